@@ -1,0 +1,68 @@
+"""Twists and wrenches: moved by a pose, multiplied, and their spans.
+
+Twist ``(w, v)`` angular first, ``v`` the velocity of the body point at the origin; wrench ``(M, F)`` moment first, about
+the origin. Power is the plain product ``w . M + v . F``: no swap matrix.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array, cross, rotate
+
+
+def move_twist(X: Array, s: Array) -> Array:
+    """Twist given in the frame of pose ``X``, expressed in the outer frame: ``(R w, R v + p x R w)``."""
+    w = rotate(X[:, :3], s[:3])
+    return np.concatenate([w, rotate(X[:, :3], s[3:]) + cross(X[:, 3], w)])
+
+
+def move_wrench(X: Array, f: Array) -> Array:
+    """Wrench given in the frame of pose ``X``, expressed in the outer frame: ``(R M + p x R F, R F)``."""
+    force = rotate(X[:, :3], f[3:])
+    return np.concatenate([rotate(X[:, :3], f[:3]) + cross(X[:, 3], force), force])
+
+
+def _direction(R: Array, v: Array) -> Array | None:
+    """``R v`` for a constant ``v`` with few nonzero parts; None where ``v`` is zero."""
+    parts = [R[:, i] if c == 1.0 else c * R[:, i] for i, c in enumerate(v) if c != 0.0]
+    return sum(parts[1:], start=parts[0]) if parts else None
+
+
+def move_constant(X: Array, free: Array, line: Array) -> tuple[Array, Array]:
+    """Directions and moments of a constant screw moved by ``X``.
+
+    A screw has a bound part ``line`` (a rotation or a force) and a free part (a translation or a couple). Returns
+    ``(R line, R free + p x R line)``, the bound and the free part in the outer frame.
+    """
+    R, p = X[:, :3], X[:, 3]
+    bound, loose = _direction(R, line), _direction(R, free)
+    if bound is None:
+        zero = np.zeros(X.shape[:1] + X.shape[2:])
+        return zero, zero if loose is None else loose
+    moment = cross(p, bound)
+    return bound, moment if loose is None else moment + loose
+
+
+def cross_twist(V: Array, S: Array) -> Array:
+    """Rate of a twist ``S`` that moves with a body of twist ``V``: ``ad(V) S = (w x s_w, w x s_v + v x s_w)``."""
+    return np.concatenate([cross(V[:3], S[:3]), cross(V[:3], S[3:]) + cross(V[3:], S[:3])])
+
+
+def shift_wrench(f: Array, point: Array) -> Array:
+    """Wrench about the origin, taken about ``point``: ``(M - point x F, F)``."""
+    return np.concatenate([f[:3] - cross(point, f[3:]), f[3:]])
+
+
+def power(V: Array, f: Array) -> Array:
+    """Power ``w . M + v . F`` of a wrench on a twist, along the first axis."""
+    return np.asarray((V * f).sum(axis=0))
+
+
+def null_space(A: Array, tolerance: float) -> Array:
+    """Orthonormal columns ``N`` with ``A N = 0``, by singular values below ``tolerance`` times the largest."""
+    if A.shape[0] == 0 or A.size == 0:
+        return np.eye(A.shape[1])
+    _, sigma, Vt = np.linalg.svd(A, full_matrices=True)
+    rank = int((sigma > tolerance * max(sigma[0], np.finfo(float).tiny)).sum())
+    return np.asarray(Vt[rank:].T)

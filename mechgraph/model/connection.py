@@ -1,0 +1,186 @@
+"""Pairs of a mechanism: the edges of the graph, and where they sit on their links."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.model.pair import TABLE, PairType
+from mechgraph.model.values import is_numeric, number_fault, plain, vector_fault
+
+PERPENDICULAR = 1e-6
+"""Largest cosine between axis and second direction that counts as perpendicular where a pair type needs it."""
+
+
+def second_direction(axis: Any) -> tuple[float, ...]:
+    """The global axis least aligned with ``axis``, made perpendicular to it: what fills ``second`` where it is left out."""
+    length = np.linalg.norm(axis)
+    if not length > 0:
+        return (1.0, 0.0, 0.0)
+    z = np.asarray(axis) / length
+    x = np.eye(3)[int(np.argmin(np.abs(z)))]
+    x = x - (z @ x) * z
+    return tuple((x / np.linalg.norm(x)).tolist())
+
+
+@dataclass(frozen=True)
+class Marker:
+    """A marker frame on a link: origin ``point``, z along ``axis``, x along ``second`` (projected perpendicular to z)."""
+
+    point: Any = (0.0, 0.0, 0.0)
+    axis: Any = (0.0, 0.0, 1.0)
+    second: Any = None
+
+    def __post_init__(self) -> None:
+        for field in ("point", "axis", "second"):
+            object.__setattr__(self, field, plain(getattr(self, field)))
+        if self.second is None and is_numeric(self.axis, (3,)):
+            object.__setattr__(self, "second", second_direction(self.axis))
+
+    def faults(self, where: str, square: bool) -> list[str]:
+        """What is wrong with this marker; ``square`` where the second direction must be perpendicular as given."""
+        found = [
+            vector_fault(self.point, where + "point"),
+            vector_fault(self.axis, where + "axis", direction=True),
+        ]
+        if self.second is not None:
+            found.append(vector_fault(self.second, where + "second", direction=True))
+        if not any(found):
+            z, x = (np.asarray(v) / np.linalg.norm(v) for v in (self.axis, self.second))
+            cosine = float(z @ x)
+            if abs(cosine) > 1 - 1e-12:
+                found.append(f"{where}second = {self.second!r}: parallel to the axis {self.axis!r}; give another direction")
+            elif square and abs(cosine) > PERPENDICULAR:
+                found.append(
+                    f"{where}second = {self.second!r}: not perpendicular to the axis {self.axis!r} (cosine {cosine:.3g}); "
+                    "this pair type needs the true direction"
+                )
+        return [fault for fault in found if fault]
+
+    def pose(self) -> Array:
+        """The marker as a pose ``(3, 4)`` in the frame of its link."""
+        z = np.asarray(self.axis) / np.linalg.norm(self.axis)
+        x = np.asarray(self.second) - (z @ np.asarray(self.second)) * z
+        x /= np.linalg.norm(x)
+        return np.column_stack([x, np.cross(z, x), z, np.asarray(self.point)])
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A kinematic pair from link ``a`` to link ``b``; its reaction is the wrench that ``a`` exerts on ``b``.
+
+    Parameters
+    ----------
+    name : its name in the graph; freedoms are named ``"name.Rz"`` after it.
+    type : a symbol of the pair table or a PairType.
+    a, b : the links. Groove, plane and slot belong to ``a``.
+    point, axis, second : marker in global coordinates at the declared configuration (all coordinates zero).
+    pitch, lead : advance per radian or per turn, right-hand positive; exactly one where the type needs it.
+    on_a, on_b : instead of point/axis, a Marker on each link in that link's own frame.
+    """
+
+    name: str
+    type: PairType
+    a: str
+    b: str
+    point: Any = None
+    axis: Any = None
+    second: Any = None
+    pitch: float | None = None
+    lead: float | None = None
+    on_a: Marker | None = None
+    on_b: Marker | None = None
+
+    def __init__(
+        self,
+        name: str,
+        type: str | PairType,
+        a: str,
+        b: str,
+        *,
+        point: Any = None,
+        axis: Any = None,
+        second: Any = None,
+        pitch: float | None = None,
+        lead: float | None = None,
+        on_a: Marker | None = None,
+        on_b: Marker | None = None,
+    ) -> None:
+        row = TABLE.get(type, type) if isinstance(type, str) else type
+        axis, second, point = plain(axis), plain(second), plain(point)
+        if axis is None and point is not None and isinstance(row, PairType) and not row.directed:
+            axis = (0.0, 0.0, 1.0)
+        if second is None and is_numeric(axis, (3,)):
+            second = second_direction(axis)
+        for key, value in {
+            "name": name, "type": row, "a": a, "b": b, "point": point, "axis": axis, "second": second,
+            "pitch": plain(pitch), "lead": plain(lead), "on_a": on_a, "on_b": on_b,
+        }.items():
+            object.__setattr__(self, key, value)
+
+    @property
+    def has_geometry(self) -> bool:
+        """Whether the pair says where it sits."""
+        return self.point is not None or self.axis is not None or self.on_a is not None or self.on_b is not None
+
+    @property
+    def pitch_per_radian(self) -> float:
+        """Advance per radian; 0 where the type takes none."""
+        if self.lead is not None:
+            return self.lead / (2 * np.pi)
+        return 0.0 if self.pitch is None else self.pitch
+
+    @property
+    def markers(self) -> tuple[Marker, Marker]:
+        """The markers on ``a`` and ``b``; for the point/axis form one marker in coinciding frames."""
+        if self.on_a is not None and self.on_b is not None:
+            return self.on_a, self.on_b
+        marker = Marker(self.point, self.axis, self.second)
+        return marker, marker
+
+    @property
+    def freedom_names(self) -> tuple[str, ...]:
+        """Full names of the freedoms, ``"B.Tz"``."""
+        return tuple(f"{self.name}.{f.name}" for f in self.type.freedoms)
+
+    def faults(self) -> list[str]:
+        """What is wrong with this pair by itself, one line each."""
+        where = f"pair {self.name!r}: "
+        if not isinstance(self.name, str) or not self.name:
+            return [f"pair {self.name!r}: the name must be a non-empty text"]
+        if not isinstance(self.type, PairType):
+            return [f"{where}unknown type {self.type!r}; known: {', '.join(TABLE)}, or pass a PairType"]
+        found: list[str | None] = []
+        if self.a == self.b:
+            found.append(f"{where}joins link {self.a!r} to itself; a pair joins two links")
+        found += list(self._pitch_faults(where))
+        if (self.on_a is None) != (self.on_b is None):
+            missing = "on_b" if self.on_b is None else "on_a"
+            found.append(f"{where}{missing} is missing; a pair by markers needs one on each link")
+        elif self.on_a is not None and self.on_b is not None:
+            if self.point is not None or self.axis is not None:
+                found.append(f"{where}has both point/axis and markers on_a/on_b; give one form")
+            for side, marker in (("on_a.", self.on_a), ("on_b.", self.on_b)):
+                found += marker.faults(where + side, self.type.square_second)
+        elif self.has_geometry:
+            if self.point is None:
+                found.append(f"{where}has an axis but no point; give point=(x, y, z)")
+            if self.axis is None:
+                found.append(f"{where}has a point but no axis; type {self.type.symbol} needs axis=(x, y, z)")
+            if self.point is not None and self.axis is not None:
+                found += Marker(self.point, self.axis, self.second).faults(where, self.type.square_second)
+        return [fault for fault in found if fault]
+
+    def _pitch_faults(self, where: str) -> Iterator[str | None]:
+        given = [(n, v) for n, v in (("pitch", self.pitch), ("lead", self.lead)) if v is not None]
+        if not self.type.takes_pitch:
+            yield from (f"{where}{n} = {v!r}: type {self.type.symbol} has no pitch; leave it out" for n, v in given)
+        elif len(given) == 2:
+            yield f"{where}has both pitch and lead; give exactly one (lead = 2 pi pitch)"
+        elif not given and self.has_geometry:
+            yield f"{where}type {self.type.symbol} needs a pitch (advance per radian) or a lead (advance per turn)"
+        yield from (number_fault(v, where + n) for n, v in given)

@@ -1,0 +1,56 @@
+"""Links: the nodes of the graph, rigid bodies with mass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from mechgraph.algebra.inertia import physical_faults
+from mechgraph.model.values import is_numeric, number_fault, plain, vector_fault
+
+
+@dataclass(frozen=True)
+class Link:
+    """A link (rigid body).
+
+    Parameters
+    ----------
+    name : its name in the graph.
+    mass : not negative.
+    center : mass centre in the link's frame (global coordinates at the declared configuration for the point/axis form);
+        needed where mass > 0.
+    inertia : 3 x 3 tensor about the mass centre, in the link's frame (off-diagonals are minus the products of inertia).
+    unphysical : accept an inertia that no body can have.
+    """
+
+    name: str
+    mass: float = 0.0
+    center: Any = None
+    inertia: Any = None
+    unphysical: bool = False
+
+    def __post_init__(self) -> None:
+        for field in ("mass", "center", "inertia"):
+            object.__setattr__(self, field, plain(getattr(self, field)))
+
+    def faults(self) -> list[str]:
+        """What is wrong with this link, one line each."""
+        where = f"link {self.name!r}: "
+        if not isinstance(self.name, str) or not self.name:
+            return [f"link {self.name!r}: the name must be a non-empty text"]
+        found = [number_fault(self.mass, where + "mass", minimum=0.0)]
+        if self.center is not None:
+            found.append(vector_fault(self.center, where + "center"))
+        elif is_numeric(self.mass, ()) and self.mass > 0:
+            found.append(f"{where}mass = {self.mass:g} without a center; give center=(x, y, z)")
+        if self.inertia is not None and not is_numeric(self.inertia, (3, 3)):
+            found.append(f"{where}inertia: expected a 3 x 3 tensor of finite numbers, got {self.inertia!r}")
+        elif self.inertia is not None:
+            if self.center is None:
+                found.append(f"{where}inertia without a center; give center=(x, y, z)")
+            if not self.unphysical:
+                found += [
+                    f"{where}inertia: {fault}; no body has it (unphysical=True accepts it)"
+                    for fault in physical_faults(self.inertia)
+                ]
+        return [fault for fault in found if fault]

@@ -1,0 +1,200 @@
+"""One batched evaluation of every row of the pair table: displacement, twists, reaction and effort wrenches.
+
+All functions take ``n`` pairs of one type at ``T`` positions: state numbers ``x`` are ``(nx, n, T)``, pitches
+``(n, 1)``. A rotation is held as a unit quaternion (four numbers), so it has no chart singularity.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mechgraph.algebra.screw import move_constant
+from mechgraph.algebra.se3 import (
+    Array,
+    compose,
+    cross,
+    identity,
+    quaternion_exp,
+    quaternion_inverse,
+    quaternion_log,
+    quaternion_matrix,
+    quaternion_product,
+    skew,
+)
+
+if TYPE_CHECKING:
+    from mechgraph.model.pair import PairType
+
+
+def _screw_motion(twist: Array, q: Array) -> Array:
+    """Displacement ``exp(q s)`` for a unit twist ``s = (w, v)`` with ``|w|`` one or zero; ``(6, n, 1)``, ``(n, T)``.
+
+    ``R = 1 + sin q w^ + (1 - cos q) w^2``, ``p = (q (1 + w^2) + (1 - cos q) w^ - sin q w^2) v``.
+    """
+    W = skew(twist[:3])
+    W2 = np.einsum("ij...,jk...->ik...", W, W)
+    v = twist[3:]
+    Wv, W2v = (np.einsum("ij...,j...->i...", M, v) for M in (W, W2))
+    out = identity(*q.shape)
+    if not twist[:3].any():
+        out[:, 3] = v * q
+        return out
+    s, c = np.sin(q), 1.0 - np.cos(q)
+    out[:, :3] += s * W + c * W2
+    out[:, 3] = q * (v + W2v) + c * Wv - s * W2v
+    return out
+
+
+def frames_of(row: PairType, pitch: Array, x: Array, base: Array | None = None) -> list[Array]:
+    """Frames 0, 1, ... of the pair as poses ``(3, 4, n, T)``, in the frame of ``base`` (marker A where it is None).
+
+    The list is indexed by the number of single freedoms before the frame; places inside a rotation hold its start.
+    The last entry is the frame of marker B.
+    """
+    frames = [identity(*x.shape[1:]) if base is None else base]
+    at = 0
+    for group in row.factors:
+        if len(group) == 1:
+            freedom = row.freedoms[group[0]]
+            twist = np.array(freedom.twist)[:, None, None] + np.array(freedom.per_pitch)[:, None, None] * pitch
+            step = _screw_motion(twist, x[at])
+            at += 1
+        else:
+            step = identity(*x.shape[1:])
+            step[:, :3] = quaternion_matrix(x[at : at + 4])
+            at += 4
+            frames += [frames[-1]] * 2
+        frames.append(compose(frames[-1], step))
+    return frames
+
+
+def twists_of(row: PairType, pitch: Array, frames: list[Array]) -> Array:
+    """Unit twists of the freedoms, ``(6, f, n, T)``, in the frame in which ``frames`` are given."""
+    out = np.empty((6, row.f, *frames[0].shape[2:]))
+    for j, freedom in enumerate(row.freedoms):
+        X = frames[row.frame_before[j]]
+        twist = np.array(freedom.twist)
+        out[:3, j], out[3:, j] = move_constant(X, twist[3:], twist[:3])
+        for i, per_pitch in enumerate(freedom.per_pitch[3:]):
+            if per_pitch:
+                out[3:, j] += per_pitch * pitch * X[:, i]
+    return out
+
+
+def _components(components: tuple, pitch: Array, frames: list[Array]) -> Array:  # type: ignore[type-arg]
+    out = np.empty((6, len(components), *frames[0].shape[2:]))
+    for j, c in enumerate(components):
+        X = frames[c.frame]
+        wrench = np.array(c.wrench)
+        if c.at_b:
+            X = np.concatenate([X[:, :3], frames[-1][:, 3:]], axis=1)
+        out[3:, j], out[:3, j] = move_constant(X, wrench[:3], wrench[3:])
+        for i, per_pitch in enumerate(c.per_pitch[:3]):
+            if per_pitch:
+                out[:3, j] += per_pitch * pitch * X[:, i]
+    return out
+
+
+def efforts_of(row: PairType, pitch: Array, frames: list[Array]) -> Array:
+    """Effort wrenches ``E``, one a freedom, ``(6, f, n, T)``."""
+    return _components(row.efforts, pitch, frames)
+
+
+def reactions_of(row: PairType, pitch: Array, frames: list[Array]) -> Array:
+    """Reaction wrenches ``W``, ``(6, 6 - f, n, T)``: the row's components, or the null space of ``S^T``.
+
+    Where the row has no constant components, the null space is taken about the origin of marker B, in its directions.
+    """
+    if row.reactions is not None:
+        return _components(row.reactions, pitch, frames)
+    S = twists_of(row, pitch, frames)
+    B = frames[-1]
+    local = np.concatenate(
+        [
+            np.einsum("ji...,jf...->if...", B[:, :3], S[:3]),
+            np.einsum("ji...,jf...->if...", B[:, :3], S[3:] + np.stack([cross(S[:3, j], B[:, 3]) for j in range(row.f)], axis=1)),
+        ]
+    )
+    U = np.linalg.svd(np.moveaxis(local, (0, 1), (-2, -1)), full_matrices=True)[0][..., row.f :]
+    out = np.empty((6, 6 - row.f, *frames[0].shape[2:]))
+    for j in range(6 - row.f):
+        f = np.moveaxis(U[..., j], -1, 0)
+        force = np.einsum("ij...,j...->i...", B[:, :3], f[3:])
+        out[3:, j] = force
+        out[:3, j] = np.einsum("ij...,j...->i...", B[:, :3], f[:3]) + cross(B[:, 3], force)
+    return out
+
+
+def coordinates_to_state(row: PairType, q: Array) -> Array:
+    """State numbers ``(nx, ...)`` from user coordinates ``(f, ...)`` (rotation vectors for rotations)."""
+    parts = [q[g[0]][None] if len(g) == 1 else quaternion_exp(q[g[0] : g[2] + 1]) for g in row.factors]
+    return np.concatenate(parts) if parts else np.empty((0, *q.shape[1:]))
+
+
+def advance(row: PairType, x: Array, dq: Array) -> Array:
+    """State after the increments ``dq`` ``(f, ...)``: added for single freedoms, ``exp(dq) Q`` for rotations."""
+    out = np.empty(np.broadcast_shapes(x.shape, (row.nx, *dq.shape[1:])))
+    at = 0
+    for g in row.factors:
+        if len(g) == 1:
+            out[at] = x[at] + dq[g[0]]
+            at += 1
+        else:
+            q = quaternion_product(quaternion_exp(dq[g[0] : g[2] + 1]), x[at : at + 4])
+            out[at : at + 4] = q / np.sqrt((q * q).sum(axis=0))
+            at += 4
+    return out
+
+
+def difference(row: PairType, x1: Array, x0: Array) -> Array:
+    """Increments ``dq`` that lead from ``x0`` to ``x1``; the inverse of ``advance`` (rotations by the short way)."""
+    out = np.empty((row.f, *np.broadcast_shapes(x1.shape[1:], x0.shape[1:])))
+    at = 0
+    for g in row.factors:
+        if len(g) == 1:
+            out[g[0]] = x1[at] - x0[at]
+            at += 1
+        else:
+            out[g[0] : g[2] + 1] = quaternion_log(quaternion_product(x1[at : at + 4], quaternion_inverse(x0[at : at + 4])))
+            at += 4
+    return out
+
+
+def state_to_coordinates(row: PairType, x: Array, start: Array | None = None) -> Array:
+    """User coordinates ``(f, ..., T)`` from states, rotation vectors continued along the last axis.
+
+    The rotation vector at the first position is the one nearest to ``start`` ``(f,)`` (zero where it is None); at every
+    further one that nearest to the one before: of ``v + 2 pi k v/|v|`` the nearest.
+    """
+    out = np.empty((row.f, *x.shape[1:]))
+    at = 0
+    for g in row.factors:
+        if len(g) == 1:
+            out[g[0]] = x[at]
+            at += 1
+        else:
+            first = np.zeros(3) if start is None else start[g[0] : g[2] + 1]
+            out[g[0] : g[2] + 1] = _continued(quaternion_log(x[at : at + 4]), first)
+            at += 4
+    return out
+
+
+def _continued(v: Array, first: Array) -> Array:
+    out = np.empty_like(v)
+    last = np.broadcast_to(first.reshape(3, *(1,) * (v.ndim - 2)), v.shape[:-1])
+    for t in range(v.shape[-1]):
+        now = v[..., t]
+        length = np.sqrt((now * now).sum(axis=0))
+        reach = np.sqrt((last * last).sum(axis=0))
+        axis = np.where(length > 1e-9, now / np.where(length > 1e-9, length, 1.0), last / np.where(reach > 0, reach, 1.0))
+        turns = np.round(((axis * last).sum(axis=0) - length) / (2 * np.pi))
+        last = now + 2 * np.pi * turns * axis
+        out[..., t] = last
+    return out
+
+
+def random_coordinates(row: PairType, rng: np.random.Generator, n: int, T: int) -> Array:
+    """Random states ``(nx, n, T)`` with coordinates of size about one."""
+    return coordinates_to_state(row, rng.uniform(-1.2, 1.2, (row.f, n, T)))

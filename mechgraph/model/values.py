@@ -1,0 +1,64 @@
+"""Values as a user types them: read leniently, kept exactly, faults told in words."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+Vector = tuple[float, ...]
+
+
+def plain(value: Any) -> Any:
+    """Numbers, sequences and arrays as floats and nested tuples; what is no number is kept as it is."""
+    if value is None or callable(value) or isinstance(value, str):
+        return value
+    try:
+        array = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        return value
+    return _nested(array.tolist())
+
+
+def _nested(value: Any) -> Any:
+    return tuple(_nested(v) for v in value) if isinstance(value, list) else value
+
+
+def is_numeric(value: Any, shape: tuple[int, ...]) -> bool:
+    """Whether ``value`` is an array of finite numbers of the given shape."""
+    try:
+        array = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        return False
+    return array.shape == shape and bool(np.isfinite(array).all())
+
+
+def vector_fault(value: Any, what: str, *, direction: bool = False, hint: str = "") -> str | None:
+    """The fault of a vector of three numbers, or None; a direction must not be zero."""
+    if not is_numeric(value, (3,)):
+        return f"{what} = {value!r}: expected three finite numbers{hint}"
+    if direction and not np.linalg.norm(np.asarray(value)) > 1e-12:
+        return f"{what} = {value!r}: has length 0; give a direction, e.g. (0, 0, 1)"
+    return None
+
+
+def number_fault(value: Any, what: str, *, minimum: float | None = None) -> str | None:
+    """The fault of one number, or None."""
+    if not is_numeric(value, ()):
+        return f"{what} = {value!r}: expected a finite number"
+    if minimum is not None and float(value) < minimum:
+        return f"{what} = {value!r}: expected a number not below {minimum:g}"
+    return None
+
+
+def same(a: Any, b: Any) -> bool:
+    """Equality that also holds for arrays."""
+    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
+        return np.shape(a) == np.shape(b) and bool(np.array_equal(np.asarray(a), np.asarray(b)))
+    return bool(a == b)
+
+
+def same_fields(a: Any, b: Any) -> bool:
+    """Field by field equality of two dataclasses of one type, arrays included."""
+    return type(a) is type(b) and all(same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a) if f.compare)

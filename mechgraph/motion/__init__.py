@@ -1,0 +1,1 @@
+"""Positions and their rates: evaluation of the graph, closure, continuation, assembly."""

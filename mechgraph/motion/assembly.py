@@ -1,0 +1,193 @@
+"""Assembly: closing the loops of a mechanism from a guess, and the scaled system in which everything is then computed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array, rotate
+from mechgraph.errors import AssemblyError, DeclarationError
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.parameters import parameters
+from mechgraph.motion.system import Configuration, Index, System
+from mechgraph.numerics.newton import closest_zero, least_norm_step
+
+CLOSED = 1e-10
+"""Closure error (angle, or length / L) up to which loops count as closed."""
+CLOSURE_GOAL = 1e-13
+"""Closure error that Newton aims at."""
+ASSEMBLY_RANK = 1e-9
+"""Relative singular value below which a direction is left alone while closing."""
+RESTARTS = 40
+"""Perturbed guesses tried where the declared one does not lead to a closed position (fixed seed)."""
+
+
+def scaled_system(m: Mechanism, q: Array, system: System | None = None) -> System:
+    """The system about the centroid of the pair points at coordinates ``q``, with lengths over their RMS distance L."""
+    raw = system or System(m)
+    here = raw.at(raw.state_of(q[:, None]))
+    par = raw.par
+    points = here.pair_points[:, :, 0]
+    centroid = points.mean(axis=1)
+    massive = [i for i, link in enumerate(m.links) if link.center is not None]
+    X = here.poses[:, :, massive]
+    centers = (rotate(X[:, :3], par.center[:, massive]) + X[:, 3])[:, :, 0]
+    distances = np.concatenate([points, centers], axis=1) - centroid[:, None]
+    L = float(np.sqrt((distances**2).sum(axis=0).mean()))
+    if L <= 1e-12 * max(1.0, float(np.abs(points).max())):
+        L = 1.0
+    return System(m, raw.graph, parameters(m, par.origin + par.L * centroid, L * par.L))
+
+
+def close(system: System, x: Array, fixed: Index, iterations: int = 60) -> tuple[Array, float]:
+    """Close the loops from state ``x (nx,)`` with the coordinates in ``fixed`` kept; smallest change of the others."""
+    free = np.setdiff1d(np.arange(system.n_freedoms), fixed)
+
+    def evaluate(x: Array) -> tuple[Array, Array]:
+        here = system.at(x[:, None])
+        return here.residual[:, 0], here.J[:, free, 0]
+
+    def advance(x: Array, step: Array) -> Array:
+        dq = np.zeros((system.n_freedoms, 1))
+        dq[free, 0] = step
+        return system.advance(x[:, None], dq)[:, 0]
+
+    x, _ = closest_zero(evaluate, advance, x, tolerance=CLOSURE_GOAL, rank_tolerance=ASSEMBLY_RANK, iterations=iterations)
+    return x, float(system.at(x[:, None]).closure[0])
+
+
+def lead(system: System, x: Array, columns: Index, goal: Array, longest: float = 0.15) -> tuple[Array, float]:
+    """Move the coordinates ``columns`` of a closed state to ``goal`` in small steps, loops closed all the way.
+
+    Coordinates not named follow with the smallest change. Returns the state reached and the part of the way done.
+    """
+    rows = np.array([_state_row(system, c) for c in columns], dtype=np.intp)
+    begin = x[rows]
+    free = np.setdiff1d(np.arange(system.n_freedoms), columns)
+    length = float(np.abs(goal - begin).max(initial=0.0))
+    done, h = 0.0, min(1.0, longest / length) if length > 0 else 1.0
+    while done < 1.0 and length > 0:
+        h = min(h, 1.0 - done)
+        here = system.at(x[:, None])
+        dq = np.zeros((system.n_freedoms, 1))
+        dq[columns, 0] = begin + (done + h) * (goal - begin) - x[rows]
+        dq[free, 0] = least_norm_step(here.J[:, free, 0], here.J[:, columns, 0] @ dq[columns, 0], ASSEMBLY_RANK)
+        ahead = system.advance(x[:, None], dq)[:, 0]
+        closed, error = close(system, ahead, columns, iterations=8)
+        change = np.abs(system.difference(closed[:, None], ahead[:, None])).max()
+        if error <= CLOSED and change < 0.2:
+            x, done = closed, done + h
+            h *= 1.5
+        else:
+            h *= 0.5
+            if h * length < 1e-6:
+                break
+    return x, done
+
+
+def _state_row(system: System, column: int) -> int:
+    """Row in the state of a single freedom's column."""
+    for g in system.groups:
+        where = np.argwhere(g.columns == column)
+        if len(where):
+            j, i = where[0]
+            before = sum(1 if len(f) == 1 else 4 for f in g.row.factors if f[0] < j)
+            return int(g.state_rows[before, i])
+    raise IndexError(column)
+
+
+def state_rows(system: System, columns: Index) -> Index:
+    """Rows in the state of single freedoms."""
+    return np.array([_state_row(system, int(c)) for c in columns], dtype=np.intp)
+
+
+def named_columns(m: Mechanism, system: System, values: Mapping[str, float]) -> tuple[Index, Array]:
+    """Columns and internal values of single freedoms given by name."""
+    faults, columns, numbers = [], [], []
+    for name, value in values.items():
+        fault = m.freedom_fault(name, single=True)
+        if fault or not np.isfinite(value):
+            faults.append(fault or f"{name} = {value!r}: expected a finite number")
+            continue
+        k, j = m.freedom(name)
+        column = int(system.first_column[k]) + j
+        columns.append(column)
+        numbers.append(float(value) / (system.par.L if system.is_length[column] else 1.0))
+    if faults:
+        raise DeclarationError(f"mechanism {m.name!r}", faults)
+    return np.array(columns, dtype=np.intp), np.array(numbers)
+
+
+def assembled(m: Mechanism, preferred: Mapping[str, float] | None = None) -> tuple[System, Array]:
+    """The scaled system and a closed state near ``start``.
+
+    Tried in this order: as it stands; drives kept at their start; drives at the ``preferred`` values; everything free;
+    then guesses around the start, further and further away.
+
+    Raises
+    ------
+    AssemblyError
+        with the smallest closure error found.
+    """
+    if not m.has_geometry:
+        bare = [p.name for p in m.pairs if not p.has_geometry]
+        raise DeclarationError(f"mechanism {m.name!r}", [f"pairs {', '.join(bare)} have no geometry; a topology can be counted, not solved"])
+    raw = System(m)
+    q = raw.start_coordinates(m.start)
+    system = scaled_system(m, q, raw)
+    x = system.state_of(q[:, None])[:, 0]
+    error = float(system.at(x[:, None]).closure[0])
+    if error <= CLOSED:
+        return _settled(system, close(system, x, np.arange(0))[0] if error > CLOSURE_GOAL * 10 else x)
+    x, error = _search(m, system, x, preferred or {})
+    if error > CLOSED:
+        best = dict(zip(m.freedom_names(), system.coordinates_of(x[:, None])[:, 0].tolist(), strict=True))
+        raise AssemblyError(
+            f"mechanism {m.name!r}: the loops cannot be closed near start; the smallest closure error found is {error:.3g} "
+            f"(largest of angle in radians and length / L, L = {system.par.L:.4g}). Check the dimensions, or give another start",
+            error, best,
+        )
+    return _settled(system, x)
+
+
+def _settled(system: System, x: Array) -> tuple[System, Array]:
+    """The system scaled about the closed position, with the state in its units."""
+    q = system.coordinates_of(x[:, None])[:, 0]
+    final = scaled_system(system.m, q, system)
+    rows = state_rows(final, np.flatnonzero(final.is_length))
+    x = x.copy()
+    x[rows] *= system.par.L / final.par.L
+    return final, x
+
+
+def _search(m: Mechanism, system: System, x: Array, preferred: Mapping[str, float]) -> tuple[Array, float]:
+    drives, _ = named_columns(m, system, {d.freedom: 0.0 for d in m.drives})
+    columns, values = named_columns(m, system, preferred)
+    at_preferred = x.copy()
+    at_preferred[state_rows(system, columns)] = values
+    attempts = [(x, drives), (at_preferred, columns), (x, np.arange(0))] if m.start else [(at_preferred, columns), (x, drives), (x, np.arange(0))]
+    rng = np.random.default_rng(20231)
+    best, best_error = x, np.inf
+    for guess, fixed in attempts:
+        closed, error = close(system, guess, fixed)
+        if error < best_error:
+            best, best_error = closed, error
+        if error <= CLOSED:
+            return closed, error
+    for i in range(RESTARTS):
+        guess, fixed = attempts[i % 2]
+        free = np.setdiff1d(np.arange(system.n_freedoms), fixed)
+        dq = np.zeros((system.n_freedoms, 1))
+        dq[free, 0] = rng.normal(0.0, 0.2 + 1.3 * i / RESTARTS, len(free))
+        closed, error = close(system, system.advance(guess[:, None], dq)[:, 0], fixed)
+        if error < best_error:
+            best, best_error = closed, error
+        if error <= CLOSED:
+            return closed, error
+    return best, best_error
+
+
+def configuration(system: System, x: Array) -> Configuration:
+    """One state evaluated as a batch of length one."""
+    return system.at(x[:, None])

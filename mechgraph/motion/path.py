@@ -1,0 +1,286 @@
+"""Positions along a path of driver values: continuation on coarse nodes, then one batched Newton for all positions.
+
+The nodes are found one after the other with a second-order predictor and step control; every position between two nodes is
+predicted from their values and rates (cubic Hermite, and the sensitivity to the drivers for what lies off the chord) and
+corrected together with all others. Source: Allgower and Georg, Introduction to Numerical Continuation Methods, 2003,
+chapters 2 and 6.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.motion.assembly import close, state_rows
+from mechgraph.motion.system import Configuration, Index, System
+from mechgraph.numerics.linear import Choice, ChosenSystem, Factor, choose
+
+CONVERGED = 1e-12
+"""Closure residual at which Newton stops."""
+LONGEST_STEP = 0.35
+"""Longest step between nodes, in driver space (radians, or lengths / L)."""
+SHORTEST_STEP = 1e-7
+"""Step at which the continuation gives up."""
+CORRECTION = 0.06
+"""Largest correction that a node may need; keeps the continuation on its branch."""
+SINGULAR = 1e7
+"""Condition number of the closure equations above which a position counts as a dead point."""
+
+
+class Status(Enum):
+    """Outcome at one position; the value is the text that a table shows."""
+
+    OK = "ok"
+    DEAD_POINT = "dead point"
+    OUT_OF_REACH = "out of reach"
+    BEYOND_DEAD_POINT = "beyond a dead point"
+    CONTRADICTION = "drivers contradict each other"
+
+
+@dataclass
+class Node:
+    """A closed position on the path: state, sensitivity ``Z (F, drivers)``, path length, driver values, choice index."""
+
+    x: Array
+    Z: Array
+    at: float
+    drive: Array
+    choice: int
+    condition: float
+
+
+@dataclass
+class Track:
+    """The nodes of one case and how it ended."""
+
+    nodes: list[Node] = field(default_factory=list)
+    end: Status = Status.OK
+
+
+@dataclass(frozen=True)
+class Positions:
+    """States ``(nx, C, N)``, statuses ``(C, N)``, and per position the index of the choice that serves it."""
+
+    x: Array
+    status: np.ndarray
+    choices: list[Choice]
+    which: Index
+    reached: Array
+
+
+class Follower:
+    """Follows driver paths on one system. ``columns`` are the driven freedoms, ``keep`` freedoms preferably held."""
+
+    def __init__(self, system: System, columns: Index, keep: Index | None = None) -> None:
+        self.system = system
+        self.columns = columns
+        self.rows = state_rows(system, columns)
+        self.keep = keep
+        self.choices: list[Choice] = []
+
+    # --- one point -----------------------------------------------------------------------------------------------------
+
+    def choose_at(self, here: Configuration) -> int:
+        """Index of a new choice of rows and columns made at a position."""
+        self.choices.append(choose(here.J[:, :, 0], self.columns, keep=self.keep))
+        return len(self.choices) - 1
+
+    def correct(self, x: Array, choice: int, iterations: int = 8) -> tuple[Configuration, Array, Array]:
+        """Newton on the chosen rows and columns for a batch of states.
+
+        Returns the last configuration, the sum of the corrections ``(F, T)`` and which positions converged.
+        """
+        total = np.zeros((self.system.n_freedoms, x.shape[1]))
+        here = self.system.at(x)
+        chosen = self.choices[choice]
+        for _ in range(iterations):
+            r = here.residual
+            open_ = np.abs(r).max(axis=0, initial=0.0) > CONVERGED
+            if not open_.any() or not len(chosen.cols):
+                break
+            part = np.flatnonzero(open_)
+            J = here.J[np.ix_(chosen.rows, chosen.cols)][:, :, part]
+            step = Factor(J).solve(-r[chosen.rows][:, None, part])[:, 0]
+            step = np.where(np.isfinite(step), step, 0.0)
+            biggest = np.abs(step).max(axis=0)
+            step *= np.minimum(1.0, 0.5 / np.where(biggest > 0, biggest, 1.0))
+            dq = np.zeros((self.system.n_freedoms, part.size))
+            dq[chosen.cols] = step
+            total[:, part] += dq
+            x = here.x.copy()
+            x[:, part] = self.system.advance(x[:, part], dq)
+            stalled = biggest.max() < 1e-14
+            here = self.system.at(x)
+            if stalled:
+                break
+        done = np.abs(here.residual).max(axis=0, initial=0.0) <= 10 * CONVERGED
+        return here, total, done
+
+    def node(self, here: Configuration, at: float, drive: Array, choice: int) -> Node:
+        """A node at a closed position."""
+        solver = ChosenSystem(here.J, [self.choices[choice]], np.zeros(1, dtype=np.intp))
+        Z = solver.solve(-here.J[:, self.columns])[:, :, 0]
+        Z[self.columns, np.arange(len(self.columns))] = 1.0
+        return Node(here.x[:, 0], Z, at, drive, choice, float(solver.condition[0]))
+
+    # --- one case ------------------------------------------------------------------------------------------------------
+
+    def track(self, x: Array, values: Array, longest: float = LONGEST_STEP) -> Track:
+        """Follow driver values ``(d, N)`` from the closed state ``x (nx,)``; path points are the start and all values."""
+        points = np.concatenate([x[self.rows][:, None], values], axis=1)
+        lengths = np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(points, axis=1) ** 2).sum(axis=0)))])
+        here = self.system.at(x[:, None])
+        track = Track([self.node(here, 0.0, points[:, 0], self.choose_at(here))])
+        if track.nodes[0].condition > SINGULAR:
+            track.end = Status.DEAD_POINT
+        h = min(0.05, longest)
+        end = lengths[-1]
+        while track.nodes[-1].at < end and track.end is Status.OK:
+            last = track.nodes[-1]
+            at = self._next(lengths, last.at, h)
+            drive = np.array([np.interp(at, lengths, row) for row in points])
+            following, correction, why = self._step(track.nodes, at, drive)
+            if following is None:
+                h = 0.5 * (at - last.at)
+                if h < SHORTEST_STEP:
+                    track.end = why
+            else:
+                track.nodes.append(following)
+                h = (at - last.at) * min(2.0, max(0.5, (0.5 * CORRECTION / max(correction, 1e-9)) ** (1 / 3)))
+                h = min(max(h, 10 * SHORTEST_STEP), longest)
+        return track
+
+    @staticmethod
+    def _next(lengths: Array, at: float, h: float) -> float:
+        """The furthest path point within ``h``, or the place at ``h`` where none is within."""
+        ahead = lengths[(lengths > at) & (lengths <= at + h)]
+        return float(ahead[-1]) if ahead.size else float(min(at + h, lengths[-1]))
+
+    def _step(self, nodes: list[Node], at: float, drive: Array) -> tuple[Node | None, float, Status]:
+        last = nodes[-1]
+        change = drive - last.drive
+        dq = last.Z @ change
+        if len(nodes) > 1 and nodes[-2].choice == last.choice:
+            before = nodes[-2]
+            ratio = np.linalg.norm(change) / max(np.linalg.norm(last.drive - before.drive), 1e-300)
+            if ratio < 4 and change @ (last.drive - before.drive) > 0:
+                dq = dq + 0.5 * ratio * (last.Z - before.Z) @ change
+        choice = last.choice
+        x = self.system.advance(last.x[:, None], dq[:, None])
+        x[self.rows, 0] = drive
+        here, total, done = self.correct(x, choice)
+        correction = float(np.abs(total).max(initial=0.0))
+        if not done[0] and correction < CORRECTION:
+            closed, error = close(self.system, x[:, 0], self.columns, iterations=12)
+            if error <= 1e-11:
+                here, done = self.system.at(closed[:, None]), np.array([True])
+                correction = float(np.abs(self.system.difference(here.x, x)).max(initial=0.0))
+        if not done[0] or correction > CORRECTION:
+            return None, correction, Status.OUT_OF_REACH
+        following = self.node(here, at, drive, choice)
+        if following.condition > 1e3:
+            other = self.node(here, at, drive, self.choose_at(here))
+            if other.condition < 0.2 * following.condition:
+                following = other
+            else:
+                self.choices.pop()
+        if following.condition > SINGULAR or not self._same_side(last, following):
+            return None, correction, Status.DEAD_POINT
+        return following, correction, Status.OK
+
+    def _same_side(self, a: Node, b: Node) -> bool:
+        """Whether no simple singular position lies between two nodes: equal signs of the determinant for one choice."""
+        J = self.system.at(np.stack([a.x, b.x], axis=1)).J
+        for choice in dict.fromkeys((a.choice, b.choice)):
+            c = self.choices[choice]
+            signs = Factor(J[np.ix_(c.rows, c.cols)]).sign() if len(c.cols) else np.ones(2)
+            if signs[0] * signs[1] > 0:
+                return True
+        middle = self.system.advance(a.x[:, None], 0.5 * self.system.difference(b.x[:, None], a.x[:, None]))
+        c = choose(self.system.at(middle).J[:, :, 0], self.columns, keep=self.keep)
+        if len(c.cols) != len(self.choices[a.choice].cols):
+            return False
+        signs = Factor(J[np.ix_(c.rows, c.cols)]).sign()
+        return bool(signs[0] * signs[1] > 0)
+
+    # --- all positions -------------------------------------------------------------------------------------------------
+
+    def follow(self, x: Array, values: Array) -> Positions:
+        """States for driver values ``(d, C, N)``: every case c from ``x (nx,)`` along its N positions."""
+        d, C, N = values.shape
+        out = np.full((self.system.n_state, C, N), np.nan)
+        status = np.full((C, N), Status.OK, dtype=object)
+        which = np.zeros((C, N), dtype=np.intp)
+        reached = np.empty((d, C))
+        for c in range(C):
+            longest = LONGEST_STEP
+            for _ in range(3):
+                track = self.track(x, values[:, c], longest)
+                states, choice_of, bad = self._between(track, values[:, c])
+                if not bad.any():
+                    break
+                longest /= 4
+            out[:, c], which[c] = states, choice_of
+            status[c] = self._statuses(track, values[:, c], states, bad)
+            reached[:, c] = track.nodes[-1].drive
+        return Positions(out, status, self.choices, which, reached)
+
+    def _statuses(self, track: Track, values: Array, states: Array, bad: Array) -> np.ndarray:
+        status = np.full(values.shape[1], Status.OK, dtype=object)
+        missing = np.isnan(states).any(axis=0)
+        beyond = Status.BEYOND_DEAD_POINT if track.end is Status.DEAD_POINT else track.end
+        status[missing] = beyond
+        if missing.any() and track.end is Status.DEAD_POINT:
+            first = int(np.flatnonzero(missing)[0])
+            if np.abs(values[:, first] - track.nodes[-1].drive).max() < 100 * SHORTEST_STEP:
+                status[first] = Status.DEAD_POINT
+        status[bad] = Status.OUT_OF_REACH
+        return status
+
+    def _between(self, track: Track, values: Array) -> tuple[Array, Index, Array]:
+        """All positions from the nodes: predicted, corrected; also which of them did not come out as predicted."""
+        nodes = track.nodes
+        start = nodes[0].drive[:, None]
+        at = np.cumsum(np.sqrt((np.diff(np.concatenate([start, values], axis=1), axis=1) ** 2).sum(axis=0)))
+        place = np.array([n.at for n in nodes])
+        states = np.full((self.system.n_state, values.shape[1]), np.nan)
+        bad = np.zeros(values.shape[1], dtype=bool)
+        inside = np.flatnonzero(at <= place[-1])
+        right = np.clip(np.searchsorted(place, at[inside]), min(1, len(nodes) - 1), len(nodes) - 1)
+        left = np.maximum(right - 1, 0)
+        choice_of = np.zeros(values.shape[1], dtype=np.intp)
+        choice_of[inside] = np.array([n.choice for n in nodes], dtype=np.intp)[right]
+        guess = self._predicted(nodes, left, right, at[inside], values[:, inside])
+        for choice in np.unique(choice_of[inside]):
+            mine = np.flatnonzero(choice_of[inside] == choice)
+            here, total, done = self.correct(guess[:, mine], int(choice))
+            states[:, inside[mine]] = here.x
+            off = np.abs(total).max(axis=0, initial=0.0)
+            bad[inside[mine]] = ~done | (off > CORRECTION)
+        return states, choice_of, bad
+
+    def _predicted(self, nodes: list[Node], left: Index, right: Index, at: Array, values: Array) -> Array:
+        X = np.stack([n.x for n in nodes], axis=1)
+        Z = np.stack([n.Z for n in nodes], axis=2)
+        drive = np.stack([n.drive for n in nodes], axis=1)
+        place = np.array([n.at for n in nodes])
+        gap = self.system.difference(X[:, 1:], X[:, :-1])
+        chord = np.diff(drive, axis=1)
+        width = place[right] - place[left]
+        u = np.where(width > 0, (at - place[left]) / np.where(width > 0, width, 1.0), 1.0)
+        if not len(chord[0]):
+            dq = np.einsum("fdt,dt->ft", Z[:, :, left], values - drive[:, left])
+        else:
+            i = np.minimum(left, len(nodes) - 2)
+            m0, m1 = (np.einsum("fdt,dt->ft", Z[:, :, k], chord[:, i]) for k in (left, right))
+            off = values - (drive[:, left] + u * chord[:, i])
+            dq = u * u * (3 - 2 * u) * gap[:, i] + u * (1 - u) ** 2 * m0 + u * u * (u - 1) * m1
+            dq += np.einsum("fdt,dt->ft", (1 - u) * Z[:, :, left] + u * Z[:, :, right], off)
+        out = self.system.advance(X[:, left], dq)
+        out[self.rows] = values
+        return out
+
+

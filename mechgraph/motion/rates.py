@@ -1,0 +1,52 @@
+"""Velocities and accelerations of closed positions: one linear solve each, for all positions together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.motion.system import Configuration, Index
+from mechgraph.numerics.linear import Choice, ChosenSystem
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Rates of all freedoms ``dq, ddq (F, T)``, link twists ``V`` and accelerations ``A (6, N, T)``.
+
+    ``contradiction (T,)`` is the largest part of the closure rates that no choice of the free rates can meet, relative to the
+    terms of the equation.
+    """
+
+    dq: Array
+    ddq: Array
+    V: Array
+    A: Array
+    contradiction: Array
+
+
+def closure_solver(here: Configuration, choices: list[Choice], which: Index) -> ChosenSystem:
+    """The closure Jacobian of a batch, ready to be solved for the free coordinates."""
+    return ChosenSystem(here.J, choices, which)
+
+
+def rates(here: Configuration, solver: ChosenSystem, columns: Index, velocity: Array, acceleration: Array) -> Rates:
+    """Rates for driver velocities and accelerations ``(d, T)``.
+
+    ``J q' = 0`` and ``J q'' = -bias``, the driven part known, held freedoms at rest.
+    """
+    dq, gap_v = _completed(here, solver, columns, velocity, np.zeros((here.J.shape[0], here.T)))
+    V = here.link_twists(dq)
+    bias = here.system.loop_sums(here.bias(dq, V))
+    ddq, gap_a = _completed(here, solver, columns, acceleration, bias)
+    return Rates(dq, ddq, V, here.link_accelerations(dq, ddq, V), np.maximum(gap_v, gap_a))
+
+
+def _completed(here: Configuration, solver: ChosenSystem, columns: Index, driven: Array, known: Array) -> tuple[Array, Array]:
+    rhs = -np.einsum("idt,dt->it", here.J[:, columns], driven) - known
+    q = solver.solve(rhs[:, None])[:, 0]
+    left = np.abs(np.einsum("ift,ft->it", here.J, q) - rhs).max(axis=0, initial=0.0)
+    q[columns] = driven
+    scale = np.abs(q).max(axis=0, initial=0.0) + np.abs(known).max(axis=0, initial=0.0)
+    return q, left / np.where(scale > 0, scale, 1.0)

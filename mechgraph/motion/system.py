@@ -1,0 +1,296 @@
+"""A mechanism made ready for evaluation: index arrays from the graph, numbers from the parameters, one batched kernel.
+
+Everything here is internal: lengths over L, positions about the internal origin (see ``model.parameters``), component axes
+first and positions last. ``S`` are the twists of all freedoms about the internal origin, one column a freedom.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechgraph.algebra.screw import cross_twist
+from mechgraph.algebra.se3 import Array, compose, inverse, pose_log
+from mechgraph.model import pair_evaluation as evaluation
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.pair import PairType
+from mechgraph.model.parameters import Parameters, parameters
+from mechgraph.topology.linkgraph import LinkGraph, link_graph
+
+Index = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Group:
+    """The pairs of one type: their indices, the columns of their freedoms ``(f, n)`` and rows of their state ``(nx, n)``."""
+
+    row: PairType
+    pairs: Index
+    columns: Index
+    state_rows: Index
+
+
+class System:
+    """A mechanism with geometry, indexed for the kernels."""
+
+    def __init__(self, m: Mechanism, graph: LinkGraph | None = None, par: Parameters | None = None) -> None:
+        self.m = m
+        self.graph = graph or link_graph(m)
+        self.par = par or parameters(m)
+        self.first_column = np.concatenate([[0], np.cumsum([p.type.f for p in m.pairs])]).astype(np.intp)
+        self.first_row = np.concatenate([[0], np.cumsum([p.type.nx for p in m.pairs])]).astype(np.intp)
+        self.n_freedoms, self.n_state = int(self.first_column[-1]), int(self.first_row[-1])
+        self.a = np.array([a for a, _ in self.graph.ends], dtype=np.intp)
+        self.b = np.array([b for _, b in self.graph.ends], dtype=np.intp)
+        self.chords = np.array(self.graph.chords, dtype=np.intp)
+        self.groups = self._group_pairs()
+        self.levels = self._tree_levels()
+        self.loop_columns = [self._columns_of_loop(loop) for loop in self.graph.loops]
+        self.is_length = np.array([not f.turns for p in m.pairs for f in p.type.freedoms], dtype=bool)
+
+    def with_parameters(self, par: Parameters) -> System:
+        """The same graph with other numbers."""
+        return System(self.m, self.graph, par)
+
+    def _group_pairs(self) -> list[Group]:
+        by_type: dict[PairType, list[int]] = {}
+        for k, pair in enumerate(self.m.pairs):
+            by_type.setdefault(pair.type, []).append(k)
+        groups = []
+        for row, pairs in by_type.items():
+            index = np.array(pairs, dtype=np.intp)
+            columns = self.first_column[index] + np.arange(row.f, dtype=np.intp)[:, None]
+            state = self.first_row[index] + np.arange(row.nx, dtype=np.intp)[:, None]
+            groups.append(Group(row, index, columns, state))
+        return groups
+
+    def _tree_levels(self) -> list[tuple[Index, NDArray[np.bool_], Index, Index]]:
+        depth = {self.graph.frame: 0}
+        levels: dict[int, list[tuple[int, bool, int, int]]] = {}
+        for k, sign, parent, child in self.graph.tree:
+            depth[child] = depth[parent] + 1
+            levels.setdefault(depth[child], []).append((k, sign > 0, parent, child))
+        out = []
+        for level in levels.values():
+            k, forward, parent, child = zip(*level, strict=True)
+            out.append((np.array(k), np.array(forward), np.array(parent), np.array(child)))
+        return out
+
+    def _columns_of_loop(self, loop: tuple[tuple[int, int], ...]) -> tuple[Index, Array]:
+        columns = [np.arange(self.first_column[k], self.first_column[k + 1]) for k, _ in loop]
+        signs = [np.full(len(c), float(sign)) for c, (_, sign) in zip(columns, loop, strict=True)]
+        return np.concatenate(columns), np.concatenate(signs)
+
+    @cached_property
+    def loops_of_chords(self) -> Array:
+        """Which chord closures make up a loop, ``(loops, chords)`` with signs."""
+        return self.graph.loop_matrix[:, self.chords]
+
+    # --- state numbers -----------------------------------------------------------------------------------------------
+
+    def state_of(self, coordinates: Array) -> Array:
+        """State ``(nx, T)`` from user coordinates ``(F, T)`` (lengths in the user's units)."""
+        q = np.where(self.is_length[:, None], coordinates / self.par.L, coordinates)
+        x = np.empty((self.n_state, q.shape[1]))
+        for g in self.groups:
+            x[g.state_rows] = evaluation.coordinates_to_state(g.row, q[g.columns])
+        return x
+
+    def coordinates_of(self, x: Array, start: Array | None = None) -> Array:
+        """User coordinates ``(F, ..., T)`` of states ``(nx, ..., T)``; rotation vectors continued along the last axis."""
+        q = np.empty((self.n_freedoms, *x.shape[1:]))
+        for pair, first, row in zip(self.m.pairs, self.first_column, self.first_row, strict=False):
+            near = None if start is None else start[first : first + pair.type.f]
+            q[first : first + pair.type.f] = evaluation.state_to_coordinates(pair.type, x[row : row + pair.type.nx], near)
+        q[self.is_length] *= self.par.L
+        return q
+
+    def start_coordinates(self, start: Mapping[str, float]) -> Array:
+        """User coordinates ``(F,)`` from a mapping freedom -> value, zero elsewhere."""
+        names = {name: i for i, name in enumerate(self.m.freedom_names())}
+        q = np.zeros(self.n_freedoms)
+        for name, value in start.items():
+            q[names[self.m.full_name(name)]] = value
+        return q
+
+    def advance(self, x: Array, dq: Array) -> Array:
+        """States after increments ``dq (F, ...)``."""
+        out = np.empty((self.n_state, *np.broadcast_shapes(x.shape[1:], dq.shape[1:])))
+        for g in self.groups:
+            out[g.state_rows] = evaluation.advance(g.row, x[g.state_rows], dq[g.columns])
+        return out
+
+    def difference(self, x1: Array, x0: Array) -> Array:
+        """Increments ``(F, ...)`` from ``x0`` to ``x1``."""
+        out = np.empty((self.n_freedoms, *np.broadcast_shapes(x1.shape[1:], x0.shape[1:])))
+        for g in self.groups:
+            out[g.columns] = evaluation.difference(g.row, x1[g.state_rows], x0[g.state_rows])
+        return out
+
+    def at(self, x: Array) -> Configuration:
+        """Evaluate states ``(nx, T)``."""
+        return Configuration(self, x)
+
+
+class Configuration:
+    """Poses, twists of freedoms and closure of a batch of states; parts are computed when first asked for."""
+
+    def __init__(self, system: System, x: Array) -> None:
+        self.system = system
+        self.x = x
+        self.T = x.shape[1]
+        par = system.par
+        P, N = len(system.m.pairs), len(system.m.links)
+        local = [evaluation.frames_of(g.row, par.pitch[g.pairs], x[g.state_rows]) for g in system.groups]
+        D = np.empty((3, 4, P, self.T))
+        for g, frames in zip(system.groups, local, strict=True):
+            D[:, :, g.pairs] = frames[-1]
+        B_inverse = inverse(par.marker_b)
+        relative = compose(compose(np.broadcast_to(par.marker_a, (3, 4, P, self.T)), D), B_inverse)
+        self.poses = np.empty((3, 4, N, self.T))
+        self.poses[:, :, system.graph.frame] = par.frame
+        for pairs, forward, parents, children in system.levels:
+            step = relative[:, :, pairs]
+            if not forward.all():
+                step[:, :, ~forward] = inverse(step[:, :, ~forward])
+            self.poses[:, :, children] = compose(self.poses[:, :, parents], step)
+        self._local = local
+
+    @cached_property
+    def frames(self) -> list[list[Array]]:
+        """For every group the pair frames 0, 1, ... about the internal origin."""
+        s = self.system
+        marker = compose(self.poses[:, :, s.a], s.par.marker_a)
+        out = []
+        for g, local in zip(s.groups, self._local, strict=True):
+            base = marker[:, :, g.pairs]
+            seen = {id(local[0]): base}
+            for X in local[1:]:
+                if id(X) not in seen:
+                    seen[id(X)] = compose(base, X)
+            out.append([seen[id(X)] for X in local])
+        return out
+
+    @cached_property
+    def S(self) -> Array:
+        """Twists of all freedoms ``(6, F, T)``."""
+        s = self.system
+        out = np.empty((6, s.n_freedoms, self.T))
+        for g, frames in zip(s.groups, self.frames, strict=True):
+            out[:, g.columns] = evaluation.twists_of(g.row, s.par.pitch[g.pairs], frames)
+        return out
+
+    @cached_property
+    def E(self) -> Array:
+        """Effort wrenches of all freedoms ``(6, F, T)``."""
+        s = self.system
+        out = np.empty((6, s.n_freedoms, self.T))
+        for g, frames in zip(s.groups, self.frames, strict=True):
+            out[:, g.columns] = evaluation.efforts_of(g.row, s.par.pitch[g.pairs], frames)
+        return out
+
+    @cached_property
+    def W(self) -> list[Array]:
+        """For every group the reaction wrenches ``(6, 6 - f, n, T)``."""
+        s = self.system
+        return [
+            evaluation.reactions_of(g.row, s.par.pitch[g.pairs], frames) for g, frames in zip(s.groups, self.frames, strict=True)
+        ]
+
+    @cached_property
+    def pair_points(self) -> Array:
+        """Origins of the markers B, ``(3, P, T)``."""
+        out = np.empty((3, len(self.system.m.pairs), self.T))
+        for g, frames in zip(self.system.groups, self.frames, strict=True):
+            out[:, g.pairs] = frames[-1][:, 3]
+        return out
+
+    @cached_property
+    def chord_errors(self) -> Array:
+        """Closure errors ``(6, chords, T)``: finite twist from marker B reached through b to that reached through a."""
+        s = self.system
+        reached = np.empty((3, 4, len(s.chords), self.T))
+        place = {int(k): i for i, k in enumerate(s.chords)}
+        for g, frames in zip(s.groups, self.frames, strict=True):
+            at = [(i, place[int(k)]) for i, k in enumerate(g.pairs) if int(k) in place]
+            if at:
+                mine, chord = zip(*at, strict=True)
+                reached[:, :, list(chord)] = frames[-1][:, :, list(mine)]
+        marker_b = compose(self.poses[:, :, s.b[s.chords]], s.par.marker_b[:, :, s.chords])
+        return pose_log(compose(reached, inverse(marker_b)))
+
+    @cached_property
+    def closure(self) -> Array:
+        """Closure error ``(T,)``: largest of angle and length / L over all loops."""
+        if not len(self.system.chords):
+            return np.zeros(self.T)
+        e = self.chord_errors
+        angle, length = (np.sqrt((part * part).sum(axis=0)).max(axis=0) for part in (e[:3], e[3:]))
+        return np.maximum(angle, length)
+
+    @cached_property
+    def residual(self) -> Array:
+        """Closure errors of the loops, stacked ``(6 loops, T)``."""
+        loops = np.einsum("lc,ict->lit", self.system.loops_of_chords, self.chord_errors)
+        return loops.reshape(-1, self.T)
+
+    @cached_property
+    def J(self) -> Array:
+        """Closure Jacobian ``(6 loops, F, T)``: ``J = (C x I6) diag(S_k)``."""
+        return self.stacked(self.S)
+
+    def stacked(self, S: Array) -> Array:
+        """Columns ``(6, F, T)`` placed with their signs into the rows of every loop."""
+        s = self.system
+        out = np.zeros((6 * len(s.loop_columns), s.n_freedoms, S.shape[2]))
+        for i, (columns, signs) in enumerate(s.loop_columns):
+            out[6 * i : 6 * i + 6, columns] = signs[:, None] * S[:, columns]
+        return out
+
+    # --- rates -----------------------------------------------------------------------------------------------------
+
+    def link_twists(self, dq: Array) -> Array:
+        """Twists of all links ``(6, N, T)`` for rates ``dq (F, T)``, along the tree."""
+        return self._accumulate(self.pair_sums(self.S * dq))
+
+    def pair_sums(self, terms: Array) -> Array:
+        """Sum of the columns of every pair: ``(6, F, T)`` -> ``(6, P, T)``."""
+        s = self.system
+        out = np.zeros((6, len(s.m.pairs), terms.shape[2]))
+        for g in s.groups:
+            for columns in g.columns:
+                out[:, g.pairs] += terms[:, columns]
+        return out
+
+    def _accumulate(self, relative: Array) -> Array:
+        s = self.system
+        out = np.zeros((6, len(s.m.links), relative.shape[2]))
+        for pairs, forward, parents, children in s.levels:
+            out[:, children] = out[:, parents] + np.where(forward[:, None], 1.0, -1.0) * relative[:, pairs]
+        return out
+
+    def bias(self, dq: Array, V: Array) -> Array:
+        """Velocity part of the relative accelerations ``(6, P, T)``: ``sum_j ad(V of the frame before j) S_j q'_j``."""
+        s = self.system
+        moving = self.S * dq
+        out = np.zeros((6, len(s.m.pairs), self.T))
+        for g in s.groups:
+            carrier = V[:, s.a[g.pairs]]
+            for factor in g.row.factors:
+                step = sum((moving[:, g.columns[j]] for j in factor[1:]), start=moving[:, g.columns[factor[0]]])
+                out[:, g.pairs] += cross_twist(carrier, step)
+                carrier = carrier + step
+        return out
+
+    def loop_sums(self, per_pair: Array) -> Array:
+        """Signed sum of pair terms along every loop, stacked ``(6 loops, T)``."""
+        sums = np.einsum("lp,ipt->lit", self.system.graph.loop_matrix, per_pair)
+        return sums.reshape(-1, per_pair.shape[2])
+
+    def link_accelerations(self, dq: Array, ddq: Array, V: Array) -> Array:
+        """Accelerations dV/dt of all links ``(6, N, T)``."""
+        return self._accumulate(self.pair_sums(self.S * ddq) + self.bias(dq, V))

@@ -1,0 +1,152 @@
+"""Batches of small linear systems: independent rows and columns chosen once, the square rest solved for all positions.
+
+Source for the strategy: Golub and Van Loan, Matrix Computations, section 5.4 (rank-revealing QR with column pivoting).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+RANK_TOLERANCE = 1e-9
+"""Singular values below this part of the largest count as zero (lengths scaled, so that a matrix has no units)."""
+
+
+def singular_values(A: Array) -> Array:
+    """Singular values of one matrix, largest first; empty matrices have none."""
+    return np.linalg.svd(A, compute_uv=False) if A.size else np.zeros(0)
+
+
+def rank_of(sigma: Array, tolerance: float = RANK_TOLERANCE) -> int:
+    """Number of singular values above ``tolerance`` times the largest."""
+    return int((sigma > tolerance * sigma[0]).sum()) if sigma.size and sigma[0] > 0 else 0
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Independent rows and columns of a matrix: ``A[rows][:, cols]`` is square and regular.
+
+    ``held`` are the columns (of those allowed) left over, ``fixed`` those that were not allowed.
+    """
+
+    rows: Index
+    cols: Index
+    held: Index
+    fixed: Index
+
+
+def choose(A: Array, fixed: Index, tolerance: float = RANK_TOLERANCE, keep: Index | None = None) -> Choice:
+    """Choose independent columns outside ``fixed`` and independent rows, by QR with column pivoting.
+
+    Columns in ``keep`` are held over if the others have the same rank.
+    """
+    free = np.setdiff1d(np.arange(A.shape[1]), fixed)
+    if keep is not None and keep.size:
+        others = np.setdiff1d(free, keep)
+        if rank_of(singular_values(A[:, others]), tolerance) == rank_of(singular_values(A[:, free]), tolerance):
+            inner = choose(A, np.union1d(fixed, keep), tolerance)
+            return Choice(inner.rows, inner.cols, np.sort(np.concatenate([inner.held, keep])), np.asarray(fixed, dtype=np.intp))
+    sub = A[:, free]
+    rank = rank_of(singular_values(sub), tolerance)
+    if rank == 0:
+        nothing = np.zeros(0, dtype=np.intp)
+        return Choice(nothing, nothing, free, np.asarray(fixed, dtype=np.intp))
+    _, pivots = scipy.linalg.qr(sub, mode="r", pivoting=True)
+    cols = np.sort(free[pivots[:rank]])
+    _, pivots = scipy.linalg.qr(A[:, cols].T, mode="r", pivoting=True)
+    return Choice(np.sort(pivots[:rank]), cols, np.setdiff1d(free, cols), np.asarray(fixed, dtype=np.intp))
+
+
+class Factor:
+    """Inverses of a batch of square matrices ``(n, n, T)``; solves with one step of refinement.
+
+    ``condition (T,)`` is the product of the infinity norms of matrix and inverse; singular matrices give infinity and NaN.
+    """
+
+    def __init__(self, A: Array) -> None:
+        self._A = np.ascontiguousarray(np.moveaxis(A, -1, 0))
+        try:
+            self._inverse = np.linalg.inv(self._A)
+        except np.linalg.LinAlgError:
+            singular = np.linalg.slogdet(self._A)[0] == 0
+            regular = np.where(singular[:, None, None], np.eye(A.shape[0]), self._A)
+            self._inverse = np.linalg.inv(regular)
+            self._inverse[singular] = np.nan
+        norms = [np.abs(M).sum(axis=2).max(axis=1, initial=0.0) for M in (self._A, self._inverse)]
+        with np.errstate(invalid="ignore", over="ignore"):
+            product = norms[0] * norms[1]
+        self.condition = np.where(np.isnan(product), np.inf, product)
+
+    def sign(self) -> Array:
+        """Sign of the determinants ``(T,)``."""
+        return np.asarray(np.linalg.slogdet(self._A)[0])
+
+    def solve(self, b: Array, transposed: bool = False) -> Array:
+        """Solution of ``A x = b`` (or ``A^T x = b``) for ``b (n, k, T)``."""
+        A, inverse = self._A, self._inverse
+        if transposed:
+            A, inverse = np.swapaxes(A, 1, 2), np.swapaxes(inverse, 1, 2)
+        rhs = np.moveaxis(b, -1, 0)
+        x = inverse @ rhs
+        x = x + inverse @ (rhs - A @ x)
+        return np.asarray(np.moveaxis(x, 0, -1))
+
+
+class ChosenSystem:
+    """A batch of matrices ``A (m, n, T)`` solved through the independent rows and columns chosen for each position.
+
+    ``which (T,)`` says which of ``choices`` serves a position.
+    """
+
+    def __init__(self, A: Array, choices: list[Choice], which: Index) -> None:
+        self.A = A
+        self.choices = choices
+        self.which = which
+        self.condition = np.ones(A.shape[2])
+        self._parts: list[tuple[Choice, Index, Factor]] = []
+        for i, choice in enumerate(choices):
+            at = np.flatnonzero(which == i)
+            if at.size:
+                square = A[np.ix_(choice.rows, choice.cols)]
+                factor = Factor(square if at.size == A.shape[2] else square[:, :, at])
+                self.condition[at] = factor.condition
+                self._parts.append((choice, at, factor))
+
+    def solve(self, b: Array) -> Array:
+        """``x (n, k, T)`` with ``A x = b`` in the chosen rows; zero in held and fixed columns."""
+        out = np.zeros((self.A.shape[1], *b.shape[1:]))
+        for choice, at, factor in self._parts:
+            out[np.ix_(choice.cols, range(b.shape[1]), at)] = factor.solve(b[choice.rows][:, :, at])
+        return out
+
+    def solve_transposed(self, b: Array) -> Array:
+        """``y (m, k, T)`` with ``A^T y = b`` in the chosen columns; zero in the rows that were not chosen."""
+        out = np.zeros((self.A.shape[0], *b.shape[1:]))
+        for choice, at, factor in self._parts:
+            out[np.ix_(choice.rows, range(b.shape[1]), at)] = factor.solve(b[choice.cols][:, :, at], transposed=True)
+        return out
+
+    def null_of_transpose(self) -> Array:
+        """Basis ``(m, m - r, T)`` of the ``y`` with ``A^T y = 0`` in the chosen columns: one vector a dropped row."""
+        m, _, T = self.A.shape
+        rank = max((len(c.rows) for c in self.choices), default=0)
+        out = np.zeros((m, m - rank, T))
+        for choice, at, factor in self._parts:
+            dropped = np.setdiff1d(np.arange(m), choice.rows)
+            part = -factor.solve(np.swapaxes(self.A[np.ix_(dropped, choice.cols)][:, :, at], 0, 1), transposed=True)
+            out[np.ix_(choice.rows, range(m - rank), at)] = part
+            out[np.ix_(dropped, range(m - rank), at)] = np.eye(m - rank)[:, :, None]
+        return out
+
+    def signs(self) -> Array:
+        """Sign of the determinant of the square part at every position."""
+        out = np.ones(self.A.shape[2])
+        for _, at, factor in self._parts:
+            out[at] = factor.sign()
+        return out

@@ -1,0 +1,1 @@
+"""The graph without geometry: incidence, loops, tree, counts."""
