@@ -1,0 +1,140 @@
+"""House rules that no linter knows."""
+
+import ast
+import re
+import shutil
+import subprocess
+import sys
+from fnmatch import fnmatch
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGE = ROOT / "mechgraph"
+
+TOP_LEVEL = {
+    ".ci", ".git", ".gitignore", "LICENSE", "README.md",
+    "examples", "library", "mechgraph", "pyproject.toml", "tests",
+}  # fmt: skip
+MAY_PRINT = {"cli.py", "__main__.py"}
+LONGEST_FILE = 600
+NOT_AT_IMPORT = ("matplotlib", "typer", "rich", "pandas", "xarray", "pint", "scipy.optimize")
+
+ABSOLUTE_PATH = re.compile(r"(?<![\w.:/~-])(?:/(?:home|tmp|root|Users|mnt|opt|work)/\w|[A-Z]:\\\\?\w)")
+SYMBOL = r"['\"](?:R|P|H|C|S|U|E|Sp|Sg|Sc|Cp|W)['\"]"
+BRANCH_ON_SYMBOL = re.compile(
+    rf"(?:symbol|kind|type|code)\s*(?:==|!=|(?:not\s+)?in)\s*[\[\(\{{]?\s*{SYMBOL}"
+    rf"|{SYMBOL}\s*(?:==|!=)\s*[\w.]*(?:symbol|kind|type|code)\b"
+    rf"|^\s*case\s+{SYMBOL}",
+    re.MULTILINE,
+)
+
+
+def repository_files() -> list[Path]:
+    """Files under version control, and new ones not ignored; without git, all but what .gitignore names."""
+    git = shutil.which("git")
+    if git and (ROOT / ".git").exists():
+        command = [git, "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+        listing = subprocess.run(command, cwd=ROOT, capture_output=True, check=False)
+        if listing.returncode == 0:
+            names = [name for name in listing.stdout.decode().split("\0") if name]
+            return sorted(ROOT / name for name in names if (ROOT / name).is_file())
+    patterns = [line.strip().rstrip("/") for line in (ROOT / ".gitignore").read_text().splitlines()]
+    patterns = [".git", *filter(None, patterns)]
+
+    def ignored(path: Path) -> bool:
+        return any(fnmatch(part, pattern) for part in path.relative_to(ROOT).parts for pattern in patterns)
+
+    return sorted(path for path in ROOT.rglob("*") if path.is_file() and not ignored(path))
+
+
+def package_files() -> list[Path]:
+    return sorted(PACKAGE.rglob("*.py"))
+
+
+def name_of(file: Path) -> str:
+    return file.relative_to(ROOT).as_posix()
+
+
+def lines_with(pattern: re.Pattern[str], text: str) -> list[int]:
+    return [text.count("\n", 0, match.start()) + 1 for match in pattern.finditer(text)]
+
+
+def test_top_level_holds_the_allowed_names_only() -> None:
+    assert {file.relative_to(ROOT).parts[0] for file in repository_files()} <= TOP_LEVEL
+
+
+def test_library_holds_no_python() -> None:
+    assert not list((ROOT / "library").rglob("*.py"))
+
+
+def test_no_absolute_paths() -> None:
+    found = []
+    for file in repository_files():
+        try:
+            text = file.read_text(encoding="utf-8")
+        except UnicodeDecodeError:
+            continue
+        found += [f"{name_of(file)}:{line}" for line in lines_with(ABSOLUTE_PATH, text)]
+    assert not found
+
+
+@pytest.mark.parametrize("folder", ["home", "tmp", "Users"])
+def test_the_check_finds_an_absolute_path(folder: str) -> None:
+    assert lines_with(ABSOLUTE_PATH, f"x = 1\nopen('/{folder}/me/file')") == [2]
+    assert not lines_with(ABSOLUTE_PATH, f"https://example.org/{folder}/me, a/{folder}/b")
+
+
+def test_nothing_prints_but_the_command_line() -> None:
+    found = []
+    for file in package_files():
+        if file.parent == PACKAGE and file.name in MAY_PRINT:
+            continue
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "print":
+                found.append(f"{name_of(file)}:{node.lineno}")
+    assert not found
+
+
+def test_nothing_branches_on_a_pair_symbol() -> None:
+    found = []
+    for file in package_files():
+        text = file.read_text(encoding="utf-8")
+        found += [f"{name_of(file)}:{line}" for line in lines_with(BRANCH_ON_SYMBOL, text)]
+    assert not found
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "if pair.symbol == 'R':",
+        'if kind != "Sp":',
+        'x = 1 if pair.type.symbol in ("R", "P") else 0',
+        "if code not in {'C'}:",
+        "if 'H' == pair.symbol:",
+        'match symbol:\n    case "W":',
+    ],
+)
+def test_the_check_finds_a_branch_on_a_symbol(code: str) -> None:
+    assert lines_with(BRANCH_ON_SYMBOL, code)
+
+
+@pytest.mark.parametrize(
+    "code", ['PAIR_TYPES["R"]', 'symbol = "R"', "if symbol in PAIR_TYPES:", 'f(kind="R")']
+)
+def test_the_check_passes_a_look_up(code: str) -> None:
+    assert not lines_with(BRANCH_ON_SYMBOL, code)
+
+
+def test_no_source_file_is_too_long() -> None:
+    files = [*package_files(), *sorted((ROOT / "examples").rglob("*.py"))]
+    lengths = {name_of(file): len(file.read_text(encoding="utf-8").splitlines()) for file in files}
+    assert not {name: length for name, length in lengths.items() if length > LONGEST_FILE}
+
+
+def test_import_loads_no_optional_package() -> None:
+    code = f"import sys, mechgraph; print(*[name for name in {NOT_AT_IMPORT!r} if name in sys.modules])"
+    run = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.split() == []

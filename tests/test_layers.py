@@ -1,0 +1,116 @@
+"""Imports go down only: the contract of pyproject.toml, checked on the syntax trees, so no linter is needed.
+
+It differs from import-linter in one point: it looks at direct imports only, which suffices where every module
+has a layer.
+"""
+
+import ast
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGE = ROOT / "mechgraph"
+
+
+def layers() -> dict[str, int]:
+    """Height of each layer, the lowest 0."""
+    tables = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    (contract,) = tables["tool"]["importlinter"]["contracts"]
+    return {name.strip("()"): height for height, name in enumerate(reversed(contract["layers"]))}
+
+
+LAYERS = layers()
+FILES = [file for file in sorted(PACKAGE.rglob("*.py")) if file != PACKAGE / "__init__.py"]
+
+
+def layer_of(module: str) -> str | None:
+    """Layer of a dotted module name; None outside the package, '' for the package itself."""
+    first, *rest = module.split(".")
+    if first != "mechgraph":
+        return None
+    return rest[0] if rest and rest[0] in LAYERS else ""
+
+
+def is_type_checking(test: ast.expr) -> bool:
+    return "TYPE_CHECKING" in {getattr(test, "id", None), getattr(test, "attr", None)}
+
+
+def import_statements(node: ast.AST) -> Iterator[ast.Import | ast.ImportFrom]:
+    """Imports anywhere below `node`, in functions too, except those for type checking only."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.Import | ast.ImportFrom):
+            yield child
+        elif isinstance(child, ast.If) and is_type_checking(child.test):
+            for other in child.orelse:
+                yield from import_statements(ast.Module([other], []))
+        else:
+            yield from import_statements(child)
+
+
+def imported_layers(source: str, package: list[str]) -> Iterator[tuple[int, str]]:
+    """(line, layer) of each import of the package, in a module that lies in the dotted `package`."""
+    for statement in import_statements(ast.parse(source)):
+        if isinstance(statement, ast.Import):
+            modules = [alias.name for alias in statement.names]
+        else:
+            above = package[: len(package) + 1 - statement.level] if statement.level else []
+            base = ".".join(above + ([statement.module] if statement.module else []))
+            modules = [f"{base}.{alias.name}" for alias in statement.names]
+        for module in modules:
+            layer = layer_of(module)
+            if layer is not None:
+                yield statement.lineno, layer
+
+
+def faults(source: str, package: list[str], own: str) -> list[str]:
+    found = []
+    for line, layer in imported_layers(source, package):
+        if layer == "" and own not in {"__main__", "cli"}:
+            found.append(f"line {line}: {own} imports the package mechgraph itself; import the layer")
+        elif layer and LAYERS[layer] > LAYERS[own]:
+            found.append(f"line {line}: {own} imports {layer}, which lies above it")
+    return found
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.relative_to(PACKAGE).as_posix())
+def test_imports_go_down_only(file: Path) -> None:
+    own = file.relative_to(PACKAGE).with_suffix("").parts[0]
+    assert own in LAYERS, f"{own} has no place among the layers in pyproject.toml"
+    package = list(file.relative_to(ROOT).parent.parts)
+    assert not faults(file.read_text(encoding="utf-8"), package, own)
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "from mechgraph.force import dalembert",
+        "from mechgraph import force",
+        "import mechgraph.force.dalembert",
+        "import mechgraph",
+        "from mechgraph import Mechanism",
+        "from ..force import dalembert",
+        "from .. import force",
+        "def f():\n    from mechgraph.force import dalembert",
+        "if TYPE_CHECKING:\n    pass\nelse:\n    import mechgraph.force",
+    ],
+)
+def test_the_check_finds_an_import_upward(source: str) -> None:
+    assert len(faults(source, ["mechgraph", "model"], "model")) == 1
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "import numpy as np\nfrom scipy import linalg",
+        "from mechgraph.errors import FileError",
+        "from mechgraph.algebra import se3",
+        "from . import pair\nfrom .pair import PAIR_TYPES\nfrom ..algebra.se3 import exp",
+        "if TYPE_CHECKING:\n    from mechgraph.force import dalembert",
+        "if typing.TYPE_CHECKING:\n    import mechgraph.force",
+    ],
+)
+def test_the_check_passes_an_import_downward(source: str) -> None:
+    assert not faults(source, ["mechgraph", "model"], "model")
