@@ -64,6 +64,12 @@ class Names(Protocol):
     def freedom_fault(self, name: Any, *, single: bool) -> str | None:
         """Why ``name`` is no freedom (with ``single``: no single freedom), or None."""
 
+    def massive_links(self) -> tuple[str, ...]:
+        """Links that have mass."""
+
+    def ends_of(self, freedom: str) -> tuple[str, str]:
+        """Links a and b of the pair of a freedom."""
+
 
 def _value_fault(value: Value, what: str, width: int) -> str | None:
     if callable(value):
@@ -135,6 +141,10 @@ class Gravity(_Load):
         fault = vector_fault(self.acceleration, "gravity: acceleration")
         return [fault] if fault else []
 
+    def links(self, names: Names) -> tuple[str, ...]:
+        """Links that this load acts on."""
+        return names.massive_links()
+
     def moved(self, pose: Array) -> Gravity:
         """The same load after a rigid motion of the whole mechanism."""
         return replace(self, acceleration=_turned(self.acceleration, pose))
@@ -180,6 +190,10 @@ class Wrench(_Load):
             found.append(vector_fault(self.point, where + "point"))
         return [fault for fault in found if fault]
 
+    def links(self, names: Names) -> tuple[str, ...]:
+        """Links that this load acts on."""
+        return (self.link,)
+
     def moved(self, pose: Array) -> Wrench:
         """The same load after a rigid motion of the whole mechanism."""
         point = None if self.point is None else plain(pose[:3, :3] @ np.asarray(self.point) + pose[:3, 3])
@@ -217,6 +231,10 @@ class Effort(_Load):
         where = f"effort in {self.freedom!r}: "
         found = [names.freedom_fault(self.freedom, single=False), _value_fault(self.value, "value", 1)]
         return [where + fault for fault in found if fault]
+
+    def links(self, names: Names) -> tuple[str, ...]:
+        """Links that this load acts on."""
+        return names.ends_of(self.freedom)
 
     def moved(self, pose: Array) -> Effort:
         """The same load after a rigid motion of the whole mechanism: unchanged."""
@@ -264,6 +282,10 @@ class Spring(_Load):
         ]
         return [fault for fault in found if fault]
 
+    def links(self, names: Names) -> tuple[str, ...]:
+        """Links that this load acts on."""
+        return (self.a, self.b)
+
     def moved(self, pose: Array) -> Spring:
         """The same load after a rigid motion of the whole mechanism."""
         p, q = (plain(pose[:3, :3] @ np.asarray(v) + pose[:3, 3]) for v in (self.p, self.q))
@@ -306,6 +328,10 @@ class TorsionSpring(_Load):
             number_fault(self.damping, "damping"),
         ]
         return [where + fault for fault in found if fault]
+
+    def links(self, names: Names) -> tuple[str, ...]:
+        """Links that this load acts on."""
+        return names.ends_of(self.freedom)
 
     def moved(self, pose: Array) -> TorsionSpring:
         """The same load after a rigid motion of the whole mechanism: unchanged."""

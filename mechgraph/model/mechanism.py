@@ -118,6 +118,15 @@ class Mechanism:
         """Names of the links, in order."""
         return tuple(link.name for link in self.links)
 
+    def massive_links(self) -> tuple[str, ...]:
+        """Names of the links that have mass."""
+        return tuple(link.name for link in self.links if link.mass > 0)
+
+    def ends_of(self, freedom: str) -> tuple[str, str]:
+        """Links a and b of the pair of a freedom."""
+        pair = self.pairs[self.freedom(freedom)[0]]
+        return pair.a, pair.b
+
     def link(self, name: str) -> Link:
         """The link of that name."""
         return self.links[self._index(name, self.link_names(), "link")]

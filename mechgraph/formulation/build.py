@@ -1,0 +1,236 @@
+"""Building a formulation from the graph and the pair table: equilibrium of every moving link, conditions of every pair."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+
+from mechgraph.errors import DeclarationError
+from mechgraph.formulation.names import Names, names_of, screw_letter, subscript
+from mechgraph.formulation.registry import AXES, Block, Equation, Formulation, Screw, Term, Unknown
+from mechgraph.model.connection import Pair
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.pair import Component
+
+
+@dataclass
+class _Draft:
+    """What is collected while a formulation is built; ``acts`` are (unknown, screw or None, part) of every pair."""
+
+    m: Mechanism
+    names: Names
+    unknowns: list[Unknown] = field(default_factory=list)
+    screws: list[Screw] = field(default_factory=list)
+    acts: list[list[tuple[int, int | None, int]]] = field(default_factory=list)
+    duals: dict[int, list[int]] = field(default_factory=dict)
+    blocks: list[Block] = field(default_factory=list)
+    efforts: dict[str, tuple[int, str]] = field(default_factory=dict)
+
+    def unknown(self, name: str, pair: Pair, group: str, couple: bool, meaning: str) -> int:
+        self.unknowns.append(Unknown(name, pair.name, group, couple, meaning))
+        return len(self.unknowns) - 1
+
+    def screw(self, kind: str, k: int, index: int, part: Component, letter: str) -> int:
+        number = f"_{k + 1}"
+        point = f"P{chr(39) * part.frame}_{k + 1}"
+        direction = letter + number
+        if part.is_couple:
+            made = Screw(kind, k, index, "", direction, f"{direction}: unit couple {part.name} of pair {self.m.pairs[k].name}")
+        else:
+            dual = f"{letter}0{number}"
+            turn = f" - rho_{k + 1} {direction}" if any(part.per_pitch) else ""
+            made = Screw(kind, k, index, direction, dual, f"{dual} = {point} x {direction}{turn}")
+        self.screws.append(made)
+        return len(self.screws) - 1
+
+    def carry(self, act: list[tuple[int, int | None, int]], unknown: int, screw: int) -> None:
+        made = self.screws[screw]
+        act += [(unknown, screw, part) for part in range(6) if (made.symbol if part >= 3 else made.dual)]
+
+
+def _along(draft: _Draft, k: int, kind: str, parts: Iterable[Component], act: list[tuple[int, int | None, int]]) -> list[str]:
+    """Unknown multiples of the screws of a pair; returns how each is printed, ``FA_1 A_1``."""
+    pair = draft.m.pairs[k]
+    printed = []
+    for i, part in enumerate(parts):
+        letter = screw_letter(part)
+        name = f"{part.name[0]}{letter}_{k + 1}"
+        where = f"{part.name} in frame {part.frame} of pair {pair.name}"
+        unknown = draft.unknown(name, pair, pair.type.symbol, part.is_couple, where)
+        screw = draft.screw(kind, k, i, part, letter)
+        draft.carry(act, unknown, screw)
+        printed.append(f"{'e ' if part.is_couple else ''}{name} {letter}_{k + 1}")
+    return printed
+
+
+def _components_of(pair: Pair) -> tuple[Component, ...]:
+    """The reaction components; those of a null space are named only."""
+    if pair.type.reactions is not None:
+        return pair.type.reactions
+    return tuple(Component(name, (1.0,) * 6) for name in pair.type.component_names)
+
+
+def _minimal(draft: _Draft, k: int) -> None:
+    act: list[tuple[int, int | None, int]] = []
+    printed = _along(draft, k, "reactions", _components_of(draft.m.pairs[k]), act)
+    draft.acts.append(act)
+    _define(draft, k, printed)
+
+
+def _lee(draft: _Draft, k: int) -> None:
+    pair = draft.m.pairs[k]
+    book = pair.type.bookkeeping
+    if book is None:
+        _minimal(draft, k)
+        return
+    symbol = draft.names.reaction[k]
+    act: list[tuple[int, int | None, int]] = []
+    dual = []
+    for letter, offset, couple in (("F", 3, False), ("M", 0, True)):
+        for i, axis in enumerate(AXES):
+            what = "moment about the origin" if couple else "force"
+            unknown = draft.unknown(f"{letter}_{symbol}{axis}", pair, pair.type.symbol, couple,
+                                    f"free dual {what} of pair {pair.name}, {axis}")
+            act.append((unknown, None, offset + i))
+            dual.append(unknown)
+    draft.duals[k] = dual
+    printed = _along(draft, k, "along", book.along, act)
+    draft.acts.append(act)
+    _define(draft, k, [f"F_{symbol}", *printed])
+
+
+BOOKKEEPINGS: dict[str, Callable[[_Draft, int], None]] = {"lee": _lee, "minimal": _minimal}
+"""How a pair's reaction is written, by the name of the bookkeeping."""
+
+
+def _define(draft: _Draft, k: int, printed: list[str]) -> None:
+    left = f"R_{draft.names.reaction[k]}"
+    if printed:
+        text = f"{left} = {' + '.join(printed)}"
+        latex = f"{_hat(left)} = {' + '.join(_hat(p) for p in printed)}"
+    else:
+        text = latex = f"{left} = 0"
+    draft.blocks.append(Block(text, latex, "reaction", draft.m.pairs[k].name))
+
+
+def _hat(symbol: str) -> str:
+    """A printed term as LaTeX with hats on dual vectors: ``FA_1 A_1`` -> ``F^{A_{1}} \\hat{A}_{1}``."""
+    words = symbol.split()
+    out = []
+    for i, word in enumerate(words):
+        head, _, tail = word.partition("_")
+        if word == "e":
+            out.append(r"\epsilon")
+        elif i == len(words) - 1:
+            out.append(rf"\hat{{{head}}}_{{{tail}}}")
+        else:
+            out.append(f"{head[0]}^{{{head[1:]}_{{{tail}}}}}" if len(head) > 1 else subscript(word))
+    return " ".join(out)
+
+
+def _driver_efforts(draft: _Draft, efforts: tuple[str, ...]) -> None:
+    """One unknown for every driven (or held) freedom; + on link b, - on link a."""
+    for name in efforts:
+        k, j = draft.m.freedom(name)
+        pair = draft.m.pairs[k]
+        part = pair.type.efforts[j]
+        label = "IN" if len(efforts) == 1 else f"IN({name})"
+        unknown = draft.unknown(f"{'M' if part.is_couple else 'F'}_{label}", pair, "driver", part.is_couple, f"effort in {pair.freedom_names[j]}")
+        letter = screw_letter(part)
+        screw = draft.screw("efforts", k, j, part, letter)
+        draft.carry(draft.acts[k], unknown, screw)
+        draft.efforts[name] = (k, f"F_{label}")
+        eps = "e " if part.is_couple else ""
+        symbol = f"{draft.unknowns[unknown].name} {letter}_{k + 1}"
+        text = f"F_{label} = {eps}{symbol}"
+        latex = rf"\hat{{F}}^{{{label}}} = {chr(92) + 'epsilon ' if eps else ''}{subscript(draft.unknowns[unknown].name)} \hat{{{letter}}}_{{{k + 1}}}"
+        draft.blocks.append(Block(text, latex, "effort", pair.name))
+
+
+def _equilibrium(draft: _Draft) -> list[Equation]:
+    """Six equations for every moving link: three of force, three of moment about the origin."""
+    m, names = draft.m, draft.names
+    touched = {link for load in m.loads for link in load.links(m)}
+    equations = []
+    for index, link in enumerate(m.links):
+        if link.name == m.frame:
+            continue
+        number = names.link_number[link.name]
+        printed: list[tuple[str, str]] = []
+        terms: list[list[Term]] = [[] for _ in range(6)]
+        for k, pair in enumerate(m.pairs):
+            if link.name not in (pair.a, pair.b):
+                continue
+            sign = 1.0 if pair.b == link.name else -1.0
+            printed.append(("+", f"R_{names.reaction[k] if sign > 0 else names.opposite[k]}"))
+            for unknown, screw, part in draft.acts[k]:
+                terms[part].append(Term(unknown, sign, screw, part))
+        known = [f"I{number}"] + ([f"A{number}"] if link.name in touched else [])
+        printed += [("+", f"F_{name}") for name in known]
+        for k, label in draft.efforts.values():
+            if link.name in (m.pairs[k].a, m.pairs[k].b):
+                printed.append(("+" if m.pairs[k].b == link.name else "-", label))
+        text = "".join(f" {sign} {symbol}" for sign, symbol in printed).removeprefix(" + ") + " = 0"
+        latex = "".join(f" {sign} {_hat(symbol)}" for sign, symbol in printed).removeprefix(" + ") + " = 0"
+        draft.blocks.append(Block(text, latex, "link", link.name))
+        for what, letter, offset in (("force", "F", 3), ("moment", "M", 0)):
+            for i, axis in enumerate(AXES):
+                equations.append(
+                    Equation(f"link {number} ({link.name}): {what} {axis}", link.name, "link", tuple(terms[offset + i]),
+                             index, offset + i, tuple(f"{letter}_{name}{axis}" for name in known))
+                )
+    return equations
+
+
+def _conditions(draft: _Draft) -> list[Equation]:
+    """Lee's constraint equations: the free dual force is reciprocal to the condition twists of its pair."""
+    equations = []
+    for k, dual in draft.duals.items():
+        pair = draft.m.pairs[k]
+        book = pair.type.bookkeeping
+        if book is None:
+            continue
+        force, moment = dual[:3], dual[3:]
+        for i, twist in enumerate(book.conditions):
+            letter = screw_letter(twist)
+            direction = f"{letter}_{k + 1}"
+            # the screw is a twist: real part (angular) multiplies the moment, dual part the force
+            screw = Screw("conditions", k, i, direction if not twist.turns else f"{letter}0_{k + 1}", direction if twist.turns else "",
+                          f"{letter}0_{k + 1} = P_{k + 1} x {direction}")
+            draft.screws.append(screw)
+            at = len(draft.screws) - 1
+            terms = [Term(force[i], 1.0, at, 3 + i) for i in range(3)]
+            if twist.turns:
+                terms += [Term(moment[i], 1.0, at, i) for i in range(3)]
+            what = "moment about" if twist.turns else "force along"
+            equations.append(Equation(f"pair {k + 1} ({pair.name}): {what} the axis", pair.name, pair.type.symbol, tuple(terms)))
+        symbol = draft.names.reaction[k]
+        axis = screw_letter(book.conditions[0])
+        draft.blocks.append(Block(f"F_{symbol} . {axis}_{k + 1} = 0", rf"\hat{{F}}_{{{symbol}}} \cdot \hat{{{axis}}}_{{{k + 1}}} = 0", "condition", pair.name))
+    return equations
+
+
+def formulate(m: Mechanism, bookkeeping: str = "lee", efforts: Iterable[str] | None = None) -> Formulation:
+    """The d'Alembert equations of a mechanism as named unknowns and equations.
+
+    For every moving link ``sum of reactions + inertia + applied + driver efforts = 0`` (six scalar equations about the global
+    origin) and, in Lee's bookkeeping, the conditions of the pairs. Needs no geometry.
+
+    Parameters
+    ----------
+    bookkeeping : ``"lee"`` (Lee 1977, equations 3.33 to 3.53) or ``"minimal"`` (reaction components of the pair table).
+    efforts : freedoms whose effort is unknown; the driven ones where left out.
+
+    Raises
+    ------
+    DeclarationError
+        for an unknown bookkeeping or freedom.
+    """
+    if bookkeeping not in BOOKKEEPINGS:
+        raise DeclarationError("formulate", [f"bookkeeping {bookkeeping!r}: expected one of {', '.join(BOOKKEEPINGS)}"])
+    draft = _Draft(m, names_of(m))
+    for k in range(len(m.pairs)):
+        BOOKKEEPINGS[bookkeeping](draft, k)
+    _driver_efforts(draft, tuple(d.freedom for d in m.drives) if efforts is None else tuple(efforts))
+    equations = _equilibrium(draft) + _conditions(draft)
+    return Formulation(m, bookkeeping, tuple(draft.unknowns), tuple(equations), tuple(draft.blocks), tuple(draft.screws))

@@ -1,0 +1,31 @@
+"""The numbers that a formulation is assembled from: screws of all pairs and wrenches of all links at a batch of positions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mechgraph.algebra.se3 import Array
+
+
+@dataclass(frozen=True)
+class State:
+    """A batch of ``T`` positions (no batch axis is ever dropped here).
+
+    Attributes
+    ----------
+    coordinates (F, T), velocities (F, T), poses (3, 4, N, T), twists (6, N, T)
+    reactions : for every pair the unit wrenches of its components ``(6, 6 - f, T)``.
+    efforts : for every pair the effort wrenches ``(6, f, T)``.
+    along, conditions : for every pair the axial wrenches and the condition twists of Lee's bookkeeping.
+    loads (6, N, T) : inertia and applied wrench of every link.
+    """
+
+    coordinates: Array
+    velocities: Array
+    poses: Array
+    twists: Array
+    reactions: tuple[Array, ...]
+    efforts: tuple[Array, ...]
+    along: tuple[Array, ...]
+    conditions: tuple[Array, ...]
+    loads: Array
