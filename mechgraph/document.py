@@ -1,0 +1,591 @@
+r"""A document as a small frozen tree, and its renderings as text, Markdown, HTML and LaTeX.
+
+The tree knows no mechanism: reports and equation listings are built from headings, paragraphs, bullets,
+tables, equations and preformatted text, and every rendering is a pure function of the tree. All renderings
+are deterministic, end with one newline and hold no trailing spaces. Blocks without content (a table without
+rows, bullets without items, an empty text) render as nothing.
+
+White space in running text (headings, paragraphs, bullets, cells, captions) counts as one space, as in HTML;
+only `Code` and the text form of an `Equation` keep theirs.
+"""
+
+from __future__ import annotations
+
+import html
+import re
+import textwrap
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import assert_never
+
+__all__ = [
+    "Block",
+    "Bullets",
+    "Code",
+    "Document",
+    "Equation",
+    "Heading",
+    "Paragraph",
+    "Table",
+    "to_html",
+    "to_latex",
+    "to_markdown",
+    "to_text",
+]
+
+WIDTH = 80
+"""Default width of a text rendering, in columns."""
+
+DEEPEST_HEADING = 5
+"""Deepest heading level; the title is level 0."""
+
+GAP = 2
+"""Blank columns between two columns of a text table."""
+
+_ALIGNMENTS = {"l": "left", "r": "right", "c": "center"}
+
+
+def _strings(values: Sequence[str], what: str) -> tuple[str, ...]:
+    """Return `values` as a tuple of strings; a bare string or any other entry is a TypeError."""
+    if isinstance(values, str):
+        raise TypeError(f"{what} must be a sequence of strings, not the single string {values!r}")
+    wrong = [value for value in values if not isinstance(value, str)]
+    if wrong:
+        raise TypeError(
+            f"{what} must be strings, got {wrong[0]!r}; format numbers before they enter a document"
+        )
+    return tuple(values)
+
+
+@dataclass(frozen=True, slots=True)
+class Heading:
+    """A heading; `level` 1 is the first below the title, `DEEPEST_HEADING` the last (else ValueError)."""
+
+    text: str
+    level: int = 1
+
+    def __post_init__(self) -> None:
+        """Check the level."""
+        if not 1 <= self.level <= DEEPEST_HEADING:
+            raise ValueError(f"heading {self.text!r}: level must be 1 to {DEEPEST_HEADING}, got {self.level}")
+
+
+@dataclass(frozen=True, slots=True)
+class Paragraph:
+    """Running text, wrapped where the rendering has a width."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Bullets:
+    """A list of strings; a sequence of strings among them is nested below the string before it.
+
+    ``Bullets(["loops", ["A B C D", "D E F"], "pairs"])`` is a list of two items, the first with two items of
+    its own. A nested sequence with no string before it raises ValueError, anything but strings in either
+    TypeError.
+    """
+
+    items: Sequence[str | Sequence[str]]
+
+    def __post_init__(self) -> None:
+        """Copy the items into tuples."""
+        if isinstance(self.items, str):
+            raise TypeError(f"items must be a sequence, not the single string {self.items!r}")
+        items = tuple(
+            item if isinstance(item, str) else _strings(item, "nested items") for item in self.items
+        )
+        if items and not isinstance(items[0], str):
+            raise ValueError(f"nested items {items[0]!r} stand below no item; put a string before them")
+        object.__setattr__(self, "items", items)
+
+    def grouped(self) -> list[tuple[str, tuple[str, ...]]]:
+        """Return every item with the items nested below it."""
+        groups: list[tuple[str, tuple[str, ...]]] = []
+        for item in self.items:
+            if isinstance(item, str):
+                groups.append((item, ()))
+            else:
+                text, nested = groups[-1]
+                groups[-1] = (text, nested + tuple(item))
+        return groups
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table of strings.
+
+    Parameters
+    ----------
+    header : sequence of str
+        Column heads; empty for a table without a head.
+    rows : sequence of sequences of str
+        Cells. Every row is as long as the head (or as the first row, where there is no head), else
+        ValueError.
+    align : str
+        One letter a column, of "l", "r" and "c" (else ValueError); empty for left throughout.
+    caption : str
+        Stands above the table.
+    """
+
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    align: str = ""
+    caption: str = ""
+
+    def __post_init__(self) -> None:
+        """Copy into tuples and check that the table is rectangular."""
+        header = _strings(self.header, "header")
+        if isinstance(self.rows, str):
+            raise TypeError(f"rows must be a sequence of rows, not the single string {self.rows!r}")
+        rows = tuple(_strings(row, "cells") for row in self.rows)
+        count = len(header or (rows[0] if rows else ()))
+        for number, row in enumerate(rows):
+            if len(row) != count:
+                raise ValueError(f"row {number} has {len(row)} cells where {count} are expected: {row!r}")
+        align = self.align or "l" * count
+        if (rows or header) and (len(align) != count or set(align) - set(_ALIGNMENTS)):
+            raise ValueError(f"align must be {count} letters of 'l', 'r', 'c', got {self.align!r}")
+        object.__setattr__(self, "header", header)
+        object.__setattr__(self, "rows", rows)
+        object.__setattr__(self, "align", align)
+
+    @property
+    def lines(self) -> list[tuple[str, ...]]:
+        """The head, if there is one, and the rows, white space normalised."""
+        lines = [self.header, *self.rows] if self.header else list(self.rows)
+        return [tuple(_plain(cell) for cell in line) for line in lines]
+
+
+@dataclass(frozen=True, slots=True)
+class Equation:
+    r"""A displayed equation: `text` (may have several lines) and `latex`, valid inside ``\[ \]``.
+
+    Text and HTML show `text`, Markdown and LaTeX show `latex`; where one form is empty the other serves.
+    """
+
+    text: str
+    latex: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Code:
+    """Preformatted text, kept line by line and never wrapped; blank lines at its ends are dropped."""
+
+    text: str
+
+
+Block = Heading | Paragraph | Bullets | Table | Equation | Code
+"""What a document is made of."""
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """A title (may be empty) and the blocks below it."""
+
+    title: str
+    blocks: Sequence[Block] = ()
+
+    def __post_init__(self) -> None:
+        """Copy the blocks into a tuple."""
+        object.__setattr__(self, "blocks", tuple(self.blocks))
+
+
+def _plain(text: str) -> str:
+    """Return running text with every run of white space as one space."""
+    return " ".join(text.split())
+
+
+def _kept(text: str) -> list[str]:
+    """Return the lines of preformatted text without trailing spaces and without blank lines at the ends."""
+    lines = [line.rstrip() for line in text.splitlines()]
+    filled = [number for number, line in enumerate(lines) if line]
+    return lines[filled[0] : filled[-1] + 1] if filled else []
+
+
+def _joined(parts: list[str], gap: str) -> str:
+    """Join the parts that hold something, strip trailing spaces and end with one newline."""
+    text = gap.join(part for part in parts if part)
+    return "\n".join(line.rstrip() for line in text.split("\n")) + "\n"
+
+
+# ---- plain text --------------------
+
+
+def to_text(document: Document, width: int = WIDTH) -> str:
+    """Return the document as plain text of at most `width` columns.
+
+    Paragraphs, bullets and equations are wrapped at spaces; a word longer than the line stands whole and
+    overhangs. Cells of a table that is too wide are wrapped, first between words, then inside them; a table
+    overhangs only when its columns would have no room at all. Preformatted text is never wrapped. Nothing is
+    ever cut. ValueError for `width` < 1.
+    """
+    if width < 1:
+        raise ValueError(f"width must be at least 1 column, got {width}")
+    parts = [_underlined(document.title, "=", width)]
+    parts += [_block_text(block, width) for block in document.blocks]
+    return _joined(parts, "\n\n")
+
+
+def _block_text(block: Block, width: int) -> str:
+    """Render one block as text; empty where the block is."""
+    match block:
+        case Heading(text, level):
+            return _underlined(text, "-~."[level - 1 : level], width)
+        case Paragraph(text):
+            return "\n".join(_wrapped(text, width))
+        case Bullets():
+            lines: list[str] = []
+            for text, nested in block.grouped():
+                lines += _wrapped(text, width, "- ")
+                for inner in nested:
+                    lines += _wrapped(inner, width, "  - ")
+            return "\n".join(lines)
+        case Table():
+            return _table_text(block, width)
+        case Equation(text, latex):
+            return "\n".join(_equation_line(line, width) for line in _kept(text) or _kept(latex))
+        case Code(text):
+            return "\n".join(_kept(text))
+        case _:
+            assert_never(block)
+
+
+def _wrapped(text: str, width: int, mark: str = "") -> list[str]:
+    """Wrap running text behind a mark, later lines indented below the first; long words stay whole."""
+    return textwrap.wrap(
+        _plain(text) or " ",
+        width,
+        initial_indent=mark,
+        subsequent_indent=" " * len(mark),
+        break_long_words=False,
+        break_on_hyphens=False,
+    ) or ([mark] if mark else [])
+
+
+def _underlined(text: str, rule: str, width: int) -> str:
+    """Return a heading over a rule of the given character (none if empty)."""
+    lines = _wrapped(text, width)
+    under = [rule * max(map(len, lines))] if lines and rule else []
+    return "\n".join(lines + under)
+
+
+def _equation_line(line: str, width: int) -> str:
+    """Indent one line of an equation by 4; break it at spaces where it is too long, inner spaces kept."""
+    indent = " " * (4 + len(line) - len(line.lstrip()))
+    return "\n".join(
+        textwrap.wrap(
+            line.strip(),
+            width,
+            initial_indent=indent,
+            subsequent_indent=indent + "    ",
+            break_long_words=False,
+            break_on_hyphens=False,
+            expand_tabs=False,
+        )
+    )
+
+
+def _fitted(natural: list[int], least: list[int], room: int) -> list[int] | None:
+    """Return column widths of sum <= room: the widest shrink to one common cap, none below `least`."""
+    for cap in range(max(natural), 0, -1):
+        widths = [min(n, max(cap, m)) for n, m in zip(natural, least, strict=True)]
+        if sum(widths) <= room:
+            return widths
+    return None
+
+
+def _column_widths(lines: list[tuple[str, ...]], width: int) -> list[int]:
+    """Return column widths that stay within `width`: cells whole, else words whole, else neither."""
+    columns = list(zip(*lines, strict=True))
+    natural = [max(1, *(len(cell) for cell in column)) for column in columns]
+    words = [max(1, *(len(word) for cell in column for word in cell.split() or [""])) for column in columns]
+    room = width - GAP * (len(columns) - 1)
+    for least in (natural, words, [1] * len(columns)):
+        widths = _fitted(natural, least, room)
+        if widths is not None:
+            return widths
+    return words
+
+
+def _cell_lines(cell: str, width: int) -> list[str]:
+    """Wrap one cell; later lines hang by 2, where words leave room, to tell them from a new row."""
+    longest = max((len(word) for word in cell.split()), default=0)
+    hang = "  " if longest + 2 <= width else ""
+    return textwrap.wrap(cell, width, subsequent_indent=hang, break_on_hyphens=False) or [""]
+
+
+def _table_text(table: Table, width: int) -> str:
+    """Render a table with its head over a rule of dashes, columns two spaces apart."""
+    if not table.rows or not table.align:
+        return ""
+    lines = table.lines
+    widths = _column_widths(lines, width)
+    justify: dict[str, Callable[[str, int], str]] = {"l": str.ljust, "r": str.rjust, "c": str.center}
+    out = _wrapped(table.caption, width)
+    for number, line in enumerate(lines):
+        cells = [_cell_lines(cell, size) for cell, size in zip(line, widths, strict=True)]
+        for depth in range(max(map(len, cells))):
+            pieces = [
+                justify[side](cell[depth] if depth < len(cell) else "", size)
+                for cell, side, size in zip(cells, table.align, widths, strict=True)
+            ]
+            out.append((" " * GAP).join(pieces).rstrip())
+        if number == 0 and table.header:
+            out.append((" " * GAP).join("-" * size for size in widths))
+    return "\n".join(out)
+
+
+# ---- Markdown --------------------
+
+_MARKDOWN_SPECIAL = re.compile(r"[\\`*\[\]<$~#]|(?<![A-Za-z0-9])_|_(?![A-Za-z0-9])|&(?=#?\w+;)")
+_MARKDOWN_START = re.compile(r"^()([-+](?= |$|-)|>)|^(\d{1,9})([.)](?= |$))")
+
+
+def to_markdown(document: Document) -> str:
+    """Return the document as Markdown (CommonMark with GitHub tables, equations between ``$$``), escaped.
+
+    An underscore between letters or digits is left as it is: it means nothing there, and names stay legible.
+    """
+    parts = [f"# {_markdown(document.title)}" if _plain(document.title) else ""]
+    parts += [_block_markdown(block) for block in document.blocks]
+    return _joined(parts, "\n\n")
+
+
+def _markdown(text: str) -> str:
+    """Escape running text for Markdown."""
+    escaped = _MARKDOWN_SPECIAL.sub(r"\\\g<0>", _plain(text))
+    return _MARKDOWN_START.sub(r"\1\3\\\2\4", escaped)
+
+
+def _fenced(lines: list[str]) -> str:
+    """Return preformatted lines inside a fence longer than any run of backticks in them."""
+    longest = max((len(run) for run in re.findall("`+", "\n".join(lines))), default=0)
+    fence = "`" * max(3, longest + 1)
+    return "\n".join([fence, *lines, fence]) if lines else ""
+
+
+def _block_markdown(block: Block) -> str:
+    """Render one block as Markdown; empty where the block is."""
+    match block:
+        case Heading(text, level):
+            return f"{'#' * (level + 1)} {_markdown(text)}" if _plain(text) else ""
+        case Paragraph(text):
+            return _markdown(text)
+        case Bullets():
+            lines: list[str] = []
+            for text, nested in block.grouped():
+                lines += [f"- {_markdown(text)}", *(f"  - {_markdown(inner)}" for inner in nested)]
+            return "\n".join(lines)
+        case Table():
+            return _table_markdown(block)
+        case Equation(text, latex):
+            lines = [line for line in _kept(latex) if line]
+            return "\n".join(["$$", *lines, "$$"]) if lines else _fenced(_kept(text))
+        case Code(text):
+            return _fenced(_kept(text))
+        case _:
+            assert_never(block)
+
+
+def _table_markdown(table: Table) -> str:
+    """Render a table as a GitHub table, which always has a head (an empty one where the table has none)."""
+    if not table.rows or not table.align:
+        return ""
+    rule = {"l": ":---", "r": "---:", "c": ":---:"}
+    lines = [[_markdown(cell).replace("|", "\\|") for cell in line] for line in table.lines]
+    if not table.header:
+        lines.insert(0, [""] * len(table.align))
+    lines.insert(1, [rule[side] for side in table.align])
+    grid = "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    caption = _markdown(table.caption)
+    return f"{caption}\n\n{grid}" if caption else grid
+
+
+# ---- HTML --------------------
+
+
+def to_html(document: Document) -> str:
+    """Return the document as an HTML fragment, escaped, legible without a style sheet and without a script.
+
+    Equations appear in their text form; their LaTeX form is in the attribute ``data-latex``.
+    """
+    parts = [_tagged("h1", document.title)]
+    parts += [_block_html(block) for block in document.blocks]
+    return _joined(parts, "\n")
+
+
+def _tagged(tag: str, text: str, attributes: str = "", *, always: bool = False) -> str:
+    """Return running text, escaped, in a tag; nothing for an empty text unless `always`."""
+    inner = html.escape(_plain(text))
+    return f"<{tag}{attributes}>{inner}</{tag}>" if inner or always else ""
+
+
+def _preformatted(lines: list[str], attributes: str = "") -> str:
+    """Return preformatted lines, escaped, in a pre tag."""
+    return f"<pre{attributes}>{html.escape(chr(10).join(lines))}</pre>" if lines else ""
+
+
+def _block_html(block: Block) -> str:
+    """Render one block as HTML; empty where the block is."""
+    match block:
+        case Heading(text, level):
+            return _tagged(f"h{level + 1}", text)
+        case Paragraph(text):
+            return _tagged("p", text)
+        case Bullets():
+            return _bullets_html(block)
+        case Table():
+            return _table_html(block)
+        case Equation(text, latex):
+            source = html.escape(_plain(latex))
+            return _preformatted(_kept(text) or _kept(latex), f' data-latex="{source}"' if source else "")
+        case Code(text):
+            return _preformatted(_kept(text))
+        case _:
+            assert_never(block)
+
+
+def _bullets_html(block: Bullets) -> str:
+    """Render bullets as nested lists."""
+    lines: list[str] = []
+    for text, nested in block.grouped():
+        inner = "".join(_tagged("li", item, always=True) for item in nested)
+        lines.append(f"<li>{html.escape(_plain(text))}{f'<ul>{inner}</ul>' if inner else ''}</li>")
+    return "\n".join(["<ul>", *lines, "</ul>"]) if lines else ""
+
+
+def _table_html(table: Table) -> str:
+    """Render a table with a caption, head and body, aligned cell by cell."""
+    if not table.rows or not table.align:
+        return ""
+    styles = [f' style="text-align: {_ALIGNMENTS[side]}"' for side in table.align]
+
+    def row(tag: str, line: Sequence[str]) -> str:
+        cells = (_tagged(tag, cell, style, always=True) for cell, style in zip(line, styles, strict=True))
+        return f"<tr>{''.join(cells)}</tr>"
+
+    head = ["<thead>", row("th", table.header), "</thead>"] if table.header else []
+    caption = [_tagged("caption", table.caption)] if _plain(table.caption) else []
+    body = ["<tbody>", *(row("td", line) for line in table.rows), "</tbody>"]
+    return "\n".join(['<table border="1">', *caption, *head, *body, "</table>"])
+
+
+# ---- LaTeX --------------------
+
+_LATEX_SPECIAL = {
+    "\\": r"\textbackslash{}",
+    "{": r"\{",
+    "}": r"\}",
+    "$": r"\$",
+    "&": r"\&",
+    "#": r"\#",
+    "%": r"\%",
+    "_": r"\_",
+    "^": r"\textasciicircum{}",
+    "~": r"\textasciitilde{}",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+    "|": r"\textbar{}",
+    "`": r"\textasciigrave{}",
+    "[": "{[}",
+    "]": "{]}",
+}
+_LATEX_TABLE = str.maketrans(_LATEX_SPECIAL)
+_LATEX_SECTIONS = ("section", "subsection", "subsubsection", "paragraph", "subparagraph", "subparagraph")
+
+
+def to_latex(document: Document) -> str:
+    r"""Return the document as a LaTeX fragment: sections, itemize, tabular, displayed equations, escaped.
+
+    The title is a ``\section``, headings go down from there. Columns that are wrapped in the text rendering
+    at 80 columns become paragraph columns of the same share of the line. No package beyond amsmath (for what
+    equations use) is needed.
+    """
+    parts = [_section(document.title, 0)]
+    parts += [_block_latex(block) for block in document.blocks]
+    return _joined(parts, "\n\n")
+
+
+def _latex(text: str) -> str:
+    """Escape running text for LaTeX; double hyphens stay two hyphens."""
+    return re.sub("-(?=-)", "-{}", _plain(text).translate(_LATEX_TABLE))
+
+
+def _section(text: str, level: int) -> str:
+    """Return the sectioning command of a level; nothing for an empty text."""
+    return rf"\{_LATEX_SECTIONS[level]}{{{_latex(text)}}}" if _plain(text) else ""
+
+
+def _verbatim(lines: list[str]) -> str:
+    r"""Return lines verbatim; lines that themselves end a verbatim are set one by one in ``\texttt``."""
+    if any(r"\end{verbatim}" in line for line in lines):
+        typed = [re.sub("-(?=-)", "-{}", line.translate(_LATEX_TABLE)).replace(" ", "~") for line in lines]
+        return "\\\\\n".join(rf"\noindent\mbox{{\texttt{{{line}}}}}" for line in typed)
+    return "\n".join([r"\begin{verbatim}", *lines, r"\end{verbatim}"]) if lines else ""
+
+
+def _block_latex(block: Block) -> str:
+    """Render one block as LaTeX; empty where the block is."""
+    match block:
+        case Heading(text, level):
+            return _section(text, level)
+        case Paragraph(text):
+            return _latex(text)
+        case Bullets():
+            return _bullets_latex(block)
+        case Table():
+            return _table_latex(block)
+        case Equation(text, latex):
+            lines = [line for line in _kept(latex) if line]
+            return "\n".join([r"\[", *lines, r"\]"]) if lines else _verbatim(_kept(text))
+        case Code(text):
+            return _verbatim(_kept(text))
+        case _:
+            assert_never(block)
+
+
+def _itemize(lines: list[str]) -> list[str]:
+    """Return lines inside an itemize, or none where there are none."""
+    return [r"\begin{itemize}", *lines, r"\end{itemize}"] if lines else []
+
+
+def _bullets_latex(block: Bullets) -> str:
+    """Render bullets as nested itemize."""
+    lines: list[str] = []
+    for text, nested in block.grouped():
+        lines += [rf"\item {_latex(text)}", *_itemize([rf"\item {_latex(inner)}" for inner in nested])]
+    return "\n".join(_itemize(lines))
+
+
+def _table_latex(table: Table) -> str:
+    """Render a table as a tabular, in a float where it has a caption."""
+    if not table.rows or not table.align:
+        return ""
+    lines = table.lines
+    natural = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    fitted = _column_widths(lines, WIDTH)
+    columns = "".join(
+        side if size >= full else rf"p{{{size / WIDTH:.2f}\linewidth}}"
+        for side, size, full in zip(table.align, fitted, natural, strict=True)
+    )
+
+    def row(line: Sequence[str]) -> str:
+        cells = " & ".join(_latex(cell) for cell in line)
+        return rf"{'{}' if cells.startswith('*') else ''}{cells} \\"
+
+    rows = [row(line) for line in lines]
+    if table.header:
+        rows.insert(1, r"\hline")
+    grid = [rf"\begin{{tabular}}{{{columns}}}", *rows, r"\end{tabular}"]
+    if _plain(table.caption):
+        return "\n".join(
+            [
+                r"\begin{table}[htbp]",
+                r"\centering",
+                rf"\caption{{{_latex(table.caption)}}}",
+                *grid,
+                r"\end{table}",
+            ]
+        )
+    return "\n".join([r"\begin{center}", *grid, r"\end{center}"])

@@ -1,0 +1,343 @@
+"""The renderings of a document: wording, width, escaping, and nothing lost."""
+
+import html
+import re
+from html.parser import HTMLParser
+
+import pytest
+
+from mechgraph.document import (
+    Bullets,
+    Code,
+    Document,
+    Equation,
+    Heading,
+    Paragraph,
+    Table,
+    to_html,
+    to_latex,
+    to_markdown,
+    to_text,
+)
+
+RENDERERS = [to_text, to_markdown, to_html, to_latex]
+
+EVERYTHING = Document(
+    "RCSR",
+    [
+        Heading("Count"),
+        Paragraph("One loop,  four\npairs."),
+        Bullets(["loops", ["O A B C", "none"], "pairs"]),
+        Heading("By kind", 2),
+        Table(["pair", "type", "f"], [["A", "R", "1"], ["B", "C", "12"]], align="llr", caption="Freedoms"),
+        Equation("F + M = 0", r"F + M = 0"),
+        Code("a  b\n  c"),
+    ],
+)
+
+
+def body(*blocks):
+    return Document("", blocks)
+
+
+# ---- all renderings
+
+
+@pytest.mark.parametrize("render", RENDERERS)
+def test_one_newline_at_the_end_and_no_trailing_spaces(render):
+    text = render(EVERYTHING)
+    assert text.endswith("\n")
+    assert not text.endswith("\n\n")
+    assert all(line == line.rstrip() for line in text.split("\n"))
+    assert text == render(EVERYTHING)
+
+
+@pytest.mark.parametrize("render", RENDERERS)
+@pytest.mark.parametrize(
+    "empty",
+    [
+        Table(["a", "b"], []),
+        Table([], []),
+        Bullets([]),
+        Paragraph(" \n"),
+        Heading(""),
+        Code("\n\n"),
+        Equation(""),
+    ],
+)
+def test_blocks_without_content_render_as_nothing(render, empty):
+    assert render(body(empty)) == "\n"
+    assert render(body(Paragraph("a"), empty, Paragraph("b"))) == render(body(Paragraph("a"), Paragraph("b")))
+
+
+def test_blocks_are_frozen_values():
+    rows = [["1"]]
+    table = Table(["a"], rows)
+    rows[0][0] = "2"
+    assert table == Table(("a",), (("1",),), "l")
+    assert hash(EVERYTHING) == hash(Document(EVERYTHING.title, list(EVERYTHING.blocks)))
+    with pytest.raises(AttributeError):
+        table.caption = "x"
+
+
+@pytest.mark.parametrize(
+    ("build", "error", "says"),
+    [
+        (lambda: Table(["a", "b"], [["1", "2"], ["1"]]), ValueError, "row 1 has 1 cells where 2"),
+        (lambda: Table([], [["1", "2"], ["1"]]), ValueError, "row 1 has 1 cells"),
+        (lambda: Table(["a"], [["1"]], align="lr"), ValueError, "align must be 1 letters"),
+        (lambda: Table(["a"], [["1"]], align="x"), ValueError, "align"),
+        (lambda: Table(["a"], [[1]]), TypeError, "strings, got 1"),
+        (lambda: Table(["a"], ["1"]), TypeError, "single string '1'"),
+        (lambda: Table("a", [["1"]]), TypeError, "single string 'a'"),
+        (lambda: Bullets("abc"), TypeError, "single string"),
+        (lambda: Bullets([["nested"]]), ValueError, "stand below no item"),
+        (lambda: Heading("a", 0), ValueError, "level"),
+        (lambda: to_text(body(), 0), ValueError, "width"),
+    ],
+)
+def test_malformed_blocks_are_refused(build, error, says):
+    with pytest.raises(error, match=says):
+        build()
+
+
+# ---- text
+
+
+def test_text_of_everything():
+    assert to_text(EVERYTHING) == (
+        "RCSR\n====\n\n"
+        "Count\n-----\n\n"
+        "One loop, four pairs.\n\n"
+        "- loops\n  - O A B C\n  - none\n- pairs\n\n"
+        "By kind\n~~~~~~~\n\n"
+        "Freedoms\npair  type   f\n----  ----  --\nA     R      1\nB     C     12\n\n"
+        "    F + M = 0\n\n"
+        "a  b\n  c\n"
+    )
+
+
+def test_text_wraps_paragraphs_and_bullets():
+    words = "the reaction of pair A is not unique along its axis and tied to that of pair D " * 4
+    for width in (20, 40, 80):
+        text = to_text(body(Paragraph(words), Bullets([words, [words]])), width)
+        assert max(map(len, text.splitlines())) <= width
+        assert re.sub(r"[\s-]+", " ", text).split() == words.split() * 3
+    lines = to_text(body(Bullets(["item", [words]])), 40).splitlines()
+    assert lines[1].startswith("  - the")
+    assert lines[2].startswith("    ")
+    assert not lines[2].startswith("     ")
+
+
+def test_long_words_are_kept_whole_in_text():
+    word = "x" * 100
+    assert to_text(body(Paragraph(f"a {word} b"))) == f"a\n{word}\nb\n"
+    assert word in to_text(body(Bullets([word])))
+    assert "rcsr-csr" in to_text(body(Paragraph("a rcsr-csr")), 8)
+
+
+def test_headings_by_level():
+    assert to_text(body(Heading("One", 1))) == "One\n---\n"
+    assert to_text(body(Heading("Three", 3))) == "Three\n.....\n"
+    assert to_text(body(Heading("Four", 4))) == "Four\n"
+
+
+def test_table_alignment_and_missing_header():
+    table = Table(["left", "right", "mid"], [["a", "b", "c"]], align="lrc")
+    assert to_text(body(table)) == "left  right  mid\n----  -----  ---\na         b   c\n"
+    assert to_text(body(Table([], [["a", "bb"], ["ccc", "d"]]))) == "a    bb\nccc  d\n"
+
+
+def test_wide_tables_wrap_cells_and_lose_nothing():
+    long = "turns about the line through the centres of the two spheres, moves no other link " * 2
+    table = Table(["freedom", "what it does", "unique"], [["B.Rx", long, "yes"], ["C.Rx", "spins", "no"]])
+    for width in (40, 80):
+        lines = to_text(body(table), width).splitlines()
+        assert max(map(len, lines)) <= width
+        assert sorted(" ".join(lines[2:]).split()) == sorted(f"B.Rx {long} yes C.Rx spins no".split())
+    assert lines[0].startswith("freedom  what it does")
+    assert lines[3].startswith(" " * 11)  # a continuation hangs by two
+
+
+def test_words_in_cells_are_broken_only_when_they_must_be():
+    words = [f"{letter * 30}" for letter in "abc"]
+    text = to_text(body(Table(["1", "2", "3"], [words])))
+    assert max(map(len, text.splitlines())) <= 80
+    for letter in "abc":
+        assert text.count(letter) == 30
+    assert to_text(body(Table(["1", "2"], [words[:2]]))).splitlines()[2] == f"{words[0]}  {words[1]}"
+
+
+def test_tables_with_more_columns_than_room_overhang():
+    cells = ["abc"] * 40
+    text = to_text(body(Table([], [cells])))
+    assert text.split() == cells
+
+
+def test_equations_keep_their_lines_and_break_at_spaces():
+    assert to_text(body(Equation("a = b\n  + c"))) == "    a = b\n      + c\n"
+    terms = " + ".join(f"{k}.5  F{k}x" for k in range(20))
+    text = to_text(body(Equation(terms)))
+    assert max(map(len, text.splitlines())) <= 80
+    assert text.split() == terms.split()
+    assert to_text(body(Equation("", "x^2"))) == "    x^2\n"
+
+
+def test_code_is_never_wrapped():
+    line = "w  " * 50
+    assert to_text(body(Code(f"\n{line}\n\n  b\n"))) == f"{line.rstrip()}\n\n  b\n"
+
+
+# ---- Markdown
+
+
+def test_markdown_of_everything():
+    assert to_markdown(EVERYTHING) == (
+        "# RCSR\n\n"
+        "## Count\n\n"
+        "One loop, four pairs.\n\n"
+        "- loops\n  - O A B C\n  - none\n- pairs\n\n"
+        "### By kind\n\n"
+        "Freedoms\n\n| pair | type | f |\n| :--- | :--- | ---: |\n| A | R | 1 |\n| B | C | 12 |\n\n"
+        "$$\nF + M = 0\n$$\n\n"
+        "```\na  b\n  c\n```\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("plain", "escaped"),
+    [
+        ("2 * a * b", r"2 \* a \* b"),
+        ("link_1 and _x_", r"link_1 and \_x\_"),
+        ("R at D -> S, a < b", r"R at D -> S, a \< b"),
+        ("[a](b) `c` $d$", r"\[a\](b) \`c\` \$d\$"),
+        ("back\\slash", r"back\\slash"),
+        ("&lt; & co", r"\&lt; & co"),
+        ("- no list", r"\- no list"),
+        ("+ no list", r"\+ no list"),
+        ("--- no rule", r"\--- no rule"),
+        ("-3.5 is a number", "-3.5 is a number"),
+        ("1. no list", r"1\. no list"),
+        ("12) no list", r"12\) no list"),
+        ("1.5 is a number", "1.5 is a number"),
+        ("3-4 pairs", "3-4 pairs"),
+        ("3- 4 pairs", "3- 4 pairs"),
+        ("> no quote", r"\> no quote"),
+        ("# no head", r"\# no head"),
+        ("a | b", "a | b"),
+    ],
+)
+def test_markdown_escapes(plain, escaped):
+    assert to_markdown(body(Paragraph(plain))) == escaped + "\n"
+
+
+def test_markdown_tables_escape_bars_and_have_a_head():
+    text = to_markdown(body(Table([], [["|F|", "b"]], align="rc")))
+    assert text == "|  |  |\n| ---: | :---: |\n| \\|F\\| | b |\n"
+
+
+def test_markdown_fences_are_longer_than_the_fences_inside():
+    assert to_markdown(body(Code("```\na\n```"))) == "````\n```\na\n```\n````\n"
+    assert to_markdown(body(Equation("a = b"))) == "```\na = b\n```\n"
+
+
+# ---- HTML
+
+
+class Reader(HTMLParser):
+    """Collects tags and text; complains where tags do not nest."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.seen, self.words = [], [], []
+        self.feed(text)
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        self.open.append(tag)
+        self.seen.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.words.append(data)
+
+
+def test_html_nests_and_holds_everything():
+    reader = Reader(to_html(EVERYTHING))
+    assert reader.seen[:6] == ["h1", "h2", "p", "ul", "li", "ul"]
+    assert {"h3", "table", "caption", "thead", "tbody", "th", "td", "pre"} <= set(reader.seen)
+    words = "".join(reader.words)
+    assert all(word in words for word in ("RCSR", "O A B C", "Freedoms", "12", "F + M = 0", "a  b\n  c"))
+    assert '<td style="text-align: right">12</td>' in to_html(EVERYTHING)
+
+
+def test_html_escapes_everywhere():
+    bad = '<b onclick="x">&amp;\'</b>'
+    document = Document(
+        bad,
+        [
+            Heading(bad),
+            Paragraph(bad),
+            Bullets([bad, [bad]]),
+            Table([bad], [[bad]], caption=bad),
+            Equation(bad, bad),
+            Code(bad),
+        ],
+    )
+    text = to_html(document)
+    assert "<b" not in text
+    assert text.count(html.escape(bad)) == 11
+    assert "".join(Reader(text).words).count(bad) == 10  # the eleventh is the attribute
+
+
+def test_html_nested_bullets_and_empty_cells():
+    assert to_html(body(Bullets(["a", ["b"], "c"]))) == (
+        "<ul>\n<li>a<ul><li>b</li></ul></li>\n<li>c</li>\n</ul>\n"
+    )
+    assert '<td style="text-align: left"></td>' in to_html(body(Table([], [["", "b"]])))
+
+
+# ---- LaTeX
+
+
+def test_latex_of_everything():
+    assert to_latex(EVERYTHING) == (
+        "\\section{RCSR}\n\n"
+        "\\subsection{Count}\n\n"
+        "One loop, four pairs.\n\n"
+        "\\begin{itemize}\n\\item loops\n\\begin{itemize}\n\\item O A B C\n\\item none\n\\end{itemize}\n"
+        "\\item pairs\n\\end{itemize}\n\n"
+        "\\subsubsection{By kind}\n\n"
+        "\\begin{table}[htbp]\n\\centering\n\\caption{Freedoms}\n\\begin{tabular}{llr}\n"
+        "pair & type & f \\\\\n\\hline\nA & R & 1 \\\\\nB & C & 12 \\\\\n\\end{tabular}\n\\end{table}\n\n"
+        "\\[\nF + M = 0\n\\]\n\n"
+        "\\begin{verbatim}\na  b\n  c\n\\end{verbatim}\n"
+    )
+
+
+def test_latex_escapes_every_special_character():
+    text = to_latex(body(Paragraph(r"\ { } $ & # % _ ^ ~ < > | ` --drive")))
+    assert text == (
+        r"\textbackslash{} \{ \} \$ \& \# \% \_ \textasciicircum{} \textasciitilde{} \textless{} "
+        r"\textgreater{} \textbar{} \textasciigrave{} -{}-drive" + "\n"
+    )
+
+
+def test_latex_rows_and_items_that_start_like_options():
+    table = to_latex(body(Table([], [["[0]", "a & b"], ["*", "c"]])))
+    assert "{[}0{]} & a \\& b \\\\" in table
+    assert "\n{}* & c \\\\" in table
+    assert "\\item {[}a{]}" in to_latex(body(Bullets(["[a]"])))
+
+
+def test_latex_wide_columns_become_paragraphs():
+    text = to_latex(body(Table(["a", "b"], [["short", "word " * 40]])))
+    assert r"\begin{tabular}{lp{0.91\linewidth}}" in text
+
+
+def test_latex_equations_have_no_blank_lines_and_verbatim_cannot_be_left():
+    assert to_latex(body(Equation("", "a\n\n b"))) == "\\[\na\n b\n\\]\n"
+    assert to_latex(body(Equation("a = b"))) == "\\begin{verbatim}\na = b\n\\end{verbatim}\n"
+    assert r"\end{verbatim}" not in to_latex(body(Code("x\n\\end{verbatim}")))

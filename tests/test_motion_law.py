@@ -1,0 +1,388 @@
+"""Motions and their laws: end values, derivatives, accuracy, what is refused."""
+
+import copy
+import math
+import pickle
+
+import numpy as np
+import pytest
+
+from mechgraph.errors import DeclarationError
+from mechgraph.model.motion_law import LAWS, Motion
+
+RISES = ["cycloidal", "harmonic", "poly345", "poly4567"]
+H, T, START = 1.7, 0.4, -0.3
+
+
+def rise(name, t):
+    return Motion.law(name, H, T, t, start=START)
+
+
+def faults(*args, **kwargs):
+    with pytest.raises(DeclarationError) as caught:
+        Motion.law(*args, **kwargs)
+    return "\n".join(caught.value.faults)
+
+
+# ---- Motion
+
+
+def test_rates_left_out_are_zero():
+    motion = Motion([1.0, 2.0])
+    np.testing.assert_array_equal(motion.velocity, [0.0, 0.0])
+    np.testing.assert_array_equal(motion.acceleration, [0.0, 0.0])
+    assert motion.t is None
+
+
+def test_arrays_broadcast_and_are_float64():
+    motion = Motion(np.zeros((3, 1), dtype=int), velocity=[1, 2], acceleration=5, t=[0.0, 1.0])
+    assert motion.shape == (3, 2)
+    for array in (motion.position, motion.velocity, motion.acceleration, motion.t):
+        assert array.shape == (3, 2)
+        assert array.dtype == np.float64
+    np.testing.assert_array_equal(motion.velocity[2], [1.0, 2.0])
+
+
+def test_one_position_has_no_leading_axis():
+    assert Motion(1.0).shape == ()
+    assert Motion(1.0, velocity=[2.0]).shape == (1,)
+
+
+def test_arrays_are_copies_and_read_only():
+    theirs = np.zeros(3)
+    motion = Motion(theirs, velocity=theirs, t=theirs)
+    theirs[:] = 7.0
+    np.testing.assert_array_equal(motion.position, 0.0)
+    for array in (motion.position, motion.velocity, motion.acceleration, motion.t):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1.0
+    with pytest.raises(AttributeError):
+        motion.position = theirs
+
+
+def test_equality_is_exact():
+    motion = Motion([1.0, 2.0], 3.0)
+    assert motion == Motion([1.0, 2.0], [3.0, 3.0], 0.0)
+    assert motion != Motion([1.0, 2.0 + 1e-15], 3.0)
+    assert motion != Motion([1.0, 2.0], 3.0, t=[0.0, 1.0])
+    assert motion != Motion([[1.0, 2.0]], 3.0)
+    assert motion != "motion"
+    assert hash(Motion(0.0)) == hash(Motion(-0.0))
+
+
+def test_copies_are_equal_and_read_only():
+    motion = Motion([1.0, 2.0], 3.0, t=[0.0, 1.0])
+    for again in (copy.deepcopy(motion), pickle.loads(pickle.dumps(motion))):
+        assert again == motion
+        assert not again.position.flags.writeable
+
+
+def test_repr_is_short():
+    assert repr(Motion(0.5, 10)) == "Motion(position=0.5, velocity=10, acceleration=0)"
+    assert repr(Motion(np.arange(360.0), 10)) == (
+        "Motion(shape=(360,), position=0..359, velocity=10, acceleration=0)"
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ({"position": np.nan}, "position must be finite, got nan"),
+        ({"position": [0.0, np.inf]}, "position must be finite, got inf at index (1,)"),
+        ({"position": "fast"}, "position must be a real number"),
+        ({"position": None}, "position must be a real number"),
+        ({"position": 1j}, "position must be a real number"),
+        ({"position": [[1.0], [1.0, 2.0]]}, "rows differ in length"),
+        ({"position": np.zeros(3), "velocity": np.zeros(2)}, "position (3,), velocity (2,)"),
+    ],
+)
+def test_what_is_no_motion_is_refused(arguments, says):
+    with pytest.raises(DeclarationError) as caught:
+        Motion(**arguments)
+    assert says in "\n".join(caught.value.faults)
+
+
+def test_all_faults_are_told_at_once():
+    with pytest.raises(DeclarationError) as caught:
+        Motion(np.nan, "fast", t=np.inf)
+    assert len(caught.value.faults) == 3
+
+
+# ---- dwell, rise, dwell
+
+
+@pytest.mark.parametrize("name", RISES)
+def test_rise_starts_and_ends_where_it_should(name):
+    motion = rise(name, [-1.0, 0.0, T / 2, T, 2.0])
+    expected = [START, START, START + H / 2, START + H, START + H]
+    np.testing.assert_allclose(motion.position, expected, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(motion.velocity[[0, 1, 3, 4]], 0.0, atol=2e-15)
+    np.testing.assert_array_equal(motion.acceleration[[0, 4]], 0.0)
+    np.testing.assert_array_equal(motion.t, [-1.0, 0.0, T / 2, T, 2.0])
+
+
+@pytest.mark.parametrize("name", RISES)
+def test_rates_are_the_derivatives_with_second_order(name):
+    t = np.linspace(0.1, 0.9, 23) * T
+    motion = rise(name, t)
+    errors = []
+    for h in (T * 1e-2, T * 5e-3):
+        ahead, behind = rise(name, t + h), rise(name, t - h)
+        velocity = (ahead.position - behind.position) / (2 * h)
+        acceleration = (ahead.velocity - behind.velocity) / (2 * h)
+        errors.append(
+            [np.abs(velocity - motion.velocity).max(), np.abs(acceleration - motion.acceleration).max()]
+        )
+    np.testing.assert_allclose(np.log2(np.divide(*errors)), 2.0, atol=0.05)
+    assert errors[1][0] < 1e-3 * np.abs(motion.velocity).max()
+
+
+@pytest.mark.parametrize(
+    ("name", "velocity", "acceleration"),
+    [
+        ("cycloidal", 2.0, 2 * np.pi),
+        ("harmonic", np.pi / 2, np.pi**2 / 2),
+        ("poly345", 15 / 8, 10 / np.sqrt(3)),
+        ("poly4567", 35 / 16, 84 / (5 * np.sqrt(5))),
+    ],
+)
+def test_largest_rates_are_the_published_ones(name, velocity, acceleration):
+    motion = rise(name, np.linspace(0, T, 20001))
+    assert np.abs(motion.velocity).max() * T / H == pytest.approx(velocity, rel=1e-7)
+    assert np.abs(motion.acceleration).max() * T**2 / H == pytest.approx(acceleration, rel=1e-7)
+
+
+@pytest.mark.parametrize("end", [0.0, T])
+@pytest.mark.parametrize("name", RISES)
+def test_acceleration_is_continuous_except_for_harmonic(name, end):
+    before, after = rise(name, np.array([end - 1e-12, end + 1e-12])).acceleration
+    jump = abs(after - before) * T**2 / H
+    assert jump == pytest.approx(np.pi**2 / 2 if name == "harmonic" else 0.0, abs=1e-9)
+
+
+def test_a_negative_rise_is_a_return():
+    there, back = rise("cycloidal", 0.1), Motion.law("cycloidal", -H, T, 0.1, start=START + H)
+    np.testing.assert_allclose(there.position + back.position, 2 * START + H)
+    np.testing.assert_allclose(there.acceleration, -back.acceleration)
+
+
+def test_laws_take_cases_on_leading_axes():
+    t = np.linspace(0.0, 1.0, 7)
+    many = Motion.law("poly345", np.array([[1.0], [2.0]]), np.array([[0.5], [1.0]]), t)
+    assert many.shape == (2, 7)
+    np.testing.assert_array_equal(many.velocity[1], Motion.law("poly345", 2.0, 1.0, t).velocity)
+
+
+@pytest.mark.parametrize("name", [*RISES, "constant_speed"])
+def test_scalar_time_has_no_leading_axis(name):
+    motion = Motion.law(name, 1.0, 2.0, 0.5)
+    assert motion.shape == ()
+    assert motion.t.shape == ()
+
+
+def test_constant_speed_knows_no_end():
+    t = np.array([-1.0, 0.0, 5.0])
+    motion = Motion.law("constant_speed", 3.0, 2.0, t, start=1.0)
+    np.testing.assert_allclose(motion.position, 1.0 + 1.5 * t)
+    np.testing.assert_array_equal(motion.velocity, 1.5)
+    np.testing.assert_array_equal(motion.acceleration, 0.0)
+    assert motion == Motion.law("constant_speed", speed=1.5, start=1.0, t=t)
+
+
+# ---- samples
+
+
+@pytest.mark.parametrize("degree", [3, 5])
+def test_splines_converge_with_their_order(degree):
+    t = np.linspace(0.0, 3.0, 301)
+    errors = []
+    for n in (41, 81):
+        times = np.linspace(0.0, 3.0, n)
+        motion = Motion.law("sampled", t=t, samples=(times, np.sin(times)), degree=degree)
+        exact = (np.sin(t), np.cos(t), -np.sin(t))
+        got = (motion.position, motion.velocity, motion.acceleration)
+        errors.append([np.abs(a - b).max() for a, b in zip(got, exact, strict=True)])
+    orders = np.log2(np.divide(*errors))
+    assert (orders > degree + 1 - np.arange(3) - 0.35).all()
+
+
+def test_spline_passes_through_its_samples_and_takes_quintics_exactly():
+    times = np.array([0.0, 0.3, 0.5, 1.1, 1.4, 2.0, 2.2])
+    quintic = np.polynomial.Polynomial([1.0, -2.0, 0.5, 3.0, -1.0, 0.2])
+    motion = Motion.law("sampled", t=times, samples=(times, quintic(times)))
+    np.testing.assert_allclose(motion.position, quintic(times), atol=1e-12)
+    np.testing.assert_allclose(motion.velocity, quintic.deriv(1)(times), atol=1e-11)
+    np.testing.assert_allclose(motion.acceleration, quintic.deriv(2)(times), atol=1e-10)
+
+
+def test_few_samples_make_a_cubic():
+    times = np.arange(4.0)
+    motion = Motion.law("sampled", t=1.5, samples=(times, times**3))
+    assert motion.shape == ()
+    assert motion.acceleration == pytest.approx(9.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (
+            {"t": 3.5, "samples": (range(4), range(4))},
+            "t = 3.5 is outside the samples, which run from 0 to 3",
+        ),
+        ({"t": -0.1, "samples": (range(4), range(4))}, "t = -0.1 is outside"),
+        ({"t": 1.0, "samples": (range(3), range(3))}, "at least 4"),
+        ({"t": 1.0, "samples": (range(5), range(4))}, "same length"),
+        ({"t": 1.0, "samples": ([0, 1, 1, 2], range(4))}, "1 is followed by 1"),
+        ({"t": 1.0, "samples": ([0, 1, 2, np.nan], range(4))}, "must be finite"),
+        ({"t": 1.0, "samples": 3.0}, "pair (times, values)"),
+        ({"t": 1.0, "samples": (range(5), range(5)), "degree": 5}, "got 5 with 5 samples"),
+        ({"t": 1.0, "samples": (range(5), range(5)), "degree": 4}, "degree must be 3"),
+        ({"t": 1.0, "samples": (range(5), range(5)), "start": 1.0}, "start is not an argument"),
+        ({"t": 1.0}, "it needs samples"),
+    ],
+)
+def test_sample_faults(arguments, says):
+    assert says in faults("sampled", **arguments)
+
+
+def test_rounding_at_the_ends_of_the_samples_is_no_fault():
+    times = np.linspace(0.0, 0.3, 7)
+    assert Motion.law("sampled", t=0.1 * 3, samples=(times, times)).position == pytest.approx(0.3)
+
+
+# ---- callables
+
+
+def relative(got, exact):
+    return np.abs(got - exact).max() / np.abs(exact).max()
+
+
+@pytest.mark.parametrize("end", [0.1, 1.0, 2 * np.pi, 300.0])
+@pytest.mark.parametrize("offset", [0.0, 5.0])
+def test_sine_is_differentiated_to_1e_8(end, offset):
+    t = np.linspace(0.0, end, 1001)
+    motion = Motion.law(lambda t: offset + np.sin(t), t=t)
+    np.testing.assert_array_equal(motion.position, offset + np.sin(t))
+    assert relative(motion.velocity, np.cos(t)) < 1e-10
+    # 5 + sin t on [0, 0.1]: eps |f| (2 / l)^2 alone is 4e-12 of the acceleration, and n^4 comes upon it
+    assert relative(motion.acceleration, -np.sin(t)) < (1e-7 if offset and end < 1.0 else 1e-8)
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e6])
+def test_accuracy_does_not_depend_on_the_unit_of_time(scale):
+    t = np.linspace(0.0, 10.0, 101) * scale
+    motion = Motion.law(lambda t: np.sin(t / scale), t=t)
+    assert relative(motion.velocity * scale, np.cos(t / scale)) < 1e-11
+    assert relative(motion.acceleration * scale**2, -np.sin(t / scale)) < 1e-10
+
+
+def test_local_features_are_resolved():
+    t = np.linspace(-1.0, 1.0, 801)
+    motion = Motion.law(lambda t: np.arctan(100 * t), t=t)
+    assert relative(motion.acceleration, -2e6 * t / (1 + 1e4 * t**2) ** 2) < 1e-9
+
+
+def test_jumps_between_panels_are_refused_too():
+    """A kink in the middle of the range is where the panels part, each of which is smooth by itself."""
+    t = np.linspace(0.0, 2.0, 21)
+    assert "near t = 1 " in faults(lambda t: np.abs(t - 1.0), t=t)
+    assert "near t = 1 " in faults(lambda t: Motion.law("harmonic", 1.0, 1.0, t).position, t=t)
+    smooth = Motion.law(lambda t: Motion.law("poly345", 1.0, 1.0, t).position, t=t)
+    exact = Motion.law("poly345", 1.0, 1.0, t)
+    np.testing.assert_allclose(smooth.acceleration, exact.acceleration, atol=1e-9)
+
+
+def test_callable_is_never_called_outside_the_times():
+    seen = []
+
+    def position(t):
+        seen.append((np.min(t), np.max(t)))
+        return np.exp(t)
+
+    Motion.law(position, t=[2.0, 2.5, 4.0])
+    assert min(low for low, _ in seen) >= 2.0
+    assert max(high for _, high in seen) <= 4.0
+
+
+def test_scalar_time_and_scalar_functions():
+    motion = Motion.law(math.sin, t=0.7)
+    assert motion.shape == ()
+    assert motion.acceleration == pytest.approx(-math.sin(0.7), rel=1e-8)
+    cycle = Motion.law(lambda t: math.sin(t), t=[[0.0, 1.0], [2.0, 3.0]])
+    np.testing.assert_allclose(cycle.velocity, np.cos([[0.0, 1.0], [2.0, 3.0]]), rtol=1e-10)
+
+
+def test_one_single_time_finds_a_range_that_serves():
+    assert Motion.law(np.sin, t=1e5).acceleration == pytest.approx(-np.sin(1e5), abs=1e-5)
+    root = Motion.law(np.sqrt, t=0.01)  # exists to the right of 0 only
+    assert root.velocity == pytest.approx(5.0, rel=1e-9)
+    assert root.acceleration == pytest.approx(-250.0, rel=1e-7)
+    assert "not smooth enough near t = 0.5" in faults(lambda t: np.abs(t - 0.5), t=0.5)
+
+
+def test_no_times_make_no_positions():
+    assert Motion.law(np.sin, t=[]).shape == (0,)
+
+
+def test_lines_and_constants_have_no_acceleration():
+    t = np.linspace(0.0, 7.0, 50)
+    line = Motion.law(lambda t: 3.0 + 2.0 * t, t=t)
+    np.testing.assert_allclose(line.velocity, 2.0, rtol=1e-13)
+    np.testing.assert_array_equal(line.acceleration, 0.0)
+    np.testing.assert_array_equal(Motion.law(lambda t: 3.0, t=t).velocity, 0.0)
+
+
+def test_rates_that_the_callable_returns_are_taken_as_they_are():
+    t = np.linspace(0.0, 1.0, 5)
+    motion = Motion.law(lambda t: (t**2, 2 * t, 2.0), t=t)
+    assert motion == Motion(t**2, 2 * t, 2.0, t=t)
+    scalar = Motion.law(lambda t: (math.sin(t), math.cos(t), -math.sin(t)), t=t)
+    np.testing.assert_allclose(scalar.acceleration, -np.sin(t))
+
+
+@pytest.mark.parametrize("function", [lambda t: np.abs(t - 0.3), lambda t: np.abs(t - 0.3) ** 3, np.ceil])
+def test_kinks_are_refused_not_smeared(function):
+    said = faults(function, t=np.linspace(0.0, 1.0, 11))
+    assert "not smooth enough near t = " in said
+    assert "return (position, velocity, acceleration)" in said
+
+
+@pytest.mark.parametrize(
+    ("function", "says"),
+    [
+        (lambda t: (t, t), "tuple of 2"),
+        (lambda t: t[:1], "shape (1,)"),
+        (lambda t: np.log(t - 10.0 + 0 * t) if np.ndim(t) == 0 else np.full(np.shape(t), np.nan), "finite"),
+        (lambda t: "far", "real number"),
+        (lambda t: [math.sin(t), 0.0], "one number a time"),
+    ],
+)
+def test_callables_that_return_something_else(function, says):
+    assert says in faults(function, t=np.linspace(0.0, 1.0, 5))
+
+
+# ---- arguments
+
+
+def test_unknown_law_lists_the_known():
+    said = faults("cycloid", 1.0, 1.0, 0.0)
+    assert "'cycloid'" in said
+    assert all(name in said for name in LAWS)
+
+
+@pytest.mark.parametrize(
+    ("args", "kwargs", "says"),
+    [
+        (("cycloidal", 1.0), {"t": 0.0}, "it needs rise and duration"),
+        (("cycloidal", 1.0, 1.0), {}, "t is missing"),
+        (("cycloidal", 1.0, 0.0, 0.0), {}, "duration must be positive"),
+        (("cycloidal", 1.0, 1.0, np.nan), {}, "t must be finite"),
+        (("cycloidal", 1.0, 1.0, 0.0), {"speed": 1.0}, "speed is not an argument"),
+        (("cycloidal", [1.0, 2.0], 1.0, np.zeros(3)), {}, "t (3,), rise (2,), duration ()"),
+        (("constant_speed",), {"t": 0.0}, "it needs rise and duration, or speed"),
+        (("constant_speed", 1.0, 1.0, 0.0), {"speed": 1.0}, "not both"),
+        ((np.sin, 1.0), {"t": 0.0}, "rise is not an argument"),
+    ],
+)
+def test_argument_faults(args, kwargs, says):
+    assert says in faults(*args, **kwargs)
