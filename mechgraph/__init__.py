@@ -1,0 +1,25 @@
+"""mechgraph: spatial mechanisms as graphs of links and pairs; determinacy, equations, motion, drivers and reactions."""
+
+from mechgraph.algebra import inertia
+from mechgraph.errors import (
+    AssemblyError,
+    DeadPointError,
+    DeclarationError,
+    FileError,
+    IndeterminateError,
+    MechgraphError,
+    MissingExtraError,
+    ReachError,
+)
+from mechgraph.formulation.build import formulate
+from mechgraph.formulation.registry import Formulation
+from mechgraph.model.chain import chain
+from mechgraph.model.connection import Marker, Pair
+from mechgraph.model.drive import Drive
+from mechgraph.model.library import library_names as library
+from mechgraph.model.link import Link
+from mechgraph.model.load import Effort, Gravity, Spring, TorsionSpring, Wrench
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.motion_law import Motion
+from mechgraph.model.pair import Bookkeeping, Component, Freedom, PairType, pair_types
+from mechgraph.model.toml import load, save
