@@ -11,6 +11,7 @@ from mechgraph.errors import (
     MissingExtraError,
     ReachError,
 )
+from mechgraph.force.kinetostatics import assemble, kinematics, solve
 from mechgraph.formulation.build import formulate
 from mechgraph.formulation.registry import Formulation
 from mechgraph.model.chain import chain
@@ -23,3 +24,5 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion_law import Motion
 from mechgraph.model.pair import Bookkeeping, Component, Freedom, PairType, pair_types
 from mechgraph.model.toml import load, save
+from mechgraph.result.solution import Solution
+from mechgraph.structure.report import DeterminacyReport, check

@@ -26,8 +26,8 @@ class _Draft:
     blocks: list[Block] = field(default_factory=list)
     efforts: dict[str, tuple[int, str]] = field(default_factory=dict)
 
-    def unknown(self, name: str, pair: Pair, group: str, couple: bool, meaning: str) -> int:
-        self.unknowns.append(Unknown(name, pair.name, group, couple, meaning))
+    def unknown(self, name: str, pair: Pair, group: str, couple: bool, meaning: str, freedom: str = "") -> int:
+        self.unknowns.append(Unknown(name, pair.name, group, couple, meaning, freedom))
         return len(self.unknowns) - 1
 
     def screw(self, kind: str, k: int, index: int, part: Component, letter: str) -> int:
@@ -135,7 +135,7 @@ def _driver_efforts(draft: _Draft, efforts: tuple[str, ...]) -> None:
         pair = draft.m.pairs[k]
         part = pair.type.efforts[j]
         label = "IN" if len(efforts) == 1 else f"IN({name})"
-        unknown = draft.unknown(f"{'M' if part.is_couple else 'F'}_{label}", pair, "driver", part.is_couple, f"effort in {pair.freedom_names[j]}")
+        unknown = draft.unknown(f"{'M' if part.is_couple else 'F'}_{label}", pair, "driver", part.is_couple, f"effort in {pair.freedom_names[j]}", pair.freedom_names[j])
         letter = screw_letter(part)
         screw = draft.screw("efforts", k, j, part, letter)
         draft.carry(draft.acts[k], unknown, screw)

@@ -39,7 +39,8 @@ class Screw:
 class Unknown:
     """An unknown number: a component of a reaction or an effort.
 
-    ``owner`` is the pair, ``group`` what the ledger books it under, ``couple`` whether it is a moment rather than a force.
+    ``owner`` is the pair, ``group`` what the ledger books it under, ``couple`` whether it is a moment rather than a force;
+    ``freedom`` the freedom of an effort.
     """
 
     name: str
@@ -47,6 +48,7 @@ class Unknown:
     group: str
     couple: bool
     meaning: str
+    freedom: str = ""
 
 
 @dataclass(frozen=True)

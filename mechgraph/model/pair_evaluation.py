@@ -25,7 +25,7 @@ from mechgraph.algebra.se3 import (
 )
 
 if TYPE_CHECKING:
-    from mechgraph.model.pair import PairType
+    from mechgraph.model.pair import Component, Freedom, PairType
 
 
 def _screw_motion(twist: Array, q: Array) -> Array:
@@ -72,9 +72,14 @@ def frames_of(row: PairType, pitch: Array, x: Array, base: Array | None = None) 
 
 def twists_of(row: PairType, pitch: Array, frames: list[Array]) -> Array:
     """Unit twists of the freedoms, ``(6, f, n, T)``, in the frame in which ``frames`` are given."""
-    out = np.empty((6, row.f, *frames[0].shape[2:]))
-    for j, freedom in enumerate(row.freedoms):
-        X = frames[row.frame_before[j]]
+    return freedoms_of(row.freedoms, row.frame_before, pitch, frames)
+
+
+def freedoms_of(freedoms: tuple[Freedom, ...], before: tuple[int, ...], pitch: Array, frames: list[Array]) -> Array:
+    """Unit twists of freedoms, each constant in the frame of its index in ``before``, ``(6, n freedoms, n, T)``."""
+    out = np.empty((6, len(freedoms), *frames[0].shape[2:]))
+    for j, freedom in enumerate(freedoms):
+        X = frames[before[j]]
         twist = np.array(freedom.twist)
         out[:3, j], out[3:, j] = move_constant(X, twist[3:], twist[:3])
         for i, per_pitch in enumerate(freedom.per_pitch[3:]):
@@ -83,7 +88,8 @@ def twists_of(row: PairType, pitch: Array, frames: list[Array]) -> Array:
     return out
 
 
-def _components(components: tuple, pitch: Array, frames: list[Array]) -> Array:  # type: ignore[type-arg]
+def components_of(components: tuple[Component, ...], pitch: Array, frames: list[Array]) -> Array:
+    """Wrenches of components, each constant in its frame, ``(6, n components, n, T)``."""
     out = np.empty((6, len(components), *frames[0].shape[2:]))
     for j, c in enumerate(components):
         X = frames[c.frame]
@@ -99,7 +105,7 @@ def _components(components: tuple, pitch: Array, frames: list[Array]) -> Array: 
 
 def efforts_of(row: PairType, pitch: Array, frames: list[Array]) -> Array:
     """Effort wrenches ``E``, one a freedom, ``(6, f, n, T)``."""
-    return _components(row.efforts, pitch, frames)
+    return components_of(row.efforts, pitch, frames)
 
 
 def reactions_of(row: PairType, pitch: Array, frames: list[Array]) -> Array:
@@ -108,7 +114,7 @@ def reactions_of(row: PairType, pitch: Array, frames: list[Array]) -> Array:
     Where the row has no constant components, the null space is taken about the origin of marker B, in its directions.
     """
     if row.reactions is not None:
-        return _components(row.reactions, pitch, frames)
+        return components_of(row.reactions, pitch, frames)
     S = twists_of(row, pitch, frames)
     B = frames[-1]
     local = np.concatenate(

@@ -191,3 +191,41 @@ def _search(m: Mechanism, system: System, x: Array, preferred: Mapping[str, floa
 def configuration(system: System, x: Array) -> Configuration:
     """One state evaluated as a batch of length one."""
     return system.at(x[:, None])
+
+
+def assembled_at(m: Mechanism, values: Mapping[str, float], guess: Mapping[str, float] | None = None) -> tuple[System, Array]:
+    """The scaled system and a closed state with some freedoms at given values.
+
+    Without a ``guess`` the closed position near ``start`` is led there in small steps; with one, the loops are closed from it.
+
+    Raises
+    ------
+    AssemblyError
+        where the values cannot be had.
+    """
+    if guess is not None:
+        m = m.replace(start={**m.start, **{m.full_name(k): v for k, v in guess.items()}})
+        raw = scaled_system(m, System(m).start_coordinates(m.start))
+        columns, goal = named_columns(m, raw, values)
+        x = raw.state_of(raw.start_coordinates(m.start)[:, None])[:, 0]
+        x[state_rows(raw, columns)] = goal
+        x, error = close(raw, x, columns)
+        if error > CLOSED:
+            raise _not_reached(m, raw, x, error, values)
+        return _settled(raw, x)
+    system, x = assembled(m, values)
+    columns, goal = named_columns(m, system, values)
+    x, done = lead(system, x, columns, goal)
+    if done < 1.0:
+        raise _not_reached(m, system, x, float(np.abs(x[state_rows(system, columns)] - goal).max()), values)
+    return _settled(system, x)
+
+
+def _not_reached(m: Mechanism, system: System, x: Array, error: float, values: Mapping[str, float]) -> AssemblyError:
+    best = dict(zip(m.freedom_names(), system.coordinates_of(x[:, None])[:, 0].tolist(), strict=True))
+    asked = ", ".join(f"{name} = {value:.6g}" for name, value in values.items())
+    reached = ", ".join(f"{name} = {best[m.full_name(name)]:.6g}" for name in values)
+    return AssemblyError(
+        f"mechanism {m.name!r}: cannot be assembled at {asked}; came to {reached}, {error:.3g} short (radians, or lengths / L). "
+        "Take a value in reach, or another start or guess", error, best,
+    )

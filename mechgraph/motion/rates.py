@@ -38,7 +38,7 @@ def rates(here: Configuration, solver: ChosenSystem, columns: Index, velocity: A
     """
     dq, gap_v = _completed(here, solver, columns, velocity, np.zeros((here.J.shape[0], here.T)))
     V = here.link_twists(dq)
-    bias = here.system.loop_sums(here.bias(dq, V))
+    bias = here.loop_sums(here.bias(dq, V))
     ddq, gap_a = _completed(here, solver, columns, acceleration, bias)
     return Rates(dq, ddq, V, here.link_accelerations(dq, ddq, V), np.maximum(gap_v, gap_a))
 

@@ -202,6 +202,22 @@ class Configuration:
         ]
 
     @cached_property
+    def lee_screws(self) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+        """For every pair the axial wrenches ``(6, n, T)`` and condition twists ``(6, n, T)`` of Lee's bookkeeping."""
+        s = self.system
+        along, conditions = ([np.zeros((6, 0, self.T))] * len(s.m.pairs) for _ in range(2))
+        for g, frames in zip(s.groups, self.frames, strict=True):
+            book = g.row.bookkeeping
+            if book is None:
+                continue
+            pitch = s.par.pitch[g.pairs]
+            wrenches = evaluation.components_of(book.along, pitch, frames)
+            twists = evaluation.freedoms_of(book.conditions, (0,) * len(book.conditions), pitch, frames)
+            for i, k in enumerate(g.pairs):
+                along[k], conditions[k] = wrenches[:, :, i], twists[:, :, i]
+        return tuple(along), tuple(conditions)
+
+    @cached_property
     def pair_points(self) -> Array:
         """Origins of the markers B, ``(3, P, T)``."""
         out = np.empty((3, len(self.system.m.pairs), self.T))

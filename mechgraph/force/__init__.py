@@ -1,0 +1,1 @@
+"""Wrenches: inertia and loads, loop wrenches, d'Alembert equations, kinetostatics."""

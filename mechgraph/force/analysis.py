@@ -1,0 +1,317 @@
+"""One analysed batch: motion and wrenches in internal units, handed out by name in the user's units, batch first."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array, cross, rotate
+from mechgraph.errors import MechgraphError
+from mechgraph.force.methods import Wrenches, given_effort_loads, internal_state
+from mechgraph.structure.reaction import (
+    UNIQUE,
+    PairFrames,
+    Stress,
+    at_pair_points,
+    least_reactions,
+    orthonormal_stress,
+    pair_power,
+    reaction_part,
+)
+from mechgraph.force.site import Site, kinetic_power, user_poses, user_twists
+from mechgraph.formulation.state import State
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.motion.rates import Rates
+from mechgraph.motion.system import Configuration, Index
+from mechgraph.result.solution import Checks, MaterialPoint
+
+
+@dataclass(frozen=True)
+class Motions:
+    """Positions and rates of a batch: only solved positions are evaluated, ``good`` says which of the flat batch they are."""
+
+    here: Configuration
+    rates: Rates
+    batch: tuple[int, ...]
+    good: Index
+    status: Any
+    t: Any
+    driven: Index
+    held: tuple[Index, ...]
+    which: Index
+
+
+@dataclass(frozen=True)
+class Forces:
+    """Inertia ``(6, N, T)`` and what loads do (``site``), the wrenches found, and whether redundant reactions are NaN."""
+
+    inertia: Array
+    site: Site
+    wrenches: Wrenches
+    mask_redundant: bool
+
+
+class Analysis:
+    """The values of a Solution (implements ``result.solution.Values``)."""
+
+    def __init__(self, motions: Motions, forces: Forces | None) -> None:
+        self.motions, self.forces = motions, forces
+        self.mechanism: Mechanism = motions.here.system.m
+        self.batch, self.t = motions.batch, motions.t
+        self.has_forces = forces is not None
+        self._here, self._system = motions.here, motions.here.system
+        self._L = self._system.par.L
+
+    # --- shapes and units ----------------------------------------------------------------------------------------------
+
+    def _out(self, values: Array) -> Array:
+        """``(..., T)`` of the solved positions -> batch first ``(*batch, ...)``, NaN where not solved; read-only."""
+        rows = np.moveaxis(values, -1, 0)
+        full = np.full((int(np.prod(self.batch)), *rows.shape[1:]), np.nan)
+        full[self.motions.good] = rows
+        out = full.reshape(*self.batch, *rows.shape[1:])
+        out.setflags(write=False)
+        return out
+
+    def _user_wrench(self, f: Array) -> Array:
+        """Wrench about the internal origin -> user's units about the global origin, ``(6, ...)``."""
+        force = self._L * f[3:]
+        origin = self._system.par.origin.reshape(3, *(1,) * (f.ndim - 1))
+        return np.concatenate([self._L**2 * f[:3] + cross(origin, force), force])
+
+    def _columns(self, pair: int) -> slice:
+        first = self._system.first_column
+        return slice(int(first[pair]), int(first[pair + 1]))
+
+    def _need_forces(self) -> Forces:
+        if self.forces is None:
+            raise MechgraphError("this solution has no forces: it comes from kinematics(); use solve()")
+        return self.forces
+
+    # --- motion --------------------------------------------------------------------------------------------------------
+
+    def status(self) -> Any:
+        """Named outcomes."""
+        return self.motions.status
+
+    @cached_property
+    def user_coordinates(self) -> Array:
+        """Coordinates ``(F, *batch)`` in the user's units, rotations continued along the last batch axis."""
+        s = self._system
+        x = np.full((s.n_state, int(np.prod(self.batch))), np.nan)
+        x[:, self.motions.good] = self._here.x
+        shaped = x.reshape(s.n_state, *(self.batch or (1,)))
+        q = s.coordinates_of(shaped, s.start_coordinates(self.mechanism.start))
+        return q.reshape(s.n_freedoms, *self.batch)
+
+    def coordinates(self, pair: int) -> tuple[Array, Array, Array]:
+        """Coordinates, rates, accelerations of a pair."""
+        columns = self._columns(pair)
+        unit = np.where(self._system.is_length[columns], self._L, 1.0)[:, None]
+        position = np.moveaxis(self.user_coordinates[columns], 0, -1).copy()
+        position.setflags(write=False)
+        return position, self._out(unit * self.motions.rates.dq[columns]), self._out(unit * self.motions.rates.ddq[columns])
+
+    @cached_property
+    def _poses(self) -> Array:
+        return user_poses(self._here)
+
+    def link(self, link: int) -> tuple[Array, Array, Array]:
+        """Pose, twist and dV/dt of a link."""
+        V = user_twists(self._here, self.motions.rates.V[:, link : link + 1])[:, 0]
+        A = user_twists(self._here, self.motions.rates.A[:, link : link + 1])[:, 0]
+        return self._out(np.moveaxis(self._poses[link], 0, -1)), self._out(V), self._out(A)
+
+    def link_point(self, link: int, p: Any) -> MaterialPoint:
+        """Position, velocity and acceleration of a material point."""
+        par = self._system.par
+        X, V, A = self._here.poses[:, :, link], self.motions.rates.V[:, link], self.motions.rates.A[:, link]
+        local = ((np.asarray(p, dtype=float) - par.offset[:, link]) / par.L)[:, None]
+        at = rotate(X[:, :3], local) + X[:, 3]
+        velocity = V[3:] + cross(V[:3], at)
+        acceleration = A[3:] + cross(A[:3], at) + cross(V[:3], velocity)
+        position = par.L * at + par.origin[:, None]
+        return MaterialPoint(*(self._out(v) for v in (position, par.L * velocity, par.L * acceleration)))
+
+    # --- forces --------------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _loads(self) -> Array:
+        forces = self._need_forces()
+        return forces.inertia + forces.site.scaled(forces.site.external + forces.site.internal)
+
+    @cached_property
+    def _stress(self) -> Stress:
+        return orthonormal_stress(self._here, self._need_forces().wrenches.stress, self.motions.driven)
+
+    @cached_property
+    def _solved(self) -> tuple[Array, Array]:
+        """Reactions ``(6, P, T)`` and all efforts ``(F, T)``, of minimum norm where redundant."""
+        totals = self._need_forces().wrenches.totals
+        efforts = pair_power(self._here, totals)
+        reactions = reaction_part(self._here, totals, efforts)
+        if not self._stress.wrenches.shape[2]:
+            return reactions, efforts
+        return least_reactions(self._here, reactions, efforts, self._stress)
+
+    def _masked(self, values: Array, stress: Array, scale: float = 1.0) -> Array:
+        """NaN where a self-stress has a part; ``stress`` has the stress index as its last but one axis."""
+        if not self._need_forces().mask_redundant or not stress.shape[-2]:
+            return values
+        touched = np.sqrt((stress * stress).sum(axis=-2)) > UNIQUE * scale
+        return np.where(touched, np.nan, values)
+
+    def wrenches(self, pair: int) -> tuple[Array, Array]:
+        """Reaction and total wrench about the global origin."""
+        reactions, efforts = self._solved
+        far = self._system.par.origin / self._L
+        columns = self._columns(pair)
+        work = (self._here.E[:, columns] * efforts[columns]).sum(axis=1)
+        stress = self._stress.wrenches[:, pair]
+        stress_work = np.einsum("fst,cft->cst", self._stress.efforts[columns], self._here.E[:, columns])
+        out = []
+        for value, state in ((reactions[:, pair], stress), (reactions[:, pair] + work, stress + stress_work)):
+            shifted = np.concatenate([state[:3] + cross(far[:, None, None], state[3:]), state[3:]])
+            out.append(self._out(self._masked(self._user_wrench(value), shifted, 1.0 + float(np.linalg.norm(far)))))
+        return out[0], out[1]
+
+    def reaction_at_pair(self, pair: int) -> Array:
+        """Reaction about the origin of marker B."""
+        local = at_pair_points(self._here, self._solved[0])[:, pair]
+        stress = at_pair_points(self._here, self._stress.wrenches)[:, pair]
+        scale = np.repeat([self._L**2, self._L], 3)[:, None]
+        return self._out(self._masked(scale * local, stress))
+
+    @cached_property
+    def _components(self) -> dict[int, tuple[tuple[str, ...], Array]]:
+        """For every pair names and masked components ``(6 - f, T)``."""
+        frames = PairFrames(self._here)
+        values = frames.components(self._solved[0])
+        stress = frames.components(self._stress.wrenches)
+        out = {}
+        for g, value, state in zip(self._system.groups, values, stress, strict=True):
+            couples = [c.is_couple for c in g.row.reactions or ()] or [False] * (6 - g.row.f)
+            unit = np.where(couples, self._L**2, self._L)[:, None]
+            for i, k in enumerate(g.pairs):
+                out[int(k)] = (g.row.component_names, self._masked(unit * value[:, i], state[:, i]))
+        return out
+
+    def components(self, pair: int) -> dict[str, Array]:
+        """Reaction components by name."""
+        names, values = self._components[pair]
+        return {name: self._out(value) for name, value in zip(names, values, strict=True)}
+
+    @cached_property
+    def _driver_efforts(self) -> Array:
+        """What drivers and holders add to given efforts, ``(F, T)``; zero elsewhere."""
+        forces = self._need_forces()
+        out = np.zeros_like(self._solved[1])
+        given = forces.site.scaled_efforts()
+        driven = self.motions.driven
+        out[driven] = self._solved[1][driven] - given[driven]
+        for i, held in enumerate(self.motions.held):
+            at = np.flatnonzero(self.motions.which == i)
+            cell = np.ix_(held, at)
+            out[cell] = self._solved[1][cell] - given[cell]
+        return out
+
+    def _effort_units(self, columns: Any) -> Array:
+        return np.where(self._system.is_length[columns], self._L, self._L**2)[:, None]
+
+    def efforts(self, pair: int) -> tuple[Array, Array]:
+        """Efforts of all kinds and of the driver alone."""
+        columns = self._columns(pair)
+        own = self._driver_efforts[columns]
+        total = own + self._need_forces().site.scaled_efforts()[columns]
+        unit = self._effort_units(columns)
+        stress = self._stress.efforts[columns]
+        return self._out(self._masked(unit * total, stress)), self._out(self._masked(unit * own, stress))
+
+    def shaking(self) -> Array:
+        """Wrench on the frame: loads and inertia of all moving links, and what springs do to the frame."""
+        forces = self._need_forces()
+        frame = self._system.graph.frame
+        moving = np.delete(self._loads, frame, axis=1).sum(axis=1)
+        return self._out(self._user_wrench(moving + forces.site.scaled(forces.site.internal)[:, frame]))
+
+    def passive_efforts(self) -> dict[str, Array]:
+        """Efforts that hold passive freedoms."""
+        self._need_forces()
+        names = self.mechanism.freedom_names()
+        columns = sorted({int(c) for held in self.motions.held for c in held})
+        unit = self._effort_units(np.array(columns, dtype=np.intp)) if columns else None
+        return {names[c]: self._out(unit[i] * self._driver_efforts[c]) for i, c in enumerate(columns) if unit is not None}
+
+    # --- checks and states -----------------------------------------------------------------------------------------------
+
+    def checks(self) -> Checks:
+        """Closure error, equilibrium and power."""
+        closure = self._out(self._here.closure)
+        if self.forces is None:
+            nothing = np.full(self.batch, np.nan)
+            return Checks(closure, nothing, nothing)
+        return Checks(closure, self._out(self._equilibrium()), self._out(self._power()))
+
+    def _equilibrium(self) -> Array:
+        here, s = self._here, self._system
+        reactions, _ = self._solved
+        given = self._need_forces().site.scaled_efforts()
+        totals = reactions + here.pair_sums(here.E * (given + self._driver_efforts))
+        balance = self._loads.copy()
+        np.add.at(balance, (slice(None), s.b), totals)
+        np.add.at(balance, (slice(None), s.a), -totals)
+        balance = np.delete(balance, s.graph.frame, axis=1)
+        largest = max(np.abs(totals).max(initial=0.0), np.abs(self._loads).max(initial=0.0))
+        residual = np.abs(balance).max(axis=(0, 1), initial=0.0)
+        work = np.abs(pair_power(here, reactions)).max(axis=0, initial=0.0)
+        return np.maximum(residual, work) / (largest or 1.0)
+
+    def _power(self) -> Array:
+        forces, rates = self._need_forces(), self.motions.rates
+        applied = forces.site.scaled(forces.site.external + forces.site.internal)
+        by_load = (rates.V * applied).sum(axis=0)
+        by_effort = rates.dq * (self._driver_efforts + forces.site.scaled_efforts())
+        kinetic = kinetic_power(rates, forces.inertia)
+        largest = max(np.abs(part).max(initial=0.0) for part in (by_load, by_effort, kinetic))
+        return (by_load.sum(axis=0) + by_effort.sum(axis=0) - kinetic.sum(axis=0)) / (largest or 1.0)
+
+    def state(self, index: Any) -> State:
+        """Screws and loads at one position, user's units, global origin."""
+        flat = np.arange(int(np.prod(self.batch))).reshape(self.batch)[index]
+        if np.ndim(flat):
+            raise MechgraphError(f"state({index!r}): names {np.size(flat)} positions of a batch {self.batch}; give one index an axis")
+        found = np.flatnonzero(self.motions.good == flat)
+        if not found.size:
+            raise MechgraphError(f"state({index!r}): this position was not solved ({np.ravel(self.motions.status)[flat]})")
+        at = int(found[0])
+        here = self._system.at(self._here.x[:, at : at + 1])
+        forces = self.forces
+        loads = np.zeros((6, len(self.mechanism.links), 1)) if forces is None else self._loads[:, :, at : at + 1]
+        if forces is not None:
+            loads = loads + given_effort_loads(here, forces.site.scaled_efforts()[:, at : at + 1])
+        inner = internal_state(here, loads)
+        rows = [p.type for p in self.mechanism.pairs]
+        spot = slice(at, at + 1)
+        unit = np.where(self._system.is_length, self._L, 1.0)[:, None]
+        return State(
+            coordinates=self.user_coordinates.reshape(self._system.n_freedoms, -1)[:, flat][:, None],
+            velocities=unit * self.motions.rates.dq[:, spot],
+            poses=np.moveaxis(user_poses(here)[..., :3, :], (0, 1), (2, 3)),
+            twists=user_twists(here, self.motions.rates.V[:, :, spot]),
+            reactions=tuple(self._user_screws(w, [c.is_couple for c in row.reactions or ()]) for w, row in zip(inner.reactions, rows, strict=True)),
+            efforts=tuple(self._user_screws(w, [c.is_couple for c in row.efforts]) for w, row in zip(inner.efforts, rows, strict=True)),
+            along=tuple(self._user_screws(w, [c.is_couple for c in row.bookkeeping.along] if row.bookkeeping else []) for w, row in zip(inner.along, rows, strict=True)),
+            conditions=tuple(user_twists(here, w) if w.shape[1] else w for w in inner.conditions),
+            loads=self._user_wrench(loads),
+        )
+
+    def _user_screws(self, wrenches: Array, couples: list[bool]) -> Array:
+        """Unit wrenches ``(6, n, T)``: arms in the user's length, about the global origin; unit couples stay."""
+        out = wrenches.copy()
+        for j in range(out.shape[1]):
+            if not (j < len(couples) and couples[j]):
+                out[:3, j] = self._L * out[:3, j] + cross(self._system.par.origin[:, None], out[3:, j])
+        return out

@@ -1,0 +1,260 @@
+"""Kinetostatics and kinematics: from driver motion to efforts and all reactions, in one call."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.errors import DeadPointError, DeclarationError, IndeterminateError, ReachError
+from mechgraph.force.analysis import Analysis, Forces, Motions
+from mechgraph.force.methods import METHODS, Problem
+from mechgraph.force.site import Site, inertia_wrenches
+from mechgraph.model.drive import Drive
+from mechgraph.model.load import Load
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.motion_law import Motion
+from mechgraph.motion.assembly import assembled, assembled_at, named_columns
+from mechgraph.motion.path import SINGULAR, Follower, Positions, Status
+from mechgraph.motion.rates import closure_solver, rates
+from mechgraph.numerics.linear import ChosenSystem
+from mechgraph.result.solution import Solution
+from mechgraph.structure.freedom import free_motion
+from mechgraph.structure.report import check
+
+CONTRADICTION = 1e-6
+"""Relative part of the closure rates that drivers may leave open before they count as contradicting each other."""
+
+ON_REACH = ("raise", "flag")
+REDUNDANT = ("nan", "minimum_norm")
+
+
+def _option(what: str, value: Any, allowed: Iterable[str]) -> list[str]:
+    return [] if value in allowed else [f"{what} = {value!r}: expected one of {', '.join(map(repr, allowed))}"]
+
+
+def _as_motion(value: Any, name: str, faults: list[str]) -> Motion | None:
+    if isinstance(value, Motion):
+        return value
+    try:
+        return Motion(value)
+    except DeclarationError as error:
+        faults += [f"drive {name!r}: {fault}" for fault in error.faults]
+        return None
+
+
+def driven(m: Mechanism, motions: Mapping[str, Any] | None) -> tuple[Mechanism, dict[str, Motion]]:
+    """The mechanism with its drives, and the motion of each by full name.
+
+    Motions given by name go to the declared drives, or become the drives where none is declared; the others use the motion
+    stored with them.
+    """
+    given = dict(motions or {})
+    faults: list[str] = []
+    if not m.drives and given:
+        faults += [f"drive {name!r}: {why}" for name in given if (why := m.freedom_fault(name, single=True))]
+        if not faults:
+            m = m.replace(drives=[Drive(name) for name in given])
+    known = {m.full_name(d.freedom): d for d in m.drives}
+    out: dict[str, Motion] = {}
+    for name, value in given.items():
+        why = m.freedom_fault(name, single=True)
+        if why or m.full_name(name) not in known:
+            faults.append(f"motion of {name!r}: {why or 'is not a drive'}; drives: {', '.join(known) or 'none'}")
+            continue
+        motion = _as_motion(value, name, faults)
+        if motion is not None:
+            out[m.full_name(name)] = motion
+    for name, drive in known.items():
+        if name not in out and drive.motion is not None:
+            out[name] = drive.motion
+        elif name not in out and not faults:
+            faults.append(f"drive {name!r} has no motion; give one: {{{name!r}: angles or mg.Motion(...)}}")
+    if faults:
+        raise DeclarationError(f"solve {m.name!r}", faults)
+    return m, {name: out[name] for name in known}
+
+
+def _batch(m: Mechanism, motions: Mapping[str, Motion]) -> tuple[int, ...]:
+    try:
+        return np.broadcast_shapes(*(motion.shape for motion in motions.values()))
+    except ValueError:
+        shapes = ", ".join(f"{name} {motion.shape}" for name, motion in motions.items())
+        raise DeclarationError(f"solve {m.name!r}", [f"the motions describe different numbers of positions: {shapes}"]) from None
+
+
+class _Run:
+    """One call of ``solve``: drivers, positions and rates."""
+
+    def __init__(self, m: Mechanism, motions: Mapping[str, Any] | None) -> None:
+        self.m, self.motions = driven(m, motions)
+        self.batch = _batch(self.m, self.motions)
+        first = {name: float(np.asarray(motion.position).reshape(-1)[0]) for name, motion in self.motions.items()}
+        self.system, self.x = assembled(self.m, first)
+        self.columns, _ = named_columns(self.m, self.system, dict.fromkeys(self.motions, 0.0))
+        self.unit = np.where(self.system.is_length[self.columns], self.system.par.L, 1.0)
+        self.t = next((motion.t for motion in self.motions.values() if motion.t is not None), None)
+        self.freedoms = free_motion(self.system, self.x, self.columns)
+        self._check_determinate()
+
+    def _check_determinate(self) -> None:
+        free = self.freedoms.undriven
+        if free:
+            names = ", ".join(dict.fromkeys(name for motion in free for name in motion.names))
+            count = f"{len(free)} freedom{'s are' if len(free) > 1 else ' is'}"
+            raise IndeterminateError(
+                f"mechanism {self.m.name!r}: {count} left free that {'are' if len(free) > 1 else 'is'} neither driven nor passive "
+                f"(moving: {names}). Drive as many more, or change a pair",
+                check(self.m),
+            )
+
+    def values(self, kind: str) -> Array:
+        """Driver positions, velocities or accelerations ``(d, T)`` in internal units."""
+        T = int(np.prod(self.batch))
+        rows = [np.broadcast_to(getattr(motion, kind), self.batch).reshape(T) for motion in self.motions.values()]
+        return np.array(rows).reshape(len(rows), T) / self.unit[:, None]
+
+    def positions(self) -> Positions:
+        """All positions, followed along the last batch axis."""
+        cases = int(np.prod(self.batch[:-1]))
+        path = self.values("position").reshape(len(self.columns), cases, -1)
+        return Follower(self.system, self.columns, self.freedoms.hold).follow(self.x, path)
+
+    def move(self) -> tuple[Motions, ChosenSystem, Positions]:
+        """Positions and rates."""
+        found = self.positions()
+        status = np.array([s.value for s in found.status.reshape(-1)], dtype="U24").reshape(self.batch)
+        good = np.flatnonzero(status.reshape(-1) == Status.OK.value)
+        here = self.system.at(found.x.reshape(self.system.n_state, -1)[:, good])
+        which = found.which.reshape(-1)[good]
+        solver = closure_solver(here, found.choices, which)
+        dead = solver.condition > SINGULAR
+        if dead.any():
+            status.reshape(-1)[good[dead]] = Status.DEAD_POINT.value
+            good = good[~dead]
+            here = self.system.at(here.x[:, ~dead])
+            which = which[~dead]
+            solver = closure_solver(here, found.choices, which)
+        moved = rates(here, solver, self.columns, self.values("velocity")[:, good], self.values("acceleration")[:, good])
+        held = tuple(choice.held for choice in found.choices)
+        return Motions(here, moved, self.batch, good, status, self.t, self.columns, held, which), solver, found
+
+
+def _raise_unreached(run: _Run, motions: Motions, found: Positions, solution: Solution) -> None:
+    """Named errors for positions that were not solved, with the solution so far."""
+    flat = motions.status.reshape(-1)
+    bad = np.flatnonzero(flat != Status.OK.value)
+    if bad.size:
+        first = int(bad[0])
+        case = first // max(1, self_length(run.batch))
+        reached = {name: float(v * u) for name, v, u in zip(run.motions, found.reached[:, case], run.unit, strict=True)}
+        asked = {name: float(v) for name, v in zip(run.motions, run.values("position")[:, first] * run.unit, strict=True)}
+        at = ", ".join(f"{name} = {value:.6g}" for name, value in reached.items())
+        wanted = ", ".join(f"{name} = {value:.6g}" for name, value in asked.items())
+        dead = flat[first] in (Status.DEAD_POINT.value, Status.BEYOND_DEAD_POINT.value)
+        if dead:
+            raise DeadPointError(
+                f"mechanism {run.m.name!r}: dead point at {at} (asked for position {first}: {wanted}). The drivers do not determine "
+                "the motion there; drive another freedom, stop before it, or use on_reach='flag'", reached, solution)
+        raise ReachError(
+            f"mechanism {run.m.name!r}: position {first} ({wanted}) is out of reach; reached {at}. Use on_reach='flag' for the "
+            "positions that can be reached", reached, solution)
+
+
+def self_length(batch: tuple[int, ...]) -> int:
+    """Number of positions of one case."""
+    return batch[-1] if batch else 1
+
+
+def _check_drivers(run: _Run, motions: Motions) -> None:
+    worst = float(motions.rates.contradiction.max(initial=0.0))
+    stuck = run.freedoms.dependent and not motions.good.size
+    if worst > CONTRADICTION or stuck:
+        names = ", ".join(run.motions)
+        raise IndeterminateError(
+            f"mechanism {run.m.name!r}: the drivers {names} contradict each other: their motions cannot be had together "
+            f"(mobility {run.freedoms.mobility}, {len(run.motions)} drivers). Take a driver away, or give motions that agree", check(run.m))
+
+
+def kinematics(m: Mechanism, motions: Mapping[str, Any] | None = None, *, on_reach: str = "raise") -> Solution:
+    """Positions, velocities and accelerations of all pairs and links, without forces; see ``solve``."""
+    return _solve(m, motions, on_reach, None)
+
+
+def solve(
+    m: Mechanism,
+    motions: Mapping[str, Any] | None = None,
+    *,
+    method: str = "loop_wrench",
+    loads: Iterable[Load] | None = None,
+    redundant: str = "nan",
+    on_reach: str = "raise",
+) -> Solution:
+    """Driver efforts and all reactions for given driver motion (kinetostatics; statics where the rates are zero).
+
+    Parameters
+    ----------
+    motions : driver -> ``Motion``, or positions at zero rates; shapes broadcast, the last axis is followed as a path from
+        ``start``, other axes are independent cases. Left out where the drives carry their motion.
+    method : ``"loop_wrench"`` (one unknown wrench a loop) or ``"newton_euler"`` (the printed equations).
+    loads : replace the declared ones.
+    redundant : ``"nan"`` for components that are not unique, or ``"minimum_norm"`` (least ``sum |F|^2 + |M / L|^2``).
+    on_reach : ``"raise"`` or ``"flag"`` (NaN rows, see ``Solution.status``).
+
+    Raises
+    ------
+    DeclarationError, AssemblyError, ReachError, DeadPointError, IndeterminateError
+    """
+    faults = _option("method", method, METHODS) + _option("redundant", redundant, REDUNDANT)
+    if faults:
+        raise DeclarationError(f"solve {m.name!r}", faults)
+    if loads is not None:
+        m = m.replace(loads=tuple(loads))
+    return _solve(m, motions, on_reach, (method, redundant))
+
+
+def _solve(m: Mechanism, motions: Mapping[str, Any] | None, on_reach: str, forces: tuple[str, str] | None) -> Solution:
+    faults = _option("on_reach", on_reach, ON_REACH)
+    if faults:
+        raise DeclarationError(f"solve {m.name!r}", faults)
+    run = _Run(m, motions)
+    moved, solver, found = run.move()
+    _check_drivers(run, moved)
+    solved = Analysis(moved, None)
+    if forces is not None:
+        solved = Analysis(moved, _forces(run, moved, solver, solved.user_coordinates, *forces))
+    solution = Solution(solved)
+    if on_reach == "raise":
+        _raise_unreached(run, moved, found, solution)
+    return solution
+
+
+def _forces(run: _Run, moved: Motions, solver: ChosenSystem, coordinates: Array, method: str, redundant: str) -> Forces:
+    inertia = inertia_wrenches(moved.here, moved.rates)
+    flat = coordinates.reshape(run.system.n_freedoms, -1)[:, moved.good]
+    site = Site(moved.here, moved.rates, flat, run.batch, moved.good, run.t)
+    site.collect(run.m.loads)
+    loads = inertia + site.scaled(site.external + site.internal)
+    problem = Problem(moved.here, loads, site.scaled_efforts(), run.columns, moved.held, solver)
+    return Forces(inertia, site, METHODS[method](problem), redundant == "nan")
+
+
+def assemble(m: Mechanism, values: Mapping[str, float] | None = None, guess: Mapping[str, Any] | None = None) -> Mechanism:
+    """The same mechanism with ``start`` set to closed coordinates at the given values of some freedoms.
+
+    From ``start`` the freedoms named are led to their values in small steps, so that the branch is kept; from a ``guess`` the
+    loops are closed directly.
+
+    Raises
+    ------
+    AssemblyError, ReachError
+    """
+    wanted = {m.full_name(name): float(value) for name, value in (values or {}).items() if not m.freedom_fault(name, single=True)}
+    system, x = assembled_at(m, values or {}, guess)
+    q = system.coordinates_of(x[:, None], system.start_coordinates(m.start))[:, 0]
+    start = dict(zip(m.freedom_names(), q.tolist(), strict=True)) | wanted
+    return m.replace(start=start)
+
+

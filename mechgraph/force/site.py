@@ -1,0 +1,163 @@
+"""Where loads act: inertia and applied wrenches of all links, and given efforts, at a batch of positions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array, cross, rotate, rotate_back, to_matrix
+from mechgraph.errors import DeclarationError
+from mechgraph.model.load import Load, Value
+from mechgraph.motion.rates import Rates
+from mechgraph.motion.system import Configuration
+
+
+def inertia_wrenches(here: Configuration, rates: Rates) -> Array:
+    """Inertia wrenches ``-(I A + V x* I V)`` of all links about the internal origin, ``(6, N, T)``.
+
+    Force ``-m a_c``, moment about the mass centre ``-(I_c alpha + w x I_c w)``, the inertia turning with the link.
+    """
+    par = here.system.par
+    R, p = here.poses[:, :3], here.poses[:, 3]
+    c = rotate(R, par.center) + p
+    w, alpha = rates.V[:3], rates.A[:3]
+    velocity = rates.V[3:] + cross(w, c)
+    acceleration = rates.A[3:] + cross(alpha, c) + cross(w, velocity)
+    w_body, alpha_body = rotate_back(R, w), rotate_back(R, alpha)
+    turning = rotate(par.inertia, alpha_body) + cross(w_body, rotate(par.inertia, w_body))
+    force = -par.mass * acceleration
+    return np.concatenate([cross(c, force) - rotate(R, turning), force])
+
+
+class Site:
+    """Collects loads on links and efforts in freedoms; speaks the user's units, about the internal origin.
+
+    Implements ``model.load.LoadSite``. ``external`` holds what comes from outside, ``internal`` what links exert on each other.
+    """
+
+    def __init__(self, here: Configuration, rates: Rates, coordinates: Array, batch: tuple[int, ...], good: Any, t: Any) -> None:
+        self.here, self.rates, self.coordinates = here, rates, coordinates
+        self.batch, self.good, self.t = batch, good, t
+        system = here.system
+        self.m, self.L = system.m, system.par.L
+        self._link = {name: i for i, name in enumerate(self.m.link_names())}
+        self.external = np.zeros((6, len(self.m.links), here.T))
+        self.internal = np.zeros_like(self.external)
+        self.efforts = np.zeros((system.n_freedoms, here.T))
+        self._target = self.external
+
+    def collect(self, loads: tuple[Load, ...]) -> None:
+        """Let all loads act."""
+        for load in loads:
+            self._target = self.internal if len(load.links(self.m)) == 2 else self.external
+            load.act(self)
+
+    # --- what loads ask ----------------------------------------------------------------------------------------------
+
+    def masses(self) -> list[tuple[str, float, Array]]:
+        """Name, mass and mass centre of every link that has mass."""
+        return [(k.name, k.mass, self.point(k.name, k.center)[0]) for k in self.m.links if k.mass > 0]
+
+    def rotation(self, link: str) -> Array:
+        """Rotation of a link ``(3, 3, T)``."""
+        return self.here.poses[:, :3, self._link[link]]
+
+    def point(self, link: str, p: Any) -> tuple[Array, Array]:
+        """Position and velocity of a material point given in the link's frame."""
+        i = self._link[link]
+        par = self.here.system.par
+        local = ((np.asarray(p, dtype=float) - par.offset[:, i]) / self.L)[:, None]
+        X = self.here.poses[:, :, i]
+        at = rotate(X[:, :3], local) + X[:, 3]
+        V = self.rates.V[:, i]
+        return self.L * at, self.L * (V[3:] + cross(V[:3], at))
+
+    def center(self, link: str) -> Any:
+        """Mass centre in the link's frame, or None."""
+        return self.m.link(link).center
+
+    def second_link(self, name: str) -> str:
+        """Link b of the pair of a freedom."""
+        return self.m.ends_of(name)[1]
+
+    def values(self, value: Value, link: str, width: int) -> Array:
+        """A value at every position, ``(width, T)``."""
+        if callable(value):
+            value = value(self._spread(user_poses(self.here)[self._link[link]]),
+                          self._spread(np.moveaxis(user_twists(self.here, self.rates.V)[:, self._link[link]], 0, -1)), self.t)
+        array = np.asarray(value, dtype=float)
+        if width == 1 and (array.ndim == 0 or array.shape[-1:] != (1,) or len(array.shape) <= len(self.batch)):
+            array = array[..., None]
+        try:
+            full = np.broadcast_to(array, (*self.batch, width))
+        except ValueError:
+            raise DeclarationError(
+                f"load on {link!r}",
+                [f"value of shape {np.shape(value)} does not fit the positions {self.batch}; the last axis holds the components"],
+            ) from None
+        return np.moveaxis(full.reshape(-1, width)[self.good], -1, 0)
+
+    def _spread(self, rows: Array) -> Array:
+        """Values of the solved positions in the user's batch shape, NaN elsewhere."""
+        out = np.full((int(np.prod(self.batch)), *rows.shape[1:]), np.nan)
+        out[self.good] = rows
+        return out.reshape(*self.batch, *rows.shape[1:])
+
+    def freedom(self, name: str) -> tuple[Array, Array]:
+        """Coordinate and rate of a freedom, in the user's units."""
+        column = self._column(name)
+        rate = self.rates.dq[column] * (self.L if self.here.system.is_length[column] else 1.0)
+        return self.coordinates[column], rate
+
+    def _column(self, name: str) -> int:
+        k, j = self.m.freedom(name)
+        return int(self.here.system.first_column[k]) + j
+
+    # --- what loads do -----------------------------------------------------------------------------------------------
+
+    def add_force(self, link: str, force: Array, at: Array) -> None:
+        """Force on a link at a position."""
+        self._target[:3, self._link[link]] += cross(at, force)
+        self._target[3:, self._link[link]] += force
+
+    def add_couple(self, link: str, moment: Array) -> None:
+        """Couple on a link."""
+        self._target[:3, self._link[link]] += moment
+
+    def add_effort(self, name: str, effort: Array) -> None:
+        """Effort in a freedom."""
+        self.efforts[self._column(name)] += effort
+
+    # --- in internal units -------------------------------------------------------------------------------------------
+
+    def scaled(self, wrench: Array) -> Array:
+        """Wrenches in the user's units as internal ones."""
+        return np.concatenate([wrench[:3] / self.L**2, wrench[3:] / self.L])
+
+    def scaled_efforts(self) -> Array:
+        """Given efforts ``(F, T)`` as internal ones."""
+        lengths = self.here.system.is_length[:, None]
+        return np.where(lengths, self.efforts / self.L, self.efforts / self.L**2)
+
+
+def user_poses(here: Configuration) -> Array:
+    """Poses of the declared link frames in the global frame, ``(N, T, 4, 4)``."""
+    par = here.system.par
+    X = here.poses.copy()
+    shift = rotate(X[:, :3], par.offset[..., None])
+    X[:, 3] = par.L * X[:, 3] + par.origin[:, None, None] - shift
+    return to_matrix(X)
+
+
+def user_twists(here: Configuration, V: Array) -> Array:
+    """Twists ``(6, N, T)`` about the global origin in the user's units (rates of twists likewise)."""
+    par = here.system.par
+    return np.concatenate([V[:3], par.L * V[3:] + cross(par.origin[:, None, None], V[:3])])
+
+
+def kinetic_power(rates: Rates, inertia: Array) -> Array:
+    """Rate of kinetic energy of every link ``(N, T)``: minus the power of its inertia wrench."""
+    return -np.asarray((rates.V * inertia).sum(axis=0))
+
+

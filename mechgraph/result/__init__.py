@@ -1,0 +1,1 @@
+"""What a solution hands back: labelled values, checks, export."""

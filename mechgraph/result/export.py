@@ -1,0 +1,97 @@
+"""Solutions as tables: columns with units, CSV, pandas, xarray. A new export is a new function here."""
+
+from __future__ import annotations
+
+import csv
+import importlib
+import io
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.errors import MissingExtraError
+from mechgraph.model.toml import write_whole
+from mechgraph.result.units import unit_of
+
+if TYPE_CHECKING:
+    import os
+
+    import pandas
+    import xarray
+
+    from mechgraph.result.solution import Solution
+
+
+def columns(s: Solution) -> dict[str, Array]:
+    """Columns by name: coordinates, rates, efforts, reaction components, status and checks.
+
+    Names are ``B.Tz``, ``B.Tz velocity``, ``B.Tz effort``, ``B:Fx`` (component of the reaction), with the unit in brackets where
+    the mechanism declares units.
+    """
+    m = s.mechanism
+    out: dict[str, Array] = {}
+
+    def put(name: str, values: Any, *dimension: float) -> None:
+        unit = unit_of(m.units, dimension)
+        out[f"{name} [{unit}]" if unit else name] = np.asarray(values)
+
+    if s.t is not None:
+        put("t", np.broadcast_to(s.t, s.batch), 0, 0, 1)
+    for pair in m.pairs:
+        r = s[pair.name]
+        values = (r.position, r.velocity, r.acceleration)
+        for j, (name, freedom) in enumerate(zip(pair.freedom_names, pair.type.freedoms, strict=True)):
+            for order, (label, value) in enumerate(zip(("", " velocity", " acceleration"), values, strict=True)):
+                put(name + label, value[..., j], 0 if freedom.turns else 1, 0, -order)
+    if s.has_forces:
+        for pair in m.pairs:
+            r = s[pair.name]
+            efforts = r.effort
+            for j, (name, part) in enumerate(zip(pair.freedom_names, pair.type.efforts, strict=True)):
+                put(f"{name} effort", efforts[..., j], 2 if part.is_couple else 1, 1, -2)
+            for name, value in r.components.items():
+                couple = name.startswith("M")
+                put(f"{pair.name}:{name}", value, 2 if couple else 1, 1, -2)
+    for name in ("closure", "equilibrium", "power"):
+        out[name] = getattr(s.checks, name)
+    out["status"] = s.status
+    return out
+
+
+def to_csv(s: Solution, path: str | os.PathLike[str]) -> None:
+    """Write one row a position; numbers with all digits."""
+    table = {name: np.asarray(values).reshape(-1) for name, values in columns(s).items()}
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(table)
+    writer.writerows(zip(*(values.tolist() for values in table.values()), strict=True))
+    write_whole(path, buffer.getvalue())
+
+
+def _optional(module: str) -> Any:
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        raise MissingExtraError(module, module) from None
+
+
+def to_pandas(s: Solution) -> pandas.DataFrame:
+    """The table as a DataFrame; several batch axes become index levels."""
+    pd = _optional("pandas")
+    frame = pd.DataFrame({name: np.asarray(values).reshape(-1) for name, values in columns(s).items()})
+    if len(s.batch) > 1:
+        frame.index = pd.MultiIndex.from_product([range(n) for n in s.batch], names=axis_names(s.batch))
+    return frame
+
+
+def to_xarray(s: Solution) -> xarray.Dataset:
+    """The table as a Dataset over the batch axes."""
+    xr = _optional("xarray")
+    dims = axis_names(s.batch)
+    return xr.Dataset({name: (dims, values) for name, values in columns(s).items()}, attrs={"mechanism": s.mechanism.name})
+
+
+def axis_names(batch: tuple[int, ...]) -> list[str]:
+    """Names of the batch axes: the last is the position, those before it are cases."""
+    return [f"case{i}" if len(batch) > 2 else "case" for i in range(len(batch) - 1)] + ["position"] * (len(batch) > 0)

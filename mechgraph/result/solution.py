@@ -1,0 +1,280 @@
+"""The Solution: values by the names of pairs, freedoms and links, batch axes first, in the declared units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.errors import DeclarationError
+from mechgraph.formulation.state import State
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.result import export
+
+if TYPE_CHECKING:
+    import os
+
+    import pandas
+    import xarray
+
+
+@dataclass(frozen=True)
+class Checks:
+    """Every solution's own checks, arrays over positions.
+
+    closure : closure error, the largest of angle and length / L over the loops.
+    equilibrium : residual of the equilibrium of all links and of ``S^T w = effort`` in all undriven freedoms, relative to the
+        largest wrench in the batch (NaN without forces).
+    power : driver power + load power - rate of kinetic energy, relative to the largest term in the batch.
+    """
+
+    closure: Array
+    equilibrium: Array
+    power: Array
+
+
+class MaterialPoint(NamedTuple):
+    """Position, velocity and acceleration of a material point, ``(..., 3)`` each."""
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+
+class Values(Protocol):
+    """Where a Solution takes its values from (see ``force.analysis``); every method returns batch-first arrays."""
+
+    mechanism: Mechanism
+    batch: tuple[int, ...]
+    t: Any
+    has_forces: bool
+
+    def status(self) -> Any:
+        """Named outcomes, one a position."""
+
+    def checks(self) -> Checks:
+        """Closure, equilibrium and power."""
+
+    def coordinates(self, pair: int) -> tuple[Array, Array, Array]:
+        """Coordinates, rates and accelerations of the freedoms of a pair, ``(..., f)``."""
+
+    def wrenches(self, pair: int) -> tuple[Array, Array]:
+        """Reaction and total wrench of a pair about the global origin, ``(..., 6)``."""
+
+    def reaction_at_pair(self, pair: int) -> Array:
+        """Reaction about the origin of marker B, global directions, ``(..., 6)``."""
+
+    def components(self, pair: int) -> dict[str, Array]:
+        """Reaction components by name, ``(...)``."""
+
+    def efforts(self, pair: int) -> tuple[Array, Array]:
+        """Efforts of all kinds, and those of the driver alone, ``(..., f)``."""
+
+    def link(self, link: int) -> tuple[Array, Array, Array]:
+        """Pose ``(..., 4, 4)``, twist and its rate ``(..., 6)`` of a link."""
+
+    def link_point(self, link: int, p: Any) -> MaterialPoint:
+        """A material point given in the link's frame."""
+
+    def shaking(self) -> Array:
+        """Wrench on the frame about the global origin, ``(..., 6)``."""
+
+    def passive_efforts(self) -> dict[str, Array]:
+        """Efforts that hold passive freedoms."""
+
+    def state(self, index: Any) -> State:
+        """Screws and loads at one position, in the declared units about the global origin."""
+
+
+class PairResult:
+    """Values of one pair; see the properties."""
+
+    def __init__(self, values: Values, index: int) -> None:
+        self._values, self._index = values, index
+
+    @property
+    def position(self) -> Array:
+        """Coordinates ``(..., f)`` in the order of the pair table; angles unwrapped, of a rotation the rotation vector."""
+        return self._values.coordinates(self._index)[0]
+
+    @property
+    def velocity(self) -> Array:
+        """Rates ``(..., f)``; of a rotation the angular velocity in frame k before it."""
+        return self._values.coordinates(self._index)[1]
+
+    @property
+    def acceleration(self) -> Array:
+        """Rates of the rates ``(..., f)``."""
+        return self._values.coordinates(self._index)[2]
+
+    @property
+    def reaction(self) -> Array:
+        """Wrench ``(..., 6)``, (M, F) about the global origin, that link a exerts on link b: the constraint part alone."""
+        return self._values.wrenches(self._index)[0]
+
+    @property
+    def total(self) -> Array:
+        """Reaction and efforts, all that the pair transmits, ``(..., 6)``."""
+        return self._values.wrenches(self._index)[1]
+
+    @property
+    def effort(self) -> Array:
+        """Efforts ``(..., f)`` of driver, springs and given efforts together; 0 where nothing acts."""
+        return self._values.efforts(self._index)[0]
+
+    @property
+    def drive_effort(self) -> Array:
+        """The driver's own part of ``effort``."""
+        return self._values.efforts(self._index)[1]
+
+    @property
+    def force(self) -> Array:
+        """Force of the reaction ``(..., 3)``, global directions."""
+        return self._values.reaction_at_pair(self._index)[..., 3:]
+
+    @property
+    def moment(self) -> Array:
+        """Moment of the reaction ``(..., 3)`` about the origin of marker B, global directions."""
+        return self._values.reaction_at_pair(self._index)[..., :3]
+
+    @property
+    def components(self) -> dict[str, Array]:
+        """Reaction components of the pair table by name, in frame k about its origin; NaN where not unique."""
+        return self._values.components(self._index)
+
+
+class LinkResult:
+    """Motion of one link in the global frame."""
+
+    def __init__(self, values: Values, index: int) -> None:
+        self._values, self._index = values, index
+
+    @property
+    def pose(self) -> Array:
+        """Pose of the link's frame, ``(..., 4, 4)``."""
+        return self._values.link(self._index)[0]
+
+    @property
+    def twist(self) -> Array:
+        """Twist ``(..., 6)``, (w, v) with v of the body point at the global origin."""
+        return self._values.link(self._index)[1]
+
+    @property
+    def acceleration(self) -> Array:
+        """dV/dt of the twist about the global origin, ``(..., 6)``."""
+        return self._values.link(self._index)[2]
+
+    @property
+    def angular_velocity(self) -> Array:
+        """Angular velocity ``(..., 3)``."""
+        return self.twist[..., :3]
+
+    @property
+    def angular_acceleration(self) -> Array:
+        """Angular acceleration ``(..., 3)``."""
+        return self.acceleration[..., :3]
+
+    def point(self, p: Any) -> MaterialPoint:
+        """Position, velocity and acceleration of the material point ``p``, given in the link's frame."""
+        return self._values.link_point(self._index, p)
+
+    def _center(self) -> MaterialPoint:
+        link = self._values.mechanism.links[self._index]
+        if link.center is None:
+            raise DeclarationError(f"link {link.name!r}", ["has no mass centre; declare center=, or use point(p)"])
+        return self.point(link.center)
+
+    @property
+    def center(self) -> Array:
+        """Mass centre ``(..., 3)``."""
+        return self._center().position
+
+    @property
+    def center_velocity(self) -> Array:
+        """Velocity of the mass centre ``(..., 3)``."""
+        return self._center().velocity
+
+    @property
+    def center_acceleration(self) -> Array:
+        """Acceleration of the mass centre ``(..., 3)``."""
+        return self._center().acceleration
+
+
+class Solution:
+    """Motion and forces at a batch of positions, by name: ``s["D"].reaction``, ``s.link("coupler").pose``."""
+
+    def __init__(self, values: Values) -> None:
+        self._values = values
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """The mechanism that was solved."""
+        return self._values.mechanism
+
+    @property
+    def batch(self) -> tuple[int, ...]:
+        """Shape of the batch of positions; empty for one position."""
+        return self._values.batch
+
+    def __getitem__(self, pair: str) -> PairResult:
+        return PairResult(self._values, self.mechanism.pairs.index(self.mechanism.pair(pair)))
+
+    def link(self, name: str) -> LinkResult:
+        """Motion of a link."""
+        return LinkResult(self._values, self.mechanism.links.index(self.mechanism.link(name)))
+
+    @property
+    def has_forces(self) -> bool:
+        """Whether reactions and efforts were solved (``kinematics`` leaves them out)."""
+        return self._values.has_forces
+
+    @property
+    def status(self) -> Any:
+        """Named outcomes, one a position: an array of texts."""
+        return self._values.status()
+
+    @property
+    def t(self) -> Any:
+        """Times of the motion, where it has some."""
+        return self._values.t
+
+    @property
+    def checks(self) -> Checks:
+        """Closure error, equilibrium residual and power balance at every position."""
+        return self._values.checks()
+
+    @property
+    def shaking(self) -> Array:
+        """Wrench ``(..., 6)`` about the global origin that pairs and springs transmit to the frame."""
+        return self._values.shaking()
+
+    @property
+    def passive_effort(self) -> dict[str, Array]:
+        """Efforts that hold passive freedoms at rest, by freedom; zero where nothing turns them."""
+        return self._values.passive_efforts()
+
+    def state(self, index: Any = ()) -> State:
+        """Screws, loads and coordinates at one position, for ``Formulation.assemble``."""
+        return self._values.state(index)
+
+    # --- tables --------------------------------------------------------------------------------------------------------
+
+    def columns(self) -> Mapping[str, Array]:
+        """All numbers a table shows, by column name with unit, ``(...)`` each."""
+        return export.columns(self)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A DataFrame, one row a position (``pandas`` extra)."""
+        return export.to_pandas(self)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """A Dataset over the batch axes (``xarray`` extra)."""
+        return export.to_xarray(self)
+
+    def to_csv(self, path: str | os.PathLike[str]) -> None:
+        """Write the table as CSV, whole or not at all."""
+        export.to_csv(self, path)
+
+    def __repr__(self) -> str:
+        return f"Solution({self.mechanism.name!r}, batch {self.batch})"

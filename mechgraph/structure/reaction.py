@@ -1,0 +1,102 @@
+"""From total pair wrenches to reactions: the split into reaction and effort, self-stress, what is unique."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from mechgraph.algebra.screw import shift_wrench
+from mechgraph.algebra.se3 import Array, cross
+from mechgraph.motion.system import Configuration, Index
+
+UNIQUE = 1e-7
+"""Part of a unit self-stress in a component above which the component is not unique (forces and moments / L compared)."""
+
+
+@dataclass(frozen=True)
+class Stress:
+    """Self-stresses: reaction states without load, orthonormal in the measure ``sum |F|^2 + |M / L|^2`` at the pair points.
+
+    ``wrenches (6, P, s, T)`` are the reaction parts about the internal origin, ``efforts (F, s, T)`` what they bring to driven
+    freedoms.
+    """
+
+    wrenches: Array
+    efforts: Array
+
+
+def at_pair_points(here: Configuration, wrenches: Array) -> Array:
+    """Wrenches ``(6, P, ..., T)`` about the internal origin, taken about the origin of marker B of their pair."""
+    points = here.pair_points
+    extra = wrenches.ndim - 3
+    return shift_wrench(wrenches, points.reshape(3, points.shape[1], *(1,) * extra, points.shape[2]))
+
+
+def reaction_part(here: Configuration, totals: Array, efforts: Array) -> Array:
+    """Reaction wrenches ``w - E tau``; totals ``(6, P, T)``, efforts ``(F, T)``."""
+    return totals - here.pair_sums(here.E * efforts)
+
+
+def pair_power(here: Configuration, totals: Array) -> Array:
+    """``S^T w`` of every freedom, ``(F, T)``: the efforts that the total wrenches ``(6, P, T)`` stand for."""
+    return np.asarray((here.S * totals[:, owner_of(here)]).sum(axis=0))
+
+
+def owner_of(here: Configuration) -> Index:
+    """Pair index of every freedom."""
+    counts = np.diff(here.system.first_column)
+    return np.repeat(np.arange(len(counts)), counts)
+
+
+def orthonormal_stress(here: Configuration, states: Array, driven: Index) -> Stress:
+    """Self-stresses from independent total wrench states ``(6, P, s, T)`` that leave all undriven freedoms without effort."""
+    s = states.shape[2]
+    efforts = np.zeros((here.system.n_freedoms, s, here.T))
+    parts = np.empty_like(states)
+    for i in range(s):
+        tau = pair_power(here, states[:, :, i])
+        efforts[driven, i] = tau[driven]
+        parts[:, :, i] = reaction_part(here, states[:, :, i], efforts[:, i])
+    if not s:
+        return Stress(parts, efforts)
+    flat = at_pair_points(here, parts).transpose(3, 0, 1, 2).reshape(here.T, -1, s)
+    _, R = np.linalg.qr(flat)
+    inverse = np.linalg.inv(R)
+    return Stress(np.einsum("cpit,tij->cpjt", parts, inverse), np.einsum("fit,tij->fjt", efforts, inverse))
+
+
+def least_reactions(here: Configuration, reactions: Array, efforts: Array, stress: Stress) -> tuple[Array, Array]:
+    """Reactions and efforts of minimum norm: the part along every self-stress removed."""
+    y = -np.einsum("cpit,cpt->it", at_pair_points(here, stress.wrenches), at_pair_points(here, reactions))
+    return reactions + np.einsum("cpit,it->cpt", stress.wrenches, y), efforts + np.einsum("fit,it->ft", stress.efforts, y)
+
+
+class PairFrames:
+    """Components of reaction wrenches in the frames of the pair table, by the dual basis of ``[W, E]``."""
+
+    def __init__(self, here: Configuration) -> None:
+        self.here = here
+
+    @cached_property
+    def dual(self) -> list[Array]:
+        """For every group the inverse of ``[W, E]`` at the pair points, ``(n, T, 6, 6)``."""
+        here = self.here
+        out = []
+        for g, W in zip(here.system.groups, here.W, strict=True):
+            E = here.E[:, g.columns]
+            basis = np.concatenate([W, E], axis=1)
+            points = here.pair_points[:, None, g.pairs]
+            local = np.concatenate([basis[:3] - cross(points, basis[3:]), basis[3:]])
+            out.append(np.linalg.inv(local.transpose(2, 3, 0, 1)))
+        return out
+
+    def components(self, wrenches: Array) -> list[Array]:
+        """For every group the components ``(6 - f, n, ..., T)`` of reaction wrenches ``(6, P, ..., T)``."""
+        local = at_pair_points(self.here, wrenches)
+        out = []
+        for g, inverse in zip(self.here.system.groups, self.dual, strict=True):
+            values = np.einsum("ntij,jn...t->in...t", inverse, local[:, g.pairs])
+            out.append(values[: 6 - g.row.f])
+        return out
