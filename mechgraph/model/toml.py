@@ -6,6 +6,7 @@ beside the library is checked against it. A field that is an angle may be given 
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import tempfile
 import tomllib
@@ -47,7 +48,7 @@ FIELDS: dict[str, tuple[str, ...]] = {
     "marker": ("point", "axis", "second"),
     "drive": ("freedom", "motion"),
     "motion": ("position", "sweep", "velocity", "acceleration", "t"),
-    **{f"load {kind}": ("kind", *cls.__dataclass_fields__) for kind, cls in LOADS.items()},
+    **{f"load {kind}": ("kind", *(f.name for f in dataclasses.fields(cls))) for kind, cls in LOADS.items()},
 }
 """Fields of every table of the format."""
 
@@ -65,6 +66,15 @@ NEEDED = {
     "load spring": ("a", "b", "p", "q", "stiffness"), "load torsion_spring": ("freedom", "stiffness"),
 }
 """Fields that must be there."""
+
+KINDS: dict[type, tuple[str, frozenset[str]]] = {
+    str: ("a text", frozenset({"name", "description", "source", "frame", "symbol", "pairs", "type", "a", "b", "freedom", "link"})),
+    bool: ("true or false", frozenset({"unphysical", "directed", "square_second", "at_b"})),
+    dict: ("a table", frozenset({"expected"})),
+}
+"""Fields that hold a text, a truth value or a table, wherever they stand alone (``frame`` of a component is a number)."""
+OTHERWISE = {"file": {"link"}, "component": {"frame"}}
+"""Fields of a table to which ``KINDS`` does not apply."""
 
 
 class _Reader:
@@ -88,6 +98,10 @@ class _Reader:
             else:
                 known = [*FIELDS[kind], *(f"{a}_deg" for a in ANGLES.get(kind, ()))]
                 self.faults.append(f"{where}: unknown field {key!r} (fields: {', '.join(known)})")
+        for want, (words, keys) in KINDS.items():
+            for key in (keys - OTHERWISE.get(kind, set())) & out.keys():
+                if not isinstance(out[key], want):
+                    self.faults.append(f"{where}.{key} = {out[key]!r}: expected {words}")
         missing = [key for key in NEEDED.get(kind, ()) if key not in out]
         if missing:
             self.faults.append(f"{where}: field{'s' if len(missing) > 1 else ''} {', '.join(missing)} missing")
@@ -130,7 +144,9 @@ def _parts(reader: _Reader, kind: str, cls: Any, items: Any, where: str) -> Any:
     for item in items:
         if isinstance(item, Mapping):
             fields = reader.table(kind, item, where)
-            item = reader.made(where, cls, **{k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()})
+            wrong = [key for key in ("twist", "wrench", "per_pitch") if key in fields and not is_numeric(fields[key], (6,))]
+            reader.faults += [f"{where}.{key} = {fields[key]!r}: expected six finite numbers" for key in wrong]
+            item = None if wrong else reader.made(where, cls, **{k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()})
         out.append(item)
     return out
 
@@ -177,7 +193,7 @@ def _loads(reader: _Reader, raw: Any) -> list[Any]:
     out = []
     for where, entry in reader.tables("load", raw):
         kind = entry.get("kind") if isinstance(entry, Mapping) else None
-        if kind not in LOADS:
+        if not isinstance(kind, str) or kind not in LOADS:
             reader.faults.append(f"{where}: kind {kind!r}: expected one of {', '.join(LOADS)}")
             continue
         fields = reader.table(f"load {kind}", entry, where)
