@@ -169,10 +169,10 @@ def test_the_stored_motion_can_be_solved(name: str) -> None:
 
 
 def test_r_sg_c_against_the_table_of_its_source() -> None:
-    """Sandor, Kohli, Hernandez and Ghosal, example 2: theta_B (degrees), s_B and s_C in units of 50 mm, printed to 0.01 (cut off, not rounded).
+    """Sandor, Kohli, Hernandez and Ghosal, example 2: theta_B in degrees, s_B and s_C in units of 50 mm.
 
-    The report was read as scanned text: theta_B is 93.34 at 160 degrees and s_C 0.55 at 320 degrees there, where the columns
-    before and after (and the mechanism) say 98.34 and 0.86; those two are left out.
+    Two decimals are printed, cut off rather than rounded. The report was read as scanned text: theta_B is 93.34 at 160 degrees
+    and s_C 0.55 at 320 degrees there, where the rows about them (and the mechanism) say 98.34 and 0.86; those are left out.
     """
     m = mg.load("r-sg-c")
     s = mg.kinematics(m, {"A": np.deg2rad([5.0, 40, 80, 120, 160, 200, 240, 280, 320, 355])})

@@ -1,5 +1,6 @@
 """TOML files: round trip, faults told at once, nothing half-written."""
 
+import contextlib
 import json
 import tomllib
 from pathlib import Path
@@ -11,9 +12,9 @@ import pytest
 
 import mechgraph as mg
 from mechgraph.model import toml
+from mechgraph.model.conversion import UNIT_NAMES
 from mechgraph.model.library import library_path
 from mechgraph.model.load import LOADS
-from mechgraph.model.mechanism import UNIT_NAMES
 
 SCHEMA = json.loads((library_path() / "mechanism.schema.json").read_text(encoding="utf-8"))
 VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)
@@ -66,9 +67,20 @@ def with_markers() -> mg.Mechanism:
     square = {"axis": (0, 0, 2.0), "second": (1 / 3, 0, 0)}
     return mg.Mechanism(
         "markers",
-        links=[mg.Link("ground"), mg.Link("body", 1.5, (0.1, 0, 0), mg.inertia.box(1.5, (0.1, 0.2, 0.3))), mg.Link("end")],
+        links=[
+            mg.Link("ground"),
+            mg.Link("body", 1.5, (0.1, 0, 0), mg.inertia.box(1.5, (0.1, 0.2, 0.3))),
+            mg.Link("end"),
+        ],
         pairs=[
-            mg.Pair("A", "U", "ground", "body", on_a=mg.Marker((0, 0, 1), **square), on_b=mg.Marker((0.1, 0.2, 0.3), **square)),
+            mg.Pair(
+                "A",
+                "U",
+                "ground",
+                "body",
+                on_a=mg.Marker((0, 0, 1), **square),
+                on_b=mg.Marker((0.1, 0.2, 0.3), **square),
+            ),
             mg.Pair("B", "S", "body", "end", on_a=mg.Marker((1, 0, 0)), on_b=mg.Marker()),
             mg.Pair("C", "H", "end", "ground", point=(0, 1, 0), axis=(1, 1, 1), lead=0.005),
             mg.Pair("D", "H", "body", "ground", point=(0, 1, 1), axis=(1, 0, 0), pitch=-0.002),
@@ -118,8 +130,18 @@ def test_degrees_are_radians_and_the_end_of_a_sweep_is_excluded() -> None:
     motion = m.drives[0].motion
     assert motion is not None
     assert np.allclose(np.rad2deg(motion.position), np.arange(150, 204, 2), rtol=0, atol=1e-12)
-    for first, end, step, count in ((0, 360, 0.1, 3600), (30, 390, 1, 360), (0, -90, -0.3, 300), (0, 10, 3, 4), (5, 5, 1, 0)):
-        swept = toml.parse(tomllib.loads(FOUR_BAR.replace("[0.0, 360.0, 1.0]", f"[{first}, {end}, {step}]")), "x").drives[0].motion
+    for first, end, step, count in (
+        (0, 360, 0.1, 3600),
+        (30, 390, 1, 360),
+        (0, -90, -0.3, 300),
+        (0, 10, 3, 4),
+        (5, 5, 1, 0),
+    ):
+        swept = (
+            toml.parse(tomllib.loads(FOUR_BAR.replace("[0.0, 360.0, 1.0]", f"[{first}, {end}, {step}]")), "x")
+            .drives[0]
+            .motion
+        )
         assert swept is not None
         assert len(swept.position) == count
 
@@ -160,7 +182,11 @@ def test_a_fault_is_named(tmp_path: Path, old: str, new: str, words: str) -> Non
 
 
 def test_several_faults_come_at_once(tmp_path: Path) -> None:
-    text = FOUR_BAR.replace("schema = 1", "schema = 2").replace('kind = "gravity"', 'kind = "levity"').replace("value = 1.0", "vallue = 1.0")
+    text = (
+        FOUR_BAR.replace("schema = 1", "schema = 2")
+        .replace('kind = "gravity"', 'kind = "levity"')
+        .replace("value = 1.0", "vallue = 1.0")
+    )
     text += "\n[extra]\n"
     faults = faults_of(tmp_path, text)
     for words in ("schema", "levity", "vallue", "'extra'", "value missing"):
@@ -189,10 +215,8 @@ def test_whatever_stands_in_a_field_the_error_is_ours(name: str) -> None:
                 inner.pop(place[-1])
             else:
                 inner[place[-1]] = wrong
-            try:
+            with contextlib.suppress(mg.MechgraphError):
                 toml.parse(data, "fuzzed")
-            except mg.MechgraphError as error:
-                assert str(error)
 
 
 def test_no_toml_and_no_file_are_file_errors(tmp_path: Path) -> None:

@@ -70,3 +70,13 @@ def test_pair_points_of_tables_v_vii_ix(solution: mg.Solution, number: str, orde
     origin = (0.0, 0.0, 0.0)  # link frames are the markers B of O2 and O3
     ours = in_lees_axes(*(solution.link(link).point(origin)[order] for link in ("link2", "link3")))
     assert np.abs(ours - table(number)[1][:, 1:]).max() <= ROUNDING
+
+
+def test_loop_1_of_table_x() -> None:
+    """RCSR-CSR: theta2, S2, theta4 (the columns S5 and theta7 of the table belong to no closure, see the library file)."""
+    s = mg.kinematics(mg.load("rcsr-csr"))
+    _, rows = table("X")
+    angles = np.rad2deg(np.column_stack([s[name].position[:, 0] for name in ("O1", "O2", "O4")]))
+    printed = rows[:, [0, 1, 3]]
+    assert (np.abs(angles - printed) <= ROUNDING + DEGREE * np.maximum(np.abs(printed), rows[:, :1])).all()
+    assert np.abs(s["O2"].position[:, 1] - rows[:, 2]).max() <= ROUNDING
