@@ -76,7 +76,11 @@ def test_loop_1_of_table_x() -> None:
     """RCSR-CSR: theta2, S2, theta4 (the columns S5 and theta7 of the table belong to no closure, see the library file)."""
     s = mg.kinematics(mg.load("rcsr-csr"))
     _, rows = table("X")
-    angles = np.rad2deg(np.column_stack([s[name].position[:, 0] for name in ("O1", "O2", "O4")]))
+    names = ("O1", "O2", "O4")
+    angles = np.rad2deg(np.column_stack([s[name].position[:, 0] for name in names]))
+    rates = np.abs(np.column_stack([s[name].velocity[:, 0] / s["O1"].velocity[:, 0] for name in names]))
     printed = rows[:, [0, 1, 3]]
-    assert (np.abs(angles - printed) <= ROUNDING + DEGREE * np.maximum(np.abs(printed), rows[:, :1])).all()
+    # a degree that is 3e-6 too short changes the angle read off, and through theta1 the angle itself
+    allowed = ROUNDING + 3e-6 * (np.abs(printed) + rates * rows[:, :1])
+    assert (np.abs(angles - printed) <= allowed).all()
     assert np.abs(s["O2"].position[:, 1] - rows[:, 2]).max() <= ROUNDING
