@@ -6,6 +6,7 @@ beside the library is checked against it. A field that is an angle may be given 
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import tempfile
 import tomllib
@@ -27,9 +28,12 @@ from mechgraph.model.load import LOADS
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion_law import Motion
 from mechgraph.model.pair import TABLE, Bookkeeping, Component, Freedom, PairType
+from mechgraph.model.values import is_numeric
 
 SCHEMA = 1
 """Number of the file format."""
+SWEEP_ROUNDING = 1e-12
+"""Part of a sweep by which its end may come early and still be excluded (degrees turned into radians are rounded)."""
 
 FIELDS: dict[str, tuple[str, ...]] = {
     "file": (
@@ -59,7 +63,7 @@ FIELDS: dict[str, tuple[str, ...]] = {
     "marker": ("point", "axis", "second"),
     "drive": ("freedom", "motion"),
     "motion": ("position", "sweep", "velocity", "acceleration", "t"),
-    **{f"load {kind}": ("kind", *cls.__dataclass_fields__) for kind, cls in LOADS.items()},
+    **{f"load {kind}": ("kind", *(f.name for f in dataclasses.fields(cls))) for kind, cls in LOADS.items()},
 }
 """Fields of every table of the format."""
 
@@ -87,6 +91,18 @@ NEEDED = {
 }
 """Fields that must be there."""
 
+KINDS: dict[type, tuple[str, frozenset[str]]] = {
+    str: (
+        "a text",
+        frozenset({"name", "description", "source", "frame", "symbol", "pairs", "type", "a", "b", "freedom", "link"}),
+    ),
+    bool: ("true or false", frozenset({"unphysical", "directed", "square_second", "at_b"})),
+    dict: ("a table", frozenset({"expected"})),
+}
+"""Fields that hold a text, a truth value or a table, wherever they stand alone (``frame`` of a component is a number)."""
+OTHERWISE = {"file": {"link"}, "component": {"frame"}}
+"""Fields of a table to which ``KINDS`` does not apply."""
+
 
 class _Reader:
     """Reads tables into constructor arguments and collects the faults of a file."""
@@ -109,6 +125,10 @@ class _Reader:
             else:
                 known = [*FIELDS[kind], *(f"{a}_deg" for a in ANGLES.get(kind, ()))]
                 self.faults.append(f"{where}: unknown field {key!r} (fields: {', '.join(known)})")
+        for want, (words, keys) in KINDS.items():
+            for key in (keys - OTHERWISE.get(kind, set())) & out.keys():
+                if not isinstance(out[key], want):
+                    self.faults.append(f"{where}.{key} = {out[key]!r}: expected {words}")
         missing = [key for key in NEEDED.get(kind, ()) if key not in out]
         if missing:
             self.faults.append(f"{where}: field{'s' if len(missing) > 1 else ''} {', '.join(missing)} missing")
@@ -153,7 +173,15 @@ def _parts(reader: _Reader, kind: str, cls: Any, items: Any, where: str) -> Any:
     for item in items:
         if isinstance(item, Mapping):
             fields = reader.table(kind, item, where)
-            item = reader.made(where, cls, **{k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()})
+            wrong = [
+                key for key in ("twist", "wrench", "per_pitch") if key in fields and not is_numeric(fields[key], (6,))
+            ]
+            reader.faults += [f"{where}.{key} = {fields[key]!r}: expected six finite numbers" for key in wrong]
+            item = (
+                None
+                if wrong
+                else reader.made(where, cls, **{k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()})
+            )
         out.append(item)
     return out
 
@@ -179,12 +207,12 @@ def _motion(reader: _Reader, raw: Any, where: str) -> Motion | None:
     fields = reader.table("motion", raw, where)
     sweep = fields.pop("sweep", None)
     if sweep is not None:
-        if "position" in fields or np.shape(sweep) != (3,) or not sweep[2]:
+        if "position" in fields or not is_numeric(sweep, (3,)) or not sweep[2]:
             reader.faults.append(
                 f"{where}.sweep = {sweep!r}: expected [first, end (excluded), step], and no position beside it"
             )
             return None
-        fields["position"] = np.arange(*sweep)
+        fields["position"] = _swept(*sweep)
     if "position" not in fields:
         reader.faults.append(f"{where}: position or sweep missing")
         return None
@@ -192,11 +220,17 @@ def _motion(reader: _Reader, raw: Any, where: str) -> Motion | None:
     return made
 
 
+def _swept(first: float, end: float, step: float) -> np.ndarray:
+    """Positions ``first + k step`` before ``end``; an end that is a whole number of steps away is left out despite rounding."""
+    count = np.ceil((end - first) / step * (1.0 - SWEEP_ROUNDING))
+    return first + step * np.arange(max(int(count), 0))
+
+
 def _loads(reader: _Reader, raw: Any) -> list[Any]:
     out = []
     for where, entry in reader.tables("load", raw):
         kind = entry.get("kind") if isinstance(entry, Mapping) else None
-        if kind not in LOADS:
+        if not isinstance(kind, str) or kind not in LOADS:
             reader.faults.append(f"{where}: kind {kind!r}: expected one of {', '.join(LOADS)}")
             continue
         fields = reader.table(f"load {kind}", entry, where)
