@@ -206,7 +206,7 @@ class Mechanism:
         return Mechanism(**{**self._arguments(), **changes})
 
     def with_pair_type(self, pair: str, type: str | PairType, *, pitch: float | None = None) -> Mechanism:
-        """A copy in which one pair has another type, at the same markers; drives of freedoms that are gone are dropped."""
+        """A copy in which one pair has another type, at the same markers; drives that it cannot take are dropped."""
         old = self.pair(pair)
         new = Pair(
             old.name,
@@ -223,8 +223,11 @@ class Mechanism:
             kept = {"pitch": old.pitch, "lead": old.lead} if pitch is None else {"pitch": pitch}
             new = new.replace(**kept)
         gone = set(old.freedom_names) - set(new.freedom_names if isinstance(new.type, PairType) else ())
+        known = new.type if isinstance(new.type, PairType) else old.type
+        able = {n for n, single in zip(new.freedom_names, known.drivable, strict=True) if single}
+        lost = set(old.freedom_names) - able
         drives = [
-            dataclasses.replace(d, freedom=name) for d in self.drives if (name := self.full_name(d.freedom)) not in gone
+            dataclasses.replace(d, freedom=name) for d in self.drives if (name := self.full_name(d.freedom)) not in lost
         ]
         loads = [
             dataclasses.replace(load, freedom=self.full_name(load.freedom)) if hasattr(load, "freedom") else load

@@ -45,7 +45,7 @@ def rates(here: Configuration, solver: ChosenSystem, columns: Index, velocity: A
 
 
 def _completed(
-    here: Configuration, solver: ChosenSystem, columns: Index, driven: Array, known: Array
+    here: Configuration, solver: ChosenSystem, columns: Index, driven: Array, known: Array, size: Array | float = 0.0
 ) -> tuple[Array, Array]:
     rhs = -np.einsum("idt,dt->it", here.J[:, columns], driven) - known
     q = solver.solve(rhs[:, None])[:, 0]

@@ -81,7 +81,7 @@ def wider_types(row: PairType) -> Iterator[PairType]:
 
 
 def changes_of(here: Configuration) -> list[Change]:
-    """All single changes to wider types with their power on the self-stresses (drivers free)."""
+    """All single changes to wider types that leave the drivers in place, with their power on the self-stresses (drivers free)."""
     system = here.system
     null = null_space(here.J[:, :, 0].T, RANK_TOLERANCE)
     C = system.graph.loop_matrix
@@ -89,10 +89,14 @@ def changes_of(here: Configuration) -> list[Change]:
     wider = {g.row: list(wider_types(g.row)) for g in system.groups}
     place = {int(k): (g, i) for g in system.groups for i, k in enumerate(g.pairs)}
     out = []
+    driven = {system.m.freedom(d.freedom) for d in system.m.drives}
     for k, pair in enumerate(system.m.pairs):
         g, i = place[k]
+        needed = {pair.type.freedoms[j].name for pair_index, j in driven if pair_index == k}
         base = here.frames[system.groups.index(g)][-1][:, :, i : i + 1]
         for row in wider[pair.type]:
+            if not needed <= {f.name for f, single in zip(row.freedoms, row.drivable, strict=True) if single}:
+                continue
             x = evaluation.coordinates_to_state(row, np.zeros((row.f, 1, 1)))
             frames = evaluation.frames_of(row, np.zeros((1, 1)), x, base)
             S = evaluation.twists_of(row, np.zeros((1, 1)), frames)[:, :, 0, 0]
@@ -132,9 +136,18 @@ def relieving(changes: list[Change], redundancy: int) -> tuple[list[tuple[Change
         found = sorted(grown.values(), key=lambda item: (-item[1], [c.pair for c in item[0]]))
         complete += [parts for parts, removed in found if removed == redundancy]
         beam = [item for item in found if item[1] < redundancy][:BEAM]
-        if len(complete) >= SHOWN or not beam:
+        if not beam:
             break
-    return [(c,) for c in _spread(singles)], complete[:SHOWN]
+    return [(c,) for c in _spread(singles)], complete
+
+
+def _mixed(complete: list[tuple[Change, ...]]) -> list[tuple[Change, ...]]:
+    """Up to two sets of every size, those whose widest change is smallest first."""
+    out: list[tuple[Change, ...]] = []
+    for size in sorted({len(parts) for parts in complete}):
+        mine = [parts for parts in complete if len(parts) == size]
+        out += sorted(mine, key=lambda parts: max(c.added for c in parts))[:2]
+    return out
 
 
 def _spread(singles: list[Change]) -> list[Change]:
@@ -181,7 +194,7 @@ def advice(system: System, x: Array, freedoms: Freedoms) -> tuple[Effect, ...]:
     inputs = freedoms.mobility - len(freedoms.passive)
     if redundancy:
         singles, complete = relieving(changes, redundancy)
-        for parts in (*complete[:3], *singles):
+        for parts in (*_mixed(complete), *singles):
             done = effect(system, x, freedoms, parts)
             if (
                 done
