@@ -1,0 +1,27 @@
+"""Figures and axes of matplotlib, asked for only when something is drawn."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mechgraph.errors import MissingExtraError
+
+INK = "#1f2933"
+MUTED = "#7b8794"
+PALETTE = ("#0b6fa4", "#d1495b", "#2e8b57", "#e09f3e", "#6a4c93", "#00798c", "#8d5524", "#c2185b")
+"""Colours of moving links, in order and then again."""
+
+
+def pyplot() -> Any:
+    """``matplotlib.pyplot``.
+
+    Raises
+    ------
+    MissingExtraError
+        where matplotlib is not installed.
+    """
+    try:
+        import matplotlib.pyplot as plt
+    except ImportError:
+        raise MissingExtraError("matplotlib", "plot") from None
+    return plt
