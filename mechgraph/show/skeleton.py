@@ -206,20 +206,17 @@ def _pairs(ax: Any, shape: _Shape, t: int) -> None:
 
 
 def _labels(ax: Any, shape: _Shape, t: int, colours: dict[str, str]) -> None:
-    """Names beside the pairs and links, on the side that leads away from the rest."""
+    """Names beside pairs and links, each where it covers least."""
     m = shape.s.mechanism
-    middle = np.mean([shape.ends[p.name, p.b][t] for p in m.pairs], axis=0)
+    camera = _camera(ax)
+    moving = {link: shape.corners(link, t) @ camera.T for link in colours if link != m.frame}
+    room = _Room([_sides(corners) for corners in moving.values()] + [shape.centers[k][t][None] @ camera.T for k in shape.centers], shape.size)
     for pair in m.pairs:
-        at = shape.ends[pair.name, pair.b][t]
-        neighbours = [shape.corners(link, t).mean(axis=0) for link in (pair.a, pair.b) if link != m.frame]
-        _label(ax, f"{pair.name} ({pair.type.symbol})", at, np.mean(neighbours or [middle], axis=0), 0.045 * shape.size, INK, "bold")
-    for link, colour in colours.items():
-        if link != m.frame:
-            corners = shape.corners(link, t)
-            at = corners.mean(axis=0)
-            beside = shape.centers[link][t] if link in shape.centers and len(corners) < 3 else middle
-            away = at + _across(ax, corners, beside - at)
-            _label(ax, link, at, away, 0.03 * shape.size, colour, "normal")
+        at = camera @ shape.ends[pair.name, pair.b][t]
+        _label(ax, room, f"{pair.name} ({pair.type.symbol})", at, 0.05, camera, INK, "bold")
+    for link, corners in moving.items():
+        at = corners.mean(axis=0)
+        _label(ax, room, link, at, 0.035, camera, colours[link], "normal")
 
 
 def _camera(ax: Any) -> Array:
@@ -228,27 +225,49 @@ def _camera(ax: Any) -> Array:
     return np.array([[-np.sin(az), np.cos(az), 0.0], [-np.sin(el) * np.cos(az), -np.sin(el) * np.sin(az), np.cos(el)]])
 
 
-def _across(ax: Any, corners: Array, toward: Array) -> Array:
-    """The direction on the screen square to the longest side of a link, on the side of ``toward``."""
-    camera = _camera(ax)
-    flat = (corners - corners.mean(axis=0)) @ camera.T
-    along = np.linalg.svd(flat)[2][0] if len(flat) > 1 else np.array([1.0, 0.0])
-    square = np.array([-along[1], along[0]])
-    side = float(square @ (camera @ toward))
-    return np.asarray((square if side >= 0 else -square) @ camera)
+def _sides(corners: Array) -> Array:
+    """Points along the lines between the corners of a link, on the screen."""
+    u = np.linspace(0.0, 1.0, 13)[:, None]
+    return np.concatenate([(1 - u) * p + u * q for p, q in zip(corners, np.roll(corners, -1, axis=0), strict=True)])
 
 
-def _label(ax: Any, text: str, at: Array, away: Array, distance: float, colour: str, weight: str) -> None:
-    """Text beside a point, on the side away from another point."""
+class _Room:
+    """What is already drawn on the screen; a text is put where it covers least of it."""
+
+    def __init__(self, drawn: list[Array], size: float) -> None:
+        self.taken = np.concatenate(drawn)
+        self.size = size
+
+    def cells(self, text: str, corner: Array, side: float) -> Array:
+        """Points that a text covers, ``side`` -1, 0, 1 for text to the left of, about, to the right of a point."""
+        width = 0.0155 * self.size * len(text)
+        x = corner[0] + width * (np.linspace(0.0, 1.0, 7) - 0.5 + 0.5 * side)
+        return np.stack([np.tile(x, 2), corner[1] + 0.012 * self.size * np.repeat([-1.0, 1.0], 7)], axis=1)
+
+    def place(self, text: str, at: Array, distance: float) -> tuple[Array, float]:
+        """Where a text covers least, and on which side of that point it stands."""
+        best: tuple[float, Array, float] | None = None
+        for reach in (1.0, 1.5):
+            for angle in np.linspace(0.0, 2 * np.pi, 16, endpoint=False) + 0.5 * np.pi:
+                d = np.array([np.cos(angle), np.sin(angle)])
+                side = float(np.sign(np.round(d[0], 1)) if abs(d[0]) > 0.3 else 0.0)
+                corner = at + reach * distance * self.size * d
+                gap = np.linalg.norm(self.cells(text, corner, side)[:, None] - self.taken, axis=2).min(axis=0)
+                cost = float(np.exp(-((gap / (0.022 * self.size)) ** 2)).sum()) + 0.4 * (reach - 1.0)
+                if best is None or cost < best[0] - 1e-9:
+                    best = (cost, corner, side)
+        assert best is not None
+        self.taken = np.concatenate([self.taken, *[self.cells(text, best[1], best[2])] * 3])
+        return best[1], best[2]
+
+
+def _label(ax: Any, room: _Room, text: str, at: Array, distance: float, camera: Array, colour: str, weight: str) -> None:
+    """Text beside a point of the screen."""
     import matplotlib.patheffects as effects
 
-    camera = _camera(ax)
-    d = camera @ (at - away)
-    length = float(np.linalg.norm(d))
-    d = d / length if length > 1e-9 * distance else np.array([0.0, 1.0])
-    ax.text(*(at + distance * (d @ camera)), text, color=colour, weight=weight, fontsize=9.5, zorder=20,
-            ha="left" if d[0] > 0.4 else "right" if d[0] < -0.4 else "center",
-            va="bottom" if d[1] > 0.4 else "top" if d[1] < -0.4 else "center",
+    corner, side = room.place(text, at, distance)
+    ax.text(*(corner @ camera), text, color=colour, weight=weight, fontsize=9.5, zorder=20, va="center",
+            ha="left" if side > 0 else "right" if side < 0 else "center",
             path_effects=[effects.withStroke(linewidth=3.0, foreground="white")])
 
 
