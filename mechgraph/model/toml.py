@@ -26,9 +26,12 @@ from mechgraph.model.load import LOADS
 from mechgraph.model.mechanism import UNIT_NAMES, Mechanism
 from mechgraph.model.motion_law import Motion
 from mechgraph.model.pair import TABLE, Bookkeeping, Component, Freedom, PairType
+from mechgraph.model.values import is_numeric
 
 SCHEMA = 1
 """Number of the file format."""
+SWEEP_ROUNDING = 1e-12
+"""Part of a sweep by which its end may come early and still be excluded (degrees turned into radians are rounded)."""
 
 FIELDS: dict[str, tuple[str, ...]] = {
     "file": ("schema", "name", "description", "source", "frame", "units", "pair_type", "chain", "link", "pair", "drive",
@@ -153,15 +156,21 @@ def _motion(reader: _Reader, raw: Any, where: str) -> Motion | None:
     fields = reader.table("motion", raw, where)
     sweep = fields.pop("sweep", None)
     if sweep is not None:
-        if "position" in fields or np.shape(sweep) != (3,) or not sweep[2]:
+        if "position" in fields or not is_numeric(sweep, (3,)) or not sweep[2]:
             reader.faults.append(f"{where}.sweep = {sweep!r}: expected [first, end (excluded), step], and no position beside it")
             return None
-        fields["position"] = np.arange(*sweep)
+        fields["position"] = _swept(*sweep)
     if "position" not in fields:
         reader.faults.append(f"{where}: position or sweep missing")
         return None
     made: Motion | None = reader.made(where, Motion, **fields)
     return made
+
+
+def _swept(first: float, end: float, step: float) -> np.ndarray:
+    """Positions ``first + k step`` before ``end``; an end that is a whole number of steps away is left out despite rounding."""
+    count = np.ceil((end - first) / step * (1.0 - SWEEP_ROUNDING))
+    return first + step * np.arange(max(int(count), 0))
 
 
 def _loads(reader: _Reader, raw: Any) -> list[Any]:
