@@ -9,6 +9,7 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Table
+from mechgraph.model.connection import Pair
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.result.solution import Solution
 from mechgraph.result.units import unit_of
@@ -73,6 +74,7 @@ class _View:
         self.moment_unit = unit_of(self.m.units, (2, 1, -2))
         self.forces, self.moments = self._magnitudes() if s.has_forces else ([], [])
         self.efforts = [self.of_freedom(name, "drive_effort") for name in self.drivers] if s.has_forces else []
+        self.extent = self._extent()
         self.loaded = any(_largest(rows) > 0 for rows in (self.forces, self.moments, self.efforts))
 
     def flat(self, values: Any) -> Array:
@@ -88,6 +90,12 @@ class _View:
         rows = [self.s[p.name] for p in self.m.pairs]
         return ([self.flat(np.linalg.norm(r.force, axis=-1)) for r in rows],
                 [self.flat(np.linalg.norm(r.moment, axis=-1)) for r in rows])
+
+    def _extent(self) -> float:
+        """A length of the mechanism: the largest distance of pair points from their middle; 1 where all coincide."""
+        found = [self.s.link(p.b).point(p.markers[1].point).position.reshape(-1, 3) for p in self.m.pairs]
+        points = np.stack(found)[:, self.solved][:, :1].reshape(-1, 3)
+        return float(np.linalg.norm(points - points.mean(axis=0), axis=1).max(initial=0.0)) or 1.0 if points.size else 1.0
 
     def turns(self, name: str) -> bool:
         k, j = self.m.freedom(name)
@@ -159,27 +167,32 @@ class _View:
             yield Table(("driver", "least", "at", "greatest", "at"), tuple(rows), align="lrrrr")
 
     def reaction_table(self) -> Iterator[Block]:
-        """Greatest force and moment of every pair's reaction, and where."""
-        largest = (_largest(self.forces), _largest(self.moments))
+        """Greatest force and moment of every pair's reaction, and where; of what is unique of it."""
+        forces, moments = _largest(self.forces), _largest(self.moments)
+        scales = (max(forces, moments / self.extent), max(moments, forces * self.extent))
         rows = []
-        for pair, force, moment in zip(self.m.pairs, self.forces, self.moments, strict=True):
+        for k, pair in enumerate(self.m.pairs):
             cells = [pair.name, pair.type.symbol, pair.a, pair.b]
-            for values, scale in zip((force, moment), largest, strict=True):
-                cells += self._greatest(values, scale)
+            for couple, values, scale in ((False, self.forces[k], scales[0]), (True, self.moments[k], scales[1])):
+                cells += self._greatest(pair, couple, values, scale)
             rows.append(tuple(cells))
-        where = ", ".join(self.drivers)
         head = ("pair", "type", "from", "on", f"force{_bracket(self.force_unit)}", "at", f"moment{_bracket(self.moment_unit)}", "at")
         yield Heading("Greatest reactions", 2)
         yield Table(head, tuple(rows), align="llllrrrr")
-        yield Paragraph(f"Moments are about the pair's own point on link 'on'; 'at' is the value of {where}." if where
-                        else "Moments are about the pair's own point on link 'on'.")
+        of = f"; 'at' is the value of {', '.join(self.drivers)}" if self.drivers else ""
+        yield Paragraph(f"Moments are about the pair's own point on link 'on'{of}.")
 
-    def _greatest(self, values: Array, scale: float) -> list[str]:
-        known = np.isfinite(values)
-        if not known[self.solved].any():
-            return ["not unique", ""]
+    def _greatest(self, pair: Pair, couple: bool, values: Array, scale: float) -> list[str]:
+        mark = ""
+        if np.isnan(values[self.solved]).any():
+            parts = {c.name for c in pair.type.reactions or () if c.is_couple == couple}
+            found = {name: self.flat(v) for name, v in self.s[pair.name].components.items() if name in parts}
+            unique = {name: v for name, v in found.items() if not np.isnan(v[self.solved]).any()}
+            if not unique:
+                return ["not unique", ""]
+            values = np.linalg.norm(list(unique.values()), axis=0)
+            mark = f" ({' '.join(unique)})"
         i = _first_extreme(values)
-        mark = "" if known[self.solved].all() else " *"
         if values[i] <= NOISE * scale:
             return ["0" + mark, ""]
         return [_number(values[i]) + mark, self.place(i)]
@@ -196,8 +209,8 @@ class _View:
         yield Heading("Not unique", 2)
         yield Paragraph(
             "Self-stress may be added to these components; shown are those of least norm." if least_norm
-            else "Self-stress may be added to these components, so they have no value (NaN); the others are unique. "
-            "A star marks a pair where this holds at some positions only.")
+            else "Self-stress may be added to these components, so they have no value (NaN). The table above is made of "
+            "what is unique: the components in brackets, where some are missing.")
         yield Bullets(items)
 
     def _nan_components(self) -> dict[str, list[str]]:
