@@ -27,7 +27,9 @@ def chain_symbols(letters: str) -> tuple[list[str], list[str]]:
             at += 1
             continue
         if symbol is None:
-            return symbols, [f"pairs {letters!r}: no pair type starts with {letters[at:]!r} (known: {', '.join(TABLE)})"]
+            return symbols, [
+                f"pairs {letters!r}: no pair type starts with {letters[at:]!r} (known: {', '.join(TABLE)})"
+            ]
         symbols.append(symbol)
         at += len(symbol)
     return symbols, []
@@ -93,7 +95,9 @@ def chain(
     if faults:
         raise DeclarationError(f"chain {title!r}", faults)
     placed = any(v is not None for v in (twist, length, offset))
-    steps = [_link_step(o, a, t) for o, a, t in zip(numbers["offset"], numbers["length"], numbers["twist"], strict=True)]
+    steps = [
+        _link_step(o, a, t) for o, a, t in zip(numbers["offset"], numbers["length"], numbers["twist"], strict=True)
+    ]
     pairs = []
     for k, symbol in enumerate(symbols):
         markers: dict[str, Any] = {}

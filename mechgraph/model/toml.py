@@ -6,6 +6,7 @@ beside the library is checked against it. A field that is an angle may be given 
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import tempfile
 import tomllib
@@ -19,11 +20,12 @@ import tomli_w
 from mechgraph.errors import DeclarationError, FileError
 from mechgraph.model.chain import chain
 from mechgraph.model.connection import Marker, Pair
+from mechgraph.model.conversion import UNIT_NAMES
 from mechgraph.model.drive import Drive
 from mechgraph.model.library import library_names, library_path
 from mechgraph.model.link import Link
 from mechgraph.model.load import LOADS
-from mechgraph.model.mechanism import UNIT_NAMES, Mechanism
+from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion_law import Motion
 from mechgraph.model.pair import TABLE, Bookkeeping, Component, Freedom, PairType
 from mechgraph.model.values import is_numeric
@@ -34,8 +36,22 @@ SWEEP_ROUNDING = 1e-12
 """Part of a sweep by which its end may come early and still be excluded (degrees turned into radians are rounded)."""
 
 FIELDS: dict[str, tuple[str, ...]] = {
-    "file": ("schema", "name", "description", "source", "frame", "units", "pair_type", "chain", "link", "pair", "drive",
-             "load", "start", "expected"),
+    "file": (
+        "schema",
+        "name",
+        "description",
+        "source",
+        "frame",
+        "units",
+        "pair_type",
+        "chain",
+        "link",
+        "pair",
+        "drive",
+        "load",
+        "start",
+        "expected",
+    ),
     "units": UNIT_NAMES,
     "pair_type": ("symbol", "name", "freedoms", "reactions", "efforts", "bookkeeping", "directed", "square_second"),
     "freedom": ("name", "twist", "per_pitch"),
@@ -47,7 +63,7 @@ FIELDS: dict[str, tuple[str, ...]] = {
     "marker": ("point", "axis", "second"),
     "drive": ("freedom", "motion"),
     "motion": ("position", "sweep", "velocity", "acceleration", "t"),
-    **{f"load {kind}": ("kind", *cls.__dataclass_fields__) for kind, cls in LOADS.items()},
+    **{f"load {kind}": ("kind", *(f.name for f in dataclasses.fields(cls))) for kind, cls in LOADS.items()},
 }
 """Fields of every table of the format."""
 
@@ -59,10 +75,19 @@ ANGLES = {
 """Fields that may be given in degrees, with ``_deg`` added to their names."""
 
 NEEDED = {
-    "file": ("schema", "name"), "pair_type": ("symbol", "freedoms"), "freedom": ("name", "twist"), "component": ("name", "wrench"),
-    "chain": ("pairs",), "link": ("name",), "pair": ("name", "type", "a", "b"), "drive": ("freedom",),
-    "load gravity": ("acceleration",), "load wrench": ("link",), "load effort": ("freedom", "value"),
-    "load spring": ("a", "b", "p", "q", "stiffness"), "load torsion_spring": ("freedom", "stiffness"),
+    "file": ("schema", "name"),
+    "pair_type": ("symbol", "freedoms"),
+    "freedom": ("name", "twist"),
+    "component": ("name", "wrench"),
+    "chain": ("pairs",),
+    "link": ("name",),
+    "pair": ("name", "type", "a", "b"),
+    "drive": ("freedom",),
+    "load gravity": ("acceleration",),
+    "load wrench": ("link",),
+    "load effort": ("freedom", "value"),
+    "load spring": ("a", "b", "p", "q", "stiffness"),
+    "load torsion_spring": ("freedom", "stiffness"),
 }
 """Fields that must be there."""
 
@@ -105,8 +130,10 @@ class _Reader:
         if not isinstance(raw, list):
             self.faults.append(f"[[{kind}]]: expected an array of tables, got {raw!r}")
             return []
-        return [(f"{kind} {entry.get('name', i + 1)!r}" if isinstance(entry, Mapping) else f"{kind} {i + 1}", entry)
-                for i, entry in enumerate(raw)]
+        return [
+            (f"{kind} {entry.get('name', i + 1)!r}" if isinstance(entry, Mapping) else f"{kind} {i + 1}", entry)
+            for i, entry in enumerate(raw)
+        ]
 
     def made(self, where: str, make: Any, **arguments: Any) -> Any:
         """The object, or None with the fault noted."""
@@ -157,7 +184,9 @@ def _motion(reader: _Reader, raw: Any, where: str) -> Motion | None:
     sweep = fields.pop("sweep", None)
     if sweep is not None:
         if "position" in fields or not is_numeric(sweep, (3,)) or not sweep[2]:
-            reader.faults.append(f"{where}.sweep = {sweep!r}: expected [first, end (excluded), step], and no position beside it")
+            reader.faults.append(
+                f"{where}.sweep = {sweep!r}: expected [first, end (excluded), step], and no position beside it"
+            )
             return None
         fields["position"] = _swept(*sweep)
     if "position" not in fields:
@@ -214,15 +243,17 @@ def parse(data: Mapping[str, Any], subject: str) -> Mechanism:
         row = _pair_type(reader, entry, where)
         if row is not None:
             types[row.symbol] = row
-    links = [reader.made(where, Link, **reader.table("link", entry, where))
-             for where, entry in reader.tables("link", top.get("link", []))]
+    links = [
+        reader.made(where, Link, **reader.table("link", entry, where))
+        for where, entry in reader.tables("link", top.get("link", []))
+    ]
     drives = []
     for where, entry in reader.tables("drive", top.get("drive", [])):
         fields = reader.table("drive", entry, where)
         if "motion" in fields:
             fields["motion"] = _motion(reader, fields["motion"], f"{where}.motion")
         drives.append(reader.made(where, Drive, **fields) if "freedom" in fields else None)
-    more = {
+    more: dict[str, Any] = {
         "drives": drives,
         "loads": _loads(reader, top.get("load", [])),
         "start": _start(reader, top.get("start", {})),
@@ -239,7 +270,7 @@ def parse(data: Mapping[str, Any], subject: str) -> Mechanism:
     try:
         if fields:
             return chain(fields.pop("pairs"), name=name, drive=None, links=links, **fields, **more)
-        return Mechanism(name, links or None, pairs, **more)
+        return Mechanism(name, links or None, [p for p in pairs if p is not None], **more)
     except DeclarationError as error:
         raise DeclarationError(subject, error.faults) from None
 
@@ -269,7 +300,10 @@ def load(name: str | os.PathLike[str]) -> Mechanism:
     text = os.fspath(name)
     is_path = text.endswith(".toml") or os.sep in text or not isinstance(name, str)
     if not is_path and text not in library_names():
-        raise FileError(text, f"no mechanism of that name in the library ({', '.join(library_names())}), and no path to a .toml file")
+        raise FileError(
+            text,
+            f"no mechanism of that name in the library ({', '.join(library_names())}), and no path to a .toml file",
+        )
     path = Path(text) if is_path else library_path(text)
     try:
         data = tomllib.loads(path.read_bytes().decode("utf-8"))
@@ -318,7 +352,7 @@ def to_data(m: Mechanism, path: str = "") -> dict[str, Any]:
     if m.drives:
         data["drive"] = []
         for drive in m.drives:
-            entry = {"freedom": drive.freedom}
+            entry: dict[str, Any] = {"freedom": drive.freedom}
             if drive.motion is not None:
                 entry["motion"] = _fields(drive.motion, "motion", path, f"drive {drive.freedom!r}")
             data["drive"].append(entry)
@@ -351,8 +385,13 @@ def _type_data(row: PairType, path: str) -> dict[str, Any]:
             freedoms.append("rotation")
         else:
             freedoms.append(_fields(row.freedoms[factor[0]], "freedom", path, "freedom"))
-    data: dict[str, Any] = {"symbol": row.symbol, "name": row.name, "freedoms": freedoms, "directed": row.directed,
-                            "square_second": row.square_second}
+    data: dict[str, Any] = {
+        "symbol": row.symbol,
+        "name": row.name,
+        "freedoms": freedoms,
+        "directed": row.directed,
+        "square_second": row.square_second,
+    }
     if row.reactions is not None:
         data["reactions"] = [_fields(c, "component", path, "reaction") for c in row.reactions]
     data["efforts"] = [_fields(c, "component", path, "effort") for c in row.efforts]
@@ -387,8 +426,9 @@ def write_whole(path: str | os.PathLike[str], text: str) -> None:
     target = Path(path)
     temporary = None
     try:
-        with tempfile.NamedTemporaryFile("w", encoding="utf-8", newline="", dir=target.parent, prefix=f".{target.name}.",
-                                         delete=False) as handle:
+        with tempfile.NamedTemporaryFile(
+            "w", encoding="utf-8", newline="", dir=target.parent, prefix=f".{target.name}.", delete=False
+        ) as handle:
             temporary = Path(handle.name)
             handle.write(text)
         mode = target.stat().st_mode & 0o777 if target.exists() else 0o666 & ~_umask()

@@ -43,7 +43,9 @@ def rates(here: Configuration, solver: ChosenSystem, columns: Index, velocity: A
     return Rates(dq, ddq, V, here.link_accelerations(dq, ddq, V), np.maximum(gap_v, gap_a))
 
 
-def _completed(here: Configuration, solver: ChosenSystem, columns: Index, driven: Array, known: Array) -> tuple[Array, Array]:
+def _completed(
+    here: Configuration, solver: ChosenSystem, columns: Index, driven: Array, known: Array
+) -> tuple[Array, Array]:
     rhs = -np.einsum("idt,dt->it", here.J[:, columns], driven) - known
     q = solver.solve(rhs[:, None])[:, 0]
     left = np.abs(np.einsum("ift,ft->it", here.J, q) - rhs).max(axis=0, initial=0.0)

@@ -121,7 +121,7 @@ def reduced(columns: Array) -> Array:
     for j in range(A.shape[1]):
         rest = np.abs(A[:, j:])
         rest[taken] = 0.0
-        i, k = np.unravel_index(int(np.argmax(rest > (1 - 1e-9) * rest.max())), rest.shape)
+        i, k = divmod(int(np.argmax(rest > (1 - 1e-9) * rest.max())), rest.shape[1])
         k += j
         A[:, [j, k]] = A[:, [k, j]]
         A[:, j] /= A[i, j]

@@ -156,7 +156,11 @@ class DeterminacyReport:
         if not self._geometry:
             return ()
         still = np.abs(self._geometry.freedoms.null).max(axis=1, initial=0.0) < STILL
-        return tuple(Finding(f"{name} stands still", (name,)) for name, s in zip(self.mechanism.freedom_names(), still, strict=True) if s)
+        return tuple(
+            Finding(f"{name} stands still", (name,))
+            for name, s in zip(self.mechanism.freedom_names(), still, strict=True)
+            if s
+        )
 
     @cached_property
     def drivable(self) -> tuple[Finding, ...]:
@@ -217,14 +221,22 @@ class DeterminacyReport:
             "redundancy": self.redundancy,
             "margin": self.margin,
             "ledger": {
-                name: {"unknowns": book.unknowns, "equations": book.equations, "balance": book.balance,
-                       "by_kind": {k: [r.count, r.unknowns, r.equations] for k, r in book.by_kind.items()}}
+                name: {
+                    "unknowns": book.unknowns,
+                    "equations": book.equations,
+                    "balance": book.balance,
+                    "by_kind": {k: [r.count, r.unknowns, r.equations] for k, r in book.by_kind.items()},
+                }
                 for name, book in ((n, self.ledger(n)) for n in ("lee", "minimal"))
             },
             "unique": self.unique,
-            **{key: [finding.__dict__ for finding in getattr(self, key)]
-               for key in ("undriven", "passive", "locked", "drivable", "advice")},
-            "self_stresses": [{"components": dict(s.components), "efforts": dict(s.efforts)} for s in self.self_stresses],
+            **{
+                key: [finding.__dict__ for finding in getattr(self, key)]
+                for key in ("undriven", "passive", "locked", "drivable", "advice")
+            },
+            "self_stresses": [
+                {"components": dict(s.components), "efforts": dict(s.efforts)} for s in self.self_stresses
+            ],
         }
 
     def to_json(self) -> str:
@@ -283,11 +295,15 @@ def uniqueness(system: System, x: Array, driven: Index) -> tuple[dict[str, dict[
     states = np.einsum("lp,lis->ips", C, null.reshape(C.shape[0], 6, null.shape[1]))[..., None]
     stress = orthonormal_stress(here, states, driven)
     parts = PairFrames(here).components(stress.wrenches)
-    table: dict[int, Array] = {int(k): part[:, i, :, 0] for g, part in zip(system.groups, parts, strict=True) for i, k in enumerate(g.pairs)}
+    table: dict[int, Array] = {
+        int(k): part[:, i, :, 0] for g, part in zip(system.groups, parts, strict=True) for i, k in enumerate(g.pairs)
+    }
     names = m.freedom_names()
     unique: dict[str, dict[str, bool]] = {}
     for k, pair in enumerate(m.pairs):
-        row = {name: bool(np.linalg.norm(v) <= UNIQUE) for name, v in zip(pair.type.component_names, table[k], strict=True)}
+        row = {
+            name: bool(np.linalg.norm(v) <= UNIQUE) for name, v in zip(pair.type.component_names, table[k], strict=True)
+        }
         mine = [int(c) for c in driven if system.first_column[k] <= c < system.first_column[k + 1]]
         for c in mine:
             label = "effort" if len(mine) == 1 else f"effort {names[c].removeprefix(pair.name + '.')}"
@@ -337,15 +353,24 @@ def _passive_finding(system: System, motion: PassiveMotion) -> Finding:
 
 def _verdict(report: DeterminacyReport) -> str:
     book = report.ledger("lee")
-    count = f"{len(report.mechanism.drives)} driver{'s' if len(report.mechanism.drives) != 1 else ''}, {book.unknowns} unknowns, {book.equations} equations"
+    drivers = len(report.mechanism.drives)
+    count = f"{drivers} driver{'s' if drivers != 1 else ''}, {book.unknowns} unknowns, {book.equations} equations"
     if report.mobility is None:
-        word = "balanced" if book.balance == 0 else ("over by" if book.balance < 0 else "short by") + f" {abs(book.balance)}"
+        word = (
+            "balanced"
+            if book.balance == 0
+            else ("over by" if book.balance < 0 else "short by") + f" {abs(book.balance)}"
+        )
         return f"By count: {count} ({word})."
     loose = [f"{pair}:{name}" for pair, row in report.unique.items() for name, ok in row.items() if not ok]
     if report.undriven:
-        return f"Under-driven: mobility {report.mobility}, {len(report.mechanism.drives)} driven, {len(report.passive)} passive, {len(report.undriven)} left free."
+        parts = f"{drivers} driven, {len(report.passive)} passive, {len(report.undriven)} left free"
+        return f"Under-driven: mobility {report.mobility}, {parts}."
     if loose:
-        return f"Moves with mobility {report.mobility}, but {len(loose)} reaction components are not unique (redundancy {report.redundancy})."
+        return (
+            f"Moves with mobility {report.mobility}, but {len(loose)} reaction components are not unique "
+            f"(redundancy {report.redundancy})."
+        )
     return f"Determinate: {count}; every reaction is unique."
 
 
@@ -355,22 +380,37 @@ def _document(report: DeterminacyReport) -> Document:
     if report.note:
         blocks.append(Paragraph(report.note))
     facts = [
-        ("links", str(len(report.links))), ("pairs", str(len(report.pairs))), ("loops", str(len(report.loops))),
-        ("freedoms of the pairs", str(sum(p.type.f for p in m.pairs))), ("mobility by count", str(report.mobility_by_count)),
+        ("links", str(len(report.links))),
+        ("pairs", str(len(report.pairs))),
+        ("loops", str(len(report.loops))),
+        ("freedoms of the pairs", str(sum(p.type.f for p in m.pairs))),
+        ("mobility by count", str(report.mobility_by_count)),
     ]
     if report.mobility is not None and report.margin is not None:
         facts += [
-            ("mobility by rank", str(report.mobility)), ("finite mobility", str(report.finite_mobility)),
-            ("redundancy", str(report.redundancy)), ("margin", f"{report.margin:.3g}"),
+            ("mobility by rank", str(report.mobility)),
+            ("finite mobility", str(report.finite_mobility)),
+            ("redundancy", str(report.redundancy)),
+            ("margin", f"{report.margin:.3g}"),
         ]
     blocks.append(Table(("fact", "value"), tuple(facts)))
     lee, minimal = report.ledger("lee"), report.ledger("minimal")
     rows = tuple(
-        (k, str(r.count), f"{r.unknowns}", f"{r.equations}", f"{minimal.by_kind[k].unknowns}", f"{minimal.by_kind[k].equations}")
+        (
+            k,
+            str(r.count),
+            f"{r.unknowns}",
+            f"{r.equations}",
+            f"{minimal.by_kind[k].unknowns}",
+            f"{minimal.by_kind[k].equations}",
+        )
         for k, r in lee.by_kind.items()
     )
     total = ("sum", "", str(lee.unknowns), str(lee.equations), str(minimal.unknowns), str(minimal.equations))
-    blocks += [Heading("Ledger", 2), Table(("kind", "count", "unknowns (Lee)", "equations", "unknowns (minimal)", "equations"), (*rows, total))]
+    blocks += [
+        Heading("Ledger", 2),
+        Table(("kind", "count", "unknowns (Lee)", "equations", "unknowns (minimal)", "equations"), (*rows, total)),
+    ]
     ends = {p.name: (p.a, p.b) for p in m.pairs}
     chains = []
     for loop in report.loops:
@@ -379,13 +419,21 @@ def _document(report: DeterminacyReport) -> Document:
             text += f" -{name}- {ends[name][1 if sign > 0 else 0]}"
         chains.append(text)
     blocks += [Heading("Loops", 2), Bullets(tuple(chains))]
-    for key, title in (("undriven", "Left free"), ("passive", "Passive freedoms"), ("locked", "Locked freedoms"), ("drivable", "Possible drivers")):
+    for key, title in (
+        ("undriven", "Left free"),
+        ("passive", "Passive freedoms"),
+        ("locked", "Locked freedoms"),
+        ("drivable", "Possible drivers"),
+    ):
         found = getattr(report, key)
         if found:
             blocks += [Heading(title, 2), Bullets(tuple(f.text for f in found))]
     loose = {pair: [n for n, ok in row.items() if not ok] for pair, row in report.unique.items()}
     if any(loose.values()):
-        blocks += [Heading("Not unique", 2), Bullets(tuple(f"{pair}: {', '.join(names)}" for pair, names in loose.items() if names))]
+        blocks += [
+            Heading("Not unique", 2),
+            Bullets(tuple(f"{pair}: {', '.join(names)}" for pair, names in loose.items() if names)),
+        ]
         blocks += [Heading("Self-stresses", 2), Bullets(tuple(s.text for s in report.self_stresses))]
     if report.advice:
         blocks += [Heading("Advice", 2), Bullets(tuple(a.text for a in report.advice))]
