@@ -53,7 +53,10 @@ def main() -> None:
     assert np.allclose(torque, RESISTANCE * slope, atol=1e-10)
 
     report = mg.check(m)
-    assert (report.mobility, report.redundancy) == (1, 3)  # three axes out of the plane: redundant, as every planar loop in space
+    assert (report.mobility, report.redundancy) == (
+        1,
+        3,
+    )  # three axes out of the plane: redundant, as every planar loop in space
     print(report.verdict)
     i = int(np.argmax(torque))
     print(f"torque of the crank: {torque.min():.4f} to {torque.max():.4f}, greatest at {np.rad2deg(theta[i]):.0f} deg")

@@ -35,7 +35,9 @@ MOST_POSITIONS = 1_000_000
 UNBROKEN = 10_000
 """Width in which nothing is wrapped: where the output goes to a file or another program."""
 
-EXIT_STATUS = "Exit status: 0 done; 1 the mechanism has no answer, and the message says why; 2 wrong usage or bad input."
+EXIT_STATUS = (
+    "Exit status: 0 done; 1 the mechanism has no answer, and the message says why; 2 wrong usage or bad input."
+)
 
 app = typer.Typer(
     name="mechgraph",
@@ -77,7 +79,9 @@ class OnReach(str, Enum):
     flag = "flag"
 
 
-Named = Annotated[str, typer.Argument(metavar="NAME_OR_FILE", help="A mechanism of the library (see 'list') or a TOML file.")]
+Named = Annotated[
+    str, typer.Argument(metavar="NAME_OR_FILE", help="A mechanism of the library (see 'list') or a TOML file.")
+]
 
 
 # --- output ------------------------------------------------------------------------------------------------------------
@@ -91,8 +95,15 @@ def _write(text: str) -> None:
     console = Console(highlight=False)
     lines = text.split("\n")
     for line, following in zip(lines, [*lines[1:], ""], strict=True):
-        rule = len(following) > 2 and not following.strip(following[0]) and following[0] in "=~-" and len(following) >= len(line.strip()) > 0
-        console.print(Text(line, style="bold" if rule else ""), soft_wrap=True, end="\n" if line is not lines[-1] else "")
+        rule = (
+            len(following) > 2
+            and not following.strip(following[0])
+            and following[0] in "=~-"
+            and len(following) >= len(line.strip()) > 0
+        )
+        console.print(
+            Text(line, style="bold" if rule else ""), soft_wrap=True, end="\n" if line is not lines[-1] else ""
+        )
 
 
 def _show(document: Document) -> None:
@@ -186,7 +197,11 @@ def _values(texts: Sequence[str], turns: bool, where: str) -> list[float]:
     out = []
     for text, (value, unit) in zip(texts, read, strict=True):
         if (unit or last) not in scales:
-            what = "is an angle: deg or rad (the default)" if turns else "is a length, in the unit that the mechanism declares: no unit"
+            what = (
+                "is an angle: deg or rad (the default)"
+                if turns
+                else "is a length, in the unit that the mechanism declares: no unit"
+            )
             _usage(where, f"unit {unit or last!r} in {text!r}: the freedom {what}")
         out.append(value * scales[unit or last])
     return out
@@ -217,7 +232,11 @@ def parse_drive(m: mg.Mechanism, text: str) -> tuple[str, mg.Motion]:
     if len(parts) not in (1, 3) or len(rates) > 2:
         _usage(where, "expected FREEDOM=START:STOP:STEP or FREEDOM=VALUE, then @RATE and @ACCELERATION where wanted")
     values = _values(parts, turns, where)
-    velocity, acceleration = (*(_values([r.removesuffix("/s^2").removesuffix("/s2").removesuffix("/s")], turns, where)[0] for r in rates), 0.0, 0.0)[:2]
+    velocity, acceleration = (
+        *(_values([r.removesuffix("/s^2").removesuffix("/s2").removesuffix("/s")], turns, where)[0] for r in rates),
+        0.0,
+        0.0,
+    )[:2]
     if len(values) == 1:
         return name, mg.Motion(values[0], velocity, acceleration)
     start, stop, step = values
@@ -251,7 +270,9 @@ def _writable(out: Path) -> None:
 
 
 @app.callback(invoke_without_command=True)
-def _main(context: typer.Context, version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False) -> None:
+def _main(
+    context: typer.Context, version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False
+) -> None:
     if version:
         try:
             number = importlib.metadata.version("mechgraph")
@@ -275,7 +296,10 @@ def check(
     mechanism: Named,
     json: Annotated[bool, typer.Option("--json", help="All facts as JSON.")] = False,
     markdown: Annotated[bool, typer.Option("--markdown", help="The report as Markdown.")] = False,
-    at: Annotated[list[str] | None, typer.Option("--at", metavar="FREEDOM=VALUE", help="Assemble there first: A=30deg, B.Tz=0.02 (repeat).")] = None,
+    at: Annotated[
+        list[str] | None,
+        typer.Option("--at", metavar="FREEDOM=VALUE", help="Assemble there first: A=30deg, B.Tz=0.02 (repeat)."),
+    ] = None,
 ) -> None:
     """Print the determinacy report: counts, mobility, redundancy, which reactions are unique, and the verdict.
 
@@ -319,7 +343,9 @@ def equations(
     """
     with _outcome():
         if (latex or blocks) and (coefficients or csv):
-            _usage("equations", "--coefficients and --csv print a table, --latex and --blocks equations; take one of them")
+            _usage(
+                "equations", "--coefficients and --csv print a table, --latex and --blocks equations; take one of them"
+            )
         f = mg.formulate(_loaded(mechanism), bookkeeping.value)
         if csv:
             _write(f.coefficients().csv())
@@ -344,10 +370,16 @@ def solve(
             "Repeat for several drivers: they describe the same positions. Without it the stored motion.",
         ),
     ] = None,
-    out: Annotated[Path | None, typer.Option("--out", metavar="FILE.csv", help="Write everything as CSV, one row a position.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE.csv", help="Write everything as CSV, one row a position.")
+    ] = None,
     method: Annotated[Method, typer.Option(help="How the forces are solved.")] = Method.loop_wrench,
-    redundant: Annotated[Redundant, typer.Option(help="What stands for reactions that are not unique.")] = Redundant.nan,
-    on_reach: Annotated[OnReach, typer.Option("--on-reach", help="Stop at a position that cannot be taken, or flag it and go on.")] = OnReach.stop,
+    redundant: Annotated[
+        Redundant, typer.Option(help="What stands for reactions that are not unique.")
+    ] = Redundant.nan,
+    on_reach: Annotated[
+        OnReach, typer.Option("--on-reach", help="Stop at a position that cannot be taken, or flag it and go on.")
+    ] = OnReach.stop,
 ) -> None:
     """Solve positions, efforts of the drivers and all reactions, print a summary and write a table.
 

@@ -93,7 +93,9 @@ def test_commands_for_a_fresh_clone() -> None:
         assert re.search(r"python -m pip install .*'\.\[(cli|test|dev)\]'", text)
 
 
-@pytest.mark.parametrize("target", sorted(set(re.findall(r"\]\((?!http)([^)]+)\)", README.read_text(encoding="utf-8")))))
+@pytest.mark.parametrize(
+    "target", sorted(set(re.findall(r"\]\((?!http)([^)]+)\)", README.read_text(encoding="utf-8"))))
+)
 def test_links_lead_somewhere(target: str) -> None:
     assert (ROOT / target).exists()
 

@@ -41,7 +41,9 @@ def summary(s: Solution, not_unique: Mapping[str, Mapping[str, bool]] | None = N
         if view.loaded:
             blocks += [*view.effort_table(), *view.reaction_table()]
         else:
-            blocks.append(Paragraph("All efforts and reactions are zero: no link has a mass that moves and no load acts."))
+            blocks.append(
+                Paragraph("All efforts and reactions are zero: no link has a mass that moves and no load acts.")
+            )
         blocks += [*view.redundant(not_unique), *view.passive()]
     if view.solved.any():
         blocks += view.checks()
@@ -88,14 +90,18 @@ class _View:
 
     def _magnitudes(self) -> tuple[list[Array], list[Array]]:
         rows = [self.s[p.name] for p in self.m.pairs]
-        return ([self.flat(np.linalg.norm(r.force, axis=-1)) for r in rows],
-                [self.flat(np.linalg.norm(r.moment, axis=-1)) for r in rows])
+        return (
+            [self.flat(np.linalg.norm(r.force, axis=-1)) for r in rows],
+            [self.flat(np.linalg.norm(r.moment, axis=-1)) for r in rows],
+        )
 
     def _extent(self) -> float:
         """A length of the mechanism: the largest distance of pair points from their middle; 1 where all coincide."""
         found = [self.s.link(p.b).point(p.markers[1].point).position.reshape(-1, 3) for p in self.m.pairs]
         points = np.stack(found)[:, self.solved][:, :1].reshape(-1, 3)
-        return float(np.linalg.norm(points - points.mean(axis=0), axis=1).max(initial=0.0)) or 1.0 if points.size else 1.0
+        return (
+            float(np.linalg.norm(points - points.mean(axis=0), axis=1).max(initial=0.0)) or 1.0 if points.size else 1.0
+        )
 
     def turns(self, name: str) -> bool:
         k, j = self.m.freedom(name)
@@ -107,8 +113,11 @@ class _View:
 
     def place(self, index: int) -> str:
         """The driver values of a position; its number where the driver values are not known."""
-        values = [self.shown_value(n, v[index]) for n, v in zip(self.drivers, self.driver_values, strict=True)
-                  if np.isfinite(v[index])]
+        values = [
+            self.shown_value(n, v[index])
+            for n, v in zip(self.drivers, self.driver_values, strict=True)
+            if np.isfinite(v[index])
+        ]
         return ", ".join(values) or f"position {index}"
 
     def effort_unit(self, name: str) -> str:
@@ -133,7 +142,11 @@ class _View:
 
     def _beside(self, first: int, last: int) -> str:
         """The solved positions next to a range that is not."""
-        near = [(word, i) for word, i in (("after", first - 1), ("before", last + 1)) if 0 <= i < self.status.size and self.solved[i]]
+        near = [
+            (word, i)
+            for word, i in (("after", first - 1), ("before", last + 1))
+            if 0 <= i < self.status.size and self.solved[i]
+        ]
         text = ", ".join(f"{word} {' = '.join((', '.join(self.drivers), self.place(i)))}" for word, i in near)
         return f" ({text})" if text else ""
 
@@ -147,7 +160,14 @@ class _View:
             low, high = np.nanmin(rate), np.nanmax(rate)
             unit = unit_of(self.m.units, (0, 0, -1) if self.turns(name) else (1, 0, -1))
             speed = _number(low) if np.isclose(low, high) else f"{_number(low)} to {_number(high)}"
-            rows.append((name, self.shown_value(name, np.nanmin(values)), self.shown_value(name, np.nanmax(values)), _with_unit(speed, unit)))
+            rows.append(
+                (
+                    name,
+                    self.shown_value(name, np.nanmin(values)),
+                    self.shown_value(name, np.nanmax(values)),
+                    _with_unit(speed, unit),
+                )
+            )
         if rows:
             yield Table(("driver", "from", "to", "rate"), tuple(rows), align="lrrr")
 
@@ -161,7 +181,9 @@ class _View:
                 rows.append((head, "not unique", "", "", ""))
                 continue
             low, high = _first_extreme(-effort), _first_extreme(effort)
-            rows.append((head, _number(effort[low], largest), self.place(low), _number(effort[high], largest), self.place(high)))
+            rows.append(
+                (head, _number(effort[low], largest), self.place(low), _number(effort[high], largest), self.place(high))
+            )
         if rows:
             yield Heading("Efforts of the drivers", 2)
             yield Table(("driver", "least", "at", "greatest", "at"), tuple(rows), align="lrrrr")
@@ -176,7 +198,16 @@ class _View:
             for couple, values, scale in ((False, self.forces[k], scales[0]), (True, self.moments[k], scales[1])):
                 cells += self._greatest(pair, couple, values, scale)
             rows.append(tuple(cells))
-        head = ("pair", "type", "from", "on", f"force{_bracket(self.force_unit)}", "at", f"moment{_bracket(self.moment_unit)}", "at")
+        head = (
+            "pair",
+            "type",
+            "from",
+            "on",
+            f"force{_bracket(self.force_unit)}",
+            "at",
+            f"moment{_bracket(self.moment_unit)}",
+            "at",
+        )
         yield Heading("Greatest reactions", 2)
         yield Table(head, tuple(rows), align="llllrrrr")
         of = f"; 'at' is the value of {', '.join(self.drivers)}" if self.drivers else ""
@@ -208,14 +239,20 @@ class _View:
             return
         yield Heading("Not unique", 2)
         yield Paragraph(
-            "Self-stress may be added to these components; shown are those of least norm." if least_norm
+            "Self-stress may be added to these components; shown are those of least norm."
+            if least_norm
             else "Self-stress may be added to these components, so they have no value (NaN). The table above is made of "
-            "what is unique: the components in brackets, where some are missing.")
+            "what is unique: the components in brackets, where some are missing."
+        )
         yield Bullets(items)
 
     def _nan_components(self) -> dict[str, list[str]]:
         return {
-            pair.name: [name for name, value in self.s[pair.name].components.items() if np.isnan(self.flat(value)[self.solved]).any()]
+            pair.name: [
+                name
+                for name, value in self.s[pair.name].components.items()
+                if np.isnan(self.flat(value)[self.solved]).any()
+            ]
             for pair in self.m.pairs
         }
 
@@ -229,8 +266,14 @@ class _View:
         for name, value in held.items():
             size = float(np.nanmax(np.abs(value), initial=0.0))
             none = size <= 1e-9 * scale
-            items.append(f"{name} held at rest; " + ("nothing turns it" if none else
-                         f"something drives it: up to {_with_unit(_number(size), self.moment_unit)} holds it, and in truth it would move"))
+            items.append(
+                f"{name} held at rest; "
+                + (
+                    "nothing turns it"
+                    if none
+                    else f"something drives it: up to {_with_unit(_number(size), self.moment_unit)} holds it, and in truth it would move"
+                )
+            )
         yield Heading("Passive freedoms", 2)
         yield Bullets(tuple(items))
 
@@ -241,7 +284,9 @@ class _View:
         if self.s.has_forces:
             rows += [("equilibrium, relative", checks.equilibrium), ("power balance, relative", checks.power)]
         yield Heading("Checks", 2)
-        yield Table(("check", "worst"), tuple((name, f"{np.nanmax(np.abs(value)):.0e}") for name, value in rows), align="lr")
+        yield Table(
+            ("check", "worst"), tuple((name, f"{np.nanmax(np.abs(value)):.0e}") for name, value in rows), align="lr"
+        )
 
 
 def _runs(status: Any) -> list[tuple[int, int]]:

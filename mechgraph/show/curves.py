@@ -29,7 +29,9 @@ def effort_curve(s: Solution, freedom: str | None = None, *, ax: Any = None, mar
     m = s.mechanism
     drivers = [m.full_name(d.freedom) for d in m.drives]
     if not s.has_forces or not drivers:
-        raise DeclarationError(f"effort curve of {m.name!r}", ["the solution has no driver effort: use solve() with a driver"])
+        raise DeclarationError(
+            f"effort curve of {m.name!r}", ["the solution has no driver effort: use solve() with a driver"]
+        )
     name = drivers[0] if freedom is None else m.full_name(freedom)
     if name not in drivers:
         raise DeclarationError(f"effort curve of {m.name!r}", [f"{name!r} is no driver; drivers: {', '.join(drivers)}"])
@@ -56,5 +58,14 @@ def effort_curve(s: Solution, freedom: str | None = None, *, ax: Any = None, mar
     ax.set_axisbelow(True)
     ax.margins(x=0.01)
     if marked is not None:
-        ax.plot(order.reshape(-1)[marked], effort.reshape(-1)[marked], "o", ms=8, mfc="white", mec=PALETTE[1], mew=2.2, zorder=5)
+        ax.plot(
+            order.reshape(-1)[marked],
+            effort.reshape(-1)[marked],
+            "o",
+            ms=8,
+            mfc="white",
+            mec=PALETTE[1],
+            mew=2.2,
+            zorder=5,
+        )
     return ax

@@ -55,7 +55,9 @@ def _shape(s: Solution) -> _Shape:
             ends[pair.name, link] = s.link(link).point(marker.point).position.reshape(-1, 3)[good]
         R = s.link(pair.a).pose[..., :3, :3].reshape(-1, 3, 3)[good]
         axes[pair.name] = R @ pair.markers[0].pose()[:, 2]
-    centers = {k.name: s.link(k.name).center.reshape(-1, 3)[good] for k in m.links if k.mass > 0 and k.center is not None}
+    centers = {
+        k.name: s.link(k.name).center.reshape(-1, 3)[good] for k in m.links if k.mass > 0 and k.center is not None
+    }
     everything = np.concatenate([p.reshape(-1, 3) for p in (*ends.values(), *centers.values())])
     size = float(np.linalg.norm(np.ptp(everything, axis=0))) or 1.0
     return _Shape(s, good, ends, axes, centers, size)
@@ -93,7 +95,9 @@ def draw_skeleton(
     shape = _shape(s)
     size = np.asarray(s.status).size
     if not -size <= position < size or position % size not in shape.good:
-        raise DeclarationError(f"skeleton of {s.mechanism.name!r}", [f"position {position} was not solved, or is none of {size}"])
+        raise DeclarationError(
+            f"skeleton of {s.mechanism.name!r}", [f"position {position} was not solved, or is none of {size}"]
+        )
     t = int(np.searchsorted(shape.good, position % size))
     if ax is None:
         ax = pyplot().figure(layout="constrained").add_subplot(projection="3d")
@@ -132,7 +136,12 @@ def _links(ax: Any, shape: _Shape, t: int, colours: dict[str, str], *, ghost: bo
         if link == shape.s.mechanism.frame:
             continue
         points = shape.corners(link, t)
-        line = {"color": colour, "lw": 1.2 if ghost else 3.4, "alpha": 0.28 if ghost else 1.0, "zorder": 1 if ghost else 4}
+        line = {
+            "color": colour,
+            "lw": 1.2 if ghost else 3.4,
+            "alpha": 0.28 if ghost else 1.0,
+            "zorder": 1 if ghost else 4,
+        }
         if len(points) > 2:
             plate = _ordered(points)
             closed = np.concatenate([plate, plate[:1]])
@@ -160,13 +169,22 @@ def _traces(ax: Any, shape: _Shape, names: Sequence[str], colours: dict[str, str
         pair = m.pair(name)
         path = shape.ends[name, pair.b]
         if np.ptp(path, axis=0).max() > 1e-3 * shape.size:
-            ax.plot(*path.T, color=colours[pair.b if pair.b != m.frame else pair.a], lw=0.9, ls=(0, (1, 1.6)), alpha=0.8, zorder=2)
+            ax.plot(
+                *path.T,
+                color=colours[pair.b if pair.b != m.frame else pair.a],
+                lw=0.9,
+                ls=(0, (1, 1.6)),
+                alpha=0.8,
+                zorder=2,
+            )
 
 
 def _feet(ax: Any, shape: _Shape, t: int) -> None:
     """A hatched foot under every pair point of the frame."""
     for at in shape.corners(shape.s.mechanism.frame, t):
-        ax.scatter(*at, marker=_foot(), s=560, facecolor=MUTED, edgecolor=MUTED, linewidth=1.1, depthshade=False, zorder=3)
+        ax.scatter(
+            *at, marker=_foot(), s=560, facecolor=MUTED, edgecolor=MUTED, linewidth=1.1, depthshade=False, zorder=3
+        )
 
 
 def _foot() -> Any:
@@ -195,7 +213,9 @@ def _pairs(ax: Any, shape: _Shape, t: int) -> None:
         if pair.type.f - turns > 1:
             across = np.linalg.svd(axis[None])[2][1:] * 0.06 * shape.size
             corners = [b + i * across[0] + j * across[1] for i, j in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
-            ax.add_collection3d(Poly3DCollection([corners], facecolor=MUTED, alpha=0.25, edgecolor=MUTED, linewidth=0.8))
+            ax.add_collection3d(
+                Poly3DCollection([corners], facecolor=MUTED, alpha=0.25, edgecolor=MUTED, linewidth=0.8)
+            )
         elif pair.type.directed:
             reach = 0.055 * shape.size * axis
             first, last = sorted((a, b), key=lambda p: float(p @ axis))
@@ -210,7 +230,11 @@ def _labels(ax: Any, shape: _Shape, t: int, colours: dict[str, str]) -> None:
     m = shape.s.mechanism
     camera = _camera(ax)
     moving = {link: shape.corners(link, t) @ camera.T for link in colours if link != m.frame}
-    room = _Room([_sides(corners) for corners in moving.values()] + [shape.centers[k][t][None] @ camera.T for k in shape.centers], shape.size)
+    room = _Room(
+        [_sides(corners) for corners in moving.values()]
+        + [shape.centers[k][t][None] @ camera.T for k in shape.centers],
+        shape.size,
+    )
     for pair in m.pairs:
         at = camera @ shape.ends[pair.name, pair.b][t]
         _label(ax, room, f"{pair.name} ({pair.type.symbol})", at, 0.05, camera, INK, "bold")
@@ -261,14 +285,24 @@ class _Room:
         return best[1], best[2]
 
 
-def _label(ax: Any, room: _Room, text: str, at: Array, distance: float, camera: Array, colour: str, weight: str) -> None:
+def _label(
+    ax: Any, room: _Room, text: str, at: Array, distance: float, camera: Array, colour: str, weight: str
+) -> None:
     """Text beside a point of the screen."""
     import matplotlib.patheffects as effects
 
     corner, side = room.place(text, at, distance)
-    ax.text(*(corner @ camera), text, color=colour, weight=weight, fontsize=9.5, zorder=20, va="center",
-            ha="left" if side > 0 else "right" if side < 0 else "center",
-            path_effects=[effects.withStroke(linewidth=3.0, foreground="white")])
+    ax.text(
+        *(corner @ camera),
+        text,
+        color=colour,
+        weight=weight,
+        fontsize=9.5,
+        zorder=20,
+        va="center",
+        ha="left" if side > 0 else "right" if side < 0 else "center",
+        path_effects=[effects.withStroke(linewidth=3.0, foreground="white")],
+    )
 
 
 def _plane_normal(points: Array) -> Array | None:
@@ -289,9 +323,14 @@ def _set_view(ax: Any, shape: _Shape, view: tuple[float, float]) -> None:
         ax.view_init(*view)
     else:
         upright = abs(normal[2]) > 0.99
-        ax.view_init(np.rad2deg(np.arcsin(np.clip(normal[2], -1, 1))), -90.0 if upright else np.rad2deg(np.arctan2(normal[1], normal[0])))
+        ax.view_init(
+            np.rad2deg(np.arcsin(np.clip(normal[2], -1, 1))),
+            -90.0 if upright else np.rad2deg(np.arctan2(normal[1], normal[0])),
+        )
     right, up = _camera(ax)
-    corner = middle + right * ((points - middle) @ right).min() + up * (((points - middle) @ up).min() - 0.04 * shape.size)
+    corner = (
+        middle + right * ((points - middle) @ right).min() + up * (((points - middle) @ up).min() - 0.04 * shape.size)
+    )
     _tripod(ax, corner, 0.06 * shape.size, normal)
     for setter, c, r in zip((ax.set_xlim, ax.set_ylim, ax.set_zlim), middle, room, strict=True):
         setter(c - r / 2, c + r / 2)
