@@ -3,8 +3,8 @@
 Problem: I.-P. J. Lee, thesis, Oklahoma State University 1977, section 2.6: a spatial four-link mechanism with revolute, cylindric,
 spherical and revolute pair; find angles, rates and accelerations of the pairs for a driven first pair.
 
-Checked against two printed rows of Table III, to 0.7 of the last printed digit (angles: and 1e-5 relative, the table was made with a
-truncated degree). The unknowns and equations of his section 3.4 are 24 each.
+Checked against two printed rows of Table III, to 0.7 of the last printed digit (angles: and 1e-5 relative, the table was made
+with a truncated degree). The unknowns and equations of his section 3.4 are 24 each.
 """
 
 import numpy as np

@@ -10,7 +10,7 @@ import shutil
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from enum import Enum
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, NoReturn
 
@@ -51,28 +51,28 @@ app = typer.Typer(
 )
 
 
-class Bookkeeping(str, Enum):
+class Bookkeeping(StrEnum):
     """Bookkeepings of the ledger."""
 
     lee = "lee"
     minimal = "minimal"
 
 
-class Method(str, Enum):
+class Method(StrEnum):
     """Formulations of the forces."""
 
     loop_wrench = "loop_wrench"
     newton_euler = "newton_euler"
 
 
-class Redundant(str, Enum):
+class Redundant(StrEnum):
     """What stands for reactions that are not unique."""
 
     nan = "nan"
     minimum_norm = "minimum_norm"
 
 
-class OnReach(str, Enum):
+class OnReach(StrEnum):
     """What happens at positions that cannot be taken."""
 
     stop = "raise"
@@ -365,8 +365,9 @@ def solve(
         typer.Option(
             "--drive",
             metavar="FREEDOM=START:STOP:STEP[@RATE[@ACCELERATION]]",
-            help="Motion of a driver, the end excluded: A=0:360:1deg@10, B.Tz=0:0.1:0.01, or one value A=30deg. Angles in rad, or in deg "
-            "where the suffix says so; lengths, rates and accelerations in the declared units (rates of turns in rad/s, or @600deg). "
+            help="Motion of a driver, the end excluded: A=0:360:1deg@10, B.Tz=0:0.1:0.01, or one value A=30deg. Angles in rad, "
+            "or in deg where the suffix says so; lengths, rates and accelerations in the declared units (rates of turns in "
+            "rad/s, or @600deg). "
             "Repeat for several drivers: they describe the same positions. Without it the stored motion.",
         ),
     ] = None,

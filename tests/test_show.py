@@ -26,8 +26,10 @@ def four_bar(z: float = 0.0) -> mg.Mechanism:
 
     axis = (0, 0, 1)
     return mg.Mechanism("four-bar", [mg.Link("frame"), mg.Link("crank", 1.0, at(0.5, 0)), mg.Link("coupler"), mg.Link("rocker")], [
-        mg.Pair("A", "R", "frame", "crank", point=at(0, 0), axis=axis), mg.Pair("B", "R", "crank", "coupler", point=at(1, 0), axis=axis),
-        mg.Pair("C", "R", "coupler", "rocker", point=at(3, 2), axis=axis), mg.Pair("D", "R", "frame", "rocker", point=at(3, 0), axis=axis),
+        mg.Pair("A", "R", "frame", "crank", point=at(0, 0), axis=axis),
+        mg.Pair("B", "R", "crank", "coupler", point=at(1, 0), axis=axis),
+        mg.Pair("C", "R", "coupler", "rocker", point=at(3, 2), axis=axis),
+        mg.Pair("D", "R", "frame", "rocker", point=at(3, 0), axis=axis),
     ], ["A"], [mg.Effort("D", 1.0)])  # fmt: skip
 
 

@@ -266,14 +266,8 @@ class _View:
         for name, value in held.items():
             size = float(np.nanmax(np.abs(value), initial=0.0))
             none = size <= 1e-9 * scale
-            items.append(
-                f"{name} held at rest; "
-                + (
-                    "nothing turns it"
-                    if none
-                    else f"something drives it: up to {_with_unit(_number(size), self.moment_unit)} holds it, and in truth it would move"
-                )
-            )
+            loose = f"would be moved: an effort up to {_with_unit(_number(size), self.effort_unit(name))} holds it"
+            items.append(f"{name} is held at rest; {'nothing moves it' if none else loose}")
         yield Heading("Passive freedoms", 2)
         yield Bullets(tuple(items))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from typing import Any
 
 from mechgraph.errors import MissingExtraError
@@ -25,3 +26,8 @@ def pyplot() -> Any:
     except ImportError:
         raise MissingExtraError("matplotlib", "plot") from None
     return plt
+
+
+def toolkit(name: str) -> Any:
+    """A module of matplotlib's three-dimensional toolkit, which has no types."""
+    return importlib.import_module(f"mpl_toolkits.mplot3d.{name}")

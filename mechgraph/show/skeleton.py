@@ -11,7 +11,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
 from mechgraph.result.solution import Solution
-from mechgraph.show.canvas import INK, MUTED, PALETTE, pyplot
+from mechgraph.show.canvas import INK, MUTED, PALETTE, pyplot, toolkit
 
 FLAT = 1e-6
 """Thickness over extent below which a mechanism is drawn as a plane one."""
@@ -32,7 +32,7 @@ class _Shape:
     """All that is drawn, over the solved positions: ``points[link]`` (n, T, 3) are pair points and mass centre of a link."""
 
     s: Solution
-    good: Array
+    good: Any
     ends: dict[tuple[str, str], Array]
     axes: dict[str, Array]
     centers: dict[str, Array]
@@ -130,8 +130,7 @@ def _ordered(points: Array) -> Array:
 
 
 def _links(ax: Any, shape: _Shape, t: int, colours: dict[str, str], *, ghost: bool) -> None:
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
+    Poly3DCollection = toolkit("art3d").Poly3DCollection
     for link, colour in colours.items():
         if link == shape.s.mechanism.frame:
             continue
@@ -197,15 +196,9 @@ def _foot() -> Any:
     return Path(vertices, [Path.MOVETO, Path.LINETO] * len(lines))
 
 
-def _mark(pair: Pair) -> tuple[str, float]:
-    turns = sum(f.turns for f in pair.type.freedoms)
-    return MARKS.get((turns, pair.type.f - turns), ("D", 62.0))
-
-
 def _pairs(ax: Any, shape: _Shape, t: int) -> None:
     """Pairs: a symbol on link b, the axis as a fine line through both points; a plane pair shows a piece of its plane."""
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
+    Poly3DCollection = toolkit("art3d").Poly3DCollection
     for pair in shape.s.mechanism.pairs:
         a, b = shape.ends[pair.name, pair.a][t], shape.ends[pair.name, pair.b][t]
         turns = sum(f.turns for f in pair.type.freedoms)
@@ -312,7 +305,7 @@ def _plane_normal(points: Array) -> Array | None:
 
 def _set_view(ax: Any, shape: _Shape, view: tuple[float, float]) -> None:
     """Equal scales, no box, a small tripod of the global directions; a plane mechanism is seen along its normal."""
-    points = np.concatenate([p for p in (*shape.ends.values(), *shape.centers.values())])
+    points = np.concatenate([*shape.ends.values(), *shape.centers.values()])
     low, high = points.min(axis=0), points.max(axis=0)
     room, middle = np.maximum(high - low, 0.12 * shape.size), (low + high) / 2
     normal = _plane_normal(points)
@@ -343,9 +336,7 @@ def _set_view(ax: Any, shape: _Shape, view: tuple[float, float]) -> None:
 
 def _fill(ax: Any, points: Array, room: Array) -> None:
     """Zoom so that the mechanism fills its axes."""
-    from mpl_toolkits.mplot3d import proj3d
-
-    x, y, _ = proj3d.proj_transform(*points.T, ax.get_proj())
+    x, y, _ = toolkit("proj3d").proj_transform(*points.T, ax.get_proj())
     (x0, y0), (x1, y1) = ax.transData.inverted().transform(ax.bbox.get_points())
     ax.set_box_aspect(room, zoom=float(0.88 * min((x1 - x0) / max(np.ptp(x), 1e-9), (y1 - y0) / max(np.ptp(y), 1e-9))))
 
