@@ -125,7 +125,10 @@ def _pitches(symbols: list[str], pitch: Any) -> tuple[dict[int, float], list[str
         names = {f"O{k + 1}": k for k in takers}
         wrong = [f"pitch: {key!r} is no helical pair of this chain" for key in pitch if key not in names]
         return {names[key]: value for key, value in pitch.items() if key in names}, wrong
-    values = list(np.atleast_1d(np.asarray(pitch, dtype=float)))
+    try:
+        values = list(np.asarray(pitch, dtype=float).reshape(-1))
+    except (TypeError, ValueError):
+        return {}, [f"pitch = {pitch!r}: expected numbers, or a mapping pair -> pitch"]
     if len(values) == len(symbols) and len(takers) < len(symbols):
         values = [values[k] for k in takers]
     if len(values) != len(takers):

@@ -91,6 +91,18 @@ NEEDED = {
 }
 """Fields that must be there."""
 
+KINDS: dict[type, tuple[str, frozenset[str]]] = {
+    str: (
+        "a text",
+        frozenset({"name", "description", "source", "frame", "symbol", "pairs", "type", "a", "b", "freedom", "link"}),
+    ),
+    bool: ("true or false", frozenset({"unphysical", "directed", "square_second", "at_b"})),
+    dict: ("a table", frozenset({"expected"})),
+}
+"""Fields that hold a text, a truth value or a table, wherever they stand alone (``frame`` of a component is a number)."""
+OTHERWISE = {"file": {"link"}, "component": {"frame"}}
+"""Fields of a table to which ``KINDS`` does not apply."""
+
 
 class _Reader:
     """Reads tables into constructor arguments and collects the faults of a file."""
@@ -113,6 +125,10 @@ class _Reader:
             else:
                 known = [*FIELDS[kind], *(f"{a}_deg" for a in ANGLES.get(kind, ()))]
                 self.faults.append(f"{where}: unknown field {key!r} (fields: {', '.join(known)})")
+        for want, (words, keys) in KINDS.items():
+            for key in (keys - OTHERWISE.get(kind, set())) & out.keys():
+                if not isinstance(out[key], want):
+                    self.faults.append(f"{where}.{key} = {out[key]!r}: expected {words}")
         missing = [key for key in NEEDED.get(kind, ()) if key not in out]
         if missing:
             self.faults.append(f"{where}: field{'s' if len(missing) > 1 else ''} {', '.join(missing)} missing")
@@ -157,7 +173,15 @@ def _parts(reader: _Reader, kind: str, cls: Any, items: Any, where: str) -> Any:
     for item in items:
         if isinstance(item, Mapping):
             fields = reader.table(kind, item, where)
-            item = reader.made(where, cls, **{k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()})
+            wrong = [
+                key for key in ("twist", "wrench", "per_pitch") if key in fields and not is_numeric(fields[key], (6,))
+            ]
+            reader.faults += [f"{where}.{key} = {fields[key]!r}: expected six finite numbers" for key in wrong]
+            item = (
+                None
+                if wrong
+                else reader.made(where, cls, **{k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()})
+            )
         out.append(item)
     return out
 
@@ -206,7 +230,7 @@ def _loads(reader: _Reader, raw: Any) -> list[Any]:
     out = []
     for where, entry in reader.tables("load", raw):
         kind = entry.get("kind") if isinstance(entry, Mapping) else None
-        if kind not in LOADS:
+        if not isinstance(kind, str) or kind not in LOADS:
             reader.faults.append(f"{where}: kind {kind!r}: expected one of {', '.join(LOADS)}")
             continue
         fields = reader.table(f"load {kind}", entry, where)
