@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
@@ -205,7 +206,7 @@ class Mechanism:
         return Mechanism(**{**self._arguments(), **changes})
 
     def with_pair_type(self, pair: str, type: str | PairType, *, pitch: float | None = None) -> Mechanism:
-        """A copy in which one pair has another type, at the same markers; drives of freedoms that are gone are dropped."""
+        """A copy in which one pair has another type, at the same markers; drives that it cannot take are dropped."""
         old = self.pair(pair)
         new = Pair(
             old.name,
@@ -222,10 +223,19 @@ class Mechanism:
             kept = {"pitch": old.pitch, "lead": old.lead} if pitch is None else {"pitch": pitch}
             new = new.replace(**kept)
         gone = set(old.freedom_names) - set(new.freedom_names if isinstance(new.type, PairType) else ())
-        drives = [d for d in self.drives if self.full_name(d.freedom) not in gone]
+        known = new.type if isinstance(new.type, PairType) else old.type
+        able = {n for n, single in zip(new.freedom_names, known.drivable, strict=True) if single}
+        lost = set(old.freedom_names) - able
+        drives = [
+            dataclasses.replace(d, freedom=name) for d in self.drives if (name := self.full_name(d.freedom)) not in lost
+        ]
+        loads = [
+            dataclasses.replace(load, freedom=self.full_name(load.freedom)) if hasattr(load, "freedom") else load
+            for load in self.loads
+        ]
         start = {k: v for k, v in self.start.items() if k not in gone}
         pairs = [new if p.name == pair else p for p in self.pairs]
-        return self.replace(pairs=pairs, drives=drives, start=start)
+        return self.replace(pairs=pairs, drives=drives, loads=loads, start=start)
 
     def to_units(self, **units: str) -> Mechanism:
         """The same mechanism in other units, e.g. ``m.to_units(length="mm", mass="g")`` (``units`` extra).
@@ -251,7 +261,7 @@ class Mechanism:
             return None if m is None else Marker(at(m.point), turned(m.axis), turned(m.second))
 
         links = [
-            replace(
+            dataclasses.replace(
                 link,
                 center=at(link.center),
                 inertia=None if link.inertia is None else plain(_symmetric(R @ np.asarray(link.inertia) @ R.T)),

@@ -63,6 +63,12 @@ class Freedoms:
         """Smallest kept singular value over the largest; 1 where there is no constraint."""
         return float(self.sigma[self.rank - 1] / self.sigma[0]) if self.rank else 1.0
 
+    @property
+    def dropped(self) -> float:
+        """Largest dropped singular value over the largest; 0 where none is dropped."""
+        rest = self.sigma[self.rank :]
+        return float(rest[0] / self.sigma[0]) if rest.size and self.sigma[0] > 0 else 0.0
+
 
 def free_motion(system: System, x: Array, columns: Index) -> Freedoms:
     """Mobility at a closed state ``x (nx,)`` and what drivers in ``columns`` leave free."""
