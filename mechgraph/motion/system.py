@@ -315,7 +315,7 @@ class Configuration:
     def loop_sums(self, per_pair: Array) -> Array:
         """Signed sum of pair terms along every loop, stacked ``(6 loops, T)``."""
         sums = np.einsum("lp,ipt->lit", self.system.graph.loop_matrix, per_pair)
-        return sums.reshape(-1, per_pair.shape[2])
+        return sums.reshape(sums.shape[0] * sums.shape[1], per_pair.shape[2])
 
     def link_accelerations(self, dq: Array, ddq: Array, V: Array) -> Array:
         """Accelerations dV/dt of all links ``(6, N, T)``."""
