@@ -87,6 +87,9 @@ class Positions:
     here: Configuration | None = None
 
 
+Case = tuple[Array, Index, np.ndarray, Array, Configuration | None]
+
+
 class Follower:
     """Follows driver paths on one system. ``columns`` are the driven freedoms, ``keep`` freedoms preferably held."""
 
@@ -258,17 +261,34 @@ class Follower:
         which = np.zeros((C, N), dtype=np.intp)
         reached = np.empty((d, C))
         for c in range(C):
-            stops = np.zeros(0, dtype=np.intp)
-            for _ in range(4):
-                track = self.track(x, values[:, c], stops)
-                states, choice_of, bad, here = self._between(track, values[:, c])
-                if not bad.any():
-                    break
-                stops = np.union1d(stops, np.flatnonzero(bad))
-            out[:, c], which[c] = states, choice_of
-            status[c] = self._statuses(track, values[:, c], states, bad)
-            reached[:, c] = track.nodes[-1].drive
+            done = self._case(x, values[:, c])
+            if N > 1 and (done[2] != Status.OK).all():
+                done = self._both_ways(x, values[:, c], done)
+            out[:, c], which[c], status[c], reached[:, c], here = done
         return Positions(out, status, self.choices, which, reached, here if C == 1 else None)
+
+    def _case(self, x: Array, values: Array) -> Case:
+        """States, choices, statuses, last driver values reached and evaluation of one case."""
+        stops = np.zeros(0, dtype=np.intp)
+        for _ in range(4):
+            track = self.track(x, values, stops)
+            states, choice_of, bad, here = self._between(track, values)
+            if not bad.any():
+                break
+            stops = np.union1d(stops, np.flatnonzero(bad))
+        return states, choice_of, self._statuses(track, values, states, bad), track.nodes[-1].drive, here
+
+    def _both_ways(self, x: Array, values: Array, failed: Case) -> Case:
+        """A path whose first position cannot be reached, entered at its position nearest to the start and followed both ways."""
+        near = int(np.argmin(((values - x[self.rows][:, None]) ** 2).sum(axis=0)))
+        ahead = self._case(x, values[:, near:])
+        behind = self._case(x, values[:, near::-1])
+        if (ahead[2] != Status.OK).all():
+            return failed
+        states, choice_of, status = (
+            np.concatenate([b[..., :0:-1], a], axis=-1) for a, b in zip(ahead[:3], behind[:3], strict=True)
+        )
+        return states, choice_of, status, failed[3], None
 
     def _statuses(self, track: Track, values: Array, states: Array, bad: Array) -> np.ndarray:
         status = np.full(values.shape[1], Status.OK, dtype=object)
