@@ -38,7 +38,7 @@ CORRECTION = 0.06
 """Largest correction that a node may need; keeps the continuation on its branch."""
 AIM = 0.005
 """Correction that the step control aims at."""
-SINGULAR = 1e10
+SINGULAR = 1e9
 """Condition number of the closure equations above which a position counts as a dead point."""
 
 
@@ -236,7 +236,8 @@ class Follower:
         following = self.node(here, at, drive, choice)
         if following.condition > 1e3:
             other = self.node(here, at, drive, self.choose_at(here))
-            if other.condition < 0.2 * following.condition:
+            same_rank = len(self.choices[other.choice].cols) == len(self.choices[choice].cols)
+            if same_rank and other.condition < 0.2 * following.condition:
                 following = other
             else:
                 self.choices.pop()
