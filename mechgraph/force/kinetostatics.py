@@ -119,7 +119,7 @@ class _Run:
     def positions(self) -> Positions:
         """All positions, followed along the last batch axis."""
         cases = int(np.prod(self.batch[:-1]))
-        path = self.values("position").reshape(len(self.columns), cases, -1)
+        path = self.values("position").reshape(len(self.columns), cases, self_length(self.batch))
         return Follower(self.system, self.columns, self.freedoms.hold).follow(self.x, path)
 
     def move(self) -> tuple[Motions, ChosenSystem, Positions]:

@@ -22,6 +22,8 @@ CONVERGED = 1e-12
 """Closure residual at which Newton stops."""
 LONGEST_STEP = 0.35
 """Longest step between nodes, in driver space (radians, or lengths / L)."""
+STRAIGHT = 0.98
+"""Smallest ratio of chord to path between two nodes; a path that bends or turns back gets a node there."""
 SHORTEST_STEP = 1e-7
 """Step at which the continuation gives up."""
 CORRECTION = 0.06
@@ -128,19 +130,23 @@ class Follower:
 
     # --- one case ------------------------------------------------------------------------------------------------------
 
-    def track(self, x: Array, values: Array, longest: float = LONGEST_STEP) -> Track:
-        """Follow driver values ``(d, N)`` from the closed state ``x (nx,)``; path points are the start and all values."""
+    def track(self, x: Array, values: Array, stops: Index | None = None) -> Track:
+        """Follow driver values ``(d, N)`` from the closed state ``x (nx,)``; path points are the start and all values.
+
+        Nodes do not pass over the positions in ``stops``.
+        """
         points = np.concatenate([x[self.rows][:, None], values], axis=1)
         lengths = np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(points, axis=1) ** 2).sum(axis=0)))])
         here = self.system.at(x[:, None])
         track = Track([self.node(here, 0.0, points[:, 0], self.choose_at(here))])
         if track.nodes[0].condition > SINGULAR:
             track.end = Status.DEAD_POINT
-        h = min(0.05, longest)
+        halts = lengths[1:][stops] if stops is not None else np.zeros(0)
+        h = 0.05
         end = lengths[-1]
         while track.nodes[-1].at < end and track.end is Status.OK:
             last = track.nodes[-1]
-            at = self._next(lengths, last.at, h)
+            at = self._next(points, lengths, last, h, halts)
             drive = np.array([np.interp(at, lengths, row) for row in points])
             following, correction, why = self._step(track.nodes, at, drive)
             if following is None:
@@ -150,14 +156,20 @@ class Follower:
             else:
                 track.nodes.append(following)
                 h = (at - last.at) * min(2.0, max(0.5, (0.5 * CORRECTION / max(correction, 1e-9)) ** (1 / 3)))
-                h = min(max(h, 10 * SHORTEST_STEP), longest)
+                h = min(max(h, 10 * SHORTEST_STEP), LONGEST_STEP)
         return track
 
     @staticmethod
-    def _next(lengths: Array, at: float, h: float) -> float:
-        """The furthest path point within ``h``, or the place at ``h`` where none is within."""
-        ahead = lengths[(lengths > at) & (lengths <= at + h)]
-        return float(ahead[-1]) if ahead.size else float(min(at + h, lengths[-1]))
+    def _next(points: Array, lengths: Array, last: Node, h: float, halts: Array) -> float:
+        """The furthest path point within ``h`` to which the path is straight, or the place at ``h`` where none is within."""
+        ahead = np.flatnonzero((lengths > last.at) & (lengths <= last.at + h))
+        between = halts[(halts > last.at) & (halts <= last.at + h)]
+        if not ahead.size:
+            return float(min(last.at + h, lengths[-1]))
+        distance = np.sqrt(((points[:, ahead] - last.drive[:, None]) ** 2).sum(axis=0))
+        bent = np.flatnonzero(distance < STRAIGHT * (lengths[ahead] - last.at))
+        furthest = ahead[max(int(bent[0]) - 1, 0)] if bent.size else ahead[-1]
+        return float(min([lengths[furthest], *between]))
 
     def _step(self, nodes: list[Node], at: float, drive: Array) -> tuple[Node | None, float, Status]:
         last = nodes[-1]
@@ -216,13 +228,13 @@ class Follower:
         which = np.zeros((C, N), dtype=np.intp)
         reached = np.empty((d, C))
         for c in range(C):
-            longest = LONGEST_STEP
-            for _ in range(3):
-                track = self.track(x, values[:, c], longest)
+            stops = np.zeros(0, dtype=np.intp)
+            for _ in range(4):
+                track = self.track(x, values[:, c], stops)
                 states, choice_of, bad = self._between(track, values[:, c])
                 if not bad.any():
                     break
-                longest /= 4
+                stops = np.union1d(stops, np.flatnonzero(bad))
             out[:, c], which[c] = states, choice_of
             status[c] = self._statuses(track, values[:, c], states, bad)
             reached[:, c] = track.nodes[-1].drive
@@ -271,7 +283,7 @@ class Follower:
         chord = np.diff(drive, axis=1)
         width = place[right] - place[left]
         u = np.where(width > 0, (at - place[left]) / np.where(width > 0, width, 1.0), 1.0)
-        if not len(chord[0]):
+        if not chord.shape[1]:
             dq = np.einsum("fdt,dt->ft", Z[:, :, left], values - drive[:, left])
         else:
             i = np.minimum(left, len(nodes) - 2)

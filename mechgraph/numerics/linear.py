@@ -28,6 +28,10 @@ def rank_of(sigma: Array, tolerance: float = RANK_TOLERANCE) -> int:
     return int((sigma > tolerance * sigma[0]).sum()) if sigma.size and sigma[0] > 0 else 0
 
 
+KEEP = 0.1
+"""Part of the smallest singular value that may be lost by holding the columns that are asked for."""
+
+
 @dataclass(frozen=True)
 class Choice:
     """Independent rows and columns of a matrix: ``A[rows][:, cols]`` is square and regular.
@@ -44,14 +48,17 @@ class Choice:
 def choose(A: Array, fixed: Index, tolerance: float = RANK_TOLERANCE, keep: Index | None = None) -> Choice:
     """Choose independent columns outside ``fixed`` and independent rows, by QR with column pivoting.
 
-    Columns in ``keep`` are held over if the others have the same rank.
+    Columns in ``keep`` are held over if the others have the same rank and are not much worse conditioned.
     """
     free = np.setdiff1d(np.arange(A.shape[1]), fixed)
     if keep is not None and keep.size:
         others = np.setdiff1d(free, keep)
-        if rank_of(singular_values(A[:, others]), tolerance) == rank_of(singular_values(A[:, free]), tolerance):
+        with_keep, without = singular_values(A[:, free]), singular_values(A[:, others])
+        rank = rank_of(with_keep, tolerance)
+        if rank_of(without, tolerance) == rank and (rank == 0 or without[rank - 1] > KEEP * with_keep[rank - 1]):
             inner = choose(A, np.union1d(fixed, keep), tolerance)
-            return Choice(inner.rows, inner.cols, np.sort(np.concatenate([inner.held, keep])), np.asarray(fixed, dtype=np.intp))
+            held = np.sort(np.concatenate([inner.held, keep]))
+            return Choice(inner.rows, inner.cols, held, np.asarray(fixed, dtype=np.intp))
     sub = A[:, free]
     rank = rank_of(singular_values(sub), tolerance)
     if rank == 0:

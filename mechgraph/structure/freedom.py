@@ -165,14 +165,12 @@ def _passive(here: Configuration, left: Array) -> list[PassiveMotion]:
             continue
         border = [k for k, (a, b) in enumerate(system.graph.ends) if (a in cluster) != (b in cluster)]
         others = [i for i in range(V.shape[1]) if i not in cluster]
-        alone = null_space(V[:, others].reshape(-1, left.shape[1]), STILL)
+        alone = _small_combinations(V[:, others].reshape(-1, left.shape[1]) / np.abs(V).max(), STILL)
         if len(border) < 2 or not alone.shape[1]:
-            continue
-        if np.abs(V[:, others] @ alone).max(initial=0.0) > STILL * np.abs(V).max():
             continue
         moves = left @ alone
         leaving = np.stack([_leaving(here, border, dq) for dq in moves.T], axis=1)
-        still = _small_combinations(leaving)
+        still = _small_combinations(leaving, IN_PLACE)
         for rates in (moves @ still).T:
             rates = rates / np.abs(rates).max()
             rates = rates * np.sign(rates[np.argmax(np.abs(rates) > 1 - 1e-9)])
@@ -181,10 +179,10 @@ def _passive(here: Configuration, left: Array) -> list[PassiveMotion]:
     return out
 
 
-def _small_combinations(leaving: Array) -> Array:
-    """Combinations of columns for which all rows vanish, against an absolute tolerance."""
-    _, s, Vt = np.linalg.svd(leaving, full_matrices=True)
-    small = np.concatenate([s, np.zeros(Vt.shape[0] - len(s))]) < IN_PLACE
+def _small_combinations(rows: Array, tolerance: float) -> Array:
+    """Orthonormal combinations of columns for which all rows vanish, against an absolute tolerance."""
+    _, s, Vt = np.linalg.svd(rows, full_matrices=True)
+    small = np.concatenate([s, np.zeros(Vt.shape[0] - len(s))]) < tolerance
     return np.asarray(Vt[small].T)
 
 

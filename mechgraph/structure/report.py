@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.screw import null_space
-from mechgraph.algebra.se3 import Array, cross
+from mechgraph.algebra.se3 import Array
 from mechgraph.document import Bullets, Document, Heading, Paragraph, Table, to_html, to_markdown, to_text
 from mechgraph.errors import AssemblyError
 from mechgraph.formulation.build import formulate
@@ -309,8 +309,9 @@ def uniqueness(system: System, x: Array, driven: Index) -> tuple[dict[str, dict[
 def screw_axis(system: System, twist: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """A point and the direction of the axis of a twist (of the slide where it does not turn), in the global frame."""
     w, v = twist[:3], twist[3:]
+    point: Array
     if np.linalg.norm(w) > 1e-9 * max(1.0, float(np.linalg.norm(v))):
-        point = cross(w, v) / (w @ w)
+        point = np.cross(w, v) / (w @ w)
         direction = w / np.linalg.norm(w)
     else:
         point, direction = np.zeros(3), v / np.linalg.norm(v)
