@@ -23,7 +23,7 @@ class _Path:
         return inside + max(0.0, s - self.end) * self.slope(self.end)
 
 
-def fold_before_the_end(m, given, step=2e-3, steps=4000):
+def fold_before_the_end(m, given, step=1e-2, steps=1000):
     """Whether the curve of closed positions over the driver path turns back (or runs off) before the path ends."""
     system, x = assembled(m, {k: float(np.ravel(v.position)[0]) for k, v in given.items()})
     columns, _ = named_columns(m, system, dict.fromkeys(given, 0.0))
