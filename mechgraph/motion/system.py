@@ -252,7 +252,7 @@ class Configuration:
     def residual(self) -> Array:
         """Closure errors of the loops, stacked ``(6 loops, T)``."""
         loops = np.einsum("lc,ict->lit", self.system.loops_of_chords, self.chord_errors)
-        return loops.reshape(-1, self.T)
+        return loops.reshape(6 * len(loops), self.T)
 
     @cached_property
     def J(self) -> Array:
@@ -305,7 +305,7 @@ class Configuration:
     def loop_sums(self, per_pair: Array) -> Array:
         """Signed sum of pair terms along every loop, stacked ``(6 loops, T)``."""
         sums = np.einsum("lp,ipt->lit", self.system.graph.loop_matrix, per_pair)
-        return sums.reshape(-1, per_pair.shape[2])
+        return sums.reshape(6 * len(sums), per_pair.shape[2])
 
     def link_accelerations(self, dq: Array, ddq: Array, V: Array) -> Array:
         """Accelerations dV/dt of all links ``(6, N, T)``."""
