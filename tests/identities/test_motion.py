@@ -24,18 +24,25 @@ TYPES = [s for s, row in mg.pair_types().items() if row.f]
 
 
 def slow_enough(m, seed):
-    """Times, motions and solution: the motion shortened until positions are resolved to rounding by their interpolant."""
+    """Times, motions and solution: the motion shortened until positions are resolved to rounding by their interpolant; or None."""
     span = 0.4
-    for _ in range(7):
+    for _ in range(6):
         t = chebyshev_times(0.0, span, NODES)
         given = motions(m, seed, t)
         s = mg.kinematics(m, given, on_reach="flag")
-        if (s.status == "ok").all():
+        if given and (s.status == "ok").all():
             tails = [chebyshev_rate(t, s[p.name].position)[1] * span for p in m.pairs if p.type.f]
             if max(tails) < 1e-9:
                 return t, given, s
         span /= 3
-    pytest.skip("stands at a dead point")
+    return None
+
+
+def moving(seed, **more):
+    """A random mechanism that moves, its times, motions and solution; the next seed where this one stands at a dead point."""
+    m = with_drives(closed_mechanism(seed, **more), seed)
+    found = None if m is None else slow_enough(m, seed)
+    return moving(seed + 1000, **more) if found is None else (m, *found)
 
 
 def assert_rate(t, values, rate, what):
@@ -43,13 +50,6 @@ def assert_rate(t, values, rate, what):
     size = max(np.abs(rate).max(initial=0.0), np.abs(got).max(initial=0.0), np.abs(np.ptp(values, axis=0)).max(initial=0) / (t[-1] - t[0]), 1e-3)
     error = np.abs(got - rate).max(initial=0.0)
     assert error < 1e-6 * size + 10 * tail, f"{what}: {error:.3g} of {size:.3g}"
-
-
-def driven(seed, **more):
-    m = with_drives(closed_mechanism(seed, **more), seed)
-    if m is None:
-        pytest.skip("what is left free cannot be driven")
-    return m
 
 
 def assert_all_rates(m, t, s):
@@ -78,10 +78,9 @@ def assert_all_rates(m, t, s):
             assert_rate(t, k.center_velocity, k.center_acceleration, f"{name} center acceleration")
 
 
-@pytest.mark.parametrize("seed", range(24))
+@pytest.mark.parametrize("seed", range(16))
 def test_rates_are_the_derivatives_of_positions(seed):
-    m = driven(seed)
-    t, _, s = slow_enough(m, seed)
+    m, t, _, s = moving(seed)
     assert s.checks.closure.max() < 1e-10
     assert_all_rates(m, t, s)
 
@@ -92,8 +91,7 @@ def test_rates_are_the_derivatives_of_positions_for_every_pair_type(symbol):
     f = mg.pair_types()[symbol].f
     rest = {1: ["S", "C", "R"], 2: ["S", "R", "R"], 3: ["R", "C", "R"], 4: ["C", "R"], 5: ["R", "R"]}[f]
     for seed in (100, 101):
-        m = driven(seed, symbols=[symbol, *rest], loops=1, branches=0)
-        t, _, s = slow_enough(m, seed)
+        m, t, _, s = moving(seed, symbols=[symbol, *rest], loops=1, branches=0)
         assert_all_rates(m, t, s)
 
 
@@ -107,9 +105,10 @@ def test_rates_are_the_derivatives_of_positions_for_chains_assembled_from_an_ope
         except mg.AssemblyError:
             continue
         m = with_drives(m, seed)
-        if m is None:
+        found = None if m is None else slow_enough(m, seed)
+        if found is None:
             continue
-        t, _, s = slow_enough(m, seed)
+        t, _, s = found
         assert s.checks.closure.max() < 1e-10
         assert_all_rates(m, t, s)
         solved += 1
@@ -119,7 +118,9 @@ def test_rates_are_the_derivatives_of_positions_for_chains_assembled_from_an_ope
 def test_markers_link_by_link_meet_at_every_position():
     """T_b B = T_a A D: axis and point of marker B stay where the type of the pair wants them on A."""
     m = with_drives(mg.assemble(open_chain(2, "RCSR"), {}), 2)
-    _, _, s = slow_enough(m, 2)
+    found = slow_enough(m, 2)
+    assert found
+    s = found[2]
     for p in m.pairs:
         a, b = s.link(p.a).pose, s.link(p.b).pose
         pa, pb = (X @ np.array([*k.point, 1.0]) for X, k in ((a, p.on_a), (b, p.on_b)))
@@ -133,10 +134,13 @@ def test_markers_link_by_link_meet_at_every_position():
             np.testing.assert_allclose(za, zb, atol=1e-10)
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", range(40))
 def test_what_is_not_reached_has_a_turning_point_before_it(seed):
     """Positions that are refused: an arc-length continuation of its own finds that the drivers turn back before."""
-    m = driven(seed)
+    m = with_drives(closed_mechanism(seed), seed)
+    if m is None:
+        assert any("R" in name.rpartition(".")[2] for name in mg.check(closed_mechanism(seed)).undriven[0].names)
+        return
     t = chebyshev_times(0.0, 0.4, 9)
     given = motions(m, seed, t)
     try:
@@ -150,8 +154,7 @@ def test_what_is_not_reached_has_a_turning_point_before_it(seed):
 
 @pytest.mark.parametrize("seed", range(8))
 def test_going_back_meets_the_positions_of_going_there(seed):
-    m = driven(seed)
-    t, given, _ = slow_enough(m, seed)
+    m, t, given, _ = moving(seed)
     there = {name: v.position for name, v in given.items()}
     both = {name: np.concatenate([x, x[::-1]]) for name, x in there.items()}
     s = mg.kinematics(m, both)
@@ -162,8 +165,7 @@ def test_going_back_meets_the_positions_of_going_there(seed):
 
 @pytest.mark.parametrize("seed", range(8))
 def test_positions_do_not_depend_on_how_finely_they_are_asked(seed):
-    m = driven(seed)
-    _, given, s = slow_enough(m, seed)
+    m, _, given, s = moving(seed)
     coarse = mg.kinematics(m, {name: v.position[::6] for name, v in given.items()})
     one = mg.kinematics(m, {name: float(v.position[-1]) for name, v in given.items()})
     for k in m.links:
@@ -176,8 +178,7 @@ def test_positions_do_not_depend_on_how_finely_they_are_asked(seed):
 
 def test_driving_another_freedom_of_the_same_motion_gives_the_same_motion():
     """Four-bar: drive the crank, read the rocker; drive the rocker with that, get the crank back."""
-    m = driven(3, loops=1, mobility=1, branches=0)
-    t, given, s = slow_enough(m, 3)
+    m, t, given, s = moving(3, loops=1, mobility=1, branches=0)
     name = m.full_name(m.drives[0].freedom)
     k, j = m.freedom(name)
     for finding in mg.check(m).drivable:
@@ -194,8 +195,7 @@ def test_driving_another_freedom_of_the_same_motion_gives_the_same_motion():
 
 
 def test_batch_axes_before_the_last_are_independent_cases():
-    m = driven(3, loops=1, mobility=1, branches=0)
-    t, given, s = slow_enough(m, 3)
+    m, t, given, s = moving(3, loops=1, mobility=1, branches=0)
     name, motion = next(iter(given.items()))
     cases = np.stack([motion.position, 0.5 * motion.position, motion.position[::-1] * 0.2])
     whole = mg.kinematics(m, {name: mg.Motion(cases, 1.0)})
@@ -209,8 +209,7 @@ def test_batch_axes_before_the_last_are_independent_cases():
 
 @pytest.mark.parametrize("seed", range(6))
 def test_kinematics_of_the_moved_mechanism_is_the_moved_kinematics(seed):
-    m = driven(seed)
-    _, given, s = slow_enough(m, seed)
+    m, _, given, s = moving(seed)
     X = pose(np.random.default_rng(seed), 30.0)
     moved = mg.kinematics(m.moved(X), given)
     for p in m.pairs:
