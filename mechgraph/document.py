@@ -51,9 +51,7 @@ def _strings(values: Sequence[str], what: str) -> tuple[str, ...]:
         raise TypeError(f"{what} must be a sequence of strings, not the single string {values!r}")
     wrong = [value for value in values if not isinstance(value, str)]
     if wrong:
-        raise TypeError(
-            f"{what} must be strings, got {wrong[0]!r}; format numbers before they enter a document"
-        )
+        raise TypeError(f"{what} must be strings, got {wrong[0]!r}; format numbers before they enter a document")
     return tuple(values)
 
 
@@ -92,9 +90,7 @@ class Bullets:
         """Copy the items into tuples."""
         if isinstance(self.items, str):
             raise TypeError(f"items must be a sequence, not the single string {self.items!r}")
-        items = tuple(
-            item if isinstance(item, str) else _strings(item, "nested items") for item in self.items
-        )
+        items = tuple(item if isinstance(item, str) else _strings(item, "nested items") for item in self.items)
         if items and not isinstance(items[0], str):
             raise ValueError(f"nested items {items[0]!r} stand below no item; put a string before them")
         object.__setattr__(self, "items", items)

@@ -293,9 +293,7 @@ def test_html_escapes_everywhere():
 
 
 def test_html_nested_bullets_and_empty_cells():
-    assert to_html(body(Bullets(["a", ["b"], "c"]))) == (
-        "<ul>\n<li>a<ul><li>b</li></ul></li>\n<li>c</li>\n</ul>\n"
-    )
+    assert to_html(body(Bullets(["a", ["b"], "c"]))) == ("<ul>\n<li>a<ul><li>b</li></ul></li>\n<li>c</li>\n</ul>\n")
     assert '<td style="text-align: left"></td>' in to_html(body(Table([], [["", "b"]])))
 
 

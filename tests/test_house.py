@@ -120,9 +120,7 @@ def test_the_check_finds_a_branch_on_a_symbol(code: str) -> None:
     assert lines_with(BRANCH_ON_SYMBOL, code)
 
 
-@pytest.mark.parametrize(
-    "code", ['PAIR_TYPES["R"]', 'symbol = "R"', "if symbol in PAIR_TYPES:", 'f(kind="R")']
-)
+@pytest.mark.parametrize("code", ['PAIR_TYPES["R"]', 'symbol = "R"', "if symbol in PAIR_TYPES:", 'f(kind="R")'])
 def test_the_check_passes_a_look_up(code: str) -> None:
     assert not lines_with(BRANCH_ON_SYMBOL, code)
 

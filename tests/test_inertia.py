@@ -79,9 +79,7 @@ def test_cylinder_takes_axes_of_any_length():
 
 def test_thin_cylinder_is_a_rod():
     thin = inertia.cylinder(3.0, 1e-9, 2.0, (1, 1, 0))
-    np.testing.assert_allclose(
-        thin, inertia.rod(3.0, (0, 0, 0), np.sqrt(2) * np.array([1, 1, 0])), atol=1e-15
-    )
+    np.testing.assert_allclose(thin, inertia.rod(3.0, (0, 0, 0), np.sqrt(2) * np.array([1, 1, 0])), atol=1e-15)
 
 
 def test_sphere_closed_form_and_rotation(turn):

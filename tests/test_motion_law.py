@@ -79,9 +79,7 @@ def test_copies_are_equal_and_read_only():
 
 def test_repr_is_short():
     assert repr(Motion(0.5, 10)) == "Motion(position=0.5, velocity=10, acceleration=0)"
-    assert repr(Motion(np.arange(360.0), 10)) == (
-        "Motion(shape=(360,), position=0..359, velocity=10, acceleration=0)"
-    )
+    assert repr(Motion(np.arange(360.0), 10)) == ("Motion(shape=(360,), position=0..359, velocity=10, acceleration=0)")
 
 
 @pytest.mark.parametrize(
@@ -130,9 +128,7 @@ def test_rates_are_the_derivatives_with_second_order(name):
         ahead, behind = rise(name, t + h), rise(name, t - h)
         velocity = (ahead.position - behind.position) / (2 * h)
         acceleration = (ahead.velocity - behind.velocity) / (2 * h)
-        errors.append(
-            [np.abs(velocity - motion.velocity).max(), np.abs(acceleration - motion.acceleration).max()]
-        )
+        errors.append([np.abs(velocity - motion.velocity).max(), np.abs(acceleration - motion.acceleration).max()])
     np.testing.assert_allclose(np.log2(np.divide(*errors)), 2.0, atol=0.05)
     assert errors[1][0] < 1e-3 * np.abs(motion.velocity).max()
 

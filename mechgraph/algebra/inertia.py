@@ -180,9 +180,7 @@ def sphere(mass: float, radius: float) -> Array:
     return np.asarray(0.4 * _mass(mass) * _length(radius, "sphere: radius") ** 2 * np.eye(3))
 
 
-def from_components(
-    xx: float, yy: float, zz: float, xy: float = 0.0, xz: float = 0.0, yz: float = 0.0
-) -> Array:
+def from_components(xx: float, yy: float, zz: float, xy: float = 0.0, xz: float = 0.0, yz: float = 0.0) -> Array:
     """Return the tensor of given moments and products of inertia.
 
     I = [[xx, -xy, -xz], [-xy, yy, -yz], [-xz, -yz, zz]].

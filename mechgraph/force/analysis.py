@@ -11,6 +11,13 @@ import numpy as np
 from mechgraph.algebra.se3 import Array, cross, rotate
 from mechgraph.errors import MechgraphError
 from mechgraph.force.methods import Wrenches, given_effort_loads, internal_state
+from mechgraph.force.site import Site, kinetic_power, user_poses, user_twists
+from mechgraph.formulation.state import State
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.motion.rates import Rates
+from mechgraph.motion.system import Configuration, Index
+from mechgraph.numerics.linear import add_at
+from mechgraph.result.solution import Checks, MaterialPoint
 from mechgraph.structure.reaction import (
     UNIQUE,
     PairFrames,
@@ -21,12 +28,6 @@ from mechgraph.structure.reaction import (
     pair_power,
     reaction_part,
 )
-from mechgraph.force.site import Site, kinetic_power, user_poses, user_twists
-from mechgraph.formulation.state import State
-from mechgraph.model.mechanism import Mechanism
-from mechgraph.motion.rates import Rates
-from mechgraph.motion.system import Configuration, Index
-from mechgraph.result.solution import Checks, MaterialPoint
 
 
 @dataclass(frozen=True)
@@ -113,7 +114,11 @@ class Analysis:
         unit = np.where(self._system.is_length[columns], self._L, 1.0)[:, None]
         position = np.moveaxis(self.user_coordinates[columns], 0, -1).copy()
         position.setflags(write=False)
-        return position, self._out(unit * self.motions.rates.dq[columns]), self._out(unit * self.motions.rates.ddq[columns])
+        return (
+            position,
+            self._out(unit * self.motions.rates.dq[columns]),
+            self._out(unit * self.motions.rates.ddq[columns]),
+        )
 
     @cached_property
     def _poses(self) -> Array:
@@ -243,7 +248,9 @@ class Analysis:
         names = self.mechanism.freedom_names()
         columns = sorted({int(c) for held in self.motions.held for c in held})
         unit = self._effort_units(np.array(columns, dtype=np.intp)) if columns else None
-        return {names[c]: self._out(unit[i] * self._driver_efforts[c]) for i, c in enumerate(columns) if unit is not None}
+        return {
+            names[c]: self._out(unit[i] * self._driver_efforts[c]) for i, c in enumerate(columns) if unit is not None
+        }
 
     # --- checks and states -----------------------------------------------------------------------------------------------
 
@@ -261,8 +268,8 @@ class Analysis:
         given = self._need_forces().site.scaled_efforts()
         totals = reactions + here.pair_sums(here.E * (given + self._driver_efforts))
         balance = self._loads.copy()
-        np.add.at(balance, (slice(None), s.b), totals)
-        np.add.at(balance, (slice(None), s.a), -totals)
+        add_at(balance, s.b, totals)
+        add_at(balance, s.a, -totals)
         balance = np.delete(balance, s.graph.frame, axis=1)
         largest = max(np.abs(totals).max(initial=0.0), np.abs(self._loads).max(initial=0.0))
         residual = np.abs(balance).max(axis=(0, 1), initial=0.0)
@@ -282,10 +289,14 @@ class Analysis:
         """Screws and loads at one position, user's units, global origin."""
         flat = np.arange(int(np.prod(self.batch))).reshape(self.batch)[index]
         if np.ndim(flat):
-            raise MechgraphError(f"state({index!r}): names {np.size(flat)} positions of a batch {self.batch}; give one index an axis")
+            raise MechgraphError(
+                f"state({index!r}): names {np.size(flat)} positions of a batch {self.batch}; give one index an axis"
+            )
         found = np.flatnonzero(self.motions.good == flat)
         if not found.size:
-            raise MechgraphError(f"state({index!r}): this position was not solved ({np.ravel(self.motions.status)[flat]})")
+            raise MechgraphError(
+                f"state({index!r}): this position was not solved ({np.ravel(self.motions.status)[flat]})"
+            )
         at = int(found[0])
         here = self._system.at(self._here.x[:, at : at + 1])
         forces = self.forces
@@ -301,9 +312,18 @@ class Analysis:
             velocities=unit * self.motions.rates.dq[:, spot],
             poses=np.moveaxis(user_poses(here)[..., :3, :], (0, 1), (2, 3)),
             twists=user_twists(here, self.motions.rates.V[:, :, spot]),
-            reactions=tuple(self._user_screws(w, [c.is_couple for c in row.reactions or ()]) for w, row in zip(inner.reactions, rows, strict=True)),
-            efforts=tuple(self._user_screws(w, [c.is_couple for c in row.efforts]) for w, row in zip(inner.efforts, rows, strict=True)),
-            along=tuple(self._user_screws(w, [c.is_couple for c in row.bookkeeping.along] if row.bookkeeping else []) for w, row in zip(inner.along, rows, strict=True)),
+            reactions=tuple(
+                self._user_screws(w, [c.is_couple for c in row.reactions or ()])
+                for w, row in zip(inner.reactions, rows, strict=True)
+            ),
+            efforts=tuple(
+                self._user_screws(w, [c.is_couple for c in row.efforts])
+                for w, row in zip(inner.efforts, rows, strict=True)
+            ),
+            along=tuple(
+                self._user_screws(w, [c.is_couple for c in row.bookkeeping.along] if row.bookkeeping else [])
+                for w, row in zip(inner.along, rows, strict=True)
+            ),
             conditions=tuple(user_twists(here, w) if w.shape[1] else w for w in inner.conditions),
             loads=self._user_wrench(loads),
         )

@@ -82,7 +82,9 @@ def _batch(m: Mechanism, motions: Mapping[str, Motion]) -> tuple[int, ...]:
         return np.broadcast_shapes(*(motion.shape for motion in motions.values()))
     except ValueError:
         shapes = ", ".join(f"{name} {motion.shape}" for name, motion in motions.items())
-        raise DeclarationError(f"solve {m.name!r}", [f"the motions describe different numbers of positions: {shapes}"]) from None
+        raise DeclarationError(
+            f"solve {m.name!r}", [f"the motions describe different numbers of positions: {shapes}"]
+        ) from None
 
 
 class _Run:
@@ -137,7 +139,9 @@ class _Run:
             here = self.system.at(here.x[:, ~dead])
             which = which[~dead]
             solver = closure_solver(here, found.choices, which)
-        moved = rates(here, solver, self.columns, self.values("velocity")[:, good], self.values("acceleration")[:, good])
+        moved = rates(
+            here, solver, self.columns, self.values("velocity")[:, good], self.values("acceleration")[:, good]
+        )
         held = tuple(choice.held for choice in found.choices)
         return Motions(here, moved, self.batch, good, status, self.t, self.columns, held, which), solver, found
 
@@ -150,17 +154,25 @@ def _raise_unreached(run: _Run, motions: Motions, found: Positions, solution: So
         first = int(bad[0])
         case = first // max(1, self_length(run.batch))
         reached = {name: float(v * u) for name, v, u in zip(run.motions, found.reached[:, case], run.unit, strict=True)}
-        asked = {name: float(v) for name, v in zip(run.motions, run.values("position")[:, first] * run.unit, strict=True)}
+        asked = {
+            name: float(v) for name, v in zip(run.motions, run.values("position")[:, first] * run.unit, strict=True)
+        }
         at = ", ".join(f"{name} = {value:.6g}" for name, value in reached.items())
         wanted = ", ".join(f"{name} = {value:.6g}" for name, value in asked.items())
         dead = flat[first] in (Status.DEAD_POINT.value, Status.BEYOND_DEAD_POINT.value)
         if dead:
             raise DeadPointError(
-                f"mechanism {run.m.name!r}: dead point at {at} (asked for position {first}: {wanted}). The drivers do not determine "
-                "the motion there; drive another freedom, stop before it, or use on_reach='flag'", reached, solution)
+                f"mechanism {run.m.name!r}: dead point at {at} (asked for position {first}: {wanted}). The drivers do not "
+                "determine the motion there; drive another freedom, stop before it, or use on_reach='flag'",
+                reached,
+                solution,
+            )
         raise ReachError(
             f"mechanism {run.m.name!r}: position {first} ({wanted}) is out of reach; reached {at}. Use on_reach='flag' for the "
-            "positions that can be reached", reached, solution)
+            "positions that can be reached",
+            reached,
+            solution,
+        )
 
 
 def self_length(batch: tuple[int, ...]) -> int:
@@ -175,7 +187,9 @@ def _check_drivers(run: _Run, motions: Motions) -> None:
         names = ", ".join(run.motions)
         raise IndeterminateError(
             f"mechanism {run.m.name!r}: the drivers {names} contradict each other: their motions cannot be had together "
-            f"(mobility {run.freedoms.mobility}, {len(run.motions)} drivers). Take a driver away, or give motions that agree", check(run.m))
+            f"(mobility {run.freedoms.mobility}, {len(run.motions)} drivers). Take a driver away, or give motions that agree",
+            check(run.m),
+        )
 
 
 def kinematics(m: Mechanism, motions: Mapping[str, Any] | None = None, *, on_reach: str = "raise") -> Solution:
@@ -241,7 +255,9 @@ def _forces(run: _Run, moved: Motions, solver: ChosenSystem, coordinates: Array,
     return Forces(inertia, site, METHODS[method](problem), redundant == "nan")
 
 
-def assemble(m: Mechanism, values: Mapping[str, float] | None = None, guess: Mapping[str, Any] | None = None) -> Mechanism:
+def assemble(
+    m: Mechanism, values: Mapping[str, float] | None = None, guess: Mapping[str, Any] | None = None
+) -> Mechanism:
     """The same mechanism with ``start`` set to closed coordinates at the given values of some freedoms.
 
     From ``start`` the freedoms named are led to their values in small steps, so that the branch is kept; from a ``guess`` the
@@ -251,10 +267,12 @@ def assemble(m: Mechanism, values: Mapping[str, float] | None = None, guess: Map
     ------
     AssemblyError, ReachError
     """
-    wanted = {m.full_name(name): float(value) for name, value in (values or {}).items() if not m.freedom_fault(name, single=True)}
+    wanted = {
+        m.full_name(name): float(value)
+        for name, value in (values or {}).items()
+        if not m.freedom_fault(name, single=True)
+    }
     system, x = assembled_at(m, values or {}, guess)
     q = system.coordinates_of(x[:, None], system.start_coordinates(m.start))[:, 0]
     start = dict(zip(m.freedom_names(), q.tolist(), strict=True)) | wanted
     return m.replace(start=start)
-
-

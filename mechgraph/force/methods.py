@@ -15,7 +15,7 @@ from mechgraph.formulation.build import formulate
 from mechgraph.formulation.registry import Formulation
 from mechgraph.formulation.state import State
 from mechgraph.motion.system import Configuration, Index
-from mechgraph.numerics.linear import Choice, ChosenSystem, choose
+from mechgraph.numerics.linear import Choice, ChosenSystem, add_at, choose
 
 CHUNK = 4_000_000
 """Largest number of matrix entries solved in one batch."""
@@ -71,7 +71,7 @@ def tree_wrenches(here: Configuration, loads: Array) -> Array:
     carried = loads.copy()
     for pairs, forward, parents, children in reversed(here.system.levels):
         out[:, pairs] = np.where(forward[:, None], -1.0, 1.0) * carried[:, children]
-        np.add.at(carried, (slice(None), parents), carried[:, children])
+        add_at(carried, parents, carried[:, children])
     return out
 
 
@@ -97,7 +97,9 @@ def newton_euler(problem: Problem) -> Wrenches:
     return Wrenches(totals, out)
 
 
-def _components_and_efforts(here: Configuration, loads: Array, efforts: Array, driven: Index, held: tuple[int, ...]) -> Wrenches:
+def _components_and_efforts(
+    here: Configuration, loads: Array, efforts: Array, driven: Index, held: tuple[int, ...]
+) -> Wrenches:
     m = here.system.m
     names = m.freedom_names()
     f = formulate(m, "minimal", efforts=[names[c] for c in sorted({*driven.tolist(), *held})])
@@ -146,7 +148,9 @@ def chosen_for_all(A: Array, known: list[Choice]) -> ChosenSystem:
 
 def _null(A: Array, solver: ChosenSystem) -> Array:
     """Basis ``(n, n - r, T)`` of the null space of A: one vector a column that was not chosen."""
-    flipped = ChosenSystem(np.swapaxes(A, 0, 1), [Choice(c.cols, c.rows, c.held, c.fixed) for c in solver.choices], solver.which)
+    flipped = ChosenSystem(
+        np.swapaxes(A, 0, 1), [Choice(c.cols, c.rows, c.held, c.fixed) for c in solver.choices], solver.which
+    )
     return flipped.null_of_transpose()
 
 
@@ -171,8 +175,8 @@ def given_effort_loads(here: Configuration, efforts: Array) -> Array:
     out = np.zeros((6, len(s.m.links), here.T))
     if efforts.any():
         pair = here.pair_sums(here.E * efforts)
-        np.add.at(out, (slice(None), s.b), pair)
-        np.add.at(out, (slice(None), s.a), -pair)
+        add_at(out, s.b, pair)
+        add_at(out, s.a, -pair)
     return out
 
 
@@ -187,8 +191,17 @@ def internal_state(here: Configuration, loads: Array) -> State:
             efforts[k] = here.E[:, g.columns[:, i]]
     along, conditions = here.lee_screws
     nothing = np.zeros((s.n_freedoms, here.T))
-    return State(nothing, nothing, here.poses, np.zeros((6, len(s.m.links), here.T)), tuple(reactions), tuple(efforts),
-                 along, conditions, loads)
+    return State(
+        nothing,
+        nothing,
+        here.poses,
+        np.zeros((6, len(s.m.links), here.T)),
+        tuple(reactions),
+        tuple(efforts),
+        along,
+        conditions,
+        loads,
+    )
 
 
 METHODS: dict[str, Callable[[Problem], Wrenches]] = {"loop_wrench": loop_wrench, "newton_euler": newton_euler}

@@ -36,7 +36,9 @@ class Site:
     Implements ``model.load.LoadSite``. ``external`` holds what comes from outside, ``internal`` what links exert on each other.
     """
 
-    def __init__(self, here: Configuration, rates: Rates, coordinates: Array, batch: tuple[int, ...], good: Any, t: Any) -> None:
+    def __init__(
+        self, here: Configuration, rates: Rates, coordinates: Array, batch: tuple[int, ...], good: Any, t: Any
+    ) -> None:
         self.here, self.rates, self.coordinates = here, rates, coordinates
         self.batch, self.good, self.t = batch, good, t
         system = here.system
@@ -84,8 +86,11 @@ class Site:
     def values(self, value: Value, link: str, width: int) -> Array:
         """A value at every position, ``(width, T)``."""
         if callable(value):
-            value = value(self._spread(user_poses(self.here)[self._link[link]]),
-                          self._spread(np.moveaxis(user_twists(self.here, self.rates.V)[:, self._link[link]], 0, -1)), self.t)
+            value = value(
+                self._spread(user_poses(self.here)[self._link[link]]),
+                self._spread(np.moveaxis(user_twists(self.here, self.rates.V)[:, self._link[link]], 0, -1)),
+                self.t,
+            )
         array = np.asarray(value, dtype=float)
         if width == 1 and (array.ndim == 0 or array.shape[-1:] != (1,) or len(array.shape) <= len(self.batch)):
             array = array[..., None]
@@ -94,7 +99,9 @@ class Site:
         except ValueError:
             raise DeclarationError(
                 f"load on {link!r}",
-                [f"value of shape {np.shape(value)} does not fit the positions {self.batch}; the last axis holds the components"],
+                [
+                    f"value of shape {np.shape(value)} does not fit the positions {self.batch}; the last axis holds the components"
+                ],
             ) from None
         return np.moveaxis(full.reshape(-1, width)[self.good], -1, 0)
 
@@ -159,5 +166,3 @@ def user_twists(here: Configuration, V: Array) -> Array:
 def kinetic_power(rates: Rates, inertia: Array) -> Array:
     """Rate of kinetic energy of every link ``(N, T)``: minus the power of its inertia wrench."""
     return -np.asarray((rates.V * inertia).sum(axis=0))
-
-

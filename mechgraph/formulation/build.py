@@ -35,7 +35,9 @@ class _Draft:
         point = f"P{chr(39) * part.frame}_{k + 1}"
         direction = letter + number
         if part.is_couple:
-            made = Screw(kind, k, index, "", direction, f"{direction}: unit couple {part.name} of pair {self.m.pairs[k].name}")
+            made = Screw(
+                kind, k, index, "", direction, f"{direction}: unit couple {part.name} of pair {self.m.pairs[k].name}"
+            )
         else:
             dual = f"{letter}0{number}"
             turn = f" - rho_{k + 1} {direction}" if any(part.per_pitch) else ""
@@ -48,7 +50,9 @@ class _Draft:
         act += [(unknown, screw, part) for part in range(6) if (made.symbol if part >= 3 else made.dual)]
 
 
-def _along(draft: _Draft, k: int, kind: str, parts: Iterable[Component], act: list[tuple[int, int | None, int]]) -> list[str]:
+def _along(
+    draft: _Draft, k: int, kind: str, parts: Iterable[Component], act: list[tuple[int, int | None, int]]
+) -> list[str]:
     """Unknown multiples of the screws of a pair; returns how each is printed, ``FA_1 A_1``."""
     pair = draft.m.pairs[k]
     printed = []
@@ -89,8 +93,13 @@ def _lee(draft: _Draft, k: int) -> None:
     for letter, offset, couple in (("F", 3, False), ("M", 0, True)):
         for i, axis in enumerate(AXES):
             what = "moment about the origin" if couple else "force"
-            unknown = draft.unknown(f"{letter}_{symbol}{axis}", pair, pair.type.symbol, couple,
-                                    f"free dual {what} of pair {pair.name}, {axis}")
+            unknown = draft.unknown(
+                f"{letter}_{symbol}{axis}",
+                pair,
+                pair.type.symbol,
+                couple,
+                f"free dual {what} of pair {pair.name}, {axis}",
+            )
             act.append((unknown, None, offset + i))
             dual.append(unknown)
     draft.duals[k] = dual
@@ -114,7 +123,7 @@ def _define(draft: _Draft, k: int, printed: list[str]) -> None:
 
 
 def _hat(symbol: str) -> str:
-    """A printed term as LaTeX with hats on dual vectors: ``FA_1 A_1`` -> ``F^{A_{1}} \\hat{A}_{1}``."""
+    r"""A printed term as LaTeX with hats on dual vectors: ``FA_1 A_1`` -> ``F^{A_{1}} \hat{A}_{1}``."""
     words = symbol.split()
     out = []
     for i, word in enumerate(words):
@@ -135,7 +144,14 @@ def _driver_efforts(draft: _Draft, efforts: tuple[str, ...]) -> None:
         pair = draft.m.pairs[k]
         part = pair.type.efforts[j]
         label = "IN" if len(efforts) == 1 else f"IN({name})"
-        unknown = draft.unknown(f"{'M' if part.is_couple else 'F'}_{label}", pair, "driver", part.is_couple, f"effort in {pair.freedom_names[j]}", pair.freedom_names[j])
+        unknown = draft.unknown(
+            f"{'M' if part.is_couple else 'F'}_{label}",
+            pair,
+            "driver",
+            part.is_couple,
+            f"effort in {pair.freedom_names[j]}",
+            pair.freedom_names[j],
+        )
         letter = screw_letter(part)
         screw = draft.screw("efforts", k, j, part, letter)
         draft.carry(draft.acts[k], unknown, screw)
@@ -143,7 +159,8 @@ def _driver_efforts(draft: _Draft, efforts: tuple[str, ...]) -> None:
         eps = "e " if part.is_couple else ""
         symbol = f"{draft.unknowns[unknown].name} {letter}_{k + 1}"
         text = f"F_{label} = {eps}{symbol}"
-        latex = rf"\hat{{F}}^{{{label}}} = {chr(92) + 'epsilon ' if eps else ''}{subscript(draft.unknowns[unknown].name)} \hat{{{letter}}}_{{{k + 1}}}"
+        size = subscript(draft.unknowns[unknown].name)
+        latex = rf"\hat{{F}}^{{{label}}} = " + (r"\epsilon " if eps else "") + rf"{size} \hat{{{letter}}}_{{{k + 1}}}"
         draft.blocks.append(Block(text, latex, "effort", pair.name))
 
 
@@ -176,8 +193,15 @@ def _equilibrium(draft: _Draft) -> list[Equation]:
         for what, letter, offset in (("force", "F", 3), ("moment", "M", 0)):
             for i, axis in enumerate(AXES):
                 equations.append(
-                    Equation(f"link {number} ({link.name}): {what} {axis}", link.name, "link", tuple(terms[offset + i]),
-                             index, offset + i, tuple(f"{letter}_{name}{axis}" for name in known))
+                    Equation(
+                        f"link {number} ({link.name}): {what} {axis}",
+                        link.name,
+                        "link",
+                        tuple(terms[offset + i]),
+                        index,
+                        offset + i,
+                        tuple(f"{letter}_{name}{axis}" for name in known),
+                    )
                 )
     return equations
 
@@ -195,18 +219,33 @@ def _conditions(draft: _Draft) -> list[Equation]:
             letter = screw_letter(twist)
             direction = f"{letter}_{k + 1}"
             # the screw is a twist: real part (angular) multiplies the moment, dual part the force
-            screw = Screw("conditions", k, i, direction if not twist.turns else f"{letter}0_{k + 1}", direction if twist.turns else "",
-                          f"{letter}0_{k + 1} = P_{k + 1} x {direction}")
+            screw = Screw(
+                "conditions",
+                k,
+                i,
+                direction if not twist.turns else f"{letter}0_{k + 1}",
+                direction if twist.turns else "",
+                f"{letter}0_{k + 1} = P_{k + 1} x {direction}",
+            )
             draft.screws.append(screw)
             at = len(draft.screws) - 1
             terms = [Term(force[i], 1.0, at, 3 + i) for i in range(3)]
             if twist.turns:
                 terms += [Term(moment[i], 1.0, at, i) for i in range(3)]
             what = "moment about" if twist.turns else "force along"
-            equations.append(Equation(f"pair {k + 1} ({pair.name}): {what} the axis", pair.name, pair.type.symbol, tuple(terms)))
+            equations.append(
+                Equation(f"pair {k + 1} ({pair.name}): {what} the axis", pair.name, pair.type.symbol, tuple(terms))
+            )
         symbol = draft.names.reaction[k]
         axis = screw_letter(book.conditions[0])
-        draft.blocks.append(Block(f"F_{symbol} . {axis}_{k + 1} = 0", rf"\hat{{F}}_{{{symbol}}} \cdot \hat{{{axis}}}_{{{k + 1}}} = 0", "condition", pair.name))
+        draft.blocks.append(
+            Block(
+                f"F_{symbol} . {axis}_{k + 1} = 0",
+                rf"\hat{{F}}_{{{symbol}}} \cdot \hat{{{axis}}}_{{{k + 1}}} = 0",
+                "condition",
+                pair.name,
+            )
+        )
     return equations
 
 
@@ -233,4 +272,6 @@ def formulate(m: Mechanism, bookkeeping: str = "lee", efforts: Iterable[str] | N
         BOOKKEEPINGS[bookkeeping](draft, k)
     _driver_efforts(draft, tuple(d.freedom for d in m.drives) if efforts is None else tuple(efforts))
     equations = _equilibrium(draft) + _conditions(draft)
-    return Formulation(m, bookkeeping, tuple(draft.unknowns), tuple(equations), tuple(draft.blocks), tuple(draft.screws))
+    return Formulation(
+        m, bookkeeping, tuple(draft.unknowns), tuple(equations), tuple(draft.blocks), tuple(draft.screws)
+    )

@@ -48,7 +48,9 @@ def formulation_document(f: Formulation, components: bool) -> Document:
             blocks += [Printed(b.text, b.latex) for b in mine]
     if components:
         blocks.append(Heading("Components", 2))
-        blocks += [Printed(f"({i + 1})  {_scalar(f, e, False)}", _scalar(f, e, True)) for i, e in enumerate(f.equations)]
+        blocks += [
+            Printed(f"({i + 1})  {_scalar(f, e, False)}", _scalar(f, e, True)) for i, e in enumerate(f.equations)
+        ]
     return Document(f"Equations of {m.name}", tuple(blocks))
 
 

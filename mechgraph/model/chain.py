@@ -27,7 +27,9 @@ def chain_symbols(letters: str) -> tuple[list[str], list[str]]:
             at += 1
             continue
         if symbol is None:
-            return symbols, [f"pairs {letters!r}: no pair type starts with {letters[at:]!r} (known: {', '.join(TABLE)})"]
+            return symbols, [
+                f"pairs {letters!r}: no pair type starts with {letters[at:]!r} (known: {', '.join(TABLE)})"
+            ]
         symbols.append(symbol)
         at += len(symbol)
     return symbols, []
@@ -93,7 +95,9 @@ def chain(
     if faults:
         raise DeclarationError(f"chain {title!r}", faults)
     placed = any(v is not None for v in (twist, length, offset))
-    steps = [_link_step(o, a, t) for o, a, t in zip(numbers["offset"], numbers["length"], numbers["twist"], strict=True)]
+    steps = [
+        _link_step(o, a, t) for o, a, t in zip(numbers["offset"], numbers["length"], numbers["twist"], strict=True)
+    ]
     pairs = []
     for k, symbol in enumerate(symbols):
         markers: dict[str, Any] = {}
@@ -121,7 +125,10 @@ def _pitches(symbols: list[str], pitch: Any) -> tuple[dict[int, float], list[str
         names = {f"O{k + 1}": k for k in takers}
         wrong = [f"pitch: {key!r} is no helical pair of this chain" for key in pitch if key not in names]
         return {names[key]: value for key, value in pitch.items() if key in names}, wrong
-    values = list(np.atleast_1d(np.asarray(pitch, dtype=float)))
+    try:
+        values = list(np.asarray(pitch, dtype=float).reshape(-1))
+    except (TypeError, ValueError):
+        return {}, [f"pitch = {pitch!r}: expected numbers, or a mapping pair -> pitch"]
     if len(values) == len(symbols) and len(takers) < len(symbols):
         values = [values[k] for k in takers]
     if len(values) != len(takers):

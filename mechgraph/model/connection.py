@@ -53,7 +53,9 @@ class Marker:
             z, x = (np.asarray(v) / np.linalg.norm(v) for v in (self.axis, self.second))
             cosine = float(z @ x)
             if abs(cosine) > 1 - 1e-12:
-                found.append(f"{where}second = {self.second!r}: parallel to the axis {self.axis!r}; give another direction")
+                found.append(
+                    f"{where}second = {self.second!r}: parallel to the axis {self.axis!r}; give another direction"
+                )
             elif square and abs(cosine) > PERPENDICULAR:
                 found.append(
                     f"{where}second = {self.second!r}: not perpendicular to the axis {self.axis!r} (cosine {cosine:.3g}); "
@@ -117,8 +119,17 @@ class Pair:
         if second is None and is_numeric(axis, (3,)):
             second = second_direction(axis)
         for key, value in {
-            "name": name, "type": row, "a": a, "b": b, "point": point, "axis": axis, "second": second,
-            "pitch": plain(pitch), "lead": plain(lead), "on_a": on_a, "on_b": on_b,
+            "name": name,
+            "type": row,
+            "a": a,
+            "b": b,
+            "point": point,
+            "axis": axis,
+            "second": second,
+            "pitch": plain(pitch),
+            "lead": plain(lead),
+            "on_a": on_a,
+            "on_b": on_b,
         }.items():
             object.__setattr__(self, key, value)
 
@@ -146,6 +157,10 @@ class Pair:
     def freedom_names(self) -> tuple[str, ...]:
         """Full names of the freedoms, ``"B.Tz"``."""
         return tuple(f"{self.name}.{f.name}" for f in self.type.freedoms)
+
+    def replace(self, **changes: Any) -> Pair:
+        """A copy with fields changed."""
+        return Pair(**{**{k: getattr(self, k) for k in self.__dataclass_fields__}, **changes})
 
     def faults(self) -> list[str]:
         """What is wrong with this pair by itself, one line each."""

@@ -28,9 +28,7 @@ def library_path(name: str | None = None) -> Path:
     """
     folder = next((place for place in _PLACES if place.is_dir()), None)
     if folder is None:
-        raise FileError(
-            _PLACES[0], f"no mechanism library there, nor in {_PLACES[1]}; install mechgraph again"
-        )
+        raise FileError(_PLACES[0], f"no mechanism library there, nor in {_PLACES[1]}; install mechgraph again")
     if name is None:
         return folder
     names = _stems(folder)

@@ -80,7 +80,11 @@ def _value_fault(value: Value, what: str, width: int) -> str | None:
         array = np.array(np.nan)
     ok = np.isfinite(array).all() and (width == 1 or (array.ndim >= 1 and array.shape[-1] == width))
     wanted = "a finite number" if width == 1 else f"{width} finite numbers"
-    return None if ok else f"{what} = {value!r}: expected {wanted}, an array of them over positions, or a callable (pose, twist, t)"
+    return (
+        None
+        if ok
+        else f"{what} = {value!r}: expected {wanted}, an array of them over positions, or a callable (pose, twist, t)"
+    )
 
 
 def _link_fault(names: Names, link: Any, where: str) -> str | None:
@@ -117,6 +121,8 @@ class _Load:
     """What all loads share: equality that also holds for arrays."""
 
     dimensions: ClassVar[dict[str, tuple[int, int, int]]] = {}
+    freedom_dimensions: ClassVar[dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]]] = {}
+    """Dimensions of fields that depend on the freedom: for a turn, for a slide."""
 
     def __eq__(self, other: object) -> bool:
         return same_fields(self, other)
@@ -185,7 +191,9 @@ class Wrench(_Load):
             found.append(f"{where}frame = {self.frame!r}: expected 'global' or 'link'")
         if self.force is None and self.moment is None:
             found.append(f"{where}has neither force nor moment")
-        found += [_value_fault(v, where + n, 3) for n, v in (("force", self.force), ("moment", self.moment)) if v is not None]
+        found += [
+            _value_fault(v, where + n, 3) for n, v in (("force", self.force), ("moment", self.moment)) if v is not None
+        ]
         if self.point is not None:
             found.append(vector_fault(self.point, where + "point"))
         return [fault for fault in found if fault]
@@ -220,6 +228,9 @@ class Effort(_Load):
     """
 
     kind: ClassVar[str] = "effort"
+    freedom_dimensions: ClassVar[dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]]] = {
+        "value": (MOMENT, FORCE)
+    }
     freedom: str
     value: Value
 
@@ -254,7 +265,11 @@ class Spring(_Load):
 
     kind: ClassVar[str] = "spring"
     dimensions: ClassVar[dict[str, tuple[int, int, int]]] = {
-        "p": LENGTH, "q": LENGTH, "stiffness": (0, 1, -2), "free_length": LENGTH, "damping": (0, 1, -1),
+        "p": LENGTH,
+        "q": LENGTH,
+        "stiffness": (0, 1, -2),
+        "free_length": LENGTH,
+        "damping": (0, 1, -1),
     }
     a: str
     b: str
@@ -298,7 +313,11 @@ class Spring(_Load):
         length = np.sqrt((d * d).sum(axis=0))
         with np.errstate(invalid="ignore", divide="ignore"):
             u = np.where(length > 0, d / length, 0.0)
-            stretched = d - self.free_length * u if self.free_length == 0 else np.where(length > 0, d - self.free_length * u, np.nan)
+            stretched = (
+                d - self.free_length * u
+                if self.free_length == 0
+                else np.where(length > 0, d - self.free_length * u, np.nan)
+            )
         pull = self.stiffness * stretched + self.damping * (u * (vq - vp)).sum(axis=0) * u
         site.add_force(self.a, pull, p)
         site.add_force(self.b, -pull, q)
@@ -309,6 +328,11 @@ class TorsionSpring(_Load):
     """A spring (and damper) in a single freedom: effort ``-stiffness (q - free) - damping dq/dt``; for turns and slides."""
 
     kind: ClassVar[str] = "torsion_spring"
+    freedom_dimensions: ClassVar[dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]]] = {
+        "stiffness": (MOMENT, (0, 1, -2)),
+        "free": ((0, 0, 0), LENGTH),
+        "damping": ((2, 1, -1), (0, 1, -1)),
+    }
     freedom: str
     stiffness: float
     free: float = 0.0

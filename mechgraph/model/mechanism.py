@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
@@ -13,13 +14,12 @@ import numpy as np
 
 from mechgraph.errors import DeclarationError
 from mechgraph.model.connection import Marker, Pair
+from mechgraph.model.conversion import UNIT_NAMES, converted
 from mechgraph.model.drive import Drive
 from mechgraph.model.link import Link
 from mechgraph.model.load import LOADS, Load
 from mechgraph.model.pair import PairType
 from mechgraph.model.values import is_numeric, plain, same_fields
-
-UNIT_NAMES = ("length", "mass", "time")
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +69,9 @@ class Mechanism:
         expected: Mapping[str, Any] | None = None,
     ) -> None:
         pair_tuple = tuple(pairs)
-        ends = dict.fromkeys(end for p in pair_tuple if isinstance(p, Pair) for end in (p.a, p.b) if isinstance(end, str))
+        ends = dict.fromkeys(
+            end for p in pair_tuple if isinstance(p, Pair) for end in (p.a, p.b) if isinstance(end, str)
+        )
         link_tuple = tuple(links) if links is not None else tuple(Link(end) for end in ends)
         first = next((link.name for link in link_tuple if isinstance(link, Link)), "")
         fields: dict[str, Any] = {
@@ -137,7 +139,9 @@ class Mechanism:
 
     def _index(self, name: str, names: Sequence[str], what: str) -> int:
         if name not in names:
-            raise DeclarationError(f"mechanism {self.name!r}", [f"unknown {what} {name!r} ({what}s: {', '.join(names)})"])
+            raise DeclarationError(
+                f"mechanism {self.name!r}", [f"unknown {what} {name!r} ({what}s: {', '.join(names)})"]
+            )
         return names.index(name)
 
     def freedom_names(self) -> tuple[str, ...]:
@@ -196,22 +200,49 @@ class Mechanism:
         """A copy with the named fields changed, checked again."""
         unknown = set(changes) - set(self.__dataclass_fields__)
         if unknown:
-            raise DeclarationError(f"mechanism {self.name!r}", [f"replace: unknown field {k!r}" for k in sorted(unknown)])
+            raise DeclarationError(
+                f"mechanism {self.name!r}", [f"replace: unknown field {k!r}" for k in sorted(unknown)]
+            )
         return Mechanism(**{**self._arguments(), **changes})
 
     def with_pair_type(self, pair: str, type: str | PairType, *, pitch: float | None = None) -> Mechanism:
-        """A copy in which one pair has another type, at the same markers; drives of freedoms that are gone are dropped."""
+        """A copy in which one pair has another type, at the same markers; drives that it cannot take are dropped."""
         old = self.pair(pair)
-        new = Pair(old.name, type, old.a, old.b, point=old.point, axis=old.axis, second=old.second,
-                   on_a=old.on_a, on_b=old.on_b)
+        new = Pair(
+            old.name,
+            type,
+            old.a,
+            old.b,
+            point=old.point,
+            axis=old.axis,
+            second=old.second,
+            on_a=old.on_a,
+            on_b=old.on_b,
+        )
         if isinstance(new.type, PairType) and new.type.takes_pitch:
             kept = {"pitch": old.pitch, "lead": old.lead} if pitch is None else {"pitch": pitch}
-            new = replace_pair(new, **kept)
+            new = new.replace(**kept)
         gone = set(old.freedom_names) - set(new.freedom_names if isinstance(new.type, PairType) else ())
-        drives = [d for d in self.drives if self.full_name(d.freedom) not in gone]
+        known = new.type if isinstance(new.type, PairType) else old.type
+        able = {n for n, single in zip(new.freedom_names, known.drivable, strict=True) if single}
+        lost = set(old.freedom_names) - able
+        drives = [
+            dataclasses.replace(d, freedom=name) for d in self.drives if (name := self.full_name(d.freedom)) not in lost
+        ]
+        loads = [
+            dataclasses.replace(load, freedom=self.full_name(load.freedom)) if hasattr(load, "freedom") else load
+            for load in self.loads
+        ]
         start = {k: v for k, v in self.start.items() if k not in gone}
         pairs = [new if p.name == pair else p for p in self.pairs]
-        return self.replace(pairs=pairs, drives=drives, start=start)
+        return self.replace(pairs=pairs, drives=drives, loads=loads, start=start)
+
+    def to_units(self, **units: str) -> Mechanism:
+        """The same mechanism in other units, e.g. ``m.to_units(length="mm", mass="g")`` (``units`` extra).
+
+        Needs the present units declared.
+        """
+        return converted(self, units)
 
     def moved(self, pose: Any) -> Mechanism:
         """The whole mechanism after a rigid motion: a 4 x 4 (or 3 x 4) pose. Coordinates of the pairs stay what they are."""
@@ -230,13 +261,21 @@ class Mechanism:
             return None if m is None else Marker(at(m.point), turned(m.axis), turned(m.second))
 
         links = [
-            replace(link, center=at(link.center),
-                    inertia=None if link.inertia is None else plain(_symmetric(R @ np.asarray(link.inertia) @ R.T)))
+            dataclasses.replace(
+                link,
+                center=at(link.center),
+                inertia=None if link.inertia is None else plain(_symmetric(R @ np.asarray(link.inertia) @ R.T)),
+            )
             for link in self.links
         ]
         pairs = [
-            replace_pair(q, point=at(q.point), axis=turned(q.axis), second=turned(q.second),
-                         on_a=marker(q.on_a), on_b=marker(q.on_b))
+            q.replace(
+                point=at(q.point),
+                axis=turned(q.axis),
+                second=turned(q.second),
+                on_a=marker(q.on_a),
+                on_b=marker(q.on_b),
+            )
             for q in self.pairs
         ]
         return self.replace(links=links, pairs=pairs, loads=[load.moved(G) for load in self.loads])
@@ -250,20 +289,18 @@ def _rebuilt(arguments: dict[str, Any]) -> Mechanism:
     return Mechanism(**arguments)
 
 
-def replace_pair(pair: Pair, **changes: Any) -> Pair:
-    """A copy of a pair with fields changed."""
-    fields = {k: getattr(pair, k) for k in pair.__dataclass_fields__}
-    return Pair(**{**fields, **changes})
-
-
 def _repeated(names: Iterable[Any], what: str) -> list[str]:
     return [f"{what} {n!r} is declared {c} times; names must differ" for n, c in Counter(names).items() if c > 1]
 
 
 def _declaration_faults(m: Mechanism) -> list[str]:
     faults = []
-    for what, items, kind in (("link", m.links, Link), ("pair", m.pairs, Pair), ("drive", m.drives, Drive),
-                              ("load", m.loads, tuple(LOADS.values()))):
+    for what, items, kind in (
+        ("link", m.links, Link),
+        ("pair", m.pairs, Pair),
+        ("drive", m.drives, Drive),
+        ("load", m.loads, tuple(LOADS.values())),
+    ):
         wrong = [item for item in items if not isinstance(item, kind)]
         faults += [f"{what} {item!r}: is no {what}; use mg.{what.capitalize()}(...)" for item in wrong]
     if not isinstance(m.name, str) or not m.name:

@@ -105,9 +105,7 @@ class Motion:
         }
         faults: list[str] = []
         arrays = {
-            name: _numbers(
-                0.0 if value is None and name in ("velocity", "acceleration") else value, name, faults
-            )
+            name: _numbers(0.0 if value is None and name in ("velocity", "acceleration") else value, name, faults)
             for name, value in given.items()
             if name != "t" or value is not None
         }
@@ -140,8 +138,7 @@ class Motion:
         if not isinstance(other, Motion):
             return NotImplemented
         return all(
-            (mine is None) == (theirs is None)
-            and (mine is None or theirs is None or np.array_equal(mine, theirs))
+            (mine is None) == (theirs is None) and (mine is None or theirs is None or np.array_equal(mine, theirs))
             for mine, theirs in zip(self._arrays, other._arrays, strict=True)
         )
 
@@ -340,9 +337,7 @@ class Sampled:
         times, values = _checked_samples(given["samples"])
         degree = given.get("degree", 5 if times.size >= 6 else 3)
         if degree not in (3, 5) or times.size <= degree:
-            raise LawFault(
-                f"degree must be 3 (from 4 samples) or 5 (from 6), got {degree!r} with {times.size} samples"
-            )
+            raise LawFault(f"degree must be 3 (from 4 samples) or 5 (from 6), got {degree!r} with {times.size} samples")
         margin = RANGE_TOLERANCE * (times[-1] - times[0])
         outside = t[(t < times[0] - margin) | (t > times[-1] + margin)]
         if outside.size:

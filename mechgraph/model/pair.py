@@ -13,7 +13,6 @@ from functools import cached_property
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array
 from mechgraph.document import Document, Table, to_text
 from mechgraph.errors import DeclarationError
 from mechgraph.model import pair_evaluation as evaluation
@@ -133,7 +132,9 @@ def _component(item: object, faults: list[str], what: str) -> Component | None:
     if isinstance(name, str) and "@" in name:
         name, _, frame = name.partition("@")
     if name not in UNIT_WRENCHES or not str(frame).isdigit():
-        faults.append(f"{what} {item!r}: expected one of {', '.join(UNIT_WRENCHES)}, with '@k' for frame k, or a Component")
+        faults.append(
+            f"{what} {item!r}: expected one of {', '.join(UNIT_WRENCHES)}, with '@k' for frame k, or a Component"
+        )
         return None
     return Component(name, UNIT_WRENCHES[name], int(frame))
 
@@ -273,10 +274,14 @@ def _row_faults(row: PairType) -> list[str]:
     for j, freedom in enumerate(row.freedoms):
         w, v = np.array(freedom.twist[:3]), np.array(freedom.twist[3:])
         if len(row.factors) and (j,) in row.factors and abs(np.linalg.norm(w if w.any() else v) - 1) > 1e-12:
-            faults.append(f"freedom {freedom.name}: the twist {freedom.twist} is not a unit twist; divide it by its length")
+            faults.append(
+                f"freedom {freedom.name}: the twist {freedom.twist} is not a unit twist; divide it by its length"
+            )
     names = [f.name for f in row.freedoms]
     if len(set(names)) < len(names):
-        faults.append(f"freedoms {', '.join(names)}: names repeat; give each a name of its own through Freedom(name, twist)")
+        faults.append(
+            f"freedoms {', '.join(names)}: names repeat; give each a name of its own through Freedom(name, twist)"
+        )
     if len(set(row.component_names)) < len(row.component_names):
         faults.append(f"reactions {', '.join(row.component_names)}: names repeat")
     if len(row.efforts) != row.f:
@@ -308,8 +313,10 @@ def _row_faults(row: PairType) -> list[str]:
     for i, name in enumerate(row.component_names):
         worst = np.abs(work[:, i]).max(initial=0.0)
         if worst > 1e-9:
-            faults.append(f"reaction {name}: does work on the freedoms (power {worst:.3g} at a random position); "
-                          "reactions must be reciprocal: try another frame, or reactions=None")
+            faults.append(
+                f"reaction {name}: does work on the freedoms (power {worst:.3g} at a random position); "
+                "reactions must be reciprocal: try another frame, or reactions=None"
+            )
     if not faults and row.f < 6 and np.linalg.matrix_rank(W[:, :, 0, 0], tol=1e-9) < 6 - row.f:
         faults.append(f"reactions {', '.join(row.component_names)}: not independent")
     return faults
@@ -341,31 +348,70 @@ class PairTable(Mapping[str, PairType]):
         for row in self.values():
             reactions = " ".join(f"{c.name}@{c.frame}" for c in row.reactions or ()) or " ".join(row.component_names)
             unknowns, equations = row.unknowns_and_equations
-            rows.append((row.symbol, row.name, str(row.f), " ".join(f.name for f in row.freedoms) or "none", reactions or "none",
-                         f"{unknowns} / {equations}"))
+            rows.append(
+                (
+                    row.symbol,
+                    row.name,
+                    str(row.f),
+                    " ".join(f.name for f in row.freedoms) or "none",
+                    reactions or "none",
+                    f"{unknowns} / {equations}",
+                )
+            )
         header = ("symbol", "name", "f", "freedoms in order", "reactions @ frame", "Lee's ledger")
         return to_text(Document("Pair types", (Table(header, tuple(rows)),)))
 
 
 TABLE = PairTable(
     [
-        PairType("R", "revolute", freedoms=["Rz"], reactions=["Fx", "Fy", "Fz", "Mx", "My"],
-                 bookkeeping=Bookkeeping(_AXIS, (_FZ,))),
-        PairType("P", "prismatic", freedoms=["Tz"], reactions=["Fx", "Fy", "Mx", "My", "Mz"],
-                 bookkeeping=Bookkeeping(_AXIS, (_MZ,))),
-        PairType("H", "helical", freedoms=["Rz + pitch Tz"], reactions=["Fx", "Fy", "Mx", "My", _SCREW_FZ],
-                 bookkeeping=Bookkeeping(_AXIS, (_SCREW_FZ,))),
-        PairType("C", "cylindrical", freedoms=["Rz", "Tz"], reactions=["Fx", "Fy", "Mx", "My"],
-                 bookkeeping=Bookkeeping(_AXIS, ())),
-        PairType("U", "universal (slotted sphere)", freedoms=["Rz", "Rx"], reactions=["Fx", "Fy", "Fz", "My@1"],
-                 square_second=True),
+        PairType(
+            "R",
+            "revolute",
+            freedoms=["Rz"],
+            reactions=["Fx", "Fy", "Fz", "Mx", "My"],
+            bookkeeping=Bookkeeping(_AXIS, (_FZ,)),
+        ),
+        PairType(
+            "P",
+            "prismatic",
+            freedoms=["Tz"],
+            reactions=["Fx", "Fy", "Mx", "My", "Mz"],
+            bookkeeping=Bookkeeping(_AXIS, (_MZ,)),
+        ),
+        PairType(
+            "H",
+            "helical",
+            freedoms=["Rz + pitch Tz"],
+            reactions=["Fx", "Fy", "Mx", "My", _SCREW_FZ],
+            bookkeeping=Bookkeeping(_AXIS, (_SCREW_FZ,)),
+        ),
+        PairType(
+            "C",
+            "cylindrical",
+            freedoms=["Rz", "Tz"],
+            reactions=["Fx", "Fy", "Mx", "My"],
+            bookkeeping=Bookkeeping(_AXIS, ()),
+        ),
+        PairType(
+            "U",
+            "universal (slotted sphere)",
+            freedoms=["Rz", "Rx"],
+            reactions=["Fx", "Fy", "Fz", "My@1"],
+            square_second=True,
+        ),
         PairType("S", "spherical", freedoms=["rotation"], reactions=["Fx", "Fy", "Fz"], directed=False),
         PairType("E", "planar", freedoms=["Tx", "Ty", "Rz"], reactions=["Fz", "Mx", "My"]),
-        PairType("Sc", "sphere in slotted cylinder", freedoms=["Tz", "Ry", "Rx"], reactions=["Fx@1", "Fy@1", "Mz@2"],
-                 square_second=True),
+        PairType(
+            "Sc",
+            "sphere in slotted cylinder",
+            freedoms=["Tz", "Ry", "Rx"],
+            reactions=["Fx@1", "Fy@1", "Mz@2"],
+            square_second=True,
+        ),
         PairType("Sg", "sphere in groove", freedoms=["Tz", "rotation"], reactions=["Fx@1", "Fy@1"]),
-        PairType("Cp", "cylinder on plane", freedoms=["Tx", "Ty", "Rz", "Rx"], reactions=["Fz@2", "My@3"],
-                 square_second=True),
+        PairType(
+            "Cp", "cylinder on plane", freedoms=["Tx", "Ty", "Rz", "Rx"], reactions=["Fz@2", "My@3"], square_second=True
+        ),
         PairType("Sp", "sphere on plane", freedoms=["Tx", "Ty", "rotation"], reactions=["Fz@2"]),
         PairType("W", "weld", freedoms=[], reactions=["Fx", "Fy", "Fz", "Mx", "My", "Mz"], directed=False),
     ]

@@ -120,7 +120,11 @@ def reactions_of(row: PairType, pitch: Array, frames: list[Array]) -> Array:
     local = np.concatenate(
         [
             np.einsum("ji...,jf...->if...", B[:, :3], S[:3]),
-            np.einsum("ji...,jf...->if...", B[:, :3], S[3:] + np.stack([cross(S[:3, j], B[:, 3]) for j in range(row.f)], axis=1)),
+            np.einsum(
+                "ji...,jf...->if...",
+                B[:, :3],
+                S[3:] + np.stack([cross(S[:3, j], B[:, 3]) for j in range(row.f)], axis=1),
+            ),
         ]
     )
     U = np.linalg.svd(np.moveaxis(local, (0, 1), (-2, -1)), full_matrices=True)[0][..., row.f :]
@@ -163,7 +167,9 @@ def difference(row: PairType, x1: Array, x0: Array) -> Array:
             out[g[0]] = x1[at] - x0[at]
             at += 1
         else:
-            out[g[0] : g[2] + 1] = quaternion_log(quaternion_product(x1[at : at + 4], quaternion_inverse(x0[at : at + 4])))
+            out[g[0] : g[2] + 1] = quaternion_log(
+                quaternion_product(x1[at : at + 4], quaternion_inverse(x0[at : at + 4]))
+            )
             at += 4
     return out
 
@@ -194,7 +200,9 @@ def _continued(v: Array, first: Array) -> Array:
         now = v[..., t]
         length = np.sqrt((now * now).sum(axis=0))
         reach = np.sqrt((last * last).sum(axis=0))
-        axis = np.where(length > 1e-9, now / np.where(length > 1e-9, length, 1.0), last / np.where(reach > 0, reach, 1.0))
+        axis = np.where(
+            length > 1e-9, now / np.where(length > 1e-9, length, 1.0), last / np.where(reach > 0, reach, 1.0)
+        )
         turns = np.round(((axis * last).sum(axis=0) - length) / (2 * np.pi))
         last = now + 2 * np.pi * turns * axis
         out[..., t] = last

@@ -57,9 +57,12 @@ def parameters(m: Mechanism, origin: Array | None = None, L: float = 1.0) -> Par
     marker_a = np.stack([local(A, p.a) for p, (A, _) in zip(m.pairs, poses, strict=True)], axis=-1)
     marker_b = np.stack([local(B, p.b) for p, (_, B) in zip(m.pairs, poses, strict=True)], axis=-1)
     center = np.stack(
-        [np.zeros(3) if k.center is None else (np.asarray(k.center) - offset[:, i]) / L for i, k in enumerate(m.links)], axis=-1
+        [np.zeros(3) if k.center is None else (np.asarray(k.center) - offset[:, i]) / L for i, k in enumerate(m.links)],
+        axis=-1,
     )
-    inertia = np.stack([np.zeros((3, 3)) if k.inertia is None else np.asarray(k.inertia) / L**2 for k in m.links], axis=-1)
+    inertia = np.stack(
+        [np.zeros((3, 3)) if k.inertia is None else np.asarray(k.inertia) / L**2 for k in m.links], axis=-1
+    )
     frame = np.zeros((3, 4, 1))
     frame[:, :3, 0] = np.eye(3)
     frame[:, 3, 0] = (offset[:, index[m.frame]] - origin) / L

@@ -6,6 +6,7 @@ beside the library is checked against it. A field that is an angle may be given 
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import tempfile
 import tomllib
@@ -19,20 +20,38 @@ import tomli_w
 from mechgraph.errors import DeclarationError, FileError
 from mechgraph.model.chain import chain
 from mechgraph.model.connection import Marker, Pair
+from mechgraph.model.conversion import UNIT_NAMES
 from mechgraph.model.drive import Drive
 from mechgraph.model.library import library_names, library_path
 from mechgraph.model.link import Link
 from mechgraph.model.load import LOADS
-from mechgraph.model.mechanism import UNIT_NAMES, Mechanism
+from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion_law import Motion
 from mechgraph.model.pair import TABLE, Bookkeeping, Component, Freedom, PairType
+from mechgraph.model.values import is_numeric
 
 SCHEMA = 1
 """Number of the file format."""
+SWEEP_ROUNDING = 1e-12
+"""Part of a sweep by which its end may come early and still be excluded (degrees turned into radians are rounded)."""
 
 FIELDS: dict[str, tuple[str, ...]] = {
-    "file": ("schema", "name", "description", "source", "frame", "units", "pair_type", "chain", "link", "pair", "drive",
-             "load", "start", "expected"),
+    "file": (
+        "schema",
+        "name",
+        "description",
+        "source",
+        "frame",
+        "units",
+        "pair_type",
+        "chain",
+        "link",
+        "pair",
+        "drive",
+        "load",
+        "start",
+        "expected",
+    ),
     "units": UNIT_NAMES,
     "pair_type": ("symbol", "name", "freedoms", "reactions", "efforts", "bookkeeping", "directed", "square_second"),
     "freedom": ("name", "twist", "per_pitch"),
@@ -44,7 +63,7 @@ FIELDS: dict[str, tuple[str, ...]] = {
     "marker": ("point", "axis", "second"),
     "drive": ("freedom", "motion"),
     "motion": ("position", "sweep", "velocity", "acceleration", "t"),
-    **{f"load {kind}": ("kind", *cls.__dataclass_fields__) for kind, cls in LOADS.items()},
+    **{f"load {kind}": ("kind", *(f.name for f in dataclasses.fields(cls))) for kind, cls in LOADS.items()},
 }
 """Fields of every table of the format."""
 
@@ -56,12 +75,33 @@ ANGLES = {
 """Fields that may be given in degrees, with ``_deg`` added to their names."""
 
 NEEDED = {
-    "file": ("schema", "name"), "pair_type": ("symbol", "freedoms"), "freedom": ("name", "twist"), "component": ("name", "wrench"),
-    "chain": ("pairs",), "link": ("name",), "pair": ("name", "type", "a", "b"), "drive": ("freedom",),
-    "load gravity": ("acceleration",), "load wrench": ("link",), "load effort": ("freedom", "value"),
-    "load spring": ("a", "b", "p", "q", "stiffness"), "load torsion_spring": ("freedom", "stiffness"),
+    "file": ("schema", "name"),
+    "pair_type": ("symbol", "freedoms"),
+    "freedom": ("name", "twist"),
+    "component": ("name", "wrench"),
+    "chain": ("pairs",),
+    "link": ("name",),
+    "pair": ("name", "type", "a", "b"),
+    "drive": ("freedom",),
+    "load gravity": ("acceleration",),
+    "load wrench": ("link",),
+    "load effort": ("freedom", "value"),
+    "load spring": ("a", "b", "p", "q", "stiffness"),
+    "load torsion_spring": ("freedom", "stiffness"),
 }
 """Fields that must be there."""
+
+KINDS: dict[type, tuple[str, frozenset[str]]] = {
+    str: (
+        "a text",
+        frozenset({"name", "description", "source", "frame", "symbol", "pairs", "type", "a", "b", "freedom", "link"}),
+    ),
+    bool: ("true or false", frozenset({"unphysical", "directed", "square_second", "at_b"})),
+    dict: ("a table", frozenset({"expected"})),
+}
+"""Fields that hold a text, a truth value or a table, wherever they stand alone (``frame`` of a component is a number)."""
+OTHERWISE = {"file": {"link"}, "component": {"frame"}}
+"""Fields of a table to which ``KINDS`` does not apply."""
 
 
 class _Reader:
@@ -85,6 +125,10 @@ class _Reader:
             else:
                 known = [*FIELDS[kind], *(f"{a}_deg" for a in ANGLES.get(kind, ()))]
                 self.faults.append(f"{where}: unknown field {key!r} (fields: {', '.join(known)})")
+        for want, (words, keys) in KINDS.items():
+            for key in (keys - OTHERWISE.get(kind, set())) & out.keys():
+                if not isinstance(out[key], want):
+                    self.faults.append(f"{where}.{key} = {out[key]!r}: expected {words}")
         missing = [key for key in NEEDED.get(kind, ()) if key not in out]
         if missing:
             self.faults.append(f"{where}: field{'s' if len(missing) > 1 else ''} {', '.join(missing)} missing")
@@ -102,8 +146,10 @@ class _Reader:
         if not isinstance(raw, list):
             self.faults.append(f"[[{kind}]]: expected an array of tables, got {raw!r}")
             return []
-        return [(f"{kind} {entry.get('name', i + 1)!r}" if isinstance(entry, Mapping) else f"{kind} {i + 1}", entry)
-                for i, entry in enumerate(raw)]
+        return [
+            (f"{kind} {entry.get('name', i + 1)!r}" if isinstance(entry, Mapping) else f"{kind} {i + 1}", entry)
+            for i, entry in enumerate(raw)
+        ]
 
     def made(self, where: str, make: Any, **arguments: Any) -> Any:
         """The object, or None with the fault noted."""
@@ -127,7 +173,15 @@ def _parts(reader: _Reader, kind: str, cls: Any, items: Any, where: str) -> Any:
     for item in items:
         if isinstance(item, Mapping):
             fields = reader.table(kind, item, where)
-            item = reader.made(where, cls, **{k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()})
+            wrong = [
+                key for key in ("twist", "wrench", "per_pitch") if key in fields and not is_numeric(fields[key], (6,))
+            ]
+            reader.faults += [f"{where}.{key} = {fields[key]!r}: expected six finite numbers" for key in wrong]
+            item = (
+                None
+                if wrong
+                else reader.made(where, cls, **{k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()})
+            )
         out.append(item)
     return out
 
@@ -153,10 +207,12 @@ def _motion(reader: _Reader, raw: Any, where: str) -> Motion | None:
     fields = reader.table("motion", raw, where)
     sweep = fields.pop("sweep", None)
     if sweep is not None:
-        if "position" in fields or np.shape(sweep) != (3,) or not sweep[2]:
-            reader.faults.append(f"{where}.sweep = {sweep!r}: expected [first, end (excluded), step], and no position beside it")
+        if "position" in fields or not is_numeric(sweep, (3,)) or not sweep[2]:
+            reader.faults.append(
+                f"{where}.sweep = {sweep!r}: expected [first, end (excluded), step], and no position beside it"
+            )
             return None
-        fields["position"] = np.arange(*sweep)
+        fields["position"] = _swept(*sweep)
     if "position" not in fields:
         reader.faults.append(f"{where}: position or sweep missing")
         return None
@@ -164,11 +220,17 @@ def _motion(reader: _Reader, raw: Any, where: str) -> Motion | None:
     return made
 
 
+def _swept(first: float, end: float, step: float) -> np.ndarray:
+    """Positions ``first + k step`` before ``end``; an end that is a whole number of steps away is left out despite rounding."""
+    count = np.ceil((end - first) / step * (1.0 - SWEEP_ROUNDING))
+    return first + step * np.arange(max(int(count), 0))
+
+
 def _loads(reader: _Reader, raw: Any) -> list[Any]:
     out = []
     for where, entry in reader.tables("load", raw):
         kind = entry.get("kind") if isinstance(entry, Mapping) else None
-        if kind not in LOADS:
+        if not isinstance(kind, str) or kind not in LOADS:
             reader.faults.append(f"{where}: kind {kind!r}: expected one of {', '.join(LOADS)}")
             continue
         fields = reader.table(f"load {kind}", entry, where)
@@ -205,15 +267,17 @@ def parse(data: Mapping[str, Any], subject: str) -> Mechanism:
         row = _pair_type(reader, entry, where)
         if row is not None:
             types[row.symbol] = row
-    links = [reader.made(where, Link, **reader.table("link", entry, where))
-             for where, entry in reader.tables("link", top.get("link", []))]
+    links = [
+        reader.made(where, Link, **reader.table("link", entry, where))
+        for where, entry in reader.tables("link", top.get("link", []))
+    ]
     drives = []
     for where, entry in reader.tables("drive", top.get("drive", [])):
         fields = reader.table("drive", entry, where)
         if "motion" in fields:
             fields["motion"] = _motion(reader, fields["motion"], f"{where}.motion")
         drives.append(reader.made(where, Drive, **fields) if "freedom" in fields else None)
-    more = {
+    more: dict[str, Any] = {
         "drives": drives,
         "loads": _loads(reader, top.get("load", [])),
         "start": _start(reader, top.get("start", {})),
@@ -230,7 +294,7 @@ def parse(data: Mapping[str, Any], subject: str) -> Mechanism:
     try:
         if fields:
             return chain(fields.pop("pairs"), name=name, drive=None, links=links, **fields, **more)
-        return Mechanism(name, links or None, pairs, **more)
+        return Mechanism(name, links or None, [p for p in pairs if p is not None], **more)
     except DeclarationError as error:
         raise DeclarationError(subject, error.faults) from None
 
@@ -260,7 +324,10 @@ def load(name: str | os.PathLike[str]) -> Mechanism:
     text = os.fspath(name)
     is_path = text.endswith(".toml") or os.sep in text or not isinstance(name, str)
     if not is_path and text not in library_names():
-        raise FileError(text, f"no mechanism of that name in the library ({', '.join(library_names())}), and no path to a .toml file")
+        raise FileError(
+            text,
+            f"no mechanism of that name in the library ({', '.join(library_names())}), and no path to a .toml file",
+        )
     path = Path(text) if is_path else library_path(text)
     try:
         data = tomllib.loads(path.read_bytes().decode("utf-8"))
@@ -309,7 +376,7 @@ def to_data(m: Mechanism, path: str = "") -> dict[str, Any]:
     if m.drives:
         data["drive"] = []
         for drive in m.drives:
-            entry = {"freedom": drive.freedom}
+            entry: dict[str, Any] = {"freedom": drive.freedom}
             if drive.motion is not None:
                 entry["motion"] = _fields(drive.motion, "motion", path, f"drive {drive.freedom!r}")
             data["drive"].append(entry)
@@ -342,8 +409,13 @@ def _type_data(row: PairType, path: str) -> dict[str, Any]:
             freedoms.append("rotation")
         else:
             freedoms.append(_fields(row.freedoms[factor[0]], "freedom", path, "freedom"))
-    data: dict[str, Any] = {"symbol": row.symbol, "name": row.name, "freedoms": freedoms, "directed": row.directed,
-                            "square_second": row.square_second}
+    data: dict[str, Any] = {
+        "symbol": row.symbol,
+        "name": row.name,
+        "freedoms": freedoms,
+        "directed": row.directed,
+        "square_second": row.square_second,
+    }
     if row.reactions is not None:
         data["reactions"] = [_fields(c, "component", path, "reaction") for c in row.reactions]
     data["efforts"] = [_fields(c, "component", path, "effort") for c in row.efforts]
@@ -378,8 +450,9 @@ def write_whole(path: str | os.PathLike[str], text: str) -> None:
     target = Path(path)
     temporary = None
     try:
-        with tempfile.NamedTemporaryFile("w", encoding="utf-8", newline="", dir=target.parent, prefix=f".{target.name}.",
-                                         delete=False) as handle:
+        with tempfile.NamedTemporaryFile(
+            "w", encoding="utf-8", newline="", dir=target.parent, prefix=f".{target.name}.", delete=False
+        ) as handle:
             temporary = Path(handle.name)
             handle.write(text)
         mode = target.stat().st_mode & 0o777 if target.exists() else 0o666 & ~_umask()

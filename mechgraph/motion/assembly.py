@@ -35,7 +35,7 @@ def scaled_system(m: Mechanism, q: Array, system: System | None = None) -> Syste
     centers = (rotate(X[:, :3], par.center[:, massive]) + X[:, 3])[:, :, 0]
     distances = np.concatenate([points, centers], axis=1) - centroid[:, None]
     L = float(np.sqrt((distances**2).sum(axis=0).mean()))
-    if L <= 1e-12 * max(1.0, float(np.abs(points).max())):
+    if 1e-12 * max(1.0, float(np.abs(points).max())) >= L:
         L = 1.0
     return System(m, raw.graph, parameters(m, par.origin + par.L * centroid, L * par.L))
 
@@ -53,7 +53,9 @@ def close(system: System, x: Array, fixed: Index, iterations: int = 60) -> tuple
         dq[free, 0] = step
         return system.advance(x[:, None], dq)[:, 0]
 
-    x, _ = closest_zero(evaluate, advance, x, tolerance=CLOSURE_GOAL, rank_tolerance=ASSEMBLY_RANK, iterations=iterations)
+    x, _ = closest_zero(
+        evaluate, advance, x, tolerance=CLOSURE_GOAL, rank_tolerance=ASSEMBLY_RANK, iterations=iterations
+    )
     return x, float(system.at(x[:, None]).closure[0])
 
 
@@ -132,7 +134,10 @@ def assembled(m: Mechanism, preferred: Mapping[str, float] | None = None) -> tup
     """
     if not m.has_geometry:
         bare = [p.name for p in m.pairs if not p.has_geometry]
-        raise DeclarationError(f"mechanism {m.name!r}", [f"pairs {', '.join(bare)} have no geometry; a topology can be counted, not solved"])
+        raise DeclarationError(
+            f"mechanism {m.name!r}",
+            [f"pairs {', '.join(bare)} have no geometry; a topology can be counted, not solved"],
+        )
     raw = System(m)
     q = raw.start_coordinates(m.start)
     system = scaled_system(m, q, raw)
@@ -146,7 +151,8 @@ def assembled(m: Mechanism, preferred: Mapping[str, float] | None = None) -> tup
         raise AssemblyError(
             f"mechanism {m.name!r}: the loops cannot be closed near start; the smallest closure error found is {error:.3g} "
             f"(largest of angle in radians and length / L, L = {system.par.L:.4g}). Check the dimensions, or give another start",
-            error, best,
+            error,
+            best,
         )
     return _settled(system, x)
 
@@ -166,7 +172,11 @@ def _search(m: Mechanism, system: System, x: Array, preferred: Mapping[str, floa
     columns, values = named_columns(m, system, preferred)
     at_preferred = x.copy()
     at_preferred[state_rows(system, columns)] = values
-    attempts = [(x, drives), (at_preferred, columns), (x, np.arange(0))] if m.start else [(at_preferred, columns), (x, drives), (x, np.arange(0))]
+    attempts = (
+        [(x, drives), (at_preferred, columns), (x, np.arange(0))]
+        if m.start
+        else [(at_preferred, columns), (x, drives), (x, np.arange(0))]
+    )
     rng = np.random.default_rng(20231)
     best, best_error = x, np.inf
     for guess, fixed in attempts:
@@ -193,7 +203,9 @@ def configuration(system: System, x: Array) -> Configuration:
     return system.at(x[:, None])
 
 
-def assembled_at(m: Mechanism, values: Mapping[str, float], guess: Mapping[str, float] | None = None) -> tuple[System, Array]:
+def assembled_at(
+    m: Mechanism, values: Mapping[str, float], guess: Mapping[str, float] | None = None
+) -> tuple[System, Array]:
     """The scaled system and a closed state with some freedoms at given values.
 
     Without a ``guess`` the closed position near ``start`` is led there in small steps; with one, the loops are closed from it.
@@ -227,5 +239,7 @@ def _not_reached(m: Mechanism, system: System, x: Array, error: float, values: M
     reached = ", ".join(f"{name} = {best[m.full_name(name)]:.6g}" for name in values)
     return AssemblyError(
         f"mechanism {m.name!r}: cannot be assembled at {asked}; came to {reached}, {error:.3g} short (radians, or lengths / L). "
-        "Take a value in reach, or another start or guess", error, best,
+        "Take a value in reach, or another start or guess",
+        error,
+        best,
     )

@@ -177,7 +177,7 @@ class Follower:
         dq = last.Z @ change
         if len(nodes) > 1 and nodes[-2].choice == last.choice:
             before = nodes[-2]
-            ratio = np.linalg.norm(change) / max(np.linalg.norm(last.drive - before.drive), 1e-300)
+            ratio = float(np.linalg.norm(change)) / max(float(np.linalg.norm(last.drive - before.drive)), 1e-300)
             if ratio < 4 and change @ (last.drive - before.drive) > 0:
                 dq = dq + 0.5 * ratio * (last.Z - before.Z) @ change
         choice = last.choice
@@ -271,7 +271,7 @@ class Follower:
             here, total, done = self.correct(guess[:, mine], int(choice))
             states[:, inside[mine]] = here.x
             off = np.abs(total).max(axis=0, initial=0.0)
-            bad[inside[mine]] = ~done | (off > CORRECTION)
+            bad[inside[mine]] = np.logical_not(done) | (off > CORRECTION)
         return states, choice_of, bad
 
     def _predicted(self, nodes: list[Node], left: Index, right: Index, at: Array, values: Array) -> Array:
@@ -294,5 +294,3 @@ class Follower:
         out = self.system.advance(X[:, left], dq)
         out[self.rows] = values
         return out
-
-

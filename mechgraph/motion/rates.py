@@ -39,14 +39,17 @@ def rates(here: Configuration, solver: ChosenSystem, columns: Index, velocity: A
     dq, gap_v = _completed(here, solver, columns, velocity, np.zeros((here.J.shape[0], here.T)))
     V = here.link_twists(dq)
     bias = here.loop_sums(here.bias(dq, V))
-    ddq, gap_a = _completed(here, solver, columns, acceleration, bias)
+    turning = (dq * dq).max(axis=0, initial=0.0)
+    ddq, gap_a = _completed(here, solver, columns, acceleration, bias, turning)
     return Rates(dq, ddq, V, here.link_accelerations(dq, ddq, V), np.maximum(gap_v, gap_a))
 
 
-def _completed(here: Configuration, solver: ChosenSystem, columns: Index, driven: Array, known: Array) -> tuple[Array, Array]:
+def _completed(
+    here: Configuration, solver: ChosenSystem, columns: Index, driven: Array, known: Array, size: Array | float = 0.0
+) -> tuple[Array, Array]:
     rhs = -np.einsum("idt,dt->it", here.J[:, columns], driven) - known
     q = solver.solve(rhs[:, None])[:, 0]
     left = np.abs(np.einsum("ift,ft->it", here.J, q) - rhs).max(axis=0, initial=0.0)
     q[columns] = driven
-    scale = np.abs(q).max(axis=0, initial=0.0) + np.abs(known).max(axis=0, initial=0.0)
+    scale = np.abs(q).max(axis=0, initial=0.0) + np.abs(known).max(axis=0, initial=0.0) + size
     return q, left / np.where(scale > 0, scale, 1.0)

@@ -76,8 +76,8 @@ class System:
             levels.setdefault(depth[child], []).append((k, sign > 0, parent, child))
         out = []
         for level in levels.values():
-            k, forward, parent, child = zip(*level, strict=True)
-            out.append((np.array(k), np.array(forward), np.array(parent), np.array(child)))
+            pairs, forward, parents, children = (np.array(part) for part in zip(*level, strict=True))
+            out.append((pairs, forward, parents, children))
         return out
 
     def _columns_of_loop(self, loop: tuple[tuple[int, int], ...]) -> tuple[Index, Array]:
@@ -105,7 +105,9 @@ class System:
         q = np.empty((self.n_freedoms, *x.shape[1:]))
         for pair, first, row in zip(self.m.pairs, self.first_column, self.first_row, strict=False):
             near = None if start is None else start[first : first + pair.type.f]
-            q[first : first + pair.type.f] = evaluation.state_to_coordinates(pair.type, x[row : row + pair.type.nx], near)
+            q[first : first + pair.type.f] = evaluation.state_to_coordinates(
+                pair.type, x[row : row + pair.type.nx], near
+            )
         q[self.is_length] *= self.par.L
         return q
 
@@ -198,7 +200,8 @@ class Configuration:
         """For every group the reaction wrenches ``(6, 6 - f, n, T)``."""
         s = self.system
         return [
-            evaluation.reactions_of(g.row, s.par.pitch[g.pairs], frames) for g, frames in zip(s.groups, self.frames, strict=True)
+            evaluation.reactions_of(g.row, s.par.pitch[g.pairs], frames)
+            for g, frames in zip(s.groups, self.frames, strict=True)
         ]
 
     @cached_property

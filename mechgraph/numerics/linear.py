@@ -20,7 +20,7 @@ RANK_TOLERANCE = 1e-9
 
 def singular_values(A: Array) -> Array:
     """Singular values of one matrix, largest first; empty matrices have none."""
-    return np.linalg.svd(A, compute_uv=False) if A.size else np.zeros(0)
+    return np.asarray(np.linalg.svd(A, compute_uv=False)) if A.size else np.zeros(0)
 
 
 def rank_of(sigma: Array, tolerance: float = RANK_TOLERANCE) -> int:
@@ -30,6 +30,11 @@ def rank_of(sigma: Array, tolerance: float = RANK_TOLERANCE) -> int:
 
 KEEP = 0.1
 """Part of the smallest singular value that may be lost by holding the columns that are asked for."""
+
+
+def add_at(out: Array, index: Index, values: Array) -> None:
+    """Add ``values (6, n, T)`` to the places ``index (n,)`` of the second axis of ``out``; places may repeat."""
+    np.add.at(np.moveaxis(out, 1, 0), index, np.moveaxis(values, 1, 0))
 
 
 @dataclass(frozen=True)
@@ -129,14 +134,16 @@ class ChosenSystem:
         """``x (n, k, T)`` with ``A x = b`` in the chosen rows; zero in held and fixed columns."""
         out = np.zeros((self.A.shape[1], *b.shape[1:]))
         for choice, at, factor in self._parts:
-            out[np.ix_(choice.cols, range(b.shape[1]), at)] = factor.solve(b[choice.rows][:, :, at])
+            out[np.ix_(choice.cols, np.arange(b.shape[1]), at)] = factor.solve(b[choice.rows][:, :, at])
         return out
 
     def solve_transposed(self, b: Array) -> Array:
         """``y (m, k, T)`` with ``A^T y = b`` in the chosen columns; zero in the rows that were not chosen."""
         out = np.zeros((self.A.shape[0], *b.shape[1:]))
         for choice, at, factor in self._parts:
-            out[np.ix_(choice.rows, range(b.shape[1]), at)] = factor.solve(b[choice.cols][:, :, at], transposed=True)
+            out[np.ix_(choice.rows, np.arange(b.shape[1]), at)] = factor.solve(
+                b[choice.cols][:, :, at], transposed=True
+            )
         return out
 
     def null_of_transpose(self) -> Array:
@@ -147,8 +154,8 @@ class ChosenSystem:
         for choice, at, factor in self._parts:
             dropped = np.setdiff1d(np.arange(m), choice.rows)
             part = -factor.solve(np.swapaxes(self.A[np.ix_(dropped, choice.cols)][:, :, at], 0, 1), transposed=True)
-            out[np.ix_(choice.rows, range(m - rank), at)] = part
-            out[np.ix_(dropped, range(m - rank), at)] = np.eye(m - rank)[:, :, None]
+            out[np.ix_(choice.rows, np.arange(m - rank), at)] = part
+            out[np.ix_(dropped, np.arange(m - rank), at)] = np.eye(m - rank)[:, :, None]
         return out
 
     def signs(self) -> Array:

@@ -89,7 +89,9 @@ def to_xarray(s: Solution) -> xarray.Dataset:
     """The table as a Dataset over the batch axes."""
     xr = _optional("xarray")
     dims = axis_names(s.batch)
-    return xr.Dataset({name: (dims, values) for name, values in columns(s).items()}, attrs={"mechanism": s.mechanism.name})
+    return xr.Dataset(
+        {name: (dims, values) for name, values in columns(s).items()}, attrs={"mechanism": s.mechanism.name}
+    )
 
 
 def axis_names(batch: tuple[int, ...]) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 NAMES = ("length", "mass", "time")
-COHERENT = {("m", "kg", "s"): {(1, 1, -2): "N", (2, 1, -2): "N m"}}
+COHERENT: dict[tuple[str, ...], dict[tuple[float, ...], str]] = {("m", "kg", "s"): {(1, 1, -2): "N", (2, 1, -2): "N m"}}
 """Sets of units whose derived units have names of their own."""
 
 
@@ -16,9 +16,9 @@ def unit_of(units: Mapping[str, str], dimension: Sequence[float]) -> str:
     """
     if not units or len(dimension) != 3:
         return ""
-    own = COHERENT.get(tuple(units.get(name, "") for name in NAMES), {})  # type: ignore[call-overload]
+    own = COHERENT.get(tuple(units.get(name, "") for name in NAMES), {})
     if tuple(dimension) in own:
-        return str(own[tuple(dimension)])
+        return own[tuple(dimension)]
     if not any(dimension[:2]):
         parts = ["rad"] if dimension[2] <= 0 else []
     else:

@@ -63,6 +63,12 @@ class Freedoms:
         """Smallest kept singular value over the largest; 1 where there is no constraint."""
         return float(self.sigma[self.rank - 1] / self.sigma[0]) if self.rank else 1.0
 
+    @property
+    def dropped(self) -> float:
+        """Largest dropped singular value over the largest; 0 where none is dropped."""
+        rest = self.sigma[self.rank :]
+        return float(rest[0] / self.sigma[0]) if rest.size and self.sigma[0] > 0 else 0.0
+
 
 def free_motion(system: System, x: Array, columns: Index) -> Freedoms:
     """Mobility at a closed state ``x (nx,)`` and what drivers in ``columns`` leave free."""
@@ -121,7 +127,7 @@ def reduced(columns: Array) -> Array:
     for j in range(A.shape[1]):
         rest = np.abs(A[:, j:])
         rest[taken] = 0.0
-        i, k = np.unravel_index(int(np.argmax(rest > (1 - 1e-9) * rest.max())), rest.shape)
+        i, k = divmod(int(np.argmax(rest > (1 - 1e-9) * rest.max())), rest.shape[1])
         k += j
         A[:, [j, k]] = A[:, [k, j]]
         A[:, j] /= A[i, j]

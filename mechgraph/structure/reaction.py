@@ -70,7 +70,9 @@ def orthonormal_stress(here: Configuration, states: Array, driven: Index) -> Str
 def least_reactions(here: Configuration, reactions: Array, efforts: Array, stress: Stress) -> tuple[Array, Array]:
     """Reactions and efforts of minimum norm: the part along every self-stress removed."""
     y = -np.einsum("cpit,cpt->it", at_pair_points(here, stress.wrenches), at_pair_points(here, reactions))
-    return reactions + np.einsum("cpit,it->cpt", stress.wrenches, y), efforts + np.einsum("fit,it->ft", stress.efforts, y)
+    return reactions + np.einsum("cpit,it->cpt", stress.wrenches, y), efforts + np.einsum(
+        "fit,it->ft", stress.efforts, y
+    )
 
 
 class PairFrames:

@@ -1,70 +1,45 @@
-"""The determinacy report: counts, ranks, passive and locked freedoms, uniqueness of every reaction, in words and numbers."""
+"""The determinacy report: facts of the graph and of its geometry, gathered once, each computed when first asked for."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array
-from mechgraph.document import Bullets, Document, Heading, Paragraph, Table, to_html, to_markdown, to_text
+from mechgraph.document import Document, to_html, to_markdown, to_text
 from mechgraph.errors import AssemblyError
 from mechgraph.formulation.build import formulate
 from mechgraph.formulation.registry import Ledger
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.motion.assembly import assembled, assembled_at, named_columns
 from mechgraph.motion.system import Index, System
-from mechgraph.numerics.linear import RANK_TOLERANCE
-from mechgraph.structure.freedom import STILL, Freedoms, PassiveMotion, free_motion
-from mechgraph.structure.mobility import finite_mobility
-from mechgraph.structure.reaction import UNIQUE, PairFrames, orthonormal_stress
+from mechgraph.structure import wording
+from mechgraph.structure.advice import Effect, advice, independent_rows
+from mechgraph.structure.findings import Finding, LoopFact, input_motions, locked_findings, loop_facts, passive_finding
+from mechgraph.structure.freedom import STILL, Freedoms, free_motion
+from mechgraph.structure.generic import Generic, generic
+from mechgraph.structure.mobility import FiniteMotion, finite_motion
+from mechgraph.structure.stress import SelfStress, Uniqueness, uniqueness
 from mechgraph.topology.linkgraph import LinkGraph, link_graph
+from mechgraph.topology.parts import Parts, parts_of
 
-SHOWN = 1e-6
-"""Part of a self-stress that is shown as a component."""
-
-
-@dataclass(frozen=True)
-class Finding:
-    """Something found, in words and by name; ``axis`` is (point, direction) in the global frame where there is one."""
-
-    text: str
-    freedoms: tuple[str, ...] = ()
-    links: tuple[str, ...] = ()
-    axis: tuple[tuple[float, ...], tuple[float, ...]] | None = None
-
-    def __str__(self) -> str:
-        return self.text
+NEAR = 1e-3
+"""Margin below which a position is called nearly singular."""
 
 
 @dataclass(frozen=True)
-class SelfStress:
-    """A reaction state without load: coefficients by ``pair:component``, moments divided by L so that they compare."""
-
-    components: Mapping[str, float]
-    efforts: Mapping[str, float]
-
-    @property
-    def text(self) -> str:
-        """The state in one line."""
-        parts = [f"{value:+.3g} {name}" for name, value in (self.components | self.efforts).items()]  # type: ignore[operator]
-        return " ".join(parts)
-
-
-@dataclass(frozen=True)
-class _Geometry:
-    """What geometry adds to the graph."""
+class Geometry:
+    """A closed position: the scaled system, its state, the driven columns and what can move."""
 
     system: System
     x: Array
+    driven: Index
     freedoms: Freedoms
-    unique: dict[str, dict[str, bool]]
-    self_stresses: tuple[SelfStress, ...]
 
 
 @dataclass(frozen=True)
@@ -77,7 +52,7 @@ class DeterminacyReport:
     mechanism: Mechanism
     graph: LinkGraph
     note: str = ""
-    _geometry: _Geometry | None = field(default=None, repr=False)
+    geometry: Geometry | None = field(default=None, repr=False)
 
     # --- the graph alone -----------------------------------------------------------------------------------------------
 
@@ -97,97 +72,217 @@ class DeterminacyReport:
         return tuple(tuple((self.pairs[k], sign) for k, sign in loop) for loop in self.graph.loops)
 
     @property
+    def freedom_count(self) -> int:
+        """Sum of the freedoms of the pairs."""
+        return sum(p.type.f for p in self.mechanism.pairs)
+
+    @property
     def mobility_by_count(self) -> int:
         """Kutzbach mobility, sum of freedoms - 6 loops."""
-        return sum(p.type.f for p in self.mechanism.pairs) - 6 * len(self.graph.loops)
+        return self.freedom_count - 6 * len(self.graph.loops)
 
     def ledger(self, bookkeeping: str = "lee") -> Ledger:
         """Unknowns against equations in a bookkeeping, ``"lee"`` or ``"minimal"``."""
         return formulate(self.mechanism, bookkeeping).ledger()
 
+    @cached_property
+    def generic(self) -> Generic:
+        """Rank and excess for random geometry: what the topology alone decides."""
+        return generic(self.mechanism, self.graph)
+
+    @cached_property
+    def parts(self) -> Parts:
+        """Dulmage-Mendelsohn parts: which links and pairs are over-, which underdetermined by count."""
+        return parts_of(self.mechanism, self.graph)
+
+    @cached_property
+    def loop_facts(self) -> tuple[LoopFact, ...]:
+        """Every loop by itself: its chain, freedoms, rank and excess."""
+        g = self.geometry
+        return loop_facts(self.mechanism, self.loops, g.system if g else None, g.x if g else None)
+
     # --- with geometry -------------------------------------------------------------------------------------------------
 
     @property
     def mobility(self) -> int | None:
-        """Freedoms minus rank of the closure Jacobian."""
-        return self._geometry.freedoms.mobility if self._geometry else None
+        """Freedoms minus rank of the closure Jacobian here."""
+        return self.geometry.freedoms.mobility if self.geometry else None
 
     @cached_property
+    def motion(self) -> FiniteMotion | None:
+        """What following the motions over finite strokes showed."""
+        return finite_motion(self.geometry.system, self.geometry.x) if self.geometry else None
+
+    @property
     def finite_mobility(self) -> int | None:
         """Dimension of the set of closed positions: what really moves."""
-        return finite_mobility(self._geometry.system, self._geometry.x) if self._geometry else None
+        return self.motion.mobility if self.motion else None
 
     @property
     def redundancy(self) -> int | None:
         """6 loops minus rank: number of self-stresses with the drivers free."""
-        return 6 * len(self.graph.loops) - self._geometry.freedoms.rank if self._geometry else None
+        return 6 * len(self.graph.loops) - self.geometry.freedoms.rank if self.geometry else None
+
+    @property
+    def excess(self) -> dict[str, int]:
+        """The redundancy by reason: ``structural`` (whatever the dimensions), ``dimensions`` (all along the motion), ``here``."""
+        if not self.geometry or not self.motion or self.redundancy is None:
+            return {}
+        nearby = 6 * len(self.graph.loops) - self.motion.rank_nearby
+        structural = min(self.generic.excess, nearby)
+        return {"structural": structural, "dimensions": nearby - structural, "here": self.redundancy - nearby}
 
     @property
     def margin(self) -> float | None:
         """Smallest kept singular value over the largest: small means nearly singular."""
-        return self._geometry.freedoms.margin if self._geometry else None
+        return self.geometry.freedoms.margin if self.geometry else None
+
+    @property
+    def dropped(self) -> float | None:
+        """Largest dropped singular value over the largest (0 where none is dropped)."""
+        return self.geometry.freedoms.dropped if self.geometry else None
+
+    @property
+    def near(self) -> bool:
+        """Whether the position is nearly singular: the verdicts on rank and uniqueness hold, but with a small margin."""
+        return self.margin is not None and self.margin < NEAR
+
+    @cached_property
+    def reactions(self) -> Uniqueness | None:
+        """Verdict on every reaction component and effort, with the self-stresses."""
+        g = self.geometry
+        return uniqueness(g.system.at(g.x[:, None]), g.driven) if g else None
 
     @property
     def unique(self) -> dict[str, dict[str, bool]]:
         """For every pair: component -> whether it is unique; ``effort`` for a driven freedom."""
-        return self._geometry.unique if self._geometry else {}
+        return self.reactions.unique if self.reactions else {}
 
     @property
     def self_stresses(self) -> tuple[SelfStress, ...]:
-        """Reaction states without load, with the declared drivers."""
-        return self._geometry.self_stresses if self._geometry else ()
+        """Reaction states without load, with the declared drivers: a canonical sparse basis."""
+        return self.reactions.states if self.reactions else ()
 
-    @property
+    @cached_property
     def undriven(self) -> tuple[Finding, ...]:
         """Freedoms left free that are neither driven nor passive."""
-        if not self._geometry:
+        if not self.geometry:
             return ()
-        return tuple(Finding(f"free: {', '.join(f.names)} move", f.names) for f in self._geometry.freedoms.undriven)
+        found = self.geometry.freedoms.undriven
+        return tuple(Finding(f"{', '.join(f.names)} {'move' if len(f.names) > 1 else 'moves'}", f.names) for f in found)
 
     @cached_property
     def passive(self) -> tuple[Finding, ...]:
-        """Passive freedoms by name."""
-        geometry = self._geometry
-        return tuple(_passive_finding(geometry.system, p) for p in geometry.freedoms.passive) if geometry else ()
+        """Passive freedoms by name and line."""
+        g = self.geometry
+        return tuple(passive_finding(g.system, p) for p in g.freedoms.passive) if g else ()
 
     @cached_property
     def locked(self) -> tuple[Finding, ...]:
-        """Freedoms that cannot move here."""
-        if not self._geometry:
-            return ()
-        still = np.abs(self._geometry.freedoms.null).max(axis=1, initial=0.0) < STILL
-        return tuple(Finding(f"{name} stands still", (name,)) for name, s in zip(self.mechanism.freedom_names(), still, strict=True) if s)
+        """Freedoms that cannot move here, with the reason."""
+        g = self.geometry
+        return locked_findings(g.system, g.x, g.freedoms) if g else ()
+
+    @cached_property
+    def _input(self) -> Array:
+        g = self.geometry
+        return input_motions(g.freedoms, g.freedoms.null) if g else np.zeros((self.freedom_count, 0))
 
     @cached_property
     def drivable(self) -> tuple[Finding, ...]:
         """Freedoms that can serve as a driver here: single freedoms that move in other than passive motions."""
-        geometry = self._geometry
-        if not geometry:
+        if not self.geometry:
             return ()
-        null = geometry.freedoms.null
-        passive = geometry.freedoms.passive
-        if passive:
-            P, _ = np.linalg.qr(np.stack([p.rates for p in passive], axis=1))
-            null = null - P @ (P.T @ null)
-        moves = np.abs(null).max(axis=1, initial=0.0) > STILL
+        moves = np.abs(self._input).max(axis=1, initial=0.0) > STILL
         single = [d for p in self.mechanism.pairs for d in p.type.drivable]
         names = self.mechanism.freedom_names()
         return tuple(Finding(f"{n} can drive", (n,)) for n, m, s in zip(names, moves, single, strict=True) if m and s)
 
+    @cached_property
+    def not_drivable(self) -> tuple[Finding, ...]:
+        """Single freedoms that cannot drive here, with the reason."""
+        g = self.geometry
+        if not g or not self.motion:
+            return ()
+        good = {name for finding in self.drivable for name in finding.freedoms}
+        still = {name for finding in self.locked for name in finding.freedoms}
+        nearby = np.abs(self.motion.null_nearby).max(axis=1, initial=0.0) > 1e3 * STILL
+        out = []
+        for i, (name, single) in enumerate(
+            zip(self.mechanism.freedom_names(), (d for p in self.mechanism.pairs for d in p.type.drivable), strict=True)
+        ):
+            if single and name not in good:
+                why = "moves only in a passive motion"
+                if name in still:
+                    why = (
+                        "dead point here: it moves in positions near by"
+                        if nearby[i] and g.freedoms.mobility
+                        else "it stands still"
+                    )
+                out.append(Finding(f"{name} cannot drive: {why}", (name,)))
+        return tuple(out)
+
+    @property
+    def inputs(self) -> int | None:
+        """Input freedoms: mobility minus passive freedoms."""
+        return self.geometry.freedoms.mobility - len(self.geometry.freedoms.passive) if self.geometry else None
+
+    @cached_property
+    def suggested_drives(self) -> tuple[str, ...]:
+        """Freedoms that would complete the drivers (all of them where none is declared): at the frame first, independent."""
+        g = self.geometry
+        if not g or not g.freedoms.undriven:
+            return ()
+        rest = np.stack([f.rates for f in g.freedoms.undriven], axis=1)
+        names = self.mechanism.freedom_names()
+        good = {name for finding in self.drivable for name in finding.freedoms}
+        at_frame = {n for p in self.mechanism.pairs if self.mechanism.frame in (p.a, p.b) for n in p.freedom_names}
+        order = sorted((i for i, n in enumerate(names) if n in good), key=lambda i: (names[i] not in at_frame, i))
+        return tuple(names[i] for i in sorted(independent_rows(rest, order, rest.shape[1])))
+
+    @cached_property
+    def dependent_drives(self) -> tuple[tuple[str, ...], ...]:
+        """For mobility above one: sets of freedoms of which only one can be driven, as they move in proportion."""
+        if not self.inputs or self.inputs < 2:
+            return ()
+        names = [name for finding in self.drivable for name in finding.freedoms]
+        index = {n: i for i, n in enumerate(self.mechanism.freedom_names())}
+        rows = {n: self._input[index[n]] / np.linalg.norm(self._input[index[n]]) for n in names}
+        groups: list[list[str]] = []
+        for n in names:
+            home = next((g for g in groups if abs(abs(rows[g[0]] @ rows[n]) - 1) < 1e-9), None)
+            if home is None:
+                groups.append([n])
+            else:
+                home.append(n)
+        return tuple(tuple(g) for g in groups if len(g) > 1)
+
     @property
     def determinate(self) -> bool:
         """Nothing left free that is neither driven nor passive, and every reaction and effort unique."""
-        if not self._geometry:
+        if not self.geometry:
             return False
-        return not self._geometry.freedoms.undriven and all(v for row in self.unique.values() for v in row.values())
+        return not self.geometry.freedoms.undriven and all(v for row in self.unique.values() for v in row.values())
 
-    @property
+    @cached_property
+    def effects(self) -> tuple[Effect, ...]:
+        """Pair changes with their computed effect: they remove redundancy, or free a structure."""
+        g = self.geometry
+        return advice(g.system, g.x, g.freedoms) if g else ()
+
+    @cached_property
     def advice(self) -> tuple[Finding, ...]:
-        """What would make it determinate."""
+        """What would make it determinate: drivers to add, pair changes with their computed effect."""
         out = []
-        if self._geometry and self.undriven:
-            names = ", ".join(f for finding in self.drivable for f in finding.freedoms)
-            out.append(Finding(f"drive {len(self.undriven)} more of: {names}"))
+        if self.suggested_drives:
+            what = "drive" if not self.mechanism.drives else "drive also"
+            out.append(
+                Finding(
+                    f"{what} {', '.join(self.suggested_drives)}: nothing but passive freedoms is left free then",
+                    self.suggested_drives,
+                )
+            )
+        out += [Finding(e.text, tuple(pair for pair, _, _ in e.changes)) for e in self.effects]
         return tuple(out)
 
     # --- print -----------------------------------------------------------------------------------------------------------
@@ -195,14 +290,16 @@ class DeterminacyReport:
     @property
     def verdict(self) -> str:
         """The verdict in one sentence."""
-        return _verdict(self)
+        return wording.verdict(self)
 
     def document(self) -> Document:
         """The report as a document."""
-        return _document(self)
+        return wording.document(self)
 
     def to_dict(self) -> dict[str, Any]:
         """All facts as plain data."""
+        findings = ("undriven", "passive", "locked", "drivable", "not_drivable", "advice")
+        books = {name: self.ledger(name) for name in ("lee", "minimal")}
         return {
             "mechanism": self.mechanism.name,
             "verdict": self.verdict,
@@ -210,21 +307,41 @@ class DeterminacyReport:
             "determinate": self.determinate,
             "links": list(self.links),
             "pairs": list(self.pairs),
-            "loops": [[list(step) for step in loop] for loop in self.loops],
+            "loops": [
+                {"steps": [list(step) for step in loop], **asdict(fact)}
+                for loop, fact in zip(self.loops, self.loop_facts, strict=True)
+            ],
             "mobility_by_count": self.mobility_by_count,
+            "generic": asdict(self.generic),
+            "parts": asdict(self.parts),
             "mobility": self.mobility,
             "finite_mobility": self.finite_mobility,
+            "inputs": self.inputs,
+            "stroke": self.motion.stroke if self.motion else None,
             "redundancy": self.redundancy,
+            "excess": self.excess,
             "margin": self.margin,
+            "dropped": self.dropped,
+            "near": self.near,
             "ledger": {
-                name: {"unknowns": book.unknowns, "equations": book.equations, "balance": book.balance,
-                       "by_kind": {k: [r.count, r.unknowns, r.equations] for k, r in book.by_kind.items()}}
-                for name, book in ((n, self.ledger(n)) for n in ("lee", "minimal"))
+                name: {
+                    "unknowns": b.unknowns,
+                    "equations": b.equations,
+                    "balance": b.balance,
+                    "by_kind": {k: [r.count, r.unknowns, r.equations] for k, r in b.by_kind.items()},
+                }
+                for name, b in books.items()
             },
             "unique": self.unique,
-            **{key: [finding.__dict__ for finding in getattr(self, key)]
-               for key in ("undriven", "passive", "locked", "drivable", "advice")},
-            "self_stresses": [{"components": dict(s.components), "efforts": dict(s.efforts)} for s in self.self_stresses],
+            "self_stresses": [
+                {"group": s.group, "components": dict(s.components), "efforts": dict(s.efforts)}
+                for s in self.self_stresses
+            ],
+            "combinations": [list(c) for c in self.reactions.combinations] if self.reactions else [],
+            "suggested_drives": list(self.suggested_drives),
+            "dependent_drives": [list(g) for g in self.dependent_drives],
+            "effects": [asdict(e) for e in self.effects],
+            **{key: [asdict(finding) for finding in getattr(self, key)] for key in findings},
         }
 
     def to_json(self) -> str:
@@ -263,130 +380,5 @@ def check(m: Mechanism, at: Mapping[str, float] | None = None) -> DeterminacyRep
         if at:
             raise
         return DeterminacyReport(m, graph, f"No facts of geometry: {error}")
-    return DeterminacyReport(m, graph, "", _geometry(m, system, x))
-
-
-def _geometry(m: Mechanism, system: System, x: Array) -> _Geometry:
     columns, _ = named_columns(m, system, {d.freedom: 0.0 for d in m.drives})
-    freedoms = free_motion(system, x, columns)
-    unique, stresses = uniqueness(system, x, columns)
-    return _Geometry(system, x, freedoms, unique, stresses)
-
-
-def uniqueness(system: System, x: Array, driven: Index) -> tuple[dict[str, dict[str, bool]], tuple[SelfStress, ...]]:
-    """Which reaction components and efforts are unique: those in which no self-stress of ``[J^T, -E]`` has a part."""
-    m = system.m
-    here = system.at(x[:, None])
-    free = np.setdiff1d(np.arange(system.n_freedoms), driven)
-    null = null_space(here.J[:, free, 0].T, RANK_TOLERANCE)
-    C = system.graph.loop_matrix
-    states = np.einsum("lp,lis->ips", C, null.reshape(C.shape[0], 6, null.shape[1]))[..., None]
-    stress = orthonormal_stress(here, states, driven)
-    parts = PairFrames(here).components(stress.wrenches)
-    table: dict[int, Array] = {int(k): part[:, i, :, 0] for g, part in zip(system.groups, parts, strict=True) for i, k in enumerate(g.pairs)}
-    names = m.freedom_names()
-    unique: dict[str, dict[str, bool]] = {}
-    for k, pair in enumerate(m.pairs):
-        row = {name: bool(np.linalg.norm(v) <= UNIQUE) for name, v in zip(pair.type.component_names, table[k], strict=True)}
-        mine = [int(c) for c in driven if system.first_column[k] <= c < system.first_column[k + 1]]
-        for c in mine:
-            label = "effort" if len(mine) == 1 else f"effort {names[c].removeprefix(pair.name + '.')}"
-            row[label] = bool(np.linalg.norm(stress.efforts[c, :, 0]) <= UNIQUE)
-        unique[pair.name] = row
-    stresses = []
-    for i in range(null.shape[1]):
-        components = {
-            f"{pair.name}:{name}": float(v[i])
-            for k, pair in enumerate(m.pairs)
-            for name, v in zip(pair.type.component_names, table[k], strict=True)
-            if abs(v[i]) > SHOWN
-        }
-        efforts = {names[c]: float(stress.efforts[c, i, 0]) for c in driven if abs(stress.efforts[c, i, 0]) > SHOWN}
-        stresses.append(SelfStress(components, efforts))
-    return unique, tuple(stresses)
-
-
-def screw_axis(system: System, twist: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """A point and the direction of the axis of a twist (of the slide where it does not turn), in the global frame."""
-    w, v = twist[:3], twist[3:]
-    point: Array
-    if np.linalg.norm(w) > 1e-9 * max(1.0, float(np.linalg.norm(v))):
-        point = np.cross(w, v) / (w @ w)
-        direction = w / np.linalg.norm(w)
-    else:
-        point, direction = np.zeros(3), v / np.linalg.norm(v)
-    par = system.par
-    return tuple((par.L * point + par.origin).tolist()), tuple(direction.tolist())
-
-
-def _passive_finding(system: System, motion: PassiveMotion) -> Finding:
-    m = system.m
-    names = m.link_names()
-    links = tuple(names[i] for i in motion.links)
-    freedoms = tuple(n for n, r in zip(m.freedom_names(), motion.rates, strict=True) if abs(r) > STILL)
-    pairs = tuple(dict.fromkeys(n.rpartition(".")[0] for n in freedoms))
-    axis = screw_axis(system, motion.twist)
-    turning = np.linalg.norm(motion.twist[:3]) > 1e-9
-    direction = ", ".join(f"{c:.4g}" for c in axis[1])
-    point = ", ".join(f"{c:.4g}" for c in axis[0])
-    how = f"turn about the line through ({point}) along ({direction})" if turning else f"slide along ({direction})"
-    verb = how if len(links) > 1 else how.replace("turn", "turns", 1).replace("slide", "slides", 1)
-    text = f"{' and '.join(links)} {verb}, in the pairs {', '.join(pairs)}: passive, moves no other link"
-    return Finding(text, freedoms, links, axis)
-
-
-def _verdict(report: DeterminacyReport) -> str:
-    book = report.ledger("lee")
-    count = f"{len(report.mechanism.drives)} driver{'s' if len(report.mechanism.drives) != 1 else ''}, {book.unknowns} unknowns, {book.equations} equations"
-    if report.mobility is None:
-        word = "balanced" if book.balance == 0 else ("over by" if book.balance < 0 else "short by") + f" {abs(book.balance)}"
-        return f"By count: {count} ({word})."
-    loose = [f"{pair}:{name}" for pair, row in report.unique.items() for name, ok in row.items() if not ok]
-    if report.undriven:
-        return f"Under-driven: mobility {report.mobility}, {len(report.mechanism.drives)} driven, {len(report.passive)} passive, {len(report.undriven)} left free."
-    if loose:
-        return f"Moves with mobility {report.mobility}, but {len(loose)} reaction components are not unique (redundancy {report.redundancy})."
-    return f"Determinate: {count}; every reaction is unique."
-
-
-def _document(report: DeterminacyReport) -> Document:
-    m = report.mechanism
-    blocks: list[Any] = [Paragraph(report.verdict)]
-    if report.note:
-        blocks.append(Paragraph(report.note))
-    facts = [
-        ("links", str(len(report.links))), ("pairs", str(len(report.pairs))), ("loops", str(len(report.loops))),
-        ("freedoms of the pairs", str(sum(p.type.f for p in m.pairs))), ("mobility by count", str(report.mobility_by_count)),
-    ]
-    if report.mobility is not None and report.margin is not None:
-        facts += [
-            ("mobility by rank", str(report.mobility)), ("finite mobility", str(report.finite_mobility)),
-            ("redundancy", str(report.redundancy)), ("margin", f"{report.margin:.3g}"),
-        ]
-    blocks.append(Table(("fact", "value"), tuple(facts)))
-    lee, minimal = report.ledger("lee"), report.ledger("minimal")
-    rows = tuple(
-        (k, str(r.count), f"{r.unknowns}", f"{r.equations}", f"{minimal.by_kind[k].unknowns}", f"{minimal.by_kind[k].equations}")
-        for k, r in lee.by_kind.items()
-    )
-    total = ("sum", "", str(lee.unknowns), str(lee.equations), str(minimal.unknowns), str(minimal.equations))
-    blocks += [Heading("Ledger", 2), Table(("kind", "count", "unknowns (Lee)", "equations", "unknowns (minimal)", "equations"), (*rows, total))]
-    ends = {p.name: (p.a, p.b) for p in m.pairs}
-    chains = []
-    for loop in report.loops:
-        text = ends[loop[0][0]][0 if loop[0][1] > 0 else 1]
-        for name, sign in loop:
-            text += f" -{name}- {ends[name][1 if sign > 0 else 0]}"
-        chains.append(text)
-    blocks += [Heading("Loops", 2), Bullets(tuple(chains))]
-    for key, title in (("undriven", "Left free"), ("passive", "Passive freedoms"), ("locked", "Locked freedoms"), ("drivable", "Possible drivers")):
-        found = getattr(report, key)
-        if found:
-            blocks += [Heading(title, 2), Bullets(tuple(f.text for f in found))]
-    loose = {pair: [n for n, ok in row.items() if not ok] for pair, row in report.unique.items()}
-    if any(loose.values()):
-        blocks += [Heading("Not unique", 2), Bullets(tuple(f"{pair}: {', '.join(names)}" for pair, names in loose.items() if names))]
-        blocks += [Heading("Self-stresses", 2), Bullets(tuple(s.text for s in report.self_stresses))]
-    if report.advice:
-        blocks += [Heading("Advice", 2), Bullets(tuple(a.text for a in report.advice))]
-    return Document(f"Determinacy of {m.name}", tuple(blocks))
+    return DeterminacyReport(m, graph, "", Geometry(system, x, columns, free_motion(system, x, columns)))

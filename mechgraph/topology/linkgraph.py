@@ -55,9 +55,9 @@ class LinkGraph:
         return C
 
 
-def network(m: Mechanism) -> nx.MultiGraph:
+def network(m: Mechanism) -> nx.MultiGraph[str]:
     """The mechanism as a networkx multigraph; edge keys are pair names, nodes and edges carry ``link`` and ``pair``."""
-    graph = nx.MultiGraph(name=m.name)
+    graph: nx.MultiGraph[str] = nx.MultiGraph(name=m.name)
     for link in m.links:
         graph.add_node(link.name, link=link)
     for pair in m.pairs:
@@ -124,8 +124,7 @@ def _short_loops(
 
 def _shortest_path(present: list[list[tuple[int, int, int]]], start: int, goal: int) -> list[tuple[int, int]]:
     """Edges (pair, sign) of a shortest path, searched from both ends; ties go to the earlier declaration."""
-    sides = ({start: None}, {goal: None})
-    back: tuple[dict[int, tuple[int, int, int] | None], ...] = sides
+    back: tuple[dict[int, tuple[int, int, int] | None], ...] = ({start: None}, {goal: None})
     fronts = [[start], [goal]]
     meet = start if start == goal else None
     while meet is None:

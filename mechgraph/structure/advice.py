@@ -1,0 +1,224 @@
+"""Advice with computed effect: pair changes that remove redundancy, changes that free a structure, drivers that complete.
+
+A change of pair ``k`` to a type with more freedoms adds twists ``S``; with the self-stresses ``n_k`` that pass the pair (drivers free)
+the redundancy falls by ``rank(S^T n_k)``, so all changes are weighed without a new analysis; those reported are then computed anew.
+Source of the idea: Reshetov, Self-Aligning Mechanisms, 1982.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechgraph.algebra.screw import null_space
+from mechgraph.algebra.se3 import Array
+from mechgraph.model import pair_evaluation as evaluation
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.pair import TABLE, PairType
+from mechgraph.motion.assembly import named_columns, scaled_system
+from mechgraph.motion.system import Configuration, System
+from mechgraph.numerics.linear import RANK_TOLERANCE, rank_of, singular_values
+from mechgraph.structure.freedom import Freedoms, free_motion
+
+SIGNIFICANT = 1e-6
+"""Power of a unit twist on a unit self-stress above which the twist relieves it."""
+SHOWN = 6
+"""Largest number of single changes, and of sets of changes, reported."""
+BEAM = 12
+"""Partial sets of changes kept while searching."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """One pair given another type; ``matrix (f, s)`` is its power on the self-stresses, ``added`` the freedoms added."""
+
+    pair: int
+    type: PairType
+    matrix: Array
+    added: int
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Changes and what they do, computed on the changed mechanism: before -> after."""
+
+    changes: tuple[tuple[str, str, str], ...]
+    redundancy: tuple[int, int]
+    mobility: tuple[int, int]
+    passive: tuple[int, int]
+
+    @property
+    def text(self) -> str:
+        """E.g. ``R at D -> S: redundancy 3 -> 1, mobility 1 -> 1, passive 0 -> 0``."""
+        what = ", ".join(f"{old} at {pair} -> {new}" for pair, old, new in self.changes)
+        effect = ", ".join(
+            f"{name} {a} -> {b}"
+            for name, (a, b) in (
+                ("redundancy", self.redundancy),
+                ("mobility", self.mobility),
+                ("passive", self.passive),
+            )
+        )
+        return f"{what}: {effect}"
+
+
+def wider_types(row: PairType) -> Iterator[PairType]:
+    """Pair types with more freedoms whose freedoms include those of ``row`` at the reference position, fewest first."""
+    one = np.full((1, 1), 1.0)
+
+    def span(t: PairType) -> Array:
+        x = evaluation.coordinates_to_state(t, np.zeros((t.f, 1, 1)))
+        return evaluation.twists_of(t, one, evaluation.frames_of(t, one, x))[:, :, 0, 0]
+
+    mine = span(row)
+    for other in sorted(TABLE.values(), key=lambda t: t.f):
+        if row.f < other.f and not other.takes_pitch:
+            both = np.concatenate([span(other), mine], axis=1)
+            if np.linalg.matrix_rank(both, tol=1e-9) == other.f:
+                yield other
+
+
+def changes_of(here: Configuration) -> list[Change]:
+    """All single changes to wider types that leave the drivers in place, with their power on the self-stresses (drivers free)."""
+    system = here.system
+    null = null_space(here.J[:, :, 0].T, RANK_TOLERANCE)
+    C = system.graph.loop_matrix
+    stress = np.einsum("lp,lis->ips", C, null.reshape(C.shape[0], 6, null.shape[1]))
+    wider = {g.row: list(wider_types(g.row)) for g in system.groups}
+    place = {int(k): (g, i) for g in system.groups for i, k in enumerate(g.pairs)}
+    out = []
+    driven = {system.m.freedom(d.freedom) for d in system.m.drives}
+    for k, pair in enumerate(system.m.pairs):
+        g, i = place[k]
+        needed = {pair.type.freedoms[j].name for pair_index, j in driven if pair_index == k}
+        base = here.frames[system.groups.index(g)][-1][:, :, i : i + 1]
+        for row in wider[pair.type]:
+            if not needed <= {f.name for f, single in zip(row.freedoms, row.drivable, strict=True) if single}:
+                continue
+            x = evaluation.coordinates_to_state(row, np.zeros((row.f, 1, 1)))
+            frames = evaluation.frames_of(row, np.zeros((1, 1)), x, base)
+            S = evaluation.twists_of(row, np.zeros((1, 1)), frames)[:, :, 0, 0]
+            out.append(Change(k, row, S.T @ stress[:, k], row.f - pair.type.f))
+    return out
+
+
+def _relief(parts: tuple[Change, ...]) -> int:
+    return rank_of_absolute(np.concatenate([c.matrix for c in parts]))
+
+
+def rank_of_absolute(A: Array) -> int:
+    """Rank with an absolute tolerance (self-stresses and twists are of size one)."""
+    return int((singular_values(A) > SIGNIFICANT).sum()) if A.size else 0
+
+
+def relieving(changes: list[Change], redundancy: int) -> tuple[list[tuple[Change, ...]], list[tuple[Change, ...]]]:
+    """Single changes that lower the redundancy, and smallest sets that remove it, without more freedoms than self-stresses removed.
+
+    Ranked by how little they change: freedoms added beyond need, then number of changes, then the order of declaration.
+    """
+    relief = {id(c): _relief((c,)) for c in changes}
+    useful = [c for c in changes if relief[id(c)]]
+    singles = sorted(useful, key=lambda c: (c.added - relief[id(c)], -relief[id(c)], c.pair))
+    exact = [c for c in singles if c.added == relief[id(c)]]
+    beam: list[tuple[tuple[Change, ...], int]] = [((), 0)]
+    complete: list[tuple[Change, ...]] = []
+    for _ in range(redundancy):
+        grown: dict[frozenset[int], tuple[tuple[Change, ...], int]] = {}
+        for parts, removed in beam:
+            for c in exact:
+                if parts and c.pair <= parts[-1].pair:
+                    continue
+                now = _relief((*parts, c))
+                if now == removed + c.added:
+                    grown[frozenset(id(p) for p in (*parts, c))] = ((*parts, c), now)
+        found = sorted(grown.values(), key=lambda item: (-item[1], [c.pair for c in item[0]]))
+        complete += [parts for parts, removed in found if removed == redundancy]
+        beam = [item for item in found if item[1] < redundancy][:BEAM]
+        if not beam:
+            break
+    return [(c,) for c in _spread(singles)], complete
+
+
+def _mixed(complete: list[tuple[Change, ...]]) -> list[tuple[Change, ...]]:
+    """Up to two sets of every size, those whose widest change is smallest first."""
+    out: list[tuple[Change, ...]] = []
+    for size in sorted({len(parts) for parts in complete}):
+        mine = [parts for parts in complete if len(parts) == size]
+        out += sorted(mine, key=lambda parts: max(c.added for c in parts))[:2]
+    return out
+
+
+def _spread(singles: list[Change]) -> list[Change]:
+    """The best changes, not all at one pair: the best of every pair first."""
+    first: list[Change] = []
+    rest: list[Change] = []
+    seen: set[int] = set()
+    for c in singles:
+        (rest if c.pair in seen else first).append(c)
+        seen.add(c.pair)
+    return (first + rest)[:SHOWN]
+
+
+def effect(system: System, x: Array, before: Freedoms, parts: tuple[Change, ...]) -> Effect | None:
+    """The effect of changes, computed on the changed mechanism at the same position; None where it cannot be built."""
+    m = system.m
+    q = system.coordinates_of(x[:, None], system.start_coordinates(m.start))[:, 0]
+    changed: Mechanism = m.replace(start=dict(zip(m.freedom_names(), q.tolist(), strict=True)), loads=())
+    for c in parts:
+        changed = changed.with_pair_type(m.pairs[c.pair].name, c.type)
+    raw = System(changed, system.graph)
+    start = raw.start_coordinates(changed.start)
+    after_system = scaled_system(changed, start, raw)
+    state = after_system.state_of(start[:, None])[:, 0]
+    if float(after_system.at(state[:, None]).closure[0]) > 1e-8:
+        return None
+    columns, _ = named_columns(changed, after_system, {d.freedom: 0.0 for d in changed.drives})
+    after = free_motion(after_system, state, columns)
+    rows = 6 * len(system.graph.loops)
+    return Effect(
+        tuple((m.pairs[c.pair].name, m.pairs[c.pair].type.symbol, c.type.symbol) for c in parts),
+        (rows - before.rank, rows - after.rank),
+        (before.mobility, after.mobility),
+        (len(before.passive), len(after.passive)),
+    )
+
+
+def advice(system: System, x: Array, freedoms: Freedoms) -> tuple[Effect, ...]:
+    """Pair changes worth making: those that remove redundancy without adding input freedoms; for a structure, those that free it."""
+    here = system.at(x[:, None])
+    changes = changes_of(here)
+    redundancy = 6 * len(system.graph.loops) - freedoms.rank
+    found: list[Effect] = []
+    inputs = freedoms.mobility - len(freedoms.passive)
+    if redundancy:
+        singles, complete = relieving(changes, redundancy)
+        for parts in (*_mixed(complete), *singles):
+            done = effect(system, x, freedoms, parts)
+            if (
+                done
+                and done.mobility[1] - done.passive[1] == inputs
+                and done.redundancy[1] < redundancy
+                and done not in found
+            ):
+                found.append(done)
+    if not inputs:
+        freeing = sorted((c for c in changes if c.added > _relief((c,))), key=lambda c: (c.added, c.pair))
+        for c in _spread(freeing)[:3]:
+            done = effect(system, x, freedoms, (c,))
+            if done and done.mobility[1] - done.passive[1] > 0:
+                found.append(done)
+    return tuple(found[: SHOWN + 3])
+
+
+def independent_rows(null: Array, candidates: list[int], count: int, tolerance: float = 1e-3) -> list[int]:
+    """The first candidates (in order) whose rows of ``null`` are independent, up to ``count``; weaker ones where needed."""
+    chosen: list[int] = []
+    for limit in (tolerance, RANK_TOLERANCE):
+        for i in candidates:
+            if len(chosen) < count and i not in chosen:
+                rows = null[[*chosen, i]]
+                if rank_of(singular_values(rows), limit) == len(chosen) + 1:
+                    chosen.append(i)
+    return chosen

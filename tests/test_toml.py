@@ -1,0 +1,310 @@
+"""TOML files: round trip, faults told at once, nothing half-written."""
+
+import contextlib
+import json
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+
+import mechgraph as mg
+from mechgraph.model import toml
+from mechgraph.model.conversion import UNIT_NAMES
+from mechgraph.model.library import library_path
+from mechgraph.model.load import LOADS
+
+SCHEMA = json.loads((library_path() / "mechanism.schema.json").read_text(encoding="utf-8"))
+VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)
+FOUR_BAR = (library_path("four-bar")).read_text(encoding="utf-8")
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "m.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def faults_of(folder: Path, text: str) -> tuple[str, ...]:
+    with pytest.raises(mg.DeclarationError) as caught:
+        mg.load(written(folder, text))
+    return caught.value.faults
+
+
+# --- round trip ----------------------------------------------------------------------------------------------------------
+
+
+def with_every_load() -> mg.Mechanism:
+    force = np.arange(12.0).reshape(4, 3)
+    return mg.load("four-bar").replace(
+        loads=[
+            mg.Gravity((0, -9.81, 0)),
+            mg.Wrench("rocker", force=force, moment=(0, 0, 1), point=(0.1, 0.2, 0.3), frame="link"),
+            mg.Wrench("coupler", force=(1, 2, 3)),
+            mg.Effort("D", [0.1, 0.2, 0.3, 0.4]),
+            mg.Spring("crank", "rocker", (0, 0.1, 0), (0.4, 0, 0), stiffness=100.0, free_length=0.1, damping=0.5),
+            mg.TorsionSpring("D", stiffness=2.0, free=0.3, damping=0.01),
+        ]
+    )
+
+
+def with_own_pair_type(reactions: list[str] | None) -> mg.Mechanism:
+    slot = mg.PairType("PinInSlot", "pin in slot", freedoms=["Tx", "Rz"], reactions=reactions)
+    return mg.Mechanism(
+        "own",
+        pairs=[
+            mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=(0, 0, 1)),
+            mg.Pair("B", slot, "crank", "slider", point=(0.3, 0.1, 0), axis=(0, 0, 1), second=(1, 2, 0)),
+            mg.Pair("C", "P", "slider", "frame", point=(0.3, 0, 0), axis=(1, 0, 0)),
+        ],
+        drives=["A"],
+    )
+
+
+def with_markers() -> mg.Mechanism:
+    square = {"axis": (0, 0, 2.0), "second": (1 / 3, 0, 0)}
+    return mg.Mechanism(
+        "markers",
+        links=[
+            mg.Link("ground"),
+            mg.Link("body", 1.5, (0.1, 0, 0), mg.inertia.box(1.5, (0.1, 0.2, 0.3))),
+            mg.Link("end"),
+        ],
+        pairs=[
+            mg.Pair(
+                "A",
+                "U",
+                "ground",
+                "body",
+                on_a=mg.Marker((0, 0, 1), **square),
+                on_b=mg.Marker((0.1, 0.2, 0.3), **square),
+            ),
+            mg.Pair("B", "S", "body", "end", on_a=mg.Marker((1, 0, 0)), on_b=mg.Marker()),
+            mg.Pair("C", "H", "end", "ground", point=(0, 1, 0), axis=(1, 1, 1), lead=0.005),
+            mg.Pair("D", "H", "body", "ground", point=(0, 1, 1), axis=(1, 0, 0), pitch=-0.002),
+        ],
+        drives=[mg.Drive("C", mg.Motion(np.linspace(0, 1, 7), 0.1, np.arange(7.0), np.linspace(0, 2, 7))), "A.Rz"],
+        start={"A": (0.1, 0.2), "B.Rx": 1 / 3, "D": -0.5},
+        units={"length": "m", "mass": "kg"},
+        frame="ground",
+        description='quotes " and \\ and é',
+        expected={"loops": 1, "notes": ["a", "b"], "table": {"x": 0.1}},
+    )
+
+
+HAND_MADE = {
+    "loads": with_every_load,
+    "own pair type": lambda: with_own_pair_type(["Fy@1", "Fz", "Mx", "My"]),
+    "own pair type, null space": lambda: with_own_pair_type(None),
+    "markers, pitch, lead, units, start, motion": with_markers,
+    "topology": lambda: mg.chain("RPRHRRR"),
+    "unphysical": lambda: mg.Mechanism(
+        "u", [mg.Link("a"), mg.Link("b", 1, (0, 0, 0), -np.eye(3), unphysical=True)], [mg.Pair("A", "R", "a", "b")]
+    ),
+    "moved": lambda: with_every_load().moved([[0, -1, 0, 0.1], [1, 0, 0, 1 / 3], [0, 0, 1, 1e5], [0, 0, 0, 1]]),
+}
+
+
+@pytest.mark.parametrize("name", mg.library())
+def test_library_mechanisms_come_back_equal(tmp_path: Path, name: str) -> None:
+    m = mg.load(name)
+    mg.save(m, tmp_path / "m.toml")
+    assert mg.load(tmp_path / "m.toml") == m
+
+
+@pytest.mark.parametrize("case", HAND_MADE)
+def test_hand_made_mechanisms_come_back_equal(tmp_path: Path, case: str) -> None:
+    m = HAND_MADE[case]()
+    mg.save(m, tmp_path / "m.toml")
+    again = mg.load(tmp_path / "m.toml")
+    assert again == m
+    mg.save(again, tmp_path / "again.toml")
+    assert (tmp_path / "again.toml").read_bytes() == (tmp_path / "m.toml").read_bytes()
+    VALIDATOR.validate(tomllib.loads((tmp_path / "m.toml").read_text(encoding="utf-8")))
+
+
+def test_degrees_are_radians_and_the_end_of_a_sweep_is_excluded() -> None:
+    m = mg.load("rcsr")
+    motion = m.drives[0].motion
+    assert motion is not None
+    assert np.allclose(np.rad2deg(motion.position), np.arange(150, 204, 2), rtol=0, atol=1e-12)
+    for first, end, step, count in (
+        (0, 360, 0.1, 3600),
+        (30, 390, 1, 360),
+        (0, -90, -0.3, 300),
+        (0, 10, 3, 4),
+        (5, 5, 1, 0),
+    ):
+        swept = (
+            toml.parse(tomllib.loads(FOUR_BAR.replace("[0.0, 360.0, 1.0]", f"[{first}, {end}, {step}]")), "x")
+            .drives[0]
+            .motion
+        )
+        assert swept is not None
+        assert len(swept.position) == count
+
+
+# --- faults --------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('description = "', 'descripton = "', "unknown field 'descripton'"),
+        ("schema = 1", "schema = 99", "this version reads schema 1"),
+        ("schema = 1\n", "", "schema missing"),
+        ('name = "crank"\nmass', 'name = "crank"\nweight', "unknown field 'weight'"),
+        ('name = "crank"\nmass = ', 'name = "crank"\nmass = "heavy" # ', "expected a finite number"),
+        ('type = "R"', 'type = "Q"', "unknown type 'Q'"),
+        ('freedom = "A"', 'freedom = "Z"', "unknown freedom 'Z'"),
+        ("sweep_deg = [0.0, 360.0, 1.0]", "sweep_deg = [0.0, 360.0]", "sweep"),
+        ("sweep_deg = [0.0, 360.0, 1.0]", 'sweep_deg = ["a", 1, 2]', "expected numbers"),
+        ("sweep_deg = [0.0, 360.0, 1.0], ", "", "position or sweep missing"),
+        ('kind = "gravity"', 'kind = "levity"', "expected one of gravity"),
+        ('kind = "gravity"', "kind = []", "expected one of gravity"),
+        ('b = "rocker"\n', "", "field b missing"),
+        ("[units]\n", "[[units]]\n", "expected a table"),
+        ("axis = [0.0, 0.0, 1.0]", "axis = [0.0, 0.0, 0.0]", "has length 0"),
+        ('description = "', 'expected = 3\ndescription = "', "expected"),
+        ('name = "four-bar"', "name = 7", "expected a text"),
+        ('name = "four-bar"', 'name = "four-bar"\nstart = { "A" = "x" }', "expected a finite number"),
+        ('name = "four-bar"', 'name = "four-bar"\nchain = { pairs = "RRRR" }', "give one form"),
+    ],
+)
+def test_a_fault_is_named(tmp_path: Path, old: str, new: str, words: str) -> None:
+    assert old in FOUR_BAR
+    text = FOUR_BAR.replace(old, new, 1)
+    if old == 'description = "' and "expected = 3" in new:
+        text = text.partition("[expected]")[0]
+    assert any(words in fault for fault in faults_of(tmp_path, text))
+
+
+def test_several_faults_come_at_once(tmp_path: Path) -> None:
+    text = (
+        FOUR_BAR.replace("schema = 1", "schema = 2")
+        .replace('kind = "gravity"', 'kind = "levity"')
+        .replace("value = 1.0", "vallue = 1.0")
+    )
+    text += "\n[extra]\n"
+    faults = faults_of(tmp_path, text)
+    for words in ("schema", "levity", "vallue", "'extra'", "value missing"):
+        assert any(words in fault for fault in faults), (words, faults)
+
+
+WRONG: list[Any] = [None, -1, 1e400, "", "x", [], [[]], {}, {"x": 1}, True, [1, "a"]]
+
+
+def places(data: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    items = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    return [q for key, value in items for q in [(*path, key), *places(value, (*path, key))]]
+
+
+@pytest.mark.parametrize("name", ["four-bar", "rchch", "bennett", "own"])
+def test_whatever_stands_in_a_field_the_error_is_ours(name: str) -> None:
+    m = with_own_pair_type(["Fy@1", "Fz", "Mx", "My"]) if name == "own" else None
+    text = json.dumps(toml.to_data(m) if m else tomllib.loads(library_path(name).read_text(encoding="utf-8")))
+    for place in places(json.loads(text)):
+        for wrong in WRONG:
+            data = json.loads(text)
+            inner = data
+            for key in place[:-1]:
+                inner = inner[key]
+            if wrong is None:
+                inner.pop(place[-1])
+            else:
+                inner[place[-1]] = wrong
+            with contextlib.suppress(mg.MechgraphError):
+                toml.parse(data, "fuzzed")
+
+
+def test_no_toml_and_no_file_are_file_errors(tmp_path: Path) -> None:
+    with pytest.raises(mg.FileError, match="is no TOML"):
+        mg.load(written(tmp_path, "name = = 3"))
+    (tmp_path / "latin.toml").write_bytes(b'name = "\xe9"')
+    with pytest.raises(mg.FileError, match="is no TOML"):
+        mg.load(tmp_path / "latin.toml")
+    with pytest.raises(mg.FileError, match="cannot be read"):
+        mg.load(tmp_path / "absent.toml")
+    with pytest.raises(mg.FileError, match="cannot be read"):
+        mg.load(tmp_path)
+    with pytest.raises(mg.FileError, match="no mechanism of that name"):
+        mg.load("no-such-mechanism")
+
+
+# --- writing -------------------------------------------------------------------------------------------------------------
+
+
+def test_a_callable_load_leaves_no_file(tmp_path: Path) -> None:
+    m = mg.load("four-bar").replace(loads=[mg.Effort("D", lambda pose, twist, t: 1.0)])
+    with pytest.raises(mg.FileError, match="callable"):
+        mg.save(m, tmp_path / "m.toml")
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_unwritable_path_is_a_file_error(tmp_path: Path) -> None:
+    with pytest.raises(mg.FileError, match="cannot be written"):
+        mg.save(mg.load("four-bar"), tmp_path / "absent" / "m.toml")
+    (tmp_path / "folder.toml").mkdir()
+    with pytest.raises(mg.FileError, match="cannot be written"):
+        mg.save(mg.load("four-bar"), tmp_path / "folder.toml")
+    assert [p.name for p in tmp_path.iterdir()] == ["folder.toml"]
+
+
+def test_an_existing_file_survives_a_failed_save(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "m.toml"
+    mg.save(mg.load("four-bar"), path)
+    before = path.read_bytes()
+    with pytest.raises(mg.FileError):
+        mg.save(mg.load("four-bar").replace(loads=[mg.Effort("D", lambda pose, twist, t: 1.0)]), path)
+
+    def full(*_: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(toml.os, "replace", full)
+    with pytest.raises(mg.FileError, match="No space left"):
+        mg.save(mg.load("bennett"), path)
+    assert path.read_bytes() == before
+    assert [p.name for p in tmp_path.iterdir()] == ["m.toml"]
+
+
+# --- the JSON Schema for editors -----------------------------------------------------------------------------------------
+
+
+def test_the_schema_is_one() -> None:
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+
+
+@pytest.mark.parametrize("name", mg.library())
+def test_library_files_keep_the_schema(name: str) -> None:
+    text = library_path(name).read_text(encoding="utf-8")
+    assert text.startswith("#:schema ./mechanism.schema.json\n")
+    VALIDATOR.validate(tomllib.loads(text))
+
+
+@pytest.mark.parametrize("kind", toml.FIELDS)
+def test_schema_and_loader_know_the_same_fields(kind: str) -> None:
+    table = SCHEMA if kind == "file" else SCHEMA["$defs"][kind]
+    allowed = {*toml.FIELDS[kind], *(f"{field}_deg" for field in toml.ANGLES.get(kind, ()))}
+    assert set(table["properties"]) == allowed
+    assert table["additionalProperties"] is False
+    needed = {*toml.NEEDED.get(kind, ()), *(("kind",) if kind.startswith("load ") else ())}
+    assert set(table.get("required", ())) == needed
+
+
+def test_schema_and_loader_know_the_same_kinds() -> None:
+    assert {name.removeprefix("load ") for name in SCHEMA["$defs"] if name.startswith("load ")} == set(LOADS)
+    assert set(SCHEMA["$defs"]["units"]["properties"]) == set(UNIT_NAMES)
+    assert SCHEMA["properties"]["schema"]["const"] == toml.SCHEMA
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [("mass = ", "weight = "), ("schema = 1", "schema = 2"), ('kind = "gravity"', 'kind = "levity"'), ('a = "frame"', ""),
+     ("sweep_deg = [0.0, 360.0, 1.0]", "sweep_deg = [0.0, 360.0]")],
+)  # fmt: skip
+def test_the_schema_finds_what_the_loader_finds(tmp_path: Path, old: str, new: str) -> None:
+    text = FOUR_BAR.replace(old, new, 1)
+    assert not VALIDATOR.is_valid(tomllib.loads(text))
+    assert faults_of(tmp_path, text)
