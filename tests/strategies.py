@@ -128,13 +128,27 @@ def with_loads(m, seed, constant=False):
     loads = [
         mg.Gravity(9.81 * unit(rng)),
         mg.Wrench(some(moving), force=10 * rng.normal(size=3), moment=rng.normal(size=3), point=rng.uniform(-1, 1, 3)),
-        mg.Wrench(some(moving), force=10 * rng.normal(size=3), moment=rng.normal(size=3), point=rng.uniform(-1, 1, 3), frame="link"),
+        mg.Wrench(
+            some(moving),
+            force=10 * rng.normal(size=3),
+            moment=rng.normal(size=3),
+            point=rng.uniform(-1, 1, 3),
+            frame="link",
+        ),
         mg.Effort(some(every), float(rng.normal())),
     ]
     if not constant:
         a, b = rng.choice([k.name for k in m.links], 2, replace=False)
         loads += [
-            mg.Spring(str(a), str(b), rng.uniform(-1, 1, 3), rng.uniform(1.5, 2.5, 3), stiffness=30.0, free_length=0.4, damping=0.7),
+            mg.Spring(
+                str(a),
+                str(b),
+                rng.uniform(-1, 1, 3),
+                rng.uniform(1.5, 2.5, 3),
+                stiffness=30.0,
+                free_length=0.4,
+                damping=0.7,
+            ),
             mg.TorsionSpring(some(single), stiffness=5.0, free=0.3, damping=0.2),
         ]
     return m.replace(loads=loads)
@@ -148,7 +162,9 @@ def motions(m, seed, t, size=0.08):
         a, w, p = size * rng.uniform(0.5, 1.0), rng.uniform(0.7, 1.5), rng.uniform(0, 2 * np.pi)
         begin = m.start.get(m.full_name(drive.freedom), 0.0)
         phase = w * np.asarray(t) + p
-        out[drive.freedom] = mg.Motion(begin + a * (np.cos(phase) - np.cos(p)), -a * w * np.sin(phase), -a * w * w * np.cos(phase), t=t)
+        out[drive.freedom] = mg.Motion(
+            begin + a * (np.cos(phase) - np.cos(p)), -a * w * np.sin(phase), -a * w * w * np.cos(phase), t=t
+        )
     return out
 
 
@@ -190,15 +206,26 @@ def rescaled(m, length=1.0, mass=1.0, time=1.0):
     def marker(k):
         return None if k is None else mg.Marker(vec(k.point, length), k.axis, k.second)
 
-    links = [replace(k, mass=mass * k.mass, center=vec(k.center, length), inertia=vec(k.inertia, mass * length**2)) for k in m.links]
+    links = [
+        replace(k, mass=mass * k.mass, center=vec(k.center, length), inertia=vec(k.inertia, mass * length**2))
+        for k in m.links
+    ]
     pairs = [
         mg.Pair(
-            p.name, p.type, p.a, p.b, point=vec(p.point, length), axis=p.axis, second=p.second,
-            pitch=None if p.pitch is None else length * p.pitch, lead=None if p.lead is None else length * p.lead,
-            on_a=marker(p.on_a), on_b=marker(p.on_b),
+            p.name,
+            p.type,
+            p.a,
+            p.b,
+            point=vec(p.point, length),
+            axis=p.axis,
+            second=p.second,
+            pitch=None if p.pitch is None else length * p.pitch,
+            lead=None if p.lead is None else length * p.lead,
+            on_a=marker(p.on_a),
+            on_b=marker(p.on_b),
         )
         for p in m.pairs
-    ]  # fmt: skip
+    ]
 
     def turns(name):
         k, j = m.freedom(name)
@@ -210,16 +237,33 @@ def rescaled(m, length=1.0, mass=1.0, time=1.0):
             case mg.Gravity():
                 loads.append(mg.Gravity(vec(load.acceleration, length / time**2)))
             case mg.Wrench():
-                loads.append(replace(load, force=vec(load.force, force), moment=vec(load.moment, force * length), point=vec(load.point, length)))
+                loads.append(
+                    replace(
+                        load,
+                        force=vec(load.force, force),
+                        moment=vec(load.moment, force * length),
+                        point=vec(load.point, length),
+                    )
+                )
             case mg.Effort():
                 loads.append(replace(load, value=load.value * (force * length if turns(load.freedom) else force)))
             case mg.Spring():
-                loads.append(replace(load, p=vec(load.p, length), q=vec(load.q, length), stiffness=load.stiffness * force / length,
-                                     free_length=load.free_length * length, damping=load.damping * force / length * time))  # fmt: skip
+                loads.append(
+                    replace(
+                        load,
+                        p=vec(load.p, length),
+                        q=vec(load.q, length),
+                        stiffness=load.stiffness * force / length,
+                        free_length=load.free_length * length,
+                        damping=load.damping * force / length * time,
+                    )
+                )
             case mg.TorsionSpring():
                 unit_ = force * length if turns(load.freedom) else force / length
                 free = load.free * (1 if turns(load.freedom) else length)
-                loads.append(replace(load, stiffness=load.stiffness * unit_, free=free, damping=load.damping * unit_ * time))
+                loads.append(
+                    replace(load, stiffness=load.stiffness * unit_, free=free, damping=load.damping * unit_ * time)
+                )
     start = {k: v * (1 if turns(k) else length) for k, v in m.start.items()}
     return m.replace(links=links, pairs=pairs, loads=loads, start=start)
 

@@ -1,5 +1,7 @@
 """Identities of the link graph: incidence, tree, loops, order."""
 
+from itertools import pairwise
+
 import networkx as nx
 import numpy as np
 import pytest
@@ -90,7 +92,7 @@ def test_loops_span_the_cycle_space_of_networkx(seed):
         row = np.zeros(len(ends))
         row[k] = 1
         path = nx.shortest_path(forest, b, a)
-        for u, v in zip(path, path[1:], strict=False):
+        for u, v in pairwise(path):
             e = next(i for i in tree_keys if set(ends[i]) == {u, v})
             row[e] = 1 if ends[e] == (u, v) else -1
         rows.append(row)

@@ -59,7 +59,10 @@ FAULTS = {
     "mass is a text": ({"links": leaf(mass="heavy")}, ["door", "mass"]),
     "NaN centre": ({"links": leaf(center=(NAN, 0, 0))}, ["door", "center", "finite"]),
     "mass without centre": ({"links": leaf(center=None, inertia=None)}, ["door", "center"]),
-    "inertia against the triangle inequality": ({"links": leaf(inertia=np.diag([1.0, 0.1, 0.1]))}, ["door", "inertia", "unphysical=True"]),
+    "inertia against the triangle inequality": (
+        {"links": leaf(inertia=np.diag([1.0, 0.1, 0.1]))},
+        ["door", "inertia", "unphysical=True"],
+    ),
     "negative inertia": ({"links": leaf(inertia=np.diag([-0.1, 0.1, 0.1]))}, ["door", "inertia"]),
     "asymmetric inertia": ({"links": leaf(inertia=[[0.1, 0.05, 0], [0, 0.1, 0], [0, 0, 0.1]])}, ["door", "inertia"]),
     "NaN inertia": ({"links": leaf(inertia=np.full((3, 3), NAN))}, ["door", "inertia", "finite"]),
@@ -74,7 +77,10 @@ FAULTS = {
     "H with pitch and lead": ({"pairs": hinge(type="H", pitch=0.1, lead=0.1)}, ["pitch", "lead", "exactly one"]),
     "H with NaN pitch": ({"pairs": hinge(type="H", pitch=NAN)}, ["pitch", "finite"]),
     "R with pitch": ({"pairs": hinge(pitch=0.1)}, ["pitch", "leave it out"]),
-    "second not perpendicular": ({"pairs": hinge(type="U", second=(1, 0, 0.1)), "drives": []}, ["second", "perpendicular"]),
+    "second not perpendicular": (
+        {"pairs": hinge(type="U", second=(1, 0, 0.1)), "drives": []},
+        ["second", "perpendicular"],
+    ),
     "second parallel": ({"pairs": hinge(second=(0, 0, 2))}, ["second", "parallel"]),
     "second zero": ({"pairs": hinge(second=(0, 0, 0))}, ["second", "length 0"]),
     "drive on a freedom that the pair lacks": ({"drives": ["A.Tz"]}, ["A.Tz"]),
@@ -84,7 +90,10 @@ FAULTS = {
     "drive on a weld": ({"pairs": hinge(type="W")}, ["A", "no freedom"]),
     "one marker only": ({"pairs": hinge(point=None, axis=None, on_a=MARKER)}, ["on_b", "missing"]),
     "markers and point": ({"pairs": hinge(on_a=MARKER, on_b=MARKER)}, ["both"]),
-    "marker with zero axis": ({"pairs": hinge(point=None, axis=None, on_a=MARKER, on_b=mg.Marker(axis=(0, 0, 0)))}, ["on_b", "axis", "length 0"]),
+    "marker with zero axis": (
+        {"pairs": hinge(point=None, axis=None, on_a=MARKER, on_b=mg.Marker(axis=(0, 0, 0)))},
+        ["on_b", "axis", "length 0"],
+    ),
     "unknown frame": ({"frame": "ground"}, ["ground"]),
     "no pairs": ({"pairs": [], "drives": []}, ["no pairs"]),
     "a pair that is none": ({"pairs": ["A"], "drives": []}, ["mg.Pair"]),
@@ -101,14 +110,20 @@ FAULTS = {
     "effort NaN": ({"loads": [mg.Effort("A", NAN)]}, ["value"]),
     "spring on an unknown link": ({"loads": [mg.Spring("frame", "gate", (0, 0, 0), (1, 0, 0), 1.0)]}, ["gate"]),
     "spring NaN": ({"loads": [mg.Spring("frame", "door", (0, 0, 0), (1, 0, 0), NAN)]}, ["stiffness"]),
-    "spring of negative length": ({"loads": [mg.Spring("frame", "door", (0, 0, 0), (1, 0, 0), 1.0, free_length=-1)]}, ["free_length"]),
-    "torsion spring in a rotation": ({"pairs": hinge(type="S"), "drives": [], "loads": [mg.TorsionSpring("A.Rx", 1.0)]}, ["A.Rx"]),
+    "spring of negative length": (
+        {"loads": [mg.Spring("frame", "door", (0, 0, 0), (1, 0, 0), 1.0, free_length=-1)]},
+        ["free_length"],
+    ),
+    "torsion spring in a rotation": (
+        {"pairs": hinge(type="S"), "drives": [], "loads": [mg.TorsionSpring("A.Rx", 1.0)]},
+        ["A.Rx"],
+    ),
     "start of an unknown freedom": ({"start": {"B": 0.1}}, ["'B'"]),
     "start NaN": ({"start": {"A": NAN}}, ["finite"]),
     "unknown unit": ({"units": {"force": "N"}}, ["force"]),
     "empty name of a pair": ({"pairs": [mg.Pair("", "R", "frame", "door")], "drives": []}, ["name"]),
     "empty name of a link": ({"links": [*leaf(), mg.Link("")]}, ["name"]),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize(("more", "words"), FAULTS.values(), ids=FAULTS)
@@ -118,7 +133,13 @@ def test_a_faulty_declaration_is_refused_with_its_fault_named(more, words):
 
 
 def test_all_faults_come_at_once():
-    links = [mg.Link("frame"), mg.Link("door", mass=-1.0), mg.Link("door"), mg.Link("fat", mass=1.0), mg.Link("flat", center=(0, 0, 0), inertia=np.diag([1, 0, 0]))]  # fmt: skip
+    links = [
+        mg.Link("frame"),
+        mg.Link("door", mass=-1.0),
+        mg.Link("door"),
+        mg.Link("fat", mass=1.0),
+        mg.Link("flat", center=(0, 0, 0), inertia=np.diag([1, 0, 0])),
+    ]
     pairs = [
         mg.Pair("A", "R", "frame", "door", point=(0, 0, 0), axis=(0, 0, 0)),
         mg.Pair("A", "Q", "frame", "fat"),
@@ -128,15 +149,30 @@ def test_all_faults_come_at_once():
     ]
     faults = faults_of(links=links, pairs=pairs, drives=[])
     text = "\n".join(faults)
-    for word in ("mass = -1", "'door' is declared 2 times", "'fat'", "'flat'", "length 0", "'Q'", "pitch", "'gate'",
-                 "one link only", "'A' is declared 2 times", "finite"):  # fmt: skip
+    for word in (
+        "mass = -1",
+        "'door' is declared 2 times",
+        "'fat'",
+        "'flat'",
+        "length 0",
+        "'Q'",
+        "pitch",
+        "'gate'",
+        "one link only",
+        "'A' is declared 2 times",
+        "finite",
+    ):
         assert word in text
     assert len(faults) >= 11
 
 
 def test_faults_of_names_and_of_structure_come_together():
     """A drive, a load and a start that are wrong, beside an unconnected link."""
-    text = "\n".join(faults_of(links=[*leaf(), mg.Link("lost")], drives=["Z"], loads=[mg.Wrench("gate", force=(1, 0, 0))], start={"Y": 1.0}))
+    text = "\n".join(
+        faults_of(
+            links=[*leaf(), mg.Link("lost")], drives=["Z"], loads=[mg.Wrench("gate", force=(1, 0, 0))], start={"Y": 1.0}
+        )
+    )
     for word in ("lost", "'Z'", "gate", "'Y'"):
         assert word in text
 
@@ -161,13 +197,22 @@ def test_an_unphysical_inertia_is_accepted_on_request():
     assert m.link("door").unphysical
 
 
-@pytest.mark.parametrize("inertia", [np.zeros((3, 3)), np.diag([0.1, 0.1, 0.0]), mg.inertia.rod(1.0, (0, 0, 0), (1, 2, 3))])
+@pytest.mark.parametrize(
+    "inertia", [np.zeros((3, 3)), np.diag([0.1, 0.1, 0.0]), mg.inertia.rod(1.0, (0, 0, 0), (1, 2, 3))]
+)
 def test_inertia_of_points_and_rods_is_physical(inertia):
     door(links=leaf(inertia=inertia))
 
 
 def test_links_may_be_left_out():
-    m = mg.Mechanism("m", pairs=[mg.Pair("A", "R", "ground", "crank"), mg.Pair("B", "S", "crank", "rod"), mg.Pair("C", "C", "ground", "rod")])
+    m = mg.Mechanism(
+        "m",
+        pairs=[
+            mg.Pair("A", "R", "ground", "crank"),
+            mg.Pair("B", "S", "crank", "rod"),
+            mg.Pair("C", "C", "ground", "rod"),
+        ],
+    )
     assert [k.name for k in m.links] == ["ground", "crank", "rod"]
     assert m.frame == "ground"
     assert not m.has_geometry
@@ -199,8 +244,19 @@ def test_arrays_are_copied_in():
 
 def test_arrays_of_a_solution_are_read_only():
     s = mg.solve(door(), {"A": mg.Motion(np.linspace(0, 1, 5), 1.0, 0.0)})
-    arrays = [s["A"].position, s["A"].velocity, s["A"].reaction, s["A"].effort, s["A"].components["Fx"], s.link("door").pose,
-              s.link("door").twist, s.link("door").center, s.shaking, s.checks.closure, s.checks.power]  # fmt: skip
+    arrays = [
+        s["A"].position,
+        s["A"].velocity,
+        s["A"].reaction,
+        s["A"].effort,
+        s["A"].components["Fx"],
+        s.link("door").pose,
+        s.link("door").twist,
+        s.link("door").center,
+        s.shaking,
+        s.checks.closure,
+        s.checks.power,
+    ]
     for array in arrays:
         with pytest.raises(ValueError, match="read-only"):
             array[...] = 0.0
@@ -220,18 +276,29 @@ def test_pickle_and_copy_give_an_equal_mechanism(seed):
 
 def test_a_mechanism_with_a_users_row_can_be_pickled():
     row = mg.PairType("Slide2", freedoms=["Tx", "Ty"], reactions=None)
-    m = mg.Mechanism("m", pairs=[mg.Pair("A", row, "frame", "plate", point=(0, 0, 0), axis=(0, 0, 1))], drives=["A.Tx", "A.Ty"])
+    m = mg.Mechanism(
+        "m", pairs=[mg.Pair("A", row, "frame", "plate", point=(0, 0, 0), axis=(0, 0, 1))], drives=["A.Tx", "A.Ty"]
+    )
     twin = pickle.loads(pickle.dumps(m))
     assert twin == m
     s = mg.solve(twin, {"A.Tx": 1.0, "A.Ty": 2.0})
-    np.testing.assert_allclose(s.link("plate").pose[:3, 3], [*(np.array(m.pair("A").second) * 1.0 + 2.0 * np.cross((0, 0, 1), m.pair("A").second))])
+    np.testing.assert_allclose(
+        s.link("plate").pose[:3, 3],
+        [*(np.array(m.pair("A").second) * 1.0 + 2.0 * np.cross((0, 0, 1), m.pair("A").second))],
+    )
 
 
 def test_equality_sees_every_field():
     m = door()
     assert m == door()
-    for other in (m.replace(name="gate"), m.replace(drives=[]), m.replace(loads=[mg.Gravity((0, 0, -1))]), m.replace(start={"A": 0.1}),
-                  door(links=leaf(mass=2.0)), m.replace(units={"length": "m"})):  # fmt: skip
+    for other in (
+        m.replace(name="gate"),
+        m.replace(drives=[]),
+        m.replace(loads=[mg.Gravity((0, 0, -1))]),
+        m.replace(start={"A": 0.1}),
+        door(links=leaf(mass=2.0)),
+        m.replace(units={"length": "m"}),
+    ):
         assert other != m
     assert m != "door"
 
@@ -316,7 +383,10 @@ def test_a_second_direction_given_is_projected_where_it_need_not_be_perpendicula
 
 
 def test_lead_is_two_pi_pitch():
-    a, b = (mg.solve(door(pairs=hinge(type="H", **more)), {"A": 1.3}) for more in ({"lead": 0.5}, {"pitch": 0.5 / (2 * np.pi)}))
+    a, b = (
+        mg.solve(door(pairs=hinge(type="H", **more)), {"A": 1.3})
+        for more in ({"lead": 0.5}, {"pitch": 0.5 / (2 * np.pi)})
+    )
     np.testing.assert_allclose(a.link("door").pose, b.link("door").pose, atol=1e-15)
 
 

@@ -1,4 +1,4 @@
-"""Identities of forces, on random mechanisms: equilibrium and power by sums of our own, two methods, two bookkeepings, any frame, any unit."""
+"""Identities of forces, on random mechanisms: equilibrium and power by sums of our own, two methods, any frame, any unit."""
 
 from functools import cache
 
@@ -109,7 +109,11 @@ def applied_wrenches(m, s):
             R = s.link(load.link).pose[..., :3, :3] if load.frame == "link" else np.eye(3)
             where = load.point if load.point is not None else m.link(load.link).center
             if load.force is not None:
-                add(load.link, np.einsum("...ij,...j->...i", R, np.asarray(load.force)), s.link(load.link).point(where).position)
+                add(
+                    load.link,
+                    np.einsum("...ij,...j->...i", R, np.asarray(load.force)),
+                    s.link(load.link).point(where).position,
+                )
             if load.moment is not None:
                 out[load.link][..., :3] += np.einsum("...ij,...j->...i", R, np.asarray(load.moment))
         elif isinstance(load, mg.Spring):
@@ -175,7 +179,9 @@ def test_undriven_freedoms_transmit_the_efforts_that_are_given_and_reactions_do_
                 np.testing.assert_allclose(r.effort[..., j], given_effort(m, s, k, j), atol=1e-9 * big)
     for name, effort in s.passive_effort.items():
         k, j = m.freedom(name)
-        np.testing.assert_allclose(s[m.pairs[k].name].effort[..., j] - given_effort(m, s, k, j), effort, atol=1e-9 * big)
+        np.testing.assert_allclose(
+            s[m.pairs[k].name].effort[..., j] - given_effort(m, s, k, j), effort, atol=1e-9 * big
+        )
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -225,7 +231,9 @@ def test_what_is_printed_is_what_is_solved(seed, bookkeeping):
         mine = [n for n, x in enumerate(f.unknowns) if x.owner == p.name and not x.freedom]
         if bookkeeping == "minimal":
             wrench = state.reactions[k][:, :, 0] @ u[mine]
-            np.testing.assert_allclose(u[mine], [s[p.name].components[c][i] for c in p.type.component_names], atol=1e-8 * big)
+            np.testing.assert_allclose(
+                u[mine], [s[p.name].components[c][i] for c in p.type.component_names], atol=1e-8 * big
+            )
         elif p.type.bookkeeping is None:
             wrench = state.reactions[k][:, :, 0] @ u[mine]
         else:
@@ -245,14 +253,20 @@ def test_a_moved_mechanism_has_the_moved_forces(seed):
     big = largest(s, m)
     for p in m.pairs:
         x, y = s[p.name], moved[p.name]
-        expected = np.moveaxis(screw.move_wrench(X[:3, :, None] * np.ones(NODES), batched(np.nan_to_num(x.reaction))), 0, -1)
+        expected = np.moveaxis(
+            screw.move_wrench(X[:3, :, None] * np.ones(NODES), batched(np.nan_to_num(x.reaction))), 0, -1
+        )
         loose = np.isnan(x.reaction).any()
         if not loose:
             np.testing.assert_allclose(y.reaction, expected, atol=1e-8 * big)
         np.testing.assert_allclose(y.effort, x.effort, atol=1e-8 * big)
         for name, value in x.components.items():
             np.testing.assert_allclose(y.components[name], value, atol=1e-7 * big)
-    np.testing.assert_allclose(moved.shaking, np.moveaxis(screw.move_wrench(X[:3, :, None] * np.ones(NODES), batched(s.shaking)), 0, -1), atol=1e-8 * big)
+    np.testing.assert_allclose(
+        moved.shaking,
+        np.moveaxis(screw.move_wrench(X[:3, :, None] * np.ones(NODES), batched(s.shaking)), 0, -1),
+        atol=1e-8 * big,
+    )
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -263,7 +277,12 @@ def test_a_mechanism_far_away_has_the_same_verdict_efforts_and_components(seed):
     X[:3, 3] = 1e5 * np.array([0.6, -0.48, 0.64])
     far = m.moved(X)
     mine, theirs = mg.check(m), mg.check(far)
-    assert (mine.mobility, mine.redundancy, mine.determinate, mine.unique) == (theirs.mobility, theirs.redundancy, theirs.determinate, theirs.unique)
+    assert (mine.mobility, mine.redundancy, mine.determinate, mine.unique) == (
+        theirs.mobility,
+        theirs.redundancy,
+        theirs.determinate,
+        theirs.unique,
+    )
     assert theirs.margin == pytest.approx(mine.margin, rel=1e-4)
     assert [f.freedoms for f in mine.locked] == [f.freedoms for f in theirs.locked]
     assert [f.links for f in mine.passive] == [f.links for f in theirs.passive]
@@ -329,13 +348,18 @@ def test_power_supplied_is_the_rate_of_kinetic_energy(seed):
 def test_statics_is_linear_in_the_loads():
     m = with_drives(closed_mechanism(12, loops=2), 12)
     a = [mg.Gravity((1, 2, -9.81))]
-    b = [mg.Wrench(m.links[2].name, force=(3, 4, 5), moment=(1, -2, 0.5), point=(0.1, 0.2, 0.3)), mg.Effort(m.freedom_names()[-1], 2.5)]
+    b = [
+        mg.Wrench(m.links[2].name, force=(3, 4, 5), moment=(1, -2, 0.5), point=(0.1, 0.2, 0.3)),
+        mg.Effort(m.freedom_names()[-1], 2.5),
+    ]
     at = {d.freedom: 0.0 for d in m.drives}
     sa, sb, both = (mg.solve(m, at, loads=x) for x in (a, b, [*a, *b]))
     none = mg.solve(m, at, loads=[])
     double = mg.solve(m, at, loads=[*a, *a])
     for p in m.pairs:
-        np.testing.assert_allclose(both[p.name].total, sa[p.name].total + sb[p.name].total, atol=1e-9 * largest(both, m))
+        np.testing.assert_allclose(
+            both[p.name].total, sa[p.name].total + sb[p.name].total, atol=1e-9 * largest(both, m)
+        )
         np.testing.assert_allclose(double[p.name].total, 2 * sa[p.name].total, atol=1e-9 * largest(both, m))
         np.testing.assert_allclose(none[p.name].total, 0, atol=1e-12)
 
@@ -364,7 +388,9 @@ MOTION = {"A": mg.Motion(ANGLE, 1.5, -0.5, t=np.linspace(0, 1, 7))}
 
 def test_values_over_positions_are_the_values_at_each():
     F = np.random.default_rng(0).normal(size=(7, 3))
-    whole = mg.solve(pendulum(loads=[mg.Wrench("bar", force=F, moment=F[::-1], point=(1, 0, 0)), mg.Effort("A", F[:, 0])]), MOTION)
+    whole = mg.solve(
+        pendulum(loads=[mg.Wrench("bar", force=F, moment=F[::-1], point=(1, 0, 0)), mg.Effort("A", F[:, 0])]), MOTION
+    )
     for i in range(7):
         one = mg.solve(
             pendulum(loads=[mg.Wrench("bar", force=F[i], moment=F[6 - i], point=(1, 0, 0)), mg.Effort("A", F[i, 0])]),
@@ -389,7 +415,9 @@ def test_callable_values_are_called_with_pose_twist_and_time():
     by_array = mg.solve(pendulum(loads=[mg.Wrench("bar", force=force, point=tip)]), MOTION)
     np.testing.assert_allclose(by_call["A"].total, by_array["A"].total, atol=1e-13)
     effort = mg.solve(pendulum(loads=[mg.Effort("A", lambda pose, twist, t: -0.7 * twist[..., 2])]), MOTION)
-    np.testing.assert_allclose(effort["A"].drive_effort[:, 0] - mg.solve(pendulum(), MOTION)["A"].effort[:, 0], 0.7 * 1.5, atol=1e-13)
+    np.testing.assert_allclose(
+        effort["A"].drive_effort[:, 0] - mg.solve(pendulum(), MOTION)["A"].effort[:, 0], 0.7 * 1.5, atol=1e-13
+    )
 
 
 def test_a_callable_load_moves_with_the_mechanism():
@@ -404,7 +432,12 @@ def test_a_callable_load_moves_with_the_mechanism():
 
 
 def test_a_callable_load_works_for_one_position():
-    m = pendulum(loads=[mg.Wrench("bar", force=lambda pose, twist, t: (0, -3, 0), point=(1, 0, 0)), mg.Effort("A", lambda pose, twist, t: 2.0)])
+    m = pendulum(
+        loads=[
+            mg.Wrench("bar", force=lambda pose, twist, t: (0, -3, 0), point=(1, 0, 0)),
+            mg.Effort("A", lambda pose, twist, t: 2.0),
+        ]
+    )
     s = mg.solve(m, {"A": 0.5})
     np.testing.assert_allclose(s["A"].drive_effort, [3 * np.cos(0.5) - 2.0], atol=1e-13)
 
@@ -430,9 +463,11 @@ def test_a_spring_stores_what_the_driver_gives():
     """A massless crank with a spring, turned slowly: driver effort = dU/dq, U = k (l - l0)^2 / 2."""
     p, q, k, l0 = np.array([0.3, -1.0, 0.2]), np.array([0.8, 0.1, 0.0]), 40.0, 0.5
     m = mg.Mechanism(
-        "sprung", pairs=[mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=(0, 0, 1))], drives=["A"],
+        "sprung",
+        pairs=[mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=(0, 0, 1))],
+        drives=["A"],
         loads=[mg.Spring("frame", "crank", p, q, stiffness=k, free_length=l0)],
-    )  # fmt: skip
+    )
     t = chebyshev_times(-2.0, 2.0, 60)
     s = mg.solve(m, {"A": t})
     length = np.linalg.norm(s.link("crank").point(q).position - p, axis=-1)
@@ -443,7 +478,9 @@ def test_a_spring_stores_what_the_driver_gives():
 def test_a_torsion_spring_is_an_effort_proportional_to_the_angle():
     m = pendulum(loads=[mg.TorsionSpring("A", stiffness=7.0, free=0.2, damping=0.4)])
     s, plain = mg.solve(m, MOTION), mg.solve(pendulum(), MOTION)
-    np.testing.assert_allclose(s["A"].drive_effort[:, 0], plain["A"].effort[:, 0] + 7.0 * (ANGLE - 0.2) + 0.4 * 1.5, atol=1e-12)
+    np.testing.assert_allclose(
+        s["A"].drive_effort[:, 0], plain["A"].effort[:, 0] + 7.0 * (ANGLE - 0.2) + 0.4 * 1.5, atol=1e-12
+    )
     np.testing.assert_allclose(s["A"].total, plain["A"].total, atol=1e-12)
 
 
@@ -459,7 +496,9 @@ def test_a_weld_transmits_what_the_cut_link_carries(seed):
     at = next(j for j, o in enumerate(pairs) if j != i and cut in (o.a, o.b))
     ends = {"a": "half" if pairs[at].a == cut else pairs[at].a, "b": "half" if pairs[at].b == cut else pairs[at].b}
     o = pairs[at]
-    pairs[at] = mg.Pair(o.name, o.type, ends["a"], ends["b"], point=o.point, axis=o.axis, second=o.second, pitch=o.pitch)
+    pairs[at] = mg.Pair(
+        o.name, o.type, ends["a"], ends["b"], point=o.point, axis=o.axis, second=o.second, pitch=o.pitch
+    )
     welded = m.replace(links=[*m.links, mg.Link("half")], pairs=[*pairs, half])
     s, w = mg.solve(m, given), mg.solve(welded, given)
     big = largest(s, m)

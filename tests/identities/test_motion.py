@@ -47,7 +47,12 @@ def moving(seed, **more):
 
 def assert_rate(t, values, rate, what):
     got, tail = chebyshev_rate(t, values)
-    size = max(np.abs(rate).max(initial=0.0), np.abs(got).max(initial=0.0), np.abs(np.ptp(values, axis=0)).max(initial=0) / (t[-1] - t[0]), 1e-3)
+    size = max(
+        np.abs(rate).max(initial=0.0),
+        np.abs(got).max(initial=0.0),
+        np.abs(np.ptp(values, axis=0)).max(initial=0) / (t[-1] - t[0]),
+        1e-3,
+    )
     error = np.abs(got - rate).max(initial=0.0)
     assert error < 1e-6 * size + 10 * tail, f"{what}: {error:.3g} of {size:.3g}"
 
@@ -95,7 +100,9 @@ def test_rates_are_the_derivatives_of_positions_for_every_pair_type(symbol):
         assert_all_rates(m, t, s)
 
 
-@pytest.mark.parametrize("letters", ["RCSR", "RRRRRRR", "RHCHC", "RSgC", "RScCR", "RSpR", "RESR", "PUUU", "RCpCR", "RUSR"])
+@pytest.mark.parametrize(
+    "letters", ["RCSR", "RRRRRRR", "RHCHC", "RSgC", "RScCR", "RSpR", "RESR", "PUUU", "RCpCR", "RUSR"]
+)
 def test_rates_are_the_derivatives_of_positions_for_chains_assembled_from_an_open_declaration(letters):
     solved = 0
     for seed in range(4):
@@ -143,13 +150,16 @@ def test_what_is_not_reached_has_a_turning_point_before_it(seed):
         return
     t = chebyshev_times(0.0, 0.4, 9)
     given = motions(m, seed, t)
-    try:
-        s = mg.kinematics(m, given)
-        assert s.checks.closure.max() < 1e-10
-    except (mg.ReachError, mg.DeadPointError) as error:
-        assert fold_before_the_end(m, given)
-        assert set(error.value) == {m.full_name(d.freedom) for d in m.drives}
-        assert error.solution.batch == (9,)
+    s = mg.kinematics(m, given, on_reach="flag")
+    good = s.status == "ok"
+    assert s.checks.closure[good].max(initial=0.0) < 1e-10
+    if good.all():
+        return
+    assert fold_before_the_end(m, given)
+    with pytest.raises((mg.ReachError, mg.DeadPointError)) as caught:
+        mg.kinematics(m, given)
+    assert set(caught.value.value) == {m.full_name(d.freedom) for d in m.drives}
+    np.testing.assert_array_equal(caught.value.solution.status, s.status)
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -187,7 +197,9 @@ def test_driving_another_freedom_of_the_same_motion_gives_the_same_motion():
         if other == name:
             continue
         r = s[m.pairs[i].name]
-        back = mg.kinematics(m.replace(drives=[other]), {other: mg.Motion(r.position[:, n], r.velocity[:, n], r.acceleration[:, n])})
+        back = mg.kinematics(
+            m.replace(drives=[other]), {other: mg.Motion(r.position[:, n], r.velocity[:, n], r.acceleration[:, n])}
+        )
         mine = back[m.pairs[k].name]
         np.testing.assert_allclose(mine.position[:, j], s[m.pairs[k].name].position[:, j], atol=1e-8)
         np.testing.assert_allclose(mine.velocity[:, j], s[m.pairs[k].name].velocity[:, j], atol=1e-7)
@@ -213,13 +225,17 @@ def test_kinematics_of_the_moved_mechanism_is_the_moved_kinematics(seed):
     X = pose(np.random.default_rng(seed), 30.0)
     moved = mg.kinematics(m.moved(X), given)
     for p in m.pairs:
-        np.testing.assert_allclose(moved[p.name].velocity, s[p.name].velocity, atol=1e-8 * max(1, np.abs(s[p.name].velocity).max(initial=0)))
+        np.testing.assert_allclose(
+            moved[p.name].velocity, s[p.name].velocity, atol=1e-8 * max(1, np.abs(s[p.name].velocity).max(initial=0))
+        )
     for k in m.links:
         np.testing.assert_allclose(moved.link(k.name).pose, X @ s.link(k.name).pose @ np.linalg.inv(X), atol=1e-8)
 
 
 def test_an_angle_is_unwrapped_over_several_turns():
-    m = mg.Mechanism("wheel", pairs=[mg.Pair("A", "R", "frame", "wheel", point=(0, 0, 0), axis=(0, 0, 1))], drives=["A"])
+    m = mg.Mechanism(
+        "wheel", pairs=[mg.Pair("A", "R", "frame", "wheel", point=(0, 0, 0), axis=(0, 0, 1))], drives=["A"]
+    )
     angle = np.linspace(0, 40, 300)
     np.testing.assert_allclose(mg.kinematics(m, {"A": angle})["A"].position[:, 0], angle)
 

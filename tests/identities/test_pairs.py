@@ -11,11 +11,11 @@ from mechgraph.model import pair_evaluation as evaluation
 
 PITCH = 0.37
 USER_ROWS = {
-    "oblique slide": mg.PairType(
-        "Tob", freedoms=[mg.Freedom("T45", (0, 0, 0, 0.6, 0.0, 0.8))], reactions=None
-    ),
+    "oblique slide": mg.PairType("Tob", freedoms=[mg.Freedom("T45", (0, 0, 0, 0.6, 0.0, 0.8))], reactions=None),
     "offset hinge": mg.PairType(
-        "Roff", freedoms=[mg.Freedom("Rz", (0, 0, 1, 0.0, -0.7, 0.0))], reactions=None,
+        "Roff",
+        freedoms=[mg.Freedom("Rz", (0, 0, 1, 0.0, -0.7, 0.0))],
+        reactions=None,
         efforts=[mg.Component("Mz", (0, 0, 1, 0, 0, 0))],
     ),
     "turn of screw and slide": mg.PairType("HT", freedoms=["Rz + pitch Tz", "Tx"], reactions=None),
@@ -23,7 +23,7 @@ USER_ROWS = {
     "universal without components": mg.PairType("U2", freedoms=["Rz", "Rx"], reactions=None),
     "free body": mg.PairType("Free", freedoms=["Tx", "Ty", "Tz", "rotation"], reactions=[]),
     "named frame": mg.PairType("Ub", freedoms=["Rz", "Rx"], reactions=["Fx@2", "Fy@2", "Fz@2", "My@1"]),
-}  # fmt: skip
+}
 ROWS = {**mg.pair_types(), **USER_ROWS}
 each_row = pytest.mark.parametrize("row", ROWS.values(), ids=list(ROWS))
 
@@ -120,7 +120,9 @@ def test_displacement_is_the_product_of_exponentials(row):
     D = evaluated(row, x)[0][-1][..., 0, 0]
     expected = se3.identity()
     for group in row.factors:
-        s = sum(q[j, 0, 0] * (np.array(row.freedoms[j].twist) + PITCH * np.array(row.freedoms[j].per_pitch)) for j in group)
+        s = sum(
+            q[j, 0, 0] * (np.array(row.freedoms[j].twist) + PITCH * np.array(row.freedoms[j].per_pitch)) for j in group
+        )
         expected = se3.compose(expected, se3.pose_exp(s))
     np.testing.assert_allclose(D, expected, atol=1e-13)
 
@@ -207,7 +209,9 @@ def test_the_touching_line_of_a_cylinder_stays_in_its_plane():
     np.testing.assert_allclose(D[2, 3], 0, atol=1e-14)
 
 
-@pytest.mark.parametrize(("symbol", "lies"), [("Sg", (0, 1)), ("Sp", (2,)), ("S", (0, 1, 2)), ("E", (2,)), ("R", (0, 1, 2))])
+@pytest.mark.parametrize(
+    ("symbol", "lies"), [("Sg", (0, 1)), ("Sp", (2,)), ("S", (0, 1, 2)), ("E", (2,)), ("R", (0, 1, 2))]
+)
 def test_the_origin_of_marker_b_stays_on_point_line_or_plane_of_a(symbol, lies):
     row = mg.pair_types()[symbol]
     D = evaluated(row, states(row, 4, 6))[0][-1]
@@ -269,7 +273,7 @@ def test_rotation_vectors_are_continuous_where_the_axis_wanders_near_a_half_turn
         ({"freedoms": [mg.Freedom("R", (0, 0, np.nan, 0, 0, 0))]}, "pair type"),
         ({"freedoms": [mg.Freedom("R", (0, 0, 1))]}, "pair type"),
     ],
-)  # fmt: skip
+)
 def test_a_bad_row_is_refused(more, word):
     with pytest.raises(mg.DeclarationError, match=word):
         mg.PairType("X", **more)

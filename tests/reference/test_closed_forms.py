@@ -19,7 +19,10 @@ def test_driven_pendulum():
     mass, c, inertia = 2.5, 0.7, 0.13
     m = mg.Mechanism(
         "pendulum",
-        links=[mg.Link("frame"), mg.Link("bar", mass=mass, center=(c, 0, 0), inertia=np.diag([0.01, inertia, inertia]))],
+        links=[
+            mg.Link("frame"),
+            mg.Link("bar", mass=mass, center=(c, 0, 0), inertia=np.diag([0.01, inertia, inertia])),
+        ],
         pairs=[mg.Pair("A", "R", "frame", "bar", point=(0, 0, 0), axis=Z)],
         drives=["A"],
         loads=[mg.Gravity((0, -G, 0))],
@@ -27,9 +30,11 @@ def test_driven_pendulum():
     q, w, alpha = np.linspace(-3, 4, 23), 1.7, -2.3
     s = mg.solve(m, {"A": mg.Motion(q, w, alpha)})
     r = c * np.stack([np.cos(q), np.sin(q), 0 * q], axis=-1)
-    a = np.cross([0, 0, alpha], r) - w**2 * r
-    np.testing.assert_allclose(s["A"].force, mass * (a + [0, G, 0]), atol=1e-12)
-    np.testing.assert_allclose(s["A"].effort[:, 0], (inertia + mass * c**2) * alpha + mass * G * c * np.cos(q), atol=1e-12)
+    a, gravity = np.cross([0, 0, alpha], r) - w**2 * r, np.array([0, -G, 0])
+    np.testing.assert_allclose(s["A"].force, mass * (a - gravity), atol=1e-12)
+    np.testing.assert_allclose(
+        s["A"].effort[:, 0], (inertia + mass * c**2) * alpha + mass * G * c * np.cos(q), atol=1e-12
+    )
     np.testing.assert_allclose(s["A"].moment, 0, atol=1e-12)
 
 
@@ -37,9 +42,11 @@ def test_a_skew_rotor_needs_a_dynamic_couple():
     """A body turning at w about z with product of inertia: M = w x I w on the body, so M_x = -I_yz' ... (Euler 1765)."""
     I = mg.inertia.from_components(0.3, 0.25, 0.2, xz=0.04, yz=-0.03)
     m = mg.Mechanism(
-        "rotor", links=[mg.Link("frame"), mg.Link("rotor", mass=4.0, center=(0, 0, 0.5), inertia=I)],
-        pairs=[mg.Pair("A", "R", "frame", "rotor", point=(0, 0, 0.5), axis=Z)], drives=["A"],
-    )  # fmt: skip
+        "rotor",
+        links=[mg.Link("frame"), mg.Link("rotor", mass=4.0, center=(0, 0, 0.5), inertia=I)],
+        pairs=[mg.Pair("A", "R", "frame", "rotor", point=(0, 0, 0.5), axis=Z)],
+        drives=["A"],
+    )
     w = np.array([0, 0, 12.0])
     s = mg.solve(m, {"A": mg.Motion(0.0, w[2])})
     np.testing.assert_allclose(s["A"].moment, np.cross(w, I @ w), atol=1e-12)
@@ -65,8 +72,20 @@ def four_bar(start=0.6, loads=()):
         mg.Link("coupler", mass=2.0, center=three(0.6 * q + 0.4 * p), inertia=np.diag([0.1, 0.15, 0.2])),
         mg.Link("rocker", mass=1.5, center=three(0.5 * (o + p)), inertia=np.diag([0.1, 0.1, 0.12])),
     ]
-    pairs = [mg.Pair(n, "R", a, b, point=three(x), axis=Z) for n, a, b, x in (("A", "frame", "crank", (0, 0)), ("B", "crank", "coupler", q), ("C", "coupler", "rocker", p), ("D", "frame", "rocker", o))]  # fmt: skip
-    return mg.Mechanism("four-bar", links=links, pairs=pairs, drives=["A"], loads=loads), np.arctan2(p[1], p[0] - A4), np.arctan2(*(p - q)[::-1])
+    pairs = [
+        mg.Pair(n, "R", a, b, point=three(x), axis=Z)
+        for n, a, b, x in (
+            ("A", "frame", "crank", (0, 0)),
+            ("B", "crank", "coupler", q),
+            ("C", "coupler", "rocker", p),
+            ("D", "frame", "rocker", o),
+        )
+    ]
+    return (
+        mg.Mechanism("four-bar", links=links, pairs=pairs, drives=["A"], loads=loads),
+        np.arctan2(p[1], p[0] - A4),
+        np.arctan2(*(p - q)[::-1]),
+    )
 
 
 def test_four_bar_displacement():
@@ -88,7 +107,9 @@ def test_four_bar_driver_by_virtual_work():
     Velocities and accelerations of crank, coupler, rocker angles by differentiating the two loop equations (textbook), independently.
     """
     force = np.array([3.0, -20.0])
-    m, psi0, theta0 = four_bar(loads=[mg.Gravity((0, -G, 0)), mg.Wrench("coupler", force=(*force, 0), point=(0.7, 0.5, 0))])
+    m, psi0, theta0 = four_bar(
+        loads=[mg.Gravity((0, -G, 0)), mg.Wrench("coupler", force=(*force, 0), point=(0.7, 0.5, 0))]
+    )
     q, w, alpha = np.linspace(0, 6, 50), 3.0, 5.0
     s = mg.solve(m, {"A": mg.Motion(q, w, alpha)})
     phi, theta, psi = 0.6 + q, theta0 + s["B"].position[:, 0] + q, psi0 + s["D"].position[:, 0]
@@ -108,12 +129,17 @@ def test_four_bar_driver_by_virtual_work():
 
     one = np.ones(50)
     v = [rate(0.5 * A1, phi, w * one), rate(A1, phi, w * one) + rate(0.4 * A2, theta, wt), rate(0.5 * A3, psi, wp)]
-    a = [rate2(0.5 * A1, phi, w * one, alpha * one), rate2(A1, phi, w * one, alpha * one) + rate2(0.4 * A2, theta, wt, at), rate2(0.5 * A3, psi, wp, ap)]
+    a = [
+        rate2(0.5 * A1, phi, w * one, alpha * one),
+        rate2(A1, phi, w * one, alpha * one) + rate2(0.4 * A2, theta, wt, at),
+        rate2(0.5 * A3, psi, wp, ap),
+    ]
     q0 = A1 * e(np.array(0.6))
     local = np.array([0.7, 0.5]) - q0
     angle = np.arctan2(local[1], local[0]) - theta0
     vp = rate(A1, phi, w * one) + rate(np.linalg.norm(local), theta + angle, wt)
-    power = sum(mass * ((ac + [0, G]) * vc).sum(-1) for mass, ac, vc in zip((1.2, 2.0, 1.5), a, v, strict=True))
+    down = np.array([0, -G])
+    power = sum(mass * ((ac - down) * vc).sum(-1) for mass, ac, vc in zip((1.2, 2.0, 1.5), a, v, strict=True))
     power = power + 0.05 * alpha * w + 0.2 * at * wt + 0.12 * ap * wp - vp @ force
     np.testing.assert_allclose(s["A"].effort[:, 0] * w, power, rtol=1e-9, atol=1e-8)
 
@@ -129,14 +155,20 @@ def test_slider_crank_of_marghitu():
     m = mg.Mechanism(
         "R-RRT",
         links=[
-            mg.Link("frame"), mg.Link("crank", mass=1.0, center=b / 2, inertia=I, unphysical=True),
-            mg.Link("rod", mass=1.0, center=(b + c) / 2, inertia=I, unphysical=True), mg.Link("slider", mass=1.0, center=c),
+            mg.Link("frame"),
+            mg.Link("crank", mass=1.0, center=b / 2, inertia=I, unphysical=True),
+            mg.Link("rod", mass=1.0, center=(b + c) / 2, inertia=I, unphysical=True),
+            mg.Link("slider", mass=1.0, center=c),
         ],
-        pairs=[mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=Z), mg.Pair("B", "R", "crank", "rod", point=b, axis=Z),
-               mg.Pair("C", "R", "rod", "slider", point=c, axis=Z), mg.Pair("D", "P", "frame", "slider", point=c, axis=(1, 0, 0))],
+        pairs=[
+            mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=Z),
+            mg.Pair("B", "R", "crank", "rod", point=b, axis=Z),
+            mg.Pair("C", "R", "rod", "slider", point=c, axis=Z),
+            mg.Pair("D", "P", "frame", "slider", point=c, axis=(1, 0, 0)),
+        ],
         drives=["A"],
         loads=[mg.Gravity((0, -10, 0)), mg.Wrench("slider", force=(100, 0, 0), point=c)],
-    )  # fmt: skip
+    )
     s = mg.solve(m, {"A": mg.Motion(0.0, 1.0)}, redundant="minimum_norm")
     np.testing.assert_allclose(s.link("slider").center_velocity, [-np.sqrt(2), 0, 0], atol=1e-12)
     np.testing.assert_allclose(s.link("slider").center_acceleration, [-np.sqrt(2), 0, 0], atol=1e-12)
@@ -155,14 +187,21 @@ def test_spatial_slider_crank_of_haug():
     assert np.linalg.norm(c - b) == pytest.approx(0.3)
     m = mg.Mechanism(
         "Haug",
-        links=[mg.Link("frame"), mg.Link("crank", mass=0.12, center=(a + b) / 2, inertia=np.diag([1e-4, 1e-4, 1e-5])),
-               mg.Link("rod", mass=0.5, center=(b + c) / 2, inertia=4e-3 * np.eye(3)), mg.Link("slider", mass=2.0, center=c, inertia=1e-4 * np.eye(3))],
-        pairs=[mg.Pair("A", "R", "frame", "crank", point=a, axis=(1, 0, 0)), mg.Pair("B", "S", "crank", "rod", point=b),
-               mg.Pair("C", "U", "slider", "rod", point=c, axis=(1, 0, 0), second=np.cross((1, 0, 0), c - b)),
-               mg.Pair("D", "P", "frame", "slider", point=c, axis=(1, 0, 0))],
+        links=[
+            mg.Link("frame"),
+            mg.Link("crank", mass=0.12, center=(a + b) / 2, inertia=np.diag([1e-4, 1e-4, 1e-5])),
+            mg.Link("rod", mass=0.5, center=(b + c) / 2, inertia=4e-3 * np.eye(3)),
+            mg.Link("slider", mass=2.0, center=c, inertia=1e-4 * np.eye(3)),
+        ],
+        pairs=[
+            mg.Pair("A", "R", "frame", "crank", point=a, axis=(1, 0, 0)),
+            mg.Pair("B", "S", "crank", "rod", point=b),
+            mg.Pair("C", "U", "slider", "rod", point=c, axis=(1, 0, 0), second=np.cross((1, 0, 0), c - b)),
+            mg.Pair("D", "P", "frame", "slider", point=c, axis=(1, 0, 0)),
+        ],
         drives=["A"],
         loads=[mg.Gravity((0, 0, -G))],
-    )  # fmt: skip
+    )
     s = mg.solve(m, {"A": mg.Motion(0.0, 6.0)})
     assert mg.check(m).mobility == 1
     np.testing.assert_allclose(s.link("slider").center_velocity, [0.24, 0, 0], atol=1e-9)
@@ -176,7 +215,13 @@ def test_spatial_slider_crank_of_haug():
 def test_bennett_half_angles(a, b, alpha):
     """Bennett (1903): tan(t1/2) tan(t2/2) = sin((beta + alpha)/2) / sin((beta - alpha)/2) up to sign, a / sin alpha = b / sin beta."""
     beta = np.arcsin(b * np.sin(alpha) / a)
-    m = mg.chain("RRRR", twist=[alpha, beta, alpha, beta], length=[a, b, a, b], offset=[0] * 4, start={"O1": 1.0, "O2": 2.0, "O3": -1.0, "O4": -2.0})
+    m = mg.chain(
+        "RRRR",
+        twist=[alpha, beta, alpha, beta],
+        length=[a, b, a, b],
+        offset=[0] * 4,
+        start={"O1": 1.0, "O2": 2.0, "O3": -1.0, "O4": -2.0},
+    )
     m = mg.assemble(m, {"O1": 1.0})
     report = mg.check(m)
     assert (report.mobility, report.redundancy) == (1, 3)
@@ -194,9 +239,14 @@ def test_spherical_four_bar():
 
     With u_B(q) = Rot(A, q) u_B and u_C(p) = Rot(D, p) u_C the input-output equation is u_B(q) . u_C(p) = cos(a2) (Chiang 1988).
     """
-    axes = {n: np.array(v) / np.linalg.norm(v) for n, v in {"A": (0, 0, 1), "B": (0.4, 0, 0.9), "C": (0.7, 0.9, 0.5), "D": (0, 0.9, 0.4)}.items()}
+    axes = {
+        n: np.array(v) / np.linalg.norm(v)
+        for n, v in {"A": (0, 0, 1), "B": (0.4, 0, 0.9), "C": (0.7, 0.9, 0.5), "D": (0, 0.9, 0.4)}.items()
+    }
     ends = {"A": ("frame", "crank"), "B": ("crank", "coupler"), "C": ("coupler", "rocker"), "D": ("frame", "rocker")}
-    m = mg.Mechanism("spherical", pairs=[mg.Pair(n, "R", *ends[n], point=2 * axes[n], axis=axes[n]) for n in "ABCD"], drives=["A"])
+    m = mg.Mechanism(
+        "spherical", pairs=[mg.Pair(n, "R", *ends[n], point=2 * axes[n], axis=axes[n]) for n in "ABCD"], drives=["A"]
+    )
     s = mg.kinematics(m, {"A": np.linspace(0, 8, 200)}, on_reach="flag")
 
     def turned(axis, angle, v):
@@ -220,15 +270,19 @@ def test_spherical_four_bar():
 
 
 def test_rssr_displacement():
-    """The coupler keeps its length: |p(q) - r(psi)|^2 = const; solved for psi it is A sin psi + B cos psi = C (Hartenberg and Denavit 1964)."""
+    """The coupler keeps its length, |p(q) - r(psi)|^2 = const: A sin psi + B cos psi = C (Hartenberg and Denavit 1964)."""
     a = {"A": ((0, 0, 0), (0, 0, 1)), "D": ((1.1, 1.0, 0), (1, 0.1, 0.05))}
     p0, r0 = np.array([0.3, 0, 0.1]), np.array([0.5, 1.2, 0.6])
     m = mg.Mechanism(
         "RSSR",
-        pairs=[mg.Pair("A", "R", "frame", "crank", point=a["A"][0], axis=a["A"][1]), mg.Pair("B", "S", "crank", "coupler", point=p0),
-               mg.Pair("C", "S", "coupler", "rocker", point=r0), mg.Pair("D", "R", "frame", "rocker", point=a["D"][0], axis=a["D"][1])],
+        pairs=[
+            mg.Pair("A", "R", "frame", "crank", point=a["A"][0], axis=a["A"][1]),
+            mg.Pair("B", "S", "crank", "coupler", point=p0),
+            mg.Pair("C", "S", "coupler", "rocker", point=r0),
+            mg.Pair("D", "R", "frame", "rocker", point=a["D"][0], axis=a["D"][1]),
+        ],
         drives=["A"],
-    )  # fmt: skip
+    )
     q = np.linspace(0, 2 * np.pi, 181)
     s = mg.kinematics(m, {"A": mg.Motion(q, 1.0)})
     p = np.stack([0.3 * np.cos(q), 0.3 * np.sin(q), 0.1 + 0 * q], axis=-1)
@@ -250,10 +304,14 @@ def test_screw_jack(more):
     pitch = more.get("pitch", more.get("lead", 0) / (2 * np.pi))
     m = mg.Mechanism(
         "jack",
-        pairs=[mg.Pair("S", "R", "frame", "spindle", point=(0, 0, 0), axis=Z), mg.Pair("N", "H", "spindle", "nut", point=(0, 0, 0.1), axis=Z, **more),
-               mg.Pair("P", "P", "frame", "nut", point=(0.2, 0, 0), axis=Z)],
-        drives=["S"], loads=[mg.Wrench("nut", force=(0, 0, -500.0), point=(0, 0, 0))],
-    )  # fmt: skip
+        pairs=[
+            mg.Pair("S", "R", "frame", "spindle", point=(0, 0, 0), axis=Z),
+            mg.Pair("N", "H", "spindle", "nut", point=(0, 0, 0.1), axis=Z, **more),
+            mg.Pair("P", "P", "frame", "nut", point=(0.2, 0, 0), axis=Z),
+        ],
+        drives=["S"],
+        loads=[mg.Wrench("nut", force=(0, 0, -500.0), point=(0, 0, 0))],
+    )
     s = mg.solve(m, {"S": np.linspace(0, 3, 4)})
     np.testing.assert_allclose(s["P"].position[:, 0], -pitch * np.linspace(0, 3, 4), atol=1e-14)
     np.testing.assert_allclose(s["S"].effort, -500.0 * pitch, atol=1e-10)
@@ -261,9 +319,21 @@ def test_screw_jack(more):
 
 
 def door(upper):
-    links = [mg.Link("frame"), mg.Link("door", mass=30.0, center=(0.45, 0, 1.0), inertia=mg.inertia.box(30.0, (0.9, 0.04, 2.0)))]
-    pairs = [mg.Pair("low", "R" if upper == "R" else "S", "frame", "door", point=(0, 0, 0.2), axis=Z), mg.Pair("high", upper, "frame", "door", point=(0, 0, 1.8), axis=Z)]  # fmt: skip
-    return mg.Mechanism(f"door {upper}", links=links, pairs=pairs, drives=["low"] if upper == "R" else [], loads=[mg.Gravity((0, 0, -G))])
+    links = [
+        mg.Link("frame"),
+        mg.Link("door", mass=30.0, center=(0.45, 0, 1.0), inertia=mg.inertia.box(30.0, (0.9, 0.04, 2.0))),
+    ]
+    pairs = [
+        mg.Pair("low", "R" if upper == "R" else "S", "frame", "door", point=(0, 0, 0.2), axis=Z),
+        mg.Pair("high", upper, "frame", "door", point=(0, 0, 1.8), axis=Z),
+    ]
+    return mg.Mechanism(
+        f"door {upper}",
+        links=links,
+        pairs=pairs,
+        drives=["low"] if upper == "R" else [],
+        loads=[mg.Gravity((0, 0, -G))],
+    )
 
 
 def test_door_on_two_hinges():
@@ -301,10 +371,15 @@ def test_universal_joint(beta):
     out, pin = (np.sin(beta), 0, np.cos(beta)), (np.cos(beta), 0, -np.sin(beta))
     m = mg.Mechanism(
         "cardan",
-        pairs=[mg.Pair("A", "R", "frame", "input", point=(0, 0, -1), axis=Z), mg.Pair("B", "R", "input", "cross", point=(0, 0, 0), axis=(0, 1, 0)),
-               mg.Pair("C", "R", "cross", "output", point=(0, 0, 0), axis=pin), mg.Pair("D", "R", "frame", "output", point=out, axis=out)],
-        drives=["A"], loads=[mg.Effort("D", -10.0)],
-    )  # fmt: skip
+        pairs=[
+            mg.Pair("A", "R", "frame", "input", point=(0, 0, -1), axis=Z),
+            mg.Pair("B", "R", "input", "cross", point=(0, 0, 0), axis=(0, 1, 0)),
+            mg.Pair("C", "R", "cross", "output", point=(0, 0, 0), axis=pin),
+            mg.Pair("D", "R", "frame", "output", point=out, axis=out),
+        ],
+        drives=["A"],
+        loads=[mg.Effort("D", -10.0)],
+    )
     q = np.linspace(0, 2 * np.pi, 97)
     s = mg.solve(m, {"A": mg.Motion(q, 2.0)})
     psi, ratio = s["D"].position[:, 0], s["D"].velocity[:, 0] / 2.0
