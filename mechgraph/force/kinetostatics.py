@@ -129,7 +129,8 @@ class _Run:
         found = self.positions()
         status = np.array([s.value for s in found.status.reshape(-1)], dtype="U24").reshape(self.batch)
         good = np.flatnonzero(status.reshape(-1) == Status.OK.value)
-        here = self.system.at(found.x.reshape(self.system.n_state, -1)[:, good])
+        here = found.here if found.here is not None and good.size == found.here.T else None
+        here = here or self.system.at(found.x.reshape(self.system.n_state, -1)[:, good])
         which = found.which.reshape(-1)[good]
         solver = closure_solver(here, found.choices, which)
         dead = solver.condition > SINGULAR
