@@ -24,6 +24,8 @@ NODE_CONVERGED = 1e-5
 """Closure residual at which a node is good enough to predict from, after one more step."""
 ITERATIONS = 8
 """Most Newton iterations at a position."""
+SURE_STEP = 0.01
+"""Steps below this are closed fully: the end of the reach is near."""
 LONGEST_STEP = 0.35
 """Longest step between nodes, in driver space (radians, or lengths / L)."""
 STRAIGHT = 0.98
@@ -87,6 +89,9 @@ class Positions:
     here: Configuration | None = None
 
 
+Case = tuple[Array, Index, np.ndarray, Array, Configuration | None]
+
+
 class Follower:
     """Follows driver paths on one system. ``columns`` are the driven freedoms, ``keep`` freedoms preferably held."""
 
@@ -113,7 +118,7 @@ class Follower:
         here = self.system.at(x)
         left = np.abs(here.residual).max(axis=0, initial=0.0)
         if not len(self.choices[choice].cols):
-            return here, total, left <= 10 * goal
+            return here, total, left <= max(goal, 10 * CONVERGED)
         for round_ in range(ITERATIONS):
             part = np.flatnonzero(left > goal)
             if not part.size:
@@ -132,7 +137,7 @@ class Follower:
                 left[part] = np.abs(few.residual).max(axis=0, initial=0.0)
                 here = self.system.at(x)
                 break
-        return here, total, left <= 10 * goal
+        return here, total, left <= max(goal, 10 * CONVERGED)
 
     def newton_step(self, here: Configuration, choice: int) -> Array:
         """One limited Newton step ``(F, T)`` at every state of a configuration."""
@@ -210,7 +215,7 @@ class Follower:
         choice = last.choice
         x = self.system.advance(last.x[:, None], dq[:, None])
         x[self.rows, 0] = drive
-        here, total, done = self.correct(x, choice, NODE_CONVERGED)
+        here, total, done = self.correct(x, choice, NODE_CONVERGED if at - last.at > SURE_STEP else CONVERGED)
         correction = float(np.abs(total).max(initial=0.0))
         if not done[0] and correction < CORRECTION:
             closed, error = close(self.system, x[:, 0], self.columns, iterations=12)
@@ -258,17 +263,34 @@ class Follower:
         which = np.zeros((C, N), dtype=np.intp)
         reached = np.empty((d, C))
         for c in range(C):
-            stops = np.zeros(0, dtype=np.intp)
-            for _ in range(4):
-                track = self.track(x, values[:, c], stops)
-                states, choice_of, bad, here = self._between(track, values[:, c])
-                if not bad.any():
-                    break
-                stops = np.union1d(stops, np.flatnonzero(bad))
-            out[:, c], which[c] = states, choice_of
-            status[c] = self._statuses(track, values[:, c], states, bad)
-            reached[:, c] = track.nodes[-1].drive
+            done = self._case(x, values[:, c])
+            if N > 1 and (done[2] != Status.OK).all():
+                done = self._both_ways(x, values[:, c], done)
+            out[:, c], which[c], status[c], reached[:, c], here = done
         return Positions(out, status, self.choices, which, reached, here if C == 1 else None)
+
+    def _case(self, x: Array, values: Array) -> Case:
+        """States, choices, statuses, last driver values reached and evaluation of one case."""
+        stops = np.zeros(0, dtype=np.intp)
+        for _ in range(4):
+            track = self.track(x, values, stops)
+            states, choice_of, bad, here = self._between(track, values)
+            if not bad.any():
+                break
+            stops = np.union1d(stops, np.flatnonzero(bad))
+        return states, choice_of, self._statuses(track, values, states, bad), track.nodes[-1].drive, here
+
+    def _both_ways(self, x: Array, values: Array, failed: Case) -> Case:
+        """A path whose first position cannot be reached, entered at its position nearest to the start and followed both ways."""
+        near = int(np.argmin(((values - x[self.rows][:, None]) ** 2).sum(axis=0)))
+        ahead = self._case(x, values[:, near:])
+        behind = self._case(x, values[:, near::-1])
+        if (ahead[2] != Status.OK).all():
+            return failed
+        states, choice_of, status = (
+            np.concatenate([b[..., :0:-1], a], axis=-1) for a, b in zip(ahead[:3], behind[:3], strict=True)
+        )
+        return states, choice_of, status, failed[3], None
 
     def _statuses(self, track: Track, values: Array, states: Array, bad: Array) -> np.ndarray:
         status = np.full(values.shape[1], Status.OK, dtype=object)
