@@ -162,6 +162,16 @@ def test_what_is_not_reached_has_a_turning_point_before_it(seed):
     np.testing.assert_array_equal(caught.value.solution.status, s.status)
 
 
+@pytest.mark.parametrize("seed", [1017, 1033, 1062, 1102])
+def test_loops_stay_closed_where_a_passive_freedom_is_held(seed):
+    m = with_drives(closed_mechanism(seed), seed)
+    assert mg.check(m).passive
+    s = mg.kinematics(m, motions(m, seed, chebyshev_times(0.0, 0.4, 16)), on_reach="flag")
+    good = s.status == "ok"
+    assert good.any()
+    assert s.checks.closure[good].max() < 1e-10
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_going_back_meets_the_positions_of_going_there(seed):
     m, t, given, _ = moving(seed)
