@@ -68,8 +68,8 @@ def lead(system: System, x: Array, columns: Index, goal: Array, longest: float =
     begin = x[rows]
     free = np.setdiff1d(np.arange(system.n_freedoms), columns)
     length = float(np.abs(goal - begin).max(initial=0.0))
-    done, h = 0.0, min(1.0, longest / length) if length > 0 else 1.0
-    while done < 1.0 and length > 0:
+    done, h = (0.0, min(1.0, longest / length)) if length > 0 else (1.0, 1.0)
+    while done < 1.0:
         h = min(h, 1.0 - done)
         here = system.at(x[:, None])
         dq = np.zeros((system.n_freedoms, 1))
