@@ -132,8 +132,18 @@ def rotation_exp(v: Array) -> Array:
 
 
 def rotation_log(R: Array) -> Array:
-    """Rotation vector of rotation matrices, of length at most pi."""
-    return quaternion_log(matrix_quaternion(R))
+    """Rotation vector of rotation matrices, of length at most pi.
+
+    From the skew part, ``sin(angle) axis``, and the trace; through quaternions where an angle comes near pi.
+    """
+    cosine = 0.5 * (R[0, 0] + R[1, 1] + R[2, 2] - 1.0)
+    if not (cosine > -0.5).all():
+        return quaternion_log(matrix_quaternion(R))
+    s = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    sine = np.sqrt((s * s).sum(axis=0))
+    small = sine < 1e-8
+    factor = np.where(small, 1.0, np.arctan2(sine, cosine) / np.where(small, 1.0, sine))
+    return np.asarray(factor * s)
 
 
 def pose_exp(s: Array) -> Array:

@@ -73,7 +73,7 @@ class Analysis:
         rows = np.moveaxis(values, -1, 0)
         full = np.full((int(np.prod(self.batch)), *rows.shape[1:]), np.nan)
         full[self.motions.good] = rows
-        out = full.reshape(*self.batch, *rows.shape[1:])
+        out = full.reshape((*self.batch, *rows.shape[1:]))
         out.setflags(write=False)
         return out
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -17,6 +18,7 @@ from mechgraph.model.load import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion_law import Motion
 from mechgraph.motion.assembly import assembled, assembled_at, named_columns
+from mechgraph.motion.idle import Idle, held_well, without_spin
 from mechgraph.motion.path import SINGULAR, Follower, Positions, Status
 from mechgraph.motion.rates import closure_solver, rates
 from mechgraph.numerics.linear import ChosenSystem
@@ -127,23 +129,38 @@ class _Run:
     def move(self) -> tuple[Motions, ChosenSystem, Positions]:
         """Positions and rates."""
         found = self.positions()
+        bodies = self.freedoms.bodies(self.system)
+        if bodies:
+            found = self._without_spin(found, bodies)
         status = np.array([s.value for s in found.status.reshape(-1)], dtype="U24").reshape(self.batch)
         good = np.flatnonzero(status.reshape(-1) == Status.OK.value)
-        here = self.system.at(found.x.reshape(self.system.n_state, -1)[:, good])
-        which = found.which.reshape(-1)[good]
-        solver = closure_solver(here, found.choices, which)
+        here = found.here if found.here is not None and good.size == found.here.T else None
+        here = here or self.system.at(found.x.reshape(self.system.n_state, -1)[:, good])
+        which, choices = found.which.reshape(-1)[good], found.choices
+        solver = closure_solver(here, choices, which)
         dead = solver.condition > SINGULAR
         if dead.any():
             status.reshape(-1)[good[dead]] = Status.DEAD_POINT.value
-            good = good[~dead]
+            good, which = good[~dead], which[~dead]
             here = self.system.at(here.x[:, ~dead])
-            which = which[~dead]
-            solver = closure_solver(here, found.choices, which)
-        moved = rates(
-            here, solver, self.columns, self.values("velocity")[:, good], self.values("acceleration")[:, good]
-        )
-        held = tuple(choice.held for choice in found.choices)
+            solver = closure_solver(here, choices, which)
+        if bodies:
+            choices, which, solver = held_well(here, choices, which, self.columns)
+        velocity, acceleration = (self.values(kind)[:, good] for kind in ("velocity", "acceleration"))
+        moved = rates(here, solver, self.columns, velocity, acceleration, bodies)
+        held = tuple(choice.held for choice in choices)
         return Motions(here, moved, self.batch, good, status, self.t, self.columns, held, which), solver, found
+
+    def _without_spin(self, found: Positions, bodies: tuple[Idle, ...]) -> Positions:
+        """The same positions with passive bodies not spinning from one to the next."""
+        x = found.x.copy()
+        for c in range(x.shape[1]):
+            at = np.flatnonzero(found.status[c] == Status.OK)
+            if at.size > 1:
+                here = self.system.at(x[:, c, at])
+                _, _, solver = held_well(here, found.choices, found.which[c, at], self.columns)
+                x[:, c, at] = without_spin(self.system, x[:, c, at], bodies, solver.null_of_columns())
+        return dataclasses.replace(found, x=x, here=None)
 
 
 def _raise_unreached(run: _Run, motions: Motions, found: Positions, solution: Solution) -> None:

@@ -17,7 +17,7 @@ from mechgraph.model.connection import Marker, Pair
 from mechgraph.model.conversion import UNIT_NAMES, converted
 from mechgraph.model.drive import Drive
 from mechgraph.model.link import Link
-from mechgraph.model.load import LOADS, Load
+from mechgraph.model.load import LOADS, Effort, Load, TorsionSpring
 from mechgraph.model.pair import PairType
 from mechgraph.model.values import is_numeric, plain, same_fields
 
@@ -230,7 +230,9 @@ class Mechanism:
             dataclasses.replace(d, freedom=name) for d in self.drives if (name := self.full_name(d.freedom)) not in lost
         ]
         loads = [
-            dataclasses.replace(load, freedom=self.full_name(load.freedom)) if hasattr(load, "freedom") else load
+            dataclasses.replace(load, freedom=self.full_name(load.freedom))
+            if isinstance(load, Effort | TorsionSpring)
+            else load
             for load in self.loads
         ]
         start = {k: v for k, v in self.start.items() if k not in gone}

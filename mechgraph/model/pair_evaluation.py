@@ -174,6 +174,20 @@ def difference(row: PairType, x1: Array, x0: Array) -> Array:
     return out
 
 
+def tangent(row: PairType, dq: Array, rates: Array) -> Array:
+    """Rates of the increments ``dq`` at the state that they lead to, from the rates ``(f, ...)`` of the freedoms there.
+
+    Unchanged for single freedoms; for a rotation ``dexp^-1(dq) w = w - dq x w / 2 + dq x (dq x w) / 12 + ...``.
+    """
+    out = rates.copy()
+    for g in row.factors:
+        if len(g) == 3:
+            v, w = dq[g[0] : g[2] + 1], rates[g[0] : g[2] + 1]
+            turned = cross(v, w)
+            out[g[0] : g[2] + 1] = w - 0.5 * turned + cross(v, turned) / 12.0
+    return out
+
+
 def state_to_coordinates(row: PairType, x: Array, start: Array | None = None) -> Array:
     """User coordinates ``(f, ..., T)`` from states, rotation vectors continued along the last axis.
 

@@ -20,6 +20,10 @@ from mechgraph.numerics.linear import Choice, ChosenSystem, Factor, choose
 
 CONVERGED = 1e-12
 """Closure residual at which Newton stops."""
+NODE_CONVERGED = 1e-5
+"""Closure residual at which a node is good enough to predict from, after one more step."""
+ITERATIONS = 8
+"""Most Newton iterations at a position."""
 LONGEST_STEP = 0.35
 """Longest step between nodes, in driver space (radians, or lengths / L)."""
 STRAIGHT = 0.98
@@ -28,6 +32,8 @@ SHORTEST_STEP = 1e-7
 """Step at which the continuation gives up."""
 CORRECTION = 0.06
 """Largest correction that a node may need; keeps the continuation on its branch."""
+AIM = 0.005
+"""Correction that the step control aims at."""
 SINGULAR = 1e7
 """Condition number of the closure equations above which a position counts as a dead point."""
 
@@ -44,7 +50,10 @@ class Status(Enum):
 
 @dataclass
 class Node:
-    """A closed position on the path: state, sensitivity ``Z (F, drivers)``, path length, driver values, choice index."""
+    """A closed position on the path: state, sensitivity ``Z (F, drivers)``, path length, driver values, choice index.
+
+    ``condition`` of the chosen square part of the closure Jacobian and the ``sign`` of its determinant.
+    """
 
     x: Array
     Z: Array
@@ -52,6 +61,7 @@ class Node:
     drive: Array
     choice: int
     condition: float
+    sign: float
 
 
 @dataclass
@@ -64,13 +74,20 @@ class Track:
 
 @dataclass(frozen=True)
 class Positions:
-    """States ``(nx, C, N)``, statuses ``(C, N)``, and per position the index of the choice that serves it."""
+    """States ``(nx, C, N)``, statuses ``(C, N)``, and per position the index of the choice that serves it.
+
+    ``here`` is the evaluation of all positions, where one batch covered them.
+    """
 
     x: Array
     status: np.ndarray
     choices: list[Choice]
     which: Index
     reached: Array
+    here: Configuration | None = None
+
+
+Case = tuple[Array, Index, np.ndarray, Array, Configuration | None]
 
 
 class Follower:
@@ -90,43 +107,56 @@ class Follower:
         self.choices.append(choose(here.J[:, :, 0], self.columns, keep=self.keep))
         return len(self.choices) - 1
 
-    def correct(self, x: Array, choice: int, iterations: int = 8) -> tuple[Configuration, Array, Array]:
-        """Newton on the chosen rows and columns for a batch of states.
+    def correct(self, x: Array, choice: int, goal: float = CONVERGED) -> tuple[Configuration, Array, Array]:
+        """Newton on the chosen rows and columns for a batch of states, until the closure residual is below ``goal``.
 
         Returns the last configuration, the sum of the corrections ``(F, T)`` and which positions converged.
         """
         total = np.zeros((self.system.n_freedoms, x.shape[1]))
         here = self.system.at(x)
-        chosen = self.choices[choice]
-        for _ in range(iterations):
-            r = here.residual
-            open_ = np.abs(r).max(axis=0, initial=0.0) > CONVERGED
-            if not open_.any() or not len(chosen.cols):
+        left = np.abs(here.residual).max(axis=0, initial=0.0)
+        if not len(self.choices[choice].cols):
+            return here, total, left <= 10 * goal
+        for round_ in range(ITERATIONS):
+            part = np.flatnonzero(left > goal)
+            if not part.size:
                 break
-            part = np.flatnonzero(open_)
-            J = here.J[np.ix_(chosen.rows, chosen.cols)][:, :, part]
-            step = Factor(J).solve(-r[chosen.rows][:, None, part])[:, 0]
-            step = np.where(np.isfinite(step), step, 0.0)
-            biggest = np.abs(step).max(axis=0)
-            step *= np.minimum(1.0, 0.5 / np.where(biggest > 0, biggest, 1.0))
-            dq = np.zeros((self.system.n_freedoms, part.size))
-            dq[chosen.cols] = step
-            total[:, part] += dq
             x = here.x.copy()
-            x[:, part] = self.system.advance(x[:, part], dq)
-            stalled = biggest.max() < 1e-14
-            here = self.system.at(x)
-            if stalled:
+            if 4 * part.size > here.T or round_ == ITERATIONS - 1:
+                dq = self.newton_step(here, choice)[:, part]
+                total[:, part] += dq
+                x[:, part] = self.system.advance(here.x[:, part], dq)
+                here = self.system.at(x)
+                left = np.abs(here.residual).max(axis=0, initial=0.0)
+            else:
+                few, more, _ = self.correct(here.x[:, part], choice, goal)
+                total[:, part] += more
+                x[:, part] = few.x
+                left[part] = np.abs(few.residual).max(axis=0, initial=0.0)
+                here = self.system.at(x)
                 break
-        done = np.abs(here.residual).max(axis=0, initial=0.0) <= 10 * CONVERGED
-        return here, total, done
+        return here, total, left <= 10 * goal
+
+    def newton_step(self, here: Configuration, choice: int) -> Array:
+        """One limited Newton step ``(F, T)`` at every state of a configuration."""
+        chosen = self.choices[choice]
+        J = here.J[np.ix_(chosen.rows, chosen.cols)]
+        step = Factor(J).solve(-here.residual[chosen.rows][:, None])[:, 0]
+        step = np.where(np.isfinite(step), step, 0.0)
+        step *= np.minimum(1.0, 0.5 / np.maximum(np.abs(step).max(axis=0), 1e-300))
+        dq = np.zeros((self.system.n_freedoms, here.T))
+        dq[chosen.cols] = step
+        return dq
 
     def node(self, here: Configuration, at: float, drive: Array, choice: int) -> Node:
-        """A node at a closed position."""
-        solver = ChosenSystem(here.J, [self.choices[choice]], np.zeros(1, dtype=np.intp))
+        """A node near a nearly closed position, brought closer by one step with the Jacobian that is there."""
+        chosen = self.choices[choice]
+        solver = ChosenSystem(here.J, [chosen], np.zeros(1, dtype=np.intp))
         Z = solver.solve(-here.J[:, self.columns])[:, :, 0]
         Z[self.columns, np.arange(len(self.columns))] = 1.0
-        return Node(here.x[:, 0], Z, at, drive, choice, float(solver.condition[0]))
+        step = solver.solve(-here.residual[:, None])[:, 0]
+        x = self.system.advance(here.x, np.where(np.isfinite(step), step, 0.0))
+        return Node(x[:, 0], Z, at, drive, choice, float(solver.condition[0]), float(solver.signs()[0]))
 
     # --- one case ------------------------------------------------------------------------------------------------------
 
@@ -155,7 +185,7 @@ class Follower:
                     track.end = why
             else:
                 track.nodes.append(following)
-                h = (at - last.at) * min(2.0, max(0.5, (0.5 * CORRECTION / max(correction, 1e-9)) ** (1 / 3)))
+                h = (at - last.at) * min(2.0, max(0.5, (AIM / max(correction, 1e-9)) ** (1 / 3)))
                 h = min(max(h, 10 * SHORTEST_STEP), LONGEST_STEP)
         return track
 
@@ -183,7 +213,7 @@ class Follower:
         choice = last.choice
         x = self.system.advance(last.x[:, None], dq[:, None])
         x[self.rows, 0] = drive
-        here, total, done = self.correct(x, choice)
+        here, total, done = self.correct(x, choice, NODE_CONVERGED)
         correction = float(np.abs(total).max(initial=0.0))
         if not done[0] and correction < CORRECTION:
             closed, error = close(self.system, x[:, 0], self.columns, iterations=12)
@@ -205,10 +235,12 @@ class Follower:
 
     def _same_side(self, a: Node, b: Node) -> bool:
         """Whether no simple singular position lies between two nodes: equal signs of the determinant for one choice."""
+        if a.choice == b.choice and a.sign * b.sign > 0:
+            return True
         J = self.system.at(np.stack([a.x, b.x], axis=1)).J
         for choice in dict.fromkeys((a.choice, b.choice)):
             c = self.choices[choice]
-            signs = Factor(J[np.ix_(c.rows, c.cols)]).sign() if len(c.cols) else np.ones(2)
+            signs = Factor(J[np.ix_(c.rows, c.cols)]).sign()
             if signs[0] * signs[1] > 0:
                 return True
         middle = self.system.advance(a.x[:, None], 0.5 * self.system.difference(b.x[:, None], a.x[:, None]))
@@ -224,21 +256,39 @@ class Follower:
         """States for driver values ``(d, C, N)``: every case c from ``x (nx,)`` along its N positions."""
         d, C, N = values.shape
         out = np.full((self.system.n_state, C, N), np.nan)
+        here = None
         status = np.full((C, N), Status.OK, dtype=object)
         which = np.zeros((C, N), dtype=np.intp)
         reached = np.empty((d, C))
         for c in range(C):
-            stops = np.zeros(0, dtype=np.intp)
-            for _ in range(4):
-                track = self.track(x, values[:, c], stops)
-                states, choice_of, bad = self._between(track, values[:, c])
-                if not bad.any():
-                    break
-                stops = np.union1d(stops, np.flatnonzero(bad))
-            out[:, c], which[c] = states, choice_of
-            status[c] = self._statuses(track, values[:, c], states, bad)
-            reached[:, c] = track.nodes[-1].drive
-        return Positions(out, status, self.choices, which, reached)
+            done = self._case(x, values[:, c])
+            if N > 1 and (done[2] != Status.OK).all():
+                done = self._both_ways(x, values[:, c], done)
+            out[:, c], which[c], status[c], reached[:, c], here = done
+        return Positions(out, status, self.choices, which, reached, here if C == 1 else None)
+
+    def _case(self, x: Array, values: Array) -> Case:
+        """States, choices, statuses, last driver values reached and evaluation of one case."""
+        stops = np.zeros(0, dtype=np.intp)
+        for _ in range(4):
+            track = self.track(x, values, stops)
+            states, choice_of, bad, here = self._between(track, values)
+            if not bad.any():
+                break
+            stops = np.union1d(stops, np.flatnonzero(bad))
+        return states, choice_of, self._statuses(track, values, states, bad), track.nodes[-1].drive, here
+
+    def _both_ways(self, x: Array, values: Array, failed: Case) -> Case:
+        """A path whose first position cannot be reached, entered at its position nearest to the start and followed both ways."""
+        near = int(np.argmin(((values - x[self.rows][:, None]) ** 2).sum(axis=0)))
+        ahead = self._case(x, values[:, near:])
+        behind = self._case(x, values[:, near::-1])
+        if (ahead[2] != Status.OK).all():
+            return failed
+        states, choice_of, status = (
+            np.concatenate([b[..., :0:-1], a], axis=-1) for a, b in zip(ahead[:3], behind[:3], strict=True)
+        )
+        return states, choice_of, status, failed[3], None
 
     def _statuses(self, track: Track, values: Array, states: Array, bad: Array) -> np.ndarray:
         status = np.full(values.shape[1], Status.OK, dtype=object)
@@ -252,7 +302,7 @@ class Follower:
         status[bad] = Status.OUT_OF_REACH
         return status
 
-    def _between(self, track: Track, values: Array) -> tuple[Array, Index, Array]:
+    def _between(self, track: Track, values: Array) -> tuple[Array, Index, Array, Configuration | None]:
         """All positions from the nodes: predicted, corrected; also which of them did not come out as predicted."""
         nodes = track.nodes
         start = nodes[0].drive[:, None]
@@ -266,31 +316,69 @@ class Follower:
         choice_of = np.zeros(values.shape[1], dtype=np.intp)
         choice_of[inside] = np.array([n.choice for n in nodes], dtype=np.intp)[right]
         guess = self._predicted(nodes, left, right, at[inside], values[:, inside])
+        whole = None
         for choice in np.unique(choice_of[inside]):
             mine = np.flatnonzero(choice_of[inside] == choice)
             here, total, done = self.correct(guess[:, mine], int(choice))
             states[:, inside[mine]] = here.x
+            whole = here if mine.size == values.shape[1] else None
             off = np.abs(total).max(axis=0, initial=0.0)
             bad[inside[mine]] = np.logical_not(done) | (off > CORRECTION)
-        return states, choice_of, bad
+        return states, choice_of, bad, whole
 
     def _predicted(self, nodes: list[Node], left: Index, right: Index, at: Array, values: Array) -> Array:
+        """Hermite interpolation through two nodes and, where the path goes straight on, a third one beside them.
+
+        What lies off the chord is added by the sensitivity to the drivers.
+        """
         X = np.stack([n.x for n in nodes], axis=1)
         Z = np.stack([n.Z for n in nodes], axis=2)
         drive = np.stack([n.drive for n in nodes], axis=1)
         place = np.array([n.at for n in nodes])
-        gap = self.system.difference(X[:, 1:], X[:, :-1])
-        chord = np.diff(drive, axis=1)
-        width = place[right] - place[left]
-        u = np.where(width > 0, (at - place[left]) / np.where(width > 0, width, 1.0), 1.0)
-        if not chord.shape[1]:
+        if len(nodes) == 1:
             dq = np.einsum("fdt,dt->ft", Z[:, :, left], values - drive[:, left])
         else:
             i = np.minimum(left, len(nodes) - 2)
-            m0, m1 = (np.einsum("fdt,dt->ft", Z[:, :, k], chord[:, i]) for k in (left, right))
-            off = values - (drive[:, left] + u * chord[:, i])
-            dq = u * u * (3 - 2 * u) * gap[:, i] + u * (1 - u) ** 2 * m0 + u * u * (u - 1) * m1
-            dq += np.einsum("fdt,dt->ft", (1 - u) * Z[:, :, left] + u * Z[:, :, right], off)
+            slope = np.diff(drive, axis=1) / np.diff(place)
+            off = values - (drive[:, i] + (at - place[i]) * slope[:, i])
+            u = ((at - place[i]) / (place[i + 1] - place[i]))[None]
+            dq = self._hermite(X, Z, slope, place, i, at)
+            dq += np.einsum("fdt,dt->ft", (1 - u) * Z[:, :, i] + u * Z[:, :, i + 1], off)
+            left = i
         out = self.system.advance(X[:, left], dq)
         out[self.rows] = values
         return out
+
+    def _hermite(self, X: Array, Z: Array, slope: Array, place: Array, interval: Index, at: Array) -> Array:
+        """Increments from the left node of each interval, by divided differences over two or three double nodes."""
+        n = len(place)
+        first = np.arange(n - 1)
+        unit = slope / np.sqrt((slope * slope).sum(axis=0))
+        straight = (unit[:, 1:] * unit[:, :-1]).sum(axis=0) > 1 - 1e-9
+        third = np.full(n - 1, -1)
+        third[1:][straight] = first[1:][straight] - 1
+        third[:-1][straight & (third[:-1] < 0)] = first[:-1][straight & (third[:-1] < 0)] + 2
+        names = np.stack([first, first + 1, np.where(third < 0, first, third)])
+        z = np.repeat(place[names] - place[first], 2, axis=0)
+        table = np.zeros((6, X.shape[1] and Z.shape[0], n - 1))
+        slopes = np.zeros_like(table)
+        for k in range(3):
+            dq = self.system.difference(X[:, names[k]], X[:, first])
+            table[2 * k] = table[2 * k + 1] = dq
+            slopes[2 * k] = self.system.tangent(dq, np.einsum("fdt,dt->ft", Z[:, :, names[k]], slope))
+        coefficients = [table[0]]
+        column = table
+        for order in range(1, 6):
+            width = z[order:] - z[:-order]
+            same = width == 0
+            column = np.where(
+                same[:, None],
+                slopes[: 6 - order] if order == 1 else 0.0,
+                np.diff(column, axis=0) / np.where(same, 1.0, width)[:, None],
+            )
+            coefficients.append(np.where((order < 4) | (third >= 0), column[0], 0.0))
+        x = at - place[interval]
+        out = coefficients[5][:, interval]
+        for order in range(4, -1, -1):
+            out = coefficients[order][:, interval] + (x - z[order, interval]) * out
+        return np.asarray(out)

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.motion import idle
+from mechgraph.motion.idle import Idle
 from mechgraph.motion.system import Configuration, Index
 from mechgraph.numerics.linear import Choice, ChosenSystem
 
@@ -31,17 +33,37 @@ def closure_solver(here: Configuration, choices: list[Choice], which: Index) -> 
     return ChosenSystem(here.J, choices, which)
 
 
-def rates(here: Configuration, solver: ChosenSystem, columns: Index, velocity: Array, acceleration: Array) -> Rates:
+def rates(
+    here: Configuration,
+    solver: ChosenSystem,
+    columns: Index,
+    velocity: Array,
+    acceleration: Array,
+    bodies: tuple[Idle, ...] = (),
+) -> Rates:
     """Rates for driver velocities and accelerations ``(d, T)``.
 
-    ``J q' = 0`` and ``J q'' = -bias``, the driven part known, held freedoms at rest.
+    ``J q' = 0`` and ``J q'' = -bias``, the driven part known; passive freedoms of ``bodies`` at rest (see ``motion.idle``).
     """
     dq, gap_v = _completed(here, solver, columns, velocity, np.zeros((here.J.shape[0], here.T)))
     V = here.link_twists(dq)
+    Z = solver.null_of_columns() if bodies else np.zeros((len(dq), 0, here.T))
+    if bodies:
+        G = idle.passive_twists(here, bodies, Z)
+        dq += np.einsum("fpt,pt->ft", Z, idle.resting_part(G, idle.body_twists(here, bodies, V)))
+        V = here.link_twists(dq)
     bias = here.loop_sums(here.bias(dq, V))
     turning = (dq * dq).max(axis=0, initial=0.0)
     ddq, gap_a = _completed(here, solver, columns, acceleration, bias, turning)
-    return Rates(dq, ddq, V, here.link_accelerations(dq, ddq, V), np.maximum(gap_v, gap_a))
+    A = here.link_accelerations(dq, ddq, V)
+    if bodies:
+        now = idle.body_accelerations(here, bodies, V, A)
+        change = np.linalg.solve(np.einsum("ipt,iqt->tpq", G, G), idle.turning_part(here, bodies, V, G).T[..., None])[
+            ..., 0
+        ].T
+        ddq += np.einsum("fpt,pt->ft", Z, idle.resting_part(G, now) - change)
+        A = here.link_accelerations(dq, ddq, V)
+    return Rates(dq, ddq, V, A, np.maximum(gap_v, gap_a))
 
 
 def _completed(

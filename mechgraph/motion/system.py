@@ -49,6 +49,7 @@ class System:
         self.chords = np.array(self.graph.chords, dtype=np.intp)
         self.groups = self._group_pairs()
         self.levels = self._tree_levels()
+        self.marker_b_inverse = inverse(self.par.marker_b)
         self.loop_columns = [self._columns_of_loop(loop) for loop in self.graph.loops]
         self.is_length = np.array([not f.turns for p in m.pairs for f in p.type.freedoms], dtype=bool)
 
@@ -133,6 +134,13 @@ class System:
             out[g.columns] = evaluation.difference(g.row, x1[g.state_rows], x0[g.state_rows])
         return out
 
+    def tangent(self, dq: Array, rates: Array) -> Array:
+        """Rates of increments ``dq (F, ...)`` at the state that they lead to, from the rates of the freedoms there."""
+        out = np.empty_like(rates)
+        for g in self.groups:
+            out[g.columns] = evaluation.tangent(g.row, dq[g.columns], rates[g.columns])
+        return out
+
     def at(self, x: Array) -> Configuration:
         """Evaluate states ``(nx, T)``."""
         return Configuration(self, x)
@@ -151,8 +159,7 @@ class Configuration:
         D = np.empty((3, 4, P, self.T))
         for g, frames in zip(system.groups, local, strict=True):
             D[:, :, g.pairs] = frames[-1]
-        B_inverse = inverse(par.marker_b)
-        relative = compose(compose(np.broadcast_to(par.marker_a, (3, 4, P, self.T)), D), B_inverse)
+        relative = compose(compose(par.marker_a, D), system.marker_b_inverse)
         self.poses = np.empty((3, 4, N, self.T))
         self.poses[:, :, system.graph.frame] = par.frame
         for pairs, forward, parents, children in system.levels:
@@ -308,7 +315,7 @@ class Configuration:
     def loop_sums(self, per_pair: Array) -> Array:
         """Signed sum of pair terms along every loop, stacked ``(6 loops, T)``."""
         sums = np.einsum("lp,ipt->lit", self.system.graph.loop_matrix, per_pair)
-        return sums.reshape(-1, per_pair.shape[2])
+        return sums.reshape(sums.shape[0] * sums.shape[1], per_pair.shape[2])
 
     def link_accelerations(self, dq: Array, ddq: Array, V: Array) -> Array:
         """Accelerations dV/dt of all links ``(6, N, T)``."""

@@ -158,6 +158,18 @@ class ChosenSystem:
             out[np.ix_(dropped, np.arange(m - rank), at)] = np.eye(m - rank)[:, :, None]
         return out
 
+    def null_of_columns(self) -> Array:
+        """Basis ``(n, held, T)`` of the ``x`` with ``A x = 0`` in the chosen rows: one vector a held column, with a one there."""
+        _, n, T = self.A.shape
+        count = max((len(c.held) for c in self.choices), default=0)
+        out = np.zeros((n, count, T))
+        for choice, at, factor in self._parts:
+            held = np.arange(len(choice.held))
+            part = -factor.solve(self.A[np.ix_(choice.rows, choice.held)][:, :, at])
+            out[np.ix_(choice.cols, held, at)] = part
+            out[np.ix_(choice.held, held, at)] = np.eye(len(held))[:, :, None]
+        return out
+
     def signs(self) -> Array:
         """Sign of the determinant of the square part at every position."""
         out = np.ones(self.A.shape[2])

@@ -9,6 +9,7 @@ import scipy
 
 from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array
+from mechgraph.motion.idle import Idle
 from mechgraph.motion.system import Configuration, Index, System
 from mechgraph.numerics.linear import RANK_TOLERANCE, rank_of, singular_values
 
@@ -57,6 +58,14 @@ class Freedoms:
     def mobility(self) -> int:
         """Freedoms minus rank."""
         return self.null.shape[1]
+
+    def bodies(self, system: System) -> tuple[Idle, ...]:
+        """The bodies that have passive freedoms."""
+        out = []
+        for links in dict.fromkeys(p.links for p in self.passive):
+            border = [k for k, (a, b) in enumerate(system.graph.ends) if (a in links) != (b in links)]
+            out.append(Idle(links[0], np.array(border, dtype=np.intp)))
+        return tuple(out)
 
     @property
     def margin(self) -> float:

@@ -1,0 +1,123 @@
+"""Passive freedoms at rest: links that could spin or slide idly are kept from doing so, in space.
+
+A passive motion moves one body (a cluster of links) and nothing else, so it can be stopped in many ways. Here the body itself is
+at rest in it: its twist has no part along the passive twist ``u`` (for the coupler between two spheres, no spin about
+their line: ``w . u = 0``, hence ``alpha . u = 0``). No choice of a coordinate enters, and a body that is symmetric about its
+line needs no effort to be held so.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array, cross, rotation_log
+from mechgraph.motion.system import Configuration, Index, System
+from mechgraph.numerics.linear import Choice, ChosenSystem, choose
+
+LARGEST = 3.0
+"""Largest rate of another freedom for a unit rate of the held one before another freedom is held."""
+TRIES = 8
+
+
+@dataclass(frozen=True)
+class Idle:
+    """A body with passive freedoms: one of its links, and the pairs at its border."""
+
+    link: int
+    border: Index
+
+
+def held_well(
+    here: Configuration, choices: list[Choice], which: Index, columns: Index
+) -> tuple[list[Choice], Index, ChosenSystem]:
+    """Choices such that at every position the held freedoms take a fair part in the passive motions."""
+    choices, which = list(choices), which.copy()
+    solver = ChosenSystem(here.J, choices, which)
+    size = np.abs(solver.null_of_columns()).max(axis=(0, 1), initial=0.0)
+    for _ in range(TRIES):
+        bad = np.flatnonzero(~(size <= LARGEST))
+        if not bad.size:
+            break
+        worst = int(bad[np.argmax(np.nan_to_num(size[bad], nan=np.inf))])
+        choices.append(choose(here.J[:, :, worst], columns))
+        trial = ChosenSystem(here.J[:, :, bad], [choices[-1]], np.zeros(bad.size, dtype=np.intp))
+        better = np.abs(trial.null_of_columns()).max(axis=(0, 1), initial=0.0)
+        take = better < np.nan_to_num(size[bad], nan=np.inf)
+        which[bad[take]] = len(choices) - 1
+        size[bad[take]] = better[take]
+    return choices, which, ChosenSystem(here.J, choices, which)
+
+
+def body_twists(here: Configuration, idle: tuple[Idle, ...], V: Array) -> Array:
+    """Angular velocity and velocity of the middle of the border of every body, stacked ``(6 bodies, T)``."""
+    out = []
+    for body in idle:
+        twist = V[:, body.link]
+        out += [twist[:3], twist[3:] + cross(twist[:3], _middle(here, body))]
+    return np.concatenate(out)
+
+
+def _middle(here: Configuration, body: Idle) -> Array:
+    return np.asarray(here.pair_points[:, body.border].mean(axis=1))
+
+
+def passive_twists(here: Configuration, idle: tuple[Idle, ...], Z: Array) -> Array:
+    """``body_twists`` of all passive motions ``Z (F, p, T)``: ``(6 bodies, p, T)``."""
+    return np.stack([body_twists(here, idle, here.link_twists(Z[:, i])) for i in range(Z.shape[1])], axis=1)
+
+
+def resting_part(G: Array, b: Array) -> Array:
+    """Multiples ``(p, T)`` of the passive motions that take the part along them out of ``b``: ``-(G^T G)^-1 G^T b``."""
+    A = np.einsum("ipt,iqt->tpq", G, G)
+    return -np.linalg.solve(A, np.einsum("ipt,it->tp", G, b)[..., None])[..., 0].T
+
+
+def turning_part(here: Configuration, idle: tuple[Idle, ...], V: Array, G: Array) -> Array:
+    """Change of the passive twists, which turn with their bodies, in the condition of rest: ``(w x d) . v``, ``(p, T)``."""
+    out = np.zeros(G.shape[1:])
+    now = body_twists(here, idle, V)
+    for i in range(len(idle)):
+        w, v = now[6 * i : 6 * i + 3], now[6 * i + 3 : 6 * i + 6]
+        for p in range(G.shape[1]):
+            out[p] += (cross(w, G[6 * i + 3 : 6 * i + 6, p]) * v).sum(axis=0)
+    return out
+
+
+def body_accelerations(here: Configuration, idle: tuple[Idle, ...], V: Array, A: Array) -> Array:
+    """Angular acceleration and acceleration of the middle of the border of every body, ``(6 bodies, T)``."""
+    out = []
+    for body in idle:
+        w, alpha, P = V[:3, body.link], A[:3, body.link], _middle(here, body)
+        velocity = V[3:, body.link] + cross(w, P)
+        out += [alpha, A[3:, body.link] + cross(alpha, P) + cross(w, velocity)]
+    return np.concatenate(out)
+
+
+def without_spin(system: System, x: Array, idle: tuple[Idle, ...], Z: Array) -> Array:
+    """States ``(nx, T)`` of one path turned along their passive motions so that no body spins from position to position.
+
+    For one passive turn of a body: the rotation from each position to the next has no part along the axis.
+    Bodies with other passive motions are left as they are.
+    """
+    here = system.at(x)
+    G = passive_twists(here, idle, Z)
+    out = x
+    for i, body in enumerate(idle):
+        mine = [p for p in range(Z.shape[1]) if np.abs(G[6 * i : 6 * i + 6, p]).max() > 1e-6]
+        if len(mine) != 1:
+            continue
+        u = G[6 * i : 6 * i + 3, mine[0]]
+        length = np.sqrt((u * u).sum(axis=0))
+        if not (length > 1e-6).all():
+            continue
+        u = u / length
+        sense = np.cumprod(np.concatenate([[1.0], np.sign((u[:, 1:] * u[:, :-1]).sum(axis=0))]))
+        axis = u * sense
+        R = here.poses[:, :3, body.link]
+        turn = rotation_log(np.einsum("ijt,kjt->ikt", R[..., 1:], R[..., :-1]))
+        spin = 0.5 * (turn * (axis[:, 1:] + axis[:, :-1])).sum(axis=0)
+        angle = -np.concatenate([[0.0], np.cumsum(spin)]) * sense / length
+        out = system.advance(out, Z[:, mine[0]] * angle)
+    return out

@@ -1,0 +1,33 @@
+"""Figures and axes of matplotlib, asked for only when something is drawn."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+from mechgraph.errors import MissingExtraError
+
+INK = "#1f2933"
+MUTED = "#7b8794"
+PALETTE = ("#0b6fa4", "#d1495b", "#2e8b57", "#e09f3e", "#6a4c93", "#00798c", "#8d5524", "#c2185b")
+"""Colours of moving links, in order and then again."""
+
+
+def pyplot() -> Any:
+    """``matplotlib.pyplot``.
+
+    Raises
+    ------
+    MissingExtraError
+        where matplotlib is not installed.
+    """
+    try:
+        import matplotlib.pyplot as plt
+    except ImportError:
+        raise MissingExtraError("matplotlib", "plot") from None
+    return plt
+
+
+def toolkit(name: str) -> Any:
+    """A module of matplotlib's three-dimensional toolkit, which has no types."""
+    return importlib.import_module(f"mpl_toolkits.mplot3d.{name}")

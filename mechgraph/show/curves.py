@@ -1,0 +1,71 @@
+"""Curves over the driver: efforts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mechgraph.errors import DeclarationError
+from mechgraph.result.solution import Solution
+from mechgraph.result.units import unit_of
+from mechgraph.show.canvas import INK, MUTED, PALETTE, pyplot
+
+
+def effort_curve(s: Solution, freedom: str | None = None, *, ax: Any = None, marked: int | None = None) -> Any:
+    """Draw the effort of a driver over its position; a turn in degrees. Returns the axes.
+
+    Parameters
+    ----------
+    freedom : a driven freedom; the first driver where it is left out.
+    ax : axes of matplotlib to draw on; new ones where left out.
+    marked : a position to mark on the curve, e.g. the one that a skeleton shows.
+
+    Raises
+    ------
+    DeclarationError
+        where the solution has no forces or no such driver; MissingExtraError without matplotlib.
+    """
+    m = s.mechanism
+    drivers = [m.full_name(d.freedom) for d in m.drives]
+    if not s.has_forces or not drivers:
+        raise DeclarationError(
+            f"effort curve of {m.name!r}", ["the solution has no driver effort: use solve() with a driver"]
+        )
+    name = drivers[0] if freedom is None else m.full_name(freedom)
+    if name not in drivers:
+        raise DeclarationError(f"effort curve of {m.name!r}", [f"{name!r} is no driver; drivers: {', '.join(drivers)}"])
+    k, j = m.freedom(name)
+    pair = m.pairs[k]
+    turns, couple = pair.type.freedoms[j].turns, pair.type.efforts[j].is_couple
+    result = s[pair.name]
+    order = np.atleast_1d(np.rad2deg(result.position[..., j]) if turns else result.position[..., j])
+    effort = np.atleast_1d(result.drive_effort[..., j])
+
+    ax = pyplot().subplots(layout="constrained")[1] if ax is None else ax
+    unit = unit_of(m.units, (2, 1, -2) if couple else (1, 1, -2))
+    length = unit_of(m.units, (1, 0, 0))
+    for row_x, row_y in zip(order.reshape(-1, order.shape[-1]), effort.reshape(-1, effort.shape[-1]), strict=True):
+        ax.plot(row_x, row_y, color=PALETTE[0], lw=2.0, solid_capstyle="round", marker="o" if row_x.size == 1 else "")
+    ax.axhline(0.0, color=MUTED, lw=0.8, zorder=0)
+    ax.set_xlabel(f"{name} [deg]" if turns else f"{name} [{length}]" if length else name, color=INK)
+    ax.set_ylabel(f"{'torque' if couple else 'force'} of the driver {name}" + (f" [{unit}]" if unit else ""), color=INK)
+    if turns and np.nanmax(order) - np.nanmin(order) > 90:
+        step = next(d for d in (30, 45, 60, 90, 180, 360, 1e9) if (np.nanmax(order) - np.nanmin(order)) / d <= 8)
+        ax.xaxis.set_major_locator(pyplot().MultipleLocator(step))
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.grid(True, color="#e4e7eb", lw=0.8)
+    ax.set_axisbelow(True)
+    ax.margins(x=0.01)
+    if marked is not None:
+        ax.plot(
+            order.reshape(-1)[marked],
+            effort.reshape(-1)[marked],
+            "o",
+            ms=8,
+            mfc="white",
+            mec=PALETTE[1],
+            mew=2.2,
+            zorder=5,
+        )
+    return ax

@@ -1,0 +1,388 @@
+"""The command line: commands, exit statuses, bad input of many kinds, no partial files."""
+
+import csv
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+import mechgraph as mg
+from mechgraph.cli import app, parse_drive
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def run(*arguments: str | Path) -> Result:
+    result = CliRunner().invoke(app, [str(a) for a in arguments])
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    assert "Traceback" not in result.output
+    assert "\x1b" not in result.output
+    return result
+
+
+def bad(*arguments: str | Path) -> str:
+    """The message of a call that is refused as wrong usage or bad input."""
+    result = run(*arguments)
+    assert result.exit_code == 2, result.output
+    assert not result.stdout
+    return result.stderr
+
+
+def process(*arguments: str, **environment: str) -> "subprocess.CompletedProcess[str]":
+    return subprocess.run(
+        [sys.executable, "-m", "mechgraph", *arguments], capture_output=True, text=True, check=False,
+        env=os.environ | {"PYTHONPATH": str(ROOT)} | environment,
+    )  # fmt: skip
+
+
+@pytest.fixture
+def free_chain(tmp_path: Path) -> Path:
+    """A mechanism in which a freedom is left free."""
+    m = mg.Mechanism("pendulum", [mg.Link("frame"), mg.Link("bob", 1.0, (0, -1, 0))],
+                     [mg.Pair("A", "R", "frame", "bob", point=(0, 0, 0), axis=(0, 0, 1))])  # fmt: skip
+    mg.save(m, tmp_path / "pendulum.toml")
+    return tmp_path / "pendulum.toml"
+
+
+@pytest.fixture
+def crank_slider(tmp_path: Path) -> Path:
+    """A slider on a table, driven in its slide, in millimetres, with a force that resists."""
+    m = mg.Mechanism(
+        "slide", [mg.Link("table"), mg.Link("slide", 2.0, (0, 0, 0))],
+        [mg.Pair("A", "P", "table", "slide", point=(0, 0, 0), axis=(1, 0, 0))], ["A"],
+        [mg.Effort("A", -7.0)], units={"length": "mm", "mass": "kg", "time": "s"},
+    )  # fmt: skip
+    mg.save(m, tmp_path / "slide.toml")
+    return tmp_path / "slide.toml"
+
+
+# --- what it does ------------------------------------------------------------------------------------------------------
+
+
+def test_list_names_the_library() -> None:
+    result = run("list")
+    assert result.exit_code == 0
+    for name in mg.library():
+        assert re.search(rf"^{re.escape(name)} ", result.stdout, re.MULTILINE)
+
+
+def test_check_prints_the_report() -> None:
+    result = run("check", "rcsr")
+    assert result.exit_code == 0
+    assert mg.check(mg.load("rcsr")).verdict in result.stdout
+
+
+def test_check_as_json_and_markdown() -> None:
+    data = json.loads(run("check", "rcsr", "--json").stdout)
+    assert data["mechanism"] == "rcsr"
+    assert data["ledger"]["lee"]["unknowns"] == 24
+    assert run("check", "rcsr", "--markdown").stdout.startswith("# ")
+
+
+def test_check_at_a_position() -> None:
+    assert run("check", "rcsr", "--at", "O1=170deg").exit_code == 0
+
+
+def test_check_of_a_redundant_mechanism_is_no_failure() -> None:
+    assert run("check", "four-bar").exit_code == 0
+
+
+def test_check_says_what_is_left_free(free_chain: Path) -> None:
+    assert run("check", free_chain).exit_code == 1
+
+
+def test_check_says_that_loops_cannot_be_closed() -> None:
+    result = run("check", "rcsr-csr-printed")
+    assert result.exit_code == 1
+    assert "cannot be closed" in result.stdout
+
+
+def test_equations() -> None:
+    assert "R_41 + R_21" in run("equations", "rcsr").stdout
+    assert "24 unknowns" in run("equations", "rcsr", "--blocks").stdout
+    assert "18 unknowns" in run("equations", "rcsr", "--bookkeeping", "minimal").stdout
+    assert r"\[" in run("equations", "rcsr", "--latex").stdout
+    f = mg.formulate(mg.load("rcsr"))
+    assert run("equations", "rcsr", "--coefficients").stdout == f.coefficients().text()
+    assert run("equations", "rcsr", "--csv").stdout == f.coefficients().csv()
+
+
+def test_solve_prints_a_summary() -> None:
+    result = run("solve", "7r", "--drive", "O1=0:360:5deg@10")
+    assert result.exit_code == 0
+    assert "Solved 72 of 72 positions." in result.stdout
+    s = mg.solve(mg.load("7r"), {"O1": mg.Motion(np.deg2rad(np.arange(0, 360, 5.0)), 10.0)})
+    effort, force = s["O1"].effort[:, 0], np.linalg.norm(s["O1"].force, axis=1)
+    row = re.search(r"^O1\.Rz \[N m\] +(\S+) +(\S+) deg +(\S+) +(\S+) deg$", result.stdout, re.MULTILINE)
+    assert row is not None
+    assert np.allclose([float(row[1]), float(row[3])], [effort.min(), effort.max()], rtol=1e-4)
+    assert [float(row[2]), float(row[4])] == [5.0 * effort.argmin(), 5.0 * effort.argmax()]
+    row = re.search(r"^O1 +R +frame +link1 +(\S+) +(\S+) deg", result.stdout, re.MULTILINE)
+    assert row is not None
+    assert np.isclose(float(row[1]), force.max(), rtol=1e-4)
+    assert float(row[2]) == 5.0 * force.argmax()
+    assert re.search(r"^closure error.*e-", result.stdout, re.MULTILINE)
+
+
+def test_solve_uses_the_stored_motion() -> None:
+    assert "Solved 27 of 27 positions." in run("solve", "rcsr").stdout
+
+
+def test_solve_of_one_position_and_of_a_slide(crank_slider: Path) -> None:
+    result = run("solve", crank_slider, "--drive", "A=12.5@1@3")
+    assert result.exit_code == 0
+    assert "Solved 1 of 1 position." in result.stdout
+    assert "12.5 mm" in result.stdout
+    row = re.search(r"^A\.Tz \[mm kg s\^-2\] +(\S+)", result.stdout, re.MULTILINE)
+    assert row is not None
+    assert np.isclose(float(row[1]), 2.0 * 3.0 + 7.0)
+
+
+def test_both_methods_print_the_same() -> None:
+    first, second = (run("solve", "7r", "--method", method).stdout for method in ("loop_wrench", "newton_euler"))
+    assert first.partition("Checks")[0] == second.partition("Checks")[0]
+
+
+def test_reactions_that_are_not_unique_are_said_to_be_so() -> None:
+    plain = run("solve", "four-bar").stdout
+    assert "Not unique" in plain
+    assert "not unique" in plain
+    assert "(Fx Fy)" in plain
+    least = run("solve", "four-bar", "--redundant", "minimum_norm").stdout
+    assert "least norm" in least
+    assert "nan" not in plain + least
+
+
+def test_positions_out_of_reach() -> None:
+    result = run("solve", "rcsr", "--drive", "O1=150:220:1deg")
+    assert result.exit_code == 1
+    assert "out of reach" in result.stderr
+    assert "205.14 deg" in result.stderr
+    result = run("solve", "rcsr", "--drive", "O1=150:220:1deg", "--on-reach", "flag")
+    assert result.exit_code == 0
+    assert "Solved 56 of 70 positions." in result.stdout
+    assert "positions 56 to 69: out of reach (after O1.Rz = 205 deg)" in result.stdout
+
+
+def test_nothing_solved_is_no_success() -> None:
+    result = run("solve", "rcsr", "--drive", "O1=0deg", "--on-reach", "flag")
+    assert result.exit_code == 1
+    assert "Solved 0 of 1 position." in result.stdout
+
+
+@pytest.mark.parametrize("name", ["rcsr-csr-printed"])
+def test_loops_that_cannot_be_closed(name: str) -> None:
+    assert run("solve", name).exit_code == 1
+
+
+def test_a_freedom_left_free(free_chain: Path) -> None:
+    result = run("solve", free_chain)
+    assert result.exit_code == 1
+    assert "left free" in result.stderr
+
+
+def test_out_writes_the_table(tmp_path: Path) -> None:
+    target = tmp_path / "7r.csv"
+    result = run("solve", "7r", "--out", target)
+    assert result.exit_code == 0
+    assert "Wrote" in result.stdout
+    with target.open(encoding="utf-8", newline="") as handle:
+        rows = list(csv.DictReader(handle))
+    assert len(rows) == 360
+    s = mg.solve(mg.load("7r"))
+    assert np.array_equal([float(r["O1.Rz effort [N m]"]) for r in rows], s["O1"].effort[:, 0])
+    assert list(tmp_path.iterdir()) == [target]
+
+
+# --- drives ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "positions", "velocity", "acceleration"),
+    [
+        ("O1=0:360:90deg", np.deg2rad([0, 90, 180, 270]), 0.0, 0.0),
+        ("O1=0:1:0.25", [0, 0.25, 0.5, 0.75], 0.0, 0.0),
+        ("O1=0deg:90deg:45deg@10", np.deg2rad([0, 45]), 10.0, 0.0),
+        ("O1=10:-20:-10deg@-2@0.5", np.deg2rad([10, 0, -10]), -2.0, 0.5),
+        ("O1.Rz=30deg@60deg/s@90deg/s^2", np.deg2rad(30), np.deg2rad(60), np.deg2rad(90)),
+        ("O1 = 0.1rad", 0.1, 0.0, 0.0),
+        ("O1=0:0.3:0.1", [0, 0.1, 0.2], 0.0, 0.0),
+        ("O1=1e-1:.25:5.e-2", [0.1, 0.15, 0.2], 0.0, 0.0),
+        ("O2.Tz=-9:-8:0.5@2", [-9.0, -8.5], 2.0, 0.0),
+    ],
+)
+def test_drive_syntax(text: str, positions: list[float], velocity: float, acceleration: float) -> None:
+    name, motion = parse_drive(mg.load("rcsr"), text)
+    assert name in text
+    assert np.allclose(motion.position, positions, atol=1e-15)
+    assert motion.shape == np.shape(positions)
+    assert np.allclose(motion.velocity, velocity)
+    assert np.allclose(motion.acceleration, acceleration)
+
+
+def test_several_drives_describe_the_same_positions(tmp_path: Path) -> None:
+    z = (0, 0, 1)
+    m = mg.Mechanism("five-bar", pairs=[
+        mg.Pair("A", "R", "frame", "a", point=(-1, 0, 0), axis=z), mg.Pair("B", "R", "a", "b", point=(-1, 1, 0), axis=z),
+        mg.Pair("C", "R", "b", "c", point=(0, 2, 0), axis=z), mg.Pair("D", "R", "d", "c", point=(1, 1, 0), axis=z),
+        mg.Pair("E", "R", "frame", "d", point=(1, 0, 0), axis=z),
+    ], drives=["A", "E"], loads=[mg.Effort("B", 1.0)])  # fmt: skip
+    mg.save(m, tmp_path / "m.toml")
+    result = run("solve", tmp_path / "m.toml", "--drive", "A=0:10:1deg", "--drive", "E=0:-10:-1deg")
+    assert result.exit_code == 0
+    assert "Solved 10 of 10" in result.stdout
+    assert "E.Rz" in result.stdout
+    assert "different numbers of positions" in bad(
+        "solve", tmp_path / "m.toml", "--drive", "A=0:10:1deg", "--drive", "E=0:-10:-2deg"
+    )
+    assert "no motion" in bad("solve", tmp_path / "m.toml", "--drive", "A=0:10:1deg")
+
+
+@pytest.mark.parametrize(
+    ("drive", "message"),
+    [
+        ("O1", "FREEDOM=VALUES"),
+        ("=3", "FREEDOM=VALUES"),
+        ("O1=", "FREEDOM=VALUES"),
+        ("O1=0:360", "START:STOP:STEP"),
+        ("O1=0:1:2:3", "START:STOP:STEP"),
+        ("O1=0:360:1deg@1@2@3", "START:STOP:STEP"),
+        ("O1=0:360:0deg", "does not lead"),
+        ("O1=0:360:-1deg", "does not lead"),
+        ("O1=5:5:1deg", "does not lead"),
+        ("O1=a:b:c", "is no number"),
+        ("O1=0::1", "is no number"),
+        ("O1=nan", "is no number"),
+        ("O1=1e999", "is no number"),
+        ("O1=0:1:0.1@", "is no number"),
+        ("O1=30mm", "is an angle"),
+        ("O2.Tz=1deg", "is a length"),
+        ("O2.Tz=1mm", "is a length"),
+        ("O9=0:1:0.1", "unknown freedom"),
+        ("O2=0:1:0.1", "name one of"),
+        ("O3.Rx=0:1:0.1", "rotation"),
+        ("O2.Rz=0:1:0.1", "is not a drive"),
+        ("O1=0:1:1e-12", "at most"),
+    ],
+)
+def test_bad_drives(drive: str, message: str) -> None:
+    assert message in bad("solve", "rcsr", "--drive", drive)
+
+
+def test_a_drive_given_twice() -> None:
+    assert "given twice" in bad("solve", "rcsr", "--drive", "O1=1", "--drive", "O1.Rz=2")
+
+
+# --- bad input ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("command", ["check", "equations", "solve"])
+def test_names_and_files_that_are_none(command: str, tmp_path: Path) -> None:
+    assert "did you mean rcsr" in bad(command, "rcs")
+    assert "there are:" in bad(command, "zzzzzz")
+    assert "No such file" in bad(command, tmp_path / "none.toml")
+    assert "directory" in bad(command, tmp_path).lower()
+    assert "is no TOML" in bad(command, _written(tmp_path / "broken.toml", "schema = = 1"))
+    assert "missing" in bad(command, _written(tmp_path / "empty.toml", ""))
+    assert "is no TOML" in bad(command, _written(tmp_path / "binary.toml", b"\xff\xfe\x00"))
+
+
+def _written(path: Path, content: str | bytes) -> Path:
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        (),
+        ("solve",),
+        ("dance", "rcsr"),
+        ("check", "rcsr", "--nope"),
+        ("check", "rcsr", "--json", "--markdown"),
+        ("check", "rcsr", "--at", "O1"),
+        ("check", "rcsr", "--at", "Q=1"),
+        ("check", "rcsr", "--at", "O1=1:2:1"),
+        ("equations", "rcsr", "--bookkeeping", "other"),
+        ("equations", "rcsr", "--latex", "--csv"),
+        ("solve", "rcsr", "--method", "guess"),
+        ("solve", "rcsr", "--redundant", "maybe"),
+        ("solve", "rcsr", "--on-reach", "hope"),
+        ("solve", "rcsr", "7r"),
+    ],
+)
+def test_wrong_usage(arguments: tuple[str, ...]) -> None:
+    assert run(*arguments).exit_code == 2
+
+
+def test_at_a_position_that_cannot_be_had() -> None:
+    assert run("check", "rcsr", "--at", "O1=0deg").exit_code == 1
+
+
+def test_out_that_cannot_be_written(tmp_path: Path) -> None:
+    assert "folder" in bad("solve", "rcsr", "--out", tmp_path)
+    assert "folder" in bad("solve", "rcsr", "--out", tmp_path / "none" / "x.csv")
+    file = _written(tmp_path / "file", "x")
+    assert bad("solve", "rcsr", "--out", file / "x.csv")
+    assert file.read_text() == "x"
+
+
+def test_no_file_is_left_where_there_is_no_answer(tmp_path: Path) -> None:
+    target = tmp_path / "x.csv"
+    assert run("solve", "rcsr", "--drive", "O1=150:220:1deg", "--out", target).exit_code == 1
+    assert not list(tmp_path.iterdir())
+    target.write_text("kept")
+    assert run("solve", "rcsr", "--drive", "O1=150:220:1deg", "--out", target).exit_code == 1
+    assert target.read_text() == "kept"
+
+
+def test_no_file_is_left_where_writing_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", full)
+    assert "No space left" in bad("solve", "rcsr", "--out", tmp_path / "x.csv")
+    assert not list(tmp_path.iterdir())
+
+
+# --- as a program ------------------------------------------------------------------------------------------------------
+
+
+def test_as_a_program() -> None:
+    done = process("solve", "7r", COLUMNS="30")
+    assert done.returncode == 0
+    assert not done.stderr
+    assert "\x1b" not in done.stdout
+    assert done.stdout == run("solve", "7r").stdout
+    assert process("solve", "rscr").returncode == 2
+
+
+def test_without_typer(tmp_path: Path) -> None:
+    _written(tmp_path / "typer.py", "raise ModuleNotFoundError('No module named typer', name='typer')")
+    done = process("list", PYTHONPATH=os.pathsep.join([str(tmp_path), str(ROOT)]))
+    assert done.returncode == 2
+    assert "pip install 'mechgraph[cli]'" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of another kind")
+def test_interrupted(tmp_path: Path) -> None:
+    out = tmp_path / "x.csv"
+    running = subprocess.Popen(
+        [sys.executable, "-m", "mechgraph", "solve", "7r", "--drive", "O1=0:100000:0.1", "--out", str(out)],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ | {"PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    time.sleep(2.5)
+    running.send_signal(signal.SIGINT)
+    _, error = running.communicate(timeout=60)
+    assert running.returncode == 130
+    assert "Traceback" not in error
+    assert not list(tmp_path.iterdir())
