@@ -50,6 +50,12 @@ class Freedom:
     per_pitch: Six = (0.0,) * 6
 
     @property
+    def label(self) -> str:
+        """The freedom as the table shows it: ``Rz``, or ``Rz+pitch*Tz`` where the pitch enters."""
+        moved = [name for name, unit in UNIT_TWISTS.items() if np.dot(unit, self.per_pitch)]
+        return "+".join([self.name, *(f"pitch*{name}" for name in moved)])
+
+    @property
     def turns(self) -> bool:
         """Whether the coordinate is an angle (radians) rather than a length."""
         return any(self.twist[:3])
@@ -353,7 +359,7 @@ class PairTable(Mapping[str, PairType]):
                     row.symbol,
                     row.name,
                     str(row.f),
-                    " ".join(f.name for f in row.freedoms) or "none",
+                    " ".join(f.label for f in row.freedoms) or "none",
                     reactions or "none",
                     f"{unknowns} / {equations}",
                 )

@@ -24,6 +24,8 @@ NODE_CONVERGED = 1e-5
 """Closure residual at which a node is good enough to predict from, after one more step."""
 ITERATIONS = 8
 """Most Newton iterations at a position."""
+SURE_STEP = 0.01
+"""Steps below this are closed fully: the end of the reach is near."""
 LONGEST_STEP = 0.35
 """Longest step between nodes, in driver space (radians, or lengths / L)."""
 STRAIGHT = 0.98
@@ -116,7 +118,7 @@ class Follower:
         here = self.system.at(x)
         left = np.abs(here.residual).max(axis=0, initial=0.0)
         if not len(self.choices[choice].cols):
-            return here, total, left <= 10 * goal
+            return here, total, left <= max(goal, 10 * CONVERGED)
         for round_ in range(ITERATIONS):
             part = np.flatnonzero(left > goal)
             if not part.size:
@@ -135,7 +137,7 @@ class Follower:
                 left[part] = np.abs(few.residual).max(axis=0, initial=0.0)
                 here = self.system.at(x)
                 break
-        return here, total, left <= 10 * goal
+        return here, total, left <= max(goal, 10 * CONVERGED)
 
     def newton_step(self, here: Configuration, choice: int) -> Array:
         """One limited Newton step ``(F, T)`` at every state of a configuration."""
@@ -213,7 +215,7 @@ class Follower:
         choice = last.choice
         x = self.system.advance(last.x[:, None], dq[:, None])
         x[self.rows, 0] = drive
-        here, total, done = self.correct(x, choice, NODE_CONVERGED)
+        here, total, done = self.correct(x, choice, NODE_CONVERGED if at - last.at > SURE_STEP else CONVERGED)
         correction = float(np.abs(total).max(initial=0.0))
         if not done[0] and correction < CORRECTION:
             closed, error = close(self.system, x[:, 0], self.columns, iterations=12)

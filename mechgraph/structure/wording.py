@@ -125,7 +125,8 @@ def explanation(r: DeterminacyReport) -> list[str]:
     if r.near:
         gap = f", largest dropped {r.dropped:.1g}" if r.dropped else ""
         out.append(
-            f"Nearly singular: smallest kept singular value {r.margin:.2g} of the largest{gap}; a small change of dimensions may change the verdict."
+            f"Nearly singular: smallest kept singular value {r.margin:.2g} of the largest{gap}; a small change of "
+            "dimensions may change the verdict."
         )
     if not out:
         out.append("Count and rank agree.")
