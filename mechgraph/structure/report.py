@@ -21,9 +21,10 @@ from mechgraph.motion.system import Index, System
 from mechgraph.structure import wording
 from mechgraph.structure.advice import Effect, advice, independent_rows
 from mechgraph.structure.findings import Finding, LoopFact, input_motions, locked_findings, loop_facts, passive_finding
-from mechgraph.structure.freedom import STILL, Freedoms, free_motion
+from mechgraph.structure.freedom import Freedoms, free_motion, is_large
 from mechgraph.structure.generic import Generic, generic
 from mechgraph.structure.mobility import FiniteMotion, finite_motion
+from mechgraph.structure.passive import STILL
 from mechgraph.structure.stress import SelfStress, Uniqueness, uniqueness
 from mechgraph.topology.linkgraph import LinkGraph, link_graph
 from mechgraph.topology.parts import Parts, parts_of

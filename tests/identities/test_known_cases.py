@@ -92,7 +92,7 @@ def test_determinate_or_not(name: str) -> None:
 @pytest.mark.parametrize("name", [n for n, case in CASES.items() if not case.finite and case.mobility])
 def test_shaky_structures_are_named(name: str) -> None:
     assert "haky" in report(name).verdict
-    assert "finite stroke" in str(report(name))
+    assert "finite stroke" in " ".join(str(report(name)).split())
 
 
 @pytest.mark.parametrize("name", ["prprrh, in general", "three cranks, detuned"])
@@ -197,7 +197,7 @@ def test_a_loop_that_cannot_close_still_gets_the_facts_of_its_graph() -> None:
     r = mg.check(mg.load("rcsr-csr-printed"))
     assert r.mobility is None
     assert "cannot be closed" in r.note
-    assert r.mobility_by_count == 1
+    assert r.mobility_by_count == r.mechanism.expected["mobility_by_count"]
     assert not r.determinate
 
 
