@@ -11,6 +11,7 @@ from mechgraph.errors import DeclarationError
 from mechgraph.formulation.state import State
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.result import export
+from mechgraph.result.units import unit_of
 
 if TYPE_CHECKING:
     import os
@@ -143,6 +144,27 @@ class PairResult:
         """Reaction components of the pair table by name, in frame k about its origin; NaN where not unique."""
         return self._values.components(self._index)
 
+    @property
+    def units(self) -> dict[str, Any]:
+        """Units of the properties in the declared units: a tuple over freedoms, a dict over components, or one text."""
+        m = self._values.mechanism
+        row = m.pairs[self._index].type
+        lengths = [0 if f.turns else 1 for f in row.freedoms]
+        efforts = tuple(unit_of(m.units, (2 if c.is_couple else 1, 1, -2)) for c in row.efforts)
+        force, moment = (unit_of(m.units, (power, 1, -2)) for power in (1, 2))
+        return {
+            "position": tuple(unit_of(m.units, (n, 0, 0)) for n in lengths),
+            "velocity": tuple(unit_of(m.units, (n, 0, -1)) for n in lengths),
+            "acceleration": tuple(unit_of(m.units, (n, 0, -2)) for n in lengths),
+            "effort": efforts,
+            "drive_effort": efforts,
+            "force": force,
+            "moment": moment,
+            "reaction": (moment,) * 3 + (force,) * 3,
+            "total": (moment,) * 3 + (force,) * 3,
+            "components": {name: moment if name.startswith("M") else force for name in row.component_names},
+        }
+
 
 class LinkResult:
     """Motion of one link in the global frame."""
@@ -178,6 +200,23 @@ class LinkResult:
     def point(self, p: Any) -> MaterialPoint:
         """Position, velocity and acceleration of the material point ``p``, given in the link's frame."""
         return self._values.link_point(self._index, p)
+
+    @property
+    def units(self) -> dict[str, Any]:
+        """Units of the properties in the declared units; of twists angular part first."""
+        m = self._values.mechanism
+        length, speed, rate = (unit_of(m.units, (1, 0, -n)) for n in range(3))
+        angular = tuple(unit_of(m.units, (0, 0, -n)) for n in range(3))
+        return {
+            "pose": length,
+            "twist": (angular[1],) * 3 + (speed,) * 3,
+            "acceleration": (angular[2],) * 3 + (rate,) * 3,
+            "center": length,
+            "center_velocity": speed,
+            "center_acceleration": rate,
+            "angular_velocity": angular[1],
+            "angular_acceleration": angular[2],
+        }
 
     def _center(self) -> MaterialPoint:
         link = self._values.mechanism.links[self._index]
