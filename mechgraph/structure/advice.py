@@ -210,15 +210,3 @@ def advice(system: System, x: Array, freedoms: Freedoms) -> tuple[Effect, ...]:
             if done and done.mobility[1] - done.passive[1] > 0:
                 found.append(done)
     return tuple(found[: SHOWN + 3])
-
-
-def independent_rows(null: Array, candidates: list[int], count: int, tolerance: float = 1e-3) -> list[int]:
-    """The first candidates (in order) whose rows of ``null`` are independent, up to ``count``; weaker ones where needed."""
-    chosen: list[int] = []
-    for limit in (tolerance, RANK_TOLERANCE):
-        for i in candidates:
-            if len(chosen) < count and i not in chosen:
-                rows = null[[*chosen, i]]
-                if rank_of(singular_values(rows), limit) == len(chosen) + 1:
-                    chosen.append(i)
-    return chosen
