@@ -19,7 +19,8 @@ import scipy
 from mechgraph.algebra.se3 import Array, cross
 from mechgraph.motion.system import Index
 
-Loops = Sequence[Sequence[tuple[int, int]]]
+SPARE = 1.5
+"""Rows a column that the front may have before it is condensed."""
 
 
 @dataclass(frozen=True)
@@ -160,7 +161,7 @@ class Elimination:
 
     def _condense(self, front: Array, slots: Index) -> tuple[Array, Index]:
         """Where the front has more rows than columns, reflect it to triangular form; rows left over are self-stresses."""
-        if front.shape[0] <= front.shape[1] + 6:
+        if front.shape[0] <= SPARE * front.shape[1] + 6:
             return front, slots
         V, T, R = householder(front)
         self._steps.append(_Reflections(slots, V, T, np.eye(R.shape[0])))

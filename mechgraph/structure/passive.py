@@ -40,15 +40,41 @@ class PassiveMotion:
     twist: Array
 
 
+class _Search:
+    """What the search needs at hand: column spans, driven columns, group and place of every pair."""
+
+    def __init__(self, here: Configuration, driven: Index) -> None:
+        self.here, self.system = here, here.system
+        first = self.system.first_column
+        self.spans = [(int(i), int(j)) for i, j in zip(first, first[1:], strict=False)]
+        self.driven = {int(c) for c in driven}
+        self.place = {int(k): (n, i) for n, g in enumerate(self.system.groups) for i, k in enumerate(g.pairs)}
+        self.columns = [[c for c in range(*span) if c not in self.driven] for span in self.spans]
+
+    def meet(self, one: int, two: int) -> bool:
+        """Whether two pairs have a twist in common."""
+        S = self.here.S[:, self.columns[one] + self.columns[two], 0]
+        if not self.columns[one] or not self.columns[two]:
+            return False
+        s = np.linalg.svd(S, compute_uv=False)
+        return S.shape[1] > 6 or bool(s[-1] <= COMMON * s[0])
+
+
 def passive_motions(here: Configuration, left: Array, driven: Index) -> list[PassiveMotion]:
     """Independent passive motions with the freedoms ``driven`` at rest; ``left (F, p)`` are all motions that leave free."""
     if not left.shape[1]:
         return []
     found: list[PassiveMotion] = []
-    for links, border in sorted(_borders(here.system, left), key=lambda item: (len(item[0]), item[0])):
-        for motion in _of_border(here, links, border, driven):
-            if _independent(motion, found):
+    search = _Search(here, driven)
+    by_freedom: dict[int, list[PassiveMotion]] = {}
+    for links, border in sorted(_borders(search, left), key=lambda item: (len(item[0]), item[0])):
+        for motion in _of_border(search, links, border):
+            moving = np.flatnonzero(np.abs(motion.rates) > STILL)
+            near = {id(p): p for c in moving for p in by_freedom.get(int(c), [])}
+            if _independent(motion, list(near.values())):
                 found.append(motion)
+                for c in moving:
+                    by_freedom.setdefault(int(c), []).append(motion)
     return sorted(found, key=lambda p: p.links)
 
 
@@ -87,12 +113,11 @@ def series(graph: LinkGraph) -> list[list[int]]:
     return [pairs for pairs in by_key.values() if len(pairs) > 1]
 
 
-def _borders(system: System, left: Array) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
+def _borders(search: _Search, left: Array) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
     """(links, border pairs) of all sets that a passive motion could move."""
-    graph = system.graph
-    seen = set()
+    graph = search.system.graph
     home: dict[int, int] = {}
-    sets = still_sets(system, left)
+    sets = still_sets(search.system, left)
     for number, links in enumerate(sets):
         home |= dict.fromkeys(links, number)
     border: list[list[int]] = [[] for _ in sets]
@@ -100,31 +125,19 @@ def _borders(system: System, left: Array) -> Iterator[tuple[tuple[int, ...], tup
         if home[a] != home[b]:
             border[home[a]].append(k)
             border[home[b]].append(k)
+    seen = set()
     for links, pairs in zip(sets, border, strict=True):
-        if graph.frame not in links and len(pairs) > 1:
+        if graph.frame not in links and len(pairs) > 1 and all(search.meet(pairs[0], k) for k in pairs[1:]):
             seen.add(tuple(links))
             yield tuple(links), tuple(pairs)
-    moving = [bool(np.abs(left[i:j]).max(initial=0.0) >= STILL) for i, j in _spans(system)]
     for pairs in series(graph):
-        pairs = [k for k in pairs if moving[k]]
         near = combinations(pairs, 2) if len(pairs) <= LONGEST_SERIES else zip(pairs, pairs[1:], strict=False)
         for one, two in near:
-            if _common(system, left, one, two):
+            if search.meet(one, two):
                 links = _cut_off(graph, one, two)
                 if links not in seen:
                     seen.add(links)
                     yield links, (one, two)
-
-
-def _spans(system: System) -> list[tuple[int, int]]:
-    return [(int(i), int(j)) for i, j in zip(system.first_column, system.first_column[1:], strict=False)]
-
-
-def _common(system: System, left: Array, one: int, two: int) -> bool:
-    """Whether some motion of ``left`` moves both pairs (cheap test before the graph is cut)."""
-    spans = _spans(system)
-    moves = [np.abs(left[i:j]).max(axis=0, initial=0.0) >= STILL for i, j in (spans[one], spans[two])]
-    return bool((moves[0] & moves[1]).any())
 
 
 def _cut_off(graph: LinkGraph, one: int, two: int) -> tuple[int, ...]:
@@ -142,13 +155,10 @@ def _cut_off(graph: LinkGraph, one: int, two: int) -> tuple[int, ...]:
     return tuple(i for i in range(graph.n_links) if i not in reached)
 
 
-def _of_border(
-    here: Configuration, links: tuple[int, ...], border: tuple[int, ...], driven: Index
-) -> list[PassiveMotion]:
+def _of_border(search: _Search, links: tuple[int, ...], border: tuple[int, ...]) -> list[PassiveMotion]:
     """Passive motions of one set of links: twists that every border pair allows and that leave all pair elements in place."""
-    system = here.system
-    spans = _spans(system)
-    columns = [[c for c in range(*spans[k]) if c not in driven] for k in border]
+    here, system = search.here, search.system
+    columns = [search.columns[k] for k in border]
     sides = [1.0 if system.graph.ends[k][1] in links else -1.0 for k in border]
     if not links or any(not c for c in columns):
         return []
@@ -165,7 +175,7 @@ def _of_border(
     moves = np.zeros((system.n_freedoms, common.shape[1]))
     moves[every] = common
     twists = first @ common[: len(columns[0])]
-    leaving = np.concatenate([_leaving(here, k, links, moves, twists) for k in border])
+    leaving = np.concatenate([_leaving(search, k, links, moves, twists) for k in border])
     out = []
     for mix in small_combinations(leaving, IN_PLACE).T:
         rates, twist = moves @ mix, twists @ mix
@@ -182,12 +192,10 @@ def small_combinations(rows: Array, tolerance: float) -> Array:
     return np.asarray(Vt[small].T)
 
 
-def _leaving(here: Configuration, k: int, links: tuple[int, ...], moves: Array, twists: Array) -> Array:
+def _leaving(search: _Search, k: int, links: tuple[int, ...], moves: Array, twists: Array) -> Array:
     """Rate at which the reaction wrenches of pair ``k`` leave their span, one column a motion."""
-    system = here.system
-    number, i = next(
-        (n, int(np.flatnonzero(g.pairs == k)[0])) for n, g in enumerate(system.groups) if k in g.pairs
-    )
+    here, system = search.here, search.system
+    number, i = search.place[k]
     g = system.groups[number]
     row, pitch = g.row, system.par.pitch[k : k + 1]
     base = here.frames[number][0][:, :, i, 0]
@@ -208,11 +216,9 @@ def _leaving(here: Configuration, k: int, links: tuple[int, ...], moves: Array, 
     return np.stack(columns, axis=1)
 
 
-def _independent(motion: PassiveMotion, found: list[PassiveMotion]) -> bool:
-    """Whether a motion is no combination of those found that share a freedom with it (directly or through others)."""
-    mine = np.abs(motion.rates) > STILL
-    near = [p.rates for p in found if (mine & (np.abs(p.rates) > STILL)).any()]
+def _independent(motion: PassiveMotion, near: list[PassiveMotion]) -> bool:
+    """Whether a motion is no combination of those found that share a freedom with it."""
     if not near:
         return True
-    s = np.linalg.svd(np.stack([*near, motion.rates]), compute_uv=False)
+    s = np.linalg.svd(np.stack([*(p.rates for p in near), motion.rates]), compute_uv=False)
     return bool(s[-1] > 1e-7 * s[0])

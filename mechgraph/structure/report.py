@@ -17,7 +17,7 @@ from mechgraph.formulation.registry import Ledger
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.motion.assembly import assembled, assembled_at, named_columns
 from mechgraph.motion.system import Index, System
-from mechgraph.structure import drivers, facts, wording
+from mechgraph.structure import drivers, facts, sections, wording
 from mechgraph.structure.advice import Effect, advice
 from mechgraph.structure.findings import Finding, LoopFact, input_motions, locked_findings, loop_facts, passive_finding
 from mechgraph.structure.freedom import Freedoms, free_motion
@@ -67,12 +67,12 @@ class DeterminacyReport:
         """Names of the links."""
         return self.mechanism.link_names()
 
-    @property
+    @cached_property
     def pairs(self) -> tuple[str, ...]:
         """Names of the pairs."""
         return tuple(p.name for p in self.mechanism.pairs)
 
-    @property
+    @cached_property
     def loops(self) -> tuple[tuple[tuple[str, int], ...], ...]:
         """Independent loops, each a chain of (pair name, sign)."""
         return tuple(tuple((self.pairs[k], sign) for k, sign in loop) for loop in self.graph.loops)
@@ -270,14 +270,14 @@ class DeterminacyReport:
 
     # --- print -----------------------------------------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def verdict(self) -> str:
         """The verdict in one sentence."""
         return wording.verdict(self)
 
     def document(self) -> Document:
         """The report as a document."""
-        return wording.document(self)
+        return sections.document(self)
 
     def to_dict(self) -> dict[str, Any]:
         """All facts as plain data."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import networkx as nx
 import numpy as np
 
 from mechgraph.algebra.screw import null_space
@@ -96,12 +97,26 @@ def _uniqueness_of_many(here: Configuration, driven: Index) -> Uniqueness:
     )
     return Uniqueness(
         count=count,
-        groups=len(found.sets),
+        groups=_group_count(here, found, verdicts["unique"]),
         states=readable(first, labels)[0][:LISTED],
         transverse=directions,
         combinations=(),
         **verdicts,
     )
+
+
+def _group_count(here: Configuration, found: Elimination, unique: dict[str, dict[str, bool]]) -> int:
+    """Sets of loops with self-stresses that share a pair some component of which is not unique."""
+    m, loops = here.system.m, here.system.graph.loops
+    home = {i: number for number, (_, members) in enumerate(found.sets) for i in members}
+    graph: nx.Graph[int] = nx.Graph()
+    graph.add_nodes_from(home.values())
+    first: dict[int, int] = {}
+    for i, number in home.items():
+        for k, _ in loops[i]:
+            if not all(unique[m.pairs[k].name].values()):
+                graph.add_edge(number, first.setdefault(k, number))
+    return int(nx.number_connected_components(graph))
 
 
 def _first_states(found: Elimination) -> Array:
