@@ -16,7 +16,7 @@ def cross(a: Array, b: Array) -> Array:
     """Vector product of ``(3, ...)`` arrays along the first axis."""
     out = np.empty(np.broadcast_shapes(a.shape, b.shape))
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        np.multiply(a[j], b[k], out=out[i])
+        np.multiply(a[j], b[k], out=out[i, ...])
         out[i] -= a[k] * b[j]
     return out
 

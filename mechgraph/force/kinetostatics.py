@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeadPointError, DeclarationError, IndeterminateError, ReachError
@@ -20,14 +21,20 @@ from mechgraph.model.motion_law import Motion
 from mechgraph.motion.assembly import assembled, assembled_at, named_columns
 from mechgraph.motion.idle import Idle, held_well, without_spin
 from mechgraph.motion.path import SINGULAR, Follower, Positions, Status
-from mechgraph.motion.rates import closure_solver, rates
-from mechgraph.numerics.linear import ChosenSystem
+from mechgraph.motion.rates import closure_solver, distance_to_dead_point, rates
+from mechgraph.motion.system import Configuration, Index
+from mechgraph.numerics.linear import Choice, ChosenSystem
 from mechgraph.result.solution import Solution
 from mechgraph.structure.freedom import free_motion
 from mechgraph.structure.report import check
 
 CONTRADICTION = 1e-6
 """Relative part of the closure rates that drivers may leave open before they count as contradicting each other."""
+
+DOUBTFUL = 1e4
+"""Condition number of the closure equations from which on the distance to a dead point is looked at."""
+DEAD_POINT = 1e-10
+"""Distance to a dead point, in driver coordinates (radians, or lengths / L), below which a position counts as one."""
 
 ON_REACH = ("raise", "flag")
 REDUNDANT = ("nan", "minimum_norm")
@@ -138,7 +145,7 @@ class _Run:
         here = here or self.system.at(found.x.reshape(self.system.n_state, -1)[:, good])
         which, choices = found.which.reshape(-1)[good], found.choices
         solver = closure_solver(here, choices, which)
-        dead = solver.condition > SINGULAR
+        dead = self._dead(here, solver, choices, which)
         if dead.any():
             status.reshape(-1)[good[dead]] = Status.DEAD_POINT.value
             good, which = good[~dead], which[~dead]
@@ -150,6 +157,18 @@ class _Run:
         moved = rates(here, solver, self.columns, velocity, acceleration, bodies)
         held = tuple(choice.held for choice in choices)
         return Motions(here, moved, self.batch, good, status, self.t, self.columns, held, which), solver, found
+
+    def _dead(
+        self, here: Configuration, solver: ChosenSystem, choices: list[Choice], which: Index
+    ) -> NDArray[np.bool_]:
+        """Positions so near to a dead point that their rates would be noise."""
+        dead = solver.condition > SINGULAR
+        doubtful = np.flatnonzero((solver.condition > DOUBTFUL) & ~dead)
+        if doubtful.size:
+            few = self.system.at(here.x[:, doubtful])
+            near = distance_to_dead_point(few, closure_solver(few, choices, which[doubtful]), self.columns)
+            dead[doubtful] = np.logical_not(near > DEAD_POINT)
+        return dead
 
     def _without_spin(self, found: Positions, bodies: tuple[Idle, ...]) -> Positions:
         """The same positions with passive bodies not spinning from one to the next."""

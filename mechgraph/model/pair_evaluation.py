@@ -208,19 +208,31 @@ def state_to_coordinates(row: PairType, x: Array, start: Array | None = None) ->
 
 
 def _continued(v: Array, first: Array) -> Array:
-    out = np.empty_like(v)
-    last = np.broadcast_to(first.reshape(3, *(1,) * (v.ndim - 2)), v.shape[:-1])
-    for t in range(v.shape[-1]):
-        now = v[..., t]
-        length = np.sqrt((now * now).sum(axis=0))
-        reach = np.sqrt((last * last).sum(axis=0))
-        axis = np.where(
-            length > 1e-9, now / np.where(length > 1e-9, length, 1.0), last / np.where(reach > 0, reach, 1.0)
-        )
-        turns = np.round(((axis * last).sum(axis=0) - length) / (2 * np.pi))
-        last = now + 2 * np.pi * turns * axis
-        out[..., t] = last
+    """Rotation vectors ``(3, ..., T)`` continued along the last axis: signed angles about axes that do not flip, unwrapped."""
+    out = np.full_like(v, np.nan)
+    for case in np.ndindex(v.shape[1:-1]):
+        here = (slice(None), *case)
+        good = np.flatnonzero(np.isfinite(v[here]).all(axis=0))
+        if good.size:
+            out[(*here, good)] = _continued_path(v[here][:, good], first)
     return out
+
+
+def _continued_path(v: Array, first: Array) -> Array:
+    angle = np.sqrt((v * v).sum(axis=0))
+    clear = angle > 1e-9
+    if not clear.any():
+        return v
+    # where the angle is nearly zero the axis of the last clear position serves
+    last_clear = np.maximum.accumulate(np.where(clear, np.arange(len(angle)), -1))
+    last_clear[last_clear < 0] = np.flatnonzero(clear)[0]
+    axis = (v / np.where(clear, angle, 1.0))[:, last_clear]
+    flips = np.where((axis[:, 1:] * axis[:, :-1]).sum(axis=0) < 0, -1.0, 1.0)
+    sense = np.cumprod(np.concatenate([[1.0], flips]))
+    axis = axis * sense
+    signed = np.unwrap((v * axis).sum(axis=0))
+    turns = np.round((first @ axis[:, 0] - signed[0]) / (2 * np.pi))
+    return np.asarray(np.where(clear | (np.abs(signed) > 1.0) | (turns != 0), (signed + 2 * np.pi * turns) * axis, v))
 
 
 def random_coordinates(row: PairType, rng: np.random.Generator, n: int, T: int) -> Array:

@@ -18,8 +18,10 @@ from mechgraph.motion.assembly import close, state_rows
 from mechgraph.motion.system import Configuration, Index, System
 from mechgraph.numerics.linear import Choice, ChosenSystem, Factor, choose
 
-CONVERGED = 1e-12
-"""Closure residual at which Newton stops."""
+CONVERGED = 1e-13
+"""Closure residual that Newton aims at."""
+ACCEPTED = 1e-11
+"""Closure residual with which a position counts as solved where rounding allows no better."""
 NODE_CONVERGED = 1e-5
 """Closure residual at which a node is good enough to predict from, after one more step."""
 ITERATIONS = 8
@@ -36,7 +38,7 @@ CORRECTION = 0.06
 """Largest correction that a node may need; keeps the continuation on its branch."""
 AIM = 0.005
 """Correction that the step control aims at."""
-SINGULAR = 1e7
+SINGULAR = 1e9
 """Condition number of the closure equations above which a position counts as a dead point."""
 
 
@@ -118,7 +120,7 @@ class Follower:
         here = self.system.at(x)
         left = np.abs(here.residual).max(axis=0, initial=0.0)
         if not len(self.choices[choice].cols):
-            return here, total, left <= max(goal, 10 * CONVERGED)
+            return here, total, left <= max(goal, ACCEPTED)
         for round_ in range(ITERATIONS):
             part = np.flatnonzero(left > goal)
             if not part.size:
@@ -129,7 +131,9 @@ class Follower:
                 total[:, part] += dq
                 x[:, part] = self.system.advance(here.x[:, part], dq)
                 here = self.system.at(x)
-                left = np.abs(here.residual).max(axis=0, initial=0.0)
+                before, left = left, np.abs(here.residual).max(axis=0, initial=0.0)
+                if (left[part] > 0.5 * before[part]).all() and (left <= ACCEPTED).all():
+                    break
             else:
                 few, more, _ = self.correct(here.x[:, part], choice, goal)
                 total[:, part] += more
@@ -137,7 +141,7 @@ class Follower:
                 left[part] = np.abs(few.residual).max(axis=0, initial=0.0)
                 here = self.system.at(x)
                 break
-        return here, total, left <= max(goal, 10 * CONVERGED)
+        return here, total, left <= max(goal, ACCEPTED)
 
     def newton_step(self, here: Configuration, choice: int) -> Array:
         """One limited Newton step ``(F, T)`` at every state of a configuration."""
@@ -176,16 +180,21 @@ class Follower:
         halts = lengths[1:][stops] if stops is not None else np.zeros(0)
         h = 0.05
         end = lengths[-1]
+        failures: list[Status] = []
         while track.nodes[-1].at < end and track.end is Status.OK:
             last = track.nodes[-1]
             at = self._next(points, lengths, last, h, halts)
             drive = np.array([np.interp(at, lengths, row) for row in points])
             following, correction, why = self._step(track.nodes, at, drive)
             if following is None:
+                failures.append(why)
                 h = 0.5 * (at - last.at)
                 if h < SHORTEST_STEP:
-                    track.end = why
+                    # beyond a change point positions exist (they lie across), beyond the end of the reach they do not
+                    across = failures.count(Status.DEAD_POINT)
+                    track.end = Status.DEAD_POINT if 2 * across > len(failures) else Status.OUT_OF_REACH
             else:
+                failures.clear()
                 track.nodes.append(following)
                 h = (at - last.at) * min(2.0, max(0.5, (AIM / max(correction, 1e-9)) ** (1 / 3)))
                 h = min(max(h, 10 * SHORTEST_STEP), LONGEST_STEP)
@@ -227,7 +236,8 @@ class Follower:
         following = self.node(here, at, drive, choice)
         if following.condition > 1e3:
             other = self.node(here, at, drive, self.choose_at(here))
-            if other.condition < 0.2 * following.condition:
+            same_rank = len(self.choices[other.choice].cols) == len(self.choices[choice].cols)
+            if same_rank and other.condition < 0.2 * following.condition:
                 following = other
             else:
                 self.choices.pop()

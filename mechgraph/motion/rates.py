@@ -66,6 +66,23 @@ def rates(
     return Rates(dq, ddq, V, A, np.maximum(gap_v, gap_a))
 
 
+def distance_to_dead_point(here: Configuration, solver: ChosenSystem, columns: Index) -> Array:
+    """How far, in driver coordinates, each position is from a dead point, ``(T,)``.
+
+    Near a dead point at ``s*`` the rates per unit of driver motion grow as ``|s* - s|^-1/2``, so that the distance is half of rate
+    over rate of the rate; the smallest over the drivers.
+    """
+    out = np.full(here.T, np.inf)
+    nothing = np.zeros((len(columns), here.T))
+    for i in range(len(columns)):
+        one = nothing.copy()
+        one[i] = 1.0
+        moved = rates(here, solver, columns, one, nothing)
+        grown = np.abs(moved.ddq).max(axis=0, initial=0.0)
+        out = np.minimum(out, 0.5 * np.abs(moved.dq).max(axis=0, initial=0.0) / np.maximum(grown, 1e-300))
+    return out
+
+
 def _completed(
     here: Configuration, solver: ChosenSystem, columns: Index, driven: Array, known: Array, size: Array | float = 0.0
 ) -> tuple[Array, Array]:

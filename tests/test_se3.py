@@ -1,0 +1,128 @@
+"""Identities of rotations and poses. Poses are (3, 4, ...), component axes first, positions last."""
+
+import numpy as np
+import pytest
+import scipy
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mechgraph.algebra import se3
+
+VECTORS = st.lists(st.floats(-1, 1), min_size=3, max_size=3).map(np.array).filter(lambda v: np.linalg.norm(v) > 1e-3)
+RATES = st.lists(st.floats(-2, 2), min_size=3, max_size=3).map(np.array)
+ANGLES = st.one_of(
+    st.floats(0, 1e-12),
+    st.floats(1e-9, 1e-3),
+    st.floats(0.1, 3.0),
+    st.floats(0, 1e-3).map(lambda e: np.pi - e),
+    st.floats(0, 1e-9).map(lambda e: np.pi - e),
+)
+
+
+def matrix_of_twist(s):
+    out = np.zeros((4, 4))
+    out[:3, :3] = se3.skew(s[:3])
+    out[:3, 3] = s[3:]
+    return out
+
+
+@given(VECTORS, ANGLES)
+def test_rotation_log_inverts_exp_also_near_zero_and_near_pi(axis, angle):
+    v = angle * axis / np.linalg.norm(axis)
+    back = se3.rotation_log(se3.rotation_exp(v))
+    assert np.linalg.norm(back) <= np.pi + 1e-12
+    other = v - 2 * np.pi * axis / np.linalg.norm(axis) if np.pi - angle < 1e-12 else v  # at pi either sign is right
+    assert min(np.abs(back - v).max(), np.abs(back - other).max()) < 1e-12
+    np.testing.assert_allclose(se3.rotation_exp(back), se3.rotation_exp(v), atol=1e-12)
+
+
+@given(VECTORS, st.floats(0, 1e-9))
+def test_small_rotation_vectors_keep_their_relative_accuracy(axis, size):
+    v = size * axis / np.linalg.norm(axis)
+    assert np.linalg.norm(se3.rotation_log(se3.rotation_exp(v)) - v) <= 1e-12 * np.linalg.norm(v)
+
+
+@given(VECTORS, st.one_of(ANGLES, st.floats(3.0, 60.0)))
+def test_rotation_exp_is_a_proper_rotation_and_the_matrix_exponential(axis, angle):
+    v = angle * axis / np.linalg.norm(axis)
+    R = se3.rotation_exp(v)
+    np.testing.assert_allclose(R.T @ R, np.eye(3), atol=1e-14)
+    assert np.linalg.det(R) == pytest.approx(1.0, abs=1e-14)
+    np.testing.assert_allclose(R, scipy.linalg.expm(se3.skew(v)), atol=1e-12)
+
+
+@given(VECTORS, st.one_of(ANGLES, st.floats(3.0, 20.0)), RATES)
+def test_pose_exp_is_the_matrix_exponential(axis, angle, v):
+    s = np.concatenate([angle * axis / np.linalg.norm(axis), v])
+    np.testing.assert_allclose(se3.pose_exp(s), scipy.linalg.expm(matrix_of_twist(s))[:3], atol=1e-11)
+
+
+@given(VECTORS, ANGLES, RATES)
+def test_pose_log_inverts_exp(axis, angle, v):
+    s = np.concatenate([angle * axis / np.linalg.norm(axis), v])
+    X = se3.pose_exp(s)
+    np.testing.assert_allclose(se3.pose_exp(se3.pose_log(X)), X, atol=1e-11)
+    if np.pi - angle > 1e-6:
+        np.testing.assert_allclose(se3.pose_log(X), s, atol=1e-9)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-13, 1e-9, 9.9e-5, 1.01e-4, 9.9e-4, 1.01e-3, 1e-2, 1.0])
+def test_pose_exp_and_log_have_no_step_where_their_series_end(angle):
+    s = np.concatenate([angle * np.array([0.6, 0.0, 0.8]), [0.3, -2.0, 0.7]])
+    X = se3.pose_exp(s)
+    np.testing.assert_allclose(X, scipy.linalg.expm(matrix_of_twist(s))[:3], atol=2e-16 * 40)
+    np.testing.assert_allclose(se3.pose_log(X), s, atol=1e-14)
+
+
+@given(VECTORS, ANGLES, RATES)
+def test_pose_times_inverse_is_identity(axis, angle, v):
+    X = se3.pose_exp(np.concatenate([angle * axis, v]))
+    np.testing.assert_allclose(se3.compose(X, se3.inverse(X)), se3.identity(), atol=1e-14)
+    np.testing.assert_allclose(se3.compose(se3.inverse(X), X), se3.identity(), atol=1e-14)
+
+
+@given(RATES, RATES, RATES, RATES)
+def test_compose_is_the_product_of_matrices(w1, v1, w2, v2):
+    X, Y = (se3.pose_exp(np.concatenate(p)) for p in ((w1, v1), (w2, v2)))
+    np.testing.assert_allclose(se3.to_matrix(se3.compose(X, Y)), se3.to_matrix(X) @ se3.to_matrix(Y), atol=1e-13)
+
+
+@given(RATES, RATES)
+def test_quaternions_multiply_as_their_matrices(a, b):
+    qa, qb = se3.quaternion_exp(a), se3.quaternion_exp(b)
+    product = se3.quaternion_matrix(se3.quaternion_product(qa, qb))
+    np.testing.assert_allclose(product, se3.quaternion_matrix(qa) @ se3.quaternion_matrix(qb), atol=1e-14)
+    np.testing.assert_allclose(se3.quaternion_product(qa, se3.quaternion_inverse(qa)), [1, 0, 0, 0], atol=1e-15)
+
+
+@given(VECTORS, st.one_of(ANGLES, st.floats(3.0, 3.3)))
+def test_matrix_quaternion_inverts_quaternion_matrix_up_to_sign(axis, angle):
+    q = se3.quaternion_exp(angle * axis / np.linalg.norm(axis))
+    back = se3.matrix_quaternion(se3.quaternion_matrix(q))
+    assert np.linalg.norm(back) == pytest.approx(1.0, abs=1e-14)
+    assert min(np.abs(back - q).max(), np.abs(back + q).max()) < 1e-14
+
+
+@pytest.mark.parametrize("axis", np.vstack([np.eye(3), -np.eye(3), [[0.6, 0.8, 0.0]]]))
+def test_half_turns_have_a_logarithm(axis):
+    R = 2 * np.outer(axis, axis) - np.eye(3)
+    v = se3.rotation_log(R)
+    assert np.linalg.norm(v) == pytest.approx(np.pi, abs=1e-14)
+    np.testing.assert_allclose(np.abs(v), np.pi * np.abs(axis), atol=1e-14)
+
+
+def test_every_function_of_a_batch_is_the_function_of_each():
+    rng = np.random.default_rng(1)
+    s, u = rng.normal(size=(2, 6, 4, 5))
+    X, Y = se3.pose_exp(s), se3.pose_exp(u)
+    for i in range(4):
+        for t in range(5):
+            x, y = se3.pose_exp(s[:, i, t]), se3.pose_exp(u[:, i, t])
+            np.testing.assert_allclose(X[..., i, t], x, atol=1e-15)
+            np.testing.assert_allclose(se3.compose(X, Y)[..., i, t], se3.compose(x, y), atol=1e-14)
+            np.testing.assert_allclose(se3.inverse(X)[..., i, t], se3.inverse(x), atol=1e-14)
+            np.testing.assert_allclose(se3.pose_log(X)[..., i, t], se3.pose_log(x), atol=1e-13)
+            np.testing.assert_allclose(se3.to_matrix(X)[i, t], se3.to_matrix(x), atol=1e-15)
+            np.testing.assert_allclose(se3.cross(s[:3], u[:3])[:, i, t], np.cross(s[:3, i, t], u[:3, i, t]), atol=1e-15)
+            np.testing.assert_allclose(se3.rotate(X[:, :3], s[:3])[:, i, t], x[:, :3] @ s[:3, i, t], atol=1e-14)
+            np.testing.assert_allclose(se3.rotate_back(X[:, :3], s[:3])[:, i, t], x[:, :3].T @ s[:3, i, t], atol=1e-14)
