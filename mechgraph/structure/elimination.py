@@ -19,7 +19,7 @@ import scipy
 from mechgraph.algebra.se3 import Array, cross
 from mechgraph.motion.system import Index
 
-SPARE = 1.5
+SPARE = 2.0
 """Rows a column that the front may have before it is condensed."""
 
 
@@ -244,14 +244,15 @@ class Elimination:
 def householder(A: Array) -> tuple[Array, Array, Array]:
     """``A = (I - V T V^T) [R; 0]`` with ``T`` upper triangular (compact WY form); the work is LAPACK's."""
     k = min(A.shape)
-    (qr, tau), R = scipy.linalg.qr(A, mode="raw")
+    h, tau = np.linalg.qr(A, mode="raw")
+    qr = h.T
     V = np.tril(qr[:, :k], -1) + np.eye(A.shape[0], k)
     T = np.zeros((k, k))
     G = V.T @ V
     for j in range(k):
         T[:j, j] = -tau[j] * (T[:j, :j] @ G[:j, j])
         T[j, j] = tau[j]
-    return V, T, np.asarray(R[:k])
+    return V, T, np.triu(qr[:k])
 
 
 def local_measure(points: Array) -> Array:

@@ -15,7 +15,7 @@ from mechgraph.numerics.linear import RANK_TOLERANCE, rank_of, singular_values
 from mechgraph.structure.elimination import Elimination, loop_rows
 from mechgraph.structure.passive import STILL, PassiveMotion, passive_motions
 
-LARGE = 240
+LARGE = 96
 """Rows of the closure Jacobian above which rank and motions come from elimination along the loops, not from one dense matrix."""
 ELIMINATION_RANK = 1e-9
 """Part of a unit row below which a pivot of the elimination counts as zero."""
