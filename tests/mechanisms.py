@@ -143,7 +143,10 @@ def planar() -> mg.Mechanism:
 
 
 def folded_bars() -> mg.Mechanism:
-    """A. E. H. Love, Treatise on the Mathematical Theory of Elasticity (critical forms): two bars in one line between fixed pins: no finite motion, one instantaneous."""
+    """A. E. H. Love, Treatise on the Mathematical Theory of Elasticity (critical forms).
+
+    Two bars in one line between fixed pins: no finite motion, one instantaneous.
+    """
     return ring("RRR", [(0, 0, 0), (1, 0, 0), (2.3, 0, 0)], [Z] * 3, name="two bars in one line")
 
 
@@ -272,7 +275,10 @@ def hexapod(types: str = "UPS", driven: bool = True) -> mg.Mechanism:
 
 
 def three_upu() -> mg.Mechanism:
-    """L.-W. Tsai, Kinematics of a three-dof platform with three extensible limbs, 1996: translations only; the outer axes of every leg are parallel, so are the inner ones."""
+    """L.-W. Tsai, Kinematics of a three-dof platform with three extensible limbs, 1996.
+
+    Translations only: the outer axes of every leg are parallel, so are the inner ones.
+    """
     legs = []
     for k in range(3):
         angle = 2 * np.pi / 3 * k
@@ -280,3 +286,35 @@ def three_upu() -> mg.Mechanism:
         head = 0.6 * np.array([np.cos(angle + 0.2), np.sin(angle + 0.2), 0.0]) + (0.1, 0.05, 1.4)
         legs.append((foot, head, np.array([-np.sin(angle), np.cos(angle), 0.15 * k])))
     return platform(legs, "UPU")
+
+
+# --- large ones -----------------------------------------------------------------------------------------------------------
+
+
+def windows(n: int, general: bool = True) -> mg.Mechanism:
+    """IFToMM library of computational benchmark problems, "N four-bars": cranks side by side, their tips joined by couplers.
+
+    ``general``: with lengths all different, otherwise parallelograms.
+    """
+    rng = np.random.default_rng(1)
+    size = 0.1 if general else 0.0
+    feet = np.column_stack([np.arange(n + 1.0) + size * rng.normal(size=n + 1), size * rng.normal(size=n + 1), np.zeros(n + 1)])
+    heads = feet + np.column_stack(
+        [0.3 + size * rng.normal(size=n + 1), 1 + size * rng.normal(size=n + 1), np.zeros(n + 1)]
+    )
+    pairs = [mg.Pair(f"A{i}", "R", "frame", f"crank{i}", point=feet[i], axis=Z) for i in range(n + 1)]
+    for i in range(n):
+        pairs.append(mg.Pair(f"B{i}", "R", f"crank{i}", f"rod{i}", point=heads[i], axis=Z))
+        pairs.append(mg.Pair(f"C{i}", "R", f"rod{i}", f"crank{i + 1}", point=heads[i + 1], axis=Z))
+    return mg.Mechanism(f"{n} windows", None, pairs, ["A0"])
+
+
+def grid(n: int) -> mg.Mechanism:
+    """Bars on a lattice of ``n x n`` parallelograms, pinned at the nodes; one bar is the frame. Mobility ``2 n - 1``."""
+    pairs = []
+    for i in range(n + 1):
+        for j in range(n + 1):
+            bars = [f"h{i - 1}_{j}"] * (i > 0) + [f"h{i}_{j}"] * (i < n) + [f"v{i}_{j - 1}"] * (j > 0) + [f"v{i}_{j}"] * (j < n)
+            point = (i + 0.3 * j, 0.9 * j, 0.0)
+            pairs += [mg.Pair(f"N{i}_{j}{b}", "R", bars[0], b, point=point, axis=Z) for b in bars[1:]]
+    return mg.Mechanism(f"{n} x {n} parallelograms", None, pairs)

@@ -83,7 +83,7 @@ def independent_rows(rows: Array, candidates: list[int], count: int) -> list[int
 
 def proportional(m: Mechanism, inputs: Array, able: tuple[Finding, ...]) -> tuple[tuple[str, ...], ...]:
     """Sets of freedoms of which only one can be driven, as they move in proportion."""
-    column = dict(map(reversed, single_freedoms(m)))  # type: ignore[arg-type]
+    column = {name: i for i, name in single_freedoms(m)}
     names = [name for finding in able for name in finding.freedoms]
     if not names or inputs.shape[1] > MOST_INPUTS:
         return ()

@@ -15,9 +15,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array, cross
 from mechgraph.motion.system import Index
+
+Mask = NDArray[np.bool_]
 
 SPARE = 2.0
 """Rows a column that the front may have before it is condensed."""
@@ -139,7 +142,7 @@ class Elimination:
         out[front.shape[0] :] = below
         return out, np.concatenate([slots, new]), columns
 
-    def _eliminate(self, front: Array, slots: Index, active: Index, done: Array) -> tuple[Array, Index, Index]:
+    def _eliminate(self, front: Array, slots: Index, active: Index, done: Mask) -> tuple[Array, Index, Index]:
         """Solve the columns ``done`` (a mask over ``active``) from the front."""
         if not done.any():
             return front, slots, active

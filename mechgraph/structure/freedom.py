@@ -19,6 +19,8 @@ LARGE = 96
 """Rows of the closure Jacobian above which rank and motions come from elimination along the loops, not from one dense matrix."""
 ELIMINATION_RANK = 1e-9
 """Part of a unit row below which a pivot of the elimination counts as zero."""
+DEPENDENT = 1e-8
+"""Part of a unit motion below which the weakest driver counts as standing still: drivers depend, or a dead point."""
 MANY = 40
 """Motions above which a basis is made sparse by pivoting once instead of by full elimination."""
 
@@ -37,7 +39,8 @@ class Freedoms:
 
     ``rank`` of the closure Jacobian; ``margin`` smallest singular value kept and ``dropped`` largest one dropped, as parts of the
     largest (pivots against unit rows where a large mechanism was eliminated along its loops); ``null (F, M)`` orthonormal motions;
-    ``dependent`` whether drivers cannot move independently; ``passive`` and ``undriven`` motions with the drivers at rest;
+    ``dependent`` whether drivers cannot move independently, ``drive`` how strongly the weakest of them moves (against the freedom that
+    moves most; small near a dead point); ``passive`` and ``undriven`` motions with the drivers at rest;
     ``hold`` freedoms whose rest stops the passive motions.
     """
 
@@ -49,6 +52,7 @@ class Freedoms:
     passive: tuple[PassiveMotion, ...]
     undriven: tuple[FreeMotion, ...]
     hold: Index
+    drive: float = 1.0
 
     @property
     def mobility(self) -> int:
@@ -105,11 +109,21 @@ def _left_free(here: Configuration, null: Array, columns: Index) -> Array:
     return left
 
 
+def _drive(null: Array, columns: Index) -> float:
+    """Smallest singular value of the drivers' part in the motions, over the part of the freedom that moves most."""
+    if not len(columns):
+        return 1.0
+    if len(columns) > null.shape[1]:
+        return 0.0
+    most = float(np.sqrt((null**2).sum(axis=1).max()))
+    return float(singular_values(null[columns])[-1]) / most
+
+
 def free_motion(system: System, x: Array, columns: Index) -> Freedoms:
     """Mobility at a closed state ``x (nx,)`` and what drivers in ``columns`` leave free."""
     here = system.at(x[:, None])
     rank, margin, gone, null = _motions(here)
-    dependent = bool(len(columns)) and rank_of(singular_values(null[columns]), 1e-8) < len(columns)
+    drive = _drive(null, columns)
     left = _left_free(here, null, columns)
     passive = passive_motions(here, left, columns)
     if not len(columns) and passive and len(passive) == null.shape[1]:
@@ -121,7 +135,7 @@ def free_motion(system: System, x: Array, columns: Index) -> Freedoms:
     if passive:
         _, pivots = scipy.linalg.qr(np.stack([p.rates for p in passive]), mode="r", pivoting=True)
         hold = np.sort(pivots[: len(passive)]).astype(np.intp)
-    return Freedoms(rank, margin, gone, null, dependent, tuple(passive), tuple(undriven), hold)
+    return Freedoms(rank, margin, gone, null, drive < DEPENDENT, tuple(passive), tuple(undriven), hold, drive)
 
 
 def motions_of(J: Array) -> Array:

@@ -165,7 +165,12 @@ class DeterminacyReport:
         """Whether the verdict is near to another one: a small singular value was kept, or one above rounding dropped."""
         if self.margin is None or self.dropped is None:
             return False
-        return self.margin < NEAR or self.dropped > DOUBT
+        return self.margin < NEAR or self.dropped > DOUBT or self.dead_point
+
+    @property
+    def dead_point(self) -> bool:
+        """Whether a driver is near a dead point: it hardly moves when the mechanism moves."""
+        return bool(self.geometry and self.geometry.freedoms.mobility and self.geometry.freedoms.drive < NEAR)
 
     @property
     def contradicting_drives(self) -> bool:

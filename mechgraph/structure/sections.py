@@ -95,7 +95,7 @@ def _drivers(r: DeterminacyReport) -> list[Any]:
 def _reactions(r: DeterminacyReport) -> list[Any]:
     if not r.unique:
         return []
-    rows = []
+    rows: list[tuple[str, str, str, str]] = []
     for pair, row in r.unique.items():
         yes = " ".join(n for n, ok in row.items() if ok)
         no = " ".join(n for n, ok in row.items() if not ok)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
     from mechgraph.structure.report import DeterminacyReport
 
@@ -35,9 +37,21 @@ def verdict(r: DeterminacyReport) -> str:
 def _near(r: DeterminacyReport) -> str:
     if not r.near or r.margin is None or r.dropped is None:
         return ""
+    if r.dead_point:
+        return f" Near a dead point: {weakest_drive(r)} hardly moves when the mechanism does."
     if r.dropped > r.margin * DROPPED:
         return f" Near another verdict: a singular value of {r.dropped:.2g} of the largest was taken for zero."
     return f" Nearly singular: margin {r.margin:.2g}."
+
+
+def weakest_drive(r: DeterminacyReport) -> str:
+    """The driver that moves least; drivers, where several depend on each other."""
+    g, drives = r.geometry, [r.mechanism.full_name(d.freedom) for d in r.mechanism.drives]
+    if g is None or len(drives) == 1:
+        return f"the driver {drives[0]}" if drives else "no driver"
+    parts = np.sqrt((g.freedoms.null[g.driven] ** 2).sum(axis=1))
+    weak = [name for name, part in zip(drives, parts, strict=True) if part < 2 * g.freedoms.drive * parts.max()]
+    return f"the driver {weak[0]}" if len(weak) == 1 else "a combination of the drivers"
 
 
 def _counts(r: DeterminacyReport) -> str:
@@ -51,6 +65,9 @@ def _counts(r: DeterminacyReport) -> str:
 def _here(r: DeterminacyReport) -> str:
     drivers = len(r.mechanism.drives)
     if r.contradicting_drives and r.mobility:
+        if drivers <= r.mobility:
+            dead = "a dead point" if drivers == 1 else "a dead point, or dependent drivers"
+            return f"Badly driven: mobility {r.mobility}, but {weakest_drive(r)} cannot move it here ({dead})."
         return f"Over-driven: mobility {r.mobility}, {plural(drivers, 'driver')} that cannot all be moved independently."
     if r.undriven:
         verb = "is" if len(r.undriven) == 1 else "are"
@@ -191,6 +208,11 @@ def _finite(r: DeterminacyReport) -> list[str]:
 
 
 def _margin(r: DeterminacyReport) -> list[str]:
+    if r.dead_point and r.geometry:
+        return [
+            f"Near a dead point of {weakest_drive(r)}: it moves {r.geometry.freedoms.drive:.2g} times as much as the freedom that moves "
+            "most, so its effort and the reactions grow without bound."
+        ]
     if not r.near:
         return []
     gap = f", largest taken for zero {r.dropped:.1g}" if r.dropped else ""
