@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array
+from mechgraph.algebra.se3 import Array, cross
+from mechgraph.model.connection import Pair
 from mechgraph.model.mechanism import Mechanism
 
 
@@ -36,26 +37,38 @@ class Parameters:
     L: float
 
 
+def _marker_poses(pairs: tuple[Pair, ...]) -> tuple[Array, Array]:
+    """Poses ``(3, 4, P)`` of the markers on ``a`` and on ``b`` in the frames of their links (see ``Marker.pose``)."""
+    markers = [pair.markers for pair in pairs]
+    out = []
+    for side in (0, 1):
+        points, axes, seconds = (
+            np.array([getattr(both[side], field) for both in markers], dtype=float).T for field in ("point", "axis", "second")
+        )
+        z = axes / np.sqrt((axes * axes).sum(axis=0))
+        x = seconds - (z * seconds).sum(axis=0) * z
+        x /= np.sqrt((x * x).sum(axis=0))
+        out.append(np.stack([x, cross(z, x), z, points], axis=1))
+    return out[0], out[1]
+
+
 def parameters(m: Mechanism, origin: Array | None = None, L: float = 1.0) -> Parameters:
     """The arrays of a mechanism with geometry, about ``origin`` (global) with lengths divided by ``L``."""
     index = {name: i for i, name in enumerate(m.link_names())}
-    poses = [tuple(marker.pose() for marker in pair.markers) for pair in m.pairs]
+    on_a, on_b = _marker_poses(m.pairs)
     offset = np.zeros((3, len(m.links)))
     points: list[list[Array]] = [[] for _ in m.links]
-    for pair, (A, B) in zip(m.pairs, poses, strict=True):
-        points[index[pair.a]].append(A[:, 3])
-        points[index[pair.b]].append(B[:, 3])
+    a, b = ([index[end] for end in ends] for ends in zip(*((p.a, p.b) for p in m.pairs), strict=True))
+    for k in range(len(m.pairs)):
+        points[a[k]].append(on_a[:, 3, k])
+        points[b[k]].append(on_b[:, 3, k])
     for i, at in enumerate(points):
         offset[:, i] = np.mean(at, axis=0)
     origin = offset[:, index[m.frame]] if origin is None else origin
 
-    def local(X: Array, link: str) -> Array:
-        out = X.copy()
-        out[:, 3] = (X[:, 3] - offset[:, index[link]]) / L
-        return out
-
-    marker_a = np.stack([local(A, p.a) for p, (A, _) in zip(m.pairs, poses, strict=True)], axis=-1)
-    marker_b = np.stack([local(B, p.b) for p, (_, B) in zip(m.pairs, poses, strict=True)], axis=-1)
+    marker_a, marker_b = on_a.copy(), on_b.copy()
+    for marker, links in ((marker_a, a), (marker_b, b)):
+        marker[:, 3] = (marker[:, 3] - offset[:, links]) / L
     center = np.stack(
         [np.zeros(3) if k.center is None else (np.asarray(k.center) - offset[:, i]) / L for i, k in enumerate(m.links)],
         axis=-1,

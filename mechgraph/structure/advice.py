@@ -15,44 +15,59 @@ import numpy as np
 from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array
 from mechgraph.model import pair_evaluation as evaluation
+from mechgraph.model.connection import Marker, Pair
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import TABLE, PairType
 from mechgraph.motion.assembly import named_columns, scaled_system
 from mechgraph.motion.system import Configuration, System
 from mechgraph.numerics.linear import RANK_TOLERANCE, rank_of, singular_values
 from mechgraph.structure.freedom import Freedoms, free_motion
+from mechgraph.structure.mobility import finite_motion
 
 SIGNIFICANT = 1e-6
 """Power of a unit twist on a unit self-stress above which the twist relieves it."""
 SHOWN = 6
 """Largest number of single changes, and of sets of changes, reported."""
+FREEING = 3
+"""Changes reported that let a structure move."""
 BEAM = 12
 """Partial sets of changes kept while searching."""
 
 
 @dataclass(frozen=True)
 class Change:
-    """One pair given another type; ``matrix (f, s)`` is its power on the self-stresses, ``added`` the freedoms added."""
+    """One pair given another type; ``matrix (f, s)`` is its power on the self-stresses, ``added`` the freedoms added.
+
+    ``turn``: angle by which the second direction x is turned about the axis, for types in which it matters.
+    """
 
     pair: int
     type: PairType
     matrix: Array
     added: int
+    turn: float = 0.0
 
 
 @dataclass(frozen=True)
 class Effect:
-    """Changes and what they do, computed on the changed mechanism: before -> after."""
+    """Changes and what they do, computed on the changed mechanism: before -> after.
+
+    ``changes`` are (pair, old type, new type), ``turns`` the angles in degrees by which their second direction x is turned.
+    """
 
     changes: tuple[tuple[str, str, str], ...]
     redundancy: tuple[int, int]
     mobility: tuple[int, int]
     passive: tuple[int, int]
+    turns: tuple[float, ...] = ()
 
     @property
     def text(self) -> str:
         """E.g. ``R at D -> S: redundancy 3 -> 1, mobility 1 -> 1, passive 0 -> 0``."""
-        what = ", ".join(f"{old} at {pair} -> {new}" for pair, old, new in self.changes)
+        turns = [f" (its x turned by {turn:.3g} degrees)" if turn else "" for turn in self.turns]
+        what = ", ".join(
+            f"{old} at {pair} -> {new}{turn}" for (pair, old, new), turn in zip(self.changes, turns, strict=True)
+        )
         effect = ", ".join(
             f"{name} {a} -> {b}"
             for name, (a, b) in (
@@ -97,11 +112,41 @@ def changes_of(here: Configuration) -> list[Change]:
         for row in wider[pair.type]:
             if not needed <= {f.name for f, single in zip(row.freedoms, row.drivable, strict=True) if single}:
                 continue
-            x = evaluation.coordinates_to_state(row, np.zeros((row.f, 1, 1)))
-            frames = evaluation.frames_of(row, np.zeros((1, 1)), x, base)
-            S = evaluation.twists_of(row, np.zeros((1, 1)), frames)[:, :, 0, 0]
-            out.append(Change(k, row, S.T @ stress[:, k], row.f - pair.type.f))
+            plain = S_of(row, base).T @ stress[:, k]
+            out.append(Change(k, row, plain, row.f - pair.type.f))
+            if row.square_second:
+                turn = best_turn(base[..., 0, 0], stress[:, k])
+                power = S_of(row, turned(base, turn)).T @ stress[:, k]
+                if rank_of_absolute(power) > rank_of_absolute(plain):
+                    out.append(Change(k, row, power, row.f - pair.type.f, turn))
     return out
+
+
+def S_of(row: PairType, base: Array) -> Array:
+    """Twists ``(6, f)`` of a pair type at coordinates zero in the frame ``base (3, 4, 1, 1)``."""
+    x = evaluation.coordinates_to_state(row, np.zeros((row.f, 1, 1)))
+    frames = evaluation.frames_of(row, np.zeros((1, 1)), x, base)
+    return evaluation.twists_of(row, np.zeros((1, 1)), frames)[:, :, 0, 0]
+
+
+def turned(base: Array, angle: float) -> Array:
+    """A frame turned about its own z."""
+    c, s = np.cos(angle), np.sin(angle)
+    out = base.copy()
+    out[:, 0], out[:, 1] = c * base[:, 0] + s * base[:, 1], c * base[:, 1] - s * base[:, 0]
+    return out
+
+
+def best_turn(frame: Array, wrenches: Array) -> float:
+    """Angle from x to the direction across z about which self-stresses ``(6, s)`` bend most, in (-pi/2, pi/2]."""
+    moments = wrenches[:3] - np.cross(frame[:, 3], wrenches[3:].T).T
+    across = frame[:, :2].T @ moments
+    U, s, _ = np.linalg.svd(across)
+    if not s.size or s[0] < SIGNIFICANT:
+        return 0.0
+    angle = float(np.arctan2(U[1, 0], U[0, 0]))
+    angle -= np.pi * np.ceil(angle / np.pi - 0.5)
+    return angle if angle > 1e-9 - np.pi / 2 else np.pi / 2
 
 
 def _relief(parts: tuple[Change, ...]) -> int:
@@ -124,6 +169,7 @@ def relieving(changes: list[Change], redundancy: int) -> tuple[list[tuple[Change
     exact = [c for c in singles if c.added == relief[id(c)]]
     beam: list[tuple[tuple[Change, ...], int]] = [((), 0)]
     complete: list[tuple[Change, ...]] = []
+    deepest: list[tuple[tuple[Change, ...], int]] = []
     for _ in range(redundancy):
         grown: dict[frozenset[int], tuple[tuple[Change, ...], int]] = {}
         for parts, removed in beam:
@@ -135,9 +181,13 @@ def relieving(changes: list[Change], redundancy: int) -> tuple[list[tuple[Change
                     grown[frozenset(id(p) for p in (*parts, c))] = ((*parts, c), now)
         found = sorted(grown.values(), key=lambda item: (-item[1], [c.pair for c in item[0]]))
         complete += [parts for parts, removed in found if removed == redundancy]
+        deepest = [*found[:2], *deepest]
         beam = [item for item in found if item[1] < redundancy][:BEAM]
         if not beam:
             break
+    if not complete and deepest:
+        most = max(removed for _, removed in deepest)
+        complete = [parts for parts, removed in deepest if removed == most and len(parts) > 1]
     return [(c,) for c in _spread(singles)], complete
 
 
@@ -168,6 +218,8 @@ def effect(system: System, x: Array, before: Freedoms, parts: tuple[Change, ...]
     changed: Mechanism = m.replace(start=dict(zip(m.freedom_names(), q.tolist(), strict=True)), loads=())
     for c in parts:
         changed = changed.with_pair_type(m.pairs[c.pair].name, c.type)
+        if c.turn:
+            changed = with_turned_pair(changed, m.pairs[c.pair].name, c.turn)
     raw = System(changed, system.graph)
     start = raw.start_coordinates(changed.start)
     after_system = scaled_system(changed, start, raw)
@@ -182,7 +234,23 @@ def effect(system: System, x: Array, before: Freedoms, parts: tuple[Change, ...]
         (rows - before.rank, rows - after.rank),
         (before.mobility, after.mobility),
         (len(before.passive), len(after.passive)),
+        tuple(float(np.degrees(c.turn)) for c in parts),
     )
+
+
+def with_turned_pair(m: Mechanism, name: str, angle: float) -> Mechanism:
+    """A copy in which the second direction x of one pair is turned about its axis, on both links."""
+
+    def marker(old: Marker) -> Marker:
+        pose = turned(old.pose()[..., None], angle)[..., 0]
+        return Marker(old.point, old.axis, pose[:, 0].tolist())
+
+    def replaced(pair: Pair) -> Pair:
+        if pair.on_a is not None and pair.on_b is not None:
+            return pair.replace(on_a=marker(pair.on_a), on_b=marker(pair.on_b))
+        return pair.replace(second=marker(pair.markers[0]).second)
+
+    return m.replace(pairs=[replaced(p) if p.name == name else p for p in m.pairs])
 
 
 def advice(system: System, x: Array, freedoms: Freedoms) -> tuple[Effect, ...]:
@@ -203,22 +271,17 @@ def advice(system: System, x: Array, freedoms: Freedoms) -> tuple[Effect, ...]:
                 and done not in found
             ):
                 found.append(done)
-    if not inputs:
-        freeing = sorted((c for c in changes if c.added > _relief((c,))), key=lambda c: (c.added, c.pair))
-        for c in _spread(freeing)[:3]:
-            done = effect(system, x, freedoms, (c,))
-            if done and done.mobility[1] - done.passive[1] > 0:
-                found.append(done)
-    return tuple(found[: SHOWN + 3])
+    return tuple([*_freeing(system, x, freedoms, changes), *found][: SHOWN + 3])
 
 
-def independent_rows(null: Array, candidates: list[int], count: int, tolerance: float = 1e-3) -> list[int]:
-    """The first candidates (in order) whose rows of ``null`` are independent, up to ``count``; weaker ones where needed."""
-    chosen: list[int] = []
-    for limit in (tolerance, RANK_TOLERANCE):
-        for i in candidates:
-            if len(chosen) < count and i not in chosen:
-                rows = null[[*chosen, i]]
-                if rank_of(singular_values(rows), limit) == len(chosen) + 1:
-                    chosen.append(i)
-    return chosen
+def _freeing(system: System, x: Array, freedoms: Freedoms, changes: list[Change]) -> list[Effect]:
+    """For a structure the changes that let it move, those that add fewest freedoms first; nothing for what moves."""
+    motion = finite_motion(system, x) if freedoms.mobility else None
+    if freedoms.mobility - len(freedoms.passive) and not (motion and motion.mobility == 0):
+        return []
+    found: list[Effect] = []
+    for c in _spread(sorted((c for c in changes if c.added > _relief((c,))), key=lambda c: (c.added, c.pair)))[:FREEING]:
+        done = effect(system, x, freedoms, (c,))
+        if done and done.mobility[1] - done.passive[1] > freedoms.mobility - len(freedoms.passive):
+            found.append(done)
+    return found

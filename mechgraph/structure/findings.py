@@ -10,7 +10,8 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.motion.system import System
 from mechgraph.numerics.linear import rank_of, singular_values
-from mechgraph.structure.freedom import STILL, Freedoms, PassiveMotion
+from mechgraph.structure.freedom import Freedoms
+from mechgraph.structure.passive import STILL, PassiveMotion
 
 
 @dataclass(frozen=True)
@@ -43,17 +44,15 @@ def loop_facts(
     """Every loop by itself; ranks where there is geometry."""
     ends = {p.name: (p.a, p.b) for p in m.pairs}
     freedom_count = {p.name: p.type.f for p in m.pairs}
-    J = system.at(x[:, None]).J[:, :, 0] if system is not None and x is not None else None
+    S = system.at(x[:, None]).S[:, :, 0] if system is not None and x is not None else None
     out = []
     for i, loop in enumerate(loops):
         chain = ends[loop[0][0]][0 if loop[0][1] > 0 else 1]
         for name, sign in loop:
             chain += f" -{name}- {ends[name][1 if sign > 0 else 0]}"
         rank = None
-        if J is not None:
-            assert system is not None
-            columns = system.loop_columns[i][0]
-            rank = rank_of(singular_values(J[6 * i : 6 * i + 6, columns]))
+        if system is not None and S is not None:
+            rank = rank_of(singular_values(S[:, system.loop_columns[i][0]]))
         pairs = tuple(name for name, _ in loop)
         out.append(
             LoopFact(chain, pairs, sum(freedom_count[p] for p in pairs), rank, None if rank is None else 6 - rank)

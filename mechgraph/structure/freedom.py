@@ -12,21 +12,17 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.motion.idle import Idle
 from mechgraph.motion.system import Configuration, Index, System
 from mechgraph.numerics.linear import RANK_TOLERANCE, rank_of, singular_values
+from mechgraph.structure.elimination import Elimination, loop_rows
+from mechgraph.structure.passive import STILL, PassiveMotion, passive_motions
 
-STILL = 1e-8
-"""Part of a unit motion below which a freedom or link counts as standing still."""
-IN_PLACE = 1e-5
-"""Rate at which a pair element may leave its place in a passive motion (differences of step ``STEP``)."""
-STEP = 1e-4
-
-
-@dataclass(frozen=True)
-class PassiveMotion:
-    """A passive freedom: unit rates ``(F,)``, the links that move as one, and their twist about the internal origin."""
-
-    rates: Array
-    links: tuple[int, ...]
-    twist: Array
+LARGE = 96
+"""Rows of the closure Jacobian above which rank and motions come from elimination along the loops, not from one dense matrix."""
+ELIMINATION_RANK = 1e-9
+"""Part of a unit row below which a pivot of the elimination counts as zero."""
+DEPENDENT = 1e-8
+"""Part of a unit motion below which the weakest driver counts as standing still: drivers depend, or a dead point."""
+MANY = 40
+"""Motions above which a basis is made sparse by pivoting once instead of by full elimination."""
 
 
 @dataclass(frozen=True)
@@ -41,18 +37,22 @@ class FreeMotion:
 class Freedoms:
     """What can move at a closed position.
 
-    ``sigma`` singular values of the closure Jacobian, ``rank``; ``null (F, M)`` orthonormal motions; ``dependent`` whether
-    drivers cannot move independently; ``passive`` and ``undriven`` motions with the drivers at rest; ``hold`` freedoms
-    whose rest stops the passive motions.
+    ``rank`` of the closure Jacobian; ``margin`` smallest singular value kept and ``dropped`` largest one dropped, as parts of the
+    largest (pivots against unit rows where a large mechanism was eliminated along its loops); ``null (F, M)`` orthonormal motions;
+    ``dependent`` whether drivers cannot move independently, ``drive`` how strongly the weakest of them moves (against the freedom that
+    moves most; small near a dead point); ``passive`` and ``undriven`` motions with the drivers at rest;
+    ``hold`` freedoms whose rest stops the passive motions.
     """
 
-    sigma: Array
     rank: int
+    margin: float
+    dropped: float
     null: Array
     dependent: bool
     passive: tuple[PassiveMotion, ...]
     undriven: tuple[FreeMotion, ...]
     hold: Index
+    drive: float = 1.0
 
     @property
     def mobility(self) -> int:
@@ -64,33 +64,65 @@ class Freedoms:
         """The bodies that have passive freedoms."""
         return tuple(Idle(links[0]) for links in dict.fromkeys(p.links for p in self.passive))
 
-    @property
-    def margin(self) -> float:
-        """Smallest kept singular value over the largest; 1 where there is no constraint."""
-        return float(self.sigma[self.rank - 1] / self.sigma[0]) if self.rank else 1.0
 
-    @property
-    def dropped(self) -> float:
-        """Largest dropped singular value over the largest; 0 where none is dropped."""
-        rest = self.sigma[self.rank :]
-        return float(rest[0] / self.sigma[0]) if rest.size and self.sigma[0] > 0 else 0.0
+def is_large(system: System) -> bool:
+    """Whether the closure Jacobian is too large for one dense decomposition."""
+    return 6 * len(system.graph.loops) > LARGE
+
+
+def elimination(here: Configuration, dropped: Index | None = None) -> Elimination:
+    """The closure Jacobian at one position eliminated along the loops, with some columns left out."""
+    s = here.system
+    rows = loop_rows(here.S[:, :, 0], s.loop_columns)
+    points = here.pair_points[:, :, 0]
+    at = [points[:, [k for k, _ in loop]] for loop in s.graph.loops]
+    return Elimination(rows if dropped is None else rows.without(dropped), at, ELIMINATION_RANK)
+
+
+def _motions(here: Configuration) -> tuple[int, float, float, Array]:
+    """Rank, margin, largest dropped and orthonormal motions."""
+    if is_large(here.system):
+        found = elimination(here)
+        return found.rank, found.smallest, found.largest, found.motions()
+    J = here.J[:, :, 0]
+    sigma = singular_values(J)
+    rank = rank_of(sigma)
+    margin = float(sigma[rank - 1] / sigma[0]) if rank else 1.0
+    rest = sigma[rank:]
+    dropped = float(rest[0] / sigma[0]) if rest.size and sigma[0] > 0 else 0.0
+    return rank, margin, dropped, motions_of(J)
+
+
+def _left_free(here: Configuration, null: Array, columns: Index) -> Array:
+    """Orthonormal motions with the freedoms ``columns`` at rest."""
+    if not len(columns) or not null.shape[1]:
+        return null
+    if is_large(here.system):
+        return np.asarray(null @ null_space(null[columns], 1e-8))
+    free = np.setdiff1d(np.arange(null.shape[0]), columns)
+    inner = motions_of(here.J[:, free, 0])
+    left = np.zeros((null.shape[0], inner.shape[1]))
+    left[free] = inner
+    return left
+
+
+def _drive(null: Array, columns: Index) -> float:
+    """Smallest singular value of the drivers' part in the motions, over the part of the freedom that moves most."""
+    if not len(columns):
+        return 1.0
+    if len(columns) > null.shape[1]:
+        return 0.0
+    most = float(np.sqrt((null**2).sum(axis=1).max()))
+    return float(singular_values(null[columns])[-1]) / most
 
 
 def free_motion(system: System, x: Array, columns: Index) -> Freedoms:
     """Mobility at a closed state ``x (nx,)`` and what drivers in ``columns`` leave free."""
     here = system.at(x[:, None])
-    J = here.J[:, :, 0]
-    sigma = singular_values(J)
-    rank = rank_of(sigma)
-    null = motions_of(J)
-    dependent = bool(len(columns)) and rank_of(singular_values(null[columns]), 1e-8) < len(columns)
-    free = np.setdiff1d(np.arange(system.n_freedoms), columns)
-    left = np.zeros((system.n_freedoms, 0))
-    if null.shape[1]:
-        inner = motions_of(J[:, free])
-        left = np.zeros((system.n_freedoms, inner.shape[1]))
-        left[free] = inner
-    passive = _passive(here, left)
+    rank, margin, gone, null = _motions(here)
+    drive = _drive(null, columns)
+    left = _left_free(here, null, columns)
+    passive = passive_motions(here, left, columns)
     if not len(columns) and passive and len(passive) == null.shape[1]:
         # nothing else can move: what could be driven is an input, not an idle freedom
         drivable = np.array([d for p in system.m.pairs for d in p.type.drivable])
@@ -100,7 +132,7 @@ def free_motion(system: System, x: Array, columns: Index) -> Freedoms:
     if passive:
         _, pivots = scipy.linalg.qr(np.stack([p.rates for p in passive]), mode="r", pivoting=True)
         hold = np.sort(pivots[: len(passive)]).astype(np.intp)
-    return Freedoms(sigma, rank, null, dependent, tuple(passive), tuple(undriven), hold)
+    return Freedoms(rank, margin, gone, null, drive < DEPENDENT, tuple(passive), tuple(undriven), hold, drive)
 
 
 def motions_of(J: Array) -> Array:
@@ -120,7 +152,7 @@ def _complement(system: System, left: Array, passive: list[PassiveMotion]) -> li
         rest = U[:, : left.shape[1] - len(passive)]
     names = system.m.freedom_names()
     out = []
-    for rates in reduced(rest).T:
+    for rates in (reduced(rest) if rest.shape[1] <= MANY else pivoted(rest)).T:
         moving = tuple(names[i] for i in np.flatnonzero(np.abs(rates) > STILL))
         out.append(FreeMotion(rates, moving))
     return out
@@ -146,68 +178,9 @@ def reduced(columns: Array) -> Array:
     return np.asarray(A[:, order])
 
 
-def clusters(system: System, V: Array) -> list[list[int]]:
-    """Links that move as one in all motions ``V (6, N, p)``, joined through pairs that stand still."""
-    size = max(float(np.abs(V).max(initial=0.0)), 1e-300)
-    parent = list(range(V.shape[1]))
-
-    def root(i: int) -> int:
-        while parent[i] != i:
-            i = parent[i]
-        return i
-
-    for a, b in system.graph.ends:
-        if np.abs(V[:, a] - V[:, b]).max(initial=0.0) < STILL * size:
-            parent[root(a)] = root(b)
-    out: dict[int, list[int]] = {}
-    for i in range(V.shape[1]):
-        out.setdefault(root(i), []).append(i)
-    return list(out.values())
-
-
-def _passive(here: Configuration, left: Array) -> list[PassiveMotion]:
-    """Passive motions among ``left (F, p)``: one cluster of links moves, its pair elements stay in place."""
-    if not left.shape[1]:
-        return []
-    system = here.system
-    V = here.link_twists(left)
-    out = []
-    for cluster in clusters(system, V):
-        if system.graph.frame in cluster:
-            continue
-        border = [k for k, (a, b) in enumerate(system.graph.ends) if (a in cluster) != (b in cluster)]
-        others = [i for i in range(V.shape[1]) if i not in cluster]
-        alone = _small_combinations(V[:, others].reshape(-1, left.shape[1]) / np.abs(V).max(), STILL)
-        if len(border) < 2 or not alone.shape[1]:
-            continue
-        moves = left @ alone
-        leaving = np.stack([_leaving(here, border, dq) for dq in moves.T], axis=1)
-        still = _small_combinations(leaving, IN_PLACE)
-        for rates in (moves @ still).T:
-            rates = rates / np.abs(rates).max()
-            rates = rates * np.sign(rates[np.argmax(np.abs(rates) > 1 - 1e-9)])
-            twist = here.link_twists(rates[:, None])[:, cluster[0], 0]
-            out.append(PassiveMotion(rates, tuple(cluster), twist))
-    return out
-
-
-def _small_combinations(rows: Array, tolerance: float) -> Array:
-    """Orthonormal combinations of columns for which all rows vanish, against an absolute tolerance."""
-    _, s, Vt = np.linalg.svd(rows, full_matrices=True)
-    small = np.concatenate([s, np.zeros(Vt.shape[0] - len(s))]) < tolerance
-    return np.asarray(Vt[small].T)
-
-
-def _leaving(here: Configuration, border: list[int], dq: Array) -> Array:
-    """Rate at which the constraint wrenches of the border pairs leave their span when the links move by ``dq``."""
-    system = here.system
-    steps = np.stack([dq * STEP, -dq * STEP, 0 * dq], axis=1)
-    moved = system.at(system.advance(np.repeat(here.x, 3, axis=1), steps))
-    out = []
-    for g, W in zip(system.groups, moved.W, strict=True):
-        for i, k in enumerate(g.pairs):
-            if int(k) in border and W.shape[1]:
-                Q, _ = np.linalg.qr(W[:, :, i, 2])
-                change = (W[:, :, i, 0] - W[:, :, i, 1]) / (2 * STEP)
-                out.append((change - Q @ (Q.T @ change)).ravel())
-    return np.concatenate(out) if out else np.zeros(1)
+def pivoted(columns: Array) -> Array:
+    """The column space of orthonormal columns with unit rows where QR with pivoting puts them: for many columns."""
+    _, pivots = scipy.linalg.qr(columns.T, mode="r", pivoting=True)
+    chosen = np.sort(pivots[: columns.shape[1]])
+    out = np.asarray(np.linalg.solve(columns[chosen].T, columns.T).T)
+    return np.where(np.abs(out) < 1e-11, 0.0, out)

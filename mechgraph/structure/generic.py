@@ -10,7 +10,10 @@ from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array, rotation_exp
 from mechgraph.model import pair_evaluation as evaluation
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.pair import PairType
 from mechgraph.numerics.linear import rank_of, singular_values
+from mechgraph.structure.elimination import Elimination, LoopRows, loop_rows
+from mechgraph.structure.freedom import LARGE
 from mechgraph.topology.linkgraph import LinkGraph
 
 GENERIC_RANK = 1e-7
@@ -32,36 +35,64 @@ class Generic:
     places: tuple[tuple[int, tuple[int, ...]], ...]
 
 
-def random_jacobian(m: Mechanism, graph: LinkGraph, rng: np.random.Generator) -> Array:
-    """Closure Jacobian ``(6 loops, F)`` with every pair at a random pose and random coordinates."""
+def random_twists(m: Mechanism, rng: np.random.Generator) -> tuple[list[Array], Array]:
+    """Twists ``(6, f)`` of every pair at a random pose and random coordinates, and the points ``(3, P)`` at which the pairs are."""
+    twists, points = [], []
+    by_type: dict[PairType, list[int]] = {}
+    for k, pair in enumerate(m.pairs):
+        by_type.setdefault(pair.type, []).append(k)
+    found: dict[int, tuple[Array, Array]] = {}
+    for row, pairs in by_type.items():
+        n = len(pairs)
+        base = np.empty((3, 4, n, 1))
+        base[:, :3, :, 0] = rotation_exp(rng.uniform(-2, 2, (3, n)))
+        base[:, 3, :, 0] = rng.normal(size=(3, n))
+        x = evaluation.random_coordinates(row, rng, n, 1)
+        pitch = rng.uniform(0.3, 0.9, (n, 1))
+        S = evaluation.twists_of(row, pitch, evaluation.frames_of(row, pitch, x, base))[..., 0]
+        found |= {k: (S[:, :, i], base[:, 3, i, 0]) for i, k in enumerate(pairs)}
+    for k in range(len(m.pairs)):
+        twists.append(found[k][0])
+        points.append(found[k][1])
+    return twists, np.array(points).T
+
+
+def random_rows(m: Mechanism, graph: LinkGraph, rng: np.random.Generator) -> tuple[LoopRows, list[Array]]:
+    """Closure Jacobian by loops for random geometry, and the points of the pairs of every loop."""
+    twists, points = random_twists(m, rng)
+    first = np.concatenate([[0], np.cumsum([c.shape[1] for c in twists])])
+    S = np.concatenate(twists, axis=1)
     columns = []
-    for pair in m.pairs:
-        base = np.empty((3, 4, 1, 1))
-        base[:, :3, 0, 0] = rotation_exp(rng.uniform(-2, 2, 3))
-        base[:, 3, 0, 0] = rng.normal(size=3)
-        x = evaluation.random_coordinates(pair.type, rng, 1, 1)
-        pitch = rng.uniform(0.3, 0.9, (1, 1))
-        columns.append(
-            evaluation.twists_of(pair.type, pitch, evaluation.frames_of(pair.type, pitch, x, base))[:, :, 0, 0]
-        )
-    first = np.concatenate([[0], np.cumsum([c.shape[1] for c in columns])])
-    J = np.zeros((6 * len(graph.loops), int(first[-1])))
-    for i, loop in enumerate(graph.loops):
-        for k, sign in loop:
-            J[6 * i : 6 * i + 6, first[k] : first[k + 1]] += sign * columns[k]
+    for loop in graph.loops:
+        at = [np.arange(first[k], first[k + 1]) for k, _ in loop]
+        signs = [np.full(len(c), float(sign)) for c, (_, sign) in zip(at, loop, strict=True)]
+        columns.append((np.concatenate(at), np.concatenate(signs)))
+    return loop_rows(S, columns), [points[:, [k for k, _ in loop]] for loop in graph.loops]
+
+
+def dense(rows: LoopRows) -> Array:
+    """The closure Jacobian ``(6 loops, F)`` as one matrix."""
+    J = np.zeros((6 * len(rows.blocks), rows.width))
+    for i, (columns, block) in enumerate(zip(rows.columns, rows.blocks, strict=True)):
+        J[6 * i : 6 * i + 6, columns] = block
     return J
 
 
 def generic(m: Mechanism, graph: LinkGraph) -> Generic:
     """Generic rank of a topology: the largest rank over a few random geometries (fixed seed)."""
     rng = np.random.default_rng(SEED)
+    count = 6 * len(graph.loops)
+    if count > LARGE:
+        rows, points = random_rows(m, graph, rng)
+        found = Elimination(rows, points, GENERIC_RANK)
+        return Generic(found.rank, rows.width - found.rank, count - found.rank, found.sets)
     best, rank = np.zeros((0, 0)), -1
     for _ in range(TRIALS):
-        J = random_jacobian(m, graph, rng)
+        J = dense(random_rows(m, graph, rng)[0])
         r = rank_of(singular_values(J), GENERIC_RANK)
         if r > rank:
             best, rank = J, r
-    excess = best.shape[0] - rank
+    excess = count - rank
     places = _places(null_space(best.T, GENERIC_RANK), len(graph.loops)) if excess else ()
     return Generic(rank, best.shape[1] - rank, excess, places)
 

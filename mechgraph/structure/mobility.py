@@ -59,10 +59,11 @@ def finite_motion(system: System, x: Array) -> FiniteMotion:
     regular = rank == J.shape[0]
     reached = _strokes(system, x, null, rng, 1 if regular else 2 * null.shape[1])
     best, rank_nearby, null_nearby = (null.shape[1] if regular else 0), rank, null
-    for point, _ in reached[:3]:
+    for i, (point, _) in enumerate(reached[:3]):
         there = motions_of(system.at(point[:, None]).J[:, :, 0])
-        if J.shape[1] - there.shape[1] > rank_nearby:
-            rank_nearby, null_nearby = J.shape[1] - there.shape[1], there
+        rank_there = J.shape[1] - there.shape[1]
+        if rank_there > rank_nearby or (not i and rank_there == rank):
+            rank_nearby, null_nearby = rank_there, there
         if regular:
             continue
         moves = [change for _, change in _strokes(system, point, there, rng, there.shape[1] + 1)]

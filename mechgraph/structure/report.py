@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -13,23 +13,27 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.document import Document, to_html, to_markdown, to_text
 from mechgraph.errors import AssemblyError
-from mechgraph.formulation.build import formulate
 from mechgraph.formulation.registry import Ledger
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.motion.assembly import assembled, assembled_at, named_columns
 from mechgraph.motion.system import Index, System
-from mechgraph.structure import wording
-from mechgraph.structure.advice import Effect, advice, independent_rows
+from mechgraph.structure import drivers, facts, sections, wording
+from mechgraph.structure.advice import Effect, advice
 from mechgraph.structure.findings import Finding, LoopFact, input_motions, locked_findings, loop_facts, passive_finding
-from mechgraph.structure.freedom import STILL, Freedoms, free_motion
+from mechgraph.structure.freedom import Freedoms, free_motion
 from mechgraph.structure.generic import Generic, generic
 from mechgraph.structure.mobility import FiniteMotion, finite_motion
-from mechgraph.structure.stress import SelfStress, Uniqueness, uniqueness
+from mechgraph.structure.readable import SelfStress
+from mechgraph.structure.stress import Uniqueness, uniqueness
 from mechgraph.topology.linkgraph import LinkGraph, link_graph
 from mechgraph.topology.parts import Parts, parts_of
 
 NEAR = 1e-3
 """Margin below which a position is called nearly singular."""
+DOUBT = 1e-11
+"""Largest dropped singular value above which it may be more than rounding, so that the verdict is called near."""
+AUTOMATIC = 90
+"""Rows of the closure Jacobian up to which motions are followed and advice is sought without being asked."""
 
 
 @dataclass(frozen=True)
@@ -47,12 +51,14 @@ class DeterminacyReport:
     """What the graph alone and the graph with its geometry say about a mechanism; prints as a report.
 
     Facts that need geometry are None (or empty) for a topology, and where the loops cannot be closed (see ``note``).
+    ``thorough``: whether motions are followed over finite strokes and pair changes are sought.
     """
 
     mechanism: Mechanism
     graph: LinkGraph
     note: str = ""
     geometry: Geometry | None = field(default=None, repr=False)
+    thorough: bool = True
 
     # --- the graph alone -----------------------------------------------------------------------------------------------
 
@@ -61,12 +67,12 @@ class DeterminacyReport:
         """Names of the links."""
         return self.mechanism.link_names()
 
-    @property
+    @cached_property
     def pairs(self) -> tuple[str, ...]:
         """Names of the pairs."""
         return tuple(p.name for p in self.mechanism.pairs)
 
-    @property
+    @cached_property
     def loops(self) -> tuple[tuple[tuple[str, int], ...], ...]:
         """Independent loops, each a chain of (pair name, sign)."""
         return tuple(tuple((self.pairs[k], sign) for k, sign in loop) for loop in self.graph.loops)
@@ -83,7 +89,7 @@ class DeterminacyReport:
 
     def ledger(self, bookkeeping: str = "lee") -> Ledger:
         """Unknowns against equations in a bookkeeping, ``"lee"`` or ``"minimal"``."""
-        return formulate(self.mechanism, bookkeeping).ledger()
+        return facts.ledger(self.mechanism, bookkeeping)
 
     @cached_property
     def generic(self) -> Generic:
@@ -111,7 +117,13 @@ class DeterminacyReport:
     @cached_property
     def motion(self) -> FiniteMotion | None:
         """What following the motions over finite strokes showed."""
-        return finite_motion(self.geometry.system, self.geometry.x) if self.geometry else None
+        g = self.geometry
+        if not g:
+            return None
+        if self.thorough:
+            return finite_motion(g.system, g.x)
+        regular = not self.redundancy  # full row rank: by the implicit function theorem all mobility is finite
+        return FiniteMotion(g.freedoms.mobility, g.freedoms.rank, 0.0, g.freedoms.null) if regular else None
 
     @property
     def finite_mobility(self) -> int | None:
@@ -125,9 +137,15 @@ class DeterminacyReport:
 
     @property
     def excess(self) -> dict[str, int]:
-        """The redundancy by reason: ``structural`` (whatever the dimensions), ``dimensions`` (all along the motion), ``here``."""
-        if not self.geometry or not self.motion or self.redundancy is None:
+        """The redundancy by reason: ``structural`` (whatever the dimensions), ``dimensions`` (all along the motion), ``here``.
+
+        Where motions were not followed (``thorough`` is False), the last two are together in ``special``.
+        """
+        if not self.geometry or self.redundancy is None:
             return {}
+        if not self.motion:
+            structural = min(self.generic.excess, self.redundancy)
+            return {"structural": structural, "special": self.redundancy - structural}
         nearby = 6 * len(self.graph.loops) - self.motion.rank_nearby
         structural = min(self.generic.excess, nearby)
         return {"structural": structural, "dimensions": nearby - structural, "here": self.redundancy - nearby}
@@ -144,8 +162,20 @@ class DeterminacyReport:
 
     @property
     def near(self) -> bool:
-        """Whether the position is nearly singular: the verdicts on rank and uniqueness hold, but with a small margin."""
-        return self.margin is not None and self.margin < NEAR
+        """Whether the verdict is near to another one: a small singular value was kept, or one above rounding dropped."""
+        if self.margin is None or self.dropped is None:
+            return False
+        return self.margin < NEAR or self.dropped > DOUBT or self.dead_point
+
+    @property
+    def dead_point(self) -> bool:
+        """Whether a driver is near a dead point: it hardly moves when the mechanism moves."""
+        return bool(self.geometry and self.geometry.freedoms.mobility and self.geometry.freedoms.drive < NEAR)
+
+    @property
+    def contradicting_drives(self) -> bool:
+        """Whether the declared drivers cannot move independently of each other."""
+        return bool(self.geometry and self.geometry.freedoms.dependent)
 
     @cached_property
     def reactions(self) -> Uniqueness | None:
@@ -191,36 +221,14 @@ class DeterminacyReport:
     @cached_property
     def drivable(self) -> tuple[Finding, ...]:
         """Freedoms that can serve as a driver here: single freedoms that move in other than passive motions."""
-        if not self.geometry:
-            return ()
-        moves = np.abs(self._input).max(axis=1, initial=0.0) > STILL
-        single = [d for p in self.mechanism.pairs for d in p.type.drivable]
-        names = self.mechanism.freedom_names()
-        return tuple(Finding(f"{n} can drive", (n,)) for n, m, s in zip(names, moves, single, strict=True) if m and s)
+        return drivers.drivable(self.mechanism, self._input) if self.geometry else ()
 
     @cached_property
     def not_drivable(self) -> tuple[Finding, ...]:
         """Single freedoms that cannot drive here, with the reason."""
         g = self.geometry
-        if not g or not self.motion:
-            return ()
-        good = {name for finding in self.drivable for name in finding.freedoms}
-        still = {name for finding in self.locked for name in finding.freedoms}
-        nearby = np.abs(self.motion.null_nearby).max(axis=1, initial=0.0) > 1e3 * STILL
-        out = []
-        for i, (name, single) in enumerate(
-            zip(self.mechanism.freedom_names(), (d for p in self.mechanism.pairs for d in p.type.drivable), strict=True)
-        ):
-            if single and name not in good:
-                why = "moves only in a passive motion"
-                if name in still:
-                    why = (
-                        "dead point here: it moves in positions near by"
-                        if nearby[i] and g.freedoms.mobility
-                        else "it stands still"
-                    )
-                out.append(Finding(f"{name} cannot drive: {why}", (name,)))
-        return tuple(out)
+        nearby = self.motion.null_nearby if self.motion else None
+        return drivers.not_drivable(self.mechanism, g.freedoms, self.drivable, nearby) if g else ()
 
     @property
     def inputs(self) -> int | None:
@@ -230,37 +238,17 @@ class DeterminacyReport:
     @cached_property
     def suggested_drives(self) -> tuple[str, ...]:
         """Freedoms that would complete the drivers (all of them where none is declared): at the frame first, independent."""
-        g = self.geometry
-        if not g or not g.freedoms.undriven:
-            return ()
-        rest = np.stack([f.rates for f in g.freedoms.undriven], axis=1)
-        names = self.mechanism.freedom_names()
-        good = {name for finding in self.drivable for name in finding.freedoms}
-        at_frame = {n for p in self.mechanism.pairs if self.mechanism.frame in (p.a, p.b) for n in p.freedom_names}
-        order = sorted((i for i, n in enumerate(names) if n in good), key=lambda i: (names[i] not in at_frame, i))
-        return tuple(names[i] for i in sorted(independent_rows(rest, order, rest.shape[1])))
+        return drivers.suggested(self.mechanism, self.geometry.freedoms, self.drivable) if self.geometry else ()
 
     @cached_property
     def dependent_drives(self) -> tuple[tuple[str, ...], ...]:
         """For mobility above one: sets of freedoms of which only one can be driven, as they move in proportion."""
-        if not self.inputs or self.inputs < 2:
-            return ()
-        names = [name for finding in self.drivable for name in finding.freedoms]
-        index = {n: i for i, n in enumerate(self.mechanism.freedom_names())}
-        rows = {n: self._input[index[n]] / np.linalg.norm(self._input[index[n]]) for n in names}
-        groups: list[list[str]] = []
-        for n in names:
-            home = next((g for g in groups if abs(abs(rows[g[0]] @ rows[n]) - 1) < 1e-9), None)
-            if home is None:
-                groups.append([n])
-            else:
-                home.append(n)
-        return tuple(tuple(g) for g in groups if len(g) > 1)
+        return drivers.proportional(self.mechanism, self._input, self.drivable) if (self.inputs or 0) > 1 else ()
 
     @property
     def determinate(self) -> bool:
         """Nothing left free that is neither driven nor passive, and every reaction and effort unique."""
-        if not self.geometry:
+        if not self.geometry or self.contradicting_drives:
             return False
         return not self.geometry.freedoms.undriven and all(v for row in self.unique.values() for v in row.values())
 
@@ -268,7 +256,7 @@ class DeterminacyReport:
     def effects(self) -> tuple[Effect, ...]:
         """Pair changes with their computed effect: they remove redundancy, or free a structure."""
         g = self.geometry
-        return advice(g.system, g.x, g.freedoms) if g else ()
+        return advice(g.system, g.x, g.freedoms) if g and self.thorough else ()
 
     @cached_property
     def advice(self) -> tuple[Finding, ...]:
@@ -287,62 +275,18 @@ class DeterminacyReport:
 
     # --- print -----------------------------------------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def verdict(self) -> str:
         """The verdict in one sentence."""
         return wording.verdict(self)
 
     def document(self) -> Document:
         """The report as a document."""
-        return wording.document(self)
+        return sections.document(self)
 
     def to_dict(self) -> dict[str, Any]:
         """All facts as plain data."""
-        findings = ("undriven", "passive", "locked", "drivable", "not_drivable", "advice")
-        books = {name: self.ledger(name) for name in ("lee", "minimal")}
-        return {
-            "mechanism": self.mechanism.name,
-            "verdict": self.verdict,
-            "note": self.note,
-            "determinate": self.determinate,
-            "links": list(self.links),
-            "pairs": list(self.pairs),
-            "loops": [
-                {"steps": [list(step) for step in loop], **asdict(fact)}
-                for loop, fact in zip(self.loops, self.loop_facts, strict=True)
-            ],
-            "mobility_by_count": self.mobility_by_count,
-            "generic": asdict(self.generic),
-            "parts": asdict(self.parts),
-            "mobility": self.mobility,
-            "finite_mobility": self.finite_mobility,
-            "inputs": self.inputs,
-            "stroke": self.motion.stroke if self.motion else None,
-            "redundancy": self.redundancy,
-            "excess": self.excess,
-            "margin": self.margin,
-            "dropped": self.dropped,
-            "near": self.near,
-            "ledger": {
-                name: {
-                    "unknowns": b.unknowns,
-                    "equations": b.equations,
-                    "balance": b.balance,
-                    "by_kind": {k: [r.count, r.unknowns, r.equations] for k, r in b.by_kind.items()},
-                }
-                for name, b in books.items()
-            },
-            "unique": self.unique,
-            "self_stresses": [
-                {"group": s.group, "components": dict(s.components), "efforts": dict(s.efforts)}
-                for s in self.self_stresses
-            ],
-            "combinations": [list(c) for c in self.reactions.combinations] if self.reactions else [],
-            "suggested_drives": list(self.suggested_drives),
-            "dependent_drives": [list(g) for g in self.dependent_drives],
-            "effects": [asdict(e) for e in self.effects],
-            **{key: [asdict(finding) for finding in getattr(self, key)] for key in findings},
-        }
+        return facts.to_dict(self)
 
     def to_json(self) -> str:
         """All facts as JSON."""
@@ -359,12 +303,15 @@ class DeterminacyReport:
         return to_html(self.document())
 
 
-def check(m: Mechanism, at: Mapping[str, float] | None = None) -> DeterminacyReport:
+def check(
+    m: Mechanism, at: Mapping[str, float] | None = None, *, thorough: bool | None = None
+) -> DeterminacyReport:
     """The determinacy report of a mechanism: of its graph, and where it has geometry of its closed position at ``start``.
 
     Parameters
     ----------
     at : values of freedoms at which to assemble first, e.g. ``{"A": 0.3}``.
+    thorough : whether to follow the motions over finite strokes and to seek pair changes; left out, up to 15 loops.
 
     Raises
     ------
@@ -372,6 +319,7 @@ def check(m: Mechanism, at: Mapping[str, float] | None = None) -> DeterminacyRep
         where ``at`` is given and cannot be reached. Without it, loops that cannot be closed are said in ``note``.
     """
     graph = link_graph(m)
+    deep = 6 * len(graph.loops) <= AUTOMATIC if thorough is None else thorough
     if not m.has_geometry:
         return DeterminacyReport(m, graph, "Topology only: no geometry is declared.")
     try:
@@ -381,4 +329,4 @@ def check(m: Mechanism, at: Mapping[str, float] | None = None) -> DeterminacyRep
             raise
         return DeterminacyReport(m, graph, f"No facts of geometry: {error}")
     columns, _ = named_columns(m, system, {d.freedom: 0.0 for d in m.drives})
-    return DeterminacyReport(m, graph, "", Geometry(system, x, columns, free_motion(system, x, columns)))
+    return DeterminacyReport(m, graph, "", Geometry(system, x, columns, free_motion(system, x, columns)), deep)

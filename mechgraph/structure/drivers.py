@@ -1,0 +1,101 @@
+"""Drivers: which freedoms can drive, which cannot and why, which move in proportion, and a set that completes the drivers."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.structure.findings import Finding
+from mechgraph.structure.freedom import Freedoms
+from mechgraph.structure.passive import STILL
+
+WEAK = (1e-3, 1e-8)
+"""Part of a freedom's motion that must be independent of the drivers chosen before: wanted, and at least."""
+PROPORTIONAL = 1e-9
+MOST_INPUTS = 200
+"""Input freedoms above which freedoms that move in proportion are not looked for."""
+
+
+def single_freedoms(m: Mechanism) -> list[tuple[int, str]]:
+    """Freedoms that take a drive, as (column, name)."""
+    single = [d for p in m.pairs for d in p.type.drivable]
+    return [(i, n) for i, (n, s) in enumerate(zip(m.freedom_names(), single, strict=True)) if s]
+
+
+def drivable(m: Mechanism, inputs: Array) -> tuple[Finding, ...]:
+    """Freedoms that can serve as a driver here: single freedoms that move in other than passive motions ``inputs (F, M)``."""
+    moves = np.abs(inputs).max(axis=1, initial=0.0) > STILL
+    return tuple(Finding(f"{n} can drive", (n,)) for i, n in single_freedoms(m) if moves[i])
+
+
+def not_drivable(
+    m: Mechanism, freedoms: Freedoms, able: tuple[Finding, ...], null_nearby: Array | None
+) -> tuple[Finding, ...]:
+    """Single freedoms that cannot drive here, with the reason: a dead point, locked, or moving only passively."""
+    good = {name for finding in able for name in finding.freedoms}
+    still = np.abs(freedoms.null).max(axis=1, initial=0.0) < STILL
+    nearby = still & False if null_nearby is None else np.abs(null_nearby).max(axis=1, initial=0.0) > 1e3 * STILL
+    out = []
+    for i, name in single_freedoms(m):
+        if name in good:
+            continue
+        why = "moves only in a passive motion"
+        if still[i]:
+            dead = nearby[i] and freedoms.mobility
+            why = "dead point here (it moves in positions near by)" if dead else "it stands still"
+        out.append(Finding(f"{name} cannot drive: {why}", (name,)))
+    return tuple(out)
+
+
+def suggested(m: Mechanism, freedoms: Freedoms, able: tuple[Finding, ...]) -> tuple[str, ...]:
+    """Freedoms that complete the drivers: at the frame first, in the order of declaration, independent of each other."""
+    if not freedoms.undriven:
+        return ()
+    rest = np.stack([f.rates for f in freedoms.undriven], axis=1)
+    names = m.freedom_names()
+    good = {name for finding in able for name in finding.freedoms}
+    ends = {n: (p.a, p.b) for p in m.pairs for n in p.freedom_names}
+    order = sorted((i for i, n in enumerate(names) if n in good), key=lambda i: (m.frame not in ends[names[i]], i))
+    return tuple(names[i] for i in sorted(independent_rows(rest, order, rest.shape[1])))
+
+
+def independent_rows(rows: Array, candidates: list[int], count: int) -> list[int]:
+    """The first candidates (in order) whose rows are independent, up to ``count``; weakly independent ones where needed."""
+    chosen: list[int] = []
+    basis = np.zeros((0, rows.shape[1]))
+    size = np.sqrt((rows**2).sum(axis=1))
+    for limit in WEAK:
+        for i in candidates:
+            if len(chosen) == count:
+                return chosen
+            if i in chosen or not size[i] > STILL:
+                continue
+            rest = rows[i] / size[i]
+            for _ in range(2):
+                rest = rest - basis.T @ (basis @ rest)
+            part = np.linalg.norm(rest)
+            if part > limit:
+                chosen.append(i)
+                basis = np.vstack([basis, rest / part])
+    return chosen
+
+
+def proportional(m: Mechanism, inputs: Array, able: tuple[Finding, ...]) -> tuple[tuple[str, ...], ...]:
+    """Sets of freedoms of which only one can be driven, as they move in proportion."""
+    column = {name: i for i, name in single_freedoms(m)}
+    names = [name for finding in able for name in finding.freedoms]
+    if not names or inputs.shape[1] > MOST_INPUTS:
+        return ()
+    rows = inputs[[column[n] for n in names]]
+    rows = rows / np.linalg.norm(rows, axis=1, keepdims=True)
+    first: list[int] = []
+    groups: list[list[str]] = []
+    for i, name in enumerate(names):
+        alike = np.flatnonzero(np.abs(np.abs(rows[first] @ rows[i]) - 1) < PROPORTIONAL)
+        if alike.size:
+            groups[int(alike[0])].append(name)
+        else:
+            first.append(i)
+            groups.append([name])
+    return tuple(tuple(g) for g in groups if len(g) > 1)

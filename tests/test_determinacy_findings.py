@@ -1,0 +1,173 @@
+"""Findings of the determinacy report: directions that stay unique, passive freedoms of several links, locked freedoms, drivers."""
+
+from __future__ import annotations
+
+import mechanisms as known
+import numpy as np
+import pytest
+from mechanisms import X, Z
+
+import mechgraph as mg
+
+# --- unique by principal direction ----------------------------------------------------------------------------------------
+
+
+def pinned_bar(types: str = "RR", end: tuple[float, float, float] = (3, 4, 0)) -> mg.Mechanism:
+    """A bar on two pins to the frame: what lies in its line is tied."""
+    return known.ring(types, [(0, 0, 0), end], [Z, Z], drives=[], name="pinned bar")
+
+
+def test_force_across_a_pinned_bar_is_unique() -> None:
+    report = mg.check(pinned_bar())
+    assert not report.unique["O1"]["Fx"]
+    assert not report.unique["O1"]["Fy"]
+    assert report.reactions is not None
+    texts = [t.text for t in report.reactions.transverse]
+    assert len(texts) == 2
+    for t in report.reactions.transverse:
+        assert not t.across
+        assert np.allclose(t.direction, (0.8, -0.6, 0))
+        assert abs(np.dot(t.in_space, (0.6, 0.8, 0))) < 1e-12
+    assert texts[0] == "O1: force along (0.8, -0.6, 0) is unique"
+    assert texts[0] in str(report)
+
+
+def test_force_across_a_bar_on_two_spheres() -> None:
+    report = mg.check(pinned_bar("SS", (2, 3, 6)))
+    assert report.reactions is not None
+    assert [t.text for t in report.reactions.transverse] == [
+        f"{pair}: force across (0.2857, 0.4286, 0.8571) is unique" for pair in report.pairs
+    ]
+
+
+def test_combinations_do_not_repeat_the_directions() -> None:
+    report = mg.check(pinned_bar())
+    assert report.reactions is not None
+    for _, text in report.reactions.combinations:
+        assert not ("O1:Fx" in text and "O1:Fy" in text)
+    assert "Unique only in combination" in str(report)
+
+
+def test_directions_and_combinations_together_are_all_there_is() -> None:
+    """Their number is that of the components touched minus that of the self-stresses."""
+    for build in (known.planar, known.three_cranks, known.sarrus, pinned_bar, lambda: pinned_bar("SS", (2, 3, 6)), known.door):
+        report = mg.check(build())
+        found = report.reactions
+        assert found is not None
+        loose = sum(not ok for row in report.unique.values() for ok in row.values())
+        directions = sum(2 if t.across else 1 for t in found.transverse)
+        assert directions + len(found.combinations) == loose - found.count
+
+
+# --- passive freedoms --------------------------------------------------------------------------------------------------------
+
+
+def rssr_with_coupler(middle: str | None, axis: object = None) -> mg.Mechanism:
+    """RSSR with a coupler of two links, joined by ``middle`` on the line of the spheres."""
+    b, c = np.array([0.3, 0, 0.1]), np.array([1.5, 0.6, 0.4])
+    pairs = [
+        mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=Z),
+        mg.Pair("B", "S", "crank", "half1", point=b),
+        mg.Pair("M", middle or "W", "half1", "half2", point=(b + c) / 2, axis=c - b if axis is None else axis),
+        mg.Pair("C", "S", "half2", "rocker", point=c),
+        mg.Pair("D", "R", "rocker", "frame", point=(1.3, -0.2, 0.5), axis=(-1, 2, 1)),
+    ]
+    return mg.Mechanism("RSSR", None, pairs, ["A"])
+
+
+def test_welded_halves_spin_together() -> None:
+    report = mg.check(rssr_with_coupler("W"))
+    (spin,) = report.passive
+    assert spin.links == ("half1", "half2")
+    assert "half1 and half2 turn about the line B-C (S-S)" in spin.text
+    assert spin.text.count("together") == 1
+    assert report.determinate
+
+
+@pytest.mark.parametrize("middle", ["R", "C"])
+def test_coaxial_halves_spin_each_by_itself(middle: str) -> None:
+    """A pair on the line of the spheres lets both halves turn; with C the distance of the spheres is free besides."""
+    m = rssr_with_coupler(middle)
+    m = m if middle == "R" else m.replace(drives=["A", "D"])
+    report = mg.check(m)
+    assert [p.links for p in report.passive] == [("half1",), ("half2",)]
+    assert report.mobility == (3 if middle == "R" else 4)
+    assert not report.undriven
+
+
+def test_telescopic_coupler_spins_as_one_though_it_slides() -> None:
+    report = mg.check(rssr_with_coupler("P"))
+    assert [p.links for p in report.passive] == [("half1", "half2")]
+    assert len(report.undriven) == 1
+
+
+def test_skew_hinge_in_the_coupler_spins_as_one_only() -> None:
+    """The hinge folds the coupler, which is a true freedom; only the spin about the line of the spheres is passive."""
+    report = mg.check(rssr_with_coupler("R", axis=(0.3, -1, 0.4)))
+    assert report.mobility == 3
+    assert [p.links for p in report.passive] == [("half1", "half2")]
+
+
+def test_a_pendulum_is_not_passive() -> None:
+    m = mg.Mechanism("pendulum", None, [mg.Pair("A", "R", "frame", "bob", point=(0, 0, 0), axis=Z)])
+    report = mg.check(m)
+    assert not report.passive
+    assert len(report.undriven) == 1
+
+
+# --- locked freedoms and drivers -----------------------------------------------------------------------------------------------
+
+
+def test_locked_turns_are_named_with_their_reason() -> None:
+    (found,) = mg.check(mg.load("pphchp")).locked
+    assert found.freedoms == ("O3.Rz", "O4.Rz", "O5.Rz")
+    assert "stand still" in found.text
+    assert "rigid spherical triangle" in found.text
+
+
+def test_locked_freedoms_cannot_drive() -> None:
+    report = mg.check(mg.load("pphchp"))
+    assert {n for f in report.not_drivable for n in f.freedoms} == {"O3.Rz", "O4.Rz", "O5.Rz"}
+    assert all("stands still" in f.text for f in report.not_drivable)
+
+
+def test_freedoms_that_move_in_proportion_cannot_both_drive() -> None:
+    """Two four-bars on one frame: within each, one driver is enough."""
+    pairs = []
+    for side, shift in (("a", 0.0), ("b", 5.0)):
+        points = np.array([(0, 0, 0), (0.2, 1, 0), (2.2, 1.6, 0), (2, 0, 0)]) + np.array((shift, 0, 0))
+        links = ["frame", *(f"{side}{k}" for k in range(1, 4)), "frame"]
+        pairs += [
+            mg.Pair(f"{side}{k}", "R", links[k - 1], links[k], point=points[k - 1], axis=Z) for k in range(1, 5)
+        ]
+    report = mg.check(mg.Mechanism("two four-bars", None, pairs))
+    assert report.mobility == 2
+    groups = {tuple(sorted({n[0] for n in group})) for group in report.dependent_drives}
+    assert groups == {("a",), ("b",)}
+    assert [n[0] for n in report.suggested_drives] == ["a", "b"]
+    both = mg.check(report.mechanism.replace(drives=["a1", "a4"]))
+    assert both.contradicting_drives
+    assert not both.determinate
+
+
+def test_over_driven() -> None:
+    report = mg.check(known.planar().replace(drives=["O1", "O4"]))
+    assert report.contradicting_drives
+    assert report.verdict.startswith("Over-driven")
+    assert not report.unique["O1"]["effort"]
+
+
+def test_passive_freedoms_cannot_drive() -> None:
+    """Coupler between two coaxial cylinders: its slide and turn reach nothing."""
+    m = known.ring("CC", [(0, 0, 0), (0, 0, 1)], [Z, Z], drives=[])
+    report = mg.check(m)
+    assert report.mobility == 2
+    assert report.inputs == 2 - len(report.passive)
+
+
+def test_sliding_plate_between_parallel_planes() -> None:
+    m = known.ring("EE", [(0, 0, 0), (0.3, 0.2, 1)], [Z, Z], drives=[])
+    report = mg.check(m)
+    assert report.mobility == 3
+    assert report.redundancy == 3
+    assert X @ Z == 0
