@@ -25,7 +25,7 @@ from mechgraph.motion.rates import Rates, closure_solver, distance_to_dead_point
 from mechgraph.motion.system import Configuration, Index
 from mechgraph.numerics.linear import Choice, ChosenSystem, rank_of, singular_values
 from mechgraph.result.solution import Solution
-from mechgraph.structure.advice import independent_rows
+from mechgraph.structure.drivers import independent_rows
 from mechgraph.structure.freedom import free_motion
 from mechgraph.structure.report import check
 
