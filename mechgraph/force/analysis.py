@@ -47,12 +47,17 @@ class Motions:
 
 @dataclass(frozen=True)
 class Forces:
-    """Inertia ``(6, N, T)`` and what loads do (``site``), the wrenches found, and whether redundant reactions are NaN."""
+    """Inertia ``(6, N, T)`` and what loads do (``site``), the wrenches found, and whether redundant reactions are NaN.
+
+    ``hold (6, N, T)`` keeps passive bodies at rest, ``holds`` are its sizes by name and whether they are couples.
+    """
 
     inertia: Array
     site: Site
     wrenches: Wrenches
     mask_redundant: bool
+    hold: Array
+    holds: tuple[tuple[str, bool, Array], ...]
 
 
 class Analysis:
@@ -146,7 +151,7 @@ class Analysis:
     @cached_property
     def _loads(self) -> Array:
         forces = self._need_forces()
-        return forces.inertia + forces.site.scaled(forces.site.external + forces.site.internal)
+        return forces.inertia + forces.site.scaled(forces.site.external + forces.site.internal) + forces.hold
 
     @cached_property
     def _stress(self) -> Stress:
@@ -211,16 +216,12 @@ class Analysis:
 
     @cached_property
     def _driver_efforts(self) -> Array:
-        """What drivers and holders add to given efforts, ``(F, T)``; zero elsewhere."""
+        """What drivers add to given efforts, ``(F, T)``; zero elsewhere."""
         forces = self._need_forces()
         out = np.zeros_like(self._solved[1])
         given = forces.site.scaled_efforts()
         driven = self.motions.driven
         out[driven] = self._solved[1][driven] - given[driven]
-        for i, held in enumerate(self.motions.held):
-            at = np.flatnonzero(self.motions.which == i)
-            cell = np.ix_(held, at)
-            out[cell] = self._solved[1][cell] - given[cell]
         return out
 
     def _effort_units(self, columns: Any) -> Array:
@@ -243,13 +244,10 @@ class Analysis:
         return self._out(self._user_wrench(moving + forces.site.scaled(forces.site.internal)[:, frame]))
 
     def passive_efforts(self) -> dict[str, Array]:
-        """Efforts that hold passive freedoms."""
-        self._need_forces()
-        names = self.mechanism.freedom_names()
-        columns = sorted({int(c) for held in self.motions.held for c in held})
-        unit = self._effort_units(np.array(columns, dtype=np.intp)) if columns else None
+        """What keeps passive bodies at rest, by body: a couple about the axis of a turn, a force along a slide."""
         return {
-            names[c]: self._out(unit[i] * self._driver_efforts[c]) for i, c in enumerate(columns) if unit is not None
+            name: self._out((self._L**2 if turns else self._L) * size)
+            for name, turns, size in self._need_forces().holds
         }
 
     # --- checks and states -----------------------------------------------------------------------------------------------
@@ -271,14 +269,16 @@ class Analysis:
         add_at(balance, s.b, totals)
         add_at(balance, s.a, -totals)
         balance = np.delete(balance, s.graph.frame, axis=1)
-        largest = max(np.abs(totals).max(initial=0.0), np.abs(self._loads).max(initial=0.0))
+        forces = self._need_forces()
+        applied = forces.site.scaled(forces.site.external + forces.site.internal)
+        largest = max(np.abs(part).max(initial=0.0) for part in (totals, applied, forces.inertia, forces.hold))
         residual = np.abs(balance).max(axis=(0, 1), initial=0.0)
         work = np.abs(pair_power(here, reactions)).max(axis=0, initial=0.0)
         return np.maximum(residual, work) / (largest or 1.0)
 
     def _power(self) -> Array:
         forces, rates = self._need_forces(), self.motions.rates
-        applied = forces.site.scaled(forces.site.external + forces.site.internal)
+        applied = forces.site.scaled(forces.site.external + forces.site.internal) + forces.hold
         by_load = (rates.V * applied).sum(axis=0)
         by_effort = rates.dq * (self._driver_efforts + forces.site.scaled_efforts())
         kinetic = kinetic_power(rates, forces.inertia)

@@ -82,7 +82,7 @@ class Values(Protocol):
         """Wrench on the frame about the global origin, ``(..., 6)``."""
 
     def passive_efforts(self) -> dict[str, Array]:
-        """Efforts that hold passive freedoms."""
+        """What keeps passive bodies at rest, by body."""
 
     def state(self, index: Any) -> State:
         """Screws and loads at one position, in the declared units about the global origin."""
@@ -290,7 +290,10 @@ class Solution:
 
     @property
     def passive_effort(self) -> dict[str, Array]:
-        """Efforts that hold passive freedoms at rest, by freedom; zero where nothing turns them."""
+        """What keeps passive bodies from spinning (or sliding) in space, by body: a couple about the axis, or a force.
+
+        Zero where nothing turns them. How such a body stands depends on the path: it does not spin from the start on.
+        """
         return self._values.passive_efforts()
 
     def state(self, index: Any = ()) -> State:
