@@ -43,6 +43,7 @@ class Motions:
     driven: Index
     held: tuple[Index, ...]
     which: Index
+    tracks: tuple[tuple[Array, Array, Array] | None, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -109,9 +110,21 @@ class Analysis:
         s = self._system
         x = np.full((s.n_state, int(np.prod(self.batch))), np.nan)
         x[:, self.motions.good] = self._here.x
-        shaped = x.reshape(s.n_state, *(self.batch or (1,)))
-        q = s.coordinates_of(shaped, s.start_coordinates(self.mechanism.start))
-        return q.reshape(s.n_freedoms, *self.batch)
+        start = s.start_coordinates(self.mechanism.start)
+        tracks = self.motions.tracks
+        if not tracks or any(track is None for track in tracks):
+            q = s.coordinates_of(x.reshape(s.n_state, *(self.batch or (1,))), start)
+            return q.reshape(s.n_freedoms, *self.batch)
+        cases = x.reshape(s.n_state, len(tracks), x.shape[1] // len(tracks))
+        out = np.empty((s.n_freedoms, *cases.shape[1:]))
+        for c, track in enumerate(tracks):
+            at, nodes, along = track or (np.zeros(0), x[:, :0], np.zeros(0))
+            order = np.argsort(np.concatenate([at, along]), kind="stable")
+            q = s.coordinates_of(np.concatenate([nodes, cases[:, c]], axis=1)[:, order], start)
+            back = np.empty_like(order)
+            back[order] = np.arange(len(order))
+            out[:, c] = q[:, back[len(at) :]]
+        return out.reshape(s.n_freedoms, *self.batch)
 
     def coordinates(self, pair: int) -> tuple[Array, Array, Array]:
         """Coordinates, rates, accelerations of a pair."""
@@ -243,6 +256,10 @@ class Analysis:
         moving = np.delete(self._loads, frame, axis=1).sum(axis=1)
         return self._out(self._user_wrench(moving + forces.site.scaled(forces.site.internal)[:, frame]))
 
+    def link_hold(self, link: int) -> Array:
+        """Wrench that keeps a passive body at rest, about the global origin."""
+        return self._out(self._user_wrench(self._need_forces().hold[:, link]))
+
     def passive_efforts(self) -> dict[str, Array]:
         """What keeps passive bodies at rest, by body: a couple about the axis of a turn, a force along a slide."""
         return {
@@ -287,7 +304,11 @@ class Analysis:
 
     def state(self, index: Any) -> State:
         """Screws and loads at one position, user's units, global origin."""
-        flat = np.arange(int(np.prod(self.batch))).reshape(self.batch)[index]
+        try:
+            flat = np.arange(int(np.prod(self.batch))).reshape(self.batch)[index]
+        except IndexError:
+            text = f"state({index!r}): no such position in a batch {self.batch}; give one index an axis"
+            raise MechgraphError(text) from None
         if np.ndim(flat):
             raise MechgraphError(
                 f"state({index!r}): names {np.size(flat)} positions of a batch {self.batch}; give one index an axis"

@@ -99,7 +99,10 @@ def driven(m: Mechanism, motions: Mapping[str, Any] | None) -> tuple[Mechanism, 
 
 def _batch(m: Mechanism, motions: Mapping[str, Motion]) -> tuple[int, ...]:
     try:
-        return np.broadcast_shapes(*(motion.shape for motion in motions.values()))
+        batch = np.broadcast_shapes(*(motion.shape for motion in motions.values()))
+        if 0 in batch:
+            raise DeclarationError(f"solve {m.name!r}", ["the motions have no positions; give at least one"])
+        return batch
     except ValueError:
         shapes = ", ".join(f"{name} {motion.shape}" for name, motion in motions.items())
         raise DeclarationError(
@@ -185,7 +188,8 @@ class _Run:
             solver = chosen_for_all(here.J, [], self.columns)
             choices, which = solver.choices, solver.which
         held = tuple(choice.held for choice in choices)
-        return Motions(here, moved, self.batch, good, status, self.t, self.columns, held, which), solver, found
+        tracks = () if bodies else found.tracks
+        return Motions(here, moved, self.batch, good, status, self.t, self.columns, held, which, tracks), solver, found
 
     def _disagreement(self, here: Configuration, moved: Rates, good: Index) -> Array:
         """How far given positions and rates of dependent drivers are from those that the leading ones bring, ``(T,)``."""
@@ -369,12 +373,8 @@ def assemble(
     ------
     AssemblyError, ReachError
     """
-    wanted = {
-        m.full_name(name): float(value)
-        for name, value in (values or {}).items()
-        if not m.freedom_fault(name, single=True)
-    }
-    system, x = assembled_at(m, values or {}, guess)
+    system, x = assembled_at(m, {} if values is None else values, guess)
+    wanted = {m.full_name(name): float(value) for name, value in (values or {}).items()}
     q = system.coordinates_of(x[:, None], system.start_coordinates(m.start))[:, 0]
     start = dict(zip(m.freedom_names(), q.tolist(), strict=True)) | wanted
     return m.replace(start=start)

@@ -338,6 +338,12 @@ def _declaration_faults(m: Mechanism) -> list[str]:
     for key, value in m.units.items():
         if key not in UNIT_NAMES or not isinstance(value, str) or not value:
             faults.append(f"units: {key} = {value!r}: expected names for {', '.join(UNIT_NAMES)}")
+    by_symbol: dict[str, PairType] = {}
+    for pair in m.pairs:
+        if isinstance(pair.type, PairType) and by_symbol.setdefault(pair.type.symbol, pair.type) != pair.type:
+            faults.append(
+                f"pair {pair.name!r}: its type shares the symbol {pair.type.symbol!r} with another type; rename one"
+            )
     ends = {end for pair in m.pairs for end in (pair.a, pair.b)}
     if m.frame in names and ends <= set(names):
         faults += _connection_faults(m)

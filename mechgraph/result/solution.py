@@ -10,6 +10,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
 from mechgraph.formulation.state import State
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.values import vector_fault
 from mechgraph.result import export
 from mechgraph.result.units import unit_of
 
@@ -74,6 +75,9 @@ class Values(Protocol):
 
     def link(self, link: int) -> tuple[Array, Array, Array]:
         """Pose ``(..., 4, 4)``, twist and its rate ``(..., 6)`` of a link."""
+
+    def link_hold(self, link: int) -> Array:
+        """Wrench that keeps a passive body at rest, about the global origin, ``(..., 6)``."""
 
     def link_point(self, link: int, p: Any) -> MaterialPoint:
         """A material point given in the link's frame."""
@@ -188,6 +192,11 @@ class LinkResult:
         return self._values.link(self._index)[2]
 
     @property
+    def hold(self) -> Array:
+        """Wrench ``(..., 6)`` about the global origin that keeps a passive body from spinning; zero for all other links."""
+        return self._values.link_hold(self._index)
+
+    @property
     def angular_velocity(self) -> Array:
         """Angular velocity ``(..., 3)``."""
         return self.twist[..., :3]
@@ -199,6 +208,9 @@ class LinkResult:
 
     def point(self, p: Any) -> MaterialPoint:
         """Position, velocity and acceleration of the material point ``p``, given in the link's frame."""
+        fault = vector_fault(p, "point")
+        if fault:
+            raise DeclarationError(f"link {self._values.mechanism.links[self._index].name!r}", [fault])
         return self._values.link_point(self._index, p)
 
     @property

@@ -151,7 +151,7 @@ def test_every_link_is_in_equilibrium(seed):
     for k in m.links:
         if k.name == m.frame:
             continue
-        total = inertia_wrench(m, s, k.name) + applied[k.name]
+        total = inertia_wrench(m, s, k.name) + applied[k.name] + s.link(k.name).hold
         for p in m.pairs:
             total = total + (p.b == k.name) * s[p.name].total - (p.a == k.name) * s[p.name].total
         assert np.abs(total).max() < 1e-9 * big
