@@ -13,7 +13,9 @@ X, Y, Z = np.eye(3)
 Vector = Sequence[float] | np.ndarray
 
 
-def ring(types: str | Sequence[str], points: Sequence[Vector], axes: Sequence[Vector | None], **more: object) -> mg.Mechanism:
+def ring(
+    types: str | Sequence[str], points: Sequence[Vector], axes: Sequence[Vector | None], **more: object
+) -> mg.Mechanism:
     """One loop: links ``frame, link1, ...``, pairs ``O1, O2, ...``; a helical pair takes the pitch 0.1 unless ``pitch`` says."""
     n = len(points)
     names = ["frame", *(f"link{k}" for k in range(1, n))]
@@ -21,7 +23,15 @@ def ring(types: str | Sequence[str], points: Sequence[Vector], axes: Sequence[Ve
     drives = more.pop("drives", ["O1"])
     name = str(more.pop("name", "-".join(types)))
     pairs = [
-        mg.Pair(f"O{k + 1}", kind, names[k], names[(k + 1) % n], point=point, axis=axis, pitch=pitch if kind == "H" else None)
+        mg.Pair(
+            f"O{k + 1}",
+            kind,
+            names[k],
+            names[(k + 1) % n],
+            point=point,
+            axis=axis,
+            pitch=pitch if kind == "H" else None,
+        )
         for k, (kind, point, axis) in enumerate(zip(types, points, axes, strict=True))
     ]
     return mg.Mechanism(name, None, pairs, drives)
@@ -57,6 +67,7 @@ def _last_side(corners: np.ndarray) -> tuple[float, float]:
 
 def _placed(corners: np.ndarray, onto: np.ndarray, flip: bool) -> np.ndarray:
     """Corners moved so that corners 4 and 1, and the axes there, lie on those of ``onto``, the rest on the other side."""
+
     def frame(c: np.ndarray, sign: float) -> np.ndarray:
         x = (c[0] - c[3]) / np.linalg.norm(c[0] - c[3])
         z = sign * corner_axes(c)[3]
@@ -251,14 +262,19 @@ def platform(legs: Sequence[tuple[Vector, Vector, Vector]], types: str, driven: 
         }
         for j, kind in ((1, types[0]), (2, types[1]), (3, types[2])):
             if j == 2:
-                pairs.append(mg.Pair(f"P{k}", kind, f"rod{k}", f"tube{k}", point=(np.asarray(foot) + head) / 2, axis=along))
+                pairs.append(
+                    mg.Pair(f"P{k}", kind, f"rod{k}", f"tube{k}", point=(np.asarray(foot) + head) / 2, axis=along)
+                )
                 continue
             point, link, ground = where[j]
             axis, x = (np.asarray(second), np.cross(along, second)) if kind == "U" else (Z, X)
             pairs.append(mg.Pair(f"{'AB'[j // 3]}{k}", kind, ground, link, point=point, axis=axis, second=x))
     links = ["frame", "platform", *(f"{part}{k}" for k in range(1, len(legs) + 1) for part in ("rod", "tube"))]
     return mg.Mechanism(
-        f"{len(legs)}-{types}", [mg.Link(n) for n in links], pairs, [f"P{k}" for k in range(1, len(legs) + 1)] if driven else []
+        f"{len(legs)}-{types}",
+        [mg.Link(n) for n in links],
+        pairs,
+        [f"P{k}" for k in range(1, len(legs) + 1)] if driven else [],
     )
 
 
@@ -298,7 +314,9 @@ def windows(n: int, general: bool = True) -> mg.Mechanism:
     """
     rng = np.random.default_rng(1)
     size = 0.1 if general else 0.0
-    feet = np.column_stack([np.arange(n + 1.0) + size * rng.normal(size=n + 1), size * rng.normal(size=n + 1), np.zeros(n + 1)])
+    feet = np.column_stack(
+        [np.arange(n + 1.0) + size * rng.normal(size=n + 1), size * rng.normal(size=n + 1), np.zeros(n + 1)]
+    )
     heads = feet + np.column_stack(
         [0.3 + size * rng.normal(size=n + 1), 1 + size * rng.normal(size=n + 1), np.zeros(n + 1)]
     )
@@ -314,7 +332,12 @@ def grid(n: int) -> mg.Mechanism:
     pairs = []
     for i in range(n + 1):
         for j in range(n + 1):
-            bars = [f"h{i - 1}_{j}"] * (i > 0) + [f"h{i}_{j}"] * (i < n) + [f"v{i}_{j - 1}"] * (j > 0) + [f"v{i}_{j}"] * (j < n)
+            bars = (
+                [f"h{i - 1}_{j}"] * (i > 0)
+                + [f"h{i}_{j}"] * (i < n)
+                + [f"v{i}_{j - 1}"] * (j > 0)
+                + [f"v{i}_{j}"] * (j < n)
+            )
             point = (i + 0.3 * j, 0.9 * j, 0.0)
             pairs += [mg.Pair(f"N{i}_{j}{b}", "R", bars[0], b, point=point, axis=Z) for b in bars[1:]]
     return mg.Mechanism(f"{n} x {n} parallelograms", None, pairs)

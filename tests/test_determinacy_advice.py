@@ -77,7 +77,11 @@ def test_a_structure_is_told_what_frees_it(build: object) -> None:
 
 
 def test_under_driven_mechanisms_get_the_drivers_that_complete_them() -> None:
-    for m in (known.pphchp(known.Z, known.Z, known.Z), known.hexapod("UPS", driven=False), mg.load("7r").replace(drives=[])):
+    for m in (
+        known.pphchp(known.Z, known.Z, known.Z),
+        known.hexapod("UPS", driven=False),
+        mg.load("7r").replace(drives=[]),
+    ):
         report = mg.check(m)
         assert report.undriven
         whole = mg.check(m.replace(drives=[*m.drives, *report.suggested_drives]))

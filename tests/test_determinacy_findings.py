@@ -50,7 +50,14 @@ def test_combinations_do_not_repeat_the_directions() -> None:
 
 def test_directions_and_combinations_together_are_all_there_is() -> None:
     """Their number is that of the components touched minus that of the self-stresses."""
-    for build in (known.planar, known.three_cranks, known.sarrus, pinned_bar, lambda: pinned_bar("SS", (2, 3, 6)), known.door):
+    for build in (
+        known.planar,
+        known.three_cranks,
+        known.sarrus,
+        pinned_bar,
+        lambda: pinned_bar("SS", (2, 3, 6)),
+        known.door,
+    ):
         report = mg.check(build())
         found = report.reactions
         assert found is not None
@@ -137,9 +144,7 @@ def test_freedoms_that_move_in_proportion_cannot_both_drive() -> None:
     for side, shift in (("a", 0.0), ("b", 5.0)):
         points = np.array([(0, 0, 0), (0.2, 1, 0), (2.2, 1.6, 0), (2, 0, 0)]) + np.array((shift, 0, 0))
         links = ["frame", *(f"{side}{k}" for k in range(1, 4)), "frame"]
-        pairs += [
-            mg.Pair(f"{side}{k}", "R", links[k - 1], links[k], point=points[k - 1], axis=Z) for k in range(1, 5)
-        ]
+        pairs += [mg.Pair(f"{side}{k}", "R", links[k - 1], links[k], point=points[k - 1], axis=Z) for k in range(1, 5)]
     report = mg.check(mg.Mechanism("two four-bars", None, pairs))
     assert report.mobility == 2
     groups = {tuple(sorted({n[0] for n in group})) for group in report.dependent_drives}

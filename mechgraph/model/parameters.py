@@ -43,7 +43,8 @@ def _marker_poses(pairs: tuple[Pair, ...]) -> tuple[Array, Array]:
     out = []
     for side in (0, 1):
         points, axes, seconds = (
-            np.array([getattr(both[side], field) for both in markers], dtype=float).T for field in ("point", "axis", "second")
+            np.array([getattr(both[side], field) for both in markers], dtype=float).T
+            for field in ("point", "axis", "second")
         )
         z = axes / np.sqrt((axes * axes).sum(axis=0))
         x = seconds - (z * seconds).sum(axis=0) * z

@@ -68,7 +68,9 @@ def _here(r: DeterminacyReport) -> str:
         if drivers <= r.mobility:
             dead = "a dead point" if drivers == 1 else "a dead point, or dependent drivers"
             return f"Badly driven: mobility {r.mobility}, but {weakest_drive(r)} cannot move it here ({dead})."
-        return f"Over-driven: mobility {r.mobility}, {plural(drivers, 'driver')} that cannot all be moved independently."
+        return (
+            f"Over-driven: mobility {r.mobility}, {plural(drivers, 'driver')} that cannot all be moved independently."
+        )
     if r.undriven:
         verb = "is" if len(r.undriven) == 1 else "are"
         free = f"{plural(len(r.undriven), 'freedom')} left free that {verb} neither driven nor passive"
@@ -111,11 +113,11 @@ def _tied(r: DeterminacyReport) -> str:
     if len(sets) > SETS:
         shown.append(f"others of {plural(sum(len(p) for p in list(sets.values())[SETS:]), 'further pair')}")
     groups = r.reactions.groups if r.reactions else 0
-    form = "one self-stress group" if groups == 1 else plural(groups, "self-stress group")
+    form = "form one self-stress group" if groups == 1 else f"form {plural(groups, 'self-stress group')}"
+    if r.reactions and r.reactions.sampled:
+        form = f"are tied in {plural(groups, 'connected part')} of the mechanism"
     components = "reaction component is" if total == 1 else "reaction components are"
-    return (
-        f"but {total} {components} not unique: {'; '.join(shown)} form {form} (redundancy {r.redundancy})"
-    )
+    return f"but {total} {components} not unique: {'; '.join(shown)} {form} (redundancy {r.redundancy})"
 
 
 def _joined(names: list[str]) -> str:
@@ -143,7 +145,9 @@ def _of_topology(r: DeterminacyReport) -> str:
         return f"{count}: {where}{rest}; mobility {generic.mobility} for general geometry."
     if generic.mobility > drivers:
         free = plural(generic.mobility - drivers, "freedom")
-        return f"{count}: mobility {generic.mobility} for general geometry, {free} not driven."
+        return (
+            f"{count}: mobility {generic.mobility} for general geometry, {free} not driven (to be driven, or passive)."
+        )
     if generic.mobility < drivers:
         return (
             f"{count}: mobility {generic.mobility} for general geometry, "
