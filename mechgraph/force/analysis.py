@@ -308,7 +308,9 @@ class Analysis:
         spot = slice(at, at + 1)
         unit = np.where(self._system.is_length, self._L, 1.0)[:, None]
         return State(
-            coordinates=self.user_coordinates.reshape(self._system.n_freedoms, -1)[:, flat][:, None],
+            coordinates=self.user_coordinates.reshape(self._system.n_freedoms, int(np.prod(self.batch)))[:, flat][
+                :, None
+            ],
             velocities=unit * self.motions.rates.dq[:, spot],
             poses=np.moveaxis(user_poses(here)[..., :3, :], (0, 1), (2, 3)),
             twists=user_twists(here, self.motions.rates.V[:, :, spot]),

@@ -12,25 +12,30 @@ from numpy.typing import NDArray
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeadPointError, DeclarationError, IndeterminateError, ReachError
 from mechgraph.force.analysis import Analysis, Forces, Motions
-from mechgraph.force.methods import METHODS, Problem
+from mechgraph.force.methods import METHODS, Problem, chosen_for_all
 from mechgraph.force.site import Site, inertia_wrenches
 from mechgraph.model.drive import Drive
 from mechgraph.model.load import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion_law import Motion
-from mechgraph.motion.assembly import assembled, assembled_at, named_columns
-from mechgraph.motion.idle import Idle, held_well, without_spin
+from mechgraph.motion.assembly import CLOSED, assembled, assembled_at, named_columns, state_rows
+from mechgraph.motion.idle import Idle, held_well, spin_angles
 from mechgraph.motion.path import SINGULAR, Follower, Positions, Status
-from mechgraph.motion.rates import closure_solver, distance_to_dead_point, rates
+from mechgraph.motion.rates import Rates, closure_solver, distance_to_dead_point, rates
 from mechgraph.motion.system import Configuration, Index
-from mechgraph.numerics.linear import Choice, ChosenSystem
+from mechgraph.numerics.linear import Choice, ChosenSystem, rank_of, singular_values
 from mechgraph.result.solution import Solution
+from mechgraph.structure.drivers import independent_rows
 from mechgraph.structure.freedom import free_motion
 from mechgraph.structure.report import check
 
 CONTRADICTION = 1e-6
 """Relative part of the closure rates that drivers may leave open before they count as contradicting each other."""
 
+TURNS_BACK = 60
+"""Most steps in which the spin of passive bodies is taken back."""
+LONGEST_TURN = 0.25
+"""Longest such step (radians)."""
 DOUBTFUL = 1e4
 """Condition number of the closure equations from which on the distance to a dead point is looked at."""
 DEAD_POINT = 1e-10
@@ -108,6 +113,12 @@ class _Run:
         self.unit = np.where(self.system.is_length[self.columns], self.system.par.L, 1.0)
         self.t = next((motion.t for motion in self.motions.values() if motion.t is not None), None)
         self.freedoms = free_motion(self.system, self.x, self.columns)
+        self.lead = np.arange(len(self.columns))
+        if self.freedoms.dependent:
+            rank = rank_of(singular_values(self.freedoms.null[self.columns]), 1e-8)
+            order = [int(c) for c in self.columns]
+            chosen = independent_rows(self.freedoms.null, order, rank)
+            self.lead = np.array([order.index(c) for c in sorted(chosen, key=order.index)], dtype=np.intp)
         self._check_determinate()
 
     def _check_determinate(self) -> None:
@@ -121,6 +132,11 @@ class _Run:
                 check(self.m),
             )
 
+    @property
+    def leading(self) -> Index:
+        """The drivers that lead: independent ones; drivers that depend on them are checked to agree."""
+        return self.columns[self.lead]
+
     def values(self, kind: str) -> Array:
         """Driver positions, velocities or accelerations ``(d, T)`` in internal units."""
         T = int(np.prod(self.batch))
@@ -130,33 +146,52 @@ class _Run:
     def positions(self) -> Positions:
         """All positions, followed along the last batch axis."""
         cases = int(np.prod(self.batch[:-1]))
-        path = self.values("position").reshape(len(self.columns), cases, self_length(self.batch))
-        return Follower(self.system, self.columns, self.freedoms.hold).follow(self.x, path)
+        path = self.values("position")[self.lead].reshape(len(self.lead), cases, self_length(self.batch))
+        return Follower(self.system, self.leading, self.freedoms.hold).follow(self.x, path)
 
     def move(self) -> tuple[Motions, ChosenSystem, Positions]:
         """Positions and rates."""
         found = self.positions()
-        bodies = self.freedoms.bodies(self.system)
+        bodies = self.freedoms.bodies
         if bodies:
             found = self._without_spin(found, bodies)
         status = np.array([s.value for s in found.status.reshape(-1)], dtype="U24").reshape(self.batch)
         good = np.flatnonzero(status.reshape(-1) == Status.OK.value)
         here = found.here if found.here is not None and good.size == found.here.T else None
-        here = here or self.system.at(found.x.reshape(self.system.n_state, -1)[:, good])
+        here = here or self.system.at(found.x.reshape(self.system.n_state, status.size)[:, good])
         which, choices = found.which.reshape(-1)[good], found.choices
         solver = closure_solver(here, choices, which)
-        dead = self._dead(here, solver, choices, which)
+        open_ = here.closure > CLOSED
+        if open_.any():
+            status.reshape(-1)[good[open_]] = Status.NOT_CLOSED.value
+        dead = self._dead(here, solver, choices, which) | open_
         if dead.any():
-            status.reshape(-1)[good[dead]] = Status.DEAD_POINT.value
+            status.reshape(-1)[good[dead & ~open_]] = Status.DEAD_POINT.value
             good, which = good[~dead], which[~dead]
             here = self.system.at(here.x[:, ~dead])
             solver = closure_solver(here, choices, which)
         if bodies:
-            choices, which, solver = held_well(here, choices, which, self.columns)
+            choices, which, solver = held_well(here, choices, which, self.leading)
         velocity, acceleration = (self.values(kind)[:, good] for kind in ("velocity", "acceleration"))
-        moved = rates(here, solver, self.columns, velocity, acceleration, bodies)
+        moved = rates(here, solver, self.leading, velocity[self.lead], acceleration[self.lead], bodies)
+        if len(self.lead) < len(self.columns):
+            moved = dataclasses.replace(moved, contradiction=self._disagreement(here, moved, good))
+            solver = chosen_for_all(here.J, [], self.columns)
+            choices, which = solver.choices, solver.which
         held = tuple(choice.held for choice in choices)
         return Motions(here, moved, self.batch, good, status, self.t, self.columns, held, which), solver, found
+
+    def _disagreement(self, here: Configuration, moved: Rates, good: Index) -> Array:
+        """How far given positions and rates of dependent drivers are from those that the leading ones bring, ``(T,)``."""
+        turns = self.values("position")[:, good] - here.x[state_rows(self.system, self.columns)]
+        turns -= np.where(self.system.is_length[self.columns], 0.0, 2 * np.pi)[:, None] * np.round(turns / (2 * np.pi))
+        out = np.abs(turns).max(axis=0, initial=0.0)
+        for given, found in (("velocity", moved.dq), ("acceleration", moved.ddq)):
+            asked = self.values(given)[:, good]
+            size = np.abs(found).max(axis=0, initial=0.0) + np.abs(asked).max(axis=0, initial=0.0)
+            gap = np.abs(found[self.columns] - asked).max(axis=0, initial=0.0)
+            out = np.maximum(out, gap / np.where(size > 0, size, 1.0))
+        return np.maximum(out, moved.contradiction)
 
     def _dead(
         self, here: Configuration, solver: ChosenSystem, choices: list[Choice], which: Index
@@ -166,20 +201,36 @@ class _Run:
         doubtful = np.flatnonzero((solver.condition > DOUBTFUL) & ~dead)
         if doubtful.size:
             few = self.system.at(here.x[:, doubtful])
-            near = distance_to_dead_point(few, closure_solver(few, choices, which[doubtful]), self.columns)
+            near = distance_to_dead_point(few, closure_solver(few, choices, which[doubtful]), self.leading)
             dead[doubtful] = np.logical_not(near > DEAD_POINT)
         return dead
 
     def _without_spin(self, found: Positions, bodies: tuple[Idle, ...]) -> Positions:
-        """The same positions with passive bodies not spinning from one to the next."""
+        """The same positions with passive bodies not spinning from one to the next, the loops closed again."""
         x = found.x.copy()
         for c in range(x.shape[1]):
             at = np.flatnonzero(found.status[c] == Status.OK)
             if at.size > 1:
-                here = self.system.at(x[:, c, at])
-                _, _, solver = held_well(here, found.choices, found.which[c, at], self.columns)
-                x[:, c, at] = without_spin(self.system, x[:, c, at], bodies, solver.null_of_columns())
+                x[:, c, at] = self._turned_back(x[:, c, at], found.choices, found.which[c, at], bodies)
         return dataclasses.replace(found, x=x, here=None)
+
+    def _turned_back(self, x: Array, choices: list[Choice], which: Index, bodies: tuple[Idle, ...]) -> Array:
+        follower = Follower(self.system, self.leading)
+        for _ in range(TURNS_BACK):
+            here = self.system.at(x)
+            follower.choices, which, solver = held_well(here, choices, which, self.leading)
+            choices = follower.choices
+            angles, unit = spin_angles(here, bodies, solver.null_of_columns())
+            if np.abs(angles).max(initial=0.0) < 1e-9:
+                break
+            turned = self.system.advance(
+                x, -np.einsum("fpt,pt->ft", unit, np.clip(angles, -LONGEST_TURN, LONGEST_TURN))
+            )
+            closed, shift = follower.closed_again(turned, which)
+            if not (shift < LONGEST_TURN).all():
+                break
+            x = closed
+        return x
 
 
 def _raise_unreached(run: _Run, motions: Motions, found: Positions, solution: Solution) -> None:
@@ -283,7 +334,7 @@ def _solve(m: Mechanism, motions: Mapping[str, Any] | None, on_reach: str, force
 
 def _forces(run: _Run, moved: Motions, solver: ChosenSystem, coordinates: Array, method: str, redundant: str) -> Forces:
     inertia = inertia_wrenches(moved.here, moved.rates)
-    flat = coordinates.reshape(run.system.n_freedoms, -1)[:, moved.good]
+    flat = coordinates.reshape(run.system.n_freedoms, int(np.prod(run.batch)))[:, moved.good]
     site = Site(moved.here, moved.rates, flat, run.batch, moved.good, run.t)
     site.collect(run.m.loads)
     loads = inertia + site.scaled(site.external + site.internal)

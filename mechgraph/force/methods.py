@@ -125,10 +125,15 @@ def _components_and_efforts(
     return Wrenches(totals, stress)
 
 
-def chosen_for_all(A: Array, known: list[Choice]) -> ChosenSystem:
-    """Independent rows and columns for every position of a batch: one choice, and new ones where it fails."""
+def chosen_for_all(A: Array, known: list[Choice], fixed: Index | None = None) -> ChosenSystem:
+    """Independent rows and columns for every position of a batch: one choice, and new ones where it fails.
+
+    Columns in ``fixed`` are left out.
+    """
     T = A.shape[2]
-    nothing = np.zeros(0, dtype=np.intp)
+    nothing = np.zeros(0, dtype=np.intp) if fixed is None else fixed
+    if not T:
+        return ChosenSystem(A, known, np.zeros(0, dtype=np.intp))
     if not known:
         known.append(choose(A[:, :, 0], nothing))
     which = np.zeros(T, dtype=np.intp)

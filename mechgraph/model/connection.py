@@ -156,6 +156,8 @@ class Pair:
     @property
     def freedom_names(self) -> tuple[str, ...]:
         """Full names of the freedoms, ``"B.Tz"``."""
+        if not isinstance(self.type, PairType):
+            return ()
         return tuple(f"{self.name}.{f.name}" for f in self.type.freedoms)
 
     def replace(self, **changes: Any) -> Pair:

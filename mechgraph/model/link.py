@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from mechgraph.algebra.inertia import physical_faults
 from mechgraph.model.values import is_numeric, number_fault, plain, vector_fault
 
@@ -48,6 +50,8 @@ class Link:
         elif self.inertia is not None:
             if self.center is None:
                 found.append(f"{where}inertia without a center; give center=(x, y, z)")
+            if self.mass == 0 and np.any(self.inertia):
+                found.append(f"{where}inertia without mass; give mass=")
             if not self.unphysical:
                 found += [
                     f"{where}inertia: {fault}; no body has it (unphysical=True accepts it)"

@@ -112,7 +112,7 @@ def _turned(value: Value, pose: Array) -> Value:
     if value is None:
         return None
     if callable(value):
-        return _Turned(value, plain(pose))
+        return _Turned(value, plain(np.vstack([pose, (0.0, 0.0, 0.0, 1.0)])))
     return plain(np.asarray(value) @ pose[:3, :3].T)
 
 

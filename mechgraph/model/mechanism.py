@@ -91,7 +91,7 @@ class Mechanism:
             object.__setattr__(self, key, value)
         faults = _declaration_faults(self)
         flat: dict[str, float] = {}
-        if not faults:
+        if all(isinstance(p, Pair) for p in pair_tuple):
             flat, start_faults = _flat_start(self, start or {})
             faults += start_faults
         if faults:
@@ -179,6 +179,8 @@ class Mechanism:
                 return pair, names.index(name)
             if name != pair.name:
                 continue
+            if not isinstance(pair.type, PairType):
+                return f"pair {name!r} has an unknown type"
             if len(names) == 1:
                 return pair, 0
             driven = [d.freedom for d in self.drives if d.freedom in names]
@@ -219,12 +221,13 @@ class Mechanism:
             on_a=old.on_a,
             on_b=old.on_b,
         )
-        if isinstance(new.type, PairType) and new.type.takes_pitch:
+        if not isinstance(new.type, PairType):
+            raise DeclarationError(f"mechanism {self.name!r}", new.faults())
+        if new.type.takes_pitch:
             kept = {"pitch": old.pitch, "lead": old.lead} if pitch is None else {"pitch": pitch}
             new = new.replace(**kept)
-        gone = set(old.freedom_names) - set(new.freedom_names if isinstance(new.type, PairType) else ())
-        known = new.type if isinstance(new.type, PairType) else old.type
-        able = {n for n, single in zip(new.freedom_names, known.drivable, strict=True) if single}
+        gone = set(old.freedom_names) - set(new.freedom_names)
+        able = {n for n, single in zip(new.freedom_names, new.type.drivable, strict=True) if single}
         lost = set(old.freedom_names) - able
         drives = [
             dataclasses.replace(d, freedom=name) for d in self.drives if (name := self.full_name(d.freedom)) not in lost
@@ -248,9 +251,10 @@ class Mechanism:
 
     def moved(self, pose: Any) -> Mechanism:
         """The whole mechanism after a rigid motion: a 4 x 4 (or 3 x 4) pose. Coordinates of the pairs stay what they are."""
-        G = np.asarray(pose, dtype=float)[:3]
+        given = np.asarray(pose, dtype=float) if is_numeric(pose, np.shape(pose)) else np.zeros(0)
+        G = given[:3] if given.shape in ((4, 4), (3, 4)) else np.zeros((3, 4))
         R, p = G[:, :3], G[:, 3]
-        if G.shape != (3, 4) or np.abs(R @ R.T - np.eye(3)).max() > 1e-9 or np.linalg.det(R) < 0:
+        if np.abs(R @ R.T - np.eye(3)).max() > 1e-9 or np.linalg.det(R) < 0:
             raise DeclarationError(f"mechanism {self.name!r}", ["moved: expected a 4 x 4 pose with a proper rotation"])
 
         def at(v: Any) -> Any:
@@ -327,9 +331,10 @@ def _declaration_faults(m: Mechanism) -> list[str]:
     for key, value in m.units.items():
         if key not in UNIT_NAMES or not isinstance(value, str) or not value:
             faults.append(f"units: {key} = {value!r}: expected names for {', '.join(UNIT_NAMES)}")
-    if faults:
-        return faults
-    return _connection_faults(m) + _reference_faults(m)
+    ends = {end for pair in m.pairs for end in (pair.a, pair.b)}
+    if m.frame in names and ends <= set(names):
+        faults += _connection_faults(m)
+    return faults + _reference_faults(m)
 
 
 def _connection_faults(m: Mechanism) -> list[str]:
@@ -364,7 +369,8 @@ def _flat_start(m: Mechanism, start: Mapping[str, Any]) -> tuple[dict[str, float
     faults = []
     for key, value in start.items():
         pair = next((p for p in m.pairs if p.name == key), None)
-        if pair is not None and pair.type.f > 1 and is_numeric(value, (pair.type.f,)):
+        many = len(pair.freedom_names) if pair is not None else 0
+        if pair is not None and many > 1 and is_numeric(value, (many,)):
             flat.update(zip(pair.freedom_names, map(float, value), strict=True))
             continue
         fault = m.freedom_fault(key, single=False)

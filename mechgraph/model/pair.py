@@ -16,6 +16,7 @@ import numpy as np
 from mechgraph.document import Document, Table, to_text
 from mechgraph.errors import DeclarationError
 from mechgraph.model import pair_evaluation as evaluation
+from mechgraph.model.values import is_numeric
 
 Six = tuple[float, float, float, float, float, float]
 
@@ -125,6 +126,10 @@ def _freedoms(given: Sequence[object], faults: list[str]) -> tuple[tuple[Freedom
         if not isinstance(item, Freedom):
             faults.append(f"freedom {item!r}: expected a name, 'rotation' or a Freedom")
             continue
+        bad = [row for row in (item.twist, item.per_pitch) if not is_numeric(row, (6,))]
+        if bad:
+            faults.append(f"freedom {item.name!r}: twist {bad[0]!r}: expected six finite numbers, angular part first")
+            continue
         out.append(item)
         frames.append(before)
     return tuple(out), tuple(frames)
@@ -133,6 +138,10 @@ def _freedoms(given: Sequence[object], faults: list[str]) -> tuple[tuple[Freedom
 def _component(item: object, faults: list[str], what: str) -> Component | None:
     """A component from ``Component``, ``"Fz@2"`` or ``("Fz", 2)``."""
     if isinstance(item, Component):
+        bad = [row for row in (item.wrench, item.per_pitch) if not is_numeric(row, (6,))]
+        if bad:
+            faults.append(f"{what} {item.name!r}: wrench {bad[0]!r}: expected six finite numbers, moment part first")
+            return None
         return item
     name, frame = item if isinstance(item, tuple) and len(item) == 2 else (item, 0)
     if isinstance(name, str) and "@" in name:
@@ -157,7 +166,7 @@ class PairType:
     reactions : components that do no work, each ``"Fx"`` (frame 0), ``"Fz@2"`` (frame 2) or a ``Component``; None where no
         constant components exist: the null space of ``S^T`` serves then, named n1, n2, ...
     efforts : one for every freedom; None for a unit couple about each turn and a unit force along each slide through
-        the origin of marker B.
+        the origin of marker B (where these are not dual to the freedoms, their combinations that are, position by position).
     bookkeeping : how Lee's ledger writes the pair; None counts ``(6 - f, 0)``.
     directed : whether the pair has an axis (False for a sphere or a weld).
     square_second : whether the second direction must be perpendicular to the axis as given.
@@ -177,6 +186,7 @@ class PairType:
     directed: bool
     square_second: bool
     frame_before: tuple[int, ...]
+    computed_efforts: bool
 
     def __init__(
         self,
@@ -212,9 +222,12 @@ class PairType:
             "directed": directed,
             "square_second": square_second,
             "frame_before": before,
+            "computed_efforts": False,
         }
         for key, value in fields.items():
             object.__setattr__(self, key, value)
+        if not faults and efforts is None:
+            object.__setattr__(self, "computed_efforts", not _dual_at_random(self))
         if not faults:
             faults += _row_faults(self)
         if faults:
@@ -274,6 +287,16 @@ def _dual_effort(freedom: Freedom, frame: int) -> Component:
     return Component("F" + freedom.name[1:], (0.0, 0.0, 0.0, *v), frame, at_b=True)
 
 
+def _dual_at_random(row: PairType) -> bool:
+    """Whether ``S^T E = 1`` at random positions (fixed seed)."""
+    x = evaluation.random_coordinates(row, np.random.default_rng(12345), 1, 7)
+    pitch = np.array([[0.3]])
+    frames = evaluation.frames_of(row, pitch, x)
+    S, E = evaluation.twists_of(row, pitch, frames), evaluation.efforts_of(row, pitch, frames)
+    unit = np.einsum("ifnt,ignt->fgnt", S, E)
+    return not row.f or bool(np.abs(unit - np.eye(row.f)[:, :, None, None]).max() < 1e-9)
+
+
 def _row_faults(row: PairType) -> list[str]:
     """Faults of a row, seen at random positions (fixed seed): unit twists, reciprocity, ranks, ``S^T E = 1``."""
     faults = []
@@ -310,10 +333,8 @@ def _row_faults(row: PairType) -> list[str]:
     if row.f and min(np.linalg.matrix_rank(S[:, :, 0, t], tol=1e-9) for t in range(7)) < row.f:
         faults.append(f"freedoms {', '.join(names)}: not independent at random positions")
         return faults
-    E = evaluation.efforts_of(row, pitch, frames)
     W = evaluation.reactions_of(row, pitch, frames)
-    unit = np.einsum("ifnt,ignt->fgnt", S, E)
-    if row.f and np.abs(unit - np.eye(row.f)[:, :, None, None]).max() > 1e-9:
+    if not _dual_at_random(row):
         faults.append("efforts: S^T E is not the unit matrix at random positions; give efforts dual to the freedoms")
     work = np.einsum("ifnt,icnt->fcnt", S, W)
     for i, name in enumerate(row.component_names):

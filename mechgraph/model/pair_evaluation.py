@@ -104,8 +104,12 @@ def components_of(components: tuple[Component, ...], pitch: Array, frames: list[
 
 
 def efforts_of(row: PairType, pitch: Array, frames: list[Array]) -> Array:
-    """Effort wrenches ``E``, one a freedom, ``(6, f, n, T)``."""
-    return components_of(row.efforts, pitch, frames)
+    """Effort wrenches ``E``, one a freedom, ``(6, f, n, T)``; combined to ``E (S^T E)^-1`` where the row asks for it."""
+    E = components_of(row.efforts, pitch, frames)
+    if not row.computed_efforts:
+        return E
+    unit = np.einsum("ifnt,ignt->ntfg", twists_of(row, pitch, frames), E)
+    return np.einsum("ignt,ntgf->ifnt", E, np.linalg.inv(unit))
 
 
 def reactions_of(row: PairType, pitch: Array, frames: list[Array]) -> Array:

@@ -418,7 +418,8 @@ def _type_data(row: PairType, path: str) -> dict[str, Any]:
     }
     if row.reactions is not None:
         data["reactions"] = [_fields(c, "component", path, "reaction") for c in row.reactions]
-    data["efforts"] = [_fields(c, "component", path, "effort") for c in row.efforts]
+    if not row.computed_efforts:
+        data["efforts"] = [_fields(c, "component", path, "effort") for c in row.efforts]
     if row.bookkeeping is not None:
         data["bookkeeping"] = {
             "conditions": [_fields(c, "freedom", path, "condition") for c in row.bookkeeping.conditions],

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, cross, rotation_log
-from mechgraph.motion.system import Configuration, Index, System
+from mechgraph.motion.system import Configuration, Index
 from mechgraph.numerics.linear import Choice, ChosenSystem, choose
 
 LARGEST = 3.0
@@ -23,10 +23,9 @@ TRIES = 8
 
 @dataclass(frozen=True)
 class Idle:
-    """A body with passive freedoms: one of its links, and the pairs at its border."""
+    """A body with passive freedoms, by one of its links."""
 
     link: int
-    border: Index
 
 
 def held_well(
@@ -50,22 +49,37 @@ def held_well(
     return choices, which, ChosenSystem(here.J, choices, which)
 
 
-def body_twists(here: Configuration, idle: tuple[Idle, ...], V: Array) -> Array:
-    """Angular velocity and velocity of the middle of the border of every body, stacked ``(6 bodies, T)``."""
+def rest_points(here: Configuration, idle: tuple[Idle, ...], Z: Array) -> list[Array]:
+    """For every body the point ``(3, T)`` of it whose velocity counts, fixed in the body.
+
+    On the axis where one passive turn is all it has (the foot from the origin of the link), so that only the spin counts; else
+    the origin of the link.
+    """
+    twists = [here.link_twists(Z[:, i]) for i in range(Z.shape[1])]
     out = []
     for body in idle:
+        origin = here.poses[:, 3, body.link]
+        mine = [V[:, body.link] for V in twists if np.abs(V[:, body.link]).max() > 1e-6]
+        point = origin
+        if len(mine) == 1 and (np.abs(mine[0][:3]).max(axis=0) > 1e-6).all():
+            w, v = mine[0][:3], mine[0][3:] + cross(mine[0][:3], origin)
+            point = origin + cross(w, v) / (w * w).sum(axis=0)
+        out.append(point)
+    return out
+
+
+def body_twists(idle: tuple[Idle, ...], points: list[Array], V: Array) -> Array:
+    """Angular velocity and velocity of the rest point of every body, stacked ``(6 bodies, T)``."""
+    out = []
+    for body, P in zip(idle, points, strict=True):
         twist = V[:, body.link]
-        out += [twist[:3], twist[3:] + cross(twist[:3], _middle(here, body))]
+        out += [twist[:3], twist[3:] + cross(twist[:3], P)]
     return np.concatenate(out)
 
 
-def _middle(here: Configuration, body: Idle) -> Array:
-    return np.asarray(here.pair_points[:, body.border].mean(axis=1))
-
-
-def passive_twists(here: Configuration, idle: tuple[Idle, ...], Z: Array) -> Array:
+def passive_twists(here: Configuration, idle: tuple[Idle, ...], points: list[Array], Z: Array) -> Array:
     """``body_twists`` of all passive motions ``Z (F, p, T)``: ``(6 bodies, p, T)``."""
-    return np.stack([body_twists(here, idle, here.link_twists(Z[:, i])) for i in range(Z.shape[1])], axis=1)
+    return np.stack([body_twists(idle, points, here.link_twists(Z[:, i])) for i in range(Z.shape[1])], axis=1)
 
 
 def resting_part(G: Array, b: Array) -> Array:
@@ -74,10 +88,10 @@ def resting_part(G: Array, b: Array) -> Array:
     return -np.linalg.solve(A, np.einsum("ipt,it->tp", G, b)[..., None])[..., 0].T
 
 
-def turning_part(here: Configuration, idle: tuple[Idle, ...], V: Array, G: Array) -> Array:
+def turning_part(idle: tuple[Idle, ...], points: list[Array], V: Array, G: Array) -> Array:
     """Change of the passive twists, which turn with their bodies, in the condition of rest: ``(w x d) . v``, ``(p, T)``."""
     out = np.zeros(G.shape[1:])
-    now = body_twists(here, idle, V)
+    now = body_twists(idle, points, V)
     for i in range(len(idle)):
         w, v = now[6 * i : 6 * i + 3], now[6 * i + 3 : 6 * i + 6]
         for p in range(G.shape[1]):
@@ -85,39 +99,37 @@ def turning_part(here: Configuration, idle: tuple[Idle, ...], V: Array, G: Array
     return out
 
 
-def body_accelerations(here: Configuration, idle: tuple[Idle, ...], V: Array, A: Array) -> Array:
-    """Angular acceleration and acceleration of the middle of the border of every body, ``(6 bodies, T)``."""
+def body_accelerations(idle: tuple[Idle, ...], points: list[Array], V: Array, A: Array) -> Array:
+    """Angular acceleration and acceleration of the rest point of every body, ``(6 bodies, T)``."""
     out = []
-    for body in idle:
-        w, alpha, P = V[:3, body.link], A[:3, body.link], _middle(here, body)
+    for body, P in zip(idle, points, strict=True):
+        w, alpha = V[:3, body.link], A[:3, body.link]
         velocity = V[3:, body.link] + cross(w, P)
         out += [alpha, A[3:, body.link] + cross(alpha, P) + cross(w, velocity)]
     return np.concatenate(out)
 
 
-def without_spin(system: System, x: Array, idle: tuple[Idle, ...], Z: Array) -> Array:
-    """States ``(nx, T)`` of one path turned along their passive motions so that no body spins from position to position.
+def spin_angles(here: Configuration, idle: tuple[Idle, ...], Z: Array) -> tuple[Array, Array]:
+    """Angles ``(p, T)`` by which passive turns have carried bodies along a path, and the rates that turn by one radian.
 
-    For one passive turn of a body: the rotation from each position to the next has no part along the axis.
-    Bodies with other passive motions are left as they are.
+    For one passive turn of a body: the part along its axis of the rotation from each position to the next, summed.
+    Bodies with other passive motions are left as they are. Returns the angles and ``Z`` per radian, ``(F, p, T)``.
     """
-    here = system.at(x)
-    G = passive_twists(here, idle, Z)
-    out = x
+    G = passive_twists(here, idle, rest_points(here, idle, Z), Z)
+    angles = np.zeros(Z.shape[1:])
+    unit = Z.copy()
     for i, body in enumerate(idle):
         mine = [p for p in range(Z.shape[1]) if np.abs(G[6 * i : 6 * i + 6, p]).max() > 1e-6]
-        if len(mine) != 1:
-            continue
         u = G[6 * i : 6 * i + 3, mine[0]]
         length = np.sqrt((u * u).sum(axis=0))
-        if not (length > 1e-6).all():
+        if len(mine) != 1 or not (length > 1e-6).all():
             continue
-        u = u / length
-        sense = np.cumprod(np.concatenate([[1.0], np.sign((u[:, 1:] * u[:, :-1]).sum(axis=0))]))
-        axis = u * sense
+        axis = u / length
+        sense = np.cumprod(np.concatenate([[1.0], np.where((axis[:, 1:] * axis[:, :-1]).sum(axis=0) < 0, -1.0, 1.0)]))
+        axis = axis * sense
         R = here.poses[:, :3, body.link]
         turn = rotation_log(np.einsum("ijt,kjt->ikt", R[..., 1:], R[..., :-1]))
         spin = 0.5 * (turn * (axis[:, 1:] + axis[:, :-1])).sum(axis=0)
-        angle = -np.concatenate([[0.0], np.cumsum(spin)]) * sense / length
-        out = system.advance(out, Z[:, mine[0]] * angle)
-    return out
+        angles[mine[0]] = np.concatenate([[0.0], np.cumsum(spin)])
+        unit[:, mine[0]] = Z[:, mine[0]] * sense / length
+    return angles, unit

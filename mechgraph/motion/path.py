@@ -49,7 +49,7 @@ class Status(Enum):
     DEAD_POINT = "dead point"
     OUT_OF_REACH = "out of reach"
     BEYOND_DEAD_POINT = "beyond a dead point"
-    CONTRADICTION = "drivers contradict each other"
+    NOT_CLOSED = "loops not closed"
 
 
 @dataclass
@@ -142,6 +142,16 @@ class Follower:
                 here = self.system.at(x)
                 break
         return here, total, left <= max(goal, ACCEPTED)
+
+    def closed_again(self, x: Array, which: Index) -> tuple[Array, Array]:
+        """States closed from near by, each with its choice; also the largest correction ``(T,)``, infinite where it failed."""
+        out, shift = x.copy(), np.zeros(x.shape[1])
+        for choice in np.unique(which):
+            at = np.flatnonzero(which == choice)
+            here, total, done = self.correct(x[:, at], int(choice))
+            out[:, at] = here.x
+            shift[at] = np.where(done, np.abs(total).max(axis=0, initial=0.0), np.inf)
+        return out, shift
 
     def newton_step(self, here: Configuration, choice: int) -> Array:
         """One limited Newton step ``(F, T)`` at every state of a configuration."""

@@ -49,16 +49,17 @@ def rates(
     V = here.link_twists(dq)
     Z = solver.null_of_columns() if bodies else np.zeros((len(dq), 0, here.T))
     if bodies:
-        G = idle.passive_twists(here, bodies, Z)
-        dq += np.einsum("fpt,pt->ft", Z, idle.resting_part(G, idle.body_twists(here, bodies, V)))
+        points = idle.rest_points(here, bodies, Z)
+        G = idle.passive_twists(here, bodies, points, Z)
+        dq += np.einsum("fpt,pt->ft", Z, idle.resting_part(G, idle.body_twists(bodies, points, V)))
         V = here.link_twists(dq)
     bias = here.loop_sums(here.bias(dq, V))
     turning = (dq * dq).max(axis=0, initial=0.0)
     ddq, gap_a = _completed(here, solver, columns, acceleration, bias, turning)
     A = here.link_accelerations(dq, ddq, V)
     if bodies:
-        now = idle.body_accelerations(here, bodies, V, A)
-        change = np.linalg.solve(np.einsum("ipt,iqt->tpq", G, G), idle.turning_part(here, bodies, V, G).T[..., None])[
+        now = idle.body_accelerations(bodies, points, V, A)
+        change = np.linalg.solve(np.einsum("ipt,iqt->tpq", G, G), idle.turning_part(bodies, points, V, G).T[..., None])[
             ..., 0
         ].T
         ddq += np.einsum("fpt,pt->ft", Z, idle.resting_part(G, now) - change)

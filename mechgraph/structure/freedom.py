@@ -61,13 +61,10 @@ class Freedoms:
         """Freedoms minus rank."""
         return self.null.shape[1]
 
-    def bodies(self, system: System) -> tuple[Idle, ...]:
+    @property
+    def bodies(self) -> tuple[Idle, ...]:
         """The bodies that have passive freedoms."""
-        out = []
-        for links in dict.fromkeys(p.links for p in self.passive):
-            border = [k for k, (a, b) in enumerate(system.graph.ends) if (a in links) != (b in links)]
-            out.append(Idle(links[0], np.array(border, dtype=np.intp)))
-        return tuple(out)
+        return tuple(Idle(links[0]) for links in dict.fromkeys(p.links for p in self.passive))
 
 
 def is_large(system: System) -> bool:
