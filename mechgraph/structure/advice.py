@@ -20,7 +20,7 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import TABLE, PairType
 from mechgraph.motion.assembly import named_columns, scaled_system
 from mechgraph.motion.system import Configuration, System
-from mechgraph.numerics.linear import RANK_TOLERANCE, rank_of, singular_values
+from mechgraph.numerics.linear import RANK_TOLERANCE, singular_values
 from mechgraph.structure.freedom import Freedoms, free_motion
 from mechgraph.structure.mobility import finite_motion
 

@@ -46,7 +46,7 @@ class _Search:
     def __init__(self, here: Configuration, driven: Index) -> None:
         self.here, self.system = here, here.system
         first = self.system.first_column
-        self.spans = [(int(i), int(j)) for i, j in zip(first, first[1:], strict=False)]
+        self.spans = [(int(i), int(j)) for i, j in pairwise(first)]
         self.driven = {int(c) for c in driven}
         self.place = {int(k): (n, i) for n, g in enumerate(self.system.groups) for i, k in enumerate(g.pairs)}
         self.columns = [[c for c in range(*span) if c not in self.driven] for span in self.spans]

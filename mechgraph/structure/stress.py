@@ -62,9 +62,9 @@ def stress_at(here: Configuration, driven: Index) -> Stress:
 def pair_states(here: Configuration, loops: Array) -> Array:
     """Total pair wrenches ``(6, P, s, 1)`` of loop wrenches ``(6 loops, s)``: ``w = C^T x``."""
     C = here.system.graph.loop_matrix
-    shaped = loops.reshape(C.shape[0], 6, loops.shape[1])
-    flat = C.T @ shaped.reshape(C.shape[0], -1)
-    return np.ascontiguousarray(flat.reshape(C.shape[1], 6, -1).transpose(1, 0, 2))[..., None]
+    count = loops.shape[1]
+    flat = C.T @ loops.reshape(C.shape[0], 6 * count)
+    return np.ascontiguousarray(flat.reshape(C.shape[1], 6, count).transpose(1, 0, 2))[..., None]
 
 
 def uniqueness(here: Configuration, driven: Index) -> Uniqueness:
