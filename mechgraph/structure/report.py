@@ -196,8 +196,7 @@ class DeterminacyReport:
         """Freedoms left free that are neither driven nor passive."""
         if not self.geometry:
             return ()
-        found = self.geometry.freedoms.undriven
-        return tuple(Finding(f"{', '.join(f.names)} {'move' if len(f.names) > 1 else 'moves'}", f.names) for f in found)
+        return drivers.left_free(self.mechanism, self.geometry.freedoms)
 
     @cached_property
     def passive(self) -> tuple[Finding, ...]:

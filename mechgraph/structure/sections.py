@@ -86,10 +86,13 @@ def _drivers(r: DeterminacyReport) -> list[Any]:
         return []
     able = [name for f in r.drivable for name in f.freedoms]
     lines = [f"can drive: {short(able, LISTED)}" if able else "no freedom can drive"]
-    if r.contradicting_drives:
+    if r.contradicting_drives and r.mobility:
         lines.append("the declared drivers depend on each other: take one away")
     lines += [f"only one of {short(group, LISTED)} (they move in proportion)" for group in r.dependent_drives]
-    lines += [f.text for f in r.not_drivable]
+    reasons_why: dict[str, list[str]] = {}
+    for f in r.not_drivable:
+        reasons_why.setdefault(f.text.split(": ", 1)[1], []).extend(f.freedoms)
+    lines += [f"cannot drive: {short(names, LISTED)}: {why}" for why, names in reasons_why.items()]
     if r.suggested_drives:
         word = "drive also" if r.mechanism.drives else "suggested"
         lines.append(f"{word}: {short(r.suggested_drives, LISTED)}")
@@ -150,7 +153,7 @@ def _cure(r: DeterminacyReport) -> list[Any]:
     if not better:
         return []
     best = min(better, key=lambda e: (e.redundancy[1], len(e.changes)))
-    start = "To make every reaction unique" if not best.redundancy[1] else "To lower the redundancy"
+    start = "To remove all redundancy" if not best.redundancy[1] else "To lower the redundancy"
     return [Paragraph(f"{start}: {best.text} (more under Advice).")]
 
 

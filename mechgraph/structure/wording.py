@@ -76,11 +76,25 @@ def _here(r: DeterminacyReport) -> str:
         free = f"{plural(len(r.undriven), 'freedom')} left free that {verb} neither driven nor passive"
         shaky = " The mobility is infinitesimal only: a shaky structure." if _shaky(r) else ""
         return f"Under-driven: mobility {r.mobility}, {plural(drivers, 'driver')}, {free}.{shaky}"
+    if not r.mobility and drivers:
+        return _driven_structure(r)
     if not _loose(r):
         idle = f" ({plural(len(r.passive), 'passive freedom')} held)" if r.passive else ""
         state = "Determinate" if r.mobility else "Determinate structure"
         return f"{state}: {_counts(r)}; every reaction is unique{idle}."
     return f"{_state(r)}, {_tied(r)}{_efforts(r)}."
+
+
+def _driven_structure(r: DeterminacyReport) -> str:
+    """A structure with drivers on it."""
+    one = len(r.mechanism.drives) == 1
+    who = f"{weakest_drive(r)} only strains it" if one else "its drivers only strain it"
+    rest = (
+        f"without {'it' if one else 'them'} every reaction is unique"
+        if not r.redundancy
+        else f"even without {'it' if one else 'them'} {plural(r.redundancy, 'constraint is', 'constraints are')} redundant"
+    )
+    return f"A structure (mobility 0), which cannot be driven: {who}; {rest}."
 
 
 def _shaky(r: DeterminacyReport) -> bool:
