@@ -120,6 +120,7 @@ def test_a_pendulum_is_not_passive() -> None:
     report = mg.check(m)
     assert not report.passive
     assert len(report.undriven) == 1
+    assert "Under-driven" in str(report)
 
 
 # --- locked freedoms and drivers -----------------------------------------------------------------------------------------------

@@ -280,7 +280,9 @@ def _freeing(system: System, x: Array, freedoms: Freedoms, changes: list[Change]
     if freedoms.mobility - len(freedoms.passive) and not (motion and motion.mobility == 0):
         return []
     found: list[Effect] = []
-    for c in _spread(sorted((c for c in changes if c.added > _relief((c,))), key=lambda c: (c.added, c.pair)))[:FREEING]:
+    for c in _spread(sorted((c for c in changes if c.added > _relief((c,))), key=lambda c: (c.added, c.pair)))[
+        :FREEING
+    ]:
         done = effect(system, x, freedoms, (c,))
         if done and done.mobility[1] - done.passive[1] > freedoms.mobility - len(freedoms.passive):
             found.append(done)

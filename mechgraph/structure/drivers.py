@@ -12,6 +12,8 @@ from mechgraph.structure.passive import STILL
 
 WEAK = (1e-3, 1e-8)
 """Part of a freedom's motion that must be independent of the drivers chosen before: wanted, and at least."""
+SHOWN = 8
+"""Freedoms named for one motion."""
 PROPORTIONAL = 1e-9
 MOST_INPUTS = 200
 """Input freedoms above which freedoms that move in proportion are not looked for."""
@@ -21,6 +23,18 @@ def single_freedoms(m: Mechanism) -> list[tuple[int, str]]:
     """Freedoms that take a drive, as (column, name)."""
     single = [d for p in m.pairs for d in p.type.drivable]
     return [(i, n) for i, (n, s) in enumerate(zip(m.freedom_names(), single, strict=True)) if s]
+
+
+def left_free(m: Mechanism, freedoms: Freedoms) -> tuple[Finding, ...]:
+    """Motions that are neither driven nor passive: the freedoms that move in each, those that could be driven first."""
+    single = {name for _, name in single_freedoms(m)}
+    out = []
+    for motion in freedoms.undriven:
+        names = sorted(motion.names, key=lambda n: n not in single)
+        shown = ", ".join(names[:SHOWN]) + (f" and {len(names) - SHOWN} more" if len(names) > SHOWN else "")
+        verb = "moves" if len(names) == 1 else "move together"
+        out.append(Finding(f"{shown} {verb}", motion.names))
+    return tuple(out)
 
 
 def drivable(m: Mechanism, inputs: Array) -> tuple[Finding, ...]:
@@ -43,7 +57,7 @@ def not_drivable(
         why = "moves only in a passive motion"
         if still[i]:
             dead = nearby[i] and freedoms.mobility
-            why = "dead point here (it moves in positions near by)" if dead else "it stands still"
+            why = "dead point here (moves in positions near by)" if dead else "stands still"
         out.append(Finding(f"{name} cannot drive: {why}", (name,)))
     return tuple(out)
 

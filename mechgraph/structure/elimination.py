@@ -118,9 +118,7 @@ class Elimination:
             self._solved.append(_Solved(free, np.zeros(0, dtype=np.intp), np.zeros((free.size, 0)), np.eye(free.size)))
         self._zero.append(slots)
 
-    def _enter(
-        self, front: Array, slots: Index, active: Index, i: int, points: Array
-    ) -> tuple[Array, Index, Index]:
+    def _enter(self, front: Array, slots: Index, active: Index, i: int, points: Array) -> tuple[Array, Index, Index]:
         """Put the independent rows of loop ``i`` under the front."""
         move = local_measure(points)
         block = move @ self.rows.blocks[i]

@@ -15,6 +15,8 @@ from mechgraph.numerics.linear import RANK_TOLERANCE, rank_of, singular_values
 from mechgraph.structure.elimination import Elimination, loop_rows
 from mechgraph.structure.passive import STILL, PassiveMotion, passive_motions
 
+NEAR = 1e-3
+"""Margin below which a position is called nearly singular, and part of a motion below which a driver is near a dead point."""
 LARGE = 96
 """Rows of the closure Jacobian above which rank and motions come from elimination along the loops, not from one dense matrix."""
 ELIMINATION_RANK = 1e-9

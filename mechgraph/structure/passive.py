@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 
@@ -46,7 +46,7 @@ class _Search:
     def __init__(self, here: Configuration, driven: Index) -> None:
         self.here, self.system = here, here.system
         first = self.system.first_column
-        self.spans = [(int(i), int(j)) for i, j in zip(first, first[1:], strict=False)]
+        self.spans = [(int(i), int(j)) for i, j in pairwise(first)]
         self.driven = {int(c) for c in driven}
         self.place = {int(k): (n, i) for n, g in enumerate(self.system.groups) for i, k in enumerate(g.pairs)}
         self.columns = [[c for c in range(*span) if c not in self.driven] for span in self.spans]
@@ -130,14 +130,14 @@ def _borders(search: _Search, left: Array) -> Iterator[tuple[tuple[int, ...], tu
         if graph.frame not in links and len(pairs) > 1 and all(search.meet(pairs[0], k) for k in pairs[1:]):
             seen.add(tuple(links))
             yield tuple(links), tuple(pairs)
-    for pairs in series(graph):
-        near = combinations(pairs, 2) if len(pairs) <= LONGEST_SERIES else zip(pairs, pairs[1:], strict=False)
-        for one, two in near:
+    for in_series in series(graph):
+        few = len(in_series) <= LONGEST_SERIES
+        for one, two in combinations(in_series, 2) if few else pairwise(in_series):
             if search.meet(one, two):
-                links = _cut_off(graph, one, two)
-                if links not in seen:
-                    seen.add(links)
-                    yield links, (one, two)
+                cut = _cut_off(graph, one, two)
+                if cut not in seen:
+                    seen.add(cut)
+                    yield cut, (one, two)
 
 
 def _cut_off(graph: LinkGraph, one: int, two: int) -> tuple[int, ...]:
@@ -207,7 +207,9 @@ def _leaving(search: _Search, k: int, links: tuple[int, ...], moves: Array, twis
         if carried:
             bases = compose(pose_exp(twist[:, None] * steps), bases)
         x = evaluation.advance(
-            row, np.repeat(here.x[g.state_rows[:, i]][:, None, :1], 3, axis=2), (move[g.columns[:, i]][:, None, None] * steps)
+            row,
+            np.repeat(here.x[g.state_rows[:, i]][:, None, :1], 3, axis=2),
+            (move[g.columns[:, i]][:, None, None] * steps),
         )
         W = evaluation.reactions_of(row, pitch, evaluation.frames_of(row, pitch, x, bases[:, :, None]))[:, :, 0]
         Q, _ = np.linalg.qr(W[:, :, 2])

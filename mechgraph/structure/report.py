@@ -20,7 +20,7 @@ from mechgraph.motion.system import Index, System
 from mechgraph.structure import drivers, facts, sections, wording
 from mechgraph.structure.advice import Effect, advice
 from mechgraph.structure.findings import Finding, LoopFact, input_motions, locked_findings, loop_facts, passive_finding
-from mechgraph.structure.freedom import Freedoms, free_motion
+from mechgraph.structure.freedom import NEAR, Freedoms, free_motion
 from mechgraph.structure.generic import Generic, generic
 from mechgraph.structure.mobility import FiniteMotion, finite_motion
 from mechgraph.structure.readable import SelfStress
@@ -28,8 +28,6 @@ from mechgraph.structure.stress import Uniqueness, uniqueness
 from mechgraph.topology.linkgraph import LinkGraph, link_graph
 from mechgraph.topology.parts import Parts, parts_of
 
-NEAR = 1e-3
-"""Margin below which a position is called nearly singular."""
 DOUBT = 1e-11
 """Largest dropped singular value above which it may be more than rounding, so that the verdict is called near."""
 AUTOMATIC = 90
@@ -198,8 +196,7 @@ class DeterminacyReport:
         """Freedoms left free that are neither driven nor passive."""
         if not self.geometry:
             return ()
-        found = self.geometry.freedoms.undriven
-        return tuple(Finding(f"{', '.join(f.names)} {'move' if len(f.names) > 1 else 'moves'}", f.names) for f in found)
+        return drivers.left_free(self.mechanism, self.geometry.freedoms)
 
     @cached_property
     def passive(self) -> tuple[Finding, ...]:
@@ -303,9 +300,7 @@ class DeterminacyReport:
         return to_html(self.document())
 
 
-def check(
-    m: Mechanism, at: Mapping[str, float] | None = None, *, thorough: bool | None = None
-) -> DeterminacyReport:
+def check(m: Mechanism, at: Mapping[str, float] | None = None, *, thorough: bool | None = None) -> DeterminacyReport:
     """The determinacy report of a mechanism: of its graph, and where it has geometry of its closed position at ``start``.
 
     Parameters

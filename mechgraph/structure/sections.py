@@ -6,11 +6,15 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from mechgraph.document import Bullets, Document, Heading, Paragraph, Table
+from mechgraph.model.pair import TABLE
+from mechgraph.structure.freedom import NEAR
 from mechgraph.structure.wording import loop_names, plural, reasons, short
 
 if TYPE_CHECKING:
     from mechgraph.structure.report import DeterminacyReport
 
+TERMS = 4
+"""Terms of a sum that is printed."""
 LISTED = 20
 """Items of one kind that are printed; the rest stand in the JSON."""
 NOT_UNIQUE = (
@@ -28,7 +32,7 @@ def document(r: DeterminacyReport) -> Document:
     blocks: list[Any] = [Paragraph(r.verdict)]
     if r.note:
         blocks.append(Paragraph(r.note))
-    blocks += _facts(r)
+    blocks += [*_facts(r), *_cure(r)]
     for key, title in (("undriven", "Left free"), ("passive", "Passive freedoms"), ("locked", "Locked freedoms")):
         found = getattr(r, key)
         if found:
@@ -72,7 +76,7 @@ def _mobility(r: DeterminacyReport) -> list[Any]:
     return [
         Paragraph(
             f"Mobility {r.mobility} = {plural(r.inputs or 0, 'input freedom')} + {plural(len(r.passive), 'passive freedom')}; "
-            f"finite mobility: {finite}. Margin {r.margin:.3g}."
+            f"finite mobility: {finite}. Margin to a singular position: {r.margin:.3g} (near below {NEAR:g})."
         )
     ]
 
@@ -82,10 +86,13 @@ def _drivers(r: DeterminacyReport) -> list[Any]:
         return []
     able = [name for f in r.drivable for name in f.freedoms]
     lines = [f"can drive: {short(able, LISTED)}" if able else "no freedom can drive"]
-    if r.contradicting_drives:
+    if r.contradicting_drives and r.mobility:
         lines.append("the declared drivers depend on each other: take one away")
     lines += [f"only one of {short(group, LISTED)} (they move in proportion)" for group in r.dependent_drives]
-    lines += [f.text for f in r.not_drivable]
+    reasons_why: dict[str, list[str]] = {}
+    for f in r.not_drivable:
+        reasons_why.setdefault(f.text.split(": ", 1)[1], []).extend(f.freedoms)
+    lines += [f"cannot drive: {short(names, LISTED)}: {why}" for why, names in reasons_why.items()]
     if r.suggested_drives:
         word = "drive also" if r.mechanism.drives else "suggested"
         lines.append(f"{word}: {short(r.suggested_drives, LISTED)}")
@@ -99,7 +106,9 @@ def _reactions(r: DeterminacyReport) -> list[Any]:
     for pair, row in r.unique.items():
         yes = " ".join(n for n, ok in row.items() if ok)
         no = " ".join(n for n, ok in row.items() if not ok)
-        rows.append((pair, r.mechanism.pair(pair).type.symbol if len(rows) < LISTED else "", yes or "none", no or "none"))
+        rows.append(
+            (pair, r.mechanism.pair(pair).type.symbol if len(rows) < LISTED else "", yes or "none", no or "none")
+        )
     if len(rows) > LISTED:
         rows = [*rows[:LISTED], ("...", "", f"and {len(rows) - LISTED} pairs more (see the JSON)", "")]
     loose = [NOT_UNIQUE] if any(not ok for row in r.unique.values() for ok in row.values()) else []
@@ -125,13 +134,38 @@ def _stresses(r: DeterminacyReport) -> list[Any]:
         if directions:
             blocks += [Paragraph("Directions in the axes x, y, z of the pair's marker."), _listed(directions)]
         if found.combinations:
-            blocks.append(_listed(f"group {group + 1}: {text}" for group, text in found.combinations))
+            blocks += _sums(found.combinations)
     return blocks
+
+
+def _sums(combinations: tuple[tuple[int, str], ...]) -> list[Any]:
+    """Sums across pairs that are unique; those of many terms are left to the JSON."""
+    lines = [f"group {group + 1}: {text}" for group, text in combinations if text.count(":") <= TERMS]
+    more = len(combinations) - len(lines)
+    if more:
+        lines.append(f"{'and ' if lines else ''}{more} of more than {TERMS} terms (see the JSON)")
+    return [Paragraph("These sums are unique though their terms are not:"), _listed(lines)]
+
+
+def _cure(r: DeterminacyReport) -> list[Any]:
+    """The change that makes most unique, in one line for the first screen."""
+    better = [e for e in r.effects if e.redundancy[1] < e.redundancy[0]]
+    if not better:
+        return []
+    best = min(better, key=lambda e: (e.redundancy[1], len(e.changes)))
+    start = "To remove all redundancy" if not best.redundancy[1] else "To lower the redundancy"
+    return [Paragraph(f"{start}: {best.text} (more under Advice).")]
+
+
+def _types(r: DeterminacyReport) -> list[Any]:
+    """What the new pair types of the advice are."""
+    new = sorted({kind for e in r.effects for _, _, kind in e.changes})
+    return [Paragraph(f"Pair types: {'; '.join(f'{kind} {TABLE[kind].name}' for kind in new)}.")] if new else []
 
 
 def _advice(r: DeterminacyReport) -> list[Any]:
     if r.advice:
-        return [Heading("Advice", 2), _listed(a.text for a in r.advice)]
+        return [Heading("Advice", 2), _listed(a.text for a in r.advice), *_types(r)]
     if r.geometry and not r.thorough and r.redundancy:
         text = "Pair changes were not sought, as the mechanism is large; check(m, thorough=True) does."
         return [Heading("Advice", 2), Paragraph(text)]
@@ -169,7 +203,8 @@ def _structure(r: DeterminacyReport) -> list[Any]:
     if not lines:
         lines.append("every equation has an unknown of its own, and every unknown an equation")
     lines += [
-        f"{n} redundant whatever the dimensions, in the {loop_names(r, loops)}" for n, loops in r.generic.places[:LISTED]
+        f"{n} redundant whatever the dimensions, in the {loop_names(r, loops)}"
+        for n, loops in r.generic.places[:LISTED]
     ]
     return [Heading("By count alone (unknowns matched to equations)", 2), Bullets(tuple(lines))]
 

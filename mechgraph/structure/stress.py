@@ -32,11 +32,13 @@ class Uniqueness:
     Attributes
     ----------
     unique : pair -> component -> bool; ``effort`` (or ``effort Tz``) for driven freedoms.
-    count, groups : number of self-stresses with the drivers in place, and of groups that share components.
+    count, groups : number of self-stresses with the drivers in place, and of groups that share components (in a large mechanism: of
+        connected parts in which they lie).
     states : canonical sparse self-stresses; in a large mechanism the first few.
     transverse : directions of force and moment that are unique in a pair though its components are not.
     combinations : per group the further sums of components that are unique although their terms are not, as text.
     weakest, strongest : the largest part of a unit self-stress in a component called unique, the smallest in one called not unique.
+    sampled : whether random self-stresses stood for all of them, as in large mechanisms.
     """
 
     unique: dict[str, dict[str, bool]]
@@ -47,6 +49,7 @@ class Uniqueness:
     combinations: tuple[tuple[int, str], ...]
     weakest: float
     strongest: float
+    sampled: bool = False
 
 
 def stress_at(here: Configuration, driven: Index) -> Stress:
@@ -59,9 +62,9 @@ def stress_at(here: Configuration, driven: Index) -> Stress:
 def pair_states(here: Configuration, loops: Array) -> Array:
     """Total pair wrenches ``(6, P, s, 1)`` of loop wrenches ``(6 loops, s)``: ``w = C^T x``."""
     C = here.system.graph.loop_matrix
-    shaped = loops.reshape(C.shape[0], 6, loops.shape[1])
-    flat = C.T @ shaped.reshape(C.shape[0], -1)
-    return np.ascontiguousarray(flat.reshape(C.shape[1], 6, -1).transpose(1, 0, 2))[..., None]
+    count = loops.shape[1]
+    flat = C.T @ loops.reshape(C.shape[0], 6 * count)
+    return np.ascontiguousarray(flat.reshape(C.shape[1], 6, count).transpose(1, 0, 2))[..., None]
 
 
 def uniqueness(here: Configuration, driven: Index) -> Uniqueness:
@@ -92,15 +95,14 @@ def _uniqueness_of_many(here: Configuration, driven: Index) -> Uniqueness:
     labels, table = component_table(here, orthonormal_stress(here, pair_states(here, probes), driven), driven)
     verdicts = _verdicts(here, labels, table)
     directions, _ = transverse(here, labels, table)
-    _, first = component_table(
-        here, orthonormal_stress(here, pair_states(here, _first_states(found)), driven), driven
-    )
+    _, first = component_table(here, orthonormal_stress(here, pair_states(here, _first_states(found)), driven), driven)
     return Uniqueness(
         count=count,
         groups=_group_count(here, found, verdicts["unique"]),
         states=readable(first, labels)[0][:LISTED],
         transverse=directions,
         combinations=(),
+        sampled=True,
         **verdicts,
     )
 
@@ -121,15 +123,16 @@ def _group_count(here: Configuration, found: Elimination, unique: dict[str, dict
 
 def _first_states(found: Elimination) -> Array:
     """Loop wrenches of the first self-stresses: those of single loops, then shared ones."""
-    columns: list[Array] = []
+    rows = 6 * len(found.rows.blocks)
+    columns: list[Array] = [np.zeros((rows, 0))]
+    count = 0
     for i, Y in sorted(found.local, key=lambda item: item[0]):
-        if len(columns) < LISTED:
-            for y in Y.T:
-                columns.append(np.zeros(6 * len(found.rows.blocks)))
-                columns[-1][6 * i : 6 * i + 6] = y
-    left = max(0, min(LISTED - len(columns), len(found.zero_rows)))
-    shared = found.wrenches(np.eye(len(found.zero_rows), left))
-    return np.concatenate([np.array(columns).reshape(len(columns), -1).T.reshape(shared.shape[0], -1), shared], axis=1)
+        if count < LISTED:
+            columns.append(np.zeros((rows, Y.shape[1])))
+            columns[-1][6 * i : 6 * i + 6] = Y
+            count += Y.shape[1]
+    left = max(0, min(LISTED - count, len(found.zero_rows)))
+    return np.concatenate([*columns, found.wrenches(np.eye(len(found.zero_rows), left))], axis=1)
 
 
 def component_table(here: Configuration, stress: Stress, driven: Index) -> tuple[list[Label], Array]:

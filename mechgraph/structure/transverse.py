@@ -1,7 +1,8 @@
 """Transverse verdicts by principal direction: forces and moments of a pair that are unique in one direction but not in another.
 
-``Fx`` and ``Fy`` in an arbitrary marker frame may both be called not unique where only the force in one direction across the axis is. So the
-components of one kind in one frame are taken as a vector; the directions in which no self-stress has a part are found and named.
+``Fx`` and ``Fy`` in an arbitrary marker frame may both be called not unique where only the force in one direction across the axis
+is. So the components of one kind in one frame are taken as a vector; the directions in which no self-stress has a part are found
+and named.
 """
 
 from __future__ import annotations

@@ -68,17 +68,33 @@ def _here(r: DeterminacyReport) -> str:
         if drivers <= r.mobility:
             dead = "a dead point" if drivers == 1 else "a dead point, or dependent drivers"
             return f"Badly driven: mobility {r.mobility}, but {weakest_drive(r)} cannot move it here ({dead})."
-        return f"Over-driven: mobility {r.mobility}, {plural(drivers, 'driver')} that cannot all be moved independently."
+        return (
+            f"Over-driven: mobility {r.mobility}, {plural(drivers, 'driver')} that cannot all be moved independently."
+        )
     if r.undriven:
         verb = "is" if len(r.undriven) == 1 else "are"
         free = f"{plural(len(r.undriven), 'freedom')} left free that {verb} neither driven nor passive"
         shaky = " The mobility is infinitesimal only: a shaky structure." if _shaky(r) else ""
         return f"Under-driven: mobility {r.mobility}, {plural(drivers, 'driver')}, {free}.{shaky}"
+    if not r.mobility and drivers:
+        return _driven_structure(r)
     if not _loose(r):
         idle = f" ({plural(len(r.passive), 'passive freedom')} held)" if r.passive else ""
         state = "Determinate" if r.mobility else "Determinate structure"
         return f"{state}: {_counts(r)}; every reaction is unique{idle}."
     return f"{_state(r)}, {_tied(r)}{_efforts(r)}."
+
+
+def _driven_structure(r: DeterminacyReport) -> str:
+    """A structure with drivers on it."""
+    one = len(r.mechanism.drives) == 1
+    who = f"{weakest_drive(r)} only strains it" if one else "its drivers only strain it"
+    rest = (
+        f"without {'it' if one else 'them'} every reaction is unique"
+        if not r.redundancy
+        else f"even without {'it' if one else 'them'} {plural(r.redundancy, 'constraint is', 'constraints are')} redundant"
+    )
+    return f"A structure (mobility 0), which cannot be driven: {who}; {rest}."
 
 
 def _shaky(r: DeterminacyReport) -> bool:
@@ -111,11 +127,11 @@ def _tied(r: DeterminacyReport) -> str:
     if len(sets) > SETS:
         shown.append(f"others of {plural(sum(len(p) for p in list(sets.values())[SETS:]), 'further pair')}")
     groups = r.reactions.groups if r.reactions else 0
-    form = "one self-stress group" if groups == 1 else plural(groups, "self-stress group")
+    form = "form one self-stress group" if groups == 1 else f"form {plural(groups, 'self-stress group')}"
+    if r.reactions and r.reactions.sampled:
+        form = f"are tied in {plural(groups, 'connected part')} of the mechanism"
     components = "reaction component is" if total == 1 else "reaction components are"
-    return (
-        f"but {total} {components} not unique: {'; '.join(shown)} form {form} (redundancy {r.redundancy})"
-    )
+    return f"but {total} {components} not unique: {'; '.join(shown)} {form} (redundancy {r.redundancy})"
 
 
 def _joined(names: list[str]) -> str:
@@ -143,7 +159,9 @@ def _of_topology(r: DeterminacyReport) -> str:
         return f"{count}: {where}{rest}; mobility {generic.mobility} for general geometry."
     if generic.mobility > drivers:
         free = plural(generic.mobility - drivers, "freedom")
-        return f"{count}: mobility {generic.mobility} for general geometry, {free} not driven."
+        return (
+            f"{count}: mobility {generic.mobility} for general geometry, {free} not driven (to be driven, or passive)."
+        )
     if generic.mobility < drivers:
         return (
             f"{count}: mobility {generic.mobility} for general geometry, "

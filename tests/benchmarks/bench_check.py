@@ -1,6 +1,7 @@
 """Times of ``mg.check`` and of the printed report: python tests/benchmarks/bench_check.py [--all]."""
 
 import sys
+from itertools import pairwise
 from pathlib import Path
 from time import perf_counter
 
@@ -20,7 +21,7 @@ def measure(m: mg.Mechanism) -> tuple[mg.DeterminacyReport, float, float, float]
     times.append(perf_counter())
     report.to_json()
     times.append(perf_counter())
-    check, text, json = (b - a for a, b in zip(times, times[1:], strict=False))
+    check, text, json = (b - a for a, b in pairwise(times))
     return report, check, text, json
 
 
