@@ -237,7 +237,7 @@ class PairType:
     def scaled(self, L: float) -> PairType:
         """The row with its lengths divided by ``L``: pitches of turns given as numbers, arms of forces; itself where it has none."""
         freedoms = tuple(
-            replace(f, twist=(*f.twist[:3], *(v / L for v in f.twist[3:]))) if f.turns and any(f.twist[3:]) else f
+            replace(f, twist=_six((*f.twist[:3], *(v / L for v in f.twist[3:])))) if f.turns and any(f.twist[3:]) else f
             for f in self.freedoms
         )
         reactions = self.reactions if self.reactions is None else tuple(_scaled_arm(c, L) for c in self.reactions)
@@ -299,7 +299,7 @@ def _scaled_arm(c: Component, L: float) -> Component:
     """A force component with its moment (an arm) divided by ``L``; couples have none."""
     if c.is_couple or not any(c.wrench[:3]):
         return c
-    return replace(c, wrench=(*(v / L for v in c.wrench[:3]), *c.wrench[3:]))
+    return replace(c, wrench=_six((*(v / L for v in c.wrench[:3]), *c.wrench[3:])))
 
 
 def _dual_effort(freedom: Freedom, frame: int) -> Component:
