@@ -63,8 +63,8 @@ class Freedoms:
 
     @property
     def bodies(self) -> tuple[Idle, ...]:
-        """The bodies that have passive freedoms."""
-        return tuple(Idle(links[0]) for links in dict.fromkeys(p.links for p in self.passive))
+        """The links that have passive freedoms, each a body."""
+        return tuple(Idle(link) for link in sorted({link for p in self.passive for link in p.links}))
 
 
 def is_large(system: System) -> bool:
