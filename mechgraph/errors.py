@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from os import PathLike
 
 
 class MechgraphError(Exception):
@@ -32,7 +32,7 @@ class DeclarationError(MechgraphError):
 class FileError(MechgraphError):
     """A file cannot be read or written; ``path`` says which."""
 
-    def __init__(self, path: str | Path, reason: str) -> None:
+    def __init__(self, path: str | PathLike[str], reason: str) -> None:
         self.path = str(path)
         self.reason = reason
         super().__init__(f"{path}: {reason}")

@@ -43,16 +43,22 @@ class Motions:
     driven: Index
     held: tuple[Index, ...]
     which: Index
+    tracks: tuple[tuple[Array, Array, Array] | None, ...] = ()
 
 
 @dataclass(frozen=True)
 class Forces:
-    """Inertia ``(6, N, T)`` and what loads do (``site``), the wrenches found, and whether redundant reactions are NaN."""
+    """Inertia ``(6, N, T)`` and what loads do (``site``), the wrenches found, and whether redundant reactions are NaN.
+
+    ``hold (6, N, T)`` keeps passive bodies at rest, ``holds`` are its sizes by name and whether they are couples.
+    """
 
     inertia: Array
     site: Site
     wrenches: Wrenches
     mask_redundant: bool
+    hold: Array
+    holds: tuple[tuple[str, bool, Array], ...]
 
 
 class Analysis:
@@ -104,9 +110,21 @@ class Analysis:
         s = self._system
         x = np.full((s.n_state, int(np.prod(self.batch))), np.nan)
         x[:, self.motions.good] = self._here.x
-        shaped = x.reshape(s.n_state, *(self.batch or (1,)))
-        q = s.coordinates_of(shaped, s.start_coordinates(self.mechanism.start))
-        return q.reshape(s.n_freedoms, *self.batch)
+        start = s.start_coordinates(self.mechanism.start)
+        tracks = self.motions.tracks
+        if not tracks or any(track is None for track in tracks):
+            q = s.coordinates_of(x.reshape(s.n_state, *(self.batch or (1,))), start)
+            return q.reshape(s.n_freedoms, *self.batch)
+        cases = x.reshape(s.n_state, len(tracks), x.shape[1] // len(tracks))
+        out = np.empty((s.n_freedoms, *cases.shape[1:]))
+        for c, track in enumerate(tracks):
+            at, nodes, along = track or (np.zeros(0), x[:, :0], np.zeros(0))
+            order = np.argsort(np.concatenate([at, along]), kind="stable")
+            q = s.coordinates_of(np.concatenate([nodes, cases[:, c]], axis=1)[:, order], start)
+            back = np.empty_like(order)
+            back[order] = np.arange(len(order))
+            out[:, c] = q[:, back[len(at) :]]
+        return out.reshape(s.n_freedoms, *self.batch)
 
     def coordinates(self, pair: int) -> tuple[Array, Array, Array]:
         """Coordinates, rates, accelerations of a pair."""
@@ -146,7 +164,7 @@ class Analysis:
     @cached_property
     def _loads(self) -> Array:
         forces = self._need_forces()
-        return forces.inertia + forces.site.scaled(forces.site.external + forces.site.internal)
+        return forces.inertia + forces.site.scaled(forces.site.external + forces.site.internal) + forces.hold
 
     @cached_property
     def _stress(self) -> Stress:
@@ -211,16 +229,12 @@ class Analysis:
 
     @cached_property
     def _driver_efforts(self) -> Array:
-        """What drivers and holders add to given efforts, ``(F, T)``; zero elsewhere."""
+        """What drivers add to given efforts, ``(F, T)``; zero elsewhere."""
         forces = self._need_forces()
         out = np.zeros_like(self._solved[1])
         given = forces.site.scaled_efforts()
         driven = self.motions.driven
         out[driven] = self._solved[1][driven] - given[driven]
-        for i, held in enumerate(self.motions.held):
-            at = np.flatnonzero(self.motions.which == i)
-            cell = np.ix_(held, at)
-            out[cell] = self._solved[1][cell] - given[cell]
         return out
 
     def _effort_units(self, columns: Any) -> Array:
@@ -242,14 +256,15 @@ class Analysis:
         moving = np.delete(self._loads, frame, axis=1).sum(axis=1)
         return self._out(self._user_wrench(moving + forces.site.scaled(forces.site.internal)[:, frame]))
 
+    def link_hold(self, link: int) -> Array:
+        """Wrench that keeps a passive body at rest, about the global origin."""
+        return self._out(self._user_wrench(self._need_forces().hold[:, link]))
+
     def passive_efforts(self) -> dict[str, Array]:
-        """Efforts that hold passive freedoms."""
-        self._need_forces()
-        names = self.mechanism.freedom_names()
-        columns = sorted({int(c) for held in self.motions.held for c in held})
-        unit = self._effort_units(np.array(columns, dtype=np.intp)) if columns else None
+        """What keeps passive bodies at rest, by body: a couple about the axis of a turn, a force along a slide."""
         return {
-            names[c]: self._out(unit[i] * self._driver_efforts[c]) for i, c in enumerate(columns) if unit is not None
+            name: self._out((self._L**2 if turns else self._L) * size)
+            for name, turns, size in self._need_forces().holds
         }
 
     # --- checks and states -----------------------------------------------------------------------------------------------
@@ -271,14 +286,16 @@ class Analysis:
         add_at(balance, s.b, totals)
         add_at(balance, s.a, -totals)
         balance = np.delete(balance, s.graph.frame, axis=1)
-        largest = max(np.abs(totals).max(initial=0.0), np.abs(self._loads).max(initial=0.0))
+        forces = self._need_forces()
+        applied = forces.site.scaled(forces.site.external + forces.site.internal)
+        largest = max(np.abs(part).max(initial=0.0) for part in (totals, applied, forces.inertia, forces.hold))
         residual = np.abs(balance).max(axis=(0, 1), initial=0.0)
         work = np.abs(pair_power(here, reactions)).max(axis=0, initial=0.0)
         return np.maximum(residual, work) / (largest or 1.0)
 
     def _power(self) -> Array:
         forces, rates = self._need_forces(), self.motions.rates
-        applied = forces.site.scaled(forces.site.external + forces.site.internal)
+        applied = forces.site.scaled(forces.site.external + forces.site.internal) + forces.hold
         by_load = (rates.V * applied).sum(axis=0)
         by_effort = rates.dq * (self._driver_efforts + forces.site.scaled_efforts())
         kinetic = kinetic_power(rates, forces.inertia)
@@ -287,7 +304,11 @@ class Analysis:
 
     def state(self, index: Any) -> State:
         """Screws and loads at one position, user's units, global origin."""
-        flat = np.arange(int(np.prod(self.batch))).reshape(self.batch)[index]
+        try:
+            flat = np.arange(int(np.prod(self.batch))).reshape(self.batch)[index]
+        except IndexError:
+            text = f"state({index!r}): no such position in a batch {self.batch}; give one index an axis"
+            raise MechgraphError(text) from None
         if np.ndim(flat):
             raise MechgraphError(
                 f"state({index!r}): names {np.size(flat)} positions of a batch {self.batch}; give one index an axis"

@@ -18,6 +18,7 @@ from mechgraph.model.drive import Drive
 from mechgraph.model.load import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion_law import Motion
+from mechgraph.motion import idle
 from mechgraph.motion.assembly import CLOSED, assembled, assembled_at, named_columns, state_rows
 from mechgraph.motion.idle import Idle, held_well, spin_angles
 from mechgraph.motion.path import SINGULAR, Follower, Positions, Status
@@ -65,6 +66,11 @@ def driven(m: Mechanism, motions: Mapping[str, Any] | None) -> tuple[Mechanism, 
     Motions given by name go to the declared drives, or become the drives where none is declared; the others use the motion
     stored with them.
     """
+    if motions is not None and not isinstance(motions, Mapping):
+        raise DeclarationError(
+            f"solve {m.name!r}",
+            [f"motions = {type(motions).__name__}: expected a mapping driver -> motion, e.g. {{'A': angles}}"],
+        )
     given = dict(motions or {})
     faults: list[str] = []
     if not m.drives and given:
@@ -93,7 +99,10 @@ def driven(m: Mechanism, motions: Mapping[str, Any] | None) -> tuple[Mechanism, 
 
 def _batch(m: Mechanism, motions: Mapping[str, Motion]) -> tuple[int, ...]:
     try:
-        return np.broadcast_shapes(*(motion.shape for motion in motions.values()))
+        batch = np.broadcast_shapes(*(motion.shape for motion in motions.values()))
+        if 0 in batch:
+            raise DeclarationError(f"solve {m.name!r}", ["the motions have no positions; give at least one"])
+        return batch
     except ValueError:
         shapes = ", ".join(f"{name} {motion.shape}" for name, motion in motions.items())
         raise DeclarationError(
@@ -179,7 +188,8 @@ class _Run:
             solver = chosen_for_all(here.J, [], self.columns)
             choices, which = solver.choices, solver.which
         held = tuple(choice.held for choice in choices)
-        return Motions(here, moved, self.batch, good, status, self.t, self.columns, held, which), solver, found
+        tracks = () if bodies else found.tracks
+        return Motions(here, moved, self.batch, good, status, self.t, self.columns, held, which, tracks), solver, found
 
     def _disagreement(self, here: Configuration, moved: Rates, good: Index) -> Array:
         """How far given positions and rates of dependent drivers are from those that the leading ones bring, ``(T,)``."""
@@ -206,12 +216,14 @@ class _Run:
         return dead
 
     def _without_spin(self, found: Positions, bodies: tuple[Idle, ...]) -> Positions:
-        """The same positions with passive bodies not spinning from one to the next, the loops closed again."""
+        """The same positions with passive bodies not spinning from the start to the first and from one to the next."""
         x = found.x.copy()
         for c in range(x.shape[1]):
             at = np.flatnonzero(found.status[c] == Status.OK)
-            if at.size > 1:
-                x[:, c, at] = self._turned_back(x[:, c, at], found.choices, found.which[c, at], bodies)
+            if at.size:
+                path = np.concatenate([self.x[:, None], x[:, c, at]], axis=1)
+                which = found.which[c, np.concatenate([at[:1], at])]
+                x[:, c, at] = self._turned_back(path, found.choices, which, bodies)[:, 1:]
         return dataclasses.replace(found, x=x, here=None)
 
     def _turned_back(self, x: Array, choices: list[Choice], which: Index, bodies: tuple[Idle, ...]) -> Array:
@@ -338,8 +350,15 @@ def _forces(run: _Run, moved: Motions, solver: ChosenSystem, coordinates: Array,
     site = Site(moved.here, moved.rates, flat, run.batch, moved.good, run.t)
     site.collect(run.m.loads)
     loads = inertia + site.scaled(site.external + site.internal)
-    problem = Problem(moved.here, loads, site.scaled_efforts(), run.columns, moved.held, solver)
-    return Forces(inertia, site, METHODS[method](problem), redundant == "nan")
+    held = np.zeros_like(loads)
+    holds: tuple[tuple[str, bool, Array], ...] = ()
+    bodies = run.freedoms.bodies
+    if bodies:
+        Z = solver.null_of_columns()
+        held, sizes = idle.hold(moved.here, bodies, Z, loads, site.scaled_efforts())
+        holds = tuple((*name, size) for name, size in zip(idle.hold_names(moved.here, bodies, Z), sizes, strict=True))
+    problem = Problem(moved.here, loads + held, site.scaled_efforts(), run.columns, moved.held, solver)
+    return Forces(inertia, site, METHODS[method](problem), redundant == "nan", held, holds)
 
 
 def assemble(
@@ -354,12 +373,8 @@ def assemble(
     ------
     AssemblyError, ReachError
     """
-    wanted = {
-        m.full_name(name): float(value)
-        for name, value in (values or {}).items()
-        if not m.freedom_fault(name, single=True)
-    }
-    system, x = assembled_at(m, values or {}, guess)
+    system, x = assembled_at(m, {} if values is None else values, guess)
+    wanted = {m.full_name(name): float(value) for name, value in (values or {}).items()}
     q = system.coordinates_of(x[:, None], system.start_coordinates(m.start))[:, 0]
     start = dict(zip(m.freedom_names(), q.tolist(), strict=True)) | wanted
     return m.replace(start=start)

@@ -54,6 +54,12 @@ class Site:
         for load in loads:
             self._target = self.internal if len(load.links(self.m)) == 2 else self.external
             load.act(self)
+            parts = (self.external, self.internal, self.efforts)
+            if not all(np.isfinite(part).all() for part in parts):
+                raise DeclarationError(
+                    f"load {load.kind} {getattr(load, 'link', getattr(load, 'freedom', ''))}".strip(),
+                    ["gives a value that is not finite at some position; check its callable, or a spring of length 0"],
+                )
 
     # --- what loads ask ----------------------------------------------------------------------------------------------
 
@@ -86,11 +92,15 @@ class Site:
     def values(self, value: Value, link: str, width: int) -> Array:
         """A value at every position, ``(width, T)``."""
         if callable(value):
-            value = value(
-                self._spread(user_poses(self.here)[self._link[link]]),
-                self._spread(np.moveaxis(user_twists(self.here, self.rates.V)[:, self._link[link]], 0, -1)),
-                self.t,
-            )
+            i = self._link[link]
+            pose = self._spread(user_poses(self.here)[i])
+            twist = self._spread(np.moveaxis(user_twists(self.here, self.rates.V)[:, i], 0, -1))
+            try:
+                value = np.asarray(value(pose, twist, self.t), dtype=float)
+            except (TypeError, ValueError) as error:
+                raise DeclarationError(
+                    f"load on {link!r}", [f"its callable (pose, twist, t) failed: {error}"]
+                ) from error
         array = np.asarray(value, dtype=float)
         if width == 1 and (array.ndim == 0 or array.shape[-1:] != (1,) or len(array.shape) <= len(self.batch)):
             array = array[..., None]

@@ -40,8 +40,11 @@ class _Draft:
             )
         else:
             dual = f"{letter}0{number}"
-            turn = f" - rho_{k + 1} {direction}" if any(part.per_pitch) else ""
-            made = Screw(kind, k, index, direction, dual, f"{dual} = {point} x {direction}{turn}")
+            meaning = f"{dual} = {point} x {direction}"
+            if any(part.per_pitch):
+                meaning += f", rho_{k + 1} the pitch of pair {self.m.pairs[k].name} (advance per radian)"
+                dual = f"({dual}{{}} - rho_{k + 1} {direction}{{}})"
+            made = Screw(kind, k, index, direction, dual, meaning)
         self.screws.append(made)
         return len(self.screws) - 1
 
@@ -63,7 +66,8 @@ def _along(
         unknown = draft.unknown(name, pair, pair.type.symbol, part.is_couple, where)
         screw = draft.screw(kind, k, i, part, letter)
         draft.carry(act, unknown, screw)
-        printed.append(f"{'e ' if part.is_couple else ''}{name} {letter}_{k + 1}")
+        turned = f"(1 - e rho_{k + 1}) " if any(part.per_pitch) else ""
+        printed.append(f"{turned}{'e ' if part.is_couple else ''}{name} {letter}_{k + 1}")
     return printed
 
 
@@ -124,6 +128,10 @@ def _define(draft: _Draft, k: int, printed: list[str]) -> None:
 
 def _hat(symbol: str) -> str:
     r"""A printed term as LaTeX with hats on dual vectors: ``FA_1 A_1`` -> ``F^{A_{1}} \hat{A}_{1}``."""
+    front = ""
+    if symbol.startswith("("):
+        front, _, symbol = symbol.partition(") ")
+        front = subscript(front + ")").replace("e rho", r"\epsilon \rho") + " "
     words = symbol.split()
     out = []
     for i, word in enumerate(words):
@@ -134,7 +142,7 @@ def _hat(symbol: str) -> str:
             out.append(rf"\hat{{{head}}}_{{{tail}}}")
         else:
             out.append(f"{head[0]}^{{{head[1:]}_{{{tail}}}}}" if len(head) > 1 else subscript(word))
-    return " ".join(out)
+    return front + " ".join(out)
 
 
 def _driver_efforts(draft: _Draft, efforts: tuple[str, ...]) -> None:

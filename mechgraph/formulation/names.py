@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from dataclasses import dataclass
 
@@ -50,6 +51,7 @@ def screw_letter(part: Component | Freedom) -> str:
 
 
 def subscript(symbol: str) -> str:
-    """``F_12x`` as LaTeX ``F_{12x}``; primes stay on the letter."""
-    head, _, tail = symbol.partition("_")
-    return f"{head}_{{{tail}}}" if tail else head
+    """Symbols as LaTeX: ``F_12x`` -> ``F_{12x}``, ``A0_1x`` -> ``A^{0}_{1x}``; primes stay on the letter, rho is Greek."""
+    text = re.sub(r"([A-Za-z])0_", r"\1^{0}_", symbol)
+    text = re.sub(r"_([\w,]+(?:\([^)]*\)[xyz]?)?)", r"_{\1}", text)
+    return re.sub(r"\brho_", r"\\rho_", text)

@@ -37,7 +37,8 @@ def formulation_document(f: Formulation, components: bool) -> Document:
                 "R_ab: dual force F + e M that link a exerts on link b, M about the global origin; R_ba = -R_ab",
                 "F_I: inertia of a link, -(m a) and its moment; F_A: applied loads; F_IN: what a driver exerts on link b",
                 "A: pair axis, X and Y: the other directions of the marker (primes: frame after so many freedoms); "
-                "A0 = P x A its moment about the origin",
+                "A0 = P x A its moment about the origin, P the origin of its frame",
+                *(s.meaning for s in f.screws if "{}" in s.dual),
             )
         ),
     ]

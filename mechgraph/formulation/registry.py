@@ -23,8 +23,8 @@ AXES = ("x", "y", "z")
 class Screw:
     """A unit wrench or twist of a pair that appears in coefficients: ``kind`` and ``index`` place it in a State.
 
-    ``symbol`` is printed for the real part (direction), ``dual`` for the dual part (moment about the origin); empty where
-    that part is zero. ``meaning`` explains them.
+    ``symbol`` is printed for the real part (direction), ``dual`` for the dual part (moment about the origin), the axis letter
+    behind it or in the place of ``{}``; empty where that part is zero. ``meaning`` explains them.
     """
 
     kind: str
@@ -213,7 +213,8 @@ class Formulation:
         if term.screw is None:
             return ""
         screw = self.screws[term.screw]
-        return (screw.symbol if term.part >= 3 else screw.dual) + AXES[term.part % 3]
+        symbol, axis = screw.symbol if term.part >= 3 else screw.dual, AXES[term.part % 3]
+        return symbol.replace("{}", axis) if "{}" in symbol else symbol + axis
 
     def document(self, components: bool = True) -> Document:
         """The printed formulation as a document."""

@@ -82,17 +82,20 @@ class Mechanism:
             "loads": tuple(loads),
             "frame": first if frame is None else frame,
             "start": MappingProxyType({}),
-            "units": MappingProxyType(dict(units or {})),
+            "units": MappingProxyType(dict(units) if isinstance(units, Mapping) else {}),
             "source": source,
             "description": description,
-            "expected": MappingProxyType(dict(expected or {})),
+            "expected": MappingProxyType(dict(expected) if isinstance(expected, Mapping) else {}),
         }
         for key, value in fields.items():
             object.__setattr__(self, key, value)
         faults = _declaration_faults(self)
+        for what, value in (("units", units), ("start", start), ("expected", expected)):
+            if value is not None and not isinstance(value, Mapping):
+                faults.append(f"{what} = {value!r}: expected a mapping")
         flat: dict[str, float] = {}
         if all(isinstance(p, Pair) for p in pair_tuple):
-            flat, start_faults = _flat_start(self, start or {})
+            flat, start_faults = _flat_start(self, start if isinstance(start, Mapping) else {})
             faults += start_faults
         if faults:
             raise DeclarationError(f"mechanism {name!r}", faults)
@@ -188,7 +191,11 @@ class Mechanism:
                 return pair, names.index(driven[0])
             if not names:
                 return f"pair {name!r} ({pair.type.symbol}) has no freedom"
-            return f"pair {name!r} has {len(names)} freedoms; name one of {', '.join(names)}"
+            able = [n for n, single in zip(names, pair.type.drivable, strict=True) if single]
+            hint = f"; a drive or spring can take {', '.join(able) or 'none of them (a rotation takes efforts only)'}"
+            return f"pair {name!r} has {len(names)} freedoms; name one of {', '.join(names)}" + (
+                hint if len(able) < len(names) else ""
+            )
         return f"unknown freedom {name!r} (freedoms: {', '.join(self.freedom_names())})"
 
     @property
@@ -331,6 +338,12 @@ def _declaration_faults(m: Mechanism) -> list[str]:
     for key, value in m.units.items():
         if key not in UNIT_NAMES or not isinstance(value, str) or not value:
             faults.append(f"units: {key} = {value!r}: expected names for {', '.join(UNIT_NAMES)}")
+    by_symbol: dict[str, PairType] = {}
+    for pair in m.pairs:
+        if isinstance(pair.type, PairType) and by_symbol.setdefault(pair.type.symbol, pair.type) != pair.type:
+            faults.append(
+                f"pair {pair.name!r}: its type shares the symbol {pair.type.symbol!r} with another type; rename one"
+            )
     ends = {end for pair in m.pairs for end in (pair.a, pair.b)}
     if m.frame in names and ends <= set(names):
         faults += _connection_faults(m)

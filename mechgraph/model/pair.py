@@ -8,7 +8,8 @@ freedoms), and one effort wrench for every freedom, so that ``S^T E = 1``. Nothi
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -233,6 +234,21 @@ class PairType:
         if faults:
             raise DeclarationError(f"pair type {symbol!r}", faults)
 
+    def scaled(self, L: float) -> PairType:
+        """The row with its lengths divided by ``L``: pitches of turns given as numbers, arms of forces; itself where it has none."""
+        freedoms = tuple(
+            replace(f, twist=_six((*f.twist[:3], *(v / L for v in f.twist[3:])))) if f.turns and any(f.twist[3:]) else f
+            for f in self.freedoms
+        )
+        reactions = self.reactions if self.reactions is None else tuple(_scaled_arm(c, L) for c in self.reactions)
+        efforts = tuple(_scaled_arm(c, L) for c in self.efforts)
+        if (freedoms, reactions, efforts) == (self.freedoms, self.reactions, self.efforts):
+            return self
+        out = copy(self)
+        for key, value in (("freedoms", freedoms), ("reactions", reactions), ("efforts", efforts)):
+            object.__setattr__(out, key, value)
+        return out
+
     @property
     def f(self) -> int:
         """Number of freedoms."""
@@ -277,6 +293,13 @@ class PairType:
 
     def __repr__(self) -> str:
         return f"PairType({self.symbol!r}, {self.name!r}, f={self.f})"
+
+
+def _scaled_arm(c: Component, L: float) -> Component:
+    """A force component with its moment (an arm) divided by ``L``; couples have none."""
+    if c.is_couple or not any(c.wrench[:3]):
+        return c
+    return replace(c, wrench=_six((*(v / L for v in c.wrench[:3]), *c.wrench[3:])))
 
 
 def _dual_effort(freedom: Freedom, frame: int) -> Component:

@@ -119,6 +119,8 @@ def reactions_of(row: PairType, pitch: Array, frames: list[Array]) -> Array:
     """
     if row.reactions is not None:
         return components_of(row.reactions, pitch, frames)
+    if not row.f:
+        return np.broadcast_to(np.eye(6)[:, :, None, None], (6, 6, *frames[0].shape[2:])).copy()
     S = twists_of(row, pitch, frames)
     B = frames[-1]
     local = np.concatenate(

@@ -436,7 +436,11 @@ def save(m: Mechanism, path: str | os.PathLike[str]) -> None:
     FileError
         where a load is a callable, or the file cannot be written.
     """
-    text = tomli_w.dumps(to_data(m, os.fspath(path)))
+    try:
+        text = tomli_w.dumps(to_data(m, os.fspath(path)))
+        text.encode("utf-8")
+    except (TypeError, UnicodeEncodeError) as error:
+        raise FileError(path, f"mechanism {m.name!r} cannot be written as TOML: {error}") from None
     write_whole(path, text)
 
 

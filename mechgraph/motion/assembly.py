@@ -10,6 +10,7 @@ from mechgraph.algebra.se3 import Array, rotate
 from mechgraph.errors import AssemblyError, DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import parameters
+from mechgraph.model.values import is_numeric
 from mechgraph.motion.system import Configuration, Index, System
 from mechgraph.numerics.newton import closest_zero, least_norm_step
 
@@ -106,10 +107,12 @@ def state_rows(system: System, columns: Index) -> Index:
 
 def named_columns(m: Mechanism, system: System, values: Mapping[str, float]) -> tuple[Index, Array]:
     """Columns and internal values of single freedoms given by name."""
+    if not isinstance(values, Mapping):
+        raise DeclarationError(f"mechanism {m.name!r}", [f"values = {values!r}: expected a mapping freedom -> number"])
     faults, columns, numbers = [], [], []
     for name, value in values.items():
         fault = m.freedom_fault(name, single=True)
-        if fault or not np.isfinite(value):
+        if fault or not is_numeric(value, ()):
             faults.append(fault or f"{name} = {value!r}: expected a finite number")
             continue
         k, j = m.freedom(name)

@@ -133,3 +133,49 @@ def spin_angles(here: Configuration, idle: tuple[Idle, ...], Z: Array) -> tuple[
         angles[mine[0]] = np.concatenate([[0.0], np.cumsum(spin)])
         unit[:, mine[0]] = Z[:, mine[0]] * sense / length
     return angles, unit
+
+
+def hold(here: Configuration, idle: tuple[Idle, ...], Z: Array, loads: Array, efforts: Array) -> tuple[Array, Array]:
+    """What keeps passive bodies at rest: wrenches ``(6, N, T)`` on them, and their sizes ``(p, T)`` for unit passive twists.
+
+    Along every passive motion the power of loads, given efforts and hold vanishes. The hold of a turn is a couple about its
+    axis, that of a slide a force along it, so that it loads no pair of the body; it comes from outside the mechanism.
+    """
+    points = rest_points(here, idle, Z)
+    G = passive_twists(here, idle, points, Z)
+    wrenches = np.zeros_like(loads)
+    sizes = np.zeros(Z.shape[1:])
+    for p in range(Z.shape[1]):
+        sizes[p] = -(loads * here.link_twists(Z[:, p])).sum(axis=(0, 1)) - (efforts * Z[:, p]).sum(axis=0)
+    for i, (body, P) in enumerate(zip(idle, points, strict=True)):
+        mine = [p for p in range(Z.shape[1]) if np.abs(G[6 * i : 6 * i + 6, p]).max(initial=0.0) > 1e-6]
+        if not mine:
+            continue
+        twists = G[6 * i : 6 * i + 6, mine]
+        dual = np.einsum("ipt,tpq->iqt", twists, np.linalg.inv(np.einsum("ipt,iqt->tpq", twists, twists)))
+        held = np.einsum("iqt,qt->it", dual, sizes[mine])
+        wrenches[3:, body.link] += held[3:]
+        wrenches[:3, body.link] += held[:3] + cross(P, held[3:])
+        for p in mine:
+            turn, slide = (
+                np.sqrt((part * part).sum(axis=0)) for part in (G[6 * i : 6 * i + 3, p], G[6 * i + 3 : 6 * i + 6, p])
+            )
+            axis = G[6 * i : 6 * i + 3, p] if (turn > 1e-6).all() else G[6 * i + 3 : 6 * i + 6, p]
+            flips = np.where((axis[:, 1:] * axis[:, :-1]).sum(axis=0) < 0, -1.0, 1.0)
+            sense = np.cumprod(np.concatenate([np.ones(min(1, here.T)), flips])) if here.T else np.ones(0)
+            sizes[p] *= sense / np.where(turn > 1e-6, turn, slide)
+    return wrenches, sizes
+
+
+def hold_names(here: Configuration, idle: tuple[Idle, ...], Z: Array) -> list[tuple[str, bool]]:
+    """For every passive motion the name of its body (numbered where it has several) and whether it turns."""
+    links = here.system.m.link_names()
+    twists = [here.link_twists(Z[:, p]) for p in range(Z.shape[1])]
+    out: list[tuple[str, bool]] = []
+    for V in twists:
+        moving = next((b for b in idle if np.abs(V[:, b.link]).max(initial=0.0) > 1e-6), idle[0])
+        turns = bool((np.abs(V[:3, moving.link]).max(axis=0) > 1e-6).all())
+        name = links[moving.link]
+        count = sum(n.split(" (")[0] == name for n, _ in out)
+        out.append((f"{name} ({count + 1})" if count else name, turns))
+    return out

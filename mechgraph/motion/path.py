@@ -26,6 +26,8 @@ NODE_CONVERGED = 1e-5
 """Closure residual at which a node is good enough to predict from, after one more step."""
 ITERATIONS = 8
 """Most Newton iterations at a position."""
+GAPS = 20
+"""Most gaps behind which a path is taken up again."""
 SURE_STEP = 0.01
 """Steps below this are closed fully: the end of the reach is near."""
 LONGEST_STEP = 0.35
@@ -80,7 +82,8 @@ class Track:
 class Positions:
     """States ``(nx, C, N)``, statuses ``(C, N)``, and per position the index of the choice that serves it.
 
-    ``here`` is the evaluation of all positions, where one batch covered them.
+    ``here`` is the evaluation of all positions, where one batch covered them. ``tracks`` hold, for every case that was followed in
+    one go, path lengths and states ``(nx, K)`` of the nodes and the path lengths of the positions.
     """
 
     x: Array
@@ -89,9 +92,10 @@ class Positions:
     which: Index
     reached: Array
     here: Configuration | None = None
+    tracks: tuple[tuple[Array, Array, Array] | None, ...] = ()
 
 
-Case = tuple[Array, Index, np.ndarray, Array, Configuration | None]
+Case = tuple[Array, Index, np.ndarray, Array, Configuration | None, tuple[Array, Array, Array] | None]
 
 
 class Follower:
@@ -282,12 +286,16 @@ class Follower:
         status = np.full((C, N), Status.OK, dtype=object)
         which = np.zeros((C, N), dtype=np.intp)
         reached = np.empty((d, C))
+        tracks: list[tuple[Array, Array, Array] | None] = []
         for c in range(C):
             done = self._case(x, values[:, c])
+            if N > 1 and (done[2] == Status.OK).any() and (done[2] != Status.OK).any():
+                done = self._behind_gaps(values[:, c], done)
             if N > 1 and (done[2] != Status.OK).all():
                 done = self._both_ways(x, values[:, c], done)
-            out[:, c], which[c], status[c], reached[:, c], here = done
-        return Positions(out, status, self.choices, which, reached, here if C == 1 else None)
+            out[:, c], which[c], status[c], reached[:, c], here, followed = done
+            tracks.append(followed)
+        return Positions(out, status, self.choices, which, reached, here if C == 1 else None, tuple(tracks))
 
     def _case(self, x: Array, values: Array) -> Case:
         """States, choices, statuses, last driver values reached and evaluation of one case."""
@@ -298,7 +306,29 @@ class Follower:
             if not bad.any():
                 break
             stops = np.union1d(stops, np.flatnonzero(bad))
-        return states, choice_of, self._statuses(track, values, states, bad), track.nodes[-1].drive, here
+        start = track.nodes[0].drive[:, None]
+        along = np.cumsum(np.sqrt((np.diff(np.concatenate([start, values], axis=1), axis=1) ** 2).sum(axis=0)))
+        followed = (np.array([n.at for n in track.nodes]), np.stack([n.x for n in track.nodes], axis=1), along)
+        return states, choice_of, self._statuses(track, values, states, bad), track.nodes[-1].drive, here, followed
+
+    def _behind_gaps(self, values: Array, done: Case) -> Case:
+        """Go on from the last position solved to the next one on this side of what could not be passed."""
+        states, choice_of, status, reached, _, _ = done
+        for _ in range(GAPS):
+            last = int(np.flatnonzero(status == Status.OK)[-1])
+            beyond = values[:, last + 1 :] - reached[:, None]
+            blocked = beyond[:, 0] if beyond.shape[1] else np.zeros(len(values))
+            back = np.flatnonzero((beyond * blocked[:, None]).sum(axis=0) < 0)
+            if not back.size:
+                break
+            first = last + 1 + int(back[0])
+            more = self._case(states[:, last], values[:, first:])
+            if (more[2] != Status.OK).all():
+                break
+            states[:, first:], choice_of[first:], status[first:], reached = more[:4]
+            if (more[2] == Status.OK).all():
+                break
+        return states, choice_of, status, done[3], None, None
 
     def _both_ways(self, x: Array, values: Array, failed: Case) -> Case:
         """A path whose first position cannot be reached, entered at its position nearest to the start and followed both ways."""
@@ -310,7 +340,7 @@ class Follower:
         states, choice_of, status = (
             np.concatenate([b[..., :0:-1], a], axis=-1) for a, b in zip(ahead[:3], behind[:3], strict=True)
         )
-        return states, choice_of, status, failed[3], None
+        return states, choice_of, status, failed[3], None, None
 
     def _statuses(self, track: Track, values: Array, states: Array, bad: Array) -> np.ndarray:
         status = np.full(values.shape[1], Status.OK, dtype=object)

@@ -66,7 +66,7 @@ class System:
             index = np.array(pairs, dtype=np.intp)
             columns = self.first_column[index] + np.arange(row.f, dtype=np.intp)[:, None]
             state = self.first_row[index] + np.arange(row.nx, dtype=np.intp)[:, None]
-            groups.append(Group(row, index, columns, state))
+            groups.append(Group(row.scaled(self.par.L), index, columns, state))
         return groups
 
     def _tree_levels(self) -> list[tuple[Index, NDArray[np.bool_], Index, Index]]:

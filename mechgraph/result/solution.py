@@ -10,6 +10,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
 from mechgraph.formulation.state import State
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.values import vector_fault
 from mechgraph.result import export
 from mechgraph.result.units import unit_of
 
@@ -75,6 +76,9 @@ class Values(Protocol):
     def link(self, link: int) -> tuple[Array, Array, Array]:
         """Pose ``(..., 4, 4)``, twist and its rate ``(..., 6)`` of a link."""
 
+    def link_hold(self, link: int) -> Array:
+        """Wrench that keeps a passive body at rest, about the global origin, ``(..., 6)``."""
+
     def link_point(self, link: int, p: Any) -> MaterialPoint:
         """A material point given in the link's frame."""
 
@@ -82,7 +86,7 @@ class Values(Protocol):
         """Wrench on the frame about the global origin, ``(..., 6)``."""
 
     def passive_efforts(self) -> dict[str, Array]:
-        """Efforts that hold passive freedoms."""
+        """What keeps passive bodies at rest, by body."""
 
     def state(self, index: Any) -> State:
         """Screws and loads at one position, in the declared units about the global origin."""
@@ -188,6 +192,11 @@ class LinkResult:
         return self._values.link(self._index)[2]
 
     @property
+    def hold(self) -> Array:
+        """Wrench ``(..., 6)`` about the global origin that keeps a passive body from spinning; zero for all other links."""
+        return self._values.link_hold(self._index)
+
+    @property
     def angular_velocity(self) -> Array:
         """Angular velocity ``(..., 3)``."""
         return self.twist[..., :3]
@@ -199,6 +208,9 @@ class LinkResult:
 
     def point(self, p: Any) -> MaterialPoint:
         """Position, velocity and acceleration of the material point ``p``, given in the link's frame."""
+        fault = vector_fault(p, "point")
+        if fault:
+            raise DeclarationError(f"link {self._values.mechanism.links[self._index].name!r}", [fault])
         return self._values.link_point(self._index, p)
 
     @property
@@ -290,7 +302,10 @@ class Solution:
 
     @property
     def passive_effort(self) -> dict[str, Array]:
-        """Efforts that hold passive freedoms at rest, by freedom; zero where nothing turns them."""
+        """What keeps passive bodies from spinning (or sliding) in space, by body: a couple about the axis, or a force.
+
+        Zero where nothing turns them. How such a body stands depends on the path: it does not spin from the start on.
+        """
         return self._values.passive_efforts()
 
     def state(self, index: Any = ()) -> State:

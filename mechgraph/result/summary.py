@@ -266,8 +266,10 @@ class _View:
         for name, value in held.items():
             size = float(np.nanmax(np.abs(value), initial=0.0))
             none = size <= 1e-9 * scale
-            loose = f"would be moved: an effort up to {_with_unit(_number(size), self.effort_unit(name))} holds it"
-            items.append(f"{name} is held at rest; {'nothing moves it' if none else loose}")
+            loose = f"would be turned or moved: {_number(size)} at most keeps it so"
+            items.append(
+                f"{name} does not spin or slide in its passive freedom; {'nothing moves it' if none else loose}"
+            )
         yield Heading("Passive freedoms", 2)
         yield Bullets(tuple(items))
 

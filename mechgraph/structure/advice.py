@@ -101,7 +101,7 @@ def changes_of(here: Configuration) -> list[Change]:
     null = null_space(here.J[:, :, 0].T, RANK_TOLERANCE)
     C = system.graph.loop_matrix
     stress = np.einsum("lp,lis->ips", C, null.reshape(C.shape[0], 6, null.shape[1]))
-    wider = {g.row: list(wider_types(g.row)) for g in system.groups}
+    wider = {row: list(wider_types(row)) for row in dict.fromkeys(p.type for p in system.m.pairs)}
     place = {int(k): (g, i) for g in system.groups for i, k in enumerate(g.pairs)}
     out = []
     driven = {system.m.freedom(d.freedom) for d in system.m.drives}

@@ -61,7 +61,7 @@ def orthonormal_stress(here: Configuration, states: Array, driven: Index) -> Str
         parts[:, :, i] = reaction_part(here, states[:, :, i], efforts[:, i])
     if not s:
         return Stress(parts, efforts)
-    flat = at_pair_points(here, parts).transpose(3, 0, 1, 2).reshape(here.T, -1, s)
+    flat = at_pair_points(here, parts).transpose(3, 0, 1, 2).reshape(here.T, 6 * states.shape[1], s)
     _, R = np.linalg.qr(flat)
     inverse = np.linalg.inv(R)
     return Stress(np.einsum("cpit,tij->cpjt", parts, inverse), np.einsum("fit,tij->fjt", efforts, inverse))
