@@ -63,14 +63,22 @@ def not_drivable(
 
 
 def suggested(m: Mechanism, freedoms: Freedoms, able: tuple[Finding, ...]) -> tuple[str, ...]:
-    """Freedoms that complete the drivers: at the frame first, in the order of declaration, independent of each other."""
+    """Freedoms that complete the drivers: free of passive motions and at the frame first, in order, independent of each other.
+
+    A driver on a freedom that also moves in a passive motion would hold that motion, and leave another free.
+    """
     if not freedoms.undriven:
         return ()
     rest = np.stack([f.rates for f in freedoms.undriven], axis=1)
     names = m.freedom_names()
     good = {name for finding in able for name in finding.freedoms}
     ends = {n: (p.a, p.b) for p in m.pairs for n in p.freedom_names}
-    order = sorted((i for i, n in enumerate(names) if n in good), key=lambda i: (m.frame not in ends[names[i]], i))
+    idle = np.zeros(len(names), dtype=bool)
+    for p in freedoms.passive:
+        idle |= np.abs(p.rates) > STILL
+    order = sorted(
+        (i for i, n in enumerate(names) if n in good), key=lambda i: (idle[i], m.frame not in ends[names[i]], i)
+    )
     return tuple(names[i] for i in sorted(independent_rows(rest, order, rest.shape[1])))
 
 

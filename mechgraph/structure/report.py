@@ -235,7 +235,20 @@ class DeterminacyReport:
     @cached_property
     def suggested_drives(self) -> tuple[str, ...]:
         """Freedoms that would complete the drivers (all of them where none is declared): at the frame first, independent."""
-        return drivers.suggested(self.mechanism, self.geometry.freedoms, self.drivable) if self.geometry else ()
+        g, m = self.geometry, self.mechanism
+        if not g:
+            return ()
+        names = drivers.suggested(m, g.freedoms, self.drivable)
+        while names and self.thorough:
+            # a driver may hold a motion that was passive, and so leave another free
+            columns, _ = named_columns(m, g.system, dict.fromkeys([*(d.freedom for d in m.drives), *names], 0.0))
+            after = free_motion(g.system, g.x, columns)
+            free = [f.rates for f in after.undriven]
+            more = drivers.suggested(m, after, drivers.drivable(m, np.stack(free, axis=1))) if free else ()
+            if not more:
+                break
+            names = (*names, *more)
+        return names
 
     @cached_property
     def dependent_drives(self) -> tuple[tuple[str, ...], ...]:
