@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import mechgraph as mg
-from lee_1977.tables import G, coefficients
 from mechgraph.formulation.registry import Term
 
 SECTIONS = {
@@ -91,8 +90,9 @@ class Effect:
 
 def rank(A: np.ndarray) -> int:
     """Rank with rows and columns scaled to unit size first, so that units do not matter."""
-    A = A / np.linalg.norm(A, axis=1, keepdims=True)
-    A = A / np.linalg.norm(A, axis=0, keepdims=True)
+    for axis in (1, 0):
+        size = np.linalg.norm(A, axis=axis, keepdims=True)
+        A = A / np.where(size > 0, size, 1.0)
     return int(np.linalg.matrix_rank(A, tol=1e-10))
 
 
@@ -184,43 +184,3 @@ def checked(name: str, every: int = 12) -> Checked:
         *counts["lee"], counts["minimal"][0], len(s.checks.power), float(np.abs(s.checks.power).max()),
         float(s.checks.equilibrium.max()), methods, books,
     )  # fmt: skip
-
-
-# --- Tables XIV, XXIV, XXXII ------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Entries:
-    """A coefficient table against the generated matrix: printed entries, equal ones, wrong ones, entries left out; rank as
-    printed and rank of the generated matrix.
-    """
-
-    printed: int
-    equal: int
-    wrong: tuple[str, ...]
-    missing: tuple[str, ...]
-    rank: int
-    size: int
-
-
-def in_lees_axes(name: str) -> mg.Mechanism:
-    """The library mechanism turned so that the global axes are Lee's."""
-    pose = np.eye(4)
-    pose[:3, :3] = G
-    return mg.load(name).moved(pose)
-
-
-def evaluated(value: str, numbers: dict[str, float]) -> float:
-    """A printed coefficient such as ``-A33x + rho3 A3x``."""
-    total, sign = 0.0, 1.0
-    for word in value.replace("-", " - ").replace("+", " + ").split(" "):
-        if word in ("-", "+"):
-            sign = -1.0 if word == "-" else 1.0
-            factor = 1.0
-        elif word.startswith("rho"):
-            factor = numbers[word]
-            sign *= factor
-        elif word:
-            total += sign * (1.0 if word == "1" else numbers[word])
-            sign = 1.0
-    return total

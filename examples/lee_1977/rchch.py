@@ -139,3 +139,34 @@ def force_identities() -> dict[str, float]:
         "XXXVII: F . A5, M about A5": largest(about_5[calm]),
         "XXXVII: MA5 + 5 FA5": largest(o5[:, 7] + PITCH_5 * o5[:, 6]),
     }
+
+
+def work_of_output() -> dict[str, float]:
+    """Driver couple at theta1 = 0 without masses, under the output couple of 10 alone and with the force -10 / rho5 along A5
+    that C(21) to C(23) of Table XXXII add to it: then the output wrench does no work on the helical pair.
+    """
+    m = mg.load("rchch")
+    link = m.pairs[4].a
+    m = m.replace(links=[mg.Link(item.name) for item in m.links], loads=[])
+    still = mg.kinematics(m, {"O1": 0.0})
+    axis = still.state().conditions[4][:3, 0, 0]  # -A5, in the library's axes
+    if np.linalg.norm(axis) < 0.5:
+        axis = still.state().conditions[4][:3, 1, 0]
+    o5 = next(p for p in m.pairs if p.name == "O5")
+    couple = mg.Wrench(link, moment=-10.0 * axis)
+    push = mg.Wrench(link, force=10.0 / PITCH_5 * axis, point=o5.on_a.point)
+    return {
+        "couple": float(mg.solve(m, {"O1": 0.0}, loads=[couple])["O1"].effort[0]),
+        "as printed": float(mg.solve(m, {"O1": 0.0}, loads=[couple, push])["O1"].effort[0]),
+    }
+
+
+def balance_of_link_3() -> float:
+    """Smallest of the four choices of sign of ``|R32 (with its axial part) -+ R43|`` over the rows with reactions below 100:
+    link 3 is between O3 and O4, so the two forces differ by its inertia alone. A3 is unknown, no closure being behind the
+    table: the components across A1 = x are compared through the length of what is left.
+    """
+    o3, o4 = printed("XXXV"), printed("XXXVI")
+    total = np.sqrt((o3[:, :3] ** 2).sum(axis=1) + o3[:, 6] ** 2)  # F^ is perpendicular to A3
+    calm = total < 100.0
+    return largest((total - np.linalg.norm(o4[:, :3], axis=1))[calm])
