@@ -1,0 +1,155 @@
+"""Tables XIV, XXIV and XXXII: the printed coefficient lists against the generated matrices, entry by entry."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+import mechgraph as mg
+from lee_1977.chains import rank
+from lee_1977.tables import G, coefficients
+
+AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Order of Lee's unknowns and equations.
+
+    ``columns``: pair and what stands there: ``F``, ``M`` (three each), ``A`` (axial), ``BCD`` (three forces of a spherical
+    pair), ``IN``; a minus sign where his reaction is that of link b on link a. ``rows``: links (six each) and pairs (two each).
+    ``screws``: his letters of a pair's axis, real and dual part.
+    """
+
+    name: str
+    columns: tuple[tuple[str, str, int], ...]
+    rows: tuple[str, ...]
+    screws: dict[str, tuple[str, str]]
+    spherical: dict[str, str]
+
+
+RCSR = (("O1", "F", 1), ("O2", "F", 1), ("O4", "F", -1), ("O1", "M", 1), ("O2", "M", 1), ("O4", "M", -1),
+        ("O1", "A", 1), ("O4", "A", -1), ("O3", "BCD", 1), ("O1", "IN", 1))  # fmt: skip
+LAYOUTS = {
+    "XIV": Layout(
+        "rcsr", RCSR, ("link1", "link2", "link3", "O2", "O4", "O1"),
+        {"O1": ("A10", "A11"), "O2": ("A20", "A21"), "O4": ("A40", "A41")}, {"O3": "BCD"},
+    ),
+    "XXIV": Layout(
+        "rcsr-csr",
+        (*RCSR, ("O5", "F", 1), ("O5", "M", 1), ("O6", "BCD", 1), ("O7", "F", -1), ("O7", "M", -1), ("O7", "A", -1)),
+        ("link1", "link2", "link3", "O2", "O4", "O1", "link5", "link6", "O5", "O7"),
+        {"O1": ("A10", "A11"), "O2": ("A20", "A21"), "O4": ("A40", "A41"), "O5": ("A50", "A51"), "O7": ("A70", "A71")},
+        {"O3": "BCD", "O6": "EFG"},
+    ),
+    "XXXII": Layout(
+        "rchch",
+        (("O1", "F", 1), ("O1", "M", 1), ("O1", "A", 1), ("O2", "F", -1), ("O2", "M", -1), ("O1", "IN", 1),
+         ("O3", "F", -1), ("O3", "M", -1), ("O3", "A", -1), ("O4", "F", -1), ("O4", "M", -1),
+         ("O5", "F", -1), ("O5", "M", -1), ("O5", "A", -1)),
+        ("link1", "O1", "link2", "link3", "link4", "O2", "O4", "O5", "O3"),
+        {"O1": ("A1", "A11"), "O2": ("A2", "A22"), "O3": ("A3", "A31"), "O4": ("A4", "A41"), "O5": ("A5", "A51")},
+        {},
+    ),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Entries:
+    """Printed entries, those equal to the generated ones, the others, entries left out; ranks; driver position."""
+
+    printed: int
+    equal: int
+    wrong: tuple[str, ...]
+    missing: tuple[str, ...]
+    rank: int
+    size: int
+
+
+def in_lees_axes(name: str) -> mg.Mechanism:
+    """The library mechanism turned so that the global axes are Lee's."""
+    pose = np.eye(4)
+    pose[:3, :3] = G
+    return mg.load(name).moved(pose)
+
+
+def evaluated(value: str, numbers: dict[str, float]) -> float:
+    """A printed coefficient such as ``-A31x + rho3 A3x``."""
+    total = 0.0
+    for term in value.replace(" + ", "|").replace(" - ", "|-").split("|"):
+        product = -1.0 if term.startswith("-") else 1.0
+        for word in term.removeprefix("-").split():
+            product *= 1.0 if word == "1" else numbers[word]
+        total += product
+    return total
+
+
+def generated(number: str, position: int = 3) -> tuple[np.ndarray, dict[str, float]]:
+    """The generated matrix in Lee's order, axes and signs, and the numbers behind his letters."""
+    layout = LAYOUTS[number]
+    m = in_lees_axes(layout.name)
+    s = mg.solve(m)
+    f = mg.formulate(m, bookkeeping="lee")
+    state = s.state(position)
+    A = f.assemble(state)[0].toarray()
+    k_of = {p.name: k for k, p in enumerate(m.pairs)}
+    numbers = dict.fromkeys([f"A33{x}" for x in AXES], 0.0)  # a letter without meaning in Table XXXII
+    for pair, (real, dual) in layout.screws.items():
+        turn = next(i for i, c in enumerate(m.pairs[k_of[pair]].type.bookkeeping.conditions) if c.turns)
+        axis = -state.conditions[k_of[pair]][:, turn, 0]  # z of the markers is minus A
+        numbers |= {real + x: axis[i] for i, x in enumerate(AXES)} | {dual + x: axis[3 + i] for i, x in enumerate(AXES)}
+    numbers |= {f"rho{k + 1}": p.pitch for k, p in enumerate(m.pairs) if p.pitch is not None}
+    rng = np.random.default_rng(1977)
+    columns = []
+    for pair, what, sense in layout.columns:
+        mine = [i for i, u in enumerate(f.unknowns) if u.owner == pair and (u.group == "driver") == (what == "IN")]
+        if what == "BCD":  # any three directions: the same on both sides
+            units = state.reactions[k_of[pair]][:, :, 0]
+            for letter in layout.spherical[pair]:
+                v = rng.normal(size=3)
+                numbers |= {f"{letter}0{x}": v[i] for i, x in enumerate(AXES)}
+                screw = units @ (units[3:].T @ v)
+                numbers |= {f"{letter}1{x}": screw[i] for i, x in enumerate(AXES)}
+                columns.append(A[:, mine] @ (units[3:].T @ v))
+        elif what in "FM":
+            part = mine[:3] if what == "F" else mine[3:6]
+            columns += [sense * A[:, i] for i in part]
+        else:
+            columns.append(-sense * A[:, mine[0] if what == "IN" else mine[6]])
+    rows: list[int] = []
+    signs: list[float] = []
+    for owner in layout.rows:
+        mine = [i for i, e in enumerate(f.equations) if e.owner == owner]
+        if owner in k_of:
+            mine.sort(key=lambda i: "moment" in f.equations[i].name)
+        rows += mine
+        signs += [-1.0 if owner in k_of else 1.0] * len(mine)
+    Q = np.column_stack(columns)[rows] * np.array(signs)[:, None]
+    for i, row in enumerate(rows):  # a condition says zero: its scale is free, ours is that of a unit screw
+        if "force along" in f.equations[row].name:
+            Q[i] /= np.linalg.norm(Q[i])
+    for owner in layout.rows:  # the free dual force enters a condition with the sense of its own column
+        if owner in k_of and any(p == owner and s < 0 for p, _, s in layout.columns):
+            at = [i for i, r in enumerate(rows) if f.equations[r].owner == owner]
+            Q[at] *= -1.0
+    return Q, numbers
+
+
+def compared(number: str) -> Entries:
+    """Table ``number`` against the generated matrix at one position."""
+    Q, numbers = generated(number)
+    printed = np.zeros_like(Q)
+    right = 0
+    wrong = []
+    listed = set()
+    for i, j, value in coefficients(number):
+        found = evaluated(value, numbers)
+        printed[i - 1, j - 1] = found
+        listed.add((i, j))
+        if np.isclose(found, Q[i - 1, j - 1], atol=1e-9):
+            right += 1
+        else:
+            wrong.append(f"Q({i},{j}) = {value}")
+    gone = [f"Q({i + 1},{j + 1})" for i, j in zip(*np.nonzero(np.abs(Q) > 1e-9), strict=True) if (i + 1, j + 1) not in listed]
+    return Entries(
+        right + len(wrong), right, tuple(wrong), tuple(gone), rank(printed), len(Q)
+    )
