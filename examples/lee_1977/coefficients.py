@@ -149,7 +149,9 @@ def compared(number: str) -> Entries:
             right += 1
         else:
             wrong.append(f"Q({i},{j}) = {value}")
-    gone = [f"Q({i + 1},{j + 1})" for i, j in zip(*np.nonzero(np.abs(Q) > 1e-9), strict=True) if (i + 1, j + 1) not in listed]
-    return Entries(
-        right + len(wrong), right, tuple(wrong), tuple(gone), rank(printed), len(Q)
-    )
+    gone = [
+        f"Q({i + 1},{j + 1})"
+        for i, j in zip(*np.nonzero(np.abs(Q) > 1e-9), strict=True)
+        if (i + 1, j + 1) not in listed
+    ]
+    return Entries(right + len(wrong), right, tuple(wrong), tuple(gone), rank(printed), len(Q))

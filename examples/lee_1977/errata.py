@@ -67,7 +67,9 @@ def chapter_2() -> dict[str, tuple[float, float]]:
     )
 
     true_o2 = lees(o2.acceleration)
-    inner = columns(0, -c1 * SA * s2dot + (c1 * P1 + n1 * s2 * SA) * W1, n1 * SA * s2dot + (c1 * s2 * SA - n1 * P1) * W1)
+    inner = columns(
+        0, -c1 * SA * s2dot + (c1 * P1 + n1 * s2 * SA) * W1, n1 * SA * s2dot + (c1 * s2 * SA - n1 * P1) * W1
+    )
     turning = columns(0, c1 * s2 * SA - n1 * P1, -c1 * P1 - n1 * s2 * SA)
     printed = axis_rate * s2dot[:, None] + v2 * s2ddot[:, None] + inner * W1 + turning * ALPHA1
     arm = lees(o2.position) + columns(S1, 0, 0) * np.ones((len(t1), 1))

@@ -61,9 +61,7 @@ def pitch_identities() -> dict[str, float]:
     }
     for number, w, s in (("XII", "w", "dot"), ("XIII", "alpha", "ddot")):
         t = table(number)
-        out[number] = max(
-            largest(pitch * t[f"{w}{k}"] - t[f"S{k}{s}"]) for pitch, k in ((PITCH_3, 3), (PITCH_5, 5))
-        )
+        out[number] = max(largest(pitch * t[f"{w}{k}"] - t[f"S{k}{s}"]) for pitch, k in ((PITCH_3, 3), (PITCH_5, 5)))
     return out
 
 

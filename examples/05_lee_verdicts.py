@@ -4,8 +4,8 @@ Problem: I.-P. J. Lee, Dynamic Analysis of Spatial Mechanisms Using the Method o
 University 1977, prints Tables III to XXXVII. Which of them are right, which are right but for an error that can be named, which
 cannot be had? The document ``library/lee-1977.md`` holds the answer; the parts of it between markers are written here:
 
-    python examples/15_lee_verdicts.py            # print them
-    python examples/15_lee_verdicts.py --write    # put them into the document
+    python examples/05_lee_verdicts.py            # print them
+    python examples/05_lee_verdicts.py --write    # put them into the document
 """
 
 import re
@@ -16,7 +16,13 @@ import numpy as np
 from lee_1977 import chains, coefficients, errata, rchch, rcsr, rcsr_csr, response
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "library" / "lee-1977.md"
-REPRODUCED, COPIED, IDENTITIES, LIST, NOT = "reproduced", "with his errors", "identities only", "list", "not reproducible"
+REPRODUCED, COPIED, IDENTITIES, LIST, NOT = (
+    "reproduced",
+    "with his errors",
+    "identities only",
+    "list",
+    "not reproducible",
+)
 
 
 def tiny(value: float, floor: float = 1e-9) -> str:
@@ -166,7 +172,7 @@ PARTS = {
 def replaced(document: str, parts: dict[str, str]) -> str:
     """The document with every part between its markers exchanged."""
     for name, text in parts.items():
-        pattern = rf"(<!-- {name}: written by examples/15_lee_verdicts\.py -->\n).*?(\n<!-- end of {name} -->)"
+        pattern = rf"(<!-- {name}: written by examples/05_lee_verdicts\.py -->\n).*?(\n<!-- end of {name} -->)"
         document, times = re.subn(pattern, lambda m, t=text: m[1] + "\n" + t + "\n" + m[2], document, flags=re.DOTALL)
         assert times == 1, f"no markers for {name}"
     return document
@@ -176,7 +182,9 @@ def main() -> None:
     parts = {name: make() for name, make in PARTS.items()}
     for name, text in parts.items():
         print(f"{name}\n\n{text}\n")
-    assert rcsr.kinetostatics()["XVIII"] <= 0.7e-2  # printed to .01: the formulation is right, the inertia torque is not
+    assert (
+        rcsr.kinetostatics()["XVIII"] <= 0.7e-2
+    )  # printed to .01: the formulation is right, the inertia torque is not
     if "--write" in sys.argv:
         DOCUMENT.write_text(replaced(DOCUMENT.read_text(encoding="utf-8"), parts), encoding="utf-8")
 
