@@ -147,24 +147,27 @@ def hold(here: Configuration, idle: tuple[Idle, ...], Z: Array, loads: Array, ef
     sizes = np.zeros(Z.shape[1:])
     for p in range(Z.shape[1]):
         sizes[p] = -(loads * here.link_twists(Z[:, p])).sum(axis=(0, 1)) - (efforts * Z[:, p]).sum(axis=0)
+    dual = np.einsum("ipt,tpq->iqt", G, np.linalg.inv(np.einsum("ipt,iqt->tpq", G, G)))
+    held = np.einsum("iqt,qt->it", dual, sizes)
     for i, (body, P) in enumerate(zip(idle, points, strict=True)):
-        mine = [p for p in range(Z.shape[1]) if np.abs(G[6 * i : 6 * i + 6, p]).max(initial=0.0) > 1e-6]
-        if not mine:
-            continue
-        twists = G[6 * i : 6 * i + 6, mine]
-        dual = np.einsum("ipt,tpq->iqt", twists, np.linalg.inv(np.einsum("ipt,iqt->tpq", twists, twists)))
-        held = np.einsum("iqt,qt->it", dual, sizes[mine])
-        wrenches[3:, body.link] += held[3:]
-        wrenches[:3, body.link] += held[:3] + cross(P, held[3:])
-        for p in mine:
-            turn, slide = (
-                np.sqrt((part * part).sum(axis=0)) for part in (G[6 * i : 6 * i + 3, p], G[6 * i + 3 : 6 * i + 6, p])
-            )
-            axis = G[6 * i : 6 * i + 3, p] if (turn > 1e-6).all() else G[6 * i + 3 : 6 * i + 6, p]
-            flips = np.where((axis[:, 1:] * axis[:, :-1]).sum(axis=0) < 0, -1.0, 1.0)
-            sense = np.cumprod(np.concatenate([np.ones(min(1, here.T)), flips])) if here.T else np.ones(0)
-            sizes[p] *= sense / np.where(turn > 1e-6, turn, slide)
+        moment, force = held[6 * i : 6 * i + 3], held[6 * i + 3 : 6 * i + 6]
+        wrenches[3:, body.link] += force
+        wrenches[:3, body.link] += moment + cross(P, force)
+    for p in range(Z.shape[1]):
+        axis, length = _leading_part(G[:, p])
+        flips = np.where((axis[:, 1:] * axis[:, :-1]).sum(axis=0) < 0, -1.0, 1.0)
+        sizes[p] *= np.cumprod(np.concatenate([np.ones(here.T)[:1], flips])) / length
     return wrenches, sizes
+
+
+def _leading_part(twists: Array) -> tuple[Array, Array]:
+    """Of the stacked twists ``(6 bodies, T)`` of one passive motion a turn, or where there is none a slide; with its length."""
+    parts = twists.reshape(-1, 3, twists.shape[1])
+    lengths = np.sqrt((parts * parts).sum(axis=1))
+    turns = [i for i in range(0, len(parts), 2) if (lengths[i] > 1e-6).all()]
+    slides = [i for i in range(1, len(parts), 2) if (lengths[i] > 1e-6).all()]
+    i = (turns or slides or [0])[0]
+    return parts[i], np.maximum(lengths[i], 1e-300)
 
 
 def hold_names(here: Configuration, idle: tuple[Idle, ...], Z: Array) -> list[tuple[str, bool]]:

@@ -63,13 +63,8 @@ class Freedoms:
 
     @property
     def bodies(self) -> tuple[Idle, ...]:
-        """The bodies that have passive freedoms, each by one of its links; of sets in sets by a link that the smaller ones have not."""
-        out: list[Idle] = []
-        taken: set[int] = set()
-        for links in sorted(dict.fromkeys(p.links for p in self.passive), key=len):
-            out.append(Idle(next((i for i in links if i not in taken), links[0])))
-            taken |= set(links)
-        return tuple(out)
+        """The links that have passive freedoms, each a body."""
+        return tuple(Idle(link) for link in sorted({link for p in self.passive for link in p.links}))
 
 
 def is_large(system: System) -> bool:
