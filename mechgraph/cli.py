@@ -303,9 +303,9 @@ def check(
 ) -> None:
     """Print the determinacy report: counts, mobility, redundancy, which reactions are unique, and the verdict.
 
-    Exit status: 0 where the forces can be asked for; 1 where the loops cannot be closed, drivers depend on each other or have nothing
-    to move, or a freedom is left free that is neither driven nor passive. Redundancy is information: a mechanism some of whose reactions are not unique has exit status 0, and so
-    has a topology without geometry. 2 wrong usage or bad input.
+    Exit status: 0 where the forces can be asked for; 1 where the loops cannot be closed, drivers depend on each other or have
+    nothing to move, or a freedom is left free that is neither driven nor passive. Redundancy is information: a mechanism some of
+    whose reactions are not unique has exit status 0, and so has a topology without geometry. 2 wrong usage or bad input.
     """
     with _outcome():
         if json and markdown:
