@@ -238,14 +238,19 @@ class DeterminacyReport:
         g, m = self.geometry, self.mechanism
         if not g:
             return ()
-        names = drivers.suggested(m, g.freedoms, self.drivable)
+        place = {name: i for i, name in enumerate(m.freedom_names())}
+        asked = [int(c) for c in g.driven] + [place[n] for n in drivers.suggested(m, g.freedoms, self.drivable)]
+        kept = set(drivers.independent_rows(g.freedoms.null, asked, len(asked)))
+        names = tuple(n for n, i in place.items() if i in kept and i in asked[len(g.driven) :])
         while names and self.thorough:
             # a driver may hold a motion that was passive, and so leave another free
             columns, _ = named_columns(m, g.system, dict.fromkeys([*(d.freedom for d in m.drives), *names], 0.0))
             after = free_motion(g.system, g.x, columns)
             free = [f.rates for f in after.undriven]
             more = drivers.suggested(m, after, drivers.drivable(m, np.stack(free, axis=1))) if free else ()
-            if not more:
+            together = [*(d.freedom for d in m.drives), *names, *more]
+            columns, _ = named_columns(m, g.system, dict.fromkeys(together, 0.0))
+            if not more or free_motion(g.system, g.x, columns).dependent:
                 break
             names = (*names, *more)
         return names
