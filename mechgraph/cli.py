@@ -87,28 +87,29 @@ Named = Annotated[
 # --- output ------------------------------------------------------------------------------------------------------------
 
 
-def _write(text: str) -> None:
-    """Text as it is; on a terminal with its headings in bold."""
+def _write(text: str, colour: str = "") -> None:
+    """Text as it is; on a terminal with its headings in bold and the paragraph after the title in ``colour``."""
     if not sys.stdout.isatty():
         sys.stdout.write(text)
         return
     console = Console(highlight=False)
     lines = text.split("\n")
-    for line, following in zip(lines, [*lines[1:], ""], strict=True):
+    first = 3 if colour else len(lines)
+    last = lines.index("", first) if "" in lines[first:] else first
+    for i, (line, following) in enumerate(zip(lines, [*lines[1:], ""], strict=True)):
         rule = (
             len(following) > 2
             and not following.strip(following[0])
             and following[0] in "=~-"
             and len(following) >= len(line.strip()) > 0
         )
-        console.print(
-            Text(line, style="bold" if rule else ""), soft_wrap=True, end="\n" if line is not lines[-1] else ""
-        )
+        style = "bold" if rule else f"bold {colour}" if first <= i < last else ""
+        console.print(Text(line, style=style), soft_wrap=True, end="\n" if i < len(lines) - 1 else "")
 
 
-def _show(document: Document) -> None:
+def _show(document: Document, colour: str = "") -> None:
     width = max(shutil.get_terminal_size().columns, 40) if sys.stdout.isatty() else UNBROKEN
-    _write(to_text(document, width))
+    _write(to_text(document, width), colour)
 
 
 def _fail(message: str, status: int) -> NoReturn:
@@ -300,6 +301,13 @@ def check(
         list[str] | None,
         typer.Option("--at", metavar="FREEDOM=VALUE", help="Assemble there first: A=30deg, B.Tz=0.02 (repeat)."),
     ] = None,
+    thorough: Annotated[
+        bool | None,
+        typer.Option(
+            "--thorough/--quick",
+            help="Follow the motions over finite strokes and seek pair changes; without either, up to 15 loops.",
+        ),
+    ] = None,
 ) -> None:
     """Print the determinacy report: counts, mobility, redundancy, which reactions are unique, and the verdict.
 
@@ -316,15 +324,16 @@ def check(
             name, value = _named_value(text, "--at")
             values[name] = _values([value], _turns(m, name, f"--at {text!r}"), f"--at {text!r}")[0]
         with _working("checking"):
-            report = mg.check(m, at=values or None)
+            report = mg.check(m, at=values or None, thorough=thorough)
             text = report.to_json() if json else report.to_markdown() if markdown else ""
             document = report.document()
+        not_closed = m.has_geometry and report.mobility is None
+        unsolvable = not_closed or report.undriven or report.contradicting_drives
         if text:
             _write(text)
         else:
-            _show(document)
-        not_closed = m.has_geometry and report.mobility is None
-        if not_closed or report.undriven or report.contradicting_drives:
+            _show(document, "red" if unsolvable else "green" if report.determinate and not report.near else "yellow")
+        if unsolvable:
             raise typer.Exit(NO_ANSWER)
 
 

@@ -8,6 +8,7 @@ import pytest
 from mechanisms import X, Z
 
 import mechgraph as mg
+from mechgraph.algebra.se3 import pose_exp
 
 # --- unique by principal direction ----------------------------------------------------------------------------------------
 
@@ -177,3 +178,61 @@ def test_sliding_plate_between_parallel_planes() -> None:
     assert report.mobility == 3
     assert report.redundancy == 3
     assert X @ Z == 0
+
+
+def test_freedoms_that_only_rest_here_are_not_called_locked() -> None:
+    """A slider-crank stretched out: the slider rests, and moves in every position near by."""
+    bars = (("A", "frame", "crank", 0.0), ("B", "crank", "rod", 1.0), ("C", "rod", "slider", 3.0))
+    pairs = [mg.Pair(name, "R", a, b, point=(x, 0, 0), axis=(0, 0, 1)) for name, a, b, x in bars]
+    slide = mg.Pair("D", "P", "slider", "frame", point=(3, 0, 0), axis=(1, 0, 0))
+    found = mg.check(mg.Mechanism("slider-crank", pairs=[*pairs, slide], drives=["A"])).locked
+    assert [(f.freedoms, f.text) for f in found] == [
+        (("D.Tz",), "D.Tz rests in this position only: it moves in positions near by")
+    ]
+
+
+def test_passive_freedoms_are_never_more_than_the_mobility() -> None:
+    """Without drivers nearly everything in this loop is passive by definition; sums of motions that overlap count once."""
+    rng = np.random.default_rng(0)
+    direction = rng.normal(size=3)
+    letters, parallel = "RRECSE", (True, True, True, False, False, True)
+    pairs = []
+    for k, (letter, along) in enumerate(zip(letters, parallel, strict=True)):
+        ends = ("frame" if k == 0 else f"link{k}", "frame" if k == 5 else f"link{k + 1}")
+        axis = direction if along else rng.normal(size=3)
+        pairs.append(mg.Pair(f"O{k}", letter, *ends, point=rng.normal(size=3), axis=axis))
+    report = mg.check(mg.Mechanism("overlapping", pairs=pairs))
+    assert report.mobility == 7
+    assert report.inputs == len(report.undriven) == len(report.suggested_drives) > 0
+    assert report.inputs + len(report.passive) == 7
+
+
+def test_motions_left_free_are_what_one_more_driver_does() -> None:
+    """A planar five-bar: each motion moves one freedom at the frame and leaves the other at rest, in any placement."""
+    corners = ((0, 0), (-1, 1), (0.5, 2.5), (2, 1.5), (1.5, 0))
+    links = ("frame", "a", "b", "c", "d", "frame")
+    pairs = [mg.Pair(f"P{i}", "R", links[i], links[i + 1], point=(*corners[i], 0), axis=(0, 0, 1)) for i in range(5)]
+    m = mg.Mechanism("five-bar", pairs=pairs)
+    for placed in (m, m.moved(pose_exp(np.array([0.3, -0.8, 0.5, 4.0, 5.0, 6.0])))):
+        names = [f.freedoms for f in mg.check(placed).undriven]
+        assert names == [("P0.Rz", "P1.Rz", "P2.Rz", "P3.Rz"), ("P1.Rz", "P2.Rz", "P3.Rz", "P4.Rz")]
+        assert mg.check(placed).suggested_drives == ("P0.Rz", "P4.Rz")
+
+
+def test_self_stress_names_every_driver_of_a_pair() -> None:
+    """Two cylindrical pairs on one line, both freedoms of both driven: the drivers can strain each other."""
+    pairs = [
+        mg.Pair(name, "C", "frame", "body", point=(0, 0, z), axis=(0, 0, 1)) for name, z in (("A", 0.0), ("B", 1.0))
+    ]
+    m = mg.Mechanism("twice driven", pairs=pairs, drives=["A.Rz", "A.Tz", "B.Rz", "B.Tz"])
+    efforts = [set(s.efforts) for s in mg.check(m).self_stresses if s.efforts]
+    assert efforts == [{"A.Rz", "B.Rz"}, {"A.Tz", "B.Tz"}]
+
+
+def test_second_direction_that_was_left_out_is_named() -> None:
+    """A universal joint without its second direction: what was taken is said, and not where it is given."""
+    pair = mg.Pair("A", "U", "frame", "body", point=(0, 0, 0), axis=Z)
+    line = "A (U): no second direction was given; x = (1, 0, 0) was taken"
+    assert line in str(mg.check(mg.Mechanism("gimbal", pairs=[pair])))
+    given = pair.replace(second=(0, 1, 0))
+    assert "no second direction" not in str(mg.check(mg.Mechanism("gimbal", pairs=[given])))

@@ -123,3 +123,23 @@ def test_thorough_on_request() -> None:
     assert mg.check(m).finite_mobility is None
     assert report.finite_mobility == 1
     assert report.effects
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_all_self_stresses_are_listed(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the drivers in place: as many as there are, readable, and spanning the components of the dense null space."""
+    m = CASES[name]()
+    system, x = assembled(m)
+    driven = np.array([0]) if m.drives else np.zeros(0, dtype=np.intp)
+    here = system.at(x[:, None])
+    labels, dense = stress.component_table(here, stress.stress_at(here, driven), driven)
+    monkeypatch.setattr(freedom, "LARGE", 0)
+    found = stress.uniqueness(here, driven)
+    states = stress.self_stresses(here, driven, found)
+    assert len(states) == found.count == dense.shape[1]
+    names = [pair if part == "effort" else f"{pair}:{part}" for pair, part in labels]
+    listed = np.array([[{**s.components, **s.efforts}.get(n, 0.0) for s in states] for n in names])
+    Q, _ = np.linalg.qr(dense)
+    assert np.linalg.matrix_rank(listed) == found.count
+    assert np.abs(listed - Q @ (Q.T @ listed)).max(initial=0.0) < 1e-6
+    assert [s.text for s in found.states] == [s.text for s in states[: len(found.states)]]

@@ -111,3 +111,19 @@ def test_without_matplotlib(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(builtins, "__import__", missing)
     with pytest.raises(mg.MissingExtraError, match=r"mechgraph\[plot\]"):
         draw_skeleton(s)
+
+
+def test_highlighted_loop_of_a_mechanism_that_was_not_solved() -> None:
+    """Links outside the loop are grey; the picture needs no drivers."""
+    m = mg.load("rcsr-csr")
+    ax = draw_skeleton(m, highlight=mg.check(m).loop_facts[1].pairs)
+    colours = {text.get_text(): text.get_color() for text in ax.texts}
+    grey = {name for name in m.link_names() if colours.get(name) == colours["link3"]}
+    assert {p for p, _ in mg.check(m).loops[1]} == {"O1", "O2", "O5", "O6", "O7"}
+    assert grey == {"link3"}
+    s = mg.solve(four_bar(), {"A": 0.0})
+    drawn, same = (draw_skeleton(x, ghosts=0, traces=False) for x in (s, four_bar()))
+    for one, other in zip(drawn.lines, same.lines, strict=True):
+        assert np.allclose(one.get_data_3d(), other.get_data_3d())
+    with pytest.raises(mg.DeclarationError, match="there is no pair 'X'"):
+        draw_skeleton(m, highlight=["X"])

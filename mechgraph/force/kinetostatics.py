@@ -24,9 +24,8 @@ from mechgraph.motion.idle import Idle, held_well, spin_angles
 from mechgraph.motion.path import SINGULAR, Follower, Positions, Status
 from mechgraph.motion.rates import Rates, closure_solver, distance_to_dead_point, rates
 from mechgraph.motion.system import Configuration, Index
-from mechgraph.numerics.linear import Choice, ChosenSystem, rank_of, singular_values
+from mechgraph.numerics.linear import Choice, ChosenSystem, independent_rows, rank_of, singular_values
 from mechgraph.result.solution import Solution
-from mechgraph.structure.drivers import independent_rows
 from mechgraph.structure.freedom import free_motion
 from mechgraph.structure.report import check
 

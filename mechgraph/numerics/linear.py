@@ -28,8 +28,36 @@ def rank_of(sigma: Array, tolerance: float = RANK_TOLERANCE) -> int:
     return int((sigma > tolerance * sigma[0]).sum()) if sigma.size and sigma[0] > 0 else 0
 
 
+WEAK = (1e-3, 1e-8)
+"""Part of a row that must be independent of the rows chosen before: wanted, and at least."""
+VANISHING = 1e-8
+"""Size of a row below which it is not chosen."""
 KEEP = 0.1
 """Part of the smallest singular value that may be lost by holding the columns that are asked for."""
+
+
+def independent_rows(rows: Array, candidates: list[int], count: int) -> list[int]:
+    """The first candidates (in order) whose rows are independent, up to ``count``; weakly independent ones where needed.
+
+    Depends on the column space of ``rows`` only where its columns are orthonormal.
+    """
+    chosen: list[int] = []
+    basis = np.zeros((0, rows.shape[1]))
+    size = np.sqrt((rows**2).sum(axis=1))
+    for limit in WEAK:
+        for i in candidates:
+            if len(chosen) == count:
+                return chosen
+            if i in chosen or not size[i] > VANISHING:
+                continue
+            rest = rows[i] / size[i]
+            for _ in range(2):
+                rest = rest - basis.T @ (basis @ rest)
+            part = np.linalg.norm(rest)
+            if part > limit:
+                chosen.append(i)
+                basis = np.vstack([basis, rest / part])
+    return chosen
 
 
 def add_at(out: Array, index: Index, values: Array) -> None:

@@ -9,6 +9,7 @@ from mechgraph.errors import MissingExtraError
 
 INK = "#1f2933"
 MUTED = "#7b8794"
+FAINT = "#c8d0d8"
 PALETTE = ("#0b6fa4", "#d1495b", "#2e8b57", "#e09f3e", "#6a4c93", "#00798c", "#8d5524", "#c2185b")
 """Colours of moving links, in order and then again."""
 

@@ -10,8 +10,11 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
+from mechgraph.force.site import user_poses
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.motion.assembly import assembled
 from mechgraph.result.solution import Solution
-from mechgraph.show.canvas import INK, MUTED, PALETTE, pyplot, toolkit
+from mechgraph.show.canvas import FAINT, INK, MUTED, PALETTE, pyplot, toolkit
 
 FLAT = 1e-6
 """Thickness over extent below which a mechanism is drawn as a plane one."""
@@ -29,9 +32,9 @@ MARKS: dict[tuple[int, int], tuple[str, float]] = {
 
 @dataclass(frozen=True)
 class _Shape:
-    """All that is drawn, over the solved positions: ``points[link]`` (n, T, 3) are pair points and mass centre of a link."""
+    """All that is drawn, over the positions drawn from: ``ends[pair, link]`` and ``centers[link]`` ``(T, 3)``."""
 
-    s: Solution
+    m: Mechanism
     good: Any
     ends: dict[tuple[str, str], Array]
     axes: dict[str, Array]
@@ -40,37 +43,49 @@ class _Shape:
 
     def corners(self, link: str, t: int) -> Array:
         """Pair points of a link at one position, ``(n, 3)``."""
-        return np.array([self.ends[p.name, link][t] for p in self.s.mechanism.pairs if link in (p.a, p.b)])
+        return np.array([self.ends[p.name, link][t] for p in self.m.pairs if link in (p.a, p.b)])
 
 
-def _shape(s: Solution) -> _Shape:
-    m = s.mechanism
-    good = np.flatnonzero(np.asarray(s.status).reshape(-1) == "ok")
+def _poses(drawn: Solution | Mechanism) -> tuple[Mechanism, dict[str, Array], Any, int]:
+    """Poses ``(T, 3, 4)`` of every link at the positions that can be drawn, which these are, and of how many."""
+    if isinstance(drawn, Mechanism):
+        system, x = assembled(drawn)
+        found = user_poses(system.at(x[:, None]))
+        poses = {name: found[i, :, :3] for i, name in enumerate(drawn.link_names())}
+        return drawn, poses, np.zeros(1, dtype=np.intp), 1
+    m = drawn.mechanism
+    good = np.flatnonzero(np.asarray(drawn.status).reshape(-1) == "ok")
     if not good.size:
         raise DeclarationError(f"skeleton of {m.name!r}", ["the solution has no solved position"])
-    ends: dict[tuple[str, str], Array] = {}
-    axes: dict[str, Array] = {}
-    for pair in m.pairs:
-        for link, marker in zip((pair.a, pair.b), pair.markers, strict=True):
-            ends[pair.name, link] = s.link(link).point(marker.point).position.reshape(-1, 3)[good]
-        R = s.link(pair.a).pose[..., :3, :3].reshape(-1, 3, 3)[good]
-        axes[pair.name] = R @ pair.markers[0].pose()[:, 2]
-    centers = {
-        k.name: s.link(k.name).center.reshape(-1, 3)[good] for k in m.links if k.mass > 0 and k.center is not None
+    poses = {name: drawn.link(name).pose.reshape(-1, 4, 4)[good, :3] for name in m.link_names()}
+    return m, poses, good, int(np.asarray(drawn.status).size)
+
+
+def _shape(m: Mechanism, poses: dict[str, Array], good: Any) -> _Shape:
+    def moved(link: str, point: Any) -> Array:
+        return np.asarray(poses[link][:, :, :3] @ np.asarray(point, dtype=float) + poses[link][:, :, 3])
+
+    ends = {
+        (pair.name, link): moved(link, marker.point)
+        for pair in m.pairs
+        for link, marker in zip((pair.a, pair.b), pair.markers, strict=True)
     }
-    everything = np.concatenate([p.reshape(-1, 3) for p in (*ends.values(), *centers.values())])
+    axes = {pair.name: poses[pair.a][:, :, :3] @ pair.markers[0].pose()[:, 2] for pair in m.pairs}
+    centers = {k.name: moved(k.name, k.center) for k in m.links if k.mass > 0 and k.center is not None}
+    everything = np.concatenate([*ends.values(), *centers.values()])
     size = float(np.linalg.norm(np.ptp(everything, axis=0))) or 1.0
-    return _Shape(s, good, ends, axes, centers, size)
+    return _Shape(m, good, ends, axes, centers, size)
 
 
 def draw_skeleton(
-    s: Solution,
+    s: Solution | Mechanism,
     position: int = 0,
     *,
     ax: Any = None,
     ghosts: int = 5,
     traces: bool | Sequence[str] = True,
     labels: bool = True,
+    highlight: Sequence[str] = (),
     view: tuple[float, float] = (24.0, -58.0),
 ) -> Any:
     """Draw the mechanism at one position, faint at others, with the paths of its pair points. Returns the axes.
@@ -80,29 +95,34 @@ def draw_skeleton(
 
     Parameters
     ----------
+    s : a solution; or a mechanism with geometry, which is drawn where its loops are closed.
     position : flat index of the position drawn in full.
     ax : three-dimensional axes of matplotlib; new ones where left out.
     ghosts : number of further positions, drawn faintly.
     traces : whether to draw the paths of pair points; or the names of the pairs whose paths are drawn.
     labels : names of pairs (with their type) and links.
+    highlight : names of pairs, e.g. of a loop of the report (``report.loop_facts[0].pairs``): all other links are drawn in grey.
     view : elevation and azimuth in degrees of a spatial mechanism.
 
     Raises
     ------
     DeclarationError
-        where that position was not solved; MissingExtraError without matplotlib.
+        where that position was not solved, or a pair to be highlighted is not there; AssemblyError where a mechanism cannot be
+        closed; MissingExtraError without matplotlib.
     """
-    shape = _shape(s)
-    size = np.asarray(s.status).size
-    if not -size <= position < size or position % size not in shape.good:
-        raise DeclarationError(
-            f"skeleton of {s.mechanism.name!r}", [f"position {position} was not solved, or is none of {size}"]
-        )
+    m, poses, good, size = _poses(s)
+    unknown = [name for name in highlight if name not in {p.name for p in m.pairs}]
+    faults = [f"highlight: there is no pair {name!r}; pairs: {', '.join(p.name for p in m.pairs)}" for name in unknown]
+    if not -size <= position < size or position % size not in good:
+        faults.append(f"position {position} was not solved, or is none of {size}")
+    if faults:
+        raise DeclarationError(f"skeleton of {m.name!r}", faults)
+    shape = _shape(m, poses, good)
     t = int(np.searchsorted(shape.good, position % size))
     if ax is None:
         ax = pyplot().figure(layout="constrained").add_subplot(projection="3d")
-    names = [p.name for p in s.mechanism.pairs] if traces is True else [] if traces is False else list(traces)
-    colours = _colours(s)
+    names = [p.name for p in m.pairs] if traces is True else [] if traces is False else list(traces)
+    colours = _colours(m, highlight)
     for i in np.unique(np.linspace(0, shape.good.size - 1, ghosts + 1).astype(int)) if ghosts else ():
         if i != t:
             _links(ax, shape, int(i), colours, ghost=True)
@@ -116,9 +136,14 @@ def draw_skeleton(
     return ax
 
 
-def _colours(s: Solution) -> dict[str, str]:
-    moving = [k for k in s.mechanism.link_names() if k != s.mechanism.frame]
-    return {s.mechanism.frame: MUTED} | {k: PALETTE[i % len(PALETTE)] for i, k in enumerate(moving)}
+def _colours(m: Mechanism, highlight: Sequence[str]) -> dict[str, str]:
+    """A colour for every link; grey for the frame and, where pairs are highlighted, for links that lie at none or one of them."""
+    moving = [k for k in m.link_names() if k != m.frame]
+    out = {m.frame: MUTED} | {k: PALETTE[i % len(PALETTE)] for i, k in enumerate(moving)}
+    if highlight:
+        ends = [link for p in m.pairs if p.name in highlight for link in (p.a, p.b)]
+        out |= {k: FAINT for k in moving if ends.count(k) < min(2, len(highlight))}
+    return out
 
 
 def _ordered(points: Array) -> Array:
@@ -132,7 +157,7 @@ def _ordered(points: Array) -> Array:
 def _links(ax: Any, shape: _Shape, t: int, colours: dict[str, str], *, ghost: bool) -> None:
     Poly3DCollection = toolkit("art3d").Poly3DCollection
     for link, colour in colours.items():
-        if link == shape.s.mechanism.frame:
+        if link == shape.m.frame:
             continue
         points = shape.corners(link, t)
         line = {
@@ -163,7 +188,7 @@ def _center(ax: Any, shape: _Shape, link: str, t: int, colour: str) -> None:
 
 
 def _traces(ax: Any, shape: _Shape, names: Sequence[str], colours: dict[str, str]) -> None:
-    m = shape.s.mechanism
+    m = shape.m
     for name in names:
         pair = m.pair(name)
         path = shape.ends[name, pair.b]
@@ -180,7 +205,7 @@ def _traces(ax: Any, shape: _Shape, names: Sequence[str], colours: dict[str, str
 
 def _feet(ax: Any, shape: _Shape, t: int) -> None:
     """A hatched foot under every pair point of the frame."""
-    for at in shape.corners(shape.s.mechanism.frame, t):
+    for at in shape.corners(shape.m.frame, t):
         ax.scatter(
             *at, marker=_foot(), s=560, facecolor=MUTED, edgecolor=MUTED, linewidth=1.1, depthshade=False, zorder=3
         )
@@ -199,7 +224,7 @@ def _foot() -> Any:
 def _pairs(ax: Any, shape: _Shape, t: int) -> None:
     """Pairs: a symbol on link b, the axis as a fine line through both points; a plane pair shows a piece of its plane."""
     Poly3DCollection = toolkit("art3d").Poly3DCollection
-    for pair in shape.s.mechanism.pairs:
+    for pair in shape.m.pairs:
         a, b = shape.ends[pair.name, pair.a][t], shape.ends[pair.name, pair.b][t]
         turns = sum(f.turns for f in pair.type.freedoms)
         axis = shape.axes[pair.name][t]
@@ -220,7 +245,7 @@ def _pairs(ax: Any, shape: _Shape, t: int) -> None:
 
 def _labels(ax: Any, shape: _Shape, t: int, colours: dict[str, str]) -> None:
     """Names beside pairs and links, each where it covers least."""
-    m = shape.s.mechanism
+    m = shape.m
     camera = _camera(ax)
     moving = {link: shape.corners(link, t) @ camera.T for link in colours if link != m.frame}
     room = _Room(

@@ -6,23 +6,16 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.structure.findings import Finding
-from mechgraph.structure.freedom import Freedoms
+from mechgraph.numerics.linear import independent_rows
+from mechgraph.structure.findings import Finding, moves_nearby
+from mechgraph.structure.freedom import Freedoms, drive_order, single_freedoms
 from mechgraph.structure.passive import STILL
 
-WEAK = (1e-3, 1e-8)
-"""Part of a freedom's motion that must be independent of the drivers chosen before: wanted, and at least."""
 SHOWN = 8
 """Freedoms named for one motion."""
 PROPORTIONAL = 1e-9
 MOST_INPUTS = 200
 """Input freedoms above which freedoms that move in proportion are not looked for."""
-
-
-def single_freedoms(m: Mechanism) -> list[tuple[int, str]]:
-    """Freedoms that take a drive, as (column, name)."""
-    single = [d for p in m.pairs for d in p.type.drivable]
-    return [(i, n) for i, (n, s) in enumerate(zip(m.freedom_names(), single, strict=True)) if s]
 
 
 def left_free(m: Mechanism, freedoms: Freedoms) -> tuple[Finding, ...]:
@@ -49,7 +42,7 @@ def not_drivable(
     """Single freedoms that cannot drive here, with the reason: a dead point, locked, or moving only passively."""
     good = {name for finding in able for name in finding.freedoms}
     still = np.abs(freedoms.null).max(axis=1, initial=0.0) < STILL
-    nearby = still & False if null_nearby is None else np.abs(null_nearby).max(axis=1, initial=0.0) > 1e3 * STILL
+    nearby = moves_nearby(null_nearby, len(still))
     out = []
     for i, name in single_freedoms(m):
         if name in good:
@@ -69,38 +62,11 @@ def suggested(m: Mechanism, freedoms: Freedoms, able: tuple[Finding, ...]) -> tu
     """
     if not freedoms.undriven:
         return ()
-    rest = np.stack([f.rates for f in freedoms.undriven], axis=1)
+    rest, _ = np.linalg.qr(np.stack([f.rates for f in freedoms.undriven], axis=1))
     names = m.freedom_names()
     good = {name for finding in able for name in finding.freedoms}
-    ends = {n: (p.a, p.b) for p in m.pairs for n in p.freedom_names}
-    idle = np.zeros(len(names), dtype=bool)
-    for p in freedoms.passive:
-        idle |= np.abs(p.rates) > STILL
-    order = sorted(
-        (i for i, n in enumerate(names) if n in good), key=lambda i: (idle[i], m.frame not in ends[names[i]], i)
-    )
+    order = [i for i in drive_order(m, freedoms.passive) if names[i] in good]
     return tuple(names[i] for i in sorted(independent_rows(rest, order, rest.shape[1])))
-
-
-def independent_rows(rows: Array, candidates: list[int], count: int) -> list[int]:
-    """The first candidates (in order) whose rows are independent, up to ``count``; weakly independent ones where needed."""
-    chosen: list[int] = []
-    basis = np.zeros((0, rows.shape[1]))
-    size = np.sqrt((rows**2).sum(axis=1))
-    for limit in WEAK:
-        for i in candidates:
-            if len(chosen) == count:
-                return chosen
-            if i in chosen or not size[i] > STILL:
-                continue
-            rest = rows[i] / size[i]
-            for _ in range(2):
-                rest = rest - basis.T @ (basis @ rest)
-            part = np.linalg.norm(rest)
-            if part > limit:
-                chosen.append(i)
-                basis = np.vstack([basis, rest / part])
-    return chosen
 
 
 def proportional(m: Mechanism, inputs: Array, able: tuple[Finding, ...]) -> tuple[tuple[str, ...], ...]:

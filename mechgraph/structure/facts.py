@@ -94,6 +94,7 @@ def _of_reactions(r: DeterminacyReport) -> dict[str, Any]:
         ],
         "transverse": [{"text": t.text, **asdict(t)} for t in found.transverse] if found else [],
         "combinations": [list(c) for c in found.combinations] if found else [],
+        "groups_without_combinations": found.unsought if found else 0,
     }
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.model.mechanism import Mechanism
@@ -12,6 +13,9 @@ from mechgraph.motion.system import System
 from mechgraph.numerics.linear import rank_of, singular_values
 from mechgraph.structure.freedom import Freedoms
 from mechgraph.structure.passive import STILL, PassiveMotion
+
+MOVES = 1e-5
+"""Part of a unit motion above which a freedom that stands still here counts as moving near by."""
 
 
 @dataclass(frozen=True)
@@ -103,12 +107,13 @@ def passive_finding(system: System, motion: PassiveMotion) -> Finding:
     )
 
 
-def locked_findings(system: System, x: Array, freedoms: Freedoms) -> tuple[Finding, ...]:
-    """Freedoms that cannot move here, grouped by the reason."""
+def locked_findings(system: System, x: Array, freedoms: Freedoms, null_nearby: Array | None) -> tuple[Finding, ...]:
+    """Freedoms that cannot move here, grouped by the reason; those that move in the motions ``null_nearby`` only rest here."""
     m = system.m
     still = np.abs(freedoms.null).max(axis=1, initial=0.0) < STILL
     names = m.freedom_names()
-    left = {names[i]: i for i in np.flatnonzero(still)}
+    rests = still & moves_nearby(null_nearby, len(names))
+    left = {names[i]: i for i in np.flatnonzero(still & ~rests)}
     S = system.at(x[:, None]).S[:, :, 0]
     turns = np.array([f.turns for p in m.pairs for f in p.type.freedoms], dtype=bool)
     out = []
@@ -140,7 +145,20 @@ def locked_findings(system: System, x: Array, freedoms: Freedoms) -> tuple[Findi
         verb = "stands" if len(rest) == 1 else "stand"
         why = "the closure of the loops leaves no rate" if mobile else "the mechanism is a structure here"
         out.append(Finding(f"{', '.join(rest)} {verb} still: {why}", rest))
+    resting = tuple(names[i] for i in np.flatnonzero(rests))
+    if resting:
+        verb, pronoun = ("rests", "it moves") if len(resting) == 1 else ("rest", "they move")
+        out.append(
+            Finding(f"{', '.join(resting)} {verb} in this position only: {pronoun} in positions near by", resting)
+        )
     return tuple(out)
+
+
+def moves_nearby(null_nearby: Array | None, count: int) -> NDArray[np.bool_]:
+    """Which of ``count`` freedoms move in the motions ``(F, M)`` of a position near by; none where that is not known."""
+    if null_nearby is None:
+        return np.zeros(count, dtype=bool)
+    return np.asarray(np.abs(null_nearby).max(axis=1, initial=0.0) > MOVES)
 
 
 def input_motions(freedoms: Freedoms, null: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,9 +10,10 @@ import scipy
 
 from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array
+from mechgraph.model.mechanism import Mechanism
 from mechgraph.motion.idle import Idle
 from mechgraph.motion.system import Configuration, Index, System
-from mechgraph.numerics.linear import RANK_TOLERANCE, rank_of, singular_values
+from mechgraph.numerics.linear import RANK_TOLERANCE, independent_rows, rank_of, singular_values
 from mechgraph.structure.elimination import Elimination, loop_rows
 from mechgraph.structure.passive import STILL, PassiveMotion, passive_motions
 
@@ -23,8 +25,8 @@ ELIMINATION_RANK = 1e-9
 """Part of a unit row below which a pivot of the elimination counts as zero."""
 DEPENDENT = 1e-8
 """Part of a unit motion below which the weakest driver counts as standing still: drivers depend, or a dead point."""
-MANY = 40
-"""Motions above which a basis is made sparse by pivoting once instead of by full elimination."""
+ROUNDING = 1e-11
+"""Part of a unit rate that counts as zero."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +129,7 @@ def free_motion(system: System, x: Array, columns: Index) -> Freedoms:
     passive = passive_motions(here, left, columns)
     if not len(columns) and passive and len(passive) == null.shape[1]:
         # nothing else can move: what could be driven is an input, not an idle freedom
-        drivable = np.array([d for p in system.m.pairs for d in p.type.drivable])
+        drivable = [c for c, _ in single_freedoms(system.m)]
         passive = [p for p in passive if not (np.abs(p.rates[drivable]) > STILL).any()]
     undriven = _complement(system, left, passive)
     hold = np.zeros(0, dtype=np.intp)
@@ -143,7 +145,10 @@ def motions_of(J: Array) -> Array:
 
 
 def _complement(system: System, left: Array, passive: list[PassiveMotion]) -> list[FreeMotion]:
-    """Motions of ``left`` that are not passive, as sparse as elimination makes them."""
+    """Motions of ``left`` that are not passive: in each one freedom moves while those of the other motions rest.
+
+    These freedoms are the first independent ones in the order in which drivers are wanted, so a motion is what one more driver does.
+    """
     if left.shape[1] == len(passive):
         return []
     rest = left
@@ -152,37 +157,32 @@ def _complement(system: System, left: Array, passive: list[PassiveMotion]) -> li
         rest = left - P @ (P.T @ left)
         U, s, _ = np.linalg.svd(rest, full_matrices=False)
         rest = U[:, : left.shape[1] - len(passive)]
-    names = system.m.freedom_names()
+    m = system.m
+    Q, _ = np.linalg.qr(rest)
+    order = drive_order(m, passive)
+    order += [c for c in range(system.n_freedoms) if c not in set(order)]
+    chosen = independent_rows(Q, order, Q.shape[1])
+    basis = np.linalg.solve(Q[chosen].T, Q.T)
+    basis /= np.abs(basis).max(axis=1, keepdims=True)
+    names = m.freedom_names()
     out = []
-    for rates in (reduced(rest) if rest.shape[1] <= MANY else pivoted(rest)).T:
+    for rates in np.where(np.abs(basis) < ROUNDING, 0.0, basis):
         moving = tuple(names[i] for i in np.flatnonzero(np.abs(rates) > STILL))
         out.append(FreeMotion(rates, moving))
     return out
 
 
-def reduced(columns: Array) -> Array:
-    """The column space with unit pivots, by elimination with full pivoting: a sparse, canonical basis."""
-    A = columns.copy()
-    taken: list[int] = []
-    for j in range(A.shape[1]):
-        rest = np.abs(A[:, j:])
-        rest[taken] = 0.0
-        i, k = divmod(int(np.argmax(rest > (1 - 1e-9) * rest.max())), rest.shape[1])
-        k += j
-        A[:, [j, k]] = A[:, [k, j]]
-        A[:, j] /= A[i, j]
-        for other in range(A.shape[1]):
-            if other != j:
-                A[:, other] -= A[i, other] * A[:, j]
-        taken.append(int(i))
-    A[np.abs(A) < 1e-11] = 0.0
-    order = np.argsort(taken)
-    return np.asarray(A[:, order])
+def single_freedoms(m: Mechanism) -> list[tuple[int, str]]:
+    """Freedoms that take a drive, as (column, name)."""
+    single = [d for p in m.pairs for d in p.type.drivable]
+    return [(i, n) for i, (n, s) in enumerate(zip(m.freedom_names(), single, strict=True)) if s]
 
 
-def pivoted(columns: Array) -> Array:
-    """The column space of orthonormal columns with unit rows where QR with pivoting puts them: for many columns."""
-    _, pivots = scipy.linalg.qr(columns.T, mode="r", pivoting=True)
-    chosen = np.sort(pivots[: columns.shape[1]])
-    out = np.asarray(np.linalg.solve(columns[chosen].T, columns.T).T)
-    return np.where(np.abs(out) < 1e-11, 0.0, out)
+def drive_order(m: Mechanism, passive: Sequence[PassiveMotion]) -> list[int]:
+    """Freedoms that take a drive in the order in which they are wanted: free of passive motions first, then at the frame."""
+    idle = np.zeros(sum(p.type.f for p in m.pairs), dtype=bool)
+    for p in passive:
+        idle |= np.abs(p.rates) > STILL
+    at_frame = {n: m.frame in (p.a, p.b) for p in m.pairs for n in p.freedom_names}
+    singles = single_freedoms(m)
+    return [i for i, name in sorted(singles, key=lambda item: (idle[item[0]], not at_frame[item[1]], item[0]))]

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations, pairwise
 
+import networkx as nx
 import numpy as np
 
 from mechgraph.algebra.screw import null_space
@@ -66,15 +67,17 @@ def passive_motions(here: Configuration, left: Array, driven: Index) -> list[Pas
         return []
     found: list[PassiveMotion] = []
     search = _Search(here, driven)
-    by_freedom: dict[int, list[PassiveMotion]] = {}
+    sharing: nx.Graph[int] = nx.Graph()
     for links, border in sorted(_borders(search, left), key=lambda item: (len(item[0]), item[0])):
         for motion in _of_border(search, links, border):
-            moving = np.flatnonzero(np.abs(motion.rates) > STILL)
-            near = {id(p): p for c in moving for p in by_freedom.get(int(c), [])}
-            if _independent(motion, list(near.values())):
+            moving = np.flatnonzero(np.abs(motion.rates) > STILL).tolist()
+            trial = ~len(found)
+            nx.add_star(sharing, [trial, *moving])
+            tied = [~i for i in nx.node_connected_component(sharing, trial) if i < 0 and i != trial]
+            if _independent(motion, [found[i] for i in sorted(tied)]):
                 found.append(motion)
-                for c in moving:
-                    by_freedom.setdefault(int(c), []).append(motion)
+            else:
+                sharing.remove_node(trial)
     return sorted(found, key=lambda p: p.links)
 
 
@@ -219,7 +222,7 @@ def _leaving(search: _Search, k: int, links: tuple[int, ...], moves: Array, twis
 
 
 def _independent(motion: PassiveMotion, near: list[PassiveMotion]) -> bool:
-    """Whether a motion is no combination of those found that share a freedom with it."""
+    """Whether a motion is no combination of those found to which shared freedoms tie it."""
     if not near:
         return True
     s = np.linalg.svd(np.stack([*(p.rates for p in near), motion.rates]), compute_uv=False)

@@ -11,6 +11,8 @@ from mechgraph.algebra.screw import shift_wrench
 from mechgraph.algebra.se3 import Array, cross
 from mechgraph.motion.system import Configuration, Index
 
+DRIVERS_ALONE = 1e-9
+"""Part of a self-stress below which its reactions count as none: drivers that strain each other alone."""
 UNIQUE = 1e-7
 """Part of a unit self-stress in a component above which the component is not unique (forces and moments / L compared)."""
 
@@ -62,14 +64,31 @@ def orthonormal_stress(here: Configuration, states: Array, driven: Index) -> Str
     if not s:
         return Stress(parts, efforts)
     flat = at_pair_points(here, parts).transpose(3, 0, 1, 2).reshape(here.T, 6 * states.shape[1], s)
-    _, R = np.linalg.qr(flat)
-    inverse = np.linalg.inv(R)
-    return Stress(np.einsum("cpit,tij->cpjt", parts, inverse), np.einsum("fit,tij->fjt", efforts, inverse))
+    mix = _orthonormal(flat, efforts.transpose(2, 0, 1))
+    return Stress(np.einsum("cpit,tij->cpjt", parts, mix), np.einsum("fit,tij->fjt", efforts, mix))
+
+
+def _orthonormal(reactions: Array, efforts: Array) -> Array:
+    """Mixes ``(T, s, s)`` that make states orthonormal in their reactions ``(T, n, s)``; in their efforts where those are all zero."""
+    R = np.linalg.qr(reactions, mode="r")
+    size = np.abs(np.einsum("tii->ti", R))
+    if (size.min(axis=1) > DRIVERS_ALONE * size.max(axis=1)).all():
+        return np.asarray(np.linalg.inv(R))
+    _, sigma, Vt = np.linalg.svd(reactions, full_matrices=False)
+    out = np.swapaxes(Vt, 1, 2).copy()
+    for t, (mix, values) in enumerate(zip(out, sigma, strict=True)):
+        alone = values <= DRIVERS_ALONE * max(values[0], float(np.abs(efforts[t]).max()))
+        mix[:, ~alone] /= values[~alone]
+        mix[:, alone] = mix[:, alone] @ np.linalg.inv(np.linalg.qr(efforts[t] @ mix[:, alone], mode="r"))
+    return out
 
 
 def least_reactions(here: Configuration, reactions: Array, efforts: Array, stress: Stress) -> tuple[Array, Array]:
     """Reactions and efforts of minimum norm: the part along every self-stress removed."""
-    y = -np.einsum("cpit,cpt->it", at_pair_points(here, stress.wrenches), at_pair_points(here, reactions))
+    states = at_pair_points(here, stress.wrenches)
+    y = -np.einsum("cpit,cpt->it", states, at_pair_points(here, reactions))
+    alone = (states**2).sum(axis=(0, 1)) < 0.5  # drivers that strain each other without any reaction
+    y -= np.where(alone, np.einsum("fit,ft->it", stress.efforts, efforts), 0.0)
     return reactions + np.einsum("cpit,it->cpt", stress.wrenches, y), efforts + np.einsum(
         "fit,it->ft", stress.efforts, y
     )
@@ -102,3 +121,14 @@ class PairFrames:
             values = np.einsum("ntij,jn...t->in...t", inverse, local[:, g.pairs])
             out.append(values[: 6 - g.row.f])
         return out
+
+    def components_of(self, pair: int, wrenches: Array) -> Array:
+        """Components ``(6 - f, s)`` of reaction wrenches ``(6, s)`` of one pair at the first position."""
+        points = self.here.pair_points[:, pair, 0]
+        g, i = self._place[pair]
+        local = shift_wrench(wrenches, points[:, None])
+        return np.asarray((self.dual[g][i, 0] @ local)[: 6 - self.here.system.groups[g].row.f])
+
+    @cached_property
+    def _place(self) -> dict[int, tuple[int, int]]:
+        return {int(k): (n, i) for n, g in enumerate(self.here.system.groups) for i, k in enumerate(g.pairs)}

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import dataclasses
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import networkx as nx
 import numpy as np
 
 from mechgraph.algebra.screw import null_space
@@ -12,7 +14,7 @@ from mechgraph.algebra.se3 import Array
 
 SHOWN = 1e-6
 """Part of a self-stress (largest part 1) below which a component is not shown."""
-COMBINED = 60
+COMBINED = 300
 """Components of one group up to which combinations across pairs are worked out."""
 
 Label = tuple[str, str]
@@ -48,28 +50,46 @@ def readable(table: Array, labels: list[Label]) -> tuple[tuple[SelfStress, ...],
         states.append(
             SelfStress(
                 {f"{pair}:{name}": v for (pair, name), v in shown if not name.startswith("effort")},
-                {pair: v for (pair, name), v in shown if name.startswith("effort")},
+                {f"{pair}{name[6:].replace(' ', '.')}": v for (pair, name), v in shown if name.startswith("effort")},
                 int(group),
             )
         )
     return tuple(states), basis, groups
 
 
-def combinations(basis: Array, groups: Array, labels: list[Label], known: set[int]) -> tuple[tuple[int, str], ...]:
+def combinations(
+    basis: Array, groups: Array, labels: list[Label], known: set[int]
+) -> tuple[tuple[tuple[int, str], ...], int]:
     """Per group the sums of components that are unique though their terms are not; ``known`` components are left out.
 
     A component that a combination found before ties to others of its pair brings nothing new, so it is among ``known``.
+    Also returned: the number of groups that have too many components for it.
     """
-    out = []
+    out, unsought = [], 0
     for group in sorted(set(groups.tolist())):
         mine = basis[:, groups == group]
         touched = [int(i) for i in np.flatnonzero(np.abs(mine).max(axis=1) > SHOWN) if int(i) not in known]
         if len(touched) > COMBINED:
+            unsought += 1
             continue
         for column in canonical(null_space(mine[touched].T, 1e-9)).T:
             terms = {":".join(labels[i]): float(v) for i, v in zip(touched, column, strict=True) if abs(v) > SHOWN}
             out.append((group, SelfStress(terms, {}).text))
-    return tuple(out)
+    return tuple(out), unsought
+
+
+def regrouped(states: Sequence[SelfStress]) -> tuple[SelfStress, ...]:
+    """The states with group numbers made anew: states that share a component belong together."""
+    names = [{*s.components, *(f"effort {name}" for name in s.efforts)} for s in states]
+    place = {name: i for i, name in enumerate(dict.fromkeys(name for part in names for name in sorted(part)))}
+    graph: nx.Graph[int] = nx.Graph()
+    for i, part in enumerate(names):
+        nx.add_star(graph, [~i, *(place[name] for name in part)])
+    number: dict[int, int] = {}
+    for component in nx.connected_components(graph):
+        number |= dict.fromkeys((~i for i in component if i < 0), len(number))
+    order = {group: n for n, group in enumerate(dict.fromkeys(number[i] for i in range(len(states))))}
+    return tuple(dataclasses.replace(s, group=order[number[i]]) for i, s in enumerate(states))
 
 
 def canonical(columns: Array) -> Array:

@@ -17,6 +17,7 @@ from mechgraph.formulation.registry import Ledger
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.motion.assembly import assembled, assembled_at, named_columns
 from mechgraph.motion.system import Index, System
+from mechgraph.numerics.linear import independent_rows
 from mechgraph.structure import drivers, facts, sections, wording
 from mechgraph.structure.advice import Effect, advice
 from mechgraph.structure.findings import Finding, LoopFact, input_motions, locked_findings, loop_facts, passive_finding
@@ -24,7 +25,7 @@ from mechgraph.structure.freedom import NEAR, Freedoms, free_motion
 from mechgraph.structure.generic import Generic, generic
 from mechgraph.structure.mobility import FiniteMotion, finite_motion
 from mechgraph.structure.readable import SelfStress
-from mechgraph.structure.stress import Uniqueness, uniqueness
+from mechgraph.structure.stress import Uniqueness, self_stresses, uniqueness
 from mechgraph.topology.linkgraph import LinkGraph, link_graph
 from mechgraph.topology.parts import Parts, parts_of
 
@@ -186,10 +187,14 @@ class DeterminacyReport:
         """For every pair: component -> whether it is unique; ``effort`` for a driven freedom."""
         return self.reactions.unique if self.reactions else {}
 
-    @property
+    @cached_property
     def self_stresses(self) -> tuple[SelfStress, ...]:
-        """Reaction states without load, with the declared drivers: a canonical sparse basis."""
-        return self.reactions.states if self.reactions else ()
+        """Reaction states without load, with the declared drivers: a canonical sparse basis.
+
+        In a large mechanism those of single loops, and of those across loops the first hundred.
+        """
+        g = self.geometry
+        return self_stresses(g.system.at(g.x[:, None]), g.driven, self.reactions) if g and self.reactions else ()
 
     @cached_property
     def undriven(self) -> tuple[Finding, ...]:
@@ -208,7 +213,11 @@ class DeterminacyReport:
     def locked(self) -> tuple[Finding, ...]:
         """Freedoms that cannot move here, with the reason."""
         g = self.geometry
-        return locked_findings(g.system, g.x, g.freedoms) if g else ()
+        return locked_findings(g.system, g.x, g.freedoms, self._null_nearby) if g else ()
+
+    @property
+    def _null_nearby(self) -> Array | None:
+        return self.motion.null_nearby if self.motion else None
 
     @cached_property
     def _input(self) -> Array:
@@ -224,8 +233,7 @@ class DeterminacyReport:
     def not_drivable(self) -> tuple[Finding, ...]:
         """Single freedoms that cannot drive here, with the reason."""
         g = self.geometry
-        nearby = self.motion.null_nearby if self.motion else None
-        return drivers.not_drivable(self.mechanism, g.freedoms, self.drivable, nearby) if g else ()
+        return drivers.not_drivable(self.mechanism, g.freedoms, self.drivable, self._null_nearby) if g else ()
 
     @property
     def inputs(self) -> int | None:
@@ -240,7 +248,7 @@ class DeterminacyReport:
             return ()
         place = {name: i for i, name in enumerate(m.freedom_names())}
         asked = [int(c) for c in g.driven] + [place[n] for n in drivers.suggested(m, g.freedoms, self.drivable)]
-        kept = set(drivers.independent_rows(g.freedoms.null, asked, len(asked)))
+        kept = set(independent_rows(g.freedoms.null, asked, len(asked)))
         names = tuple(n for n, i in place.items() if i in kept and i in asked[len(g.driven) :])
         while names and self.thorough:
             # a driver may hold a motion that was passive, and so leave another free

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from mechgraph.document import Bullets, Document, Heading, Paragraph, Table
 from mechgraph.model.pair import TABLE
 from mechgraph.structure.freedom import NEAR
-from mechgraph.structure.wording import loop_names, plural, reasons, short
+from mechgraph.structure.wording import assumed, loop_names, plural, reasons, short
 
 if TYPE_CHECKING:
     from mechgraph.structure.report import DeterminacyReport
@@ -66,7 +66,7 @@ def _facts(r: DeterminacyReport) -> list[Any]:
         tuple((name, *(str(values[i]) for _, values in columns)) for i, name in enumerate(names)),
         align="l" + "r" * len(columns),
     )
-    return [Paragraph(there), table, *_mobility(r), *([Bullets(tuple(reasons(r)))] if r.geometry else [])]
+    return [Paragraph(there), table, *_mobility(r), *([Bullets((*reasons(r), *assumed(r)))] if r.geometry else [])]
 
 
 def _mobility(r: DeterminacyReport) -> list[Any]:
@@ -122,19 +122,22 @@ def _stresses(r: DeterminacyReport) -> list[Any]:
         return []
     lines = [f"group {s.group + 1}: {s.text}" for s in found.states[:LISTED]]
     if found.count > len(lines):
-        lines.append(f"... and {found.count - len(lines)} more")
+        lines.append(f"... and {found.count - len(lines)} more (see the JSON)")
     blocks: list[Any] = [
         Heading("Self-stresses", 2),
         Paragraph(MEANINGS.format(L=r.geometry.system.par.L)),
         Bullets(tuple(lines)),
     ]
     directions = [t.text for t in found.transverse]
-    if directions or found.combinations:
+    if directions or found.combinations or found.unsought:
         blocks.append(Heading("Unique only in combination", 2))
         if directions:
             blocks += [Paragraph("Directions in the axes x, y, z of the pair's marker."), _listed(directions)]
         if found.combinations:
             blocks += _sums(found.combinations)
+        if found.unsought:
+            where = f"{plural(found.unsought, 'group')} of many components"
+            blocks.append(Paragraph(f"Sums across pairs were not sought in {where}."))
     return blocks
 
 

@@ -10,18 +10,21 @@ import numpy as np
 
 from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array
+from mechgraph.model.connection import Pair
 from mechgraph.motion.system import Configuration, Index
 from mechgraph.numerics.linear import RANK_TOLERANCE
 from mechgraph.structure.elimination import Elimination
 from mechgraph.structure.freedom import elimination, is_large
 from mechgraph.structure.reaction import UNIQUE, PairFrames, Stress, orthonormal_stress
-from mechgraph.structure.readable import Label, SelfStress, combinations, readable
+from mechgraph.structure.readable import Label, SelfStress, combinations, readable, regrouped
 from mechgraph.structure.transverse import Transverse, transverse
 
 PROBES = 6
 """Random self-stresses that stand for all of them in a large mechanism."""
 LISTED = 20
-"""Self-stresses of a large mechanism that are worked out as sparse vectors."""
+"""Self-stresses of a large mechanism that are worked out at once; the others when asked for."""
+SHARED = 100
+"""Self-stresses across loops of a large mechanism that are worked out at most."""
 SEED = 5
 
 
@@ -34,9 +37,10 @@ class Uniqueness:
     unique : pair -> component -> bool; ``effort`` (or ``effort Tz``) for driven freedoms.
     count, groups : number of self-stresses with the drivers in place, and of groups that share components (in a large mechanism: of
         connected parts in which they lie).
-    states : canonical sparse self-stresses; in a large mechanism the first few.
+    states : canonical sparse self-stresses; in a large mechanism the first few (``self_stresses`` gives the others).
     transverse : directions of force and moment that are unique in a pair though its components are not.
     combinations : per group the further sums of components that are unique although their terms are not, as text.
+    unsought : groups in which such sums were not sought, as they have too many components; all groups of a large mechanism.
     weakest, strongest : the largest part of a unit self-stress in a component called unique, the smallest in one called not unique.
     sampled : whether random self-stresses stood for all of them, as in large mechanisms.
     """
@@ -49,6 +53,7 @@ class Uniqueness:
     combinations: tuple[tuple[int, str], ...]
     weakest: float
     strongest: float
+    unsought: int = 0
     sampled: bool = False
 
 
@@ -76,12 +81,14 @@ def _uniqueness_of_few(here: Configuration, driven: Index) -> Uniqueness:
     labels, table = component_table(here, stress_at(here, driven), driven)
     states, basis, groups = readable(table, labels)
     directions, known = transverse(here, labels, table)
+    sums, unsought = combinations(basis, groups, labels, known)
     return Uniqueness(
         count=table.shape[1],
         groups=len({s.group for s in states}),
         states=states,
         transverse=directions,
-        combinations=combinations(basis, groups, labels, known),
+        combinations=sums,
+        unsought=unsought,
         **_verdicts(here, labels, table),
     )
 
@@ -95,16 +102,24 @@ def _uniqueness_of_many(here: Configuration, driven: Index) -> Uniqueness:
     labels, table = component_table(here, orthonormal_stress(here, pair_states(here, probes), driven), driven)
     verdicts = _verdicts(here, labels, table)
     directions, _ = transverse(here, labels, table)
-    _, first = component_table(here, orthonormal_stress(here, pair_states(here, _first_states(found)), driven), driven)
+    groups = _group_count(here, found, verdicts["unique"])
     return Uniqueness(
         count=count,
-        groups=_group_count(here, found, verdicts["unique"]),
-        states=readable(first, labels)[0][:LISTED],
+        groups=groups,
+        states=_states_of_many(here, driven, found, LISTED),
         transverse=directions,
         combinations=(),
+        unsought=groups,
         sampled=True,
         **verdicts,
     )
+
+
+def self_stresses(here: Configuration, driven: Index, found: Uniqueness) -> tuple[SelfStress, ...]:
+    """All self-stresses in readable form; in a large mechanism those of single loops, and of those across loops the first few."""
+    if not found.sampled:
+        return found.states
+    return _states_of_many(here, driven, elimination(here, driven), found.count)
 
 
 def _group_count(here: Configuration, found: Elimination, unique: dict[str, dict[str, bool]]) -> int:
@@ -121,18 +136,35 @@ def _group_count(here: Configuration, found: Elimination, unique: dict[str, dict
     return int(nx.number_connected_components(graph))
 
 
-def _first_states(found: Elimination) -> Array:
-    """Loop wrenches of the first self-stresses: those of single loops, then shared ones."""
-    rows = 6 * len(found.rows.blocks)
-    columns: list[Array] = [np.zeros((rows, 0))]
-    count = 0
+def _states_of_many(here: Configuration, driven: Index, found: Elimination, most: int) -> tuple[SelfStress, ...]:
+    """The first ``most`` self-stresses: those of single loops, each made readable by itself, then those across loops."""
+    frames = PairFrames(here)
+    states: list[SelfStress] = []
     for i, Y in sorted(found.local, key=lambda item: item[0]):
-        if count < LISTED:
-            columns.append(np.zeros((rows, Y.shape[1])))
-            columns[-1][6 * i : 6 * i + 6] = Y
-            count += Y.shape[1]
-    left = max(0, min(LISTED - count, len(found.zero_rows)))
-    return np.concatenate([*columns, found.wrenches(np.eye(len(found.zero_rows), left))], axis=1)
+        if len(states) < most:
+            states += readable(*_of_loop(here, frames, driven, i, Y))[0]
+    left = max(0, min(most - len(states), len(found.zero_rows), SHARED))
+    if left:
+        shared = found.wrenches(np.eye(len(found.zero_rows), left))
+        stress = orthonormal_stress(here, pair_states(here, shared), driven)
+        labels, table = component_table(here, stress, driven)
+        touched = np.flatnonzero(np.abs(table).max(axis=1) > UNIQUE)
+        states += readable(table[touched], [labels[i] for i in touched])[0]
+    return regrouped(states[:most])
+
+
+def _of_loop(here: Configuration, frames: PairFrames, driven: Index, loop: int, Y: Array) -> tuple[Array, list[Label]]:
+    """Parts ``(components, s)`` and labels of self-stresses of one loop alone, given by its wrenches ``Y (6, s)``."""
+    system = here.system
+    labels: list[Label] = []
+    parts: list[Array] = []
+    for k, sign in system.graph.loops[loop]:
+        mine = driven[(driven >= system.first_column[k]) & (driven < system.first_column[k + 1])]
+        efforts = here.S[:, mine, 0].T @ (sign * Y)
+        reactions = sign * Y - here.E[:, mine, 0] @ efforts
+        labels += labels_of(system.m.pairs[k], mine - system.first_column[k])
+        parts += [frames.components_of(k, reactions), efforts]
+    return np.concatenate(parts), labels
 
 
 def component_table(here: Configuration, stress: Stress, driven: Index) -> tuple[list[Label], Array]:
@@ -142,19 +174,21 @@ def component_table(here: Configuration, stress: Stress, driven: Index) -> tuple
     rows: dict[int, Array] = {
         int(k): part[:, i, :, 0] for g, part in zip(system.groups, parts, strict=True) for i, k in enumerate(g.pairs)
     }
-    names = m.freedom_names()
     labels: list[Label] = []
     values: list[Array] = []
     for k, pair in enumerate(m.pairs):
-        labels += [(pair.name, name) for name in pair.type.component_names]
-        values += list(rows[k])
-        mine = [int(c) for c in driven if system.first_column[k] <= c < system.first_column[k + 1]]
-        for c in mine:
-            labels.append(
-                (pair.name, "effort" if len(mine) == 1 else f"effort {names[c].removeprefix(pair.name + '.')}")
-            )
-            values.append(stress.efforts[c, :, 0])
-    return labels, np.array(values).reshape(len(labels), -1)
+        mine = driven[(driven >= system.first_column[k]) & (driven < system.first_column[k + 1])]
+        labels += labels_of(pair, mine - system.first_column[k])
+        values += [rows[k], stress.efforts[mine, :, 0]]
+    return labels, np.concatenate([np.zeros((0, stress.wrenches.shape[2])), *values])
+
+
+def labels_of(pair: Pair, driven: Index) -> list[Label]:
+    """(pair, component) of the reaction components of a pair, then of the efforts of its freedoms ``driven`` (numbers)."""
+    out = [(pair.name, name) for name in pair.type.component_names]
+    if len(driven) == 1:
+        return [*out, (pair.name, "effort")]
+    return out + [(pair.name, f"effort {pair.type.freedoms[j].name}") for j in driven]
 
 
 def _verdicts(here: Configuration, labels: list[Label], table: Array) -> dict[str, Any]:

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mechgraph.model.connection import second_direction
+
 if TYPE_CHECKING:
     from mechgraph.structure.report import DeterminacyReport
 
@@ -79,7 +81,8 @@ def _here(r: DeterminacyReport) -> str:
     if not r.mobility and drivers:
         return _driven_structure(r)
     if not _loose(r):
-        idle = f" ({plural(len(r.passive), 'passive freedom')} held)" if r.passive else ""
+        more = plural(len(r.passive), "unknown")
+        idle = f" ({plural(len(r.passive), 'passive freedom')} held: {more} more)" if r.passive else ""
         state = "Determinate" if r.mobility else "Determinate structure"
         return f"{state}: {_counts(r)}; every reaction is unique{idle}."
     return f"{_state(r)}, {_tied(r)}{_efforts(r)}."
@@ -186,6 +189,16 @@ def reasons(r: DeterminacyReport) -> list[str]:
     if not r.geometry:
         return []
     return _excess(r) + _finite(r) + _margin(r) or ["Count and rank agree: no equation is redundant."]
+
+
+def assumed(r: DeterminacyReport) -> list[str]:
+    """Second directions that were left out where the pair type needs one."""
+    return [
+        f"{p.name} ({p.type.symbol}): no second direction was given; x = ({', '.join(f'{v:.4g}' for v in p.second)}) was taken. Give "
+        "second=... if the marker lies otherwise."
+        for p in r.mechanism.pairs
+        if p.type.square_second and p.point is not None and p.second == second_direction(p.axis)
+    ]
 
 
 def _excess(r: DeterminacyReport) -> list[str]:
