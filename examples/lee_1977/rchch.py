@@ -1,6 +1,7 @@
 """RCHCH, sections 2.8 and 3.7: Tables XI to XIII and XXXIII to XXXVII."""
 
 from functools import cache
+from itertools import product
 
 import numpy as np
 
@@ -51,6 +52,40 @@ def gap_of_table_xi() -> tuple[float, float]:
     return float(between.min()), float(between.max())
 
 
+def _rotation(axis: int, angle: np.ndarray | float) -> np.ndarray:
+    """Rotations ``(..., 3, 3)`` about x (0) or z (2)."""
+    c, s = np.cos(angle), np.sin(angle)
+    out = np.zeros((*np.shape(angle), 3, 3))
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    out[..., axis, axis] = 1.0
+    out[..., i, i] = out[..., j, j] = c
+    out[..., j, i], out[..., i, j] = s, -s
+    return out
+
+
+def direction_gap(angles: dict[str, np.ndarray], signs: tuple[int, ...] = (1,) * 9) -> np.ndarray:
+    """Angle (degrees) between the directions of A4 on both halves of the chain, from theta1, theta2, theta3, theta5 (radians):
+    Rz1 Rx1 Rz2 Rx2 Rz3 Rx3 z against Rx5^-1 Rz5^-1 Rx4^-1 z, the four angles and the five twists with the signs given.
+    """
+    t1, t2, t3, t5 = (
+        sign * angles[name] for sign, name in zip(signs, ("theta1", "theta2", "theta3", "theta5"), strict=False)
+    )
+    a1, a2, a3, a4, a5 = np.array(signs[4:]) * np.deg2rad([10.0, 80.0, 40.0, 50.0, 60.0])
+    left = (
+        _rotation(2, t1) @ _rotation(0, a1) @ _rotation(2, t2) @ _rotation(0, a2) @ _rotation(2, t3) @ _rotation(0, a3)
+    )
+    right = _rotation(0, -a5) @ _rotation(2, -t5) @ _rotation(0, -a4)
+    return np.rad2deg(np.arccos(np.clip(dot(left[..., 2], right[..., 2]), -1.0, 1.0)))
+
+
+def smallest_gaps_of_all_signs() -> tuple[float, float]:
+    """Over all signs of angles and twists, theta1 positive: smallest greatest gap, and smallest median gap of Table XI."""
+    t = table("XI")
+    angles = {name: np.deg2rad(t[name]) for name in ("theta1", "theta2", "theta3", "theta5")}
+    gaps = [direction_gap(angles, (1, *signs)) for signs in product((1, -1), repeat=8)]
+    return float(min(g.max() for g in gaps)), float(min(np.median(g) for g in gaps))
+
+
 def pitch_identities() -> dict[str, float]:
     """What holds in Tables XI to XIII: S3 = 2 theta3 and S5 = 5 theta5, and their rates."""
     t = table("XI")
@@ -96,6 +131,7 @@ def modes(theta1_deg: float = 0.0, starts: int = 60, turns: float = np.pi) -> tu
     return tuple(sorted(found))
 
 
+@cache
 def branches(step: float = 5.0, end: float = 65.0) -> tuple[mg.Solution, ...]:
     """The four modes followed over theta1 from -end to end, a Solution each, positions in order."""
     m = mg.load("rchch")
