@@ -13,7 +13,8 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from lee_1977 import chains, coefficients, errata, rchch, rcsr, rcsr_csr, response
+from lee_1977 import chains, coefficients, equations, errata, rchch, rcsr, rcsr_csr, response
+from lee_1977.tables import largest, table
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "library" / "lee-1977.md"
 REPRODUCED, COPIED, IDENTITIES, LIST, NOT = (
@@ -113,6 +114,50 @@ def text_of_equations() -> str:
         f"| 2.100 minus 2.107 | {tiny(same)}, the left sides ranging over {spread:.2g} | |",
         f"| rank of 2.117 for w2, w3, w5 | {errata.rank_of_2_117()} | |",
     ]
+    for number, motion in (("III", rcsr.motion()), ("X", rcsr_csr.motion())):
+        going_in, coming_out, left = errata.short_degree(motion, number)
+        short = f"{going_in * 1e6:.1f} in a million for theta1, {coming_out * 1e6:.1f} for theta2 and theta4"
+        lines.append(f"| degree of Table {number} | too short by {short} | {left:.1g} degrees left |")
+    return "\n".join(lines)
+
+
+def text_of_printed() -> str:
+    """Equations 3.106 to 3.226 that differ from the generated ones."""
+    lines = ["| mechanism | number | Lee | generated | verdict |", "|---|---|---|---|---|"]
+    same = total = 0
+    for name in chains.SECTIONS:
+        for x in equations.matched(name):
+            total += bool(x.number)
+            same += x.verdict in (equations.AGREES, equations.OTHER_SIDE)
+            if x.verdict not in (equations.AGREES, equations.OTHER_SIDE):
+                printed = f"`{x.printed}`" if x.printed else ""
+                lines.append(f"| {name} | {x.number} | {printed} | `{x.generated}` | {x.verdict} |")
+    return "\n".join([f"{same} of {total} equations agree. The others, and those that are not there:", "", *lines])
+
+
+def text_of_earlier() -> str:
+    """Where these numbers differ from an earlier independent examination, and what decides."""
+    other, rows = rcsr_csr.other_branch(), table("X")
+    theta2 = np.rad2deg(other["O2"].position[:, 0])
+    closed = int((other.checks.closure < 1e-9).sum())
+    decoded = rcsr_csr.axial_force_from_table_xxviii()
+    fits = largest((decoded - table("XXVII")["FA4"])[:-1])
+    torque = {slip.equations: chains.effect(slip) for slip in chains.SLIPS}["3.201"]
+    lines = ["| about | earlier | here | what decides |", "|---|---|---|---|"]
+    lines += [
+        "| RCSR-CSR, P6 = .4, true geometry | loop 2 cannot be assembled at any row of Table X | "
+        f"closes at {closed} of {len(theta2)} values of theta1, with theta2 = {theta2[0]:.1f} at {rows['theta1'][0]:.0f} and "
+        f"{theta2[-1]:.1f} at {rows['theta1'][-1]:.0f} degrees | both: on the branch of the table (theta2 = {rows['theta2'][0]:.1f} "
+        f"and {rows['theta2'][-1]:.1f}) it stays {rcsr_csr.gap_without_errors():.3f} in open, on the other branch of loop 1 it closes |",
+        f"| RCSR, true M_IN at 202 degrees | -134.9 | {rcsr.true_driver()[202][0]:.2f} | {rcsr.driver_of_point_masses():.2f} without the "
+        "tensors, which the earlier value leaves out; power balance holds for both |",
+        f"| Table XXVII, FA4 in row 214 (printed .743) | .738 | {rcsr_csr.copied()['XXVII'][-1, 6]:.3f} | the forces at O3 of Table XXVIII "
+        f"give {decoded[-1]:.3f}, and fit all other rows to {fits:.1g}: an 8 was read as a 3 |",
+        "| Tables XXV to XXVIII | reproduced to .0018 | to .0007, and 3e-6 of theta1 times the slope | the short degree, as in "
+        "Tables III and X: .0018 occurs in row 214, where the reactions are steep |",
+        f"| RCRCR, 3.201 alone | doubles the torque | {torque.printed_effort:.4g} for {torque.effort:.4g} | both: the rank stays full and "
+        "the torque is wrong; by how much depends on the geometry |",
+    ]
     return "\n".join(lines)
 
 
@@ -163,8 +208,10 @@ def text_of_table_xi() -> str:
 PARTS = {
     "verdicts": text_of_verdicts,
     "equations": text_of_equations,
+    "printed": text_of_printed,
     "slips": text_of_slips,
     "chains": text_of_chains,
+    "earlier": text_of_earlier,
     "table-xi": text_of_table_xi,
 }
 

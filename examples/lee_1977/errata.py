@@ -89,6 +89,24 @@ def chapter_2() -> dict[str, tuple[float, float]]:
     return out
 
 
+def short_degree(s: mg.Solution, number: str) -> tuple[float, float, float]:
+    """How much the degree of the thesis is too short, for theta1 going in and for theta2, theta4 coming out, and what is left.
+
+    Least squares over a table: printed - found = -in theta1 dtheta/dtheta1 - out theta, degrees.
+    """
+    theta1 = table(number)["theta1"]
+    columns_in, columns_out, differences = [], [], []
+    for k in (2, 4):
+        result = s[f"O{k}"]
+        theta = np.rad2deg(result.position[:, 0])
+        columns_in.append(-theta1 * result.velocity[:, 0] / s["O1"].velocity[:, 0])
+        columns_out.append(-theta)
+        differences.append(table(number)[f"theta{k}"] - theta)
+    A, b = np.column_stack([np.concatenate(columns_in), np.concatenate(columns_out)]), np.concatenate(differences)
+    found = np.linalg.lstsq(A, b, rcond=None)[0]
+    return float(found[0]), float(found[1]), largest(b - A @ found)
+
+
 def zero_of_2_63() -> float:
     """Largest N2 . (N1 x N2), by which 2.63 divides."""
     rng = np.random.default_rng(63)

@@ -210,14 +210,25 @@ def loop_1_loaded(r25: np.ndarray) -> mg.Solution:
     )
 
 
-def reactions(s: mg.Solution) -> dict[str, np.ndarray]:
-    """A solution of the first loop in the columns of Tables XXV to XXVIII."""
+def spherical_directions(s: mg.Solution) -> np.ndarray:
+    """B, C, D of the sphere O3 as columns, ``(T, 3, 3)``: equations 2.33 to 2.35."""
     t1, t2, t4 = (s[name].position[:, 0] for name in ("O1", "O2", "O4"))
     b = np.column_stack([np.sin(t4) * np.sin(A4), np.cos(t4), np.sin(t4) * np.cos(A4)])
     s1, c1, s2, c2 = np.sin(t1), np.cos(t1), np.sin(t2), np.cos(t2)
     c = np.column_stack([-s2 * np.sin(A1), -c1 * c2 + s1 * s2 * np.cos(A1), c1 * s2 * np.cos(A1) + s1 * c2])
+    return np.stack([b, c, np.cross(b, c)], axis=2)
+
+
+def axial_force_from_table_xxviii() -> np.ndarray:
+    """FA4 of every row from the printed forces at O3: link 3 has no mass, so ``FA4 = -(FB B + FC C + FD D) . A4``."""
+    force = (spherical_directions(motion()) * printed("XXVIII")[:, None, :3]).sum(axis=2)
+    return -force @ AXIS_4
+
+
+def reactions(s: mg.Solution) -> dict[str, np.ndarray]:
+    """A solution of the first loop in the columns of Tables XXV to XXVIII."""
     o3, _ = wrench(s["O3"].reaction)
-    parts = np.linalg.solve(np.stack([b, c, np.cross(b, c)], axis=2), o3[:, :, None])[:, :, 0]
+    parts = np.linalg.solve(spherical_directions(s), o3[:, :, None])[:, :, 0]
     f4, m4 = wrench(-s["O4"].reaction)
     return {
         "XXV": without_axis(*wrench(s["O1"].reaction), X, np.zeros(3)),

@@ -12,7 +12,7 @@ pytestmark = pytest.mark.reference
 ROUNDING = 0.7e-3
 """0.7 of the last printed digit."""
 DEGREE = 3e-6
-"""The degree of the thesis is relatively so much too short; it enters through theta1 and through the angle itself."""
+"""The degree of the thesis is too short, by 2 in a million going in and 4 coming out (see test_lee_verdicts): their mean."""
 
 
 def test_first_loop_is_right() -> None:
