@@ -7,7 +7,7 @@ import numpy as np
 
 import mechgraph as mg
 from lee_1977.rcsr import axis_2
-from lee_1977.tables import axial_sums, dot, largest, printed, table
+from lee_1977.tables import axial_sums, dot, largest, lees, printed, table
 
 TWIST_1, TWIST_5 = np.deg2rad(10.0), np.deg2rad(60.0)
 S1, P1, P5 = 0.2, 1.0, 0.4
@@ -195,12 +195,16 @@ def work_of_output() -> dict[str, float]:
     }
 
 
-def balance_of_link_3() -> float:
-    """Smallest of the four choices of sign of ``|R32 (with its axial part) -+ R43|`` over the rows with reactions below 100:
-    link 3 is between O3 and O4, so the two forces differ by its inertia alone. A3 is unknown, no closure being behind the
-    table: the components across A1 = x are compared through the length of what is left.
+def axial_force_of_o4() -> float:
+    """F43 . A4 of Table XXXVI, which a cylindrical pair makes zero: its greatest value over the rows with forces below 100, at the
+    best choice of signs. A4 is the direction that theta5 of Table XI gives it on the half of the chain beyond O5.
     """
-    o3, o4 = printed("XXXV"), printed("XXXVI")
-    total = np.sqrt((o3[:, :3] ** 2).sum(axis=1) + o3[:, 6] ** 2)  # F^ is perpendicular to A3
-    calm = total < 100.0
-    return largest((total - np.linalg.norm(o4[:, :3], axis=1))[calm])
+    force = printed("XXXVI")[:, :3]
+    calm = np.linalg.norm(force, axis=1) < 100.0
+    theta5 = np.deg2rad(table("XI")["theta5"])
+    a4, a5 = np.deg2rad([50.0, 60.0])
+    greatest = []
+    for turned, first, second in product((1, -1), repeat=3):
+        axes = _rotation(0, -first * a5) @ _rotation(2, -turned * theta5) @ _rotation(0, -second * a4)
+        greatest.append(largest(dot(force, lees(axes[..., 2]))[calm]))
+    return min(greatest)
