@@ -176,16 +176,16 @@ def text_of_earlier() -> str:
     lines += [
         "| RCSR-CSR, P6 = .4, true geometry | loop 2 cannot be assembled at any row of Table X | "
         f"closes at {closed} of {len(theta2)} values of theta1, with theta2 = {theta2[0]:.1f} at {rows['theta1'][0]:.0f} and "
-        f"{theta2[-1]:.1f} at {rows['theta1'][-1]:.0f} degrees | both: on the branch of the table (theta2 = {rows['theta2'][0]:.1f} "
-        f"and {rows['theta2'][-1]:.1f}) it stays {rcsr_csr.gap_without_errors():.3f} in open, on the other branch of loop 1 it closes |",
+        f"{theta2[-1]:.1f} at {rows['theta1'][-1]:.0f} degrees | the branch: on that of the table (theta2 = {rows['theta2'][0]:.1f} "
+        f"and {rows['theta2'][-1]:.1f}) it stays {rcsr_csr.gap_without_errors():.3f} in open, on the other one of loop 1 it closes |",
         f"| RCSR, true M_IN at 202 degrees | -134.9 | {rcsr.true_driver()[202][0]:.2f} | {rcsr.driver_of_point_masses():.2f} without the "
         "tensors, which the earlier value leaves out; power balance holds for both |",
         f"| Table XXVII, FA4 in row 214 (printed .743) | .738 | {rcsr_csr.copied()['XXVII'][-1, 6]:.3f} | the forces at O3 of Table XXVIII "
         f"give {decoded[-1]:.3f}, and fit all other rows to {fits:.1g}: an 8 was read as a 3 |",
         "| Tables XXV to XXVIII | reproduced to .0018 | to .0007, and 3e-6 of theta1 times the slope | the short degree, as in "
         "Tables III and X: .0018 occurs in row 214, where the reactions are steep |",
-        f"| RCRCR, 3.201 alone | doubles the torque | {torque.printed_effort:.4g} for {torque.effort:.4g} | both: the rank stays full and "
-        "the torque is wrong; by how much depends on the geometry |",
+        f"| RCRCR, 3.201 alone | doubles the torque | {torque.printed_effort:.4g} for {torque.effort:.4g} | the geometry: the rank stays full and "
+        "the torque is wrong in both |",
     ]
     return "\n".join(lines)
 
