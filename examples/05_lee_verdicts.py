@@ -184,8 +184,8 @@ def text_of_earlier() -> str:
         f"give {decoded[-1]:.3f}, and fit all other rows to {fits:.1g}: an 8 was read as a 3 |",
         "| Tables XXV to XXVIII | reproduced to .0018 | to .0007, and 3e-6 of theta1 times the slope | the short degree, as in "
         "Tables III and X: .0018 occurs in row 214, where the reactions are steep |",
-        f"| RCRCR, 3.201 alone | doubles the torque | {torque.printed_effort:.4g} for {torque.effort:.4g} | the geometry: the rank stays full and "
-        "the torque is wrong in both |",
+        f"| RCRCR, 3.201 alone | doubles the torque | {torque.printed_effort:.4g} for {torque.effort:.4g} | the geometry: the rank "
+        "stays full and the torque is wrong in both |",
     ]
     return "\n".join(lines)
 
