@@ -1,42 +1,93 @@
-"""Lee's RCSR mechanism: kinematics against his Table III, and his equations.
+"""Lee's RCSR mechanism end to end: check, equations, kinematics, kinetostatics, and his Tables III to IX and XV to XVIII.
 
-Problem: I.-P. J. Lee, thesis, Oklahoma State University 1977, section 2.6: a spatial four-link mechanism with revolute, cylindric,
-spherical and revolute pair; find angles, rates and accelerations of the pairs for a driven first pair.
+Problem: I.-P. J. Lee, thesis, Oklahoma State University 1977, sections 2.6 and 3.4: a spatial four-link mechanism with revolute,
+cylindric, spherical and revolute pair is driven at the first pair against a couple of 10 about the last. Find angles, rates,
+accelerations, the input torque and the reactions.
 
-Checked against two printed rows of Table III, to 0.7 of the last printed digit (angles: and 1e-5 relative, the table was made
-with a truncated degree). The unknowns and equations of his section 3.4 are 24 each.
+Checked against every row of his tables, to 0.7 of the last printed digit. Tables III to IX are right (angles: and 1e-5 relative,
+they were made with a truncated degree). Tables XV to XVIII come out only when the inertia torque of his equation 3.31 is put in as
+a load in place of the true one; the true input torque is another, and the picture shows both:
+
+    python examples/03_lee_rcsr.py picture.png
 """
 
+import sys
+from pathlib import Path
+
 import numpy as np
+from lee_1977 import pictures, rcsr
+from lee_1977.tables import table
 
 import mechgraph as mg
+from mechgraph.show import draw_skeleton
 
-# theta1; theta2 [deg], S2 [in], theta4 [deg]; their rates [rad/s, in/s, rad/s]; their accelerations [rad/s2, in/s2, rad/s2]
-TABLE_III = {
-    150: (-103.882, -8.961, 37.232, 0.143, 0.006, -0.007, 0.282, 0.015, -0.083),
-    188: (-55.591, -8.845, -46.226, 0.044, 0.022, -0.362, 0.040, 0.040, -0.742),
-}
+ROW = 10
+"""The position that the picture shows."""
+
+
+def solved() -> mg.Solution:
+    """The mechanism of the library over its stored sweep, 150 to 202 degrees, w1 = .1 rad/s, alpha1 = .2 rad/s2."""
+    m = mg.load("rcsr")
+    report = mg.check(m)
+    assert report.determinate
+    print(report.verdict)
+    f = mg.formulate(m, bookkeeping="lee")
+    assert len(f.unknowns) == len(f.equations) == 24
+    print(f.text(components=False))
+    return mg.solve(m)
+
+
+def compare() -> None:
+    """Largest differences from the tables."""
+    kinematics, kinetostatics = rcsr.kinematics(), rcsr.kinetostatics()
+    angles = kinematics.pop("III angles")
+    assert angles <= 0.7e-3 + 1e-5 * 202.0
+    assert max(kinematics.values()) <= 0.7e-3
+    assert max(kinetostatics.values()) <= 0.7e-2
+    print(f"angles of Table III: {angles:.4f} degrees")
+    print("Tables III to IX (printed to .001):", {n: round(v, 5) for n, v in kinematics.items()})
+    print(
+        "Tables XV to XVIII (printed to .01) with the torque of 3.31:",
+        {n: round(v, 4) for n, v in kinetostatics.items()},
+    )
+    for theta, (found, printed) in rcsr.true_driver().items():
+        print(f"M_IN at {theta} degrees: {found:.2f} with the true inertia, printed {printed:.2f}")
+
+
+def draw(s: mg.Solution, target: Path) -> None:
+    """Skeleton; angles with Table III; input torque with Table XVIII. Lee's M_IN is minus the effort."""
+    figure = pictures.figure(13.2, 4.6)
+    grid = figure.add_gridspec(1, 3, width_ratios=(1.0, 1.0, 1.0))
+    theta = np.rad2deg(s["O1"].position[:, 0])
+    space = figure.add_subplot(grid[0], projection="3d")
+    draw_skeleton(s, ROW, ax=space, ghosts=0, traces=["O2", "O3"])
+    space.set_title(f"RCSR at theta1 = {theta[ROW]:.0f} deg", fontsize=10.5, loc="left")
+
+    left, iii = figure.add_subplot(grid[1]), table("III")
+    for k, name in enumerate(("theta2", "theta4")):
+        angle = np.rad2deg(s[f"O{name[-1]}"].position[:, 0])
+        left.plot(theta, angle, color=pictures.COLOURS[k], lw=2.0, label=name)
+        left.plot(iii["theta1"], iii[name], label="Table III" if k else None, **pictures.PRINTED)
+    pictures.finish(left, "theta1 [deg]", "angle [deg]", "Angles of O2 and O4")
+
+    right, xviii = figure.add_subplot(grid[2]), table("XVIII")
+    right.plot(theta, -s["O1"].effort[:, 0], color=pictures.COLOURS[0], lw=2.0, label="true inertia")
+    copied = -rcsr.as_lee()["O1"].effort[:, 0]
+    right.plot(theta, copied, color=pictures.COLOURS[1], lw=2.0, ls="--", label="inertia torque of eq. 3.31")
+    right.plot(xviii["theta1"], xviii["MIN"], label="Table XVIII", **pictures.PRINTED)
+    pictures.finish(right, "theta1 [deg]", "M_IN [lb in2/s2]", "Input torque")
+    pictures.save(figure, target)
 
 
 def main() -> None:
-    m = mg.load("rcsr")
-    theta1 = np.deg2rad([float(angle) for angle in TABLE_III])
-    s = mg.kinematics(m, {"O1": mg.Motion(theta1, velocity=0.1, acceleration=0.2)})
-
-    def row(kind: str, degrees: bool = False) -> np.ndarray:
-        second, fourth = getattr(s["O2"], kind), getattr(s["O4"], kind)
-        turn = np.rad2deg(1.0) if degrees else 1.0
-        return np.stack([turn * second[:, 0], second[:, 1], turn * fourth[:, 0]], axis=1)
-
-    found = np.concatenate([row("position", degrees=True), row("velocity"), row("acceleration")], axis=1)
-    printed = np.array(list(TABLE_III.values()))
-    allowed = 0.7e-3 + 1e-5 * np.abs(printed) * np.isin(np.arange(9), (0, 2))
-    assert (np.abs(found - printed) <= allowed).all()
-
-    f = mg.formulate(m, bookkeeping="lee")
-    assert (len(f.unknowns), len(f.equations)) == (24, 24)
-    print(f.text(components=False))
-    print(f"largest difference from Table III: {np.abs(found - printed).max():.4f} (printed to 0.001)")
+    s = solved()
+    other = mg.solve(s.mechanism, method="newton_euler")
+    assert np.allclose(other["O1"].effort, s["O1"].effort, rtol=1e-9)
+    assert max(s.checks.closure.max(), np.abs(s.checks.power).max(), s.checks.equilibrium.max()) < 1e-10
+    print(f"closure error {s.checks.closure.max():.0e}, power balance {np.abs(s.checks.power).max():.0e}")
+    compare()
+    if len(sys.argv) > 1:
+        draw(s, Path(sys.argv[1]))
 
 
 if __name__ == "__main__":

@@ -25,9 +25,8 @@ def run(script: Path, *arguments: str) -> str:
     return done.stdout
 
 
-def arguments_for(script: Path, folder: Path) -> list[str]:
-    """The script that draws writes into a folder of the test."""
-    return [str(folder / "figure.png")] if "figure" in script.stem else []
+def draws(script: Path) -> bool:
+    return "draw_skeleton" in script.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("script", EXAMPLES, ids=lambda script: script.stem)
@@ -35,11 +34,19 @@ def test_example(script: Path, tmp_path: Path) -> None:
     text = script.read_text(encoding="utf-8")
     assert text.startswith('"""')
     assert "assert " in text
-    assert run(script, *arguments_for(script, tmp_path))
+    picture = tmp_path / "picture.png"
+    assert run(script, *([str(picture)] if draws(script) else []))
+    assert picture.exists() == draws(script)
 
 
 def test_examples_are_numbered_without_gaps() -> None:
     assert [script.stem.partition("_")[0] for script in EXAMPLES] == [f"{i + 1:02d}" for i in range(len(EXAMPLES))]
+
+
+def test_a_worked_example_draws_only_on_request() -> None:
+    script = next(script for script in EXAMPLES if script.stem == "03_lee_rcsr")
+    assert draws(script)
+    assert ".png:" not in run(script)
 
 
 def test_picture_of_the_readme_is_small() -> None:

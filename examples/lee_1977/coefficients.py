@@ -7,6 +7,7 @@ import numpy as np
 import mechgraph as mg
 from lee_1977.chains import rank
 from lee_1977.tables import G, coefficients
+from mechgraph.formulation.state import State
 
 AXES = "xyz"
 
@@ -83,54 +84,75 @@ def evaluated(value: str, numbers: dict[str, float]) -> float:
     return total
 
 
+def letters(layout: Layout, m: mg.Mechanism, state: State) -> dict[str, float]:
+    """The numbers behind the letters of the pair axes, real and dual part, and of the pitches."""
+    numbers = dict.fromkeys([f"A33{x}" for x in AXES], 0.0)  # a letter without meaning in Table XXXII
+    for k, pair in enumerate(m.pairs):
+        if pair.name in layout.screws:
+            real, dual = layout.screws[pair.name]
+            turn = next(i for i, c in enumerate(pair.type.bookkeeping.conditions) if c.turns)
+            axis = -state.conditions[k][:, turn, 0]  # z of the markers is minus A
+            numbers |= {real + x: axis[i] for i, x in enumerate(AXES)} | {
+                dual + x: axis[3 + i] for i, x in enumerate(AXES)
+            }
+    return numbers | {f"rho{k + 1}": p.pitch for k, p in enumerate(m.pairs) if p.pitch is not None}
+
+
+def spherical(units: np.ndarray, names: str, A: np.ndarray) -> tuple[list[np.ndarray], dict[str, float]]:
+    """Columns of three forces through a sphere, and the numbers behind their letters: any three directions, the same on both
+    sides.
+    """
+    rng = np.random.default_rng(1977)
+    columns, numbers = [], {}
+    for letter in names:
+        v = rng.normal(size=3)
+        amounts = units[3:].T @ v
+        screw = units @ amounts
+        numbers |= {f"{letter}0{x}": v[i] for i, x in enumerate(AXES)} | {
+            f"{letter}1{x}": screw[i] for i, x in enumerate(AXES)
+        }
+        columns.append(A @ amounts)
+    return columns, numbers
+
+
+def ordered_rows(layout: Layout, f: mg.Formulation) -> tuple[list[int], np.ndarray]:
+    """Rows in Lee's order, and their signs: his conditions are about A, minus z, and about his own free dual force."""
+    rows: list[int] = []
+    signs: list[float] = []
+    pairs = {p.name for p in f.mechanism.pairs}
+    reversed_pairs = {pair for pair, _, sense in layout.columns if sense < 0}
+    for owner in layout.rows:
+        mine = [i for i, e in enumerate(f.equations) if e.owner == owner]
+        if owner in pairs:
+            mine.sort(key=lambda i: "moment" in f.equations[i].name)
+        rows += mine
+        signs += [(1.0 if owner in reversed_pairs else -1.0) if owner in pairs else 1.0] * len(mine)
+    return rows, np.array(signs)
+
+
 def generated(number: str, position: int = 3) -> tuple[np.ndarray, dict[str, float]]:
     """The generated matrix in Lee's order, axes and signs, and the numbers behind his letters."""
     layout = LAYOUTS[number]
     m = in_lees_axes(layout.name)
-    s = mg.solve(m)
-    f = mg.formulate(m, bookkeeping="lee")
-    state = s.state(position)
+    f, state = mg.formulate(m, bookkeeping="lee"), mg.solve(m).state(position)
     A = f.assemble(state)[0].toarray()
-    k_of = {p.name: k for k, p in enumerate(m.pairs)}
-    numbers = dict.fromkeys([f"A33{x}" for x in AXES], 0.0)  # a letter without meaning in Table XXXII
-    for pair, (real, dual) in layout.screws.items():
-        turn = next(i for i, c in enumerate(m.pairs[k_of[pair]].type.bookkeeping.conditions) if c.turns)
-        axis = -state.conditions[k_of[pair]][:, turn, 0]  # z of the markers is minus A
-        numbers |= {real + x: axis[i] for i, x in enumerate(AXES)} | {dual + x: axis[3 + i] for i, x in enumerate(AXES)}
-    numbers |= {f"rho{k + 1}": p.pitch for k, p in enumerate(m.pairs) if p.pitch is not None}
-    rng = np.random.default_rng(1977)
-    columns = []
+    numbers, columns = letters(layout, m, state), []
     for pair, what, sense in layout.columns:
         mine = [i for i, u in enumerate(f.unknowns) if u.owner == pair and (u.group == "driver") == (what == "IN")]
-        if what == "BCD":  # any three directions: the same on both sides
-            units = state.reactions[k_of[pair]][:, :, 0]
-            for letter in layout.spherical[pair]:
-                v = rng.normal(size=3)
-                numbers |= {f"{letter}0{x}": v[i] for i, x in enumerate(AXES)}
-                screw = units @ (units[3:].T @ v)
-                numbers |= {f"{letter}1{x}": screw[i] for i, x in enumerate(AXES)}
-                columns.append(A[:, mine] @ (units[3:].T @ v))
+        if what == "BCD":
+            k = [p.name for p in m.pairs].index(pair)
+            found, named = spherical(state.reactions[k][:, :, 0], layout.spherical[pair], A[:, mine])
+            columns += found
+            numbers |= named
         elif what in "FM":
-            part = mine[:3] if what == "F" else mine[3:6]
-            columns += [sense * A[:, i] for i in part]
+            columns += [sense * A[:, i] for i in (mine[:3] if what == "F" else mine[3:6])]
         else:
             columns.append(-sense * A[:, mine[0] if what == "IN" else mine[6]])
-    rows: list[int] = []
-    signs: list[float] = []
-    for owner in layout.rows:
-        mine = [i for i, e in enumerate(f.equations) if e.owner == owner]
-        if owner in k_of:
-            mine.sort(key=lambda i: "moment" in f.equations[i].name)
-        rows += mine
-        signs += [-1.0 if owner in k_of else 1.0] * len(mine)
-    Q = np.column_stack(columns)[rows] * np.array(signs)[:, None]
+    rows, signs = ordered_rows(layout, f)
+    Q = np.column_stack(columns)[rows] * signs[:, None]
     for i, row in enumerate(rows):  # a condition says zero: its scale is free, ours is that of a unit screw
         if "force along" in f.equations[row].name:
             Q[i] /= np.linalg.norm(Q[i])
-    for owner in layout.rows:  # the free dual force enters a condition with the sense of its own column
-        if owner in k_of and any(p == owner and s < 0 for p, _, s in layout.columns):
-            at = [i for i, r in enumerate(rows) if f.equations[r].owner == owner]
-            Q[at] *= -1.0
     return Q, numbers
 
 

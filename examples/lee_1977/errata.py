@@ -3,6 +3,8 @@
 Every entry is (largest difference as printed, largest difference corrected); RCSR over the rows of Table III, w1 = .1.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 import mechgraph as mg
@@ -18,75 +20,134 @@ def columns(*parts: np.ndarray | float) -> np.ndarray:
     return np.column_stack(np.broadcast_arrays(*[np.asarray(p, dtype=float) for p in parts]))
 
 
-def chapter_2() -> dict[str, tuple[float, float]]:
-    """Equation number -> differences as printed and corrected."""
+@dataclass(frozen=True)
+class Row:
+    """The motion of RCSR over the rows of Table III in Lee's letters: cosines ``c``, sines ``n``, S2 and its rates."""
+
+    s: mg.Solution
+    c1: np.ndarray
+    n1: np.ndarray
+    c2: np.ndarray
+    n2: np.ndarray
+    c4: np.ndarray
+    n4: np.ndarray
+    s2: np.ndarray
+    s2dot: np.ndarray
+    s2ddot: np.ndarray
+
+    @property
+    def a2(self) -> np.ndarray:
+        """Direction of A2, equation 2.36."""
+        return columns(CA, self.n1 * SA, self.c1 * SA)
+
+    @property
+    def axis_rate(self) -> np.ndarray:
+        """dA2/dt as 2.51 prints it: the sign is reversed."""
+        return columns(0, -self.c1 * SA, self.n1 * SA) * W1
+
+
+def letters() -> Row:
     s = motion()
     t1, t2, t4 = (s[name].position[:, 0] for name in ("O1", "O2", "O4"))
-    s2, s2dot, s2ddot = s["O2"].position[:, 1], s["O2"].velocity[:, 1], s["O2"].acceleration[:, 1]
-    w2, w4 = s["O2"].velocity[:, 0], s["O4"].velocity[:, 0]
-    c1, n1, c2, n2, c4, n4 = np.cos(t1), np.sin(t1), np.cos(t2), np.sin(t2), np.cos(t4), np.sin(t4)
-    x, y, z = CENTRE
-    out: dict[str, tuple[float, float]] = {}
+    o2 = s["O2"]
+    return Row(s, np.cos(t1), np.sin(t1), np.cos(t2), np.sin(t2), np.cos(t4), np.sin(t4),
+               o2.position[:, 1], o2.velocity[:, 1], o2.acceleration[:, 1])  # fmt: skip
 
-    left = columns(-P2 * SA * n2 - s2 * CA - S1,
-                   c1 * (-P2 * c2 - P1) + n1 * (P2 * CA * n2 - s2 * SA),
-                   c1 * (P2 * CA * n2 - s2 * SA) + n1 * (P2 * c2 + P1))  # fmt: skip
-    right = columns(P3 * S4A * n4 + S4 * C4A, P4, P3 * C4A * n4 - S4A * S4)
-    out["2.20"] = tuple(largest(left - right - columns(0, d2 * c4, 0)) for d2 in (P4, P3))
+
+def positions(r: Row) -> dict[str, tuple[float, float]]:
+    """Equations 2.20 (closure) and 2.28 (mass centre of link 2)."""
+    left = columns(-P2 * SA * r.n2 - r.s2 * CA - S1,
+                   r.c1 * (-P2 * r.c2 - P1) + r.n1 * (P2 * CA * r.n2 - r.s2 * SA),
+                   r.c1 * (P2 * CA * r.n2 - r.s2 * SA) + r.n1 * (P2 * r.c2 + P1))  # fmt: skip
+    right = columns(P3 * S4A * r.n4 + S4 * C4A, P4, P3 * C4A * r.n4 - S4A * S4)
+    x, y, z = CENTRE
 
     def centre_2(arm: float) -> np.ndarray:
-        radial = y * c2 + n2 * z - arm
-        across = -CA * z * c2 + CA * y * n2 + s2 * SA - x * SA
-        return columns(-S1 - z * SA * c2 + n2 * SA * y - s2 * CA + x * CA,
-                       c1 * radial - n1 * across, -c1 * across - n1 * radial)  # fmt: skip
+        radial = y * r.c2 + r.n2 * z - arm
+        across = -CA * z * r.c2 + CA * y * r.n2 + r.s2 * SA - x * SA
+        return columns(-S1 - z * SA * r.c2 + r.n2 * SA * y - r.s2 * CA + x * CA,
+                       r.c1 * radial - r.n1 * across, -r.c1 * across - r.n1 * radial)  # fmt: skip
 
-    out["2.28"] = tuple(largest(centre_2(arm) - lees(s.link("link2").center)) for arm in (P2, P1))
-
-    v1 = columns(P2 * SA * c2, -P2 * n2 * c1 - P2 * CA * c2 * n1, n1 * P2 * n2 - P2 * CA * c1 * c2)
-    v2 = columns(CA, n1 * SA, c1 * SA)
-    v3 = columns(P3 * S4A * c4, -P3 * n4, P3 * C4A * c4)
-    vy = c1 * (P2 * CA * n2 - s2 * SA) + n1 * (P2 * c2 + P1)
-    vz = c1 * (-P2 * c2 - P1) + n1 * (P2 * CA * n2 - s2 * SA)
-    rates = v1 * w2[:, None] + v2 * s2dot[:, None] + v3 * w4[:, None]
-    out["2.44, 2.47"] = tuple(largest(rates - columns(0, vy, sign * vz) * W1) for sign in (1.0, -1.0))
-
-    axis_rate = columns(0, -c1 * SA, n1 * SA) * W1
-    twist = s.link("link1").twist
-    true_rate = np.cross(lees(twist[:, :3]), v2)
-    out["2.51"] = (largest(axis_rate - true_rate), largest(-axis_rate - true_rate))
-
-    shift = columns(0, c1 * s2 * SA - P1 * n1, -c1 * P1 - s2 * n1 * SA) * W1
-    o2 = s.link("link2").point((0.0, 0.0, 0.0))
-    o2_rate = v2 * s2dot[:, None] + shift
-    out["2.53"] = (largest(o2_rate - lees(o2.velocity)), largest(-o2_rate - lees(o2.velocity)))
-
-    true_pm1 = lees(s.link("link1").center_velocity)
-    out["2.55"] = (
-        largest(columns(0, -(y * n1 + z * c1), y * c1 + z * n1) * W1 - true_pm1),
-        largest(columns(0, -y * n1 + z * c1, -y * c1 - z * n1) * W1 - true_pm1),
+    d2, p1 = (
+        tuple(largest(left - right - columns(0, arm * r.c4, 0)) for arm in (P4, P3)),
+        tuple(largest(centre_2(arm) - lees(r.s.link("link2").center)) for arm in (P2, P1)),
     )
+    return {"2.20": (d2[0], d2[1]), "2.28": (p1[0], p1[1])}
 
+
+def velocities(r: Row) -> dict[str, tuple[float, float]]:
+    """Equations 2.44 to 2.55: closure, direction of A2, point O2, mass centre of link 1."""
+    v1 = columns(P2 * SA * r.c2, -P2 * r.n2 * r.c1 - P2 * CA * r.c2 * r.n1, r.n1 * P2 * r.n2 - P2 * CA * r.c1 * r.c2)
+    v3 = columns(P3 * S4A * r.c4, -P3 * r.n4, P3 * C4A * r.c4)
+    vy = r.c1 * (P2 * CA * r.n2 - r.s2 * SA) + r.n1 * (P2 * r.c2 + P1)
+    vz = r.c1 * (-P2 * r.c2 - P1) + r.n1 * (P2 * CA * r.n2 - r.s2 * SA)
+    rates = v1 * r.s["O2"].velocity[:, :1] + r.a2 * r.s2dot[:, None] + v3 * r.s["O4"].velocity
+    closure = [largest(rates - columns(0, vy, sign * vz) * W1) for sign in (1.0, -1.0)]
+
+    true_rate = np.cross(lees(r.s.link("link1").twist[:, :3]), r.a2)
+    shift = columns(0, r.c1 * r.s2 * SA - P1 * r.n1, -r.c1 * P1 - r.s2 * r.n1 * SA) * W1
+    o2_rate = r.a2 * r.s2dot[:, None] + shift
+    o2 = lees(r.s.link("link2").point((0.0, 0.0, 0.0)).velocity)
+    _, y, z = CENTRE
+    true_1 = lees(r.s.link("link1").center_velocity)
+    printed_1 = columns(0, -(y * r.n1 + z * r.c1), y * r.c1 + z * r.n1) * W1
+    corrected_1 = columns(0, -y * r.n1 + z * r.c1, -y * r.c1 - z * r.n1) * W1
+    return {
+        "2.44, 2.47": (closure[0], closure[1]),
+        "2.51": (largest(r.axis_rate - true_rate), largest(-r.axis_rate - true_rate)),
+        "2.53": (largest(o2_rate - o2), largest(-o2_rate - o2)),
+        "2.55": (largest(printed_1 - true_1), largest(corrected_1 - true_1)),
+    }
+
+
+def accelerations(r: Row) -> dict[str, tuple[float, float]]:
+    """Equations 2.64 (point O2) and 2.66 (mass centre of link 1)."""
+    o2 = r.s.link("link2").point((0.0, 0.0, 0.0))
     true_o2 = lees(o2.acceleration)
     inner = columns(
-        0, -c1 * SA * s2dot + (c1 * P1 + n1 * s2 * SA) * W1, n1 * SA * s2dot + (c1 * s2 * SA - n1 * P1) * W1
+        0,
+        -r.c1 * SA * r.s2dot + (r.c1 * P1 + r.n1 * r.s2 * SA) * W1,
+        r.n1 * SA * r.s2dot + (r.c1 * r.s2 * SA - r.n1 * P1) * W1,
     )
-    turning = columns(0, c1 * s2 * SA - n1 * P1, -c1 * P1 - n1 * s2 * SA)
-    printed = axis_rate * s2dot[:, None] + v2 * s2ddot[:, None] + inner * W1 + turning * ALPHA1
-    arm = lees(o2.position) + columns(S1, 0, 0) * np.ones((len(t1), 1))
-    corrected = (
-        columns(0, -turning[:, 1], -turning[:, 2]) * ALPHA1
-        - W1**2 * columns(0, arm[:, 1], arm[:, 2])
-        - v2 * s2ddot[:, None]
-        - 2 * s2dot[:, None] * true_rate
-    )
-    out["2.64"] = (largest(printed - true_o2), largest(corrected - true_o2))
+    turning = columns(0, r.c1 * r.s2 * SA - r.n1 * P1, -r.c1 * P1 - r.n1 * r.s2 * SA)
+    printed = r.axis_rate * r.s2dot[:, None] + r.a2 * r.s2ddot[:, None] + inner * W1 + turning * ALPHA1
+    arm = lees(o2.position) * [0.0, 1.0, 1.0]
+    true_rate = np.cross(lees(r.s.link("link1").twist[:, :3]), r.a2)
+    corrected = -turning * ALPHA1 - W1**2 * arm - r.a2 * r.s2ddot[:, None] - 2 * r.s2dot[:, None] * true_rate
 
-    true_a1 = lees(s.link("link1").center_acceleration)
-    first = columns(0, y * n1 - z * c1, y * c1 + z * n1) * ALPHA1
-    second = columns(0, -y * c1 - z * n1, y * n1 + z * c1)
-    third = columns(0, -y * c1 - z * n1, y * n1 - z * c1) * W1**2
-    out["2.66"] = (largest(first + second - true_a1), largest(-first + third - true_a1))
-    return out
+    _, y, z = CENTRE
+    true_1 = lees(r.s.link("link1").center_acceleration)
+    first = columns(0, y * r.n1 - z * r.c1, y * r.c1 + z * r.n1) * ALPHA1
+    second = columns(0, -y * r.c1 - z * r.n1, y * r.n1 + z * r.c1)
+    third = columns(0, -y * r.c1 - z * r.n1, y * r.n1 - z * r.c1) * W1**2
+    return {
+        "2.64": (largest(printed - true_o2), largest(corrected - true_o2)),
+        "2.66": (largest(first + second - true_1), largest(-first + third - true_1)),
+    }
+
+
+def chapter_2() -> dict[str, tuple[float, float]]:
+    """Equation number -> differences as printed and corrected."""
+    r = letters()
+    return positions(r) | velocities(r) | accelerations(r)
+
+
+def short_degree(s: mg.Solution, number: str) -> tuple[float, float, float]:
+    """How much the degree of the thesis is too short, for theta1 going in and for theta2, theta4 coming out, and what is left.
+
+    Least squares over a table: printed - found = -in theta1 dtheta/dtheta1 - out theta, degrees.
+    """
+    theta1 = table(number)["theta1"]
+    columns_in, columns_out, differences = [], [], []
+    for k in (2, 4):
+        result = s[f"O{k}"]
+        theta = np.rad2deg(result.position[:, 0])
+        columns_in.append(-theta1 * result.velocity[:, 0] / s["O1"].velocity[:, 0])
+        columns_out.append(-theta)
+        differences.append(table(number)[f"theta{k}"] - theta)
+    A, b = np.column_stack([np.concatenate(columns_in), np.concatenate(columns_out)]), np.concatenate(differences)
+    found = np.linalg.lstsq(A, b, rcond=None)[0]
+    return float(found[0]), float(found[1]), largest(b - A @ found)
 
 
 def zero_of_2_63() -> float:
@@ -142,8 +203,3 @@ def rank_of_2_117() -> int:
 def _turning(m: mg.Mechanism, k: int) -> int:
     book = m.pairs[k].type.bookkeeping
     return next(i for i, c in enumerate(book.conditions) if c.turns)
-
-
-def rows() -> int:
-    """Number of rows compared."""
-    return len(table("III")["theta1"])

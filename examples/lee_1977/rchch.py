@@ -1,12 +1,13 @@
 """RCHCH, sections 2.8 and 3.7: Tables XI to XIII and XXXIII to XXXVII."""
 
 from functools import cache
+from itertools import product
 
 import numpy as np
 
 import mechgraph as mg
 from lee_1977.rcsr import axis_2
-from lee_1977.tables import axial_sums, dot, largest, printed, table
+from lee_1977.tables import axial_sums, dot, largest, lees, printed, table
 
 TWIST_1, TWIST_5 = np.deg2rad(10.0), np.deg2rad(60.0)
 S1, P1, P5 = 0.2, 1.0, 0.4
@@ -49,6 +50,40 @@ def gap_of_table_xi() -> tuple[float, float]:
     right /= np.linalg.norm(right, axis=1, keepdims=True)
     between = np.rad2deg(np.arccos(np.clip(dot(left, right), -1.0, 1.0)))
     return float(between.min()), float(between.max())
+
+
+def _rotation(axis: int, angle: np.ndarray | float) -> np.ndarray:
+    """Rotations ``(..., 3, 3)`` about x (0) or z (2)."""
+    c, s = np.cos(angle), np.sin(angle)
+    out = np.zeros((*np.shape(angle), 3, 3))
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    out[..., axis, axis] = 1.0
+    out[..., i, i] = out[..., j, j] = c
+    out[..., j, i], out[..., i, j] = s, -s
+    return out
+
+
+def direction_gap(angles: dict[str, np.ndarray], signs: tuple[int, ...] = (1,) * 9) -> np.ndarray:
+    """Angle (degrees) between the directions of A4 on both halves of the chain, from theta1, theta2, theta3, theta5 (radians):
+    Rz1 Rx1 Rz2 Rx2 Rz3 Rx3 z against Rx5^-1 Rz5^-1 Rx4^-1 z, the four angles and the five twists with the signs given.
+    """
+    t1, t2, t3, t5 = (
+        sign * angles[name] for sign, name in zip(signs, ("theta1", "theta2", "theta3", "theta5"), strict=False)
+    )
+    a1, a2, a3, a4, a5 = np.array(signs[4:]) * np.deg2rad([10.0, 80.0, 40.0, 50.0, 60.0])
+    left = (
+        _rotation(2, t1) @ _rotation(0, a1) @ _rotation(2, t2) @ _rotation(0, a2) @ _rotation(2, t3) @ _rotation(0, a3)
+    )
+    right = _rotation(0, -a5) @ _rotation(2, -t5) @ _rotation(0, -a4)
+    return np.rad2deg(np.arccos(np.clip(dot(left[..., 2], right[..., 2]), -1.0, 1.0)))
+
+
+def smallest_gaps_of_all_signs() -> tuple[float, float]:
+    """Over all signs of angles and twists, theta1 positive: smallest greatest gap, and smallest median gap of Table XI."""
+    t = table("XI")
+    angles = {name: np.deg2rad(t[name]) for name in ("theta1", "theta2", "theta3", "theta5")}
+    gaps = [direction_gap(angles, (1, *signs)) for signs in product((1, -1), repeat=8)]
+    return float(min(g.max() for g in gaps)), float(min(np.median(g) for g in gaps))
 
 
 def pitch_identities() -> dict[str, float]:
@@ -96,6 +131,7 @@ def modes(theta1_deg: float = 0.0, starts: int = 60, turns: float = np.pi) -> tu
     return tuple(sorted(found))
 
 
+@cache
 def branches(step: float = 5.0, end: float = 65.0) -> tuple[mg.Solution, ...]:
     """The four modes followed over theta1 from -end to end, a Solution each, positions in order."""
     m = mg.load("rchch")
@@ -159,12 +195,16 @@ def work_of_output() -> dict[str, float]:
     }
 
 
-def balance_of_link_3() -> float:
-    """Smallest of the four choices of sign of ``|R32 (with its axial part) -+ R43|`` over the rows with reactions below 100:
-    link 3 is between O3 and O4, so the two forces differ by its inertia alone. A3 is unknown, no closure being behind the
-    table: the components across A1 = x are compared through the length of what is left.
+def axial_force_of_o4() -> float:
+    """F43 . A4 of Table XXXVI, which a cylindrical pair makes zero: its greatest value over the rows with forces below 100, at the
+    best choice of signs. A4 is the direction that theta5 of Table XI gives it on the half of the chain beyond O5.
     """
-    o3, o4 = printed("XXXV"), printed("XXXVI")
-    total = np.sqrt((o3[:, :3] ** 2).sum(axis=1) + o3[:, 6] ** 2)  # F^ is perpendicular to A3
-    calm = total < 100.0
-    return largest((total - np.linalg.norm(o4[:, :3], axis=1))[calm])
+    force = printed("XXXVI")[:, :3]
+    calm = np.linalg.norm(force, axis=1) < 100.0
+    theta5 = np.deg2rad(table("XI")["theta5"])
+    a4, a5 = np.deg2rad([50.0, 60.0])
+    greatest = []
+    for turned, first, second in product((1, -1), repeat=3):
+        axes = _rotation(0, -first * a5) @ _rotation(2, -turned * theta5) @ _rotation(0, -second * a4)
+        greatest.append(largest(dot(force, lees(axes[..., 2]))[calm]))
+    return min(greatest)

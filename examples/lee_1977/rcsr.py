@@ -149,3 +149,10 @@ def true_driver() -> dict[int, tuple[float, float]]:
     found = -physical()["O1"].effort[:, 0]
     shown = table("XVIII")["MIN"]
     return {int(theta[i]): (float(found[i]), float(shown[i])) for i in (0, -1)}
+
+
+def driver_of_point_masses() -> float:
+    """M_IN in the last row, 202 degrees, with the masses alone: the printed tensors belong to no body."""
+    m = mg.load("rcsr")
+    points = m.replace(links=[mg.Link(link.name, link.mass, link.center) for link in m.links])
+    return -float(mg.solve(points)["O1"].effort[-1, 0])

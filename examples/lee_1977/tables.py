@@ -68,3 +68,11 @@ def without_axis(force: np.ndarray, moment: np.ndarray, axis: np.ndarray, point:
 def axial_sums(force: np.ndarray, moment: np.ndarray, axis: np.ndarray, point: np.ndarray) -> np.ndarray:
     """F^ . A^ = 0: force along an axis, and moment about it."""
     return np.column_stack([dot(force, axis), dot(moment, axis) + dot(force, np.cross(point, axis))])
+
+
+def last_place(number: str) -> dict[str, float]:
+    """Size of the last printed digit of every column of a table, 0.01 for ``-.57``."""
+    with (DATA / f"lee_table_{number}.csv").open(encoding="utf-8") as handle:
+        rows = list(csv.reader(line for line in handle if not line.startswith("#")))
+    columns = zip(rows[0], *rows[1:], strict=True)
+    return {name: 10.0 ** -max(len(cell.partition(".")[2]) for cell in cells) for name, *cells in columns}

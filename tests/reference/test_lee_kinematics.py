@@ -22,8 +22,8 @@ DATA = Path(__file__).parent / "data"
 G = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 ROUNDING = 0.7e-3
 """0.7 of the last printed digit."""
-DEGREE = 1e-5
-"""Lee used a truncated degree: relative to the larger of the angle itself and theta1, through which it enters too."""
+DEGREE = 3e-6
+"""The degree of the thesis is too short, by 2 in a million going in and 4 coming out (see test_lee_verdicts): their mean."""
 
 
 @pytest.fixture(scope="module")
@@ -45,9 +45,10 @@ def in_lees_axes(*vectors: np.ndarray) -> np.ndarray:
 def test_pair_coordinates_and_rates_of_table_iii(solution: mg.Solution) -> None:
     names, rows = table("III")
     o2, o4 = solution["O2"], solution["O4"]
-    angles = np.rad2deg(np.column_stack([solution["O1"].position[:, 0], o2.position[:, 0], o4.position[:, 0]]))
-    printed = rows[:, [names.index(n) for n in ("theta1", "theta2", "theta4")]]
-    allowed = ROUNDING + DEGREE * np.maximum(np.abs(printed), rows[:, :1])
+    angles = np.rad2deg(np.column_stack([o2.position[:, 0], o4.position[:, 0]]))
+    slopes = np.abs(np.column_stack([o2.velocity[:, 0], o4.velocity[:, 0]]) / solution["O1"].velocity)
+    printed = rows[:, [names.index(n) for n in ("theta2", "theta4")]]
+    allowed = ROUNDING + DEGREE * (np.abs(printed) + slopes * rows[:, :1])
     assert (np.abs(angles - printed) <= allowed).all()
     ours = np.column_stack([
         o2.position[:, 1], o2.velocity[:, 0], o2.velocity[:, 1], o4.velocity[:, 0],
@@ -70,17 +71,3 @@ def test_pair_points_of_tables_v_vii_ix(solution: mg.Solution, number: str, orde
     origin = (0.0, 0.0, 0.0)  # link frames are the markers B of O2 and O3
     ours = in_lees_axes(*(solution.link(link).point(origin)[order] for link in ("link2", "link3")))
     assert np.abs(ours - table(number)[1][:, 1:]).max() <= ROUNDING
-
-
-def test_loop_1_of_table_x() -> None:
-    """RCSR-CSR: theta2, S2, theta4 (the columns S5 and theta7 of the table belong to no closure, see the library file)."""
-    s = mg.kinematics(mg.load("rcsr-csr"))
-    _, rows = table("X")
-    names = ("O1", "O2", "O4")
-    angles = np.rad2deg(np.column_stack([s[name].position[:, 0] for name in names]))
-    rates = np.abs(np.column_stack([s[name].velocity[:, 0] / s["O1"].velocity[:, 0] for name in names]))
-    printed = rows[:, [0, 1, 3]]
-    # a degree that is 3e-6 too short changes the angle read off, and through theta1 the angle itself
-    allowed = ROUNDING + 3e-6 * (np.abs(printed) + rates * rows[:, :1])
-    assert (np.abs(angles - printed) <= allowed).all()
-    assert np.abs(s["O2"].position[:, 1] - rows[:, 2]).max() <= ROUNDING
