@@ -12,12 +12,15 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-def cross(a: Array, b: Array) -> Array:
-    """Vector product of ``(3, ...)`` arrays along the first axis."""
-    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
+def cross(a: Array, b: Array, out: Array | None = None) -> Array:
+    """Vector product of ``(3, ...)`` arrays along the first axis, into ``out`` where given."""
+    out = np.empty(np.broadcast_shapes(a.shape, b.shape)) if out is None else out
+    part = np.empty(out.shape[1:])
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        np.multiply(a[j], b[k], out=out[i, ...])
-        out[i] -= a[k] * b[j]
+        row = out[i, ...]
+        np.multiply(a[j], b[k], out=row)
+        np.multiply(a[k], b[j], out=part)
+        row -= part
     return out
 
 
@@ -29,12 +32,22 @@ def skew(a: Array) -> Array:
 
 def rotate(R: Array, v: Array) -> Array:
     """``R v`` for ``(3, 3, ...)`` and ``(3, ...)``."""
-    return R[:, 0] * v[0] + R[:, 1] * v[1] + R[:, 2] * v[2]
+    out = np.asarray(R[:, 0] * v[0])
+    part = np.empty_like(out)
+    for i in (1, 2):
+        np.multiply(R[:, i], v[i], out=part)
+        out += part
+    return out
 
 
 def rotate_back(R: Array, v: Array) -> Array:
     """``R^T v`` for ``(3, 3, ...)`` and ``(3, ...)``."""
-    return R[0] * v[0] + R[1] * v[1] + R[2] * v[2]
+    out = np.asarray(R[0] * v[0])
+    part = np.empty_like(out)
+    for i in (1, 2):
+        np.multiply(R[i], v[i], out=part)
+        out += part
+    return out
 
 
 def identity(*batch: int) -> Array:
@@ -47,7 +60,11 @@ def identity(*batch: int) -> Array:
 
 def compose(X: Array, Y: Array) -> Array:
     """Product ``X Y`` of two poses."""
-    out = X[:, 0, None] * Y[0] + X[:, 1, None] * Y[1] + X[:, 2, None] * Y[2]
+    out = np.asarray(X[:, 0, None] * Y[0])
+    part = np.empty_like(out)
+    for i in (1, 2):
+        np.multiply(X[:, i, None], Y[i], out=part)
+        out += part
     out[:, 3] += X[:, 3]
     return out
 
