@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Protocol
 
@@ -58,8 +58,9 @@ class LoadSite(Protocol):
 class Names(Protocol):
     """The names that a load may refer to."""
 
-    def link_names(self) -> tuple[str, ...]:
-        """Names of the links."""
+    @property
+    def link_index(self) -> Mapping[str, int]:
+        """Place of every link, by name."""
 
     def freedom_fault(self, name: Any, *, single: bool) -> str | None:
         """Why ``name`` is no freedom (with ``single``: no single freedom), or None."""
@@ -88,7 +89,7 @@ def _value_fault(value: Value, what: str, width: int) -> str | None:
 
 
 def _link_fault(names: Names, link: Any, where: str) -> str | None:
-    known = names.link_names()
+    known = names.link_index
     return None if link in known else f"{where}unknown link {link!r} (links: {', '.join(known)})"
 
 
