@@ -67,12 +67,7 @@ def loop_wrench(problem: Problem) -> Wrenches:
 
 def tree_wrenches(here: Configuration, loads: Array) -> Array:
     """Pair wrenches that carry the loads along the spanning tree, chords free, ``(6, P, T)``."""
-    out = np.zeros((6, len(here.system.m.pairs), here.T))
-    carried = loads.copy()
-    for pairs, forward, parents, children in reversed(here.system.levels):
-        out[:, pairs] = np.where(forward[:, None], -1.0, 1.0) * carried[:, children]
-        add_at(carried, parents, carried[:, children])
-    return out
+    return here.system.tree.wrenches(loads, len(here.system.m.pairs))
 
 
 def newton_euler(problem: Problem) -> Wrenches:
