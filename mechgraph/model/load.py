@@ -24,8 +24,8 @@ FORCE, MOMENT, LENGTH = (1, 1, -2), (2, 1, -2), (1, 0, 0)
 class LoadSite(Protocol):
     """What a load sees of a mechanism at a batch of ``T`` positions (component axes first, positions last)."""
 
-    def masses(self) -> list[tuple[str, float, Array]]:
-        """Name, mass and mass centre ``(3, T)`` of every link that has mass."""
+    def add_weight(self, acceleration: Array) -> None:
+        """Force ``m g`` at the mass centre of every link, for one ``g (3,)``."""
 
     def rotation(self, link: str) -> Array:
         """Rotation of the link, ``(3, 3, T)``."""
@@ -121,6 +121,8 @@ def _turned(value: Value, pose: Array) -> Value:
 class _Load:
     """What all loads share: equality that also holds for arrays."""
 
+    between_links: ClassVar[bool] = False
+    """Whether it is a force that two links exert on each other."""
     dimensions: ClassVar[dict[str, tuple[int, int, int]]] = {}
     freedom_dimensions: ClassVar[dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]]] = {}
     """Dimensions of fields that depend on the freedom: for a turn, for a slide."""
@@ -158,9 +160,7 @@ class Gravity(_Load):
 
     def act(self, site: LoadSite) -> None:
         """Add the weight of every link."""
-        g = np.asarray(self.acceleration)[:, None]
-        for link, mass, center in site.masses():
-            site.add_force(link, np.broadcast_to(mass * g, center.shape), center)
+        site.add_weight(np.asarray(self.acceleration))
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,6 +265,7 @@ class Spring(_Load):
     """
 
     kind: ClassVar[str] = "spring"
+    between_links: ClassVar[bool] = True
     dimensions: ClassVar[dict[str, tuple[int, int, int]]] = {
         "p": LENGTH,
         "q": LENGTH,

@@ -87,6 +87,18 @@ class System:
             groups.append(Group(row.scaled(self.par.L), index, columns, state))
         return groups
 
+    @cached_property
+    def _group_of(self) -> Index:
+        out = np.empty(len(self.m.pairs), dtype=np.intp)
+        for number, g in enumerate(self.groups):
+            out[g.pairs] = number
+        return out
+
+    def place_of(self, pair: int) -> tuple[int, int]:
+        """Number of the group of a pair, and its place there."""
+        number = int(self._group_of[pair])
+        return number, int(np.searchsorted(self.groups[number].pairs, pair))
+
     def _columns_of_loop(self, loop: tuple[tuple[int, int], ...]) -> tuple[Index, Array]:
         columns = [np.arange(self.first_column[k], self.first_column[k + 1]) for k, _ in loop]
         signs = [np.full(len(c), float(sign)) for c, (_, sign) in zip(columns, loop, strict=True)]
@@ -320,6 +332,15 @@ class Configuration:
             return np.asarray(s.graph.sparse_loop_matrix @ flat).reshape(-1, per_pair.shape[2])
         sums = np.einsum("lp,ipt->lit", s.graph.loop_matrix, per_pair)
         return sums.reshape(sums.shape[0] * sums.shape[1], per_pair.shape[2])
+
+    def pair_wrenches(self, x: Array) -> Array:
+        """Pair wrenches ``(6, P, k, T)`` of loop wrenches ``(6 loops, k, T)``: ``w = C^T x``."""
+        s = self.system
+        loops = x.reshape(len(s.graph.loops), 6, *x.shape[1:])
+        if s.many_loops:
+            flat = np.asarray(s.graph.sparse_loop_matrix.T @ loops.reshape(len(loops), -1))
+            return np.moveaxis(flat.reshape(len(s.m.pairs), 6, *x.shape[1:]), 1, 0)
+        return np.asarray(np.einsum("lp,list->ipst", s.graph.loop_matrix, loops))
 
     def link_accelerations(self, dq: Array, ddq: Array, V: Array) -> Array:
         """Accelerations dV/dt of all links ``(6, N, T)``."""

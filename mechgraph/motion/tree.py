@@ -8,6 +8,7 @@ Source: Jaja, An Introduction to Parallel Algorithms, 1992, section 2.2 (pointer
 from __future__ import annotations
 
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +36,7 @@ class Tree:
         for parent, child in zip(self.parents.tolist(), self.children.tolist(), strict=True):
             depth[child] = depth[parent] + 1
         ends = np.searchsorted(depth[self.children], np.arange(1, depth.max(initial=0) + 2))
-        spans = [slice(int(i), int(j)) for i, j in zip(ends[:-1], ends[1:], strict=True)]
+        spans = [slice(int(i), int(j)) for i, j in pairwise(ends)]
         parts = (self.pairs, self.forward, self.parents, self.children)
         self.levels: list[Level] = [tuple(part[span] for part in parts) for span in spans]  # type: ignore[misc]
         self.deep = len(self.levels) > DEEP

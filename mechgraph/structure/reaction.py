@@ -102,3 +102,14 @@ class PairFrames:
             values = np.einsum("ntij,jn...t->in...t", inverse, local[:, g.pairs])
             out.append(values[: 6 - g.row.f])
         return out
+
+    def components_of(self, number: int, i: int, wrenches: Array) -> Array:
+        """Components ``(6 - f, ..., T)`` of the ``i``-th pair of a group from its reaction wrenches ``(6, ..., T)``."""
+        here = self.here
+        g = here.system.groups[number]
+        basis = np.concatenate([here.W[number][:, :, i], here.E[:, g.columns[:, i]]], axis=1)
+        point = here.pair_points[:, int(g.pairs[i])]
+        local = np.concatenate([basis[:3] - cross(point[:, None], basis[3:]), basis[3:]])
+        inverse = np.linalg.inv(np.moveaxis(local, 2, 0))
+        shifted = shift_wrench(wrenches, point.reshape(3, *(1,) * (wrenches.ndim - 2), here.T))
+        return np.asarray(np.einsum("tij,j...t->i...t", inverse, shifted)[: 6 - g.row.f])

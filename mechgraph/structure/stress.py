@@ -61,10 +61,7 @@ def stress_at(here: Configuration, driven: Index) -> Stress:
 
 def pair_states(here: Configuration, loops: Array) -> Array:
     """Total pair wrenches ``(6, P, s, 1)`` of loop wrenches ``(6 loops, s)``: ``w = C^T x``."""
-    C = here.system.graph.loop_matrix
-    count = loops.shape[1]
-    flat = C.T @ loops.reshape(C.shape[0], 6 * count)
-    return np.ascontiguousarray(flat.reshape(C.shape[1], 6, count).transpose(1, 0, 2))[..., None]
+    return here.pair_wrenches(loops[..., None])
 
 
 def uniqueness(here: Configuration, driven: Index) -> Uniqueness:
