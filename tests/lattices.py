@@ -90,7 +90,9 @@ def tree_of_loops(links: int) -> mg.Mechanism:
     bars: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     pairs: list[tuple[str, str, np.ndarray]] = []
 
-    def cell(k: int, base: str, foot: np.ndarray, size: float, turn: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def cell(
+        k: int, base: str, foot: np.ndarray, size: float, turn: float
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """A four-bar k on the link ``base``: corners crank foot, crank head, rocker head."""
         R = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1.0]])
         corners = [foot + size * (R @ np.array(p)) for p in ((0, 0, 0), (0.2, 1, 0), (1.3, 1.1, 0), (1.1, 0.05, 0))]

@@ -48,7 +48,7 @@ def certified_loops(system: System, x: Array, columns: Index) -> LoopSystem | No
     """
     if 6 * len(system.graph.loops) < SPARSE_ROWS:
         return None
-    loops = LoopSystem(system.at(x[:, None]), columns)
+    loops = LoopSystem.at(system.at(x[:, None]), columns)
     if not loops.regular or loops.held:
         return None
     return loops

@@ -175,7 +175,7 @@ class SparseFollower:
         loops, factor = last.loops, last.loops.factor(here.S[:, :, 0])
         same = factor.sign == last.factor.sign
         if not same or not factor.smallest_pivot > loops.pivot_limit:
-            loops = LoopSystem(here, self.columns)
+            loops = LoopSystem.at(here, self.columns)
             if not loops.regular or loops.held:
                 return None, correction, Status.DEAD_POINT
             again = loops.factor(self.system.at(last.x[:, None]).S[:, :, 0])

@@ -24,8 +24,9 @@ import scipy
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array, cross
-from mechgraph.motion.system import Configuration, Index, System
+from mechgraph.motion.system import Configuration, Index
 from mechgraph.numerics.sparse import Pattern, SparseFactor
+from mechgraph.topology.linkgraph import LinkGraph
 
 Mask = NDArray[np.bool_]
 
@@ -48,14 +49,14 @@ class Entries:
     first: Index
 
 
-def entries_of(system: System) -> Entries:
-    """All (loop, column) places of the closure Jacobian of a system."""
-    loop, pair, sign = system.graph.loop_steps
-    width = np.diff(system.first_column)[pair]
+def entries_of(graph: LinkGraph, first_column: Index) -> Entries:
+    """All (loop, column) places of the closure Jacobian of a graph whose pairs have their freedoms from ``first_column`` on."""
+    loop, pair, sign = graph.loop_steps
+    width = np.diff(first_column)[pair]
     step = np.repeat(np.arange(len(loop)), width)
     within = np.arange(len(step)) - np.repeat(np.cumsum(width) - width, width)
-    first = np.searchsorted(loop[step], np.arange(len(system.graph.loops) + 1))
-    return Entries(loop[step], system.first_column[pair[step]] + within, sign[step], first.astype(np.intp))
+    first = np.searchsorted(loop[step], np.arange(len(graph.loops) + 1))
+    return Entries(loop[step], first_column[pair[step]] + within, sign[step], first.astype(np.intp))
 
 
 @dataclass(frozen=True)
@@ -76,11 +77,11 @@ class Measure:
         return np.concatenate([y[:3] + cross(self.middle[:, :, None], force), force])
 
 
-def measure_of(here: Configuration) -> Measure:
-    """Middle and size of the pair points of every loop at the first position of a configuration."""
-    loop, pair, _ = here.system.graph.loop_steps
-    n = len(here.system.graph.loops)
-    points = here.pair_points[:, pair, 0]
+def measure_of(graph: LinkGraph, pair_points: Array) -> Measure:
+    """Middle and size of the pair points ``(3, P)`` of every loop."""
+    loop, pair, _ = graph.loop_steps
+    n = len(graph.loops)
+    points = pair_points[:, pair]
     count = np.maximum(np.bincount(loop, minlength=n), 1)
     middle = np.stack([np.bincount(loop, row, minlength=n) for row in points]) / count
     off = points - middle[:, loop]
@@ -92,27 +93,32 @@ class LoopSystem:
     """The bordered system chosen at one position, columns ``fixed`` left out; serves positions near by.
 
     ``regular`` whether its pivots prove the rank there; ``rank`` of J without the fixed columns; ``smallest`` pivot; ``redundant``
-    number of self-stresses; ``held`` number of motions left.
+    number of self-stresses; ``held`` number of motions left; ``kept (loops,)`` rows of every loop that are
+    independent there, ``dropped`` the largest singular value among the others; ``shared`` number of self-stresses that connect loops,
+    ``shared_in`` a loop of each.
     """
 
-    def __init__(self, here: Configuration, fixed: Index) -> None:
-        self.system = here.system
-        self.entries = entries_of(here.system)
-        self.measure = measure_of(here)
-        self.fixed = fixed
-        self._free = np.ones(here.system.n_freedoms, dtype=bool)
+    def __init__(self, graph: LinkGraph, first_column: Index, S: Array, points: Array, fixed: Index) -> None:
+        self.entries, self.measure, self.fixed = entries_of(graph, first_column), measure_of(graph, points), fixed
+        self._free = np.ones(S.shape[1], dtype=bool)
         self._free[fixed] = False
-        blocks = self._blocks(here.S[:, :, 0])
-        largest = np.zeros(here.system.n_freedoms)
+        blocks = self._blocks(S)
+        largest = np.zeros(S.shape[1])
         np.maximum.at(largest, self.entries.column, np.abs(blocks).max(axis=0, initial=0.0))
         self._scale = np.where(largest > 0, 1.0 / np.where(largest > 0, largest, 1.0), 1.0)
         self._reduce(blocks * self._scale[self.entries.column])
         self._border()
-        self.first = self.factor(here.S[:, :, 0])
+        self.first = self.factor(S)
         self.smallest = self.first.smallest_pivot
         self.regular = self.smallest > PIVOT
         self.pivot_limit = max(PIVOT, WORSE * self.smallest)
         self.rank = self._matched - self._motions
+
+    @classmethod
+    def at(cls, here: Configuration, fixed: Index) -> LoopSystem:
+        """The system chosen at the first position of a configuration."""
+        s = here.system
+        return cls(s.graph, s.first_column, here.S[:, :, 0], here.pair_points[:, :, 0], fixed)
 
     # --- the choice ------------------------------------------------------------------------------------------------------
 
@@ -133,7 +139,7 @@ class LoopSystem:
     def _reduce(self, blocks: Array) -> None:
         """Turn the rows of every loop so that the redundant ones come last; find the motions of single loops."""
         n = len(self.entries.first) - 1
-        self._turn, self._kept = np.empty((n, 6, 6)), np.zeros(n, dtype=np.intp)
+        self._turn, self.kept, self.dropped = np.empty((n, 6, 6)), np.zeros(n, dtype=np.intp), 0.0
         shared = np.bincount(self.entries.column, minlength=len(self._free)) > 1
         own = self._free & ~shared
         rows: list[tuple[Array, Index]] = []
@@ -141,7 +147,9 @@ class LoopSystem:
             block = np.moveaxis(blocks[:, at], 0, 1)
             U, s, _ = np.linalg.svd(block, full_matrices=block.shape[2] < 6)
             self._turn[loops] = np.swapaxes(U, 1, 2)
-            self._kept[loops] = (s > LOCAL_RANK * np.maximum(s.max(axis=1, initial=0.0), 1.0)[:, None]).sum(axis=1)
+            s = s / np.maximum(s.max(axis=1, initial=0.0), 1.0)[:, None]
+            self.kept[loops] = (s > LOCAL_RANK).sum(axis=1)
+            self.dropped = max(self.dropped, float(s[s <= LOCAL_RANK].max(initial=0.0)))
             rows += self._own_motions(block, own[self.entries.column[at]], self.entries.column[at])
         self._own_rows = rows
 
@@ -168,7 +176,7 @@ class LoopSystem:
     def _border(self) -> None:
         """Match rows to columns; random rows and columns for what stays over; the pattern of the square system."""
         e = self.entries
-        starts = np.concatenate([[0], np.cumsum(self._kept)])
+        starts = np.concatenate([[0], np.cumsum(self.kept)])
         self._m = int(starts[-1])
         self._row = (starts[e.loop][None] + np.arange(6)[:, None])[self._live]
         place = np.cumsum(self._free) - 1
@@ -194,37 +202,27 @@ class LoopSystem:
         taken[match[match >= 0]] = True
         left_cols = np.flatnonzero(~taken)
         rng = np.random.default_rng(SEED)
-        for i, (mine, support) in enumerate(zip(left_rows, self._beside(pattern, left_rows, True), strict=True)):
-            del mine
-            rows.append(support)
-            cols.append(np.full(len(support), n + i))
-            data.append(_unit(rng, len(support)))
-        for i, (mine, support) in enumerate(zip(left_cols, self._beside(pattern, left_cols, False), strict=True)):
-            del mine
-            rows.append(np.full(len(support), height + i))
-            cols.append(support)
-            data.append(_unit(rng, len(support)))
+        for left, are_rows in ((left_rows, True), (left_cols, False)):
+            number, support = _beside(pattern, left, are_rows)
+            rows.append(support if are_rows else height + number)
+            cols.append(n + number if are_rows else support)
+            data.append(rng.normal(size=len(support)) / np.sqrt(np.maximum(np.bincount(number)[number], 1)))
         self.held = self._motions + len(left_cols)
         self.redundant = 6 * (len(e.first) - 1) - (self._matched - self._motions)
-        self._shared = len(left_rows)
+        self.shared = len(left_rows)
+        owner = np.concatenate(
+            [np.repeat(np.arange(len(self.kept)), self.kept), np.zeros(height - self._m, dtype=np.intp)]
+        )
+        self.shared_in = owner[left_rows]
         self._n, self._size = n, n + len(left_rows)
         self._constant = np.concatenate([*data, np.zeros(0)])
         self.pattern = Pattern(np.concatenate(rows), np.concatenate(cols), self._size)
-
-    @staticmethod
-    def _beside(pattern: scipy.sparse.csr_array, left: Index, are_rows: bool) -> list[Index]:
-        """Rows that share a column with each row left over (or columns that share a row with each column)."""
-        if not left.size:
-            return []
-        near = pattern[left] @ pattern.T if are_rows else pattern.T.tocsr()[left] @ pattern
-        near = near.tocsr()
-        return [near.indices[near.indptr[i] : near.indptr[i + 1]].astype(np.intp) for i in range(left.size)]
 
     @cached_property
     def _live(self) -> Mask:
         """Which of the turned entries ``(6, entries)`` stand in the system: kept rows, free columns."""
         e = self.entries
-        return (np.arange(6)[:, None] < self._kept[e.loop][None]) & self._free[e.column][None]
+        return (np.arange(6)[:, None] < self.kept[e.loop][None]) & self._free[e.column][None]
 
     # --- solving ---------------------------------------------------------------------------------------------------------
 
@@ -247,13 +245,13 @@ class LoopSystem:
         live = np.broadcast_to(self._free[e.column], (6, len(e.loop)))
         rows = (6 * e.loop + np.arange(6)[:, None])[live]
         cols = np.broadcast_to(place[e.column], (6, len(e.loop)))[live]
-        shape = (6 * len(self._kept), int(self._free.sum()))
+        shape = (6 * len(self.kept), int(self._free.sum()))
         return scipy.sparse.csr_array((self._turned_blocks(S)[live], (rows, cols)), shape=shape)
 
     @property
     def unit(self) -> float:
         """A length in the middle of those of the loops."""
-        return float(np.median(self.measure.length)) if len(self._kept) else 1.0
+        return float(np.median(self.measure.length)) if len(self.kept) else 1.0
 
     def unit_wrenches(self) -> Array:
         """Loop wrenches ``(6, 6, loops)`` of unit multipliers of the turned rows, one column a row."""
@@ -261,12 +259,12 @@ class LoopSystem:
 
     def wrenches_of_rows(self, y: Array) -> Array:
         """Loop wrenches ``(6 loops,)`` from multipliers ``(6 loops, 1)`` of the turned rows."""
-        rows = np.swapaxes(self._turn, 1, 2) @ y.reshape(len(self._kept), 6, 1)
+        rows = np.swapaxes(self._turn, 1, 2) @ y.reshape(len(self.kept), 6, 1)
         return np.moveaxis(self.measure.wrenches(np.moveaxis(rows, 1, 0)), 0, 1).reshape(-1)
 
     def _turned(self, b: Array) -> Array:
         """Right sides ``(6 loops, k)`` about the internal origin as turned rows ``(loops, 6, k)``."""
-        loops = len(self._kept)
+        loops = len(self.kept)
         rows = b.reshape(loops, 6, -1)
         local = np.empty_like(rows)
         local[:, :3] = rows[:, :3]
@@ -277,7 +275,7 @@ class LoopSystem:
     def solve(self, factor: SparseFactor, b: Array) -> Array:
         """``q (F, k)`` with ``J q = b (6 loops, k)`` in the kept rows, zero in fixed columns."""
         rhs = np.zeros((self._size, b.shape[1]))
-        rhs[: self._m] = self._turned(b)[np.arange(6) < self._kept[:, None]]
+        rhs[: self._m] = self._turned(b)[np.arange(6) < self.kept[:, None]]
         y = factor.solve(rhs)
         q = np.zeros((len(self._free), b.shape[1]))
         q[self._free] = y[: self._n] * self._scale[self._free][:, None]
@@ -290,11 +288,11 @@ class LoopSystem:
         if shared is not None:
             rhs[self._n :] = shared
         kept = factor.solve(rhs, transposed=True)[: self._m]
-        return self._wrenches(kept, np.zeros((6 * len(self._kept) - self._m, tau.shape[1])))
+        return self._wrenches(kept, np.zeros((6 * len(self.kept) - self._m, tau.shape[1])))
 
     def _wrenches(self, kept: Array, dropped: Array) -> Array:
-        full = np.empty((len(self._kept), 6, kept.shape[1]))
-        mask = np.arange(6) < self._kept[:, None]
+        full = np.empty((len(self.kept), 6, kept.shape[1]))
+        mask = np.arange(6) < self.kept[:, None]
         full[mask], full[~mask] = kept, dropped
         rows = np.swapaxes(self._turn, 1, 2) @ full
         return self.measure.wrenches(np.moveaxis(rows, 1, 0))
@@ -307,18 +305,25 @@ class LoopSystem:
         """
         e = self.entries
         free = np.where(self._live, 0.0, self._turned_blocks(S))
-        dropped = ~(np.arange(6) < self._kept[:, None])
-        local = np.zeros((len(self._kept), 6, count))
+        dropped = ~(np.arange(6) < self.kept[:, None])
+        local = np.zeros((len(self.kept), 6, count))
         local[dropped] = rng.normal(size=(int(dropped.sum()), count))
         rhs = np.zeros((self._size, count))
         for i in range(count):
             power = (free * local[e.loop, :, i].T).sum(axis=0)
             rhs[: self._n, i] = -np.bincount(e.column, power, minlength=len(self._free))[self._free]
-        if self._shared:
-            rhs[self._n :] = rng.normal(size=(self._shared, count))
+        if self.shared:
+            rhs[self._n :] = rng.normal(size=(self.shared, count))
         kept = factor.solve(rhs, transposed=True)[: self._m]
         size = np.maximum(np.abs(kept).max(axis=0, initial=0.0), 1.0)
         return self._wrenches(kept / size, local[dropped] / size)
+
+    def local_stress(self) -> tuple[Index, Array]:
+        """Loops with self-stresses of their own, and these as loop wrenches ``(6, 6, n)``, those of rows that were kept left out."""
+        some = np.flatnonzero(self.kept < 6)
+        unit = self.unit_wrenches()[:, :, some]
+        order = (np.arange(6)[:, None] + self.kept[some]) % 6
+        return some, np.take_along_axis(unit, order[None], axis=1)
 
     def motions(self, factor: SparseFactor) -> Array:
         """Motions ``(F, held)`` with the fixed columns at rest, one a held motion."""
@@ -332,6 +337,9 @@ class LoopSystem:
         return q
 
 
-def _unit(rng: np.random.Generator, n: int) -> Array:
-    v = rng.normal(size=n)
-    return v / np.linalg.norm(v)
+def _beside(pattern: scipy.sparse.csr_array, left: Index, are_rows: bool) -> tuple[Index, Index]:
+    """Rows that share a column with each row left over (or columns that share a row with each column): its number, and which."""
+    if not left.size:
+        return np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
+    near = (pattern[left] @ pattern.T if are_rows else pattern.T.tocsr()[left] @ pattern).tocsr()
+    return np.repeat(np.arange(left.size), np.diff(near.indptr)), near.indices.astype(np.intp)

@@ -12,6 +12,7 @@ from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array
 from mechgraph.motion.system import Configuration, Index
 from mechgraph.numerics.linear import RANK_TOLERANCE
+from mechgraph.structure.bordered import Bordered
 from mechgraph.structure.elimination import Elimination
 from mechgraph.structure.freedom import elimination, is_large
 from mechgraph.structure.reaction import UNIQUE, PairFrames, Stress, orthonormal_stress
@@ -92,7 +93,11 @@ def _uniqueness_of_many(here: Configuration, driven: Index) -> Uniqueness:
     labels, table = component_table(here, orthonormal_stress(here, pair_states(here, probes), driven), driven)
     verdicts = _verdicts(here, labels, table)
     directions, _ = transverse(here, labels, table)
-    _, first = component_table(here, orthonormal_stress(here, pair_states(here, _first_states(found)), driven), driven)
+    _, first = component_table(
+        here,
+        orthonormal_stress(here, pair_states(here, _first_states(found, len(here.system.graph.loops))), driven),
+        driven,
+    )
     return Uniqueness(
         count=count,
         groups=_group_count(here, found, verdicts["unique"]),
@@ -104,7 +109,7 @@ def _uniqueness_of_many(here: Configuration, driven: Index) -> Uniqueness:
     )
 
 
-def _group_count(here: Configuration, found: Elimination, unique: dict[str, dict[str, bool]]) -> int:
+def _group_count(here: Configuration, found: Bordered | Elimination, unique: dict[str, dict[str, bool]]) -> int:
     """Sets of loops with self-stresses that share a pair some component of which is not unique."""
     m, loops = here.system.m, here.system.graph.loops
     home = {i: number for number, (_, members) in enumerate(found.sets) for i in members}
@@ -118,9 +123,9 @@ def _group_count(here: Configuration, found: Elimination, unique: dict[str, dict
     return int(nx.number_connected_components(graph))
 
 
-def _first_states(found: Elimination) -> Array:
+def _first_states(found: Bordered | Elimination, loops: int) -> Array:
     """Loop wrenches of the first self-stresses: those of single loops, then shared ones."""
-    rows = 6 * len(found.rows.blocks)
+    rows = 6 * loops
     columns: list[Array] = [np.zeros((rows, 0))]
     count = 0
     for i, Y in sorted(found.local, key=lambda item: item[0]):
