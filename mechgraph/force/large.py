@@ -22,7 +22,7 @@ from mechgraph.motion.loops import LoopSystem
 from mechgraph.motion.path import Status
 from mechgraph.motion.rates import DEAD_POINT, Rates
 from mechgraph.motion.system import Configuration, Index, System
-from mechgraph.structure.reaction import PairFrames, Stress, pair_power, reaction_part
+from mechgraph.structure.reaction import PairFrames, Stress, pair_power, reaction_part, split_stress
 
 SPARSE_ROWS = 96
 """Rows of the closure Jacobian (six a loop) from which on a mechanism is solved sparsely."""
@@ -109,14 +109,7 @@ class SparseAnalysis(Analysis):
 
     @cached_property
     def _stress(self) -> Stress:
-        states = self._need_forces().wrenches.stress
-        efforts = np.zeros((self._system.n_freedoms, states.shape[2], self._here.T))
-        parts = np.empty_like(states)
-        for i in range(states.shape[2]):
-            tau = pair_power(self._here, states[:, :, i])
-            efforts[self.motions.driven, i] = tau[self.motions.driven]
-            parts[:, :, i] = reaction_part(self._here, states[:, :, i], efforts[:, i])
-        return Stress(parts, efforts)
+        return split_stress(self._here, self._need_forces().wrenches.stress, self.motions.driven)
 
     @cached_property
     def _solved(self) -> tuple[Array, Array]:

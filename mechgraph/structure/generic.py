@@ -91,7 +91,7 @@ def generic(m: Mechanism, graph: LinkGraph) -> Generic:
         S = np.concatenate(twists, axis=1)
         found: Bordered | Elimination
         found = Bordered(LoopSystem(graph, first, S, points, np.zeros(0, dtype=np.intp)), S)
-        if not found.sure:
+        if not found.smallest > GENERIC_RANK:
             rng.bit_generator.state = state
             found = Elimination(*random_rows(m, graph, rng), GENERIC_RANK)
         return Generic(found.rank, S.shape[1] - found.rank, count - found.rank, found.sets)

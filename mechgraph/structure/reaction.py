@@ -50,8 +50,8 @@ def owner_of(here: Configuration) -> Index:
     return np.repeat(np.arange(len(counts)), counts)
 
 
-def orthonormal_stress(here: Configuration, states: Array, driven: Index) -> Stress:
-    """Self-stresses from independent total wrench states ``(6, P, s, T)`` that leave all undriven freedoms without effort."""
+def split_stress(here: Configuration, states: Array, driven: Index) -> Stress:
+    """Reaction parts and efforts of total wrench states ``(6, P, s, T)`` that leave all undriven freedoms without effort."""
     s = states.shape[2]
     efforts = np.zeros((here.system.n_freedoms, s, here.T))
     parts = np.empty_like(states)
@@ -59,8 +59,15 @@ def orthonormal_stress(here: Configuration, states: Array, driven: Index) -> Str
         tau = pair_power(here, states[:, :, i])
         efforts[driven, i] = tau[driven]
         parts[:, :, i] = reaction_part(here, states[:, :, i], efforts[:, i])
+    return Stress(parts, efforts)
+
+
+def orthonormal_stress(here: Configuration, states: Array, driven: Index) -> Stress:
+    """Self-stresses from independent total wrench states ``(6, P, s, T)``, orthonormal at every position."""
+    found, s = split_stress(here, states, driven), states.shape[2]
     if not s:
-        return Stress(parts, efforts)
+        return found
+    parts, efforts = found.wrenches, found.efforts
     flat = at_pair_points(here, parts).transpose(3, 0, 1, 2).reshape(here.T, 6 * states.shape[1], s)
     _, R = np.linalg.qr(flat)
     inverse = np.linalg.inv(R)

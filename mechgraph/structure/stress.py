@@ -15,7 +15,7 @@ from mechgraph.numerics.linear import RANK_TOLERANCE
 from mechgraph.structure.bordered import Bordered
 from mechgraph.structure.elimination import Elimination
 from mechgraph.structure.freedom import elimination, is_large
-from mechgraph.structure.reaction import UNIQUE, PairFrames, Stress, orthonormal_stress
+from mechgraph.structure.reaction import UNIQUE, PairFrames, Stress, orthonormal_stress, split_stress
 from mechgraph.structure.readable import Label, SelfStress, combinations, readable
 from mechgraph.structure.transverse import Transverse, transverse
 
@@ -90,7 +90,8 @@ def _uniqueness_of_many(here: Configuration, driven: Index) -> Uniqueness:
     rng = np.random.default_rng(SEED)
     count = 6 * len(here.system.graph.loops) - found.rank
     probes = found.random_stress(rng, min(PROBES, count))
-    labels, table = component_table(here, orthonormal_stress(here, pair_states(here, probes), driven), driven)
+    # of size one in the measure of every loop, not as a whole: the verdict does not depend on how many loops there are
+    labels, table = component_table(here, split_stress(here, pair_states(here, probes), driven), driven)
     verdicts = _verdicts(here, labels, table)
     directions, _ = transverse(here, labels, table)
     _, first = component_table(
