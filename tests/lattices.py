@@ -130,7 +130,7 @@ def spatial_ladder(links: int) -> mg.Mechanism:
     links_made = [mg.Link("frame")]
     pairs = [mg.Pair("J0", "R", "frame", "crank0", point=(0, 0, 0), axis=Z)]
     for i in range(n):
-        head, far = np.array([i, 1.0, 0]), np.array([i + 1.0, 1.1, 0.3])
+        head, far = np.array([i, 1.0, 0]), np.array([i + 1.0, 1.0, 0.3])
         pairs += [
             mg.Pair(f"S{i}", "S", f"crank{i}", f"rod{i}", point=head),
             mg.Pair(f"U{i}", "U", f"rod{i}", f"crank{i + 1}", point=far, axis=(0, 0.1, 1), second=(1, 0, 0)),

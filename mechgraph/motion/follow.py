@@ -1,8 +1,8 @@
 """Positions and rates of a large mechanism: followed from position to position, one sparse factorization at each.
 
 Every position of the path is a node. From node to node a second-order predictor, Newton with the factors of the last node, a new
-factorization where it slows down, and half the step where the correction is too large. A position where the sign of the determinant
-changes against the last one, both about the same bordering, lies behind a dead point. Positions behind the first that could not be
+factorization where it slows down, and half the step where the correction is too large. A position where the signs of the pivots
+change against the last one, both about the same bordering, lies behind a dead point. Positions behind the first that could not be
 reached are not tried again (in a small mechanism they are, see ``motion.path``).
 """
 
@@ -173,13 +173,12 @@ class SparseFollower:
         if here is None or correction > CORRECTION:
             return None, correction, Status.OUT_OF_REACH
         loops, factor = last.loops, last.loops.factor(here.S[:, :, 0])
-        same = factor.sign == last.factor.sign
-        if not same or not factor.smallest_pivot > loops.pivot_limit:
+        if not factor.same_side(last.factor) or not factor.smallest_pivot > loops.pivot_limit:
             loops = LoopSystem.at(here, self.columns)
             if not loops.regular or loops.held:
                 return None, correction, Status.DEAD_POINT
             again = loops.factor(self.system.at(last.x[:, None]).S[:, :, 0])
-            if again.sign != loops.first.sign:
+            if not again.same_side(loops.first):
                 return None, correction, Status.DEAD_POINT
             factor = loops.first
         last_step = loops.solve(factor, -here.residual)

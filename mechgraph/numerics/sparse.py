@@ -5,7 +5,7 @@ Source: Davis, Direct Methods for Sparse Linear Systems, 2006, chapters 6 and 7;
 
 from __future__ import annotations
 
-from typing import Any, Literal, cast
+from typing import Any, Literal
 
 import numpy as np
 import scipy
@@ -15,43 +15,76 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 
+KEEP_PIVOT = 0.1
+"""Part of the largest candidate that the pivot of the first factorization needs to be taken again."""
+
+
 class Pattern:
-    """Places ``(rows, cols)`` of the nonzeros of a square matrix, with the column order of the first factorization kept."""
+    """Places ``(rows, cols)`` of the nonzeros of a square matrix; order of columns and pivots of the first factorization are kept."""
 
     def __init__(self, rows: Index, cols: Index, size: int) -> None:
         self.size = size
         self._rows, self._cols = rows, cols
-        self._order: Index | None = None
-        self._arrange(np.arange(size, dtype=np.intp))
+        self._known = False
+        self._arrange(np.arange(size, dtype=np.intp), np.arange(size, dtype=np.intp))
 
-    def _arrange(self, place: Index) -> None:
-        """Compressed columns with column ``j`` at ``place[j]``; where each value goes."""
-        cols = place[self._cols]
-        self._values = np.lexsort((self._rows, cols))
-        self._indices = self._rows[self._values].astype(np.int32)
+    def _arrange(self, row_place: Index, col_place: Index) -> None:
+        """Compressed columns with row ``i`` at ``row_place[i]``, column ``j`` at ``col_place[j]``; where each value goes."""
+        self._row_place, self._col_place = row_place, col_place
+        rows, cols = row_place[self._rows], col_place[self._cols]
+        self._values = np.lexsort((rows, cols))
+        self._indices = rows[self._values].astype(np.int32)
         self._starts = np.searchsorted(cols[self._values], np.arange(self.size + 1)).astype(np.int32)
 
     def factor(self, values: Array) -> SparseFactor:
         """The matrix with these values, factored."""
-        A = scipy.sparse.csc_array((values[self._values], self._indices, self._starts), shape=(self.size, self.size))
+        if not self._known:
+            first = self._factored(values, "COLAMD", 1.0)
+            if first is None:
+                return SparseFactor(self._matrix(values), None, self._row_place, self._col_place)
+            self._known = True
+            self._arrange(first.perm_r.astype(np.intp), first.perm_c.astype(np.intp))
+        lu = self._factored(values, "NATURAL", KEEP_PIVOT)
+        return SparseFactor(self._matrix(values), lu, self._row_place, self._col_place)
+
+    def _matrix(self, values: Array) -> scipy.sparse.csc_array:
+        return scipy.sparse.csc_array((values[self._values], self._indices, self._starts), shape=(self.size,) * 2)
+
+    def _factored(self, values: Array, order: Literal["COLAMD", "NATURAL"], threshold: float) -> Any:
+        """SuperLU of the matrix as it is arranged, None where it is exactly singular."""
         try:
-            lu = scipy.sparse.linalg.splu(A, permc_spec="COLAMD" if self._order is None else "NATURAL")
+            return scipy.sparse.linalg.splu(self._matrix(values), permc_spec=order, diag_pivot_thresh=threshold)
         except RuntimeError:
-            return SparseFactor(A, None, self._order)
-        if self._order is None:
-            self._order = lu.perm_c.astype(np.intp)
-            self._arrange(self._order)
-            return SparseFactor(A, lu, None)
-        return SparseFactor(A, lu, self._order)
+            return None
 
 
 class SparseFactor:
     """One factored matrix; solves with one step of refinement. ``lu`` is None for a matrix that is exactly singular."""
 
-    def __init__(self, A: scipy.sparse.csc_array, lu: scipy.sparse.linalg.SuperLU | None, order: Index | None) -> None:
-        self._A, self._lu, self._order = A, lu, order
+    def __init__(self, A: scipy.sparse.csc_array, lu: Any, row_place: Index, col_place: Index) -> None:
+        self._A, self._lu, self._row_place, self._col_place = A, lu, row_place, col_place
         self._pivots = np.zeros(1) if lu is None else np.asarray(lu.U.diagonal())
         self.smallest_pivot = float(np.abs(self._pivots).min(initial=1.0))
+
+    def _signs(self) -> Array:
+        """Signs of the pivots in the places of the first factorization, whatever their size."""
+        lu = self._lu
+        if not np.array_equal(lu.perm_r, lu.perm_c):
+            try:
+                lu = scipy.sparse.linalg.splu(self._A, permc_spec="NATURAL", diag_pivot_thresh=0.0)
+            except RuntimeError:
+                return np.zeros(self._A.shape[0])
+        return np.asarray(np.sign(lu.U.diagonal())[lu.perm_c])
+
+    def same_side(self, other: SparseFactor) -> bool:
+        """Whether nothing says that a singular matrix lies between two of one pattern: every pivot keeps its sign.
+
+        The sign of the determinant alone would miss an even number of zeros passed at once. That a leading block is singular on the
+        way changes signs too, so that a change asks for a closer look, about pivots chosen near by.
+        """
+        if self._lu is None or other._lu is None:
+            return False
+        return np.array_equal(self._signs(), other._signs())
 
     @property
     def sign(self) -> float:
@@ -59,8 +92,7 @@ class SparseFactor:
         if self._lu is None:
             return 0.0
         out = float(np.prod(np.sign(self._pivots)))
-        perms = [self._lu.perm_r, self._lu.perm_c] + ([] if self._order is None else [self._order])
-        for perm in perms:
+        for perm in (self._lu.perm_r, self._lu.perm_c, self._row_place, self._col_place):
             out *= _parity(perm)
         return out
 
@@ -71,13 +103,11 @@ class SparseFactor:
         if not b.size:
             return np.zeros_like(b)
         if transposed:
-            rhs = b if self._order is None else _to_places(b, self._order)
-            return self._refined(rhs, "T", self._A.T)
-        x = self._refined(b, "N", self._A)
-        return x if self._order is None else x[self._order]
+            return self._refined(_to_places(b, self._col_place), "T", self._A.T)[self._row_place]
+        return self._refined(_to_places(b, self._row_place), "N", self._A)[self._col_place]
 
     def _refined(self, b: Array, trans: Literal["N", "T"], A: Any) -> Array:
-        solve = cast(Any, self._lu).solve
+        solve = self._lu.solve
         x = solve(b, trans)
         return np.asarray(x + solve(b - A @ x, trans))
 
