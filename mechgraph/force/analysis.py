@@ -50,7 +50,8 @@ class Motions:
 class Forces:
     """Inertia ``(6, N, T)`` and what loads do (``site``), the wrenches found, and whether redundant reactions are NaN.
 
-    ``hold (6, N, T)`` keeps passive bodies at rest, ``holds`` are its sizes by name and whether they are couples.
+    ``hold (6, N, T)`` keeps passive bodies at rest, ``holds`` are its sizes by name and whether they are couples; ``solver`` the closure
+    equations.
     """
 
     inertia: Array
@@ -59,6 +60,7 @@ class Forces:
     mask_redundant: bool
     hold: Array
     holds: tuple[tuple[str, bool, Array], ...]
+    solver: Any = None
 
 
 class Analysis:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeadPointError, DeclarationError, IndeterminateError, ReachError
 from mechgraph.force.analysis import Analysis, Forces, Motions
+from mechgraph.force.large import Given, SparseAnalysis, certified_loops, move_sparse
 from mechgraph.force.methods import METHODS, Problem, chosen_for_all
 from mechgraph.force.site import Site, inertia_wrenches
 from mechgraph.model.drive import Drive
@@ -20,9 +21,10 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion_law import Motion
 from mechgraph.motion import idle
 from mechgraph.motion.assembly import CLOSED, assembled, assembled_at, named_columns, state_rows
+from mechgraph.motion.follow import SparseSolver
 from mechgraph.motion.idle import Idle, held_well, spin_angles
 from mechgraph.motion.path import SINGULAR, Follower, Positions, Status
-from mechgraph.motion.rates import Rates, closure_solver, distance_to_dead_point, rates
+from mechgraph.motion.rates import DEAD_POINT, Rates, closure_solver, distance_to_dead_point, rates
 from mechgraph.motion.system import Configuration, Index
 from mechgraph.numerics.linear import Choice, ChosenSystem, independent_rows, rank_of, singular_values
 from mechgraph.result.solution import Solution
@@ -38,8 +40,6 @@ LONGEST_TURN = 0.25
 """Longest such step (radians)."""
 DOUBTFUL = 1e4
 """Condition number of the closure equations from which on the distance to a dead point is looked at."""
-DEAD_POINT = 1e-10
-"""Distance to a dead point, in driver coordinates (radians, or lengths / L), below which a position counts as one."""
 
 ON_REACH = ("raise", "flag")
 REDUNDANT = ("nan", "minimum_norm")
@@ -120,6 +120,9 @@ class _Run:
         self.columns, _ = named_columns(self.m, self.system, dict.fromkeys(self.motions, 0.0))
         self.unit = np.where(self.system.is_length[self.columns], self.system.par.L, 1.0)
         self.t = next((motion.t for motion in self.motions.values() if motion.t is not None), None)
+        self.loops = certified_loops(self.system, self.x, self.columns)
+        if self.loops is not None:
+            return
         self.freedoms = free_motion(self.system, self.x, self.columns)
         self.lead = np.arange(len(self.columns))
         if self.freedoms.dependent:
@@ -128,6 +131,13 @@ class _Run:
             chosen = independent_rows(self.freedoms.null, order, rank)
             self.lead = np.array([order.index(c) for c in sorted(chosen, key=order.index)], dtype=np.intp)
         self._check_determinate()
+
+    @property
+    def mobility(self) -> int:
+        """Freedoms minus rank at the first closed position."""
+        if self.loops is None:
+            return self.freedoms.mobility
+        return free_motion(self.system, self.x, self.columns).mobility
 
     def _check_determinate(self) -> None:
         free = self.freedoms.undriven
@@ -150,6 +160,11 @@ class _Run:
         T = int(np.prod(self.batch))
         rows = [np.broadcast_to(getattr(motion, kind), self.batch).reshape(T) for motion in self.motions.values()]
         return np.array(rows).reshape(len(rows), T) / self.unit[:, None]
+
+    def given(self) -> Given:
+        """What the motions of the drivers say."""
+        rows = (self.values(kind) for kind in ("position", "velocity", "acceleration"))
+        return Given(self.batch, self.t, *rows)
 
     def positions(self) -> Positions:
         """All positions, followed along the last batch axis."""
@@ -244,14 +259,14 @@ class _Run:
         return x
 
 
-def _raise_unreached(run: _Run, motions: Motions, found: Positions, solution: Solution) -> None:
+def _raise_unreached(run: _Run, motions: Motions, last: Array, solution: Solution) -> None:
     """Named errors for positions that were not solved, with the solution so far."""
     flat = motions.status.reshape(-1)
     bad = np.flatnonzero(flat != Status.OK.value)
     if bad.size:
         first = int(bad[0])
         case = first // max(1, self_length(run.batch))
-        reached = {name: float(v * u) for name, v, u in zip(run.motions, found.reached[:, case], run.unit, strict=True)}
+        reached = {name: float(v * u) for name, v, u in zip(run.motions, last[:, case], run.unit, strict=True)}
         asked = {
             name: float(v) for name, v in zip(run.motions, run.values("position")[:, first] * run.unit, strict=True)
         }
@@ -280,12 +295,12 @@ def self_length(batch: tuple[int, ...]) -> int:
 
 def _check_drivers(run: _Run, motions: Motions) -> None:
     worst = float(motions.rates.contradiction.max(initial=0.0))
-    stuck = run.freedoms.dependent and not motions.good.size
+    stuck = run.loops is None and run.freedoms.dependent and not motions.good.size
     if worst > CONTRADICTION or stuck:
         names = ", ".join(run.motions)
         raise IndeterminateError(
             f"mechanism {run.m.name!r}: the drivers {names} contradict each other: their motions cannot be had together "
-            f"(mobility {run.freedoms.mobility}, {len(run.motions)} drivers). Take a driver away, or give motions that agree",
+            f"(mobility {run.mobility}, {len(run.motions)} drivers). Take a driver away, or give motions that agree",
             check(run.m),
         )
 
@@ -332,18 +347,26 @@ def _solve(m: Mechanism, motions: Mapping[str, Any] | None, on_reach: str, force
     if faults:
         raise DeclarationError(f"solve {m.name!r}", faults)
     run = _Run(m, motions)
-    moved, solver, found = run.move()
+    solver: ChosenSystem | SparseSolver
+    if run.loops is not None:
+        moved, solver, reached = move_sparse(run.system, run.x, run.columns, run.loops, run.given())
+        kind: type[Analysis] = SparseAnalysis
+    else:
+        moved, solver, found = run.move()
+        reached, kind = found.reached, Analysis
     _check_drivers(run, moved)
-    solved = Analysis(moved, None)
+    solved = kind(moved, None)
     if forces is not None:
-        solved = Analysis(moved, _forces(run, moved, solver, solved.user_coordinates, *forces))
+        solved = kind(moved, _forces(run, moved, solver, solved.user_coordinates, *forces))
     solution = Solution(solved)
     if on_reach == "raise":
-        _raise_unreached(run, moved, found, solution)
+        _raise_unreached(run, moved, reached, solution)
     return solution
 
 
-def _forces(run: _Run, moved: Motions, solver: ChosenSystem, coordinates: Array, method: str, redundant: str) -> Forces:
+def _forces(
+    run: _Run, moved: Motions, solver: ChosenSystem | SparseSolver, coordinates: Array, method: str, redundant: str
+) -> Forces:
     inertia = inertia_wrenches(moved.here, moved.rates)
     flat = coordinates.reshape(run.system.n_freedoms, int(np.prod(run.batch)))[:, moved.good]
     site = Site(moved.here, moved.rates, flat, run.batch, moved.good, run.t)
@@ -351,13 +374,13 @@ def _forces(run: _Run, moved: Motions, solver: ChosenSystem, coordinates: Array,
     loads = inertia + site.scaled(site.external + site.internal)
     held = np.zeros_like(loads)
     holds: tuple[tuple[str, bool, Array], ...] = ()
-    bodies = run.freedoms.bodies
-    if bodies:
+    bodies = () if run.loops is not None else run.freedoms.bodies
+    if bodies and isinstance(solver, ChosenSystem):
         Z = solver.null_of_columns()
         held, sizes = idle.hold(moved.here, bodies, Z, loads, site.scaled_efforts())
         holds = tuple((*name, size) for name, size in zip(idle.hold_names(moved.here, bodies, Z), sizes, strict=True))
-    problem = Problem(moved.here, loads + held, site.scaled_efforts(), run.columns, moved.held, solver)
-    return Forces(inertia, site, METHODS[method](problem), redundant == "nan", held, holds)
+    problem = Problem(moved.here, loads + held, site.scaled_efforts(), run.columns, moved.held, moved.which, solver)
+    return Forces(inertia, site, METHODS[method](problem), redundant == "nan", held, holds, solver)
 
 
 def assemble(

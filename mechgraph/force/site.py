@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -43,7 +44,7 @@ class Site:
         self.batch, self.good, self.t = batch, good, t
         system = here.system
         self.m, self.L = system.m, system.par.L
-        self._link = {name: i for i, name in enumerate(self.m.link_names())}
+        self._link = self.m.link_index
         self.external = np.zeros((6, len(self.m.links), here.T))
         self.internal = np.zeros_like(self.external)
         self.efforts = np.zeros((system.n_freedoms, here.T))
@@ -52,20 +53,28 @@ class Site:
     def collect(self, loads: tuple[Load, ...]) -> None:
         """Let all loads act."""
         for load in loads:
-            self._target = self.internal if len(load.links(self.m)) == 2 else self.external
+            self._target = self.internal if load.between_links else self.external
             load.act(self)
-            parts = (self.external, self.internal, self.efforts)
-            if not all(np.isfinite(part).all() for part in parts):
-                raise DeclarationError(
-                    f"load {load.kind} {getattr(load, 'link', getattr(load, 'freedom', ''))}".strip(),
-                    ["gives a value that is not finite at some position; check its callable, or a spring of length 0"],
-                )
+        if not self._finite():
+            wrong = next((load for load in loads if not self._alone(load)), loads[-1])
+            raise DeclarationError(
+                f"load {wrong.kind} {getattr(wrong, 'link', getattr(wrong, 'freedom', ''))}".strip(),
+                ["gives a value that is not finite at some position; check its callable, or a spring of length 0"],
+            )
+
+    def _finite(self) -> bool:
+        return all(np.isfinite(part).all() for part in (self.external, self.internal, self.efforts))
+
+    def _alone(self, load: Load) -> bool:
+        """Whether a load by itself gives finite values."""
+        other = copy(self)
+        other.external, other.internal = np.zeros_like(self.external), np.zeros_like(self.internal)
+        other.efforts = np.zeros_like(self.efforts)
+        other._target = other.external
+        load.act(other)
+        return other._finite()
 
     # --- what loads ask ----------------------------------------------------------------------------------------------
-
-    def masses(self) -> list[tuple[str, float, Array]]:
-        """Name, mass and mass centre of every link that has mass."""
-        return [(k.name, k.mass, self.point(k.name, k.center)[0]) for k in self.m.links if k.mass > 0]
 
     def rotation(self, link: str) -> Array:
         """Rotation of a link ``(3, 3, T)``."""
@@ -132,6 +141,14 @@ class Site:
         return int(self.here.system.first_column[k]) + j
 
     # --- what loads do -----------------------------------------------------------------------------------------------
+
+    def add_weight(self, acceleration: Array) -> None:
+        """Force ``m g`` at the mass centre of every link."""
+        par, X = self.here.system.par, self.here.poses
+        at = self.L * (rotate(X[:, :3], par.center) + X[:, 3])
+        force = np.broadcast_to(par.mass * acceleration[:, None, None], at.shape)
+        self._target[:3] += cross(at, force)
+        self._target[3:] += force
 
     def add_force(self, link: str, force: Array, at: Array) -> None:
         """Force on a link at a position."""

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Protocol
 
@@ -24,8 +24,8 @@ FORCE, MOMENT, LENGTH = (1, 1, -2), (2, 1, -2), (1, 0, 0)
 class LoadSite(Protocol):
     """What a load sees of a mechanism at a batch of ``T`` positions (component axes first, positions last)."""
 
-    def masses(self) -> list[tuple[str, float, Array]]:
-        """Name, mass and mass centre ``(3, T)`` of every link that has mass."""
+    def add_weight(self, acceleration: Array) -> None:
+        """Force ``m g`` at the mass centre of every link, for one ``g (3,)``."""
 
     def rotation(self, link: str) -> Array:
         """Rotation of the link, ``(3, 3, T)``."""
@@ -58,8 +58,9 @@ class LoadSite(Protocol):
 class Names(Protocol):
     """The names that a load may refer to."""
 
-    def link_names(self) -> tuple[str, ...]:
-        """Names of the links."""
+    @property
+    def link_index(self) -> Mapping[str, int]:
+        """Place of every link, by name."""
 
     def freedom_fault(self, name: Any, *, single: bool) -> str | None:
         """Why ``name`` is no freedom (with ``single``: no single freedom), or None."""
@@ -88,7 +89,7 @@ def _value_fault(value: Value, what: str, width: int) -> str | None:
 
 
 def _link_fault(names: Names, link: Any, where: str) -> str | None:
-    known = names.link_names()
+    known = names.link_index
     return None if link in known else f"{where}unknown link {link!r} (links: {', '.join(known)})"
 
 
@@ -120,6 +121,8 @@ def _turned(value: Value, pose: Array) -> Value:
 class _Load:
     """What all loads share: equality that also holds for arrays."""
 
+    between_links: ClassVar[bool] = False
+    """Whether it is a force that two links exert on each other."""
     dimensions: ClassVar[dict[str, tuple[int, int, int]]] = {}
     freedom_dimensions: ClassVar[dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]]] = {}
     """Dimensions of fields that depend on the freedom: for a turn, for a slide."""
@@ -157,9 +160,7 @@ class Gravity(_Load):
 
     def act(self, site: LoadSite) -> None:
         """Add the weight of every link."""
-        g = np.asarray(self.acceleration)[:, None]
-        for link, mass, center in site.masses():
-            site.add_force(link, np.broadcast_to(mass * g, center.shape), center)
+        site.add_weight(np.asarray(self.acceleration))
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,6 +265,7 @@ class Spring(_Load):
     """
 
     kind: ClassVar[str] = "spring"
+    between_links: ClassVar[bool] = True
     dimensions: ClassVar[dict[str, tuple[int, int, int]]] = {
         "p": LENGTH,
         "q": LENGTH,

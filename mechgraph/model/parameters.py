@@ -7,7 +7,7 @@ stands and whatever its units: internal position = (R_b offset_b + p_b - center)
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,14 +36,32 @@ class Parameters:
     origin: Array
     L: float
 
+    def rescaled(self, origin: Array, L: float) -> Parameters:
+        """The same numbers about another ``origin (3,)`` (global), with lengths over another ``L``."""
+        ratio = self.L / L
+        moved = {}
+        for name in ("marker_a", "marker_b", "frame"):
+            moved[name] = getattr(self, name).copy()
+            moved[name][:, 3] *= ratio
+        moved["frame"][:, 3, 0] += (self.origin - origin) / L
+        return replace(
+            self,
+            **moved,
+            pitch=self.pitch * ratio,
+            center=self.center * ratio,
+            inertia=self.inertia * ratio**2,
+            origin=np.asarray(origin, dtype=float),
+            L=L,
+        )
+
 
 def _marker_poses(pairs: tuple[Pair, ...]) -> tuple[Array, Array]:
     """Poses ``(3, 4, P)`` of the markers on ``a`` and on ``b`` in the frames of their links (see ``Marker.pose``)."""
-    markers = [pair.markers for pair in pairs]
     out = []
-    for side in (0, 1):
+    for side in ("on_a", "on_b"):
+        placed = [pair if getattr(pair, side) is None else getattr(pair, side) for pair in pairs]
         points, axes, seconds = (
-            np.array([getattr(both[side], field) for both in markers], dtype=float).T
+            np.array([getattr(marker, field) for marker in placed], dtype=float).T
             for field in ("point", "axis", "second")
         )
         z = axes / np.sqrt((axes * axes).sum(axis=0))
@@ -55,28 +73,25 @@ def _marker_poses(pairs: tuple[Pair, ...]) -> tuple[Array, Array]:
 
 def parameters(m: Mechanism, origin: Array | None = None, L: float = 1.0) -> Parameters:
     """The arrays of a mechanism with geometry, about ``origin`` (global) with lengths divided by ``L``."""
-    index = {name: i for i, name in enumerate(m.link_names())}
+    index = m.link_index
     on_a, on_b = _marker_poses(m.pairs)
-    offset = np.zeros((3, len(m.links)))
-    points: list[list[Array]] = [[] for _ in m.links]
-    a, b = ([index[end] for end in ends] for ends in zip(*((p.a, p.b) for p in m.pairs), strict=True))
-    for k in range(len(m.pairs)):
-        points[a[k]].append(on_a[:, 3, k])
-        points[b[k]].append(on_b[:, 3, k])
-    for i, at in enumerate(points):
-        offset[:, i] = np.mean(at, axis=0)
+    a, b = (np.array([index[getattr(p, end)] for p in m.pairs], dtype=np.intp) for end in ("a", "b"))
+    count = np.bincount(np.concatenate([a, b]), minlength=len(m.links))
+    points = np.concatenate([on_a[:, 3], on_b[:, 3]], axis=1)
+    ends = np.concatenate([a, b])
+    offset = np.stack([np.bincount(ends, row, minlength=len(m.links)) for row in points]) / count
     origin = offset[:, index[m.frame]] if origin is None else origin
 
     marker_a, marker_b = on_a.copy(), on_b.copy()
     for marker, links in ((marker_a, a), (marker_b, b)):
         marker[:, 3] = (marker[:, 3] - offset[:, links]) / L
-    center = np.stack(
-        [np.zeros(3) if k.center is None else (np.asarray(k.center) - offset[:, i]) / L for i, k in enumerate(m.links)],
-        axis=-1,
-    )
-    inertia = np.stack(
-        [np.zeros((3, 3)) if k.inertia is None else np.asarray(k.inertia) / L**2 for k in m.links], axis=-1
-    )
+    center, inertia = np.zeros((3, len(m.links))), np.zeros((3, 3, len(m.links)))
+    placed = [i for i, link in enumerate(m.links) if link.center is not None]
+    center[:, placed] = np.array([m.links[i].center for i in placed], dtype=float).reshape(-1, 3).T
+    center[:, placed] = (center[:, placed] - offset[:, placed]) / L
+    turning = [i for i, link in enumerate(m.links) if link.inertia is not None]
+    tensors = np.array([m.links[i].inertia for i in turning], dtype=float).reshape(-1, 3, 3)
+    inertia[:, :, turning] = np.moveaxis(tensors, 0, -1) / L**2
     frame = np.zeros((3, 4, 1))
     frame[:, :3, 0] = np.eye(3)
     frame[:, 3, 0] = (offset[:, index[m.frame]] - origin) / L

@@ -7,7 +7,8 @@ first and positions last. ``S`` are the twists of all freedoms about the interna
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,9 +20,13 @@ from mechgraph.model import pair_evaluation as evaluation
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import PairType
 from mechgraph.model.parameters import Parameters, parameters
+from mechgraph.motion.tree import Tree
 from mechgraph.topology.linkgraph import LinkGraph, link_graph
 
 Index = NDArray[np.intp]
+
+MANY_LOOPS = 16
+"""Loops above which the loop matrix is applied as a sparse one (measured: from here on it is the faster one)."""
 
 
 @dataclass(frozen=True)
@@ -48,43 +53,61 @@ class System:
         self.b = np.array([b for _, b in self.graph.ends], dtype=np.intp)
         self.chords = np.array(self.graph.chords, dtype=np.intp)
         self.groups = self._group_pairs()
-        self.levels = self._tree_levels()
+        self.tree = Tree(self.graph)
         self.marker_b_inverse = inverse(self.par.marker_b)
-        self.loop_columns = [self._columns_of_loop(loop) for loop in self.graph.loops]
-        self.is_length = np.array([not f.turns for p in m.pairs for f in p.type.freedoms], dtype=bool)
+        self.is_length = np.zeros(self.n_freedoms, dtype=bool)
+        for g in self.groups:
+            self.is_length[g.columns] = np.array([not f.turns for f in g.row.freedoms], dtype=bool)[:, None]
 
     def with_parameters(self, par: Parameters) -> System:
         """The same graph with other numbers."""
-        return System(self.m, self.graph, par)
+        out = copy(self)
+        out.par, out.marker_b_inverse = par, inverse(par.marker_b)
+        rows = [self.m.pairs[int(g.pairs[0])].type.scaled(par.L) for g in self.groups]
+        out.groups = [replace(g, row=row) for g, row in zip(self.groups, rows, strict=True)]
+        return out
+
+    @cached_property
+    def loop_columns(self) -> list[tuple[Index, Array]]:
+        """Columns of the freedoms along every loop, and their signs."""
+        return [self._columns_of_loop(loop) for loop in self.graph.loops]
 
     def _group_pairs(self) -> list[Group]:
-        by_type: dict[PairType, list[int]] = {}
+        same: dict[int, list[int]] = {}
         for k, pair in enumerate(self.m.pairs):
-            by_type.setdefault(pair.type, []).append(k)
+            same.setdefault(id(pair.type), []).append(k)
+        by_type: dict[PairType, list[int]] = {}
+        for pairs in same.values():
+            by_type.setdefault(self.m.pairs[pairs[0]].type, []).extend(pairs)
         groups = []
         for row, pairs in by_type.items():
-            index = np.array(pairs, dtype=np.intp)
+            index = np.array(sorted(pairs), dtype=np.intp)
             columns = self.first_column[index] + np.arange(row.f, dtype=np.intp)[:, None]
             state = self.first_row[index] + np.arange(row.nx, dtype=np.intp)[:, None]
             groups.append(Group(row.scaled(self.par.L), index, columns, state))
         return groups
 
-    def _tree_levels(self) -> list[tuple[Index, NDArray[np.bool_], Index, Index]]:
-        depth = {self.graph.frame: 0}
-        levels: dict[int, list[tuple[int, bool, int, int]]] = {}
-        for k, sign, parent, child in self.graph.tree:
-            depth[child] = depth[parent] + 1
-            levels.setdefault(depth[child], []).append((k, sign > 0, parent, child))
-        out = []
-        for level in levels.values():
-            pairs, forward, parents, children = (np.array(part) for part in zip(*level, strict=True))
-            out.append((pairs, forward, parents, children))
+    @cached_property
+    def _group_of(self) -> Index:
+        out = np.empty(len(self.m.pairs), dtype=np.intp)
+        for number, g in enumerate(self.groups):
+            out[g.pairs] = number
         return out
+
+    def place_of(self, pair: int) -> tuple[int, int]:
+        """Number of the group of a pair, and its place there."""
+        number = int(self._group_of[pair])
+        return number, int(np.searchsorted(self.groups[number].pairs, pair))
 
     def _columns_of_loop(self, loop: tuple[tuple[int, int], ...]) -> tuple[Index, Array]:
         columns = [np.arange(self.first_column[k], self.first_column[k + 1]) for k, _ in loop]
         signs = [np.full(len(c), float(sign)) for c, (_, sign) in zip(columns, loop, strict=True)]
         return np.concatenate(columns), np.concatenate(signs)
+
+    @property
+    def many_loops(self) -> bool:
+        """Whether sums along loops are taken with the sparse loop matrix."""
+        return len(self.graph.loops) > MANY_LOOPS
 
     @cached_property
     def loops_of_chords(self) -> Array:
@@ -104,20 +127,18 @@ class System:
     def coordinates_of(self, x: Array, start: Array | None = None) -> Array:
         """User coordinates ``(F, ..., T)`` of states ``(nx, ..., T)``; rotation vectors continued along the last axis."""
         q = np.empty((self.n_freedoms, *x.shape[1:]))
-        for pair, first, row in zip(self.m.pairs, self.first_column, self.first_row, strict=False):
-            near = None if start is None else start[first : first + pair.type.f]
-            q[first : first + pair.type.f] = evaluation.state_to_coordinates(
-                pair.type, x[row : row + pair.type.nx], near
-            )
+        for g in self.groups:
+            near = None if start is None else start[g.columns]
+            q[g.columns] = evaluation.state_to_coordinates(g.row, x[g.state_rows], near)
         q[self.is_length] *= self.par.L
         return q
 
     def start_coordinates(self, start: Mapping[str, float]) -> Array:
         """User coordinates ``(F,)`` from a mapping freedom -> value, zero elsewhere."""
-        names = {name: i for i, name in enumerate(self.m.freedom_names())}
         q = np.zeros(self.n_freedoms)
         for name, value in start.items():
-            q[names[self.m.full_name(name)]] = value
+            k, j = self.m.freedom(name)
+            q[self.first_column[k] + j] = value
         return q
 
     def advance(self, x: Array, dq: Array) -> Array:
@@ -154,19 +175,13 @@ class Configuration:
         self.x = x
         self.T = x.shape[1]
         par = system.par
-        P, N = len(system.m.pairs), len(system.m.links)
+        P = len(system.m.pairs)
         local = [evaluation.frames_of(g.row, par.pitch[g.pairs], x[g.state_rows]) for g in system.groups]
         D = np.empty((3, 4, P, self.T))
         for g, frames in zip(system.groups, local, strict=True):
             D[:, :, g.pairs] = frames[-1]
         relative = compose(compose(par.marker_a, D), system.marker_b_inverse)
-        self.poses = np.empty((3, 4, N, self.T))
-        self.poses[:, :, system.graph.frame] = par.frame
-        for pairs, forward, parents, children in system.levels:
-            step = relative[:, :, pairs]
-            if not forward.all():
-                step[:, :, ~forward] = inverse(step[:, :, ~forward])
-            self.poses[:, :, children] = compose(self.poses[:, :, parents], step)
+        self.poses = system.tree.poses(relative, par.frame)
         self._local = local
 
     @cached_property
@@ -240,12 +255,11 @@ class Configuration:
         """Closure errors ``(6, chords, T)``: finite twist from marker B reached through b to that reached through a."""
         s = self.system
         reached = np.empty((3, 4, len(s.chords), self.T))
-        place = {int(k): i for i, k in enumerate(s.chords)}
+        place = np.full(len(s.m.pairs), -1)
+        place[s.chords] = np.arange(len(s.chords))
         for g, frames in zip(s.groups, self.frames, strict=True):
-            at = [(i, place[int(k)]) for i, k in enumerate(g.pairs) if int(k) in place]
-            if at:
-                mine, chord = zip(*at, strict=True)
-                reached[:, :, list(chord)] = frames[-1][:, :, list(mine)]
+            chord = place[g.pairs]
+            reached[:, :, chord[chord >= 0]] = frames[-1][:, :, chord >= 0]
         marker_b = compose(self.poses[:, :, s.b[s.chords]], s.par.marker_b[:, :, s.chords])
         return pose_log(compose(reached, inverse(marker_b)))
 
@@ -261,7 +275,12 @@ class Configuration:
     @cached_property
     def residual(self) -> Array:
         """Closure errors of the loops, stacked ``(6 loops, T)``."""
-        loops = np.einsum("lc,ict->lit", self.system.loops_of_chords, self.chord_errors)
+        s = self.system
+        if s.many_loops:
+            per_pair = np.zeros((6, len(s.m.pairs), self.T))
+            per_pair[:, s.chords] = self.chord_errors
+            return self.loop_sums(per_pair)
+        loops = np.einsum("lc,ict->lit", s.loops_of_chords, self.chord_errors)
         return loops.reshape(-1, self.T)
 
     @cached_property
@@ -281,7 +300,7 @@ class Configuration:
 
     def link_twists(self, dq: Array) -> Array:
         """Twists of all links ``(6, N, T)`` for rates ``dq (F, T)``, along the tree."""
-        return self._accumulate(self.pair_sums(self.S * dq))
+        return self.system.tree.sums(self.pair_sums(self.S * dq))
 
     def pair_sums(self, terms: Array) -> Array:
         """Sum of the columns of every pair: ``(6, F, T)`` -> ``(6, P, T)``."""
@@ -290,13 +309,6 @@ class Configuration:
         for g in s.groups:
             for columns in g.columns:
                 out[:, g.pairs] += terms[:, columns]
-        return out
-
-    def _accumulate(self, relative: Array) -> Array:
-        s = self.system
-        out = np.zeros((6, len(s.m.links), relative.shape[2]))
-        for pairs, forward, parents, children in s.levels:
-            out[:, children] = out[:, parents] + np.where(forward[:, None], 1.0, -1.0) * relative[:, pairs]
         return out
 
     def bias(self, dq: Array, V: Array) -> Array:
@@ -314,9 +326,22 @@ class Configuration:
 
     def loop_sums(self, per_pair: Array) -> Array:
         """Signed sum of pair terms along every loop, stacked ``(6 loops, T)``."""
-        sums = np.einsum("lp,ipt->lit", self.system.graph.loop_matrix, per_pair)
+        s = self.system
+        if s.many_loops:
+            flat = per_pair.transpose(1, 0, 2).reshape(per_pair.shape[1], 6 * per_pair.shape[2])
+            return np.asarray(s.graph.sparse_loop_matrix @ flat).reshape(-1, per_pair.shape[2])
+        sums = np.einsum("lp,ipt->lit", s.graph.loop_matrix, per_pair)
         return sums.reshape(sums.shape[0] * sums.shape[1], per_pair.shape[2])
+
+    def pair_wrenches(self, x: Array) -> Array:
+        """Pair wrenches ``(6, P, k, T)`` of loop wrenches ``(6 loops, k, T)``: ``w = C^T x``."""
+        s = self.system
+        loops = x.reshape(len(s.graph.loops), 6, *x.shape[1:])
+        if s.many_loops:
+            flat = np.asarray(s.graph.sparse_loop_matrix.T @ loops.reshape(len(loops), -1))
+            return np.moveaxis(flat.reshape(len(s.m.pairs), 6, *x.shape[1:]), 1, 0)
+        return np.asarray(np.einsum("lp,list->ipst", s.graph.loop_matrix, loops))
 
     def link_accelerations(self, dq: Array, ddq: Array, V: Array) -> Array:
         """Accelerations dV/dt of all links ``(6, N, T)``."""
-        return self._accumulate(self.pair_sums(self.S * ddq) + self.bias(dq, V))
+        return self.system.tree.sums(self.pair_sums(self.S * ddq) + self.bias(dq, V))

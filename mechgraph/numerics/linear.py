@@ -65,6 +65,13 @@ def add_at(out: Array, index: Index, values: Array) -> None:
     np.add.at(np.moveaxis(out, 1, 0), index, np.moveaxis(values, 1, 0))
 
 
+def scattered_sum(values: Array, index: Index, count: int) -> Array:
+    """Sums ``(6, count, T)`` of ``values (6, n, T)`` by their place ``index (n,)``."""
+    to = scipy.sparse.csr_array((np.ones(len(index)), (index, np.arange(len(index)))), shape=(count, len(index)))
+    flat = np.moveaxis(values, 1, 0).reshape(len(index), values.shape[0] * values.shape[2])
+    return np.moveaxis(np.asarray(to @ flat).reshape(count, values.shape[0], values.shape[2]), 0, 1)
+
+
 @dataclass(frozen=True)
 class Choice:
     """Independent rows and columns of a matrix: ``A[rows][:, cols]`` is square and regular.

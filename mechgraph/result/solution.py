@@ -269,11 +269,11 @@ class Solution:
         return self._values.batch
 
     def __getitem__(self, pair: str) -> PairResult:
-        return PairResult(self._values, self.mechanism.pairs.index(self.mechanism.pair(pair)))
+        return PairResult(self._values, self.mechanism.place_of_pair(pair))
 
     def link(self, name: str) -> LinkResult:
         """Motion of a link."""
-        return LinkResult(self._values, self.mechanism.links.index(self.mechanism.link(name)))
+        return LinkResult(self._values, self.mechanism.place_of_link(name))
 
     @property
     def has_forces(self) -> bool:
