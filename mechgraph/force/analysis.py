@@ -154,7 +154,9 @@ class Analysis:
         """Position, velocity and acceleration of a material point."""
         par = self._system.par
         X, V, A = self._here.poses[:, :, link], self.motions.rates.V[:, link], self.motions.rates.A[:, link]
-        local = ((np.asarray(p, dtype=float) - par.offset[:, link]) / par.L)[:, None]
+        local = (
+            par.center[:, link] if p is None else ((np.asarray(p, dtype=float) - par.offset[:, link]) / par.L)[:, None]
+        )
         at = rotate(X[:, :3], local) + X[:, 3]
         velocity = V[3:] + cross(V[:3], at)
         acceleration = A[3:] + cross(A[:3], at) + cross(V[:3], velocity)
@@ -321,7 +323,7 @@ class Analysis:
                 f"state({index!r}): this position was not solved ({np.ravel(self.motions.status)[flat]})"
             )
         at = int(found[0])
-        here = self._system.at(self._here.x[:, at : at + 1])
+        here = self._here.part(np.array([at]))
         forces = self.forces
         loads = np.zeros((6, len(self.mechanism.links), 1)) if forces is None else self._loads[:, :, at : at + 1]
         if forces is not None:

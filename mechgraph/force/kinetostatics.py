@@ -25,7 +25,7 @@ from mechgraph.motion.follow import SparseSolver
 from mechgraph.motion.idle import Idle, held_well, spin_angles
 from mechgraph.motion.path import SINGULAR, Follower, Positions, Status
 from mechgraph.motion.rates import DEAD_POINT, Rates, closure_solver, distance_to_dead_point, rates
-from mechgraph.motion.system import Configuration, Index
+from mechgraph.motion.system import Configuration, Index, System
 from mechgraph.numerics.linear import Choice, ChosenSystem, independent_rows, rank_of, singular_values
 from mechgraph.result.solution import Solution
 from mechgraph.structure.freedom import free_motion
@@ -109,7 +109,7 @@ def _batch(m: Mechanism, motions: Mapping[str, Motion]) -> tuple[int, ...]:
         ) from None
 
 
-class _Run:
+class Run:
     """One call of ``solve``: drivers, positions and rates."""
 
     def __init__(self, m: Mechanism, motions: Mapping[str, Any] | None) -> None:
@@ -131,6 +131,11 @@ class _Run:
             chosen = independent_rows(self.freedoms.null, order, rank)
             self.lead = np.array([order.index(c) for c in sorted(chosen, key=order.index)], dtype=np.intp)
         self._check_determinate()
+
+    @property
+    def loads(self) -> tuple[Load, ...]:
+        """The loads that act."""
+        return self.m.loads
 
     @property
     def mobility(self) -> int:
@@ -172,6 +177,14 @@ class _Run:
         path = self.values("position")[self.lead].reshape(len(self.lead), cases, self_length(self.batch))
         return Follower(self.system, self.leading, self.freedoms.hold).follow(self.x, path)
 
+    def evaluated(self, x: Array, at: Index) -> Configuration:
+        """States ``x (nx, T)`` evaluated, which stand at the places ``at`` of the flat batch."""
+        return self.system.at(x)
+
+    def case(self, c: int) -> tuple[System, Array]:
+        """System and start ``(nx,)`` of one case of the batch."""
+        return self.system, self.x
+
     def move(self) -> tuple[Motions, ChosenSystem, Positions]:
         """Positions and rates."""
         found = self.positions()
@@ -181,7 +194,7 @@ class _Run:
         status = np.array([s.value for s in found.status.reshape(-1)], dtype="U24").reshape(self.batch)
         good = np.flatnonzero(status.reshape(-1) == Status.OK.value)
         here = found.here if found.here is not None and good.size == found.here.T else None
-        here = here or self.system.at(found.x.reshape(self.system.n_state, status.size)[:, good])
+        here = here or self.evaluated(found.x.reshape(self.system.n_state, status.size)[:, good], good)
         which, choices = found.which.reshape(-1)[good], found.choices
         solver = closure_solver(here, choices, which)
         open_ = here.closure > CLOSED
@@ -191,7 +204,7 @@ class _Run:
         if dead.any():
             status.reshape(-1)[good[dead & ~open_]] = Status.DEAD_POINT.value
             good, which = good[~dead], which[~dead]
-            here = self.system.at(here.x[:, ~dead])
+            here = here.part(np.flatnonzero(~dead))
             solver = closure_solver(here, choices, which)
         if bodies:
             choices, which, solver = held_well(here, choices, which, self.leading)
@@ -224,7 +237,7 @@ class _Run:
         dead = solver.condition > SINGULAR
         doubtful = np.flatnonzero((solver.condition > DOUBTFUL) & ~dead)
         if doubtful.size:
-            few = self.system.at(here.x[:, doubtful])
+            few = here.part(doubtful)
             near = distance_to_dead_point(few, closure_solver(few, choices, which[doubtful]), self.leading)
             dead[doubtful] = np.logical_not(near > DEAD_POINT)
         return dead
@@ -235,23 +248,24 @@ class _Run:
         for c in range(x.shape[1]):
             at = np.flatnonzero(found.status[c] == Status.OK)
             if at.size:
-                path = np.concatenate([self.x[:, None], x[:, c, at]], axis=1)
+                system, start = self.case(c)
+                path = np.concatenate([start[:, None], x[:, c, at]], axis=1)
                 which = found.which[c, np.concatenate([at[:1], at])]
-                x[:, c, at] = self._turned_back(path, found.choices, which, bodies)[:, 1:]
+                x[:, c, at] = self._turned_back(system, path, found.choices, which, bodies)[:, 1:]
         return dataclasses.replace(found, x=x, here=None)
 
-    def _turned_back(self, x: Array, choices: list[Choice], which: Index, bodies: tuple[Idle, ...]) -> Array:
-        follower = Follower(self.system, self.leading)
+    def _turned_back(
+        self, system: System, x: Array, choices: list[Choice], which: Index, bodies: tuple[Idle, ...]
+    ) -> Array:
+        follower = Follower(system, self.leading)
         for _ in range(TURNS_BACK):
-            here = self.system.at(x)
+            here = system.at(x)
             follower.choices, which, solver = held_well(here, choices, which, self.leading)
             choices = follower.choices
             angles, unit = spin_angles(here, bodies, solver.null_of_columns())
             if np.abs(angles).max(initial=0.0) < 1e-9:
                 break
-            turned = self.system.advance(
-                x, -np.einsum("fpt,pt->ft", unit, np.clip(angles, -LONGEST_TURN, LONGEST_TURN))
-            )
+            turned = system.advance(x, -np.einsum("fpt,pt->ft", unit, np.clip(angles, -LONGEST_TURN, LONGEST_TURN)))
             closed, shift = follower.closed_again(turned, which)
             if not (shift < LONGEST_TURN).all():
                 break
@@ -259,7 +273,7 @@ class _Run:
         return x
 
 
-def _raise_unreached(run: _Run, motions: Motions, last: Array, solution: Solution) -> None:
+def _raise_unreached(run: Run, motions: Motions, last: Array, solution: Solution) -> None:
     """Named errors for positions that were not solved, with the solution so far."""
     flat = motions.status.reshape(-1)
     bad = np.flatnonzero(flat != Status.OK.value)
@@ -293,7 +307,7 @@ def self_length(batch: tuple[int, ...]) -> int:
     return batch[-1] if batch else 1
 
 
-def _check_drivers(run: _Run, motions: Motions) -> None:
+def _check_drivers(run: Run, motions: Motions) -> None:
     worst = float(motions.rates.contradiction.max(initial=0.0))
     stuck = run.loops is None and run.freedoms.dependent and not motions.good.size
     if worst > CONTRADICTION or stuck:
@@ -346,7 +360,7 @@ def _solve(m: Mechanism, motions: Mapping[str, Any] | None, on_reach: str, force
     faults = _option("on_reach", on_reach, ON_REACH)
     if faults:
         raise DeclarationError(f"solve {m.name!r}", faults)
-    run = _Run(m, motions)
+    run = Run(m, motions)
     solver: ChosenSystem | SparseSolver
     if run.loops is not None:
         moved, solver, reached = move_sparse(run.system, run.x, run.columns, run.loops, run.given())
@@ -357,20 +371,21 @@ def _solve(m: Mechanism, motions: Mapping[str, Any] | None, on_reach: str, force
     _check_drivers(run, moved)
     solved = kind(moved, None)
     if forces is not None:
-        solved = kind(moved, _forces(run, moved, solver, solved.user_coordinates, *forces))
+        solved = kind(moved, forces_of(run, moved, solver, solved.user_coordinates, *forces))
     solution = Solution(solved)
     if on_reach == "raise":
         _raise_unreached(run, moved, reached, solution)
     return solution
 
 
-def _forces(
-    run: _Run, moved: Motions, solver: ChosenSystem | SparseSolver, coordinates: Array, method: str, redundant: str
+def forces_of(
+    run: Run, moved: Motions, solver: ChosenSystem | SparseSolver, coordinates: Array, method: str, redundant: str
 ) -> Forces:
+    """Loads, and the wrenches of all pairs that balance them, at the positions of a run."""
     inertia = inertia_wrenches(moved.here, moved.rates)
     flat = coordinates.reshape(run.system.n_freedoms, int(np.prod(run.batch)))[:, moved.good]
     site = Site(moved.here, moved.rates, flat, run.batch, moved.good, run.t)
-    site.collect(run.m.loads)
+    site.collect(run.loads)
     loads = inertia + site.scaled(site.external + site.internal)
     held = np.zeros_like(loads)
     holds: tuple[tuple[str, bool, Array], ...] = ()

@@ -80,7 +80,7 @@ def newton_euler(problem: Problem) -> Wrenches:
     for held in {tuple(part.tolist()) for part in problem.held}:
         at = np.flatnonzero([tuple(problem.held[i].tolist()) == held for i in problem.which])
         if at.size:
-            mine = here if at.size == here.T else here.system.at(here.x[:, at])
+            mine = here if at.size == here.T else here.part(at)
             found = _components_and_efforts(mine, problem.loads[:, :, at], problem.efforts[:, at], problem.driven, held)
             totals[:, :, at] = found.totals
             stress.append((at, found.stress))

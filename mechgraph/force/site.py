@@ -10,6 +10,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array, cross, rotate, rotate_back, to_matrix
 from mechgraph.errors import DeclarationError
 from mechgraph.model.load import Load, Value
+from mechgraph.model.values import PerCase
 from mechgraph.motion.rates import Rates
 from mechgraph.motion.system import Configuration
 
@@ -84,22 +85,31 @@ class Site:
         """Position and velocity of a material point given in the link's frame."""
         i = self._link[link]
         par = self.here.system.par
-        local = ((np.asarray(p, dtype=float) - par.offset[:, i]) / self.L)[:, None]
+        local = (np.asarray(p, dtype=float).reshape(3, -1) - par.offset[:, i, None]) / self.L
         X = self.here.poses[:, :, i]
         at = rotate(X[:, :3], local) + X[:, 3]
         V = self.rates.V[:, i]
         return self.L * at, self.L * (V[3:] + cross(V[:3], at))
 
     def center(self, link: str) -> Any:
-        """Mass centre in the link's frame, or None."""
-        return self.m.link(link).center
+        """Mass centre in the link's frame, ``(3, 1)`` or ``(3, T)``, or None."""
+        i, par = self._link[link], self.here.system.par
+        return None if self.m.link(link).center is None else self.L * par.center[:, i] + par.offset[:, i, None]
 
     def second_link(self, name: str) -> str:
         """Link b of the pair of a freedom."""
         return self.m.ends_of(name)[1]
 
+    def number(self, value: Any) -> Any:
+        """A number or vector as it is; where it varies from case to case, at every position ``(T,)`` or ``(3, T)``."""
+        if not isinstance(value, PerCase):
+            return value
+        return np.moveaxis(value.values[self.good // self.batch[-1]], 0, -1)
+
     def values(self, value: Value, link: str, width: int) -> Array:
         """A value at every position, ``(width, T)``."""
+        if isinstance(value, PerCase):
+            return np.asarray(self.number(value)).reshape(width, self.here.T)
         if callable(value):
             i = self._link[link]
             pose = self._spread(user_poses(self.here)[i])
@@ -142,11 +152,11 @@ class Site:
 
     # --- what loads do -----------------------------------------------------------------------------------------------
 
-    def add_weight(self, acceleration: Array) -> None:
+    def add_weight(self, acceleration: Any) -> None:
         """Force ``m g`` at the mass centre of every link."""
         par, X = self.here.system.par, self.here.poses
         at = self.L * (rotate(X[:, :3], par.center) + X[:, 3])
-        force = np.broadcast_to(par.mass * acceleration[:, None, None], at.shape)
+        force = np.broadcast_to(par.mass * np.asarray(acceleration, dtype=float).reshape(3, 1, -1), at.shape)
         self._target[:3] += cross(at, force)
         self._target[3:] += force
 

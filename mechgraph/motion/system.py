@@ -184,6 +184,12 @@ class Configuration:
         self.poses = system.tree.poses(relative, par.frame)
         self._local = local
 
+    def part(self, at: Index) -> Configuration:
+        """Some of the positions, evaluated by themselves."""
+        par = self.system.par
+        system = self.system if par.batch == 1 else self.system.with_parameters(par.taken(at))
+        return Configuration(system, self.x[:, at])
+
     @cached_property
     def frames(self) -> list[list[Array]]:
         """For every group the pair frames 0, 1, ... about the internal origin."""

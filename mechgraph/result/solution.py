@@ -80,7 +80,7 @@ class Values(Protocol):
         """Wrench that keeps a passive body at rest, about the global origin, ``(..., 6)``."""
 
     def link_point(self, link: int, p: Any) -> MaterialPoint:
-        """A material point given in the link's frame."""
+        """A material point given in the link's frame; the mass centre where it is None."""
 
     def shaking(self) -> Array:
         """Wrench on the frame about the global origin, ``(..., 6)``."""
@@ -234,7 +234,7 @@ class LinkResult:
         link = self._values.mechanism.links[self._index]
         if link.center is None:
             raise DeclarationError(f"link {link.name!r}", ["has no mass centre; declare center=, or use point(p)"])
-        return self.point(link.center)
+        return self._values.link_point(self._index, None)
 
     @property
     def center(self) -> Array:
