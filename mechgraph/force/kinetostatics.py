@@ -133,13 +133,6 @@ class _Run:
             self.lead = np.array([order.index(c) for c in sorted(chosen, key=order.index)], dtype=np.intp)
         self._check_determinate()
 
-    @property
-    def mobility(self) -> int:
-        """Freedoms minus rank at the first closed position."""
-        if self.loops is None:
-            return self.freedoms.mobility
-        return free_motion(self.system, self.x, self.columns).mobility
-
     def _check_determinate(self) -> None:
         free = self.freedoms.undriven
         if free:
@@ -298,10 +291,10 @@ def _check_drivers(run: _Run, motions: Motions) -> None:
     worst = float(motions.rates.contradiction.max(initial=0.0))
     stuck = run.loops is None and run.freedoms.dependent and not motions.good.size
     if worst > CONTRADICTION or stuck:
-        names = ", ".join(run.motions)
+        names, mobility = ", ".join(run.motions), free_motion(run.system, run.x, run.columns).mobility
         raise IndeterminateError(
             f"mechanism {run.m.name!r}: the drivers {names} contradict each other: their motions cannot be had together "
-            f"(mobility {run.mobility}, {len(run.motions)} drivers). Take a driver away, or give motions that agree",
+            f"(mobility {mobility}, {len(run.motions)} drivers). Take a driver away, or give motions that agree",
             check(run.m),
         )
 
@@ -326,7 +319,7 @@ def solve(
     ----------
     motions : driver -> ``Motion``, or positions at zero rates; shapes broadcast, the last axis is followed as a path from
         ``start``, other axes are independent cases. Left out where the drives carry their motion.
-    method : ``"loop_wrench"`` (one unknown wrench a loop) or ``"newton_euler"`` (the printed equations).
+    method : ``"loop_wrench"`` (one unknown wrench a loop) or ``"newton_euler"`` (the printed equations; for up to some hundred links).
     loads : replace the declared ones.
     redundant : ``"nan"`` for components that are not unique, or ``"minimum_norm"`` (least ``sum |F|^2 + |M / L|^2``).
     on_reach : ``"raise"`` or ``"flag"`` (NaN rows, see ``Solution.status``).

@@ -213,9 +213,10 @@ class LoopSystem:
         self.shared_in = owner[self._left_rows]
 
     def _border(self, beside: bool) -> tuple[Pattern, Array]:
-        """The pattern of the square system and its constant values: a random column for every row left over, a random row for every column left over.
+        """The pattern of the square system and its constant values.
 
-        The column stands in the rows of the same loop, or where it is ``beside`` them also in those of its neighbours.
+        A random column for every row left over, in the rows of its loop, or where it is ``beside`` them also in those of the
+        neighbours; a random row for every column left over.
         """
         rows, cols, data = self._inner
         rng = np.random.default_rng(SEED)
