@@ -196,6 +196,12 @@ def test_what_the_sparse_path_leaves_to_the_dense_one() -> None:
         mg.solve(free, {"N0_0v0_0": 0.0})
 
 
+def test_what_neither_path_can_hold_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(large, "DENSE_ROWS", 5)
+    with pytest.raises(mg.MechgraphError, match="passive freedoms"):
+        mg.solve(mg.load("rssr"), {"A": 0.1})
+
+
 @pytest.mark.parametrize("name", FEW)
 def test_a_bordered_system_proves_the_rank(name: str) -> None:
     system, x = assembled(FEW[name]())

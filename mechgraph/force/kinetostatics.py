@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeadPointError, DeclarationError, IndeterminateError, ReachError
 from mechgraph.force.analysis import Analysis, Forces, Motions
-from mechgraph.force.large import Given, SparseAnalysis, certified_loops, move_sparse
+from mechgraph.force.large import Given, SparseAnalysis, certified_loops, move_sparse, refuse_dense
 from mechgraph.force.methods import METHODS, Problem, chosen_for_all
 from mechgraph.force.site import Site, inertia_wrenches
 from mechgraph.model.drive import Drive
@@ -132,6 +132,7 @@ class _Run:
             chosen = independent_rows(self.freedoms.null, order, rank)
             self.lead = np.array([order.index(c) for c in sorted(chosen, key=order.index)], dtype=np.intp)
         self._check_determinate()
+        refuse_dense(self.system)
 
     def _check_determinate(self) -> None:
         free = self.freedoms.undriven
