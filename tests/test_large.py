@@ -100,7 +100,7 @@ def test_sparse_and_dense_agree(name: str, seed: int, many: bool, least: bool) -
 @pytest.mark.parametrize("name", LATTICES)
 def test_three_hundred_links(name: str) -> None:
     """Above the crossover by themselves, against the dense path."""
-    m = LATTICES[name](300 if name in ("ladder", "scissors") else 80)
+    m = LATTICES[name](300 if name in ("ladder", "scissors") else 130)
     motion = mg.Motion(0.02, velocity=1.0)
     sparse = mg.solve(m, {"J0": motion})
     assert is_sparse(sparse)
@@ -153,14 +153,14 @@ def test_verdicts_are_those_of_the_dense_check(name: str) -> None:
 
 
 def test_independent_cases_and_flagged_positions() -> None:
-    m = ladder(60)
+    m = ladder(120)
     motion = mg.Motion(np.array([[0.0, 0.1, 0.2], [0.0, -0.1, -0.2]]), velocity=1.0)
     assert_same(solved(m, motion, ALWAYS), solved(m, motion, NEVER))
 
 
 def crank_rocker_ladder() -> mg.Mechanism:
     """A ladder whose first crank cannot turn fully."""
-    return known.windows(20).replace(drives=["A0"])
+    return known.windows(60).replace(drives=["A0"])
 
 
 def test_the_end_of_the_reach_is_found() -> None:
@@ -178,7 +178,7 @@ def test_the_end_of_the_reach_is_found() -> None:
 
 def test_parallelograms_stop_at_their_change_point() -> None:
     """Folded flat, a parallelogram can go on as an antiparallelogram: a dead point, not a silent choice."""
-    m = ladder(60, equal=True)
+    m = ladder(120, equal=True)
     turns = np.linspace(0.0, 3.0, 61)
     flat = np.pi - np.arctan2(1.0, 0.5)
     s = mg.solve(m, {"J0": turns}, on_reach="flag")
@@ -194,6 +194,12 @@ def test_what_the_sparse_path_leaves_to_the_dense_one() -> None:
     free = known.grid(5).replace(drives=["N0_0v0_0"])
     with pytest.raises(mg.IndeterminateError):
         mg.solve(free, {"N0_0v0_0": 0.0})
+
+
+def test_what_neither_path_can_hold_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(large, "DENSE_ROWS", 5)
+    with pytest.raises(mg.MechgraphError, match="passive freedoms"):
+        mg.solve(mg.load("rssr"), {"A": 0.1})
 
 
 @pytest.mark.parametrize("name", FEW)

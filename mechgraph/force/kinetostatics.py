@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeadPointError, DeclarationError, IndeterminateError, ReachError
 from mechgraph.force.analysis import Analysis, Forces, Motions
-from mechgraph.force.large import Given, SparseAnalysis, certified_loops, move_sparse
+from mechgraph.force.large import Given, SparseAnalysis, certified_loops, move_sparse, refuse_dense
 from mechgraph.force.methods import METHODS, Problem, chosen_for_all
 from mechgraph.force.site import Site, inertia_wrenches
 from mechgraph.model.drive import Drive
@@ -131,18 +131,12 @@ class Run:
             chosen = independent_rows(self.freedoms.null, order, rank)
             self.lead = np.array([order.index(c) for c in sorted(chosen, key=order.index)], dtype=np.intp)
         self._check_determinate()
+        refuse_dense(self.system)
 
     @property
     def loads(self) -> tuple[Load, ...]:
         """The loads that act."""
         return self.m.loads
-
-    @property
-    def mobility(self) -> int:
-        """Freedoms minus rank at the first closed position."""
-        if self.loops is None:
-            return self.freedoms.mobility
-        return free_motion(self.system, self.x, self.columns).mobility
 
     def _check_determinate(self) -> None:
         free = self.freedoms.undriven
@@ -311,10 +305,10 @@ def _check_drivers(run: Run, motions: Motions) -> None:
     worst = float(motions.rates.contradiction.max(initial=0.0))
     stuck = run.loops is None and run.freedoms.dependent and not motions.good.size
     if worst > CONTRADICTION or stuck:
-        names = ", ".join(run.motions)
+        names, mobility = ", ".join(run.motions), free_motion(run.system, run.x, run.columns).mobility
         raise IndeterminateError(
             f"mechanism {run.m.name!r}: the drivers {names} contradict each other: their motions cannot be had together "
-            f"(mobility {run.mobility}, {len(run.motions)} drivers). Take a driver away, or give motions that agree",
+            f"(mobility {mobility}, {len(run.motions)} drivers). Take a driver away, or give motions that agree",
             check(run.m),
         )
 
@@ -339,7 +333,7 @@ def solve(
     ----------
     motions : driver -> ``Motion``, or positions at zero rates; shapes broadcast, the last axis is followed as a path from
         ``start``, other axes are independent cases. Left out where the drives carry their motion.
-    method : ``"loop_wrench"`` (one unknown wrench a loop) or ``"newton_euler"`` (the printed equations).
+    method : ``"loop_wrench"`` (one unknown wrench a loop) or ``"newton_euler"`` (the printed equations; for up to some hundred links).
     loads : replace the declared ones.
     redundant : ``"nan"`` for components that are not unique, or ``"minimum_norm"`` (least ``sum |F|^2 + |M / L|^2``).
     on_reach : ``"raise"`` or ``"flag"`` (NaN rows, see ``Solution.status``).

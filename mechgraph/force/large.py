@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.errors import MechgraphError
 from mechgraph.force.analysis import Analysis, Motions
 from mechgraph.force.least import least_change
 from mechgraph.motion.assembly import CLOSED
@@ -24,8 +25,14 @@ from mechgraph.motion.rates import DEAD_POINT, Rates
 from mechgraph.motion.system import Configuration, Index, System
 from mechgraph.structure.reaction import PairFrames, Stress, pair_power, reaction_part, split_stress
 
-SPARSE_ROWS = 96
-"""Rows of the closure Jacobian (six a loop) from which on a mechanism is solved sparsely."""
+SPARSE_ROWS = 300
+"""Rows of the closure Jacobian (six a loop) from which on a mechanism is solved sparsely.
+
+Measured by ``tests/benchmarks/bench_large.py --crossover`` on ladders of four-bars: with 100 positions both take the same time at about
+300 rows, with one position at 30.
+"""
+DENSE_ROWS = 12_000
+"""Rows of the closure Jacobian above which dense matrices are refused (one would take gigabytes)."""
 DOUBTFUL = 1e3
 """Largest rate per unit rate of a driver from which on the distance to a dead point is looked at."""
 
@@ -52,6 +59,22 @@ def certified_loops(system: System, x: Array, columns: Index) -> LoopSystem | No
     if not loops.regular or loops.held:
         return None
     return loops
+
+
+def refuse_dense(system: System) -> None:
+    """Say honestly that a mechanism is too large for dense matrices where the sparse path could not prove it determinate.
+
+    Raises
+    ------
+    MechgraphError
+    """
+    rows = 6 * len(system.graph.loops)
+    if rows > DENSE_ROWS:
+        raise MechgraphError(
+            f"mechanism {system.m.name!r}: {rows} closure equations that leave passive freedoms, are singular at the first position, or "
+            f"have drivers that depend on each other; such mechanisms are solved with dense matrices, up to {DENSE_ROWS} equations. "
+            "mg.check tells which it is; hold passive freedoms by other pairs, or start elsewhere"
+        )
 
 
 def move_sparse(

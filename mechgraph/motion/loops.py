@@ -34,6 +34,8 @@ PIVOT = 1e-8
 """Pivot (against unit rows and columns) below which a bordered system counts as singular."""
 WORSE = 1e-2
 """Part of the smallest pivot at the position of choice below which a bordering is chosen anew."""
+RETRY = 1e-3
+"""Smallest pivot below which another bordering is tried."""
 LOCAL_RANK = 1e-9
 """Singular value of a loop's own rows (columns of unit length) below which a row of that loop is redundant."""
 SEED = 17
@@ -107,8 +109,15 @@ class LoopSystem:
         np.maximum.at(largest, self.entries.column, np.abs(blocks).max(axis=0, initial=0.0))
         self._scale = np.where(largest > 0, 1.0 / np.where(largest > 0, largest, 1.0), 1.0)
         self._reduce(blocks * self._scale[self.entries.column])
-        self._border()
+        self._match()
+        self.pattern, self._constant = self._border(beside=False)
         self.first = self.factor(S)
+        if self.shared and not self.first.smallest_pivot > RETRY:
+            own = self.first, self.pattern, self._constant
+            self.pattern, self._constant = self._border(beside=True)
+            self.first = self.factor(S)
+            if own[0].smallest_pivot > self.first.smallest_pivot:
+                self.first, self.pattern, self._constant = own
         self.smallest = self.first.smallest_pivot
         self.regular = self.smallest > PIVOT
         self.pivot_limit = max(PIVOT, WORSE * self.smallest)
@@ -173,50 +182,60 @@ class LoopSystem:
             out.append((null, columns[some[mine[with_it]]]))
         return out
 
-    def _border(self) -> None:
-        """Match rows to columns; random rows and columns for what stays over; the pattern of the square system."""
+    def _match(self) -> None:
+        """Match kept rows and the rows of single-loop motions to the free columns; what stays over."""
         e = self.entries
         starts = np.concatenate([[0], np.cumsum(self.kept)])
-        self._m = int(starts[-1])
-        self._row = (starts[e.loop][None] + np.arange(6)[:, None])[self._live]
+        self._m, self._n = int(starts[-1]), int(self._free.sum())
         place = np.cumsum(self._free) - 1
-        n = int(self._free.sum())
-        rows, cols, data = [self._row], [np.broadcast_to(place[e.column], (6, len(e.loop)))[self._live]], []
-        self._motions, at = 0, self._m
+        rows = [(starts[e.loop][None] + np.arange(6)[:, None])[self._live]]
+        cols, data = [np.broadcast_to(place[e.column], (6, len(e.loop)))[self._live]], []
+        self._motions = 0
         for null, columns in self._own_rows:
             keep = np.abs(null) > 0
-            number = at + np.repeat(np.arange(len(null))[:, None], null.shape[1], axis=1)
+            number = self._m + self._motions + np.repeat(np.arange(len(null))[:, None], null.shape[1], axis=1)
             rows.append(number[keep])
             cols.append(place[columns[keep]])
             data.append(null[keep])
-            at += len(null)
             self._motions += len(null)
-        height = at
-        pattern = scipy.sparse.csr_array(
-            (np.ones(sum(map(len, rows))), (np.concatenate(rows), np.concatenate(cols))), shape=(height, n)
-        )
-        match = scipy.sparse.csgraph.maximum_bipartite_matching(pattern, perm_type="column")
+        self._inner = (np.concatenate(rows), np.concatenate(cols), np.concatenate([*data, np.zeros(0)]))
+        shape = (self._m + self._motions, self._n)
+        self._touch = scipy.sparse.csr_array((np.ones(len(self._inner[0])), self._inner[:2]), shape=shape)
+        match = scipy.sparse.csgraph.maximum_bipartite_matching(self._touch, perm_type="column")
+        self._left_rows = np.flatnonzero(match < 0)
+        self._left_cols = np.setdiff1d(np.arange(self._n), match[match >= 0])
         self._matched = int((match >= 0).sum())
-        left_rows = np.flatnonzero(match < 0)
-        taken = np.zeros(n, dtype=bool)
-        taken[match[match >= 0]] = True
-        left_cols = np.flatnonzero(~taken)
-        rng = np.random.default_rng(SEED)
-        for left, are_rows in ((left_rows, True), (left_cols, False)):
-            number, support = _beside(pattern, left, are_rows)
-            rows.append(support if are_rows else height + number)
-            cols.append(n + number if are_rows else support)
-            data.append(rng.normal(size=len(support)) / np.sqrt(np.maximum(np.bincount(number)[number], 1)))
-        self.held = self._motions + len(left_cols)
-        self.redundant = 6 * (len(e.first) - 1) - (self._matched - self._motions)
-        self.shared = len(left_rows)
+        self.shared, self.held = len(self._left_rows), self._motions + len(self._left_cols)
+        self.redundant = 6 * len(self.kept) - (self._matched - self._motions)
         owner = np.concatenate(
-            [np.repeat(np.arange(len(self.kept)), self.kept), np.zeros(height - self._m, dtype=np.intp)]
+            [np.repeat(np.arange(len(self.kept)), self.kept), np.zeros(self._motions, dtype=np.intp)]
         )
-        self.shared_in = owner[left_rows]
-        self._n, self._size = n, n + len(left_rows)
-        self._constant = np.concatenate([*data, np.zeros(0)])
-        self.pattern = Pattern(np.concatenate(rows), np.concatenate(cols), self._size)
+        self.shared_in = owner[self._left_rows]
+
+    def _border(self, beside: bool) -> tuple[Pattern, Array]:
+        """The pattern of the square system and its constant values.
+
+        A random column for every row left over, in the rows of its loop, or where it is ``beside`` them also in those of the
+        neighbours; a random row for every column left over.
+        """
+        rows, cols, data = self._inner
+        rng = np.random.default_rng(SEED)
+        if beside:
+            number, support = _shares(self._touch, self._touch.T.tocsr(), self._left_rows)
+        else:
+            count = self.kept[self.shared_in]
+            number = np.repeat(np.arange(self.shared), count)
+            first = np.cumsum(self.kept)[self.shared_in] - count
+            support = first[number] + np.arange(len(number)) - (np.cumsum(count) - count)[number]
+        held, columns = _shares(self._touch.T.tocsr(), self._touch, self._left_cols.astype(np.intp))
+        self._size = self._n + self.shared
+        constant = np.concatenate([data, _random_units(rng, number), _random_units(rng, held)])
+        pattern = Pattern(
+            np.concatenate([rows, support, self._m + self._motions + held]),
+            np.concatenate([cols, self._n + number, columns]),
+            self._size,
+        )
+        return pattern, constant
 
     @cached_property
     def _live(self) -> Mask:
@@ -337,9 +356,12 @@ class LoopSystem:
         return q
 
 
-def _beside(pattern: scipy.sparse.csr_array, left: Index, are_rows: bool) -> tuple[Index, Index]:
-    """Rows that share a column with each row left over (or columns that share a row with each column): its number, and which."""
-    if not left.size:
-        return np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
-    near = (pattern[left] @ pattern.T if are_rows else pattern.T.tocsr()[left] @ pattern).tocsr()
+def _shares(touch: scipy.sparse.csr_array, back: scipy.sparse.csr_array, left: Index) -> tuple[Index, Index]:
+    """Rows that share a column with each of the rows ``left``: its number, and the row."""
+    near = (touch[left] @ back).tocsr() if left.size else touch[left]
     return np.repeat(np.arange(left.size), np.diff(near.indptr)), near.indices.astype(np.intp)
+
+
+def _random_units(rng: np.random.Generator, number: Index) -> Array:
+    """Random values of size one together for every number."""
+    return rng.normal(size=len(number)) / np.sqrt(np.maximum(np.bincount(number)[number], 1))
