@@ -300,6 +300,13 @@ def physical_faults(inertia: ArrayLike, tol: float = 1e-9) -> list[str]:
     return []
 
 
+def physical(inertia: Array, tol: float = 1e-9) -> NDArray[np.bool_]:
+    """Which symmetric tensors ``(3, 3, ...)`` a body can have: ``a >= 0`` and ``a + b >= c`` for principal moments a <= b <= c."""
+    moments = np.linalg.eigvalsh(np.moveaxis(inertia, (0, 1), (-2, -1)))
+    slack = tol * np.abs(inertia).max(axis=(0, 1))
+    return np.asarray((moments[..., 0] >= -slack) & (moments[..., 0] + moments[..., 1] >= moments[..., 2] - slack))
+
+
 def _symmetric(tensor: Array) -> Array:
     """Return the symmetric part of a tensor, (I + I^T) / 2."""
     return (tensor + np.swapaxes(tensor, -1, -2)) / 2.0

@@ -31,9 +31,7 @@ def _direction(column: Callable[[int], Array], v: Sequence[float]) -> Array | No
     return sum(parts[1:], start=parts[0]) if parts else None
 
 
-def moved_screw(
-    column: Callable[[int], Array], free: Sequence[float], line: Sequence[float]
-) -> tuple[Array, Array]:
+def moved_screw(column: Callable[[int], Array], free: Sequence[float], line: Sequence[float]) -> tuple[Array, Array]:
     """Directions and moments of a constant screw moved by a pose that is given by its columns.
 
     A screw has a bound part ``line`` (a rotation or a force) and a free part (a translation or a couple). Returns

@@ -50,7 +50,8 @@ class Motions:
 class Forces:
     """Inertia ``(6, N, T)`` and what loads do (``site``), the wrenches found, and whether redundant reactions are NaN.
 
-    ``hold (6, N, T)`` keeps passive bodies at rest, ``holds`` are its sizes by name and whether they are couples.
+    ``hold (6, N, T)`` keeps passive bodies at rest, ``holds`` are its sizes by name and whether they are couples; ``solver`` the closure
+    equations.
     """
 
     inertia: Array
@@ -59,6 +60,7 @@ class Forces:
     mask_redundant: bool
     hold: Array
     holds: tuple[tuple[str, bool, Array], ...]
+    solver: Any = None
 
 
 class Analysis:
@@ -152,7 +154,9 @@ class Analysis:
         """Position, velocity and acceleration of a material point."""
         par = self._system.par
         X, V, A = self._here.poses[:, :, link], self.motions.rates.V[:, link], self.motions.rates.A[:, link]
-        local = ((np.asarray(p, dtype=float) - par.offset[:, link]) / par.L)[:, None]
+        local = (
+            par.center[:, link] if p is None else ((np.asarray(p, dtype=float) - par.offset[:, link]) / par.L)[:, None]
+        )
         at = rotate(X[:, :3], local) + X[:, 3]
         velocity = V[3:] + cross(V[:3], at)
         acceleration = A[3:] + cross(A[:3], at) + cross(V[:3], velocity)
@@ -319,7 +323,7 @@ class Analysis:
                 f"state({index!r}): this position was not solved ({np.ravel(self.motions.status)[flat]})"
             )
         at = int(found[0])
-        here = self._system.at(self._here.x[:, at : at + 1])
+        here = self._here.part(np.array([at]))
         forces = self.forces
         loads = np.zeros((6, len(self.mechanism.links), 1)) if forces is None else self._loads[:, :, at : at + 1]
         if forces is not None:

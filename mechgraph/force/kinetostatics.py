@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeadPointError, DeclarationError, IndeterminateError, ReachError
 from mechgraph.force.analysis import Analysis, Forces, Motions
+from mechgraph.force.large import Given, SparseAnalysis, certified_loops, move_sparse, refuse_dense
 from mechgraph.force.methods import METHODS, Problem, chosen_for_all
 from mechgraph.force.site import Site, inertia_wrenches
 from mechgraph.model.drive import Drive
@@ -20,10 +21,11 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion_law import Motion
 from mechgraph.motion import idle
 from mechgraph.motion.assembly import CLOSED, assembled, assembled_at, named_columns, state_rows
+from mechgraph.motion.follow import SparseSolver
 from mechgraph.motion.idle import Idle, held_well, spin_angles
 from mechgraph.motion.path import SINGULAR, Follower, Positions, Status
-from mechgraph.motion.rates import Rates, closure_solver, distance_to_dead_point, rates
-from mechgraph.motion.system import Configuration, Index
+from mechgraph.motion.rates import DEAD_POINT, Rates, closure_solver, distance_to_dead_point, rates
+from mechgraph.motion.system import Configuration, Index, System
 from mechgraph.numerics.linear import Choice, ChosenSystem, independent_rows, rank_of, singular_values
 from mechgraph.result.solution import Solution
 from mechgraph.structure.freedom import free_motion
@@ -38,8 +40,6 @@ LONGEST_TURN = 0.25
 """Longest such step (radians)."""
 DOUBTFUL = 1e4
 """Condition number of the closure equations from which on the distance to a dead point is looked at."""
-DEAD_POINT = 1e-10
-"""Distance to a dead point, in driver coordinates (radians, or lengths / L), below which a position counts as one."""
 
 ON_REACH = ("raise", "flag")
 REDUNDANT = ("nan", "minimum_norm")
@@ -109,7 +109,7 @@ def _batch(m: Mechanism, motions: Mapping[str, Motion]) -> tuple[int, ...]:
         ) from None
 
 
-class _Run:
+class Run:
     """One call of ``solve``: drivers, positions and rates."""
 
     def __init__(self, m: Mechanism, motions: Mapping[str, Any] | None) -> None:
@@ -120,6 +120,9 @@ class _Run:
         self.columns, _ = named_columns(self.m, self.system, dict.fromkeys(self.motions, 0.0))
         self.unit = np.where(self.system.is_length[self.columns], self.system.par.L, 1.0)
         self.t = next((motion.t for motion in self.motions.values() if motion.t is not None), None)
+        self.loops = certified_loops(self.system, self.x, self.columns)
+        if self.loops is not None:
+            return
         self.freedoms = free_motion(self.system, self.x, self.columns)
         self.lead = np.arange(len(self.columns))
         if self.freedoms.dependent:
@@ -128,6 +131,12 @@ class _Run:
             chosen = independent_rows(self.freedoms.null, order, rank)
             self.lead = np.array([order.index(c) for c in sorted(chosen, key=order.index)], dtype=np.intp)
         self._check_determinate()
+        refuse_dense(self.system)
+
+    @property
+    def loads(self) -> tuple[Load, ...]:
+        """The loads that act."""
+        return self.m.loads
 
     def _check_determinate(self) -> None:
         free = self.freedoms.undriven
@@ -151,11 +160,24 @@ class _Run:
         rows = [np.broadcast_to(getattr(motion, kind), self.batch).reshape(T) for motion in self.motions.values()]
         return np.array(rows).reshape(len(rows), T) / self.unit[:, None]
 
+    def given(self) -> Given:
+        """What the motions of the drivers say."""
+        rows = (self.values(kind) for kind in ("position", "velocity", "acceleration"))
+        return Given(self.batch, self.t, *rows)
+
     def positions(self) -> Positions:
         """All positions, followed along the last batch axis."""
         cases = int(np.prod(self.batch[:-1]))
         path = self.values("position")[self.lead].reshape(len(self.lead), cases, self_length(self.batch))
         return Follower(self.system, self.leading, self.freedoms.hold).follow(self.x, path)
+
+    def evaluated(self, x: Array, at: Index) -> Configuration:
+        """States ``x (nx, T)`` evaluated, which stand at the places ``at`` of the flat batch."""
+        return self.system.at(x)
+
+    def case(self, c: int) -> tuple[System, Array]:
+        """System and start ``(nx,)`` of one case of the batch."""
+        return self.system, self.x
 
     def move(self) -> tuple[Motions, ChosenSystem, Positions]:
         """Positions and rates."""
@@ -166,7 +188,7 @@ class _Run:
         status = np.array([s.value for s in found.status.reshape(-1)], dtype="U24").reshape(self.batch)
         good = np.flatnonzero(status.reshape(-1) == Status.OK.value)
         here = found.here if found.here is not None and good.size == found.here.T else None
-        here = here or self.system.at(found.x.reshape(self.system.n_state, status.size)[:, good])
+        here = here or self.evaluated(found.x.reshape(self.system.n_state, status.size)[:, good], good)
         which, choices = found.which.reshape(-1)[good], found.choices
         solver = closure_solver(here, choices, which)
         open_ = here.closure > CLOSED
@@ -176,7 +198,7 @@ class _Run:
         if dead.any():
             status.reshape(-1)[good[dead & ~open_]] = Status.DEAD_POINT.value
             good, which = good[~dead], which[~dead]
-            here = self.system.at(here.x[:, ~dead])
+            here = here.part(np.flatnonzero(~dead))
             solver = closure_solver(here, choices, which)
         if bodies:
             choices, which, solver = held_well(here, choices, which, self.leading)
@@ -209,7 +231,7 @@ class _Run:
         dead = solver.condition > SINGULAR
         doubtful = np.flatnonzero((solver.condition > DOUBTFUL) & ~dead)
         if doubtful.size:
-            few = self.system.at(here.x[:, doubtful])
+            few = here.part(doubtful)
             near = distance_to_dead_point(few, closure_solver(few, choices, which[doubtful]), self.leading)
             dead[doubtful] = np.logical_not(near > DEAD_POINT)
         return dead
@@ -220,23 +242,24 @@ class _Run:
         for c in range(x.shape[1]):
             at = np.flatnonzero(found.status[c] == Status.OK)
             if at.size:
-                path = np.concatenate([self.x[:, None], x[:, c, at]], axis=1)
+                system, start = self.case(c)
+                path = np.concatenate([start[:, None], x[:, c, at]], axis=1)
                 which = found.which[c, np.concatenate([at[:1], at])]
-                x[:, c, at] = self._turned_back(path, found.choices, which, bodies)[:, 1:]
+                x[:, c, at] = self._turned_back(system, path, found.choices, which, bodies)[:, 1:]
         return dataclasses.replace(found, x=x, here=None)
 
-    def _turned_back(self, x: Array, choices: list[Choice], which: Index, bodies: tuple[Idle, ...]) -> Array:
-        follower = Follower(self.system, self.leading)
+    def _turned_back(
+        self, system: System, x: Array, choices: list[Choice], which: Index, bodies: tuple[Idle, ...]
+    ) -> Array:
+        follower = Follower(system, self.leading)
         for _ in range(TURNS_BACK):
-            here = self.system.at(x)
+            here = system.at(x)
             follower.choices, which, solver = held_well(here, choices, which, self.leading)
             choices = follower.choices
             angles, unit = spin_angles(here, bodies, solver.null_of_columns())
             if np.abs(angles).max(initial=0.0) < 1e-9:
                 break
-            turned = self.system.advance(
-                x, -np.einsum("fpt,pt->ft", unit, np.clip(angles, -LONGEST_TURN, LONGEST_TURN))
-            )
+            turned = system.advance(x, -np.einsum("fpt,pt->ft", unit, np.clip(angles, -LONGEST_TURN, LONGEST_TURN)))
             closed, shift = follower.closed_again(turned, which)
             if not (shift < LONGEST_TURN).all():
                 break
@@ -244,14 +267,14 @@ class _Run:
         return x
 
 
-def _raise_unreached(run: _Run, motions: Motions, found: Positions, solution: Solution) -> None:
+def _raise_unreached(run: Run, motions: Motions, last: Array, solution: Solution) -> None:
     """Named errors for positions that were not solved, with the solution so far."""
     flat = motions.status.reshape(-1)
     bad = np.flatnonzero(flat != Status.OK.value)
     if bad.size:
         first = int(bad[0])
         case = first // max(1, self_length(run.batch))
-        reached = {name: float(v * u) for name, v, u in zip(run.motions, found.reached[:, case], run.unit, strict=True)}
+        reached = {name: float(v * u) for name, v, u in zip(run.motions, last[:, case], run.unit, strict=True)}
         asked = {
             name: float(v) for name, v in zip(run.motions, run.values("position")[:, first] * run.unit, strict=True)
         }
@@ -278,14 +301,14 @@ def self_length(batch: tuple[int, ...]) -> int:
     return batch[-1] if batch else 1
 
 
-def _check_drivers(run: _Run, motions: Motions) -> None:
+def _check_drivers(run: Run, motions: Motions) -> None:
     worst = float(motions.rates.contradiction.max(initial=0.0))
-    stuck = run.freedoms.dependent and not motions.good.size
+    stuck = run.loops is None and run.freedoms.dependent and not motions.good.size
     if worst > CONTRADICTION or stuck:
-        names = ", ".join(run.motions)
+        names, mobility = ", ".join(run.motions), free_motion(run.system, run.x, run.columns).mobility
         raise IndeterminateError(
             f"mechanism {run.m.name!r}: the drivers {names} contradict each other: their motions cannot be had together "
-            f"(mobility {run.freedoms.mobility}, {len(run.motions)} drivers). Take a driver away, or give motions that agree",
+            f"(mobility {mobility}, {len(run.motions)} drivers). Take a driver away, or give motions that agree",
             check(run.m),
         )
 
@@ -310,7 +333,7 @@ def solve(
     ----------
     motions : driver -> ``Motion``, or positions at zero rates; shapes broadcast, the last axis is followed as a path from
         ``start``, other axes are independent cases. Left out where the drives carry their motion.
-    method : ``"loop_wrench"`` (one unknown wrench a loop) or ``"newton_euler"`` (the printed equations).
+    method : ``"loop_wrench"`` (one unknown wrench a loop) or ``"newton_euler"`` (the printed equations; for up to some hundred links).
     loads : replace the declared ones.
     redundant : ``"nan"`` for components that are not unique, or ``"minimum_norm"`` (least ``sum |F|^2 + |M / L|^2``).
     on_reach : ``"raise"`` or ``"flag"`` (NaN rows, see ``Solution.status``).
@@ -331,33 +354,42 @@ def _solve(m: Mechanism, motions: Mapping[str, Any] | None, on_reach: str, force
     faults = _option("on_reach", on_reach, ON_REACH)
     if faults:
         raise DeclarationError(f"solve {m.name!r}", faults)
-    run = _Run(m, motions)
-    moved, solver, found = run.move()
+    run = Run(m, motions)
+    solver: ChosenSystem | SparseSolver
+    if run.loops is not None:
+        moved, solver, reached = move_sparse(run.system, run.x, run.columns, run.loops, run.given())
+        kind: type[Analysis] = SparseAnalysis
+    else:
+        moved, solver, found = run.move()
+        reached, kind = found.reached, Analysis
     _check_drivers(run, moved)
-    solved = Analysis(moved, None)
+    solved = kind(moved, None)
     if forces is not None:
-        solved = Analysis(moved, _forces(run, moved, solver, solved.user_coordinates, *forces))
+        solved = kind(moved, forces_of(run, moved, solver, solved.user_coordinates, *forces))
     solution = Solution(solved)
     if on_reach == "raise":
-        _raise_unreached(run, moved, found, solution)
+        _raise_unreached(run, moved, reached, solution)
     return solution
 
 
-def _forces(run: _Run, moved: Motions, solver: ChosenSystem, coordinates: Array, method: str, redundant: str) -> Forces:
+def forces_of(
+    run: Run, moved: Motions, solver: ChosenSystem | SparseSolver, coordinates: Array, method: str, redundant: str
+) -> Forces:
+    """Loads, and the wrenches of all pairs that balance them, at the positions of a run."""
     inertia = inertia_wrenches(moved.here, moved.rates)
     flat = coordinates.reshape(run.system.n_freedoms, int(np.prod(run.batch)))[:, moved.good]
     site = Site(moved.here, moved.rates, flat, run.batch, moved.good, run.t)
-    site.collect(run.m.loads)
+    site.collect(run.loads)
     loads = inertia + site.scaled(site.external + site.internal)
     held = np.zeros_like(loads)
     holds: tuple[tuple[str, bool, Array], ...] = ()
-    bodies = run.freedoms.bodies
-    if bodies:
+    bodies = () if run.loops is not None else run.freedoms.bodies
+    if bodies and isinstance(solver, ChosenSystem):
         Z = solver.null_of_columns()
         held, sizes = idle.hold(moved.here, bodies, Z, loads, site.scaled_efforts())
         holds = tuple((*name, size) for name, size in zip(idle.hold_names(moved.here, bodies, Z), sizes, strict=True))
-    problem = Problem(moved.here, loads + held, site.scaled_efforts(), run.columns, moved.held, solver)
-    return Forces(inertia, site, METHODS[method](problem), redundant == "nan", held, holds)
+    problem = Problem(moved.here, loads + held, site.scaled_efforts(), run.columns, moved.held, moved.which, solver)
+    return Forces(inertia, site, METHODS[method](problem), redundant == "nan", held, holds, solver)
 
 
 def assemble(

@@ -14,6 +14,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.formulation.build import formulate
 from mechgraph.formulation.registry import Formulation
 from mechgraph.formulation.state import State
+from mechgraph.motion.follow import SparseSolver
 from mechgraph.motion.system import Configuration, Index
 from mechgraph.numerics.linear import Choice, ChosenSystem, add_at, choose
 
@@ -28,7 +29,7 @@ class Problem:
     """What a method solves: closed positions with loads (internal units).
 
     ``loads (6, N, T)`` inertia and applied wrenches, ``efforts (F, T)`` given efforts, ``driven`` and ``held`` the freedoms
-    with unknown effort, ``solver`` the chosen closure Jacobian.
+    with unknown effort (``held`` by choice, ``which (T,)`` the choice of a position), ``solver`` the closure equations.
     """
 
     here: Configuration
@@ -36,7 +37,8 @@ class Problem:
     efforts: Array
     driven: Index
     held: tuple[Index, ...]
-    solver: ChosenSystem
+    which: Index
+    solver: ChosenSystem | SparseSolver
 
 
 @dataclass(frozen=True)
@@ -56,23 +58,14 @@ def loop_wrench(problem: Problem) -> Wrenches:
     tree = tree_wrenches(here, problem.loads)
     owner = np.repeat(np.arange(len(here.system.m.pairs)), np.diff(here.system.first_column))
     rhs = problem.efforts - (here.S * tree[:, owner]).sum(axis=0)
-    x = problem.solver.solve_transposed(rhs[:, None])[:, 0]
-    null = problem.solver.null_of_transpose()
-    C = here.system.graph.loop_matrix
-    loops = C.shape[0]
-    totals = tree + np.einsum("lp,lit->ipt", C, x.reshape(loops, 6, here.T))
-    stress = np.einsum("lp,list->ipst", C, null.reshape(loops, 6, null.shape[1], here.T))
-    return Wrenches(totals, stress)
+    x = problem.solver.solve_transposed(rhs[:, None])
+    totals = tree + here.pair_wrenches(x)[:, :, 0]
+    return Wrenches(totals, here.pair_wrenches(problem.solver.null_of_transpose()))
 
 
 def tree_wrenches(here: Configuration, loads: Array) -> Array:
     """Pair wrenches that carry the loads along the spanning tree, chords free, ``(6, P, T)``."""
-    out = np.zeros((6, len(here.system.m.pairs), here.T))
-    carried = loads.copy()
-    for pairs, forward, parents, children in reversed(here.system.levels):
-        out[:, pairs] = np.where(forward[:, None], -1.0, 1.0) * carried[:, children]
-        add_at(carried, parents, carried[:, children])
-    return out
+    return here.system.tree.wrenches(loads, len(here.system.m.pairs))
 
 
 def newton_euler(problem: Problem) -> Wrenches:
@@ -85,9 +78,9 @@ def newton_euler(problem: Problem) -> Wrenches:
     totals = np.empty((6, len(here.system.m.pairs), here.T))
     stress: list[tuple[Index, Array]] = []
     for held in {tuple(part.tolist()) for part in problem.held}:
-        at = np.flatnonzero([tuple(problem.held[i].tolist()) == held for i in problem.solver.which])
+        at = np.flatnonzero([tuple(problem.held[i].tolist()) == held for i in problem.which])
         if at.size:
-            mine = here if at.size == here.T else here.system.at(here.x[:, at])
+            mine = here if at.size == here.T else here.part(at)
             found = _components_and_efforts(mine, problem.loads[:, :, at], problem.efforts[:, at], problem.driven, held)
             totals[:, :, at] = found.totals
             stress.append((at, found.stress))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array, cross, rotate, rotate_back, to_matrix
 from mechgraph.errors import DeclarationError
 from mechgraph.model.load import Load, Value
+from mechgraph.model.values import PerCase
 from mechgraph.motion.rates import Rates
 from mechgraph.motion.system import Configuration
 
@@ -43,7 +45,7 @@ class Site:
         self.batch, self.good, self.t = batch, good, t
         system = here.system
         self.m, self.L = system.m, system.par.L
-        self._link = {name: i for i, name in enumerate(self.m.link_names())}
+        self._link = self.m.link_index
         self.external = np.zeros((6, len(self.m.links), here.T))
         self.internal = np.zeros_like(self.external)
         self.efforts = np.zeros((system.n_freedoms, here.T))
@@ -52,20 +54,28 @@ class Site:
     def collect(self, loads: tuple[Load, ...]) -> None:
         """Let all loads act."""
         for load in loads:
-            self._target = self.internal if len(load.links(self.m)) == 2 else self.external
+            self._target = self.internal if load.between_links else self.external
             load.act(self)
-            parts = (self.external, self.internal, self.efforts)
-            if not all(np.isfinite(part).all() for part in parts):
-                raise DeclarationError(
-                    f"load {load.kind} {getattr(load, 'link', getattr(load, 'freedom', ''))}".strip(),
-                    ["gives a value that is not finite at some position; check its callable, or a spring of length 0"],
-                )
+        if not self._finite():
+            wrong = next((load for load in loads if not self._alone(load)), loads[-1])
+            raise DeclarationError(
+                f"load {wrong.kind} {getattr(wrong, 'link', getattr(wrong, 'freedom', ''))}".strip(),
+                ["gives a value that is not finite at some position; check its callable, or a spring of length 0"],
+            )
+
+    def _finite(self) -> bool:
+        return all(np.isfinite(part).all() for part in (self.external, self.internal, self.efforts))
+
+    def _alone(self, load: Load) -> bool:
+        """Whether a load by itself gives finite values."""
+        other = copy(self)
+        other.external, other.internal = np.zeros_like(self.external), np.zeros_like(self.internal)
+        other.efforts = np.zeros_like(self.efforts)
+        other._target = other.external
+        load.act(other)
+        return other._finite()
 
     # --- what loads ask ----------------------------------------------------------------------------------------------
-
-    def masses(self) -> list[tuple[str, float, Array]]:
-        """Name, mass and mass centre of every link that has mass."""
-        return [(k.name, k.mass, self.point(k.name, k.center)[0]) for k in self.m.links if k.mass > 0]
 
     def rotation(self, link: str) -> Array:
         """Rotation of a link ``(3, 3, T)``."""
@@ -75,22 +85,31 @@ class Site:
         """Position and velocity of a material point given in the link's frame."""
         i = self._link[link]
         par = self.here.system.par
-        local = ((np.asarray(p, dtype=float) - par.offset[:, i]) / self.L)[:, None]
+        local = (np.asarray(p, dtype=float).reshape(3, -1) - par.offset[:, i, None]) / self.L
         X = self.here.poses[:, :, i]
         at = rotate(X[:, :3], local) + X[:, 3]
         V = self.rates.V[:, i]
         return self.L * at, self.L * (V[3:] + cross(V[:3], at))
 
     def center(self, link: str) -> Any:
-        """Mass centre in the link's frame, or None."""
-        return self.m.link(link).center
+        """Mass centre in the link's frame, ``(3, 1)`` or ``(3, T)``, or None."""
+        i, par = self._link[link], self.here.system.par
+        return None if self.m.link(link).center is None else self.L * par.center[:, i] + par.offset[:, i, None]
 
     def second_link(self, name: str) -> str:
         """Link b of the pair of a freedom."""
         return self.m.ends_of(name)[1]
 
+    def number(self, value: Any) -> Any:
+        """A number or vector as it is; where it varies from case to case, at every position ``(T,)`` or ``(3, T)``."""
+        if not isinstance(value, PerCase):
+            return value
+        return np.moveaxis(value.values[self.good // self.batch[-1]], 0, -1)
+
     def values(self, value: Value, link: str, width: int) -> Array:
         """A value at every position, ``(width, T)``."""
+        if isinstance(value, PerCase):
+            return np.asarray(self.number(value)).reshape(width, self.here.T)
         if callable(value):
             i = self._link[link]
             pose = self._spread(user_poses(self.here)[i])
@@ -132,6 +151,14 @@ class Site:
         return int(self.here.system.first_column[k]) + j
 
     # --- what loads do -----------------------------------------------------------------------------------------------
+
+    def add_weight(self, acceleration: Any) -> None:
+        """Force ``m g`` at the mass centre of every link."""
+        par, X = self.here.system.par, self.here.poses
+        at = self.L * (rotate(X[:, :3], par.center) + X[:, 3])
+        force = np.broadcast_to(par.mass * np.asarray(acceleration, dtype=float).reshape(3, 1, -1), at.shape)
+        self._target[:3] += cross(at, force)
+        self._target[3:] += force
 
     def add_force(self, link: str, force: Array, at: Array) -> None:
         """Force on a link at a position."""

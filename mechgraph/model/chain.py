@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array, compose, identity, inverse
+from mechgraph.algebra.se3 import Array, identity, inverse
 from mechgraph.errors import DeclarationError
 from mechgraph.model.connection import Marker, Pair
 from mechgraph.model.link import Link
@@ -33,12 +33,6 @@ def chain_symbols(letters: str) -> tuple[list[str], list[str]]:
         symbols.append(symbol)
         at += len(symbol)
     return symbols, []
-
-
-def _link_step(offset: float, length: float, twist: float) -> Array:
-    """``Tz(offset) Tx(length) Rx(twist)``."""
-    c, s = np.cos(twist), np.sin(twist)
-    return np.array([[1.0, 0, 0, length], [0, c, -s, 0], [0, s, c, offset]])
 
 
 def _marker(X: Array) -> Marker:
@@ -95,16 +89,12 @@ def chain(
     if faults:
         raise DeclarationError(f"chain {title!r}", faults)
     placed = any(v is not None for v in (twist, length, offset))
-    steps = [
-        _link_step(o, a, t) for o, a, t in zip(numbers["offset"], numbers["length"], numbers["twist"], strict=True)
-    ]
+    poses = markers_of_chain(np.array([numbers["twist"], numbers["length"], numbers["offset"]])[:, :, None])
     pairs = []
     for k, symbol in enumerate(symbols):
         markers: dict[str, Any] = {}
         if placed:
-            on_a = identity() if k == 0 else steps[k - 1]
-            on_b = identity() if k < n - 1 else inverse(compose(identity(), steps[-1]))
-            markers = {"on_a": _marker(on_a), "on_b": _marker(on_b)}
+            markers = {side: _marker(X[:, :, k, 0]) for side, X in zip(("on_a", "on_b"), poses, strict=True)}
         pairs.append(Pair(f"O{k + 1}", symbol, names[k], names[(k + 1) % n], pitch=pitches.get(k), **markers))
     if drive is not None:
         more.setdefault("drives", [_first_freedom(pairs, drive)])
@@ -134,3 +124,34 @@ def _pitches(symbols: list[str], pitch: Any) -> tuple[dict[int, float], list[str
     if len(values) != len(takers):
         return {}, [f"pitch: {len(values)} given for {len(takers)} helical pairs"]
     return dict(zip(takers, map(float, values), strict=True)), []
+
+
+def markers_of_chain(numbers: Array) -> tuple[Array, Array]:
+    """Poses ``(3, 4, n, B)`` of the markers on links a and b of the pairs of a chain, from its numbers ``(3, n, B)``.
+
+    ``numbers`` are twist, length and offset. Marker A of the first pair and marker B of all but the last are the link frames.
+    """
+    twist, length, offset = numbers
+    steps = np.zeros((3, 4, *twist.shape))
+    steps[0, 0] = 1.0
+    steps[1, 1] = steps[2, 2] = np.cos(twist)
+    steps[2, 1], steps[1, 2] = np.sin(twist), -np.sin(twist)
+    steps[0, 3], steps[2, 3] = length, offset
+    plain_frames = identity(*twist.shape)
+    on_a = np.concatenate([plain_frames[:, :, :1], steps[:, :, :-1]], axis=2)
+    on_b = np.concatenate([plain_frames[:, :, :-1], inverse(steps[:, :, -1:])], axis=2)
+    return on_a, on_b
+
+
+def chain_numbers(m: Mechanism) -> Array | None:
+    """Twist, length and offset ``(3, n)`` of a mechanism that stands as ``chain`` places it; None of any other."""
+    if any(p.on_a is None or p.on_b is None for p in m.pairs):
+        return None
+    poses = [[pair.markers[side].pose() for pair in m.pairs] for side in (0, 1)]
+    steps = [*poses[0][1:], inverse(poses[1][-1][:, :, None])[:, :, 0]]
+    numbers = np.array([[np.arctan2(X[2, 1], X[1, 1]), X[0, 3], X[2, 3]] for X in steps]).T
+    again = markers_of_chain(numbers[:, :, None])
+    ends = [(p.a, p.b) for p in m.pairs]
+    ring = all(one[1] == following[0] for one, following in zip(ends, [*ends[1:], ends[0]], strict=True))
+    same = all(np.allclose(np.stack(part, axis=2), made[..., 0]) for part, made in zip(poses, again, strict=True))
+    return numbers if ring and ends[0][0] == m.frame and same else None

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Protocol
 
@@ -24,8 +24,8 @@ FORCE, MOMENT, LENGTH = (1, 1, -2), (2, 1, -2), (1, 0, 0)
 class LoadSite(Protocol):
     """What a load sees of a mechanism at a batch of ``T`` positions (component axes first, positions last)."""
 
-    def masses(self) -> list[tuple[str, float, Array]]:
-        """Name, mass and mass centre ``(3, T)`` of every link that has mass."""
+    def add_weight(self, acceleration: Any) -> None:
+        """Force ``m g`` at the mass centre of every link, for one ``g (3,)``."""
 
     def rotation(self, link: str) -> Array:
         """Rotation of the link, ``(3, 3, T)``."""
@@ -38,6 +38,9 @@ class LoadSite(Protocol):
 
     def values(self, value: Value, link: str, width: int) -> Array:
         """A value at every position, ``(width, T)``; callables are called with the pose and twist of ``link``."""
+
+    def number(self, value: Any) -> Any:
+        """A number or vector as it is; where it varies from case to case, at every position ``(T,)`` or ``(3, T)``."""
 
     def freedom(self, name: str) -> tuple[Array, Array]:
         """Coordinate and rate ``(T,)`` of a freedom."""
@@ -58,8 +61,9 @@ class LoadSite(Protocol):
 class Names(Protocol):
     """The names that a load may refer to."""
 
-    def link_names(self) -> tuple[str, ...]:
-        """Names of the links."""
+    @property
+    def link_index(self) -> Mapping[str, int]:
+        """Place of every link, by name."""
 
     def freedom_fault(self, name: Any, *, single: bool) -> str | None:
         """Why ``name`` is no freedom (with ``single``: no single freedom), or None."""
@@ -88,7 +92,7 @@ def _value_fault(value: Value, what: str, width: int) -> str | None:
 
 
 def _link_fault(names: Names, link: Any, where: str) -> str | None:
-    known = names.link_names()
+    known = names.link_index
     return None if link in known else f"{where}unknown link {link!r} (links: {', '.join(known)})"
 
 
@@ -120,6 +124,8 @@ def _turned(value: Value, pose: Array) -> Value:
 class _Load:
     """What all loads share: equality that also holds for arrays."""
 
+    between_links: ClassVar[bool] = False
+    """Whether it is a force that two links exert on each other."""
     dimensions: ClassVar[dict[str, tuple[int, int, int]]] = {}
     freedom_dimensions: ClassVar[dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]]] = {}
     """Dimensions of fields that depend on the freedom: for a turn, for a slide."""
@@ -157,9 +163,7 @@ class Gravity(_Load):
 
     def act(self, site: LoadSite) -> None:
         """Add the weight of every link."""
-        g = np.asarray(self.acceleration)[:, None]
-        for link, mass, center in site.masses():
-            site.add_force(link, np.broadcast_to(mass * g, center.shape), center)
+        site.add_weight(site.number(self.acceleration))
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,7 +216,7 @@ class Wrench(_Load):
         R = site.rotation(self.link) if self.frame == "link" else None
         if self.force is not None:
             force = site.values(self.force, self.link, 3)
-            point = self.point if self.point is not None else site.center(self.link)
+            point = site.number(self.point) if self.point is not None else site.center(self.link)
             at, _ = site.point(self.link, (0.0, 0.0, 0.0) if point is None else point)
             site.add_force(self.link, force if R is None else rotate(R, force), at)
         if self.moment is not None:
@@ -264,6 +268,7 @@ class Spring(_Load):
     """
 
     kind: ClassVar[str] = "spring"
+    between_links: ClassVar[bool] = True
     dimensions: ClassVar[dict[str, tuple[int, int, int]]] = {
         "p": LENGTH,
         "q": LENGTH,
@@ -308,17 +313,14 @@ class Spring(_Load):
 
     def act(self, site: LoadSite) -> None:
         """Pull both links towards each other."""
-        (p, vp), (q, vq) = site.point(self.a, self.p), site.point(self.b, self.q)
+        stiffness, free_length, damping = map(site.number, (self.stiffness, self.free_length, self.damping))
+        (p, vp), (q, vq) = site.point(self.a, site.number(self.p)), site.point(self.b, site.number(self.q))
         d = q - p
         length = np.sqrt((d * d).sum(axis=0))
         with np.errstate(invalid="ignore", divide="ignore"):
             u = np.where(length > 0, d / length, 0.0)
-            stretched = (
-                d - self.free_length * u
-                if self.free_length == 0
-                else np.where(length > 0, d - self.free_length * u, np.nan)
-            )
-        pull = self.stiffness * stretched + self.damping * (u * (vq - vp)).sum(axis=0) * u
+            stretched = np.where((length > 0) | (np.asarray(free_length) == 0), d - free_length * u, np.nan)
+        pull = stiffness * stretched + damping * (u * (vq - vp)).sum(axis=0) * u
         site.add_force(self.a, pull, p)
         site.add_force(self.b, -pull, q)
 
@@ -363,8 +365,9 @@ class TorsionSpring(_Load):
 
     def act(self, site: LoadSite) -> None:
         """Add the effort of the spring."""
+        stiffness, free, damping = map(site.number, (self.stiffness, self.free, self.damping))
         q, rate = site.freedom(self.freedom)
-        site.add_effort(self.freedom, -self.stiffness * (q - self.free) - self.damping * rate)
+        site.add_effort(self.freedom, -stiffness * (q - free) - damping * rate)
 
 
 Load = Gravity | Wrench | Effort | Spring | TorsionSpring

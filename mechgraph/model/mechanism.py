@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
-from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
-import networkx as nx
 import numpy as np
 
 from mechgraph.errors import DeclarationError
 from mechgraph.model.connection import Marker, Pair
-from mechgraph.model.conversion import UNIT_NAMES, converted
+from mechgraph.model.conversion import converted
+from mechgraph.model.declaration import declaration_faults, flat_start, item_faults
 from mechgraph.model.drive import Drive
 from mechgraph.model.link import Link
-from mechgraph.model.load import LOADS, Effort, Load, TorsionSpring
+from mechgraph.model.load import Effort, Load, TorsionSpring
 from mechgraph.model.pair import PairType
 from mechgraph.model.values import is_numeric, plain, same_fields
 
@@ -87,18 +87,26 @@ class Mechanism:
             "description": description,
             "expected": MappingProxyType(dict(expected) if isinstance(expected, Mapping) else {}),
         }
+        mappings = {"units": units, "start": start, "expected": expected}
+        self._settle(fields, mappings, declaration_faults)
+
+    def _settle(
+        self, fields: Mapping[str, Any], mappings: Mapping[str, Any], check: Callable[[Mechanism], list[str]]
+    ) -> None:
+        """Set the fields and raise all faults found at once; ``start`` is kept by full freedom names."""
         for key, value in fields.items():
             object.__setattr__(self, key, value)
-        faults = _declaration_faults(self)
-        for what, value in (("units", units), ("start", start), ("expected", expected)):
+        faults = check(self)
+        for what, value in mappings.items():
             if value is not None and not isinstance(value, Mapping):
                 faults.append(f"{what} = {value!r}: expected a mapping")
+        start = mappings["start"]
         flat: dict[str, float] = {}
-        if all(isinstance(p, Pair) for p in pair_tuple):
-            flat, start_faults = _flat_start(self, start if isinstance(start, Mapping) else {})
+        if all(isinstance(p, Pair) for p in self.pairs):
+            flat, start_faults = flat_start(self, start if isinstance(start, Mapping) else {})
             faults += start_faults
         if faults:
-            raise DeclarationError(f"mechanism {name!r}", faults)
+            raise DeclarationError(f"mechanism {self.name!r}", faults)
         object.__setattr__(self, "start", MappingProxyType(flat))
 
     def __eq__(self, other: object) -> bool:
@@ -132,20 +140,47 @@ class Mechanism:
         pair = self.pairs[self.freedom(freedom)[0]]
         return pair.a, pair.b
 
+    @cached_property
+    def link_index(self) -> Mapping[str, int]:
+        """Place of every link, by name."""
+        return MappingProxyType(_places(link.name for link in self.links))
+
+    @cached_property
+    def pair_index(self) -> Mapping[str, int]:
+        """Place of every pair, by name."""
+        return MappingProxyType(_places(pair.name for pair in self.pairs))
+
+    @cached_property
+    def _named_pair(self) -> dict[str, int]:
+        """Place of the first pair that answers to a name, its own or that of one of its freedoms."""
+        out: dict[str, int] = {}
+        for k, pair in enumerate(self.pairs):
+            for name in (pair.name, *pair.freedom_names):
+                out.setdefault(name, k)
+        return out
+
     def link(self, name: str) -> Link:
         """The link of that name."""
-        return self.links[self._index(name, self.link_names(), "link")]
+        return self.links[self.place_of_link(name)]
 
     def pair(self, name: str) -> Pair:
         """The pair of that name."""
-        return self.pairs[self._index(name, tuple(p.name for p in self.pairs), "pair")]
+        return self.pairs[self.place_of_pair(name)]
 
-    def _index(self, name: str, names: Sequence[str], what: str) -> int:
-        if name not in names:
+    def place_of_link(self, name: str) -> int:
+        """Index of the link of that name."""
+        return self._index(name, self.link_index, "link")
+
+    def place_of_pair(self, name: str) -> int:
+        """Index of the pair of that name."""
+        return self._index(name, self.pair_index, "pair")
+
+    def _index(self, name: str, places: Mapping[str, int], what: str) -> int:
+        if name not in places:
             raise DeclarationError(
-                f"mechanism {self.name!r}", [f"unknown {what} {name!r} ({what}s: {', '.join(names)})"]
+                f"mechanism {self.name!r}", [f"unknown {what} {name!r} ({what}s: {', '.join(places)})"]
             )
-        return names.index(name)
+        return places[name]
 
     def freedom_names(self) -> tuple[str, ...]:
         """Full names of all freedoms, ``"B.Tz"``, in the order of the pairs."""
@@ -166,7 +201,7 @@ class Mechanism:
         found = self._find_freedom(name)
         if isinstance(found, str):
             raise DeclarationError(f"mechanism {self.name!r}", [found])
-        return self.pairs.index(found[0]), found[1]
+        return self._named_pair[name], found[1]
 
     def full_name(self, name: str) -> str:
         """The full spelling ``"B.Tz"`` of a freedom."""
@@ -176,27 +211,26 @@ class Mechanism:
     def _find_freedom(self, name: Any) -> tuple[Pair, int] | str:
         if not isinstance(name, str):
             return f"freedom {name!r}: expected a name such as 'B' or 'B.Tz'"
-        for pair in self.pairs:
-            names = pair.freedom_names
-            if name in names:
-                return pair, names.index(name)
-            if name != pair.name:
-                continue
-            if not isinstance(pair.type, PairType):
-                return f"pair {name!r} has an unknown type"
-            if len(names) == 1:
-                return pair, 0
-            driven = [d.freedom for d in self.drives if d.freedom in names]
-            if len(driven) == 1:
-                return pair, names.index(driven[0])
-            if not names:
-                return f"pair {name!r} ({pair.type.symbol}) has no freedom"
-            able = [n for n, single in zip(names, pair.type.drivable, strict=True) if single]
-            hint = f"; a drive or spring can take {', '.join(able) or 'none of them (a rotation takes efforts only)'}"
-            return f"pair {name!r} has {len(names)} freedoms; name one of {', '.join(names)}" + (
-                hint if len(able) < len(names) else ""
-            )
-        return f"unknown freedom {name!r} (freedoms: {', '.join(self.freedom_names())})"
+        if name not in self._named_pair:
+            return f"unknown freedom {name!r} (freedoms: {', '.join(self.freedom_names())})"
+        pair = self.pairs[self._named_pair[name]]
+        names = pair.freedom_names
+        if name in names:
+            return pair, names.index(name)
+        if not isinstance(pair.type, PairType):
+            return f"pair {name!r} has an unknown type"
+        if len(names) == 1:
+            return pair, 0
+        driven = [d.freedom for d in self.drives if d.freedom in names]
+        if len(driven) == 1:
+            return pair, names.index(driven[0])
+        if not names:
+            return f"pair {name!r} ({pair.type.symbol}) has no freedom"
+        able = [n for n, single in zip(names, pair.type.drivable, strict=True) if single]
+        hint = f"; a drive or spring can take {', '.join(able) or 'none of them (a rotation takes efforts only)'}"
+        return f"pair {name!r} has {len(names)} freedoms; name one of {', '.join(names)}" + (
+            hint if len(able) < len(names) else ""
+        )
 
     @property
     def has_geometry(self) -> bool:
@@ -212,7 +246,16 @@ class Mechanism:
             raise DeclarationError(
                 f"mechanism {self.name!r}", [f"replace: unknown field {k!r}" for k in sorted(unknown)]
             )
-        return Mechanism(**{**self._arguments(), **changes})
+        if not set(changes) <= {"drives", "loads", "start"}:
+            return Mechanism(**{**self._arguments(), **changes})
+        out = object.__new__(Mechanism)
+        fields = {k: getattr(self, k) for k in self.__dataclass_fields__}
+        if "drives" in changes:
+            fields["drives"] = tuple(Drive(d) if isinstance(d, str) else d for d in changes["drives"])
+        if "loads" in changes:
+            fields["loads"] = tuple(changes["loads"])
+        out._settle(fields, {"start": changes.get("start", self.start)}, item_faults)
+        return out
 
     def with_pair_type(self, pair: str, type: str | PairType, *, pitch: float | None = None) -> Mechanism:
         """A copy in which one pair has another type, at the same markers; drives that it cannot take are dropped."""
@@ -294,101 +337,17 @@ class Mechanism:
         return self.replace(links=links, pairs=pairs, loads=[load.moved(G) for load in self.loads])
 
 
+def _places(names: Iterable[Any]) -> dict[Any, int]:
+    """Name -> its first place."""
+    out: dict[Any, int] = {}
+    for i, name in enumerate(names):
+        out.setdefault(name, i)
+    return out
+
+
 def _symmetric(A: Any) -> Any:
     return (A + A.T) / 2
 
 
 def _rebuilt(arguments: dict[str, Any]) -> Mechanism:
     return Mechanism(**arguments)
-
-
-def _repeated(names: Iterable[Any], what: str) -> list[str]:
-    return [f"{what} {n!r} is declared {c} times; names must differ" for n, c in Counter(names).items() if c > 1]
-
-
-def _declaration_faults(m: Mechanism) -> list[str]:
-    faults = []
-    for what, items, kind in (
-        ("link", m.links, Link),
-        ("pair", m.pairs, Pair),
-        ("drive", m.drives, Drive),
-        ("load", m.loads, tuple(LOADS.values())),
-    ):
-        wrong = [item for item in items if not isinstance(item, kind)]
-        faults += [f"{what} {item!r}: is no {what}; use mg.{what.capitalize()}(...)" for item in wrong]
-    if not isinstance(m.name, str) or not m.name:
-        faults.append(f"name {m.name!r}: expected a text")
-    if not m.pairs:
-        faults.append("no pairs; a mechanism needs at least one pair")
-    if faults:
-        return faults
-    names = m.link_names()
-    for link in m.links:
-        faults += link.faults()
-    faults += _repeated(names, "link") + _repeated([p.name for p in m.pairs], "pair")
-    for pair in m.pairs:
-        faults += pair.faults()
-        for end in (pair.a, pair.b):
-            if end is None:
-                faults.append(f"pair {pair.name!r}: is on one link only; name both links")
-            elif end not in names:
-                faults.append(f"pair {pair.name!r}: link {end!r} is not declared (links: {', '.join(map(str, names))})")
-    if m.frame not in names:
-        faults.append(f"frame {m.frame!r}: is no link (links: {', '.join(map(str, names))})")
-    for key, value in m.units.items():
-        if key not in UNIT_NAMES or not isinstance(value, str) or not value:
-            faults.append(f"units: {key} = {value!r}: expected names for {', '.join(UNIT_NAMES)}")
-    by_symbol: dict[str, PairType] = {}
-    for pair in m.pairs:
-        if isinstance(pair.type, PairType) and by_symbol.setdefault(pair.type.symbol, pair.type) != pair.type:
-            faults.append(
-                f"pair {pair.name!r}: its type shares the symbol {pair.type.symbol!r} with another type; rename one"
-            )
-    ends = {end for pair in m.pairs for end in (pair.a, pair.b)}
-    if m.frame in names and ends <= set(names):
-        faults += _connection_faults(m)
-    return faults + _reference_faults(m)
-
-
-def _connection_faults(m: Mechanism) -> list[str]:
-    graph = nx.Graph([(p.a, p.b) for p in m.pairs])
-    graph.add_nodes_from(m.link_names())
-    reached = nx.node_connected_component(graph, m.frame)
-    return [
-        f"link {name!r} is not connected to the frame {m.frame!r} by any chain of pairs; add the pair that holds it"
-        for name in m.link_names()
-        if name not in reached
-    ]
-
-
-def _reference_faults(m: Mechanism) -> list[str]:
-    faults = []
-    drives = []
-    for drive in m.drives:
-        fault = m.freedom_fault(drive.freedom, single=True)
-        if fault:
-            faults.append(f"drive {drive.freedom!r}: {fault}")
-        else:
-            drives.append(m.full_name(drive.freedom))
-    faults += _repeated(drives, "drive")
-    for load in m.loads:
-        faults += load.faults(m)
-    return faults
-
-
-def _flat_start(m: Mechanism, start: Mapping[str, Any]) -> tuple[dict[str, float], list[str]]:
-    """Start values by full freedom name; a pair's name may carry one value for each of its freedoms."""
-    flat: dict[str, float] = {}
-    faults = []
-    for key, value in start.items():
-        pair = next((p for p in m.pairs if p.name == key), None)
-        many = len(pair.freedom_names) if pair is not None else 0
-        if pair is not None and many > 1 and is_numeric(value, (many,)):
-            flat.update(zip(pair.freedom_names, map(float, value), strict=True))
-            continue
-        fault = m.freedom_fault(key, single=False)
-        if fault or not is_numeric(value, ()):
-            faults.append(f"start {key!r} = {value!r}: {fault or 'expected a finite number'}")
-        else:
-            flat[m.full_name(key)] = float(value)
-    return flat, faults

@@ -224,9 +224,9 @@ def tangent(row: PairType, dq: Array, rates: Array) -> Array:
 
 
 def state_to_coordinates(row: PairType, x: Array, start: Array | None = None) -> Array:
-    """User coordinates ``(f, ..., T)`` from states, rotation vectors continued along the last axis.
+    """User coordinates ``(f, n, ..., T)`` of n pairs from states, rotation vectors continued along the last axis.
 
-    The rotation vector at the first position is the one nearest to ``start`` ``(f,)`` (zero where it is None); at every
+    The rotation vector at the first position is the one nearest to ``start`` ``(f, n)`` (zero where it is None); at every
     further one that nearest to the one before: of ``v + 2 pi k v/|v|`` the nearest.
     """
     out = np.empty((row.f, *x.shape[1:]))
@@ -243,31 +243,34 @@ def state_to_coordinates(row: PairType, x: Array, start: Array | None = None) ->
 
 
 def _continued(v: Array, first: Array) -> Array:
-    """Rotation vectors ``(3, ..., T)`` continued along the last axis: signed angles about axes that do not flip, unwrapped."""
-    out = np.full_like(v, np.nan)
-    for case in np.ndindex(v.shape[1:-1]):
-        here = (slice(None), *case)
-        good = np.flatnonzero(np.isfinite(v[here]).all(axis=0))
+    """Rotation vectors ``(3, n, ..., T)`` continued along the last axis: signed angles about axes that do not flip, unwrapped."""
+    near = np.broadcast_to(first.reshape(*first.shape, *(1,) * (v.ndim - 1 - first.ndim)), v.shape[:-1])
+    flat, starts = v.reshape(3, -1, v.shape[-1]), near.reshape(3, -1)
+    if np.isfinite(flat).all():
+        return _continued_paths(flat, starts).reshape(v.shape)
+    out = np.full_like(flat, np.nan)
+    for case in range(flat.shape[1]):
+        good = np.flatnonzero(np.isfinite(flat[:, case]).all(axis=0))
         if good.size:
-            out[(*here, good)] = _continued_path(v[here][:, good], first)
-    return out
+            out[:, case, good] = _continued_paths(flat[:, case : case + 1, good], starts[:, case : case + 1])[:, 0]
+    return out.reshape(v.shape)
 
 
-def _continued_path(v: Array, first: Array) -> Array:
+def _continued_paths(v: Array, first: Array) -> Array:
+    """The same for ``(3, n, T)`` without gaps, ``first (3, n)``."""
     angle = np.sqrt((v * v).sum(axis=0))
     clear = angle > 1e-9
-    if not clear.any():
-        return v
-    # where the angle is nearly zero the axis of the last clear position serves
-    last_clear = np.maximum.accumulate(np.where(clear, np.arange(len(angle)), -1))
-    last_clear[last_clear < 0] = np.flatnonzero(clear)[0]
-    axis = (v / np.where(clear, angle, 1.0))[:, last_clear]
-    flips = np.where((axis[:, 1:] * axis[:, :-1]).sum(axis=0) < 0, -1.0, 1.0)
-    sense = np.cumprod(np.concatenate([[1.0], flips]))
-    axis = axis * sense
-    signed = np.unwrap((v * axis).sum(axis=0))
-    turns = np.round((first @ axis[:, 0] - signed[0]) / (2 * np.pi))
-    return np.asarray(np.where(clear | (np.abs(signed) > 1.0) | (turns != 0), (signed + 2 * np.pi * turns) * axis, v))
+    # where the angle is nearly zero the axis of the last clear position serves, before the first one that one's
+    last_clear = np.maximum.accumulate(np.where(clear, np.arange(v.shape[2]), -1), axis=1)
+    last_clear = np.where(last_clear < 0, np.argmax(clear, axis=1)[:, None], last_clear)
+    axis = np.take_along_axis(v / np.where(clear, angle, 1.0), last_clear[None], axis=2)
+    flips = np.where((axis[..., 1:] * axis[..., :-1]).sum(axis=0) < 0, -1.0, 1.0)
+    axis = axis * np.cumprod(np.concatenate([np.ones((v.shape[1], 1)), flips], axis=1), axis=1)
+    signed = np.unwrap((v * axis).sum(axis=0), axis=1)
+    turns = np.round(((first * axis[..., 0]).sum(axis=0) - signed[:, 0]) / (2 * np.pi))[:, None]
+    moved = (signed + 2 * np.pi * turns) * axis
+    turned = (clear | (np.abs(signed) > 1.0) | (turns != 0)) & clear.any(axis=1, keepdims=True)
+    return np.asarray(np.where(turned, moved, v))
 
 
 def random_coordinates(row: PairType, rng: np.random.Generator, n: int, T: int) -> Array:

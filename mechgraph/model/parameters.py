@@ -7,13 +7,15 @@ stands and whatever its units: internal position = (R_b offset_b + p_b - center)
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array, cross
-from mechgraph.model.connection import Pair
 from mechgraph.model.mechanism import Mechanism
+
+Index = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -36,59 +38,130 @@ class Parameters:
     origin: Array
     L: float
 
-
-def _marker_poses(pairs: tuple[Pair, ...]) -> tuple[Array, Array]:
-    """Poses ``(3, 4, P)`` of the markers on ``a`` and on ``b`` in the frames of their links (see ``Marker.pose``)."""
-    markers = [pair.markers for pair in pairs]
-    out = []
-    for side in (0, 1):
-        points, axes, seconds = (
-            np.array([getattr(both[side], field) for both in markers], dtype=float).T
-            for field in ("point", "axis", "second")
+    @property
+    def batch(self) -> int:
+        """Number of variants."""
+        return max(
+            self.marker_a.shape[-1],
+            self.marker_b.shape[-1],
+            self.pitch.shape[-1],
+            self.mass.shape[-1],
+            self.center.shape[-1],
         )
-        z = axes / np.sqrt((axes * axes).sum(axis=0))
-        x = seconds - (z * seconds).sum(axis=0) * z
-        x /= np.sqrt((x * x).sum(axis=0))
-        out.append(np.stack([x, cross(z, x), z, points], axis=1))
-    return out[0], out[1]
+
+    def taken(self, cases: Index) -> Parameters:
+        """The numbers of some variants of a batch, in that order (one may stand several times); of a batch of one, itself."""
+        arrays = {name: getattr(self, name) for name in ("marker_a", "marker_b", "pitch", "mass", "center", "inertia")}
+        return replace(self, **{k: v[..., cases] if v.shape[-1] > 1 else v for k, v in arrays.items()})
+
+    def rescaled(self, origin: Array, L: float) -> Parameters:
+        """The same numbers about another ``origin (3,)`` (global), with lengths over another ``L``."""
+        ratio = self.L / L
+        moved = {}
+        for name in ("marker_a", "marker_b", "frame"):
+            moved[name] = getattr(self, name).copy()
+            moved[name][:, 3] *= ratio
+        moved["frame"][:, 3, 0] += (self.origin - origin) / L
+        return replace(
+            self,
+            **moved,
+            pitch=self.pitch * ratio,
+            center=self.center * ratio,
+            inertia=self.inertia * ratio**2,
+            origin=np.asarray(origin, dtype=float),
+            L=L,
+        )
+
+
+@dataclass(frozen=True)
+class Declared:
+    """The numbers of a mechanism as they are declared, in its units; the batch axis of variants is last, of length 1 or B.
+
+    ``point, axis, second (2, 3, P, B)`` of the markers on ``a`` and ``b`` in the frames of their links, ``pitch (P, B)`` per
+    radian, ``mass (N, B)``, ``center (3, N, B)``, ``inertia (3, 3, N, B)``; zeros where nothing is declared.
+    """
+
+    point: Array
+    axis: Array
+    second: Array
+    pitch: Array
+    mass: Array
+    center: Array
+    inertia: Array
+
+    def offset(self, m: Mechanism) -> Array:
+        """Middle of the markers of every link in its frame, ``(3, N)``: of the first variant."""
+        ends = np.concatenate(_ends(m))
+        points = np.concatenate([self.point[0, :, :, 0], self.point[1, :, :, 0]], axis=1)
+        count = np.bincount(ends, minlength=len(m.links))
+        return np.stack([np.bincount(ends, row, minlength=len(m.links)) for row in points]) / count
+
+    def parameters(self, m: Mechanism, offset: Array, origin: Array, L: float) -> Parameters:
+        """The arrays that kernels read, about ``origin (3,)`` with lengths over ``L`` and link frames moved by ``offset (3, N)``."""
+        frame_link = m.link_index[m.frame]
+        frame = np.zeros((3, 4, 1))
+        frame[:, :3, 0] = np.eye(3)
+        frame[:, 3, 0] = (offset[:, frame_link] - origin) / L
+        placed = np.array([link.center is not None for link in m.links])
+        center = np.where(placed[:, None], self.center - offset[:, :, None], 0.0)
+        a, b = _ends(m)
+        return Parameters(
+            marker_a=self._markers(0, offset[:, a], L),
+            marker_b=self._markers(1, offset[:, b], L),
+            pitch=self.pitch / L,
+            mass=self.mass,
+            center=center / L,
+            inertia=self.inertia / L**2,
+            offset=offset,
+            frame=frame,
+            origin=np.asarray(origin, dtype=float),
+            L=L,
+        )
+
+    def _markers(self, side: int, offset: Array, L: float) -> Array:
+        """Poses ``(3, 4, P, B)`` of the markers on one side (see ``Marker.pose``)."""
+        z = self.axis[side] / np.sqrt((self.axis[side] ** 2).sum(axis=0))
+        x = self.second[side] - (z * self.second[side]).sum(axis=0) * z
+        x = x / np.sqrt((x * x).sum(axis=0))
+        at = (self.point[side] - offset[:, :, None]) / L
+        B = max(z.shape[2], x.shape[2], at.shape[2])
+        return np.stack([np.broadcast_to(v, (*v.shape[:2], B)) for v in (x, cross(z, x), z, at)], axis=1)
+
+
+def _ends(m: Mechanism) -> tuple[Index, Index]:
+    index = m.link_index
+    a, b = (np.array([index[getattr(p, end)] for p in m.pairs], dtype=np.intp) for end in ("a", "b"))
+    return a, b
+
+
+def declared(m: Mechanism) -> Declared:
+    """The declared numbers of one mechanism with geometry, a batch of one."""
+    placed = [
+        [pair if getattr(pair, side) is None else getattr(pair, side) for pair in m.pairs] for side in ("on_a", "on_b")
+    ]
+    point, axis, second = (
+        np.array([[getattr(marker, field) for marker in side] for side in placed], dtype=float).transpose(0, 2, 1)
+        for field in ("point", "axis", "second")
+    )
+    center, inertia = np.zeros((3, len(m.links))), np.zeros((3, 3, len(m.links)))
+    at = [i for i, link in enumerate(m.links) if link.center is not None]
+    center[:, at] = np.array([m.links[i].center for i in at], dtype=float).reshape(-1, 3).T
+    turning = [i for i, link in enumerate(m.links) if link.inertia is not None]
+    tensors = np.array([m.links[i].inertia for i in turning], dtype=float).reshape(-1, 3, 3)
+    inertia[:, :, turning] = np.moveaxis(tensors, 0, -1)
+    return Declared(
+        point[..., None],
+        axis[..., None],
+        second[..., None],
+        np.array([[p.pitch_per_radian] for p in m.pairs]),
+        np.array([[link.mass] for link in m.links]),
+        center[..., None],
+        inertia[..., None],
+    )
 
 
 def parameters(m: Mechanism, origin: Array | None = None, L: float = 1.0) -> Parameters:
     """The arrays of a mechanism with geometry, about ``origin`` (global) with lengths divided by ``L``."""
-    index = {name: i for i, name in enumerate(m.link_names())}
-    on_a, on_b = _marker_poses(m.pairs)
-    offset = np.zeros((3, len(m.links)))
-    points: list[list[Array]] = [[] for _ in m.links]
-    a, b = ([index[end] for end in ends] for ends in zip(*((p.a, p.b) for p in m.pairs), strict=True))
-    for k in range(len(m.pairs)):
-        points[a[k]].append(on_a[:, 3, k])
-        points[b[k]].append(on_b[:, 3, k])
-    for i, at in enumerate(points):
-        offset[:, i] = np.mean(at, axis=0)
-    origin = offset[:, index[m.frame]] if origin is None else origin
-
-    marker_a, marker_b = on_a.copy(), on_b.copy()
-    for marker, links in ((marker_a, a), (marker_b, b)):
-        marker[:, 3] = (marker[:, 3] - offset[:, links]) / L
-    center = np.stack(
-        [np.zeros(3) if k.center is None else (np.asarray(k.center) - offset[:, i]) / L for i, k in enumerate(m.links)],
-        axis=-1,
-    )
-    inertia = np.stack(
-        [np.zeros((3, 3)) if k.inertia is None else np.asarray(k.inertia) / L**2 for k in m.links], axis=-1
-    )
-    frame = np.zeros((3, 4, 1))
-    frame[:, :3, 0] = np.eye(3)
-    frame[:, 3, 0] = (offset[:, index[m.frame]] - origin) / L
-    return Parameters(
-        marker_a=marker_a[..., None],
-        marker_b=marker_b[..., None],
-        pitch=np.array([[p.pitch_per_radian / L] for p in m.pairs]),
-        mass=np.array([[link.mass] for link in m.links]),
-        center=center[..., None],
-        inertia=inertia[..., None],
-        offset=offset,
-        frame=frame,
-        origin=np.asarray(origin, dtype=float),
-        L=L,
-    )
+    numbers = declared(m)
+    offset = numbers.offset(m)
+    return numbers.parameters(m, offset, offset[:, m.link_index[m.frame]] if origin is None else origin, L)

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 LARGEST = 1e100
 """Numbers from here on are refused: their squares would overflow."""
 
 Vector = tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class PerCase:
+    """One number or vector for each of many variants, ``(cases, ...)``: what stands in a load that varies."""
+
+    values: NDArray[np.float64]
 
 
 def plain(value: Any) -> Any:

@@ -9,7 +9,6 @@ import numpy as np
 from mechgraph.algebra.se3 import Array, rotate
 from mechgraph.errors import AssemblyError, DeclarationError
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.parameters import parameters
 from mechgraph.model.values import is_numeric
 from mechgraph.motion.system import Configuration, Index, System
 from mechgraph.numerics.newton import closest_zero, least_norm_step
@@ -38,7 +37,7 @@ def scaled_system(m: Mechanism, q: Array, system: System | None = None) -> Syste
     L = float(np.sqrt((distances**2).sum(axis=0).mean()))
     if 1e-12 * max(1.0, float(np.abs(points).max())) >= L:
         L = 1.0
-    return System(m, raw.graph, parameters(m, par.origin + par.L * centroid, L * par.L))
+    return raw.with_parameters(par.rescaled(par.origin + par.L * centroid, L * par.L))
 
 
 def close(system: System, x: Array, fixed: Index, iterations: int = 60) -> tuple[Array, float]:
@@ -65,7 +64,7 @@ def lead(system: System, x: Array, columns: Index, goal: Array, longest: float =
 
     Coordinates not named follow with the smallest change. Returns the state reached and the part of the way done.
     """
-    rows = np.array([_state_row(system, c) for c in columns], dtype=np.intp)
+    rows = state_rows(system, columns)
     begin = x[rows]
     free = np.setdiff1d(np.arange(system.n_freedoms), columns)
     length = float(np.abs(goal - begin).max(initial=0.0))
@@ -89,20 +88,15 @@ def lead(system: System, x: Array, columns: Index, goal: Array, longest: float =
     return x, done
 
 
-def _state_row(system: System, column: int) -> int:
-    """Row in the state of a single freedom's column."""
-    for g in system.groups:
-        where = np.argwhere(g.columns == column)
-        if len(where):
-            j, i = where[0]
-            before = sum(1 if len(f) == 1 else 4 for f in g.row.factors if f[0] < j)
-            return int(g.state_rows[before, i])
-    raise IndexError(column)
-
-
 def state_rows(system: System, columns: Index) -> Index:
     """Rows in the state of single freedoms."""
-    return np.array([_state_row(system, int(c)) for c in columns], dtype=np.intp)
+    row_of = np.full(system.n_freedoms, -1, dtype=np.intp)
+    for g in system.groups:
+        at = 0
+        for factor in g.row.factors:
+            row_of[g.columns[factor[0]]] = g.state_rows[at]
+            at += 1 if len(factor) == 1 else 4
+    return row_of[columns]
 
 
 def named_columns(m: Mechanism, system: System, values: Mapping[str, float]) -> tuple[Index, Array]:
@@ -146,6 +140,8 @@ def assembled(m: Mechanism, preferred: Mapping[str, float] | None = None) -> tup
     system = scaled_system(m, q, raw)
     x = system.state_of(q[:, None])[:, 0]
     error = float(system.at(x[:, None]).closure[0])
+    if error <= CLOSED and system.many_loops:
+        return system, x
     if error <= CLOSED:
         return _settled(system, close(system, x, np.arange(0))[0] if error > CLOSURE_GOAL * 10 else x)
     x, error = _search(m, system, x, preferred or {})

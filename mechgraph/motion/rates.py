@@ -12,6 +12,9 @@ from mechgraph.motion.idle import Idle
 from mechgraph.motion.system import Configuration, Index
 from mechgraph.numerics.linear import Choice, ChosenSystem
 
+DEAD_POINT = 1e-10
+"""Distance to a dead point, in driver coordinates (radians, or lengths / L), below which a position counts as one."""
+
 
 @dataclass(frozen=True)
 class Rates:

@@ -7,7 +7,8 @@ first and positions last. ``S`` are the twists of all freedoms about the interna
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -28,23 +29,14 @@ from mechgraph.model.pair_frames import (
     moved_marker,
 )
 from mechgraph.model.parameters import Parameters, parameters
+from mechgraph.motion.tree import Tree
+from mechgraph.numerics.linear import Place, compact
 from mechgraph.topology.linkgraph import LinkGraph, link_graph
 
 Index = NDArray[np.intp]
 
-
-Place = slice | Index
-
-
-def compact(index: Index) -> Place:
-    """An evenly spaced rising index as a slice, which takes no copy; any other as it is."""
-    n = len(index)
-    if not n:
-        return index
-    step = int(index[1] - index[0]) if n > 1 else 1
-    if step < 1 or (n > 2 and (np.diff(index) != step).any()):
-        return index
-    return slice(int(index[0]), int(index[-1]) + 1, step)
+MANY_LOOPS = 16
+"""Loops above which the loop matrix is applied as a sparse one (measured: from here on it is the faster one)."""
 
 
 @dataclass(frozen=True)
@@ -81,10 +73,11 @@ class System:
         self.b = np.array([b for _, b in self.graph.ends], dtype=np.intp)
         self.chords = np.array(self.graph.chords, dtype=np.intp)
         self.groups = self._group_pairs()
-        self.levels = self._tree_levels()
+        self.tree = Tree(self.graph)
         self.marker_b_inverse = inverse(self.par.marker_b)
-        self.loop_columns = [self._columns_of_loop(loop) for loop in self.graph.loops]
-        self.is_length = np.array([not f.turns for p in m.pairs for f in p.type.freedoms], dtype=bool)
+        self.is_length = np.zeros(self.n_freedoms, dtype=bool)
+        for g in self.groups:
+            self.is_length[g.columns] = np.array([not f.turns for f in g.row.freedoms], dtype=bool)[:, None]
 
     @cached_property
     def factors(self) -> list[list[Factor]]:
@@ -111,43 +104,56 @@ class System:
         """Links a and b of the chords."""
         return compact(self.a[self.chords]), compact(self.b[self.chords])
 
-    @cached_property
-    def walk(self) -> list[tuple[Place, NDArray[np.bool_], Place, Place]]:
-        """The levels of the tree with indices that take no copy where they are evenly spaced."""
-        return [(compact(p), forward, compact(a), compact(c)) for p, forward, a, c in self.levels]
-
     def with_parameters(self, par: Parameters) -> System:
         """The same graph with other numbers."""
-        return System(self.m, self.graph, par)
+        out = copy(self)
+        out.__dict__.pop("factors", None)
+        out.par, out.marker_b_inverse = par, inverse(par.marker_b)
+        rows = [self.m.pairs[int(g.pairs[0])].type.scaled(par.L) for g in self.groups]
+        out.groups = [replace(g, row=row) for g, row in zip(self.groups, rows, strict=True)]
+        return out
+
+    @cached_property
+    def loop_columns(self) -> list[tuple[Index, Array]]:
+        """Columns of the freedoms along every loop, and their signs."""
+        return [self._columns_of_loop(loop) for loop in self.graph.loops]
 
     def _group_pairs(self) -> list[Group]:
-        by_type: dict[PairType, list[int]] = {}
+        same: dict[int, list[int]] = {}
         for k, pair in enumerate(self.m.pairs):
-            by_type.setdefault(pair.type, []).append(k)
+            same.setdefault(id(pair.type), []).append(k)
+        by_type: dict[PairType, list[int]] = {}
+        for pairs in same.values():
+            by_type.setdefault(self.m.pairs[pairs[0]].type, []).extend(pairs)
         groups = []
         for row, pairs in by_type.items():
-            index = np.array(pairs, dtype=np.intp)
+            index = np.array(sorted(pairs), dtype=np.intp)
             columns = self.first_column[index] + np.arange(row.f, dtype=np.intp)[:, None]
             state = self.first_row[index] + np.arange(row.nx, dtype=np.intp)[:, None]
             groups.append(Group(row.scaled(self.par.L), index, columns, state))
         return groups
 
-    def _tree_levels(self) -> list[tuple[Index, NDArray[np.bool_], Index, Index]]:
-        depth = {self.graph.frame: 0}
-        levels: dict[int, list[tuple[int, bool, int, int]]] = {}
-        for k, sign, parent, child in self.graph.tree:
-            depth[child] = depth[parent] + 1
-            levels.setdefault(depth[child], []).append((k, sign > 0, parent, child))
-        out = []
-        for level in levels.values():
-            pairs, forward, parents, children = (np.array(part) for part in zip(*level, strict=True))
-            out.append((pairs, forward, parents, children))
+    @cached_property
+    def _group_of(self) -> Index:
+        out = np.empty(len(self.m.pairs), dtype=np.intp)
+        for number, g in enumerate(self.groups):
+            out[g.pairs] = number
         return out
+
+    def place_of(self, pair: int) -> tuple[int, int]:
+        """Number of the group of a pair, and its place there."""
+        number = int(self._group_of[pair])
+        return number, int(np.searchsorted(self.groups[number].pairs, pair))
 
     def _columns_of_loop(self, loop: tuple[tuple[int, int], ...]) -> tuple[Index, Array]:
         columns = [np.arange(self.first_column[k], self.first_column[k + 1]) for k, _ in loop]
         signs = [np.full(len(c), float(sign)) for c, (_, sign) in zip(columns, loop, strict=True)]
         return np.concatenate(columns), np.concatenate(signs)
+
+    @property
+    def many_loops(self) -> bool:
+        """Whether sums along loops are taken with the sparse loop matrix."""
+        return len(self.graph.loops) > MANY_LOOPS
 
     @cached_property
     def loop_pieces(self) -> list[list[tuple[slice, Array]]]:
@@ -178,20 +184,18 @@ class System:
     def coordinates_of(self, x: Array, start: Array | None = None) -> Array:
         """User coordinates ``(F, ..., T)`` of states ``(nx, ..., T)``; rotation vectors continued along the last axis."""
         q = np.empty((self.n_freedoms, *x.shape[1:]))
-        for pair, first, row in zip(self.m.pairs, self.first_column, self.first_row, strict=False):
-            near = None if start is None else start[first : first + pair.type.f]
-            q[first : first + pair.type.f] = evaluation.state_to_coordinates(
-                pair.type, x[row : row + pair.type.nx], near
-            )
+        for g in self.groups:
+            near = None if start is None else start[g.columns]
+            q[g.columns] = evaluation.state_to_coordinates(g.row, x[g.state_rows], near)
         q[self.is_length] *= self.par.L
         return q
 
     def start_coordinates(self, start: Mapping[str, float]) -> Array:
         """User coordinates ``(F,)`` from a mapping freedom -> value, zero elsewhere."""
-        names = {name: i for i, name in enumerate(self.m.freedom_names())}
         q = np.zeros(self.n_freedoms)
         for name, value in start.items():
-            q[names[self.m.full_name(name)]] = value
+            k, j = self.m.freedom(name)
+            q[self.first_column[k] + j] = value
         return q
 
     def advance(self, x: Array, dq: Array) -> Array:
@@ -235,14 +239,7 @@ class Configuration:
         for g, factors, values in zip(s.groups, s.factors, self._values, strict=True):
             relative[:, :, g.at_pairs] = displaced(factors, values) if factors else s.weld(g)
         self._chords = relative[:, :, s.chords]
-        self.poses = np.empty((3, 4, len(s.m.links), self.T))
-        self.poses[:, :, s.graph.frame] = s.par.frame
-        for pairs, forward, parents, children in s.walk:
-            step = relative[:, :, pairs]
-            if not forward.all():
-                step = step.copy()
-                step[:, :, ~forward] = inverse(step[:, :, ~forward])
-            self.poses[:, :, children] = compose(self.poses[:, :, parents], step)
+        self.poses = s.tree.poses(relative, s.par.frame)
 
     @cached_property
     def _columns(self) -> list[list[Frame]]:
@@ -253,6 +250,12 @@ class Configuration:
             base = moved_marker(self.poses[:, :, links], s.par.marker_a[:, :, g.at_pairs])
             out.append(frames_along(g.row, factors, values, base))
         return out
+
+    def part(self, at: Index) -> Configuration:
+        """Some of the positions, evaluated by themselves."""
+        par = self.system.par
+        system = self.system if par.batch == 1 else self.system.with_parameters(par.taken(at))
+        return Configuration(system, self.x[:, at])
 
     @cached_property
     def frames(self) -> list[list[Array]]:
@@ -337,7 +340,12 @@ class Configuration:
     @cached_property
     def residual(self) -> Array:
         """Closure errors of the loops, stacked ``(6 loops, T)``."""
-        return _combined(self.system.loops_of_chords, self.chord_errors)
+        s = self.system
+        if s.many_loops:
+            per_pair = np.zeros((6, len(s.m.pairs), self.T))
+            per_pair[:, s.chords] = self.chord_errors
+            return self.loop_sums(per_pair)
+        return _combined(s.loops_of_chords, self.chord_errors)
 
     @cached_property
     def J(self) -> Array:
@@ -358,7 +366,7 @@ class Configuration:
 
     def link_twists(self, dq: Array) -> Array:
         """Twists of all links ``(6, N, T)`` for rates ``dq (F, T)``, along the tree."""
-        return self._accumulate(self.pair_sums(self.S * dq))
+        return self.system.tree.sums(self.pair_sums(self.S * dq))
 
     def pair_sums(self, terms: Array) -> Array:
         """Sum of the columns of every pair: ``(6, F, T)`` -> ``(6, P, T)``."""
@@ -370,16 +378,6 @@ class Configuration:
                     out[:, g.at_pairs] = terms[:, at]
                 else:
                     out[:, g.at_pairs] += terms[:, at]
-        return out
-
-    def _accumulate(self, relative: Array) -> Array:
-        s = self.system
-        out = np.zeros((6, len(s.m.links), relative.shape[2]))
-        for pairs, forward, parents, children in s.walk:
-            if forward.all():
-                out[:, children] = out[:, parents] + relative[:, pairs]
-            else:
-                out[:, children] = out[:, parents] + np.where(forward[:, None], 1.0, -1.0) * relative[:, pairs]
         return out
 
     def bias(self, dq: Array, V: Array) -> Array:
@@ -402,7 +400,20 @@ class Configuration:
 
     def loop_sums(self, per_pair: Array) -> Array:
         """Signed sum of pair terms along every loop, stacked ``(6 loops, T)``."""
-        return _combined(self.system.graph.loop_matrix, per_pair)
+        s = self.system
+        if s.many_loops:
+            flat = per_pair.transpose(1, 0, 2).reshape(per_pair.shape[1], 6 * per_pair.shape[2])
+            return np.asarray(s.graph.sparse_loop_matrix @ flat).reshape(-1, per_pair.shape[2])
+        return _combined(s.graph.loop_matrix, per_pair)
+
+    def pair_wrenches(self, x: Array) -> Array:
+        """Pair wrenches ``(6, P, k, T)`` of loop wrenches ``(6 loops, k, T)``: ``w = C^T x``."""
+        s = self.system
+        loops = x.reshape(len(s.graph.loops), 6, *x.shape[1:])
+        if s.many_loops:
+            flat = np.asarray(s.graph.sparse_loop_matrix.T @ loops.reshape(len(loops), -1))
+            return np.moveaxis(flat.reshape(len(s.m.pairs), 6, *x.shape[1:]), 1, 0)
+        return np.asarray(np.einsum("lp,list->ipst", s.graph.loop_matrix, loops))
 
     def link_accelerations(self, dq: Array, ddq: Array, V: Array) -> Array:
         """Accelerations dV/dt of all links ``(6, N, T)``."""
@@ -412,7 +423,7 @@ class Configuration:
         """Accelerations dV/dt of all links ``(6, N, T)``, the velocity part ``bias (6, P, T)`` known."""
         relative = self.pair_sums(self.S * ddq)
         relative += bias
-        return self._accumulate(relative)
+        return self.system.tree.sums(relative)
 
 
 def _combined(matrix: Array, terms: Array) -> Array:

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
+Place = slice | Index
+"""Places along an axis; a slice takes no copy."""
 
 RANK_TOLERANCE = 1e-9
 """Singular values below this part of the largest count as zero (lengths scaled, so that a matrix has no units)."""
@@ -61,9 +63,27 @@ def independent_rows(rows: Array, candidates: list[int], count: int) -> list[int
     return chosen
 
 
+def compact(index: Index) -> Place:
+    """An evenly spaced rising index as a slice, any other as it is."""
+    n = len(index)
+    if not n:
+        return index
+    step = int(index[1] - index[0]) if n > 1 else 1
+    if step < 1 or (n > 2 and (np.diff(index) != step).any()):
+        return index
+    return slice(int(index[0]), int(index[-1]) + 1, step)
+
+
 def add_at(out: Array, index: Index, values: Array) -> None:
     """Add ``values (6, n, T)`` to the places ``index (n,)`` of the second axis of ``out``; places may repeat."""
     np.add.at(np.moveaxis(out, 1, 0), index, np.moveaxis(values, 1, 0))
+
+
+def scattered_sum(values: Array, index: Index, count: int) -> Array:
+    """Sums ``(6, count, T)`` of ``values (6, n, T)`` by their place ``index (n,)``."""
+    to = scipy.sparse.csr_array((np.ones(len(index)), (index, np.arange(len(index)))), shape=(count, len(index)))
+    flat = np.moveaxis(values, 1, 0).reshape(len(index), values.shape[0] * values.shape[2])
+    return np.moveaxis(np.asarray(to @ flat).reshape(count, values.shape[0], values.shape[2]), 0, 1)
 
 
 @dataclass(frozen=True)

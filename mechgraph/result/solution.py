@@ -80,7 +80,7 @@ class Values(Protocol):
         """Wrench that keeps a passive body at rest, about the global origin, ``(..., 6)``."""
 
     def link_point(self, link: int, p: Any) -> MaterialPoint:
-        """A material point given in the link's frame."""
+        """A material point given in the link's frame; the mass centre where it is None."""
 
     def shaking(self) -> Array:
         """Wrench on the frame about the global origin, ``(..., 6)``."""
@@ -234,7 +234,7 @@ class LinkResult:
         link = self._values.mechanism.links[self._index]
         if link.center is None:
             raise DeclarationError(f"link {link.name!r}", ["has no mass centre; declare center=, or use point(p)"])
-        return self.point(link.center)
+        return self._values.link_point(self._index, None)
 
     @property
     def center(self) -> Array:
@@ -269,11 +269,11 @@ class Solution:
         return self._values.batch
 
     def __getitem__(self, pair: str) -> PairResult:
-        return PairResult(self._values, self.mechanism.pairs.index(self.mechanism.pair(pair)))
+        return PairResult(self._values, self.mechanism.place_of_pair(pair))
 
     def link(self, name: str) -> LinkResult:
         """Motion of a link."""
-        return LinkResult(self._values, self.mechanism.links.index(self.mechanism.link(name)))
+        return LinkResult(self._values, self.mechanism.place_of_link(name))
 
     @property
     def has_forces(self) -> bool:

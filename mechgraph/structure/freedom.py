@@ -12,8 +12,10 @@ from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.motion.idle import Idle
+from mechgraph.motion.loops import LoopSystem
 from mechgraph.motion.system import Configuration, Index, System
 from mechgraph.numerics.linear import RANK_TOLERANCE, independent_rows, rank_of, singular_values
+from mechgraph.structure.bordered import Bordered
 from mechgraph.structure.elimination import Elimination, loop_rows
 from mechgraph.structure.passive import STILL, PassiveMotion, passive_motions
 
@@ -74,9 +76,12 @@ def is_large(system: System) -> bool:
     return 6 * len(system.graph.loops) > LARGE
 
 
-def elimination(here: Configuration, dropped: Index | None = None) -> Elimination:
-    """The closure Jacobian at one position eliminated along the loops, with some columns left out."""
+def elimination(here: Configuration, dropped: Index | None = None) -> Bordered | Elimination:
+    """The closure Jacobian at one position, with some columns left out: bordered and factored, or eliminated along the loops."""
     s = here.system
+    quick = Bordered(LoopSystem.at(here, np.zeros(0, dtype=np.intp) if dropped is None else dropped), here.S[:, :, 0])
+    if quick.sure:
+        return quick
     rows = loop_rows(here.S[:, :, 0], s.loop_columns)
     points = here.pair_points[:, :, 0]
     at = [points[:, [k for k, _ in loop]] for loop in s.graph.loops]

@@ -11,7 +11,9 @@ from mechgraph.algebra.se3 import Array, rotation_exp
 from mechgraph.model import pair_evaluation as evaluation
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import PairType
+from mechgraph.motion.loops import LoopSystem
 from mechgraph.numerics.linear import rank_of, singular_values
+from mechgraph.structure.bordered import Bordered
 from mechgraph.structure.elimination import Elimination, LoopRows, loop_rows
 from mechgraph.structure.freedom import LARGE
 from mechgraph.topology.linkgraph import LinkGraph
@@ -83,9 +85,16 @@ def generic(m: Mechanism, graph: LinkGraph) -> Generic:
     rng = np.random.default_rng(SEED)
     count = 6 * len(graph.loops)
     if count > LARGE:
-        rows, points = random_rows(m, graph, rng)
-        found = Elimination(rows, points, GENERIC_RANK)
-        return Generic(found.rank, rows.width - found.rank, count - found.rank, found.sets)
+        state = rng.bit_generator.state
+        twists, points = random_twists(m, rng)
+        first = np.concatenate([[0], np.cumsum([c.shape[1] for c in twists])]).astype(np.intp)
+        S = np.concatenate(twists, axis=1)
+        found: Bordered | Elimination
+        found = Bordered(LoopSystem(graph, first, S, points, np.zeros(0, dtype=np.intp)), S)
+        if not found.smallest > GENERIC_RANK:
+            rng.bit_generator.state = state
+            found = Elimination(*random_rows(m, graph, rng), GENERIC_RANK)
+        return Generic(found.rank, S.shape[1] - found.rank, count - found.rank, found.sets)
     best, rank = np.zeros((0, 0)), -1
     for _ in range(TRIALS):
         J = dense(random_rows(m, graph, rng)[0])

@@ -52,8 +52,8 @@ def owner_of(here: Configuration) -> Index:
     return np.repeat(np.arange(len(counts)), counts)
 
 
-def orthonormal_stress(here: Configuration, states: Array, driven: Index) -> Stress:
-    """Self-stresses from independent total wrench states ``(6, P, s, T)`` that leave all undriven freedoms without effort."""
+def split_stress(here: Configuration, states: Array, driven: Index) -> Stress:
+    """Reaction parts and efforts of total wrench states ``(6, P, s, T)`` that leave all undriven freedoms without effort."""
     s = states.shape[2]
     efforts = np.zeros((here.system.n_freedoms, s, here.T))
     parts = np.empty_like(states)
@@ -61,8 +61,15 @@ def orthonormal_stress(here: Configuration, states: Array, driven: Index) -> Str
         tau = pair_power(here, states[:, :, i])
         efforts[driven, i] = tau[driven]
         parts[:, :, i] = reaction_part(here, states[:, :, i], efforts[:, i])
+    return Stress(parts, efforts)
+
+
+def orthonormal_stress(here: Configuration, states: Array, driven: Index) -> Stress:
+    """Self-stresses from independent total wrench states ``(6, P, s, T)``, orthonormal at every position."""
+    found, s = split_stress(here, states, driven), states.shape[2]
     if not s:
-        return Stress(parts, efforts)
+        return found
+    parts, efforts = found.wrenches, found.efforts
     flat = at_pair_points(here, parts).transpose(3, 0, 1, 2).reshape(here.T, 6 * states.shape[1], s)
     mix = _orthonormal(flat, efforts.transpose(2, 0, 1))
     return Stress(np.einsum("cpit,tij->cpjt", parts, mix), np.einsum("fit,tij->fjt", efforts, mix))
@@ -122,13 +129,21 @@ class PairFrames:
             out.append(values[: 6 - g.row.f])
         return out
 
-    def components_of(self, pair: int, wrenches: Array) -> Array:
-        """Components ``(6 - f, s)`` of reaction wrenches ``(6, s)`` of one pair at the first position."""
-        points = self.here.pair_points[:, pair, 0]
-        g, i = self._place[pair]
-        local = shift_wrench(wrenches, points[:, None])
-        return np.asarray((self.dual[g][i, 0] @ local)[: 6 - self.here.system.groups[g].row.f])
+    def of_one_pair(self, pair: int, wrenches: Array) -> Array:
+        """Components ``(6 - f, s)`` of reaction wrenches ``(6, s)`` of one pair at a single position."""
+        return self.components_of(*self._place[pair], wrenches[..., None])[..., 0]
 
     @cached_property
     def _place(self) -> dict[int, tuple[int, int]]:
         return {int(k): (n, i) for n, g in enumerate(self.here.system.groups) for i, k in enumerate(g.pairs)}
+
+    def components_of(self, number: int, i: int, wrenches: Array) -> Array:
+        """Components ``(6 - f, ..., T)`` of the ``i``-th pair of a group from its reaction wrenches ``(6, ..., T)``."""
+        here = self.here
+        g = here.system.groups[number]
+        basis = np.concatenate([here.W[number][:, :, i], here.E[:, g.columns[:, i]]], axis=1)
+        point = here.pair_points[:, int(g.pairs[i])]
+        local = np.concatenate([basis[:3] - cross(point[:, None], basis[3:]), basis[3:]])
+        inverse = np.linalg.inv(np.moveaxis(local, 2, 0))
+        shifted = shift_wrench(wrenches, point.reshape(3, *(1,) * (wrenches.ndim - 2), here.T))
+        return np.asarray(np.einsum("tij,j...t->i...t", inverse, shifted)[: 6 - g.row.f])

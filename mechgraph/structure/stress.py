@@ -13,9 +13,10 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.model.connection import Pair
 from mechgraph.motion.system import Configuration, Index
 from mechgraph.numerics.linear import RANK_TOLERANCE
+from mechgraph.structure.bordered import Bordered
 from mechgraph.structure.elimination import Elimination
 from mechgraph.structure.freedom import elimination, is_large
-from mechgraph.structure.reaction import UNIQUE, PairFrames, Stress, orthonormal_stress
+from mechgraph.structure.reaction import UNIQUE, PairFrames, Stress, orthonormal_stress, split_stress
 from mechgraph.structure.readable import Label, SelfStress, combinations, readable, regrouped
 from mechgraph.structure.transverse import Transverse, transverse
 
@@ -66,10 +67,7 @@ def stress_at(here: Configuration, driven: Index) -> Stress:
 
 def pair_states(here: Configuration, loops: Array) -> Array:
     """Total pair wrenches ``(6, P, s, 1)`` of loop wrenches ``(6 loops, s)``: ``w = C^T x``."""
-    C = here.system.graph.loop_matrix
-    count = loops.shape[1]
-    flat = C.T @ loops.reshape(C.shape[0], 6 * count)
-    return np.ascontiguousarray(flat.reshape(C.shape[1], 6, count).transpose(1, 0, 2))[..., None]
+    return here.pair_wrenches(loops[..., None])
 
 
 def uniqueness(here: Configuration, driven: Index) -> Uniqueness:
@@ -99,7 +97,8 @@ def _uniqueness_of_many(here: Configuration, driven: Index) -> Uniqueness:
     rng = np.random.default_rng(SEED)
     count = 6 * len(here.system.graph.loops) - found.rank
     probes = found.random_stress(rng, min(PROBES, count))
-    labels, table = component_table(here, orthonormal_stress(here, pair_states(here, probes), driven), driven)
+    # of size one in the measure of every loop, not as a whole: the verdict does not depend on how many loops there are
+    labels, table = component_table(here, split_stress(here, pair_states(here, probes), driven), driven)
     verdicts = _verdicts(here, labels, table)
     directions, _ = transverse(here, labels, table)
     groups = _group_count(here, found, verdicts["unique"])
@@ -122,7 +121,7 @@ def self_stresses(here: Configuration, driven: Index, found: Uniqueness) -> tupl
     return _states_of_many(here, driven, elimination(here, driven), found.count)
 
 
-def _group_count(here: Configuration, found: Elimination, unique: dict[str, dict[str, bool]]) -> int:
+def _group_count(here: Configuration, found: Bordered | Elimination, unique: dict[str, dict[str, bool]]) -> int:
     """Sets of loops with self-stresses that share a pair some component of which is not unique."""
     m, loops = here.system.m, here.system.graph.loops
     home = {i: number for number, (_, members) in enumerate(found.sets) for i in members}
@@ -136,7 +135,9 @@ def _group_count(here: Configuration, found: Elimination, unique: dict[str, dict
     return int(nx.number_connected_components(graph))
 
 
-def _states_of_many(here: Configuration, driven: Index, found: Elimination, most: int) -> tuple[SelfStress, ...]:
+def _states_of_many(
+    here: Configuration, driven: Index, found: Bordered | Elimination, most: int
+) -> tuple[SelfStress, ...]:
     """The first ``most`` self-stresses: those of single loops, each made readable by itself, then those across loops."""
     frames = PairFrames(here)
     states: list[SelfStress] = []
@@ -163,7 +164,7 @@ def _of_loop(here: Configuration, frames: PairFrames, driven: Index, loop: int, 
         efforts = here.S[:, mine, 0].T @ (sign * Y)
         reactions = sign * Y - here.E[:, mine, 0] @ efforts
         labels += labels_of(system.m.pairs[k], mine - system.first_column[k])
-        parts += [frames.components_of(k, reactions), efforts]
+        parts += [frames.of_one_pair(k, reactions), efforts]
     return np.concatenate(parts), labels
 
 

@@ -54,8 +54,9 @@ def transverse(
     found: list[Transverse] = []
     known: set[int] = set()
     poses = {int(k): (g, i) for g, group in enumerate(here.system.groups) for i, k in enumerate(group.pairs)}
+    vectors = [_vectors(g.row.reactions or ()) for g in here.system.groups]
     for k, pair in enumerate(here.system.m.pairs):
-        for (frame, kind), parts in _vectors(pair.type.reactions or ()).items():
+        for (frame, kind), parts in vectors[poses[k][0]].items():
             mine = [(axis, place[pair.name, name]) for axis, name in parts if loose[place[pair.name, name]]]
             if len(mine) < 2:
                 continue

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
+from functools import cached_property
 
 import networkx as nx
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from mechgraph.model.mechanism import Mechanism
@@ -45,6 +47,19 @@ class LinkGraph:
             A[a, k] -= 1.0
         return np.delete(A, self.frame, axis=0)
 
+    @cached_property
+    def loop_steps(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]:
+        """All steps of all loops, one after the other: loop, pair and sign of each."""
+        loop = np.repeat(np.arange(len(self.loops)), [len(steps) for steps in self.loops])
+        flat = np.array([step for steps in self.loops for step in steps], dtype=np.intp).reshape(len(loop), 2)
+        return loop.astype(np.intp), flat[:, 0], flat[:, 1].astype(float)
+
+    @cached_property
+    def sparse_loop_matrix(self) -> scipy.sparse.csr_array:
+        """The loop matrix, loops x pairs, stored sparsely."""
+        loop, pair, sign = self.loop_steps
+        return scipy.sparse.csr_array((sign, (loop, pair)), shape=(len(self.loops), len(self.ends)))
+
     @property
     def loop_matrix(self) -> NDArray[np.float64]:
         """Loop matrix, loops x pairs: sign with which a loop runs through a pair, 0 elsewhere. A C^T = 0."""
@@ -67,7 +82,7 @@ def network(m: Mechanism) -> nx.MultiGraph[str]:
 
 def link_graph(m: Mechanism) -> LinkGraph:
     """Tree, chords and loops of a mechanism."""
-    index = {name: i for i, name in enumerate(m.link_names())}
+    index = m.link_index
     ends = tuple((index[p.a], index[p.b]) for p in m.pairs)
     return graph_of_ends(len(m.links), ends, index[m.frame])
 

@@ -1,0 +1,328 @@
+"""Declared numbers by name, and many variants of a mechanism as one set of arrays.
+
+A field is named as it is declared: ``crank.mass``, ``crank.center.x``, ``crank.inertia.xy``, ``B.point.x``, ``B.axis.z``,
+``B.on_a.point.y``, ``B.pitch``, ``loads[0].stiffness``, ``loads[1].force.x``; of a chain ``length[2]``, ``twist[0]``, ``offset[1]``
+(as in ``mg.chain``, counted from 0).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechgraph.algebra.inertia import physical
+from mechgraph.algebra.se3 import Array
+from mechgraph.errors import DeclarationError
+from mechgraph.model.chain import chain_numbers, markers_of_chain
+from mechgraph.model.connection import Marker, Pair
+from mechgraph.model.link import Link
+from mechgraph.model.load import Load
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.parameters import Declared, declared
+from mechgraph.model.values import PerCase, is_numeric
+
+XYZ = "xyz"
+CHAIN = ("twist", "length", "offset")
+_INDEXED = re.compile(r"(?P<what>\w+)\[(?P<index>\d+)\](?:\.(?P<rest>[\w.]+))?")
+
+Place = tuple[Any, ...]
+
+
+@dataclass(frozen=True)
+class Field:
+    """A declared number: the array of ``Declared`` and the places in it that hold ``scale`` times the number."""
+
+    array: str
+    places: tuple[Place, ...]
+    scale: float = 1.0
+
+    def read(self, numbers: Declared) -> float:
+        """The declared value."""
+        return float(getattr(numbers, self.array)[self.places[0]][..., 0].reshape(-1)[0]) / self.scale
+
+
+@dataclass(frozen=True)
+class ChainField:
+    """Twist, length or offset (``kind`` 0, 1, 2) of the ``index``-th link of a chain."""
+
+    kind: int
+    index: int
+
+
+@dataclass(frozen=True)
+class LoadField:
+    """A number of the ``index``-th load, or a component of a vector of it."""
+
+    index: int
+    name: str
+    component: int | None
+
+
+AnyField = Field | ChainField | LoadField
+
+
+def find_field(m: Mechanism, name: str) -> AnyField | str:
+    """The field of that name, or why there is none."""
+    indexed = _INDEXED.fullmatch(name)
+    if indexed and indexed["what"] in CHAIN and not indexed["rest"]:
+        return _chain_field(m, name, indexed["what"], int(indexed["index"]))
+    if indexed and indexed["what"] == "loads":
+        return _load_field(m, name, int(indexed["index"]), indexed["rest"] or "")
+    for link in m.links:
+        if name.startswith(link.name + ".") and (found := _link_field(m, link, name.removeprefix(link.name + "."))):
+            return found
+    for pair in m.pairs:
+        if name.startswith(pair.name + ".") and (found := _pair_field(m, pair, name.removeprefix(pair.name + "."))):
+            return found
+    return (
+        f"{name!r}: no declared number of that name; expected e.g. {m.links[-1].name}.mass, {m.links[-1].name}.center.x, "
+        f"{m.links[-1].name}.inertia.xx, {m.pairs[0].name}.{'point' if m.pairs[0].point is not None else 'on_a.point'}.x, "
+        "loads[0].stiffness, or length[2] of a chain"
+    )
+
+
+def _link_field(m: Mechanism, link: Link, rest: str) -> Field | None:
+    i = m.link_index[link.name]
+    if rest == "mass":
+        return Field("mass", ((i,),))
+    what, _, at = rest.partition(".")
+    if what == "center" and link.center is not None and at in tuple(XYZ):
+        return Field("center", ((XYZ.index(at), i),))
+    if what == "inertia" and link.inertia is not None and len(at) == 2 and set(at) <= set(XYZ):
+        j, k = XYZ.index(at[0]), XYZ.index(at[1])
+        return Field("inertia", tuple(dict.fromkeys([(j, k, i), (k, j, i)])))
+    return None
+
+
+def _pair_field(m: Mechanism, pair: Pair, rest: str) -> Field | None:
+    k = m.pairs.index(pair)
+    if rest in ("pitch", "lead") and getattr(pair, rest) is not None:
+        return Field("pitch", ((k,),), 1.0 if rest == "pitch" else 1 / (2 * np.pi))
+    sides = {"": slice(None), "on_a": 0, "on_b": 1} if pair.on_a is not None else {"": slice(None)}
+    side, _, tail = rest.partition(".") if rest.startswith("on_") else ("", "", rest)
+    what, _, at = tail.partition(".")
+    if side not in sides or (side == "") != (pair.on_a is None) or at not in tuple(XYZ):
+        return None
+    return Field(what, ((sides[side], XYZ.index(at), k),)) if what in ("point", "axis", "second") else None
+
+
+def _chain_field(m: Mechanism, name: str, what: str, index: int) -> ChainField | str:
+    numbers = chain_numbers(m)
+    if numbers is None:
+        return f"{name!r}: mechanism {m.name!r} is no chain with twist, length and offset of every link"
+    if index >= numbers.shape[1]:
+        return f"{name!r}: the chain has {numbers.shape[1]} links, counted from 0"
+    return ChainField(CHAIN.index(what), index)
+
+
+def _load_field(m: Mechanism, name: str, index: int, rest: str) -> LoadField | str:
+    if index >= len(m.loads):
+        return f"{name!r}: there are {len(m.loads)} loads, counted from 0"
+    load = m.loads[index]
+    what, _, at = rest.partition(".")
+    value = getattr(load, what, None) if what in {f.name for f in dataclasses.fields(load)} else None
+    if is_numeric(value, (3,)) and at in tuple(XYZ):
+        return LoadField(index, what, XYZ.index(at))
+    if is_numeric(value, ()) and not at:
+        return LoadField(index, what, None)
+    known = [
+        f.name for f in dataclasses.fields(load) if is_numeric(getattr(load, f.name), np.shape(getattr(load, f.name)))
+    ]
+    return (
+        f"{name!r}: no number of that name in load {index} ({load.kind}: {', '.join(known)}; vectors with .x, .y, .z)"
+    )
+
+
+@dataclass(frozen=True)
+class Variants:
+    """``count`` variants of one mechanism: declared numbers and loads with a batch axis (``PerCase`` where a load varies)."""
+
+    mechanism: Mechanism
+    numbers: Declared
+    loads: tuple[Load, ...]
+    count: int
+
+    def valid(self) -> NDArray[np.bool_]:
+        """Which variants are physical: finite numbers, no negative mass, axes of some length, possible inertias, ``(count,)``."""
+        n = self.numbers
+        ok = np.ones(self.count, dtype=bool)
+        for field in dataclasses.fields(n):
+            values = getattr(n, field.name)
+            ok &= np.isfinite(values).all(axis=tuple(range(values.ndim - 1)))
+        ok &= (n.mass >= 0).all(axis=0)
+        ok &= ((n.axis**2).sum(axis=1) > 1e-24).all(axis=(0, 1))
+        if n.inertia.shape[-1] > 1:
+            free = np.array([link.unphysical for link in self.mechanism.links])
+            ok &= (physical(np.nan_to_num(n.inertia)) | free[:, None]).all(axis=0)
+        return ok
+
+    def one(self, i: int) -> Mechanism:
+        """The ``i``-th variant as a mechanism of its own.
+
+        Raises
+        ------
+        DeclarationError
+            where no such mechanism can be.
+        """
+        n = replace(
+            self.numbers,
+            **{
+                f.name: v[..., i if v.shape[-1] > 1 else 0]
+                for f in dataclasses.fields(self.numbers)
+                for v in [getattr(self.numbers, f.name)]
+            },
+        )
+        m = self.mechanism
+        links = [
+            link
+            if link.center is None
+            else replace(
+                link,
+                mass=float(n.mass[k]),
+                center=n.center[:, k],
+                inertia=None if link.inertia is None else n.inertia[:, :, k],
+            )
+            for k, link in enumerate(m.links)
+        ]
+        pairs = [_placed(pair, n, k) for k, pair in enumerate(m.pairs)]
+        return m.replace(links=links, pairs=pairs, loads=[_load_of(load, i) for load in self.loads])
+
+
+def _placed(pair: Pair, n: Declared, k: int) -> Pair:
+    """A pair with the numbers of one variant; a second direction that must be square is made so again."""
+    markers = []
+    for side in (0, 1):
+        axis, second = n.axis[side, :, k], n.second[side, :, k]
+        if pair.type.square_second:
+            second = second - (axis @ second) / (axis @ axis) * axis
+        markers.append(Marker(n.point[side, :, k], axis, second))
+    changes: dict[str, Any] = {"pitch": None, "lead": None}
+    if pair.type.takes_pitch:
+        changes["pitch"] = float(n.pitch[k])
+    if pair.on_a is not None:
+        return pair.replace(on_a=markers[0], on_b=markers[1], **changes)
+    return pair.replace(point=markers[0].point, axis=markers[0].axis, second=markers[0].second, **changes)
+
+
+def _load_of(load: Load, i: int) -> Load:
+    varied = {f.name: getattr(load, f.name) for f in dataclasses.fields(load)}
+    changes: dict[str, Any] = {k: v.values[i].tolist() for k, v in varied.items() if isinstance(v, PerCase)}
+    return replace(load, **changes)
+
+
+def field_values(m: Mechanism, fields: Mapping[str, AnyField]) -> dict[str, float]:
+    """Declared values of fields."""
+    numbers, chained = declared(m), chain_numbers(m)
+    out = {}
+    for name, field in fields.items():
+        if isinstance(field, Field):
+            out[name] = field.read(numbers)
+        elif isinstance(field, ChainField):
+            assert chained is not None
+            out[name] = float(chained[field.kind, field.index])
+        else:
+            value = np.asarray(getattr(m.loads[field.index], field.name), dtype=float)
+            out[name] = float(value if field.component is None else value[field.component])
+    return out
+
+
+def varied(m: Mechanism, fields: Mapping[str, AnyField], values: Array) -> Variants:
+    """Variants of a mechanism in which the fields take ``values (fields, count)``."""
+    count = values.shape[1]
+    numbers, loads = declared(m), list(m.loads)
+    arrays = {f.name: getattr(numbers, f.name) for f in dataclasses.fields(numbers)}
+    chained = None
+    for field, row in zip(fields.values(), values, strict=True):
+        if isinstance(field, Field):
+            if arrays[field.array].shape[-1] != count or arrays[field.array] is getattr(numbers, field.array):
+                arrays[field.array] = np.repeat(arrays[field.array][..., :1], count, axis=-1)
+            for place in field.places:
+                arrays[field.array][place] = field.scale * row
+        elif isinstance(field, ChainField):
+            if chained is None:
+                start = chain_numbers(m)
+                assert start is not None
+                chained = np.repeat(start[:, :, None], count, axis=2)
+            chained[field.kind, field.index] = row
+        else:
+            loads[field.index] = _varied_load(loads[field.index], field, row)
+    if chained is not None:
+        arrays |= _chain_markers(arrays, chained)
+    return Variants(m, Declared(**arrays), tuple(loads), count)
+
+
+def _chain_markers(arrays: Mapping[str, Array], chained: Array) -> dict[str, Array]:
+    """Markers of a chain from its numbers ``(3, n, count)``, in place of those in ``arrays``."""
+    on_a, on_b = markers_of_chain(chained)
+    X = np.stack([on_a, on_b])
+    return {"point": X[:, :, 3], "axis": X[:, :, 2], "second": X[:, :, 0]}
+
+
+def _varied_load(load: Load, field: LoadField, row: Array) -> Load:
+    old = getattr(load, field.name)
+    values = row
+    if field.component is not None:
+        values = old.values.copy() if isinstance(old, PerCase) else np.tile(np.asarray(old, dtype=float), (len(row), 1))
+        values[:, field.component] = row
+    changes: dict[str, Any] = {field.name: PerCase(values)}
+    return replace(load, **changes)
+
+
+def stacked(mechanisms: Sequence[Mechanism]) -> Variants:
+    """Variants from mechanisms of one topology.
+
+    Raises
+    ------
+    DeclarationError
+        where they differ in more than numbers.
+    """
+    first = mechanisms[0]
+    for i, m in enumerate(mechanisms):
+        if topology_of(m) != topology_of(first):
+            raise DeclarationError(
+                f"variants of {first.name!r}",
+                [f"variant {i} differs in links, pairs, drives or loads from the first; only numbers may differ"],
+            )
+    every = [declared(m) for m in mechanisms]
+    numbers = Declared(
+        **{f.name: np.concatenate([getattr(n, f.name) for n in every], axis=-1) for f in dataclasses.fields(Declared)}
+    )
+    loads = tuple(_stacked_loads(group) for group in zip(*(m.loads for m in mechanisms), strict=True))
+    return Variants(first, numbers, loads, len(mechanisms))
+
+
+def topology_of(m: Mechanism) -> tuple[Any, ...]:
+    """What variants must share: names, types and ends of pairs, the way they are placed, drives, kinds of loads, the start."""
+    return (
+        m.link_names(),
+        m.frame,
+        tuple((p.name, p.type, p.a, p.b, p.on_a is None) for p in m.pairs),
+        tuple(d.freedom for d in m.drives),
+        tuple(
+            (load.kind, *(v for f in dataclasses.fields(load) if isinstance(v := getattr(load, f.name), str)))
+            for load in m.loads
+        ),
+        tuple(link.center is None for link in m.links),
+        tuple(link.inertia is None for link in m.links),
+    )
+
+
+def _stacked_loads(loads: Sequence[Load]) -> Load:
+    changes: dict[str, Any] = {}
+    for f in dataclasses.fields(loads[0]):
+        values = [getattr(load, f.name) for load in loads]
+        if all(v == values[0] for v in values):
+            continue
+        if not all(is_numeric(v, np.shape(values[0])) for v in values):
+            raise DeclarationError(
+                f"variants with load {loads[0].kind}",
+                [f"{f.name} differs from variant to variant and is no number or vector; build it once, outside"],
+            )
+        changes[f.name] = PerCase(np.array(values, dtype=float))
+    return replace(loads[0], **changes)

@@ -1,0 +1,135 @@
+"""Kinetostatics of large mechanisms: ``python tests/benchmarks/bench_large.py [--all] [--crossover] [kind ...]`` (one BLAS thread).
+
+For ladders, grids, scissors, trees of loops and spatial ladders: seconds to declare, to solve one position from a closed start (one
+driver, gravity, driver rate 1, all reactions) and to read one pair; the exponent of growth of ``solve`` against the size before; the time
+of one factorization and solution by scipy's splu of a regular matrix of the size and pattern of the Newton-Euler equations, which has
+six rows a moving link and as many reaction components and efforts; and the peak of memory. Every row is measured in a process of its own.
+"""
+
+import os
+import resource
+import subprocess
+import sys
+from math import log
+from pathlib import Path
+from time import perf_counter
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+import numpy as np
+import scipy
+from lattices import LATTICES
+
+import mechgraph as mg
+from mechgraph.force import large
+from mechgraph.topology.linkgraph import link_graph
+
+SIZES = [10, 100, 1_000, 10_000, 100_000]
+NEVER, ALWAYS = 10**9, 0
+
+
+def regular_matrix(m: mg.Mechanism) -> scipy.sparse.csc_array:
+    """Random values in the pattern of the Newton-Euler equations, made square by a matching, whose entries are large (regular)."""
+    graph = link_graph(m)
+    rng = np.random.default_rng(0)
+    rows, cols, at = [], [], 0
+    for k, ends in enumerate(graph.ends):
+        width = 6 - m.pairs[k].type.f + (k == 0)
+        for link in ends:
+            if link != graph.frame:
+                row = link - (link > graph.frame)
+                rows.append(6 * row + np.repeat(np.arange(6), width))
+                cols.append(np.tile(at + np.arange(width), 6))
+        at += width
+    i, j = np.concatenate(rows), np.concatenate(cols)
+    A = scipy.sparse.csr_array((rng.normal(size=len(i)), (i, j)), shape=(6 * (len(m.links) - 1), at))
+    chosen = scipy.sparse.csgraph.maximum_bipartite_matching(A, perm_type="column")
+    assert (chosen >= 0).all()
+    large_part = scipy.sparse.csr_array((np.full(len(chosen), 20.0), (np.arange(len(chosen)), chosen)), shape=A.shape)
+    return (A + large_part)[:, np.sort(chosen)].tocsc()
+
+
+def reference(m: mg.Mechanism) -> float:
+    """Seconds of one factorization and solution by splu."""
+    A = regular_matrix(m)
+    b = np.ones(A.shape[0])
+    begin = perf_counter()
+    scipy.sparse.linalg.splu(A).solve(b)
+    return perf_counter() - begin
+
+
+def measured(kind: str, links: int) -> list[float]:
+    """Links, seconds to declare, to solve and to read one pair, worst check, seconds of the reference, MB."""
+    begin = perf_counter()
+    m = LATTICES[kind](links)
+    declared = perf_counter()
+    s = mg.solve(m, {"J0": mg.Motion(0.0, velocity=1.0)})
+    solved = perf_counter()
+    s["J1"].reaction, s["J1"].components
+    read = perf_counter()
+    worst = max(float(s.checks.closure), float(s.checks.equilibrium))
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return [len(m.links), declared - begin, solved - declared, read - solved, worst, reference(m), peak]
+
+
+def in_own_process(kind: str, links: int) -> list[float]:
+    """The same, measured in a process of its own."""
+    done = subprocess.run(
+        [sys.executable, __file__, "--row", kind, str(links)], capture_output=True, text=True, check=True
+    )
+    return [float(x) for x in done.stdout.split()]
+
+
+def table(kinds: list[str], sizes: list[int]) -> None:
+    """Print one line a mechanism."""
+    head = f"{'kind':10} {'links':>7} {'declare s':>9} {'solve s':>8} {'read s':>7} {'growth':>6} {'splu s':>7} {'ratio':>6}"
+    print(f"{head} {'checks':>8} {'MB':>6}")
+    for kind in kinds:
+        before: tuple[float, float] | None = None
+        for links in sizes:
+            n, declare, solve, read, worst, splu, peak = in_own_process(kind, links)
+            growth = f"{log(solve / before[1]) / log(n / before[0]):6.2f}" if before and n > before[0] else " " * 6
+            print(
+                f"{kind:10} {n:7.0f} {declare:9.3f} {solve:8.3f} {read:7.3f} {growth} {splu:7.3f} {solve / splu:6.2f} "
+                f"{worst:8.1e} {peak:6.0f}",
+                flush=True,
+            )
+            before = (n, solve)
+
+
+def crossover() -> None:
+    """Dense against sparse by rows of the closure Jacobian: ratio of the times, one position and 100 positions."""
+    print(f"{'links':>6} {'rows':>6} {'dense/sparse, 1 position':>26} {'100 positions':>14}")
+    for links in (10, 16, 24, 32, 48, 64, 100):
+        m = LATTICES["four-bars"](links)
+        ratios = []
+        for values in (0.0, np.linspace(0.0, 0.3, 100)):
+            times = []
+            for large.SPARSE_ROWS in (NEVER, ALWAYS):
+                runs = []
+                for _ in range(3):
+                    begin = perf_counter()
+                    mg.solve(m, {"J0": values})
+                    runs.append(perf_counter() - begin)
+                times.append(min(runs))
+            ratios.append(times[0] / times[1])
+        print(f"{len(m.links):6} {6 * len(link_graph(m).loops):6} {ratios[0]:26.2f} {ratios[1]:14.2f}")
+
+
+def main() -> None:
+    """Print what the arguments ask for."""
+    if "--row" in sys.argv:
+        kind, links = sys.argv[-2:]
+        print(*measured(kind, int(links)))
+        return
+    if "--crossover" in sys.argv:
+        crossover()
+        return
+    kinds = [a for a in sys.argv[1:] if a in LATTICES] or list(LATTICES)
+    table(kinds, SIZES if "--all" in sys.argv else SIZES[:-1])
+
+
+if __name__ == "__main__":
+    main()

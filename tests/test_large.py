@@ -1,0 +1,294 @@
+"""Large mechanisms: the sparse path against the dense one, against closed forms, and what it says where nothing is unique."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import mechanisms as known
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from lattices import BAR, LATTICES, ladder, parallelograms, scissors
+from numpy.testing import assert_allclose
+from strategies import body
+
+import mechgraph as mg
+from mechgraph.force import large
+from mechgraph.force.large import SparseAnalysis
+from mechgraph.motion import tree
+from mechgraph.motion.assembly import assembled
+from mechgraph.motion.loops import LoopSystem
+from mechgraph.motion.tree import Tree
+from mechgraph.topology.linkgraph import link_graph
+
+AGREE = 1e-9
+VALUES = ("position", "velocity", "acceleration", "reaction", "total", "effort", "force", "moment")
+NEVER, ALWAYS = 10**9, 0
+
+
+def is_sparse(s: mg.Solution) -> bool:
+    return isinstance(s._values, SparseAnalysis)
+
+
+def solved(m: mg.Mechanism, motion: object, rows: int, **options: str) -> mg.Solution:
+    """The mechanism solved with the crossover at a number of rows."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(large, "SPARSE_ROWS", rows)
+        return mg.solve(m, {m.drives[0].freedom: motion}, **options)
+
+
+def assert_same(one: mg.Solution, other: mg.Solution) -> None:
+    """All values of all pairs agree, NaN in the same places."""
+    assert (one.status == other.status).all()
+    largest = 1.0
+    for what in VALUES:
+        a, b = (np.concatenate([getattr(s[p.name], what).ravel() for p in s.mechanism.pairs]) for s in (one, other))
+        size = np.nanmax(np.abs(a), initial=0.0)
+        largest = max(largest, size) if what in ("reaction", "total", "force") else largest
+        scale = largest if what in ("effort", "moment") else max(1.0, size)
+        assert_allclose(a, b, rtol=0, atol=AGREE * scale, err_msg=what)
+    for p in one.mechanism.pairs:
+        a, b = one[p.name].components, other[p.name].components
+        assert {k: np.isnan(v).tolist() for k, v in a.items()} == {k: np.isnan(v).tolist() for k, v in b.items()}
+
+
+def heavy(m: mg.Mechanism, seed: int) -> mg.Mechanism:
+    """The same with masses, gravity, a spring and a force that turns with its link."""
+    rng = np.random.default_rng(seed)
+    links = [body(rng, link.name, rng.uniform(-1, 1, 3)) if link.name != m.frame else link for link in m.links]
+    a, b = m.links[1].name, m.links[-1].name
+    loads = [
+        mg.Gravity((0.4, -9.81, 0.3)),
+        mg.Spring(a, b, (0, 0, 0), (1, 2, 0.3), stiffness=3.0, free_length=0.4, damping=0.2),
+        mg.Wrench(b, force=(1.0, 2.0, -0.5), point=(0.2, 0.1, 0), frame="link"),
+    ]
+    return m.replace(links=links, loads=loads)
+
+
+FEW = {
+    "windows": lambda: known.windows(5),
+    "parallelograms side by side": lambda: known.windows(6, general=False),
+    "three cranks": known.three_cranks,
+    "rssr-sc": known.rssr_sc,
+    "rccc": known.rccc,
+    "rsur": known.rsur,
+    "planar": known.planar,
+    "spherical": known.spherical,
+    "bennett": known.bennett,
+    "sarrus": known.sarrus,
+    "bricard": known.bricard_cube,
+    "grid": lambda: parallelograms(14),
+    "scissors": lambda: scissors(12),
+}
+
+
+@given(name=st.sampled_from(list(FEW)), seed=st.integers(0, 999), many=st.booleans(), least=st.booleans())
+def test_sparse_and_dense_agree(name: str, seed: int, many: bool, least: bool) -> None:
+    m = heavy(FEW[name](), seed)
+    positions = np.linspace(0.0, 0.2, 4) if many else 0.0
+    motion = mg.Motion(positions, velocity=0.7, acceleration=-0.3)
+    options = {"redundant": "minimum_norm" if least else "nan"}
+    sparse, dense = (solved(m, motion, rows, **options) for rows in (ALWAYS, NEVER))
+    assert is_sparse(sparse)
+    assert not is_sparse(dense)
+    assert_same(sparse, dense)
+    assert np.max(sparse.checks.equilibrium) < 1e-11
+    assert np.max(np.abs(sparse.checks.power)) < 1e-11
+
+
+@pytest.mark.parametrize("name", LATTICES)
+def test_three_hundred_links(name: str) -> None:
+    """Above the crossover by themselves, against the dense path."""
+    m = LATTICES[name](300 if name in ("ladder", "scissors") else 130)
+    motion = mg.Motion(0.02, velocity=1.0)
+    sparse = mg.solve(m, {"J0": motion})
+    assert is_sparse(sparse)
+    assert_same(sparse, solved(m, motion, NEVER))
+
+
+@pytest.mark.parametrize("method", ["newton_euler", "loop_wrench"])
+def test_both_methods_agree_in_a_large_mechanism(method: str) -> None:
+    m = LATTICES["spatial"](40)
+    one = solved(m, 0.0, ALWAYS, method=method)
+    assert is_sparse(one)
+    assert_same(one, solved(m, 0.0, NEVER))
+
+
+@pytest.mark.reference
+def test_effort_of_a_ladder_of_parallelograms() -> None:
+    """Virtual work: every crank turns like the first and every rod moves like a crank's head.
+
+    ``tau = g cos(a) l (m (n + 1) / 2 + m n)`` with ``a`` the angle of the cranks and ``l`` their length.
+    """
+    m = ladder(400, equal=True)
+    n = (len(m.links) - 2) // 2
+    turns = np.linspace(0.0, 0.5, 3)
+    s = mg.solve(m, {"J0": turns})
+    length, angle = np.hypot(0.5, 1.0), np.arctan2(1.0, 0.5) + turns
+    expected = 9.81 * BAR * length * np.cos(angle) * ((n + 1) / 2 + n)
+    assert_allclose(s["J0"].effort[:, 0], expected, rtol=1e-10)
+
+
+@pytest.mark.reference
+def test_rates_of_a_chain_of_scissors() -> None:
+    """All crossings turn alike, and the end moves n times as far along the chain as one of them opens it."""
+    m = scissors(200)
+    s = mg.kinematics(m, {"J0": mg.Motion(0.0, velocity=1.0)})
+    n = len(m.links) // 2
+    for i in (1, n // 2, n - 1):
+        assert_allclose(np.abs(s[f"J{3 * i}"].velocity), 1.0, rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", LATTICES)
+def test_verdicts_are_those_of_the_dense_check(name: str) -> None:
+    """NaN in a solution exactly where the report says that a component is not unique."""
+    m = LATTICES[name](14)
+    s = solved(m, 0.0, ALWAYS)
+    assert is_sparse(s)
+    unique = mg.check(m).unique
+    for p in m.pairs:
+        found = {k: not np.isnan(v) for k, v in s[p.name].components.items()}
+        assert found == {k: v for k, v in unique[p.name].items() if k != "effort"}
+
+
+def test_independent_cases_and_flagged_positions() -> None:
+    m = ladder(120)
+    motion = mg.Motion(np.array([[0.0, 0.1, 0.2], [0.0, -0.1, -0.2]]), velocity=1.0)
+    assert_same(solved(m, motion, ALWAYS), solved(m, motion, NEVER))
+
+
+def crank_rocker_ladder() -> mg.Mechanism:
+    """A ladder whose first crank cannot turn fully."""
+    return known.windows(60).replace(drives=["A0"])
+
+
+def test_the_end_of_the_reach_is_found() -> None:
+    m = crank_rocker_ladder()
+    with pytest.raises((mg.ReachError, mg.DeadPointError)) as caught:
+        mg.solve(m, {"A0": np.linspace(0.0, 2 * np.pi, 60)})
+    flagged = mg.solve(m, {"A0": np.linspace(0.0, 2 * np.pi, 60)}, on_reach="flag")
+    assert is_sparse(flagged)
+    dense = solved(m, np.linspace(0.0, 2 * np.pi, 60), NEVER, on_reach="flag")
+    first = [int(np.flatnonzero(s.status != "ok")[0]) for s in (flagged, dense)]
+    assert first[0] == first[1]
+    assert 0 < first[0] < 60
+    assert caught.value.value["A0.Rz"] == pytest.approx(np.linspace(0.0, 2 * np.pi, 60)[first[0]], abs=0.11)
+
+
+def test_parallelograms_stop_at_their_change_point() -> None:
+    """Folded flat, a parallelogram can go on as an antiparallelogram: a dead point, not a silent choice."""
+    m = ladder(120, equal=True)
+    turns = np.linspace(0.0, 3.0, 61)
+    flat = np.pi - np.arctan2(1.0, 0.5)
+    s = mg.solve(m, {"J0": turns}, on_reach="flag")
+    assert is_sparse(s)
+    assert (s.status[turns < flat - 0.05] == "ok").all()
+    assert (s.status[turns > flat + 0.05] != "ok").all()
+
+
+def test_what_the_sparse_path_leaves_to_the_dense_one() -> None:
+    """Small mechanisms, passive freedoms, and freedoms left free (an error, as ever)."""
+    assert not is_sparse(mg.solve(mg.load("7r"), {"O1": 0.1}))
+    assert not is_sparse(solved(mg.load("rssr").replace(loads=()), 0.0, ALWAYS))
+    free = known.grid(5).replace(drives=["N0_0v0_0"])
+    with pytest.raises(mg.IndeterminateError):
+        mg.solve(free, {"N0_0v0_0": 0.0})
+
+
+def test_what_neither_path_can_hold_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(large, "DENSE_ROWS", 5)
+    with pytest.raises(mg.MechgraphError, match="passive freedoms"):
+        mg.solve(mg.load("rssr"), {"A": 0.1})
+
+
+@pytest.mark.parametrize("name", FEW)
+def test_a_bordered_system_proves_the_rank(name: str) -> None:
+    system, x = assembled(FEW[name]())
+    here = system.at(x[:, None])
+    driven = np.array([0])
+    loops = LoopSystem.at(here, driven)
+    J = np.delete(here.J[:, :, 0], driven, axis=1)
+    assert loops.regular
+    assert loops.rank == np.linalg.matrix_rank(J, 1e-9)
+    assert loops.redundant == J.shape[0] - loops.rank
+    assert loops.held == J.shape[1] - loops.rank
+    stress = loops.random_stress(loops.first, here.S[:, :, 0], np.random.default_rng(1), 3)
+    flat = np.moveaxis(stress, 0, 1).reshape(J.shape[0], 3)
+    assert np.abs(J.T @ flat).max(initial=0.0) < 1e-11 * np.abs(flat).max(initial=1.0)
+
+
+def test_dependent_rows_and_columns_are_no_proof() -> None:
+    """Concurrent cranks move instantaneously though their count forbids it: the pivots say that nothing is proved."""
+    system, x = assembled(known.concurrent_cranks())
+    loops = LoopSystem.at(system.at(x[:, None]), np.zeros(0, dtype=np.intp))
+    assert not loops.regular
+
+
+def test_factors_of_one_pattern_are_renewed() -> None:
+    """The second factorization takes the column order of the first; determinant sign and solutions are the same."""
+    system, x = assembled(ladder(40))
+    here = system.at(x[:, None])
+    loops = LoopSystem.at(here, np.array([0]))
+    again = loops.factor(here.S[:, :, 0])
+    b = np.random.default_rng(2).normal(size=(6 * len(system.graph.loops), 2))
+    assert_allclose(loops.solve(again, b), loops.solve(loops.first, b), atol=1e-11)
+    tau = np.random.default_rng(3).normal(size=(system.n_freedoms, 2))
+    assert_allclose(loops.solve_transposed(again, tau), loops.solve_transposed(loops.first, tau), atol=1e-10)
+    assert again.sign == loops.first.sign != 0
+
+
+def test_deep_trees_by_pointer_doubling(monkeypatch: pytest.MonkeyPatch) -> None:
+    m = scissors(60)
+    system, _ = assembled(m)
+    rng = np.random.default_rng(4)
+    n, P = len(m.links), len(m.pairs)
+    relative = system.at(system.state_of(rng.uniform(-1, 1, (system.n_freedoms, 2)))).poses[:, :, :1].repeat(P, axis=2)
+    relative[:, 3] += rng.normal(size=(3, P, 2))
+    terms, loads = rng.normal(size=(6, P, 2)), rng.normal(size=(6, n, 2))
+    frame = system.par.frame
+    shallow = Tree(link_graph(m))
+    monkeypatch.setattr(tree, "DEEP", 0)
+    deep = Tree(link_graph(m))
+    assert deep.deep
+    assert not shallow.deep
+    assert_allclose(deep.poses(relative, frame), shallow.poses(relative, frame), atol=1e-11)
+    assert_allclose(deep.sums(terms), shallow.sums(terms), atol=1e-11)
+    assert_allclose(deep.carried(loads), shallow.carried(loads), atol=1e-11)
+
+
+@pytest.mark.parametrize("name", LATTICES)
+def test_five_thousand_links(name: str) -> None:
+    m = LATTICES[name](5000)
+    s = mg.solve(m, {"J0": mg.Motion(0.0, velocity=1.0)})
+    assert is_sparse(s)
+    assert s.checks.closure < 1e-10
+    assert s.checks.equilibrium < 1e-10
+    assert abs(s.checks.power) < 1e-8
+    planar = name != "spatial"
+    assert np.isnan(s["J7"].components["Fz"]) == planar
+    assert np.isfinite([s["J7"].components[k] for k in ("Fx", "Fy")]).all()
+    report = mg.check(m)
+    assert report.mobility == 1
+    assert report.redundancy == (3 * len(report.graph.loops) if planar else 0)
+
+
+def test_a_thousand_links_along_a_path() -> None:
+    m = ladder(1000)
+    s = mg.solve(m, {"J0": mg.Motion(np.linspace(0.0, 0.3, 12), velocity=1.0)})
+    assert is_sparse(s)
+    assert (s.status == "ok").all()
+    assert s["J5"].reaction.shape == (12, 6)
+    assert np.max(s.checks.equilibrium) < 1e-11
+
+
+def test_a_new_load_leaves_links_and_pairs_as_they_are() -> None:
+    m = ladder(20)
+    other = m.replace(loads=[mg.Gravity((0, 0, -1))], drives=["J1"])
+    assert other.links is m.links
+    assert other.pairs is m.pairs
+    assert other.drives == (mg.Drive("J1"),)
+    with pytest.raises(mg.DeclarationError, match="nothing"):
+        m.replace(drives=["nothing"])
+    heavier = m.replace(links=[dataclasses.replace(k, mass=0.0, inertia=None) for k in m.links])
+    assert heavier != m
