@@ -23,7 +23,8 @@ from mechgraph.motion import idle
 from mechgraph.motion.assembly import CLOSED, assembled, assembled_at, named_columns, state_rows
 from mechgraph.motion.follow import SparseSolver
 from mechgraph.motion.idle import Idle, held_well, spin_angles
-from mechgraph.motion.path import SINGULAR, Follower, Positions, Status
+from mechgraph.motion.march import SINGULAR, Status
+from mechgraph.motion.path import Follower, Positions
 from mechgraph.motion.rates import DEAD_POINT, Rates, closure_solver, distance_to_dead_point, rates
 from mechgraph.motion.system import Configuration, Index, System
 from mechgraph.numerics.linear import Choice, ChosenSystem, independent_rows, rank_of, singular_values
@@ -187,7 +188,7 @@ class Run:
             found = self._without_spin(found, bodies)
         status = np.array([s.value for s in found.status.reshape(-1)], dtype="U24").reshape(self.batch)
         good = np.flatnonzero(status.reshape(-1) == Status.OK.value)
-        here = found.here if found.here is not None and good.size == found.here.T else None
+        here = found.here[0] if len(found.here) == 1 and good.size == found.here[0].T else None
         here = here or self.evaluated(found.x.reshape(self.system.n_state, status.size)[:, good], good)
         which, choices = found.which.reshape(-1)[good], found.choices
         solver = closure_solver(here, choices, which)
@@ -246,7 +247,7 @@ class Run:
                 path = np.concatenate([start[:, None], x[:, c, at]], axis=1)
                 which = found.which[c, np.concatenate([at[:1], at])]
                 x[:, c, at] = self._turned_back(system, path, found.choices, which, bodies)[:, 1:]
-        return dataclasses.replace(found, x=x, here=None)
+        return dataclasses.replace(found, x=x, here=())
 
     def _turned_back(
         self, system: System, x: Array, choices: list[Choice], which: Index, bodies: tuple[Idle, ...]

@@ -15,7 +15,8 @@ from mechgraph.force.kinetostatics import CONTRADICTION, Run, forces_of
 from mechgraph.model.load import Load
 from mechgraph.model.motion_law import Motion
 from mechgraph.motion.lockstep import Lockstep
-from mechgraph.motion.path import Positions, Status
+from mechgraph.motion.march import Status
+from mechgraph.motion.path import Positions
 from mechgraph.motion.system import Configuration, Index, System
 from mechgraph.result.solution import Solution
 from mechgraph.variants.fields import Variants
