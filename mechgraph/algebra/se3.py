@@ -14,7 +14,8 @@ Array = NDArray[np.float64]
 
 def cross(a: Array, b: Array, out: Array | None = None) -> Array:
     """Vector product of ``(3, ...)`` arrays along the first axis, into ``out`` where given."""
-    out = np.empty(np.broadcast_shapes(a.shape, b.shape)) if out is None else out
+    if out is None:
+        out = np.empty(a.shape if a.shape == b.shape else np.broadcast_shapes(a.shape, b.shape))
     part = np.empty(out.shape[1:])
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         row = out[i, ...]
@@ -156,11 +157,16 @@ def rotation_log(R: Array) -> Array:
     cosine = 0.5 * (R[0, 0] + R[1, 1] + R[2, 2] - 1.0)
     if not (cosine > -0.5).all():
         return quaternion_log(matrix_quaternion(R))
-    s = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    s = np.empty((3, *R.shape[2:]))
+    for i, j, k in ((0, 2, 1), (1, 0, 2), (2, 1, 0)):
+        np.subtract(R[j, k], R[k, j], out=s[i, ...])
+    s *= 0.5
     sine = np.sqrt((s * s).sum(axis=0))
-    small = sine < 1e-8
-    factor = np.where(small, 1.0, np.arctan2(sine, cosine) / np.where(small, 1.0, sine))
-    return np.asarray(factor * s)
+    angle = np.arctan2(sine, cosine)
+    # below this size sine and angle are the same number
+    sine[...] = np.where(sine < 1e-8, angle + (angle == 0.0), sine)
+    s *= angle / sine
+    return s
 
 
 def pose_exp(s: Array) -> Array:
@@ -186,8 +192,18 @@ def pose_log(X: Array) -> Array:
     """
     w = rotation_log(X[:, :3])
     angle2 = (w * w).sum(axis=0)
-    small = angle2 < 1e-6
-    half = 0.5 * np.sqrt(np.where(small, 1.0, angle2))
-    c = np.where(small, 1 / 12 + angle2 / 720, (1 - half / np.tan(half)) / (4 * half**2))
+    if (angle2 < 1e-6).all():
+        c = 1 / 12 + angle2 / 720
+    else:
+        small = angle2 < 1e-6
+        half = 0.5 * np.sqrt(np.where(small, 1.0, angle2))
+        c = np.where(small, 1 / 12 + angle2 / 720, (1 - half / np.tan(half)) / (4 * half**2))
+    out = np.empty((6, *X.shape[2:]))
     wp = cross(w, X[:, 3])
-    return np.concatenate([w, X[:, 3] - 0.5 * wp + c * cross(w, wp)])
+    out[:3] = w
+    cross(w, wp, out[3:])
+    out[3:] *= c
+    wp *= 0.5
+    out[3:] -= wp
+    out[3:] += X[:, 3]
+    return out

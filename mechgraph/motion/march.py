@@ -39,15 +39,15 @@ CORRECTION = 0.06
 """Largest correction that a node may need; keeps the continuation on its branch."""
 AIM = 0.005
 """Correction that the step control aims at."""
-QUICK = 0.01
+QUICK = 0.02
 """Correction up to which one evaluation is enough for a node (it is closed with all others at the end)."""
-SHIFT = 1e-3
+SHIFT = 0.02
 """Largest shift of a node in that last closing."""
 FAIR = 1e3
 """Condition number of the closure equations above which another choice of rows and columns is tried."""
 ROUNDING = 1e-15
 """Closure residual that nodes are brought to, so that what is interpolated between them needs no correction."""
-PAST = 3
+PAST = 2
 """Nodes from which the next one is predicted."""
 SINGULAR = 1e9
 """Condition number of the closure equations above which a position counts as a dead point."""
@@ -226,7 +226,7 @@ class Marcher:
     @staticmethod
     def _next(points: Array, lengths: Array, last: Node, h: float, halts: Array) -> float:
         """The furthest path point within ``h`` to which the path is straight, or the place at ``h`` where none is within."""
-        ahead = np.flatnonzero((lengths > last.at) & (lengths <= last.at + h))
+        ahead = np.arange(*np.searchsorted(lengths, (last.at, last.at + h), side="right"))
         between = halts[(halts > last.at) & (halts <= last.at + h)]
         if not ahead.size:
             return float(min(last.at + h, lengths[-1]))

@@ -51,6 +51,12 @@ class Tree:
             for pairs, forward, parents, children in self.levels
         ]
 
+    @cached_property
+    def _back(self) -> Place | None:
+        """Pairs of the tree that lead inwards, from b to a; None where there are none."""
+        back = np.sort(self.pairs[~self.forward])
+        return compact(back) if back.size else None
+
     @property
     def _whole(self) -> Step:
         """All pairs of the tree in one step."""
@@ -68,7 +74,7 @@ class Tree:
         return out
 
     def poses(self, relative: Array, frame: Array) -> Array:
-        """Poses ``(3, 4, N, T)`` of all links from those of b seen from a, ``relative (3, 4, P, T)``."""
+        """Poses ``(3, 4, N, T)`` of all links from those of b seen from a, ``relative (3, 4, P, T)``, which is used up."""
         if not self.deep:
             return self._poses_by_levels(relative, frame)
         X = identity(self.n_links, relative.shape[3])
@@ -82,12 +88,10 @@ class Tree:
     def _poses_by_levels(self, relative: Array, frame: Array) -> Array:
         X = np.empty((3, 4, self.n_links, relative.shape[3]))
         X[:, :, self.frame] = frame
-        for pairs, forward, parents, children in self._walk:
-            step = relative[:, :, pairs]
-            if forward is not None:
-                step = step.copy()
-                step[:, :, ~forward] = inverse(step[:, :, ~forward])
-            X[:, :, children] = compose(X[:, :, parents], step)
+        if self._back is not None:
+            relative[:, :, self._back] = inverse(relative[:, :, self._back])
+        for pairs, _, parents, children in self._walk:
+            X[:, :, children] = compose(X[:, :, parents], relative[:, :, pairs])
         return X
 
     def sums(self, relative: Array) -> Array:

@@ -33,6 +33,8 @@ def rank_of(sigma: Array, tolerance: float = RANK_TOLERANCE) -> int:
 
 WEAK = (1e-3, 1e-8)
 """Part of a row that must be independent of the rows chosen before: wanted, and at least."""
+FEW = 64
+"""Number of places up to which they are added to one by one."""
 VANISHING = 1e-8
 """Size of a row below which it is not chosen."""
 KEEP = 0.1
@@ -76,7 +78,11 @@ def compact(index: Index) -> Place:
 
 def add_at(out: Array, index: Index, values: Array) -> None:
     """Add ``values (6, n, T)`` to the places ``index (n,)`` of the second axis of ``out``; places may repeat."""
-    np.add.at(np.moveaxis(out, 1, 0), index, np.moveaxis(values, 1, 0))
+    if len(index) > FEW:
+        np.add.at(np.moveaxis(out, 1, 0), index, np.moveaxis(values, 1, 0))
+        return
+    for i, place in enumerate(index):
+        out[:, place] += values[:, i]
 
 
 def scattered_sum(values: Array, index: Index, count: int) -> Array:
