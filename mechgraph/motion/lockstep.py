@@ -225,6 +225,8 @@ def _ahead(front: _Front, change: Array) -> Array:
             out += 0.5 * h**2 * first
             slope = first
         else:
-            out += np.where(straight, (h**3 / 3 + 0.5 * back * h**2) / (back + length), 0.0) * (slope - first)
+            out += np.where(straight, (h**3 / 3 + 0.5 * back * h**2) / np.where(straight, back + length, 1.0), 0.0) * (
+                slope - first
+            )
         newer, back = older, back + length
     return np.asarray(out)
