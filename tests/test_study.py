@@ -265,7 +265,7 @@ def test_same_seed_same_result_whatever_the_executor(monkeypatch: pytest.MonkeyP
                     motions=RCSR,
                     executor=executor,
                     progress=lambda done, of: calls.append((done, of)),
-                )  # fmt: skip
+                )
             )
     here = mg.study(
         mg.load("rcsr"),
