@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
-import networkx as nx
 import numpy as np
 
 from mechgraph.errors import DeclarationError
@@ -351,9 +350,15 @@ def _declaration_faults(m: Mechanism) -> list[str]:
 
 
 def _connection_faults(m: Mechanism) -> list[str]:
-    graph = nx.Graph([(p.a, p.b) for p in m.pairs])
-    graph.add_nodes_from(m.link_names())
-    reached = nx.node_connected_component(graph, m.frame)
+    near: dict[str, list[str]] = {name: [] for name in m.link_names()}
+    for p in m.pairs:
+        near[p.a].append(p.b)
+        near[p.b].append(p.a)
+    reached, ahead = {m.frame}, [m.frame]
+    while ahead:
+        new = set(near[ahead.pop()]) - reached
+        reached |= new
+        ahead += new
     return [
         f"link {name!r} is not connected to the frame {m.frame!r} by any chain of pairs; add the pair that holds it"
         for name in m.link_names()
