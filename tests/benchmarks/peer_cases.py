@@ -85,9 +85,7 @@ def bricard() -> mg.Mechanism:
     for k in range(5):
         start, end = corners[k], corners[k + 1]
         links.append(mg.Link(names[k + 1], 1.0, (start + end) / 2, mg.inertia.cylinder(1.0, 0.005, 1.0, end - start)))
-    pairs = [
-        mg.Pair(f"O{k + 1}", "R", names[k], names[(k + 1) % 6], point=corners[k], axis=axes[k]) for k in range(6)
-    ]
+    pairs = [mg.Pair(f"O{k + 1}", "R", names[k], names[(k + 1) % 6], point=corners[k], axis=axes[k]) for k in range(6)]
     return mg.Mechanism("bricard", links, pairs, drives=["O1"], loads=[mg.Gravity((0, -9.81, 0))])
 
 
@@ -125,9 +123,7 @@ def body_of(link: mg.Link, s: mg.Solution) -> Body:
     at = s.link(link.name)
     turned = at.pose[:3, :3]
     inertia = np.zeros((3, 3)) if link.inertia is None else np.asarray(link.inertia)
-    return Body(
-        link.name, link.mass, at.center, turned @ inertia @ turned.T, at.center_velocity, at.angular_velocity
-    )
+    return Body(link.name, link.mass, at.center, turned @ inertia @ turned.T, at.center_velocity, at.angular_velocity)
 
 
 def joint_of(pair: mg.Pair, s: mg.Solution) -> Joint:
