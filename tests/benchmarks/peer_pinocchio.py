@@ -1,4 +1,4 @@
-"""Driver torque and all reactions over a cycle with Pinocchio, as its documentation teaches: a tree, closed by a constraint.
+"""Driver torque and all reactions over a cycle with Pinocchio: a tree of joints, closed by a constraint.
 
 The loop is cut in the frame: the last link carries a frame that has to stay where it is (six rows). What a user writes: the tree,
 Newton for the closure, its rates, the constraint force from the rows of the passive joints, and one more recursion for the reactions.
