@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import concurrent.futures
 import os
 import pickle
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from typing import Any
 
 import numpy as np
@@ -41,7 +41,7 @@ def study(
     *,
     motions: Mapping[str, Any] | None = None,
     sampling: str = "random",
-    executor: Executor | None = None,
+    executor: concurrent.futures.Executor | None = None,
     method: str = "loop_wrench",
     redundant: str = "nan",
     progress: Progress | None = None,
@@ -147,7 +147,9 @@ def _as_rows(name: str, motion: Motion, count: int) -> Motion:
     return Motion(rows(motion.position), rows(motion.velocity), rows(motion.acceleration), rows(motion.t))
 
 
-def _all_solved(tasks: Sequence[Task], executor: Executor | None, progress: Progress | None) -> list[Part]:
+def _all_solved(
+    tasks: Sequence[Task], executor: concurrent.futures.Executor | None, progress: Progress | None
+) -> list[Part]:
     done: dict[int, Part] = {}
     for i, part in _streamed(tasks, executor):
         done[i] = part
@@ -156,23 +158,25 @@ def _all_solved(tasks: Sequence[Task], executor: Executor | None, progress: Prog
     return [done[i] for i in range(len(tasks))]
 
 
-def _streamed(tasks: Sequence[Task], executor: Executor | None) -> Iterator[tuple[int, Part]]:
+def _streamed(tasks: Sequence[Task], executor: concurrent.futures.Executor | None) -> Iterator[tuple[int, Part]]:
     """Parts as they come: from the executor, from processes of this machine where there is much to do, or from here."""
     workers = os.cpu_count() or 1
     if executor is not None:
         yield from _submitted(tasks, executor)
     elif len(tasks) > 2 and workers > 1 and _can_be_sent(tasks[0]):
-        with ProcessPoolExecutor(min(workers, len(tasks))) as pool:
+        with concurrent.futures.ProcessPoolExecutor(min(workers, len(tasks))) as pool:
             yield from _submitted(tasks, pool)
     else:
         for i, task in enumerate(tasks):
             yield i, solved(task)
 
 
-def _submitted(tasks: Sequence[Task], executor: Executor) -> Iterator[tuple[int, Part]]:
-    futures: dict[Future[Part], int] = {executor.submit(solved, task): i for i, task in enumerate(tasks)}
+def _submitted(tasks: Sequence[Task], executor: concurrent.futures.Executor) -> Iterator[tuple[int, Part]]:
+    futures: dict[concurrent.futures.Future[Part], int] = {
+        executor.submit(solved, task): i for i, task in enumerate(tasks)
+    }
     try:
-        for future in as_completed(futures):
+        for future in concurrent.futures.as_completed(futures):
             yield futures[future], future.result()
     finally:
         for future in futures:
