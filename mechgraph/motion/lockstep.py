@@ -24,7 +24,7 @@ LONGEST = 0.1
 """Longest step, in driver space (radians, or lengths / L)."""
 ITERATIONS = 6
 """Most Newton iterations in a step."""
-LAST = 1e-7
+LAST = 1e-8
 """Closure residual from which one more Newton step ends an iteration: its square is rounding."""
 FAIR = 1e3
 """Condition number of the closure equations above which another choice of rows and columns is tried."""
