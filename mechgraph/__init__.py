@@ -26,6 +26,8 @@ from mechgraph.model.pair import Bookkeeping, Component, Freedom, PairType, pair
 from mechgraph.model.toml import load, save
 from mechgraph.result.solution import Solution
 from mechgraph.structure.report import DeterminacyReport, check
+from mechgraph.variants.result import Study
+from mechgraph.variants.study import study
 
 __all__ = [
     "AssemblyError",
@@ -52,6 +54,7 @@ __all__ = [
     "ReachError",
     "Solution",
     "Spring",
+    "Study",
     "TorsionSpring",
     "Wrench",
     "assemble",
@@ -65,4 +68,5 @@ __all__ = [
     "pair_types",
     "save",
     "solve",
+    "study",
 ]

@@ -26,7 +26,7 @@ def run(script: Path, *arguments: str) -> str:
 
 
 def draws(script: Path) -> bool:
-    return "draw_skeleton" in script.read_text(encoding="utf-8")
+    return "sys.argv" in script.read_text(encoding="utf-8") and "draw" in script.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("script", EXAMPLES, ids=lambda script: script.stem)

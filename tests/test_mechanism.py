@@ -461,3 +461,11 @@ def test_unknown_names_in_a_solution_are_told_with_the_known_ones():
         s["B"]
     with pytest.raises(mg.DeclarationError, match="door"):
         s.link("gate")
+
+
+def test_a_freedom_given_twice_by_two_spellings_is_refused() -> None:
+    m = mg.load("four-bar")
+    with pytest.raises(mg.DeclarationError, match=r"A\.Rz is given twice"):
+        mg.solve(m, {"A": 0.1, "A.Rz": 0.2})
+    with pytest.raises(mg.DeclarationError, match=r"A\.Rz is given twice"):
+        mg.check(m, at={"A": 0.1, "A.Rz": 0.2})

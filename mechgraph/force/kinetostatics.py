@@ -84,6 +84,9 @@ def driven(m: Mechanism, motions: Mapping[str, Any] | None) -> tuple[Mechanism, 
         if why or m.full_name(name) not in known:
             faults.append(f"motion of {name!r}: {why or 'is not a drive'}; drives: {', '.join(known) or 'none'}")
             continue
+        if m.full_name(name) in out:
+            faults.append(f"motion of {name!r}: {m.full_name(name)} is given twice")
+            continue
         motion = _as_motion(value, name, faults)
         if motion is not None:
             out[m.full_name(name)] = motion

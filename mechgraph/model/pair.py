@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -201,32 +202,17 @@ class PairType:
         directed: bool = True,
         square_second: bool = False,
     ) -> None:
-        faults: list[str] = []
-        if not isinstance(symbol, str) or not symbol.isidentifier():
-            faults.append(f"symbol {symbol!r}: expected letters and digits, starting with a letter")
-        rows, before = _freedoms(freedoms, faults)
-        parts = None
-        if reactions is not None:
-            parts = tuple(c for c in (_component(r, faults, "reaction") for r in reactions) if c is not None)
-        if efforts is None:
-            work = tuple(_dual_effort(f, k) for f, k in zip(rows, before, strict=True))
-        else:
-            given = [c for c in (_component(e, faults, "effort") for e in efforts) if c is not None]
-            work = tuple(given)
-        fields = {
-            "symbol": symbol,
-            "name": name or str(symbol),
-            "freedoms": rows,
-            "reactions": parts,
-            "efforts": work,
-            "bookkeeping": bookkeeping,
-            "directed": directed,
-            "square_second": square_second,
-            "frame_before": before,
-            "computed_efforts": False,
-        }
-        for key, value in fields.items():
-            object.__setattr__(self, key, value)
+        faults = _fill(
+            self,
+            symbol,
+            name,
+            freedoms,
+            reactions,
+            efforts,
+            bookkeeping,
+            directed=directed,
+            square_second=square_second,
+        )
         if not faults and efforts is None:
             object.__setattr__(self, "computed_efforts", not _dual_at_random(self))
         if not faults:
@@ -293,6 +279,47 @@ class PairType:
 
     def __repr__(self) -> str:
         return f"PairType({self.symbol!r}, {self.name!r}, f={self.f})"
+
+
+def _fill(
+    row: PairType,
+    symbol: str,
+    name: str,
+    freedoms: Sequence[object],
+    reactions: Sequence[object] | None,
+    efforts: Sequence[object] | None = None,
+    bookkeeping: Bookkeeping | None = None,
+    *,
+    directed: bool = True,
+    square_second: bool = False,
+) -> list[str]:
+    """Set the fields of a new row; the faults of what is given, before any number is tried."""
+    faults: list[str] = []
+    if not isinstance(symbol, str) or not symbol.isidentifier():
+        faults.append(f"symbol {symbol!r}: expected letters and digits, starting with a letter")
+    rows, before = _freedoms(freedoms, faults)
+    parts = None
+    if reactions is not None:
+        parts = tuple(c for c in (_component(r, faults, "reaction") for r in reactions) if c is not None)
+    if efforts is None:
+        work = tuple(_dual_effort(f, k) for f, k in zip(rows, before, strict=True))
+    else:
+        work = tuple(c for c in (_component(e, faults, "effort") for e in efforts) if c is not None)
+    fields = {
+        "symbol": symbol,
+        "name": name or str(symbol),
+        "freedoms": rows,
+        "reactions": parts,
+        "efforts": work,
+        "bookkeeping": bookkeeping,
+        "directed": directed,
+        "square_second": square_second,
+        "frame_before": before,
+        "computed_efforts": False,
+    }
+    for key, value in fields.items():
+        object.__setattr__(row, key, value)
+    return faults
 
 
 def _scaled_arm(c: Component, L: float) -> Component:
@@ -412,58 +439,65 @@ class PairTable(Mapping[str, PairType]):
         return to_text(Document("Pair types", (Table(header, tuple(rows)),)))
 
 
+def _row(symbol: str, name: str, freedoms: Sequence[object], reactions: Sequence[object], **rest: Any) -> PairType:
+    """A row of the table, not tried at random positions: a test does that for all of them, once and not at every start."""
+    row = object.__new__(PairType)
+    _fill(row, symbol, name, freedoms, reactions, **rest)
+    return row
+
+
 TABLE = PairTable(
     [
-        PairType(
+        _row(
             "R",
             "revolute",
             freedoms=["Rz"],
             reactions=["Fx", "Fy", "Fz", "Mx", "My"],
             bookkeeping=Bookkeeping(_AXIS, (_FZ,)),
         ),
-        PairType(
+        _row(
             "P",
             "prismatic",
             freedoms=["Tz"],
             reactions=["Fx", "Fy", "Mx", "My", "Mz"],
             bookkeeping=Bookkeeping(_AXIS, (_MZ,)),
         ),
-        PairType(
+        _row(
             "H",
             "helical",
             freedoms=["Rz + pitch Tz"],
             reactions=["Fx", "Fy", "Mx", "My", _SCREW_FZ],
             bookkeeping=Bookkeeping(_AXIS, (_SCREW_FZ,)),
         ),
-        PairType(
+        _row(
             "C",
             "cylindrical",
             freedoms=["Rz", "Tz"],
             reactions=["Fx", "Fy", "Mx", "My"],
             bookkeeping=Bookkeeping(_AXIS, ()),
         ),
-        PairType(
+        _row(
             "U",
             "universal (slotted sphere)",
             freedoms=["Rz", "Rx"],
             reactions=["Fx", "Fy", "Fz", "My@1"],
             square_second=True,
         ),
-        PairType("S", "spherical", freedoms=["rotation"], reactions=["Fx", "Fy", "Fz"], directed=False),
-        PairType("E", "planar", freedoms=["Tx", "Ty", "Rz"], reactions=["Fz", "Mx", "My"]),
-        PairType(
+        _row("S", "spherical", freedoms=["rotation"], reactions=["Fx", "Fy", "Fz"], directed=False),
+        _row("E", "planar", freedoms=["Tx", "Ty", "Rz"], reactions=["Fz", "Mx", "My"]),
+        _row(
             "Sc",
             "sphere in slotted cylinder",
             freedoms=["Tz", "Ry", "Rx"],
             reactions=["Fx@1", "Fy@1", "Mz@2"],
             square_second=True,
         ),
-        PairType("Sg", "sphere in groove", freedoms=["Tz", "rotation"], reactions=["Fx@1", "Fy@1"]),
-        PairType(
+        _row("Sg", "sphere in groove", freedoms=["Tz", "rotation"], reactions=["Fx@1", "Fy@1"]),
+        _row(
             "Cp", "cylinder on plane", freedoms=["Tx", "Ty", "Rz", "Rx"], reactions=["Fz@2", "My@3"], square_second=True
         ),
-        PairType("Sp", "sphere on plane", freedoms=["Tx", "Ty", "rotation"], reactions=["Fz@2"]),
-        PairType("W", "weld", freedoms=[], reactions=["Fx", "Fy", "Fz", "Mx", "My", "Mz"], directed=False),
+        _row("Sp", "sphere on plane", freedoms=["Tx", "Ty", "rotation"], reactions=["Fz@2"]),
+        _row("W", "weld", freedoms=[], reactions=["Fx", "Fy", "Fz", "Mx", "My", "Mz"], directed=False),
     ]
 )
 

@@ -111,6 +111,8 @@ def named_columns(m: Mechanism, system: System, values: Mapping[str, float]) -> 
             continue
         k, j = m.freedom(name)
         column = int(system.first_column[k]) + j
+        if column in columns:
+            faults.append(f"{name}: {m.full_name(name)} is given twice")
         columns.append(column)
         numbers.append(float(value) / (system.par.L if system.is_length[column] else 1.0))
     if faults:

@@ -24,7 +24,7 @@ LONGEST = 0.1
 """Longest step, in driver space (radians, or lengths / L)."""
 ITERATIONS = 6
 """Most Newton iterations in a step."""
-LAST = 1e-7
+LAST = 1e-8
 """Closure residual from which one more Newton step ends an iteration: its square is rounding."""
 FAIR = 1e3
 """Condition number of the closure equations above which another choice of rows and columns is tried."""
@@ -225,6 +225,8 @@ def _ahead(front: _Front, change: Array) -> Array:
             out += 0.5 * h**2 * first
             slope = first
         else:
-            out += np.where(straight, (h**3 / 3 + 0.5 * back * h**2) / (back + length), 0.0) * (slope - first)
+            out += np.where(straight, (h**3 / 3 + 0.5 * back * h**2) / np.where(straight, back + length, 1.0), 0.0) * (
+                slope - first
+            )
         newer, back = older, back + length
     return np.asarray(out)

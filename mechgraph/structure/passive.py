@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations, pairwise
 
-import networkx as nx
 import numpy as np
 
 from mechgraph.algebra.screw import null_space
@@ -65,6 +64,8 @@ def passive_motions(here: Configuration, left: Array, driven: Index) -> list[Pas
     """Independent passive motions with the freedoms ``driven`` at rest; ``left (F, p)`` are all motions that leave free."""
     if not left.shape[1]:
         return []
+    import networkx as nx
+
     found: list[PassiveMotion] = []
     search = _Search(here, driven)
     sharing: nx.Graph[int] = nx.Graph()

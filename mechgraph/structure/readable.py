@@ -6,7 +6,6 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import networkx as nx
 import numpy as np
 
 from mechgraph.algebra.screw import null_space
@@ -80,6 +79,10 @@ def combinations(
 
 def regrouped(states: Sequence[SelfStress]) -> tuple[SelfStress, ...]:
     """The states with group numbers made anew: states that share a component belong together."""
+    if len(states) < 2:
+        return tuple(dataclasses.replace(s, group=0) for s in states)
+    import networkx as nx
+
     names = [{*s.components, *(f"effort {name}" for name in s.efforts)} for s in states]
     place = {name: i for i, name in enumerate(dict.fromkeys(name for part in names for name in sorted(part)))}
     graph: nx.Graph[int] = nx.Graph()

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import networkx as nx
 import numpy as np
 
 from mechgraph.algebra.screw import null_space
@@ -123,6 +122,8 @@ def self_stresses(here: Configuration, driven: Index, found: Uniqueness) -> tupl
 
 def _group_count(here: Configuration, found: Bordered | Elimination, unique: dict[str, dict[str, bool]]) -> int:
     """Sets of loops with self-stresses that share a pair some component of which is not unique."""
+    import networkx as nx
+
     m, loops = here.system.m, here.system.graph.loops
     home = {i: number for number, (_, members) in enumerate(found.sets) for i in members}
     graph: nx.Graph[int] = nx.Graph()

@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
-import networkx as nx
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 from mechgraph.model.mechanism import Mechanism
+
+if TYPE_CHECKING:
+    import networkx as nx
 
 Loop = tuple[tuple[int, int], ...]
 """A loop as (pair index, sign) in the order in which it is run through."""
@@ -72,6 +75,8 @@ class LinkGraph:
 
 def network(m: Mechanism) -> nx.MultiGraph[str]:
     """The mechanism as a networkx multigraph; edge keys are pair names, nodes and edges carry ``link`` and ``pair``."""
+    import networkx as nx
+
     graph: nx.MultiGraph[str] = nx.MultiGraph(name=m.name)
     for link in m.links:
         graph.add_node(link.name, link=link)

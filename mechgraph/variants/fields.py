@@ -141,17 +141,22 @@ def _load_field(m: Mechanism, name: str, index: int, rest: str) -> LoadField | s
 
 @dataclass(frozen=True)
 class Variants:
-    """``count`` variants of one mechanism: declared numbers and loads with a batch axis (``PerCase`` where a load varies)."""
+    """``count`` variants of one mechanism: declared numbers and loads with a batch axis (``PerCase`` where a load varies).
+
+    Those ``missing`` could not be built; the numbers of the mechanism itself stand in their places.
+    """
 
     mechanism: Mechanism
     numbers: Declared
     loads: tuple[Load, ...]
     count: int
+    missing: tuple[int, ...] = ()
 
     def valid(self) -> NDArray[np.bool_]:
         """Which variants are physical: finite numbers, no negative mass, axes of some length, possible inertias, ``(count,)``."""
         n = self.numbers
         ok = np.ones(self.count, dtype=bool)
+        ok[list(self.missing)] = False
         for field in dataclasses.fields(n):
             values = getattr(n, field.name)
             ok &= np.isfinite(values).all(axis=tuple(range(values.ndim - 1)))

@@ -68,6 +68,22 @@ def test_freedoms_and_components_are_named_as_in_the_design(symbol, freedoms, co
     assert list(row.component_names) == components.split()
 
 
+@pytest.mark.parametrize("row", mg.pair_types().values(), ids=list(mg.pair_types()))
+def test_rows_of_the_table_pass_the_checks_of_a_user_row(row):
+    """The table is built without the trials at random positions; made by the constructor, each row is the same."""
+    freedoms = ["rotation" if len(group) == 3 else row.freedoms[group[0]] for group in row.factors]
+    tried = mg.PairType(
+        row.symbol,
+        row.name,
+        freedoms=freedoms,
+        reactions=row.reactions,
+        bookkeeping=row.bookkeeping,
+        directed=row.directed,
+        square_second=row.square_second,
+    )
+    assert tried == row
+
+
 @each_row
 def test_reactions_do_no_work(row):
     """S^T W = 0."""

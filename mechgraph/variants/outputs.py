@@ -1,0 +1,112 @@
+"""What a study keeps of every variant: quantities of a Solution by name, or functions of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.errors import DeclarationError
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.result.solution import LinkResult, PairResult, Solution
+
+Output = str | Callable[[Solution], Any]
+
+OF_SOLUTION = ("shaking",)
+OF_CHECKS = ("closure", "equilibrium", "power")
+
+
+def _properties(kind: type) -> tuple[str, ...]:
+    return tuple(n for n, v in vars(kind).items() if isinstance(v, property) and n not in ("units", "components"))
+
+
+OF_PAIR, OF_LINK = _properties(PairResult), _properties(LinkResult)
+
+
+def named_outputs(m: Mechanism, outputs: Any) -> dict[str, Output]:
+    """Outputs by name, from a quantity, several, or a mapping name -> quantity or function.
+
+    Raises
+    ------
+    DeclarationError
+        with all names that are no quantity.
+    """
+    if isinstance(outputs, str):
+        outputs = [outputs]
+    if not isinstance(outputs, Mapping):
+        if not isinstance(outputs, Iterable) or not all(isinstance(name, str) for name in outputs):
+            raise DeclarationError(
+                "study: outputs", [f"{outputs!r}: expected names, or a mapping name -> name or function of a Solution"]
+            )
+        outputs = {name: name for name in outputs}
+    faults = [
+        fault
+        for name, what in outputs.items()
+        if (fault := None if callable(what) else _fault(m, name, what)) is not None
+    ]
+    if faults or not outputs:
+        raise DeclarationError("study: outputs", faults or ["no outputs; name at least one, e.g. 'A.effort'"])
+    return dict(outputs)
+
+
+def _fault(m: Mechanism, name: str, what: Any) -> str | None:
+    if isinstance(what, str) and _found(m, what):
+        return None
+    pair = m.pairs[0]
+    return (
+        f"{name!r}: {what!r} is no quantity; expected e.g. '{pair.name}.effort', '{pair.name}.position', "
+        f"'{pair.freedom_names[0] if pair.freedom_names else pair.name}', '{pair.name}:{(*pair.type.component_names, 'Fx')[0]}', "
+        f"'{m.links[-1].name}.center', 'shaking', or a function of a Solution"
+    )
+
+
+def _found(m: Mechanism, text: str) -> Callable[[Solution], Any] | None:
+    """The quantity of that name: of a pair, a freedom, a component, a link, or the whole."""
+    if text in OF_SOLUTION:
+        return lambda s: getattr(s, text)
+    if text in OF_CHECKS:
+        return lambda s: getattr(s.checks, text)
+    if text in m.freedom_names():
+        k, j = m.freedom(text)
+        return lambda s: s[m.pairs[k].name].position[..., j]
+    owner, colon, part = text.partition(":")
+    if colon and owner in m.pair_index and part in m.pair(owner).type.component_names:
+        return lambda s: s[owner].components[part]
+    owner, _, part = text.rpartition(".")
+    if owner in m.pair_index and part in OF_PAIR:
+        return lambda s: getattr(s[owner], part)
+    if owner in m.link_index and part in OF_LINK:
+        return lambda s: getattr(s.link(owner), part)
+    return None
+
+
+def quantity(s: Solution, name: str, what: Output) -> Array:
+    """An output of a solution of variants ``(V, N)``, ``(V, ...)``; a last axis of length one (of a pair with one freedom) is dropped.
+
+    Raises
+    ------
+    DeclarationError
+        where a function fails or gives no array with one entry for every variant.
+    """
+    if isinstance(what, str):
+        found = _found(s.mechanism, what)
+        assert found is not None
+        value = np.asarray(found(s))
+        return value[..., 0] if value.ndim > len(s.batch) and value.shape[-1] == 1 else value
+    try:
+        value = np.asarray(what(s), dtype=float)
+    except Exception as error:
+        raise DeclarationError(
+            f"study: output {name!r}", [f"its function failed: {type(error).__name__}: {error}"]
+        ) from error
+    if not value.ndim or value.shape[0] != s.batch[0]:
+        raise DeclarationError(
+            f"study: output {name!r}",
+            [
+                f"its function gave shape {value.shape} for {s.batch[0]} variants; quantities of a study are (variants, positions, ...): "
+                "reduce over axis 1, not over the variants"
+            ],
+        )
+    return value

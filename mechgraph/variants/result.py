@@ -1,0 +1,209 @@
+"""What a study found: labelled arrays, quantiles, sensitivities, and every variant as a mechanism to check by itself."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.errors import DeclarationError, MissingExtraError
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.motion_law import Motion
+from mechgraph.motion.path import Status
+from mechgraph.variants.sampling import reach, spread
+from mechgraph.variants.work import Part, Source
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+
+class Study:
+    """Results of ``study``; arrays have the variants first, then the positions, then components.
+
+    Attributes
+    ----------
+    parameters : name -> values ``(n,)``.
+    outputs : name -> array ``(n, ...)``, NaN where a variant or position was not solved.
+    nominal : name -> array ``(...)`` of the mechanism itself.
+    status : named outcomes ``(n, positions)``.
+    messages : variant -> why it could not be solved.
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        ways: Mapping[str, Any],
+        values: Array,
+        steps: Array,
+        names: Sequence[str],
+        motions: Mapping[str, Motion],
+        near: Part,
+        parts: Sequence[Part],
+    ) -> None:
+        self._source, self._ways, self._values, self._steps, self._near = source, ways, values, steps, near
+        self.motions = MappingProxyType(dict(motions))
+        self.parameters: Mapping[str, Array] = MappingProxyType(dict(zip(ways, values, strict=True)))
+        self.status: NDArray[np.str_] = np.concatenate([part.status for part in parts])
+        shape = next((part.outputs for part in [near, *parts] if part.outputs is not None), None)
+        shapes = {name: self.status.shape[1:] if shape is None else shape[name].shape[1:] for name in names}
+        self.outputs: Mapping[str, Array] = MappingProxyType(
+            {
+                name: np.concatenate(
+                    [
+                        np.full((len(part.status), *shapes[name]), np.nan)
+                        if part.outputs is None
+                        else part.outputs[name]
+                        for part in parts
+                    ]
+                )
+                for name in names
+            }
+        )
+        self.messages: dict[int, str] = {}
+        first = 0
+        for part in parts:
+            self.messages |= {first + i: text for i, text in part.messages.items()}
+            first += len(part.status)
+
+    def __repr__(self) -> str:
+        bad = int(self.failed.sum())
+        return f"Study({self._source.mechanism.name!r}, {len(self.status)} variants, {bad} not solved, outputs {', '.join(self.outputs)})"
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """The mechanism itself."""
+        return self._source.mechanism
+
+    @property
+    def failed(self) -> NDArray[np.bool_]:
+        """Variants some position of which was not solved, ``(n,)``."""
+        return np.asarray((self.status != Status.OK.value).any(axis=1))
+
+    def variant(self, i: int) -> Mechanism:
+        """The ``i``-th variant as a mechanism, to be solved and checked by itself.
+
+        Raises
+        ------
+        DeclarationError
+            where no such mechanism can be.
+        """
+        return self._source.one(self._values[:, i])
+
+    # --- what varies with what ---------------------------------------------------------------------------------------------
+
+    def _output(self, name: str) -> Array:
+        if name not in self.outputs:
+            raise DeclarationError("study", [f"{name!r} is no output; outputs: {', '.join(self.outputs)}"])
+        return self.outputs[name]
+
+    @property
+    def nominal(self) -> Mapping[str, Array]:
+        """Outputs of the mechanism itself."""
+        return {name: self._near_output(name)[0] for name in self.outputs}
+
+    def _near_output(self, name: str) -> Array:
+        self._output(name)
+        if self._near.outputs is None:
+            return np.full((len(self._near.status), *self.outputs[name].shape[1:]), np.nan)
+        return self._near.outputs[name]
+
+    def quantiles(self, name: str, q: Any = (0.00135, 0.5, 0.99865)) -> Array:
+        """Quantiles of an output over the variants that were solved, ``(*shape of q, ...)``; NaN where none was."""
+        values = self._output(name)
+        some = np.isfinite(values).any(axis=0)
+        found = np.nanquantile(np.where(some, values, 0.0), q, axis=0)
+        return np.where(some, found, np.nan)
+
+    def mean(self, name: str) -> Array:
+        """Mean of an output over the variants that were solved."""
+        values = self._output(name)
+        count = np.isfinite(values).sum(axis=0)
+        return np.where(count > 0, np.nansum(values, axis=0) / np.maximum(count, 1), np.nan)
+
+    def std(self, name: str) -> Array:
+        """Standard deviation of an output over the variants that were solved (of the sample, ``n - 1``)."""
+        values = self._output(name)
+        count = np.isfinite(values).sum(axis=0)
+        squares = np.nansum((values - self.mean(name)) ** 2, axis=0)
+        return np.where(count > 1, np.sqrt(squares / np.maximum(count - 1, 1)), np.nan)
+
+    def sensitivities(self, name: str) -> dict[str, Array]:
+        """Derivative of an output after every parameter at the mechanism itself, ``(...)`` each, by central differences."""
+        near = self._near_output(name)
+        k = len(self._ways)
+        return {
+            parameter: (near[1 + j] - near[1 + k + j]) / (2 * self._steps[j])
+            if self._steps[j]
+            else np.zeros_like(near[0])
+            for j, parameter in enumerate(self._ways)
+        }
+
+    @cached_property
+    def _ends(self) -> Array:
+        """Furthest departures of every parameter from the mechanism itself, ``(parameters, 2)``."""
+        return np.array([reach(way) for way in self._ways.values()]) - self._source.start[:, None]
+
+    def worst_case(self, name: str) -> tuple[Array, Array]:
+        """Smallest and largest value of an output, to first order, with every parameter at its worse end.
+
+        ``f_0 + sum_j min(or max)(df/dp_j low_j, df/dp_j high_j)``; a distribution without end ends at three standard deviations (of a
+        normal one). Compare with the extremes of the sample: the mechanism may be far from linear.
+        """
+        middle = self._near_output(name)[0]
+        moves = [
+            np.stack([g * end for end in ends])
+            for g, ends in zip(self.sensitivities(name).values(), self._ends, strict=True)
+        ]
+        low, high = (
+            middle + sum((pick(move, axis=0) for move in moves), np.zeros_like(middle)) for pick in (np.min, np.max)
+        )
+        return low, high
+
+    def linear_std(self, name: str) -> Array:
+        """Standard deviation to first order, ``sqrt(sum_j (df/dp_j sigma_j)^2)``, parameters independent, sigma their spread."""
+        sigma = [spread(way) for way in self._ways.values()]
+        return np.sqrt(
+            sum(
+                ((g * s) ** 2 for g, s in zip(self.sensitivities(name).values(), sigma, strict=True)),
+                start=np.array(0.0),
+            )
+        )
+
+    # --- tables --------------------------------------------------------------------------------------------------------------
+
+    def to_xarray(self) -> xarray.Dataset:
+        """A Dataset over variants and positions, parameters as coordinates of the variants (``xarray`` extra)."""
+        xr = _optional("xarray")
+        N = self.status.shape[1]
+        data: dict[str, Any] = {}
+        for name, values in self.outputs.items():
+            placed = values.ndim > 1 and values.shape[1] == N
+            rest = [f"{name} {i}" for i in range(values.ndim - 1 - placed)]
+            data[name] = (["variant", *(["position"] if placed else []), *rest], values)
+        data["status"] = (["variant", "position"], self.status)
+        return xr.Dataset(
+            data,
+            coords={name: ("variant", values) for name, values in self.parameters.items()},
+            attrs={"mechanism": self.mechanism.name},
+        )
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A DataFrame, one row a variant: parameters, outputs that are one number a variant, positions not solved (``pandas`` extra)."""
+        pd = _optional("pandas")
+        single = {name: values for name, values in self.outputs.items() if values.ndim == 1}
+        missing = (self.status != Status.OK.value).sum(axis=1)
+        return pd.DataFrame({**self.parameters, **single, "positions not solved": missing})
+
+
+def _optional(module: str) -> Any:
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        raise MissingExtraError(module, module) from None

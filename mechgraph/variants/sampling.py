@@ -1,0 +1,100 @@
+"""Samples of numbers that vary: at random, by Latin hypercube, or on a grid. A new way of sampling is a new row of ``SAMPLINGS``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.errors import DeclarationError
+
+TAIL = 0.00135
+"""Part of a distribution without end beyond which nothing is looked at: three standard deviations of a normal one."""
+SPREAD = (0.15866, 0.84134)
+"""Quantiles whose half distance is called the spread: the standard deviation of a normal distribution."""
+
+
+@dataclass(frozen=True)
+class Levels:
+    """Numbers that a parameter may take, each as likely as the others; in place of a distribution."""
+
+    values: Array
+
+    def ppf(self, u: Any) -> Array:
+        """The number at quantile ``u`` (0 to 1)."""
+        at = np.minimum((np.asarray(u) * len(self.values)).astype(int), len(self.values) - 1)
+        return np.asarray(self.values[at])
+
+
+def distributions(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Every parameter as something with quantiles ``ppf``.
+
+    Raises
+    ------
+    DeclarationError
+        where a value is neither a distribution nor a sequence of numbers.
+    """
+    out, faults = {}, []
+    for name, given in parameters.items():
+        if hasattr(given, "ppf"):
+            out[name] = given
+            continue
+        try:
+            levels = np.asarray(given, dtype=float)
+        except (TypeError, ValueError):
+            levels = np.array(np.nan)
+        if levels.ndim != 1 or not levels.size or not np.isfinite(levels).all():
+            faults.append(
+                f"{name!r} = {given!r}: expected a distribution of scipy.stats, e.g. scipy.stats.norm(10, 0.1), or a sequence of numbers"
+            )
+        else:
+            out[name] = Levels(np.sort(levels))
+    if faults:
+        raise DeclarationError("study: parameters", faults)
+    return out
+
+
+def reach(distribution: Any) -> tuple[float, float]:
+    """Smallest and largest value; where a distribution has no end, its quantiles at ``TAIL``."""
+    low, high = (float(distribution.ppf(u)) for u in (0.0, 1.0))
+    return (
+        low if np.isfinite(low) else float(distribution.ppf(TAIL)),
+        high if np.isfinite(high) else float(distribution.ppf(1 - TAIL)),
+    )
+
+
+def spread(distribution: Any) -> float:
+    """Half the distance of the quantiles ``SPREAD``; where that is zero, half the reach."""
+    low, high = (float(distribution.ppf(u)) for u in SPREAD)
+    if high == low:
+        low, high = reach(distribution)
+    return (high - low) / 2
+
+
+def _random(ways: Sequence[Any], n: int, rng: np.random.Generator) -> Array:
+    return _quantiles(ways, rng.random((n, len(ways))))
+
+
+def _latin(ways: Sequence[Any], n: int, rng: np.random.Generator) -> Array:
+    return _quantiles(ways, scipy.stats.qmc.LatinHypercube(d=len(ways), seed=rng).random(n))
+
+
+def _grid(ways: Sequence[Any], n: int, rng: np.random.Generator) -> Array:
+    levels = [w.values if isinstance(w, Levels) else w.ppf((np.arange(n) + 0.5) / n) for w in ways]
+    return np.stack([part.reshape(-1) for part in np.meshgrid(*levels, indexing="ij")])
+
+
+def _quantiles(ways: Sequence[Any], u: Array) -> Array:
+    return np.stack([np.asarray(w.ppf(column), dtype=float) for w, column in zip(ways, u.T, strict=True)])
+
+
+SAMPLINGS: dict[str, Callable[[Sequence[Any], int, np.random.Generator], Array]] = {
+    "random": _random,
+    "latin": _latin,
+    "grid": _grid,
+}
+"""Ways of sampling by name: ``(distributions, n, generator) -> (parameters, samples)``."""

@@ -1,0 +1,192 @@
+"""Studies of many variants: tolerances, sweeps of a design, Monte Carlo, with quantiles and sensitivities."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import os
+import pickle
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.errors import DeclarationError
+from mechgraph.force.kinetostatics import REDUNDANT, driven
+from mechgraph.force.methods import METHODS
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.motion_law import Motion
+from mechgraph.variants.fields import AnyField, field_values, find_field
+from mechgraph.variants.outputs import named_outputs
+from mechgraph.variants.result import Study
+from mechgraph.variants.sampling import SAMPLINGS, distributions, spread
+from mechgraph.variants.work import Part, Source, Task, motion_of_case, solved
+
+CHUNK = 60_000
+"""Positions of all variants that are solved together: bounds the memory."""
+MOST_TOGETHER = 500
+"""Variants that are followed together: their arrays stay in the cache."""
+DIFFERENCE = 1e-4
+"""Step of the central differences of the sensitivities, as a part of the spread of the parameter."""
+
+Progress = Callable[[int, int], None]
+
+
+def study(
+    m: Mechanism | Callable[..., Mechanism],
+    parameters: Mapping[str, Any],
+    outputs: Any,
+    n: int = 1000,
+    seed: int = 0,
+    *,
+    motions: Mapping[str, Any] | None = None,
+    sampling: str = "random",
+    executor: concurrent.futures.Executor | None = None,
+    method: str = "loop_wrench",
+    redundant: str = "nan",
+    progress: Progress | None = None,
+) -> Study:
+    """Solve many variants of one mechanism, and what varies with what.
+
+    Parameters
+    ----------
+    m : a mechanism; or a function ``build(**parameters)`` that returns one, always of the same topology.
+    parameters : declared number -> distribution of ``scipy.stats`` or numbers. Declared numbers are named as in
+        ``mechgraph.variants.fields``: ``crank.mass``, ``B.on_a.point.x``, ``loads[0].stiffness``, ``length[2]`` of a chain.
+    outputs : quantities by name (``"A.effort"``, ``"B.force"``, ``"B:Fx"``, ``"coupler.center"``), or a mapping name -> quantity or
+        function of a Solution with the batch ``(variants, positions)``.
+    n : number of variants; on a grid, of levels of every distribution (numbers are taken as they are).
+    seed : of the sample. The same seed gives the same result, whatever the executor.
+    motions : of the drivers as in ``solve``; a leading axis of length ``n`` gives every variant its own.
+    sampling : ``"random"``, ``"latin"`` (Latin hypercube) or ``"grid"``.
+    executor : any ``concurrent.futures`` Executor, e.g. that of a cluster; left out, the processors of this machine.
+    method, redundant : as in ``solve``.
+    progress : called with the numbers of parts done and of all parts.
+
+    Returns
+    -------
+    Study
+        A variant that cannot be built, assembled or moved has NaN in its outputs and says so in ``status`` and ``messages``; it
+        never stops the others. Every variant starts on the branch to which the mechanism itself is led when its numbers change
+        into those of the variant; one for which that is not beyond doubt is solved by itself, as ``solve`` does. A passive body
+        whose centre is off its line stands as it comes to stand on that way.
+
+    Raises
+    ------
+    DeclarationError
+        with all faults of parameters and outputs at once. Errors of the mechanism itself as in ``solve``.
+    """
+    ways = distributions(parameters)
+    faults = [
+        f"{what} = {value!r}: expected one of {', '.join(known)}"
+        for what, value, known in (
+            ("sampling", sampling, SAMPLINGS),
+            ("method", method, METHODS),
+            ("redundant", redundant, REDUNDANT),
+        )
+        if value not in known
+    ]
+    if not ways:
+        faults.append("parameters: none are named")
+    if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
+        faults.append(f"n = {n!r}: expected a whole number, at least 1")
+    if faults:
+        raise DeclarationError("study", faults)
+    source, given = _source(m, ways, motions)
+    kept = named_outputs(source.mechanism, outputs)
+    values = SAMPLINGS[sampling](list(ways.values()), int(n), np.random.default_rng(seed))
+    paths = {name: _as_rows(name, motion, values.shape[1]) for name, motion in given.items()}
+    steps = np.array([DIFFERENCE * spread(way) for way in ways.values()])
+    near = np.concatenate([np.zeros((len(steps), 1)), np.diag(steps), -np.diag(steps)], axis=1) + source.start[:, None]
+
+    def task(part: Array, at: slice) -> Task:
+        own = {name: motion_of_case(motion, at) for name, motion in paths.items()}
+        return Task(source, part, own, kept, method, redundant)
+
+    size = max(1, min(MOST_TOGETHER, CHUNK // max(motion.shape[-1] for motion in paths.values())))
+    tasks = [task(near, slice(0, 1))]
+    tasks += [task(values[:, i : i + size], slice(i, i + size)) for i in range(0, values.shape[1], size)]
+    parts = _all_solved(tasks, executor, progress)
+    return Study(source, ways, values, steps, tuple(kept), paths, parts[0], parts[1:])
+
+
+def _source(
+    m: Mechanism | Callable[..., Mechanism], ways: Mapping[str, Any], motions: Mapping[str, Any] | None
+) -> tuple[Source, dict[str, Motion]]:
+    names = tuple(ways)
+    if isinstance(m, Mechanism):
+        own, given = driven(m, motions)
+        found = {name: find_field(own, name) for name in names}
+        faults = [fault for fault in found.values() if isinstance(fault, str)]
+        if faults:
+            raise DeclarationError(f"study of {m.name!r}", faults)
+        fields: dict[str, AnyField] = {name: f for name, f in found.items() if not isinstance(f, str)}
+        start = field_values(own, fields)
+        return Source(own, names, np.array([start[name] for name in names]), fields), given
+    start_values = np.array([float(way.ppf(0.5)) for way in ways.values()])
+    first = m(**dict(zip(names, start_values.tolist(), strict=True)))
+    if not isinstance(first, Mechanism):
+        raise DeclarationError("study", [f"the function gave {type(first).__name__}; expected a Mechanism"])
+    own, given = driven(first, motions)
+    if own is not first:
+        raise DeclarationError(f"study of {first.name!r}", ["declare the drives in the function that builds it"])
+    return Source(own, names, start_values, build=m), given
+
+
+def _as_rows(name: str, motion: Motion, count: int) -> Motion:
+    """The motion as ``(1 or count, N)``."""
+    shape = motion.shape if len(motion.shape) > 1 else (1, *(motion.shape or (1,)))
+    if len(shape) != 2 or shape[0] not in (1, count) or not shape[1]:
+        raise DeclarationError(
+            "study", [f"motion of {name!r}: shape {motion.shape}; expected positions, or {count} variants x positions"]
+        )
+
+    def rows(values: Any) -> Any:
+        return None if values is None else np.broadcast_to(values, motion.shape).reshape(shape)
+
+    return Motion(rows(motion.position), rows(motion.velocity), rows(motion.acceleration), rows(motion.t))
+
+
+def _all_solved(
+    tasks: Sequence[Task], executor: concurrent.futures.Executor | None, progress: Progress | None
+) -> list[Part]:
+    done: dict[int, Part] = {}
+    for i, part in _streamed(tasks, executor):
+        done[i] = part
+        if progress is not None:
+            progress(len(done), len(tasks))
+    return [done[i] for i in range(len(tasks))]
+
+
+def _streamed(tasks: Sequence[Task], executor: concurrent.futures.Executor | None) -> Iterator[tuple[int, Part]]:
+    """Parts as they come: from the executor, from processes of this machine where there is much to do, or from here."""
+    workers = os.cpu_count() or 1
+    if executor is not None:
+        yield from _submitted(tasks, executor)
+    elif len(tasks) > 2 and workers > 1 and _can_be_sent(tasks[0]):
+        with concurrent.futures.ProcessPoolExecutor(min(workers, len(tasks))) as pool:
+            yield from _submitted(tasks, pool)
+    else:
+        for i, task in enumerate(tasks):
+            yield i, solved(task)
+
+
+def _submitted(tasks: Sequence[Task], executor: concurrent.futures.Executor) -> Iterator[tuple[int, Part]]:
+    futures: dict[concurrent.futures.Future[Part], int] = {
+        executor.submit(solved, task): i for i, task in enumerate(tasks)
+    }
+    try:
+        for future in concurrent.futures.as_completed(futures):
+            yield futures[future], future.result()
+    finally:
+        for future in futures:
+            future.cancel()
+
+
+def _can_be_sent(task: Task) -> bool:
+    """Whether a task can go to another process: functions typed at a prompt, or without a name, cannot."""
+    try:
+        pickle.dumps(task)
+    except Exception:
+        return False
+    return True

@@ -1,0 +1,147 @@
+"""The work of a study in parts that can be sent to other processes: some variants solved together, the rest one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.errors import DeclarationError, MechgraphError
+from mechgraph.force.kinetostatics import solve
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.motion_law import Motion
+from mechgraph.result.solution import Solution
+from mechgraph.variants.batch import solve_together
+from mechgraph.variants.fields import AnyField, Variants, stacked, topology_of, varied
+from mechgraph.variants.outputs import Output, quantity
+
+Build = Callable[..., Mechanism]
+NOT_SOLVED = "not solved"
+"""Status of a variant that could not be built or assembled; its message says why."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where variants come from: fields of a mechanism, or a function that builds one; ``start`` are its own values."""
+
+    mechanism: Mechanism
+    names: tuple[str, ...]
+    start: Array
+    fields: Mapping[str, AnyField] | None = None
+    build: Build | None = None
+
+    def one(self, values: Array) -> Mechanism:
+        """The mechanism for ``values (parameters,)``."""
+        if self.build is None:
+            return self._varied(values[:, None]).one(0)
+        made = self.build(**dict(zip(self.names, values.tolist(), strict=True)))
+        if not isinstance(made, Mechanism):
+            raise DeclarationError("study", [f"the function gave {type(made).__name__}; expected a Mechanism"])
+        if topology_of(made) != topology_of(self.mechanism):
+            raise DeclarationError(
+                f"study of {self.mechanism.name!r}",
+                ["a variant differs in links, pairs, drives or loads from the first; only numbers may differ"],
+            )
+        return made
+
+    def _varied(self, values: Array) -> Variants:
+        assert self.fields is not None
+        return varied(self.mechanism, self.fields, values)
+
+    def variants(self, values: Array, s: float) -> Variants:
+        """Variants on the way ``s`` from the mechanism itself (0) to ``values (parameters, count)`` (1)."""
+        if self.build is None:
+            return self._varied(self.start[:, None] + s * (values - self.start[:, None]))
+        if s == 0.0:
+            return stacked([self.mechanism] * values.shape[1])
+        made: list[Mechanism] = []
+        missing = []
+        for i, column in enumerate((self.start[:, None] + s * (values - self.start[:, None])).T):
+            try:
+                made.append(self.one(column))
+            except Exception:  # told where this variant is solved alone
+                made.append(self.mechanism)
+                missing.append(i)
+        return replace(stacked(made), missing=tuple(missing))
+
+
+@dataclass(frozen=True)
+class Task:
+    """Some variants to be solved: ``values (parameters, count)``, motions ``(1 or count, N)``, and what is kept of them."""
+
+    source: Source
+    values: Array
+    motions: Mapping[str, Motion]
+    outputs: Mapping[str, Output]
+    method: str
+    redundant: str
+
+
+@dataclass(frozen=True)
+class Part:
+    """What came of a task: outputs ``(count, ...)`` (None where no variant could be solved), status ``(count, N)``, messages."""
+
+    outputs: dict[str, Array] | None
+    status: NDArray[np.str_]
+    messages: dict[int, str]
+
+
+def solved(task: Task) -> Part:
+    """Solve the variants of a task: together where they can be followed in step, alone where not."""
+    count = task.values.shape[1]
+    together, alone = solve_together(
+        lambda s: task.source.variants(task.values, s), task.motions, task.method, task.redundant
+    )
+    N = max(motion.shape[-1] for motion in task.motions.values())
+    status = np.full((count, N), NOT_SOLVED, dtype="U24")
+    found: dict[str, Array] | None = None
+    if together is not None:
+        status[~alone] = together.status[~alone]
+        found = {name: _writable(quantity(together, name, what)) for name, what in task.outputs.items()}
+    messages = {}
+    for i in np.flatnonzero(alone):
+        try:
+            s = _solved_alone(task, int(i))
+        except MechgraphError as error:
+            messages[int(i)] = str(error)
+            s = None
+        if s is not None:
+            status[i] = s.status[0]
+            values = {name: quantity(s, name, what) for name, what in task.outputs.items()}
+            found = found or {name: np.full((count, *v.shape[1:]), np.nan) for name, v in values.items()}
+            for name, v in values.items():
+                found[name][i] = v[0]
+        elif found is not None:
+            for v in found.values():
+                v[i] = np.nan
+    return Part(found, status, messages)
+
+
+def _writable(values: Array) -> Array:
+    return np.array(values, dtype=float)
+
+
+def _solved_alone(task: Task, i: int) -> Solution:
+    """One variant by itself, positions out of reach flagged, as a batch ``(1, N)``."""
+    try:
+        m = task.source.one(task.values[:, i])
+    except MechgraphError:
+        raise
+    except Exception as error:
+        raise DeclarationError("study", [f"the function failed: {type(error).__name__}: {error}"]) from error
+    motions = {name: motion_of_case(motion, i) for name, motion in task.motions.items()}
+    return solve(m, motions, method=task.method, redundant=task.redundant, on_reach="flag")
+
+
+def motion_of_case(motion: Motion, cases: int | slice) -> Motion:
+    """The motion of some cases, ``(1 or count, N)``."""
+    one = slice(cases, cases + 1) if isinstance(cases, int) else cases
+
+    def part(values: Any) -> Any:
+        return None if values is None else values[one] if np.shape(values)[0] > 1 else values
+
+    return Motion(part(motion.position), part(motion.velocity), part(motion.acceleration), part(motion.t))

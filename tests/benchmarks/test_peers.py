@@ -1,0 +1,60 @@
+"""What the benchmarks hand to other programs, and how they report; without those programs, and without a clock."""
+
+import bench_peers
+import numpy as np
+import peer_mechgraph
+import pytest
+from peer_cases import cases
+
+import mechgraph as mg
+
+CASES = {case.mechanism.name: case for case in cases(24)}
+each_case = pytest.mark.parametrize("case", CASES.values(), ids=list(CASES))
+
+
+@each_case
+def test_bodies_and_joints_are_the_mechanism(case):
+    """Declared anew from the numbers alone, the mechanism needs the same torque, and the power balances."""
+    s = mg.solve(case.mechanism, {case.driver: case.motion})
+    torque, wrenches = peer_mechgraph.solve(case)
+    np.testing.assert_allclose(torque, s[case.driver].effort[:, 0], atol=1e-9 * np.abs(torque).max())
+    assert wrenches.shape == (len(case.joints), 24, 6)
+    assert np.abs(s.checks.power).max() < 1e-11
+
+
+@each_case
+def test_joints_go_round_the_loop(case):
+    ends = [case.frame, *(joint.b for joint in case.joints)]
+    assert [joint.a for joint in case.joints] == ends[:-1]
+    assert ends[-1] == case.frame
+    assert [body.name for body in case.bodies] == ends[1:-1]
+    for joint in case.joints:
+        np.testing.assert_allclose(joint.axes.T @ joint.axes, np.eye(3), atol=1e-12)
+
+
+@each_case
+def test_velocities_are_those_of_the_first_step(case):
+    """Velocity of a mass centre against the difference of its places."""
+    step = 1e-6
+    q, rate = case.motion.position[0], case.turned()[1][0]
+    s = mg.kinematics(case.mechanism, {case.driver: np.array([q - step * rate, q, q + step * rate])})
+    for body in case.bodies:
+        place = s.link(body.name).center
+        np.testing.assert_allclose(body.velocity, (place[2] - place[0]) / (2 * step), rtol=1e-6, atol=1e-6)
+
+
+def test_a_program_that_is_not_installed_says_so(monkeypatch):
+    monkeypatch.setattr(bench_peers, "PEERS", {"Other": "no_such_program"})
+    programs, every = bench_peers.installed(), tuple(CASES.values())[:1]
+    text = bench_peers.table(programs, every, [bench_peers.compared(programs, case, 1) for case in every])
+    assert text.count("not installed") == 3
+    assert "| four-bar | R-R-R-R | " in text
+
+
+def test_a_program_that_fails_says_why():
+    result = bench_peers.Result(failure="the loop does not close")
+    assert bench_peers.cell(result, 1.0) == "fails: the loop does not close"
+
+
+def test_the_table_has_its_place_in_the_readme():
+    assert len(bench_peers.MARKED.findall(bench_peers.README.read_text(encoding="utf-8"))) == 1
