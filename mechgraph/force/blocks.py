@@ -18,7 +18,7 @@ from mechgraph.result.solution import Checks, MaterialPoint
 class Blocks:
     """The values of a Solution (implements ``result.solution.Values``) from those of blocks of its positions.
 
-    ``places`` are the positions of every block in the flat batch, ``coordinates (F, *batch)`` those of all positions.
+    ``places`` are the positions of every block in the flat batch.
     """
 
     def __init__(
@@ -28,12 +28,10 @@ class Blocks:
         batch: tuple[int, ...],
         status: Any,
         t: Any,
-        coordinates: Array,
     ) -> None:
         self._parts, self._places, self._status = parts, places, status
         self.mechanism, self.batch, self.t = parts[0].mechanism, batch, t
         self.has_forces = parts[0].has_forces
-        self._coordinates = coordinates
         self._count = int(np.prod(batch))
         self._whole = sum(len(at) for at in places) == self._count
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Mapping
+from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -11,7 +13,8 @@ from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeadPointError, DeclarationError, IndeterminateError, ReachError
-from mechgraph.force.analysis import Analysis, Forces, Motions
+from mechgraph.force.analysis import Analysis, Forces, Motions, continued
+from mechgraph.force.blocks import Blocks
 from mechgraph.force.large import Given, SparseAnalysis, certified_loops, move_sparse, refuse_dense
 from mechgraph.force.methods import METHODS, Problem, chosen_for_all
 from mechgraph.force.site import Site, inertia_wrenches
@@ -24,7 +27,7 @@ from mechgraph.motion.assembly import CLOSED, assembled, assembled_at, named_col
 from mechgraph.motion.follow import SparseSolver
 from mechgraph.motion.idle import Idle, held_well, spin_angles
 from mechgraph.motion.march import SINGULAR, Status
-from mechgraph.motion.path import Follower, Positions
+from mechgraph.motion.path import BLOCK, Follower, Positions
 from mechgraph.motion.rates import DEAD_POINT, Rates, closure_solver, distance_to_dead_point, rates
 from mechgraph.motion.system import Configuration, Index, System
 from mechgraph.numerics.linear import Choice, ChosenSystem, independent_rows, rank_of, singular_values
@@ -113,6 +116,15 @@ def _batch(m: Mechanism, motions: Mapping[str, Motion]) -> tuple[int, ...]:
         ) from None
 
 
+@dataclasses.dataclass(frozen=True)
+class Part:
+    """Motions of some of the positions, the closure equations there, and the places of these positions in the flat batch."""
+
+    motions: Motions
+    solver: ChosenSystem
+    places: Index
+
+
 class Run:
     """One call of ``solve``: drivers, positions and rates."""
 
@@ -164,6 +176,11 @@ class Run:
         rows = [np.broadcast_to(getattr(motion, kind), self.batch).reshape(T) for motion in self.motions.values()]
         return np.array(rows).reshape(len(rows), T) / self.unit[:, None]
 
+    @cached_property
+    def _driver_rates(self) -> tuple[Array, Array]:
+        """Driver velocities and accelerations ``(d, T)`` in internal units."""
+        return self.values("velocity"), self.values("acceleration")
+
     def given(self) -> Given:
         """What the motions of the drivers say."""
         rows = (self.values(kind) for kind in ("position", "velocity", "acceleration"))
@@ -184,14 +201,44 @@ class Run:
         return self.system, self.x
 
     def move(self) -> tuple[Motions, ChosenSystem, Positions]:
-        """Positions and rates."""
+        """Positions and rates, all in one piece."""
+        found = self._found()
+        status, good = self._outcomes(found)
+        here = found.here[0] if len(found.here) == 1 and good.size == status.size else None
+        part = self._rates(found, here, good, status)
+        motions = dataclasses.replace(part.motions, batch=self.batch, good=part.places, status=status)
+        return motions, part.solver, found
+
+    def move_in_blocks(self) -> tuple[list[Part], Any, Positions]:
+        """Positions and rates, block by block; the statuses of all positions."""
+        found = self._found()
+        status, good = self._outcomes(found)
+        parts = []
+        if found.here and good.size == status.size:
+            at = np.cumsum([0, *(here.T for here in found.here)])
+            pieces = [(good[i:j], here) for (i, j), here in zip(pairwise(at), found.here, strict=True)]
+        else:
+            pieces = [(good[i : i + BLOCK], None) for i in range(0, max(1, good.size), BLOCK)]
+        for places, here in pieces:
+            part = self._rates(found, here, places, status)
+            if part.places.size or not parts:
+                parts.append(part)
+        return parts, status, found
+
+    def _found(self) -> Positions:
         found = self.positions()
+        return self._without_spin(found, self.freedoms.bodies) if self.freedoms.bodies else found
+
+    def _outcomes(self, found: Positions) -> tuple[Any, Index]:
+        """Statuses of all positions as text, and the flat places of those that were solved."""
+        good = np.array([s is Status.OK for s in found.status.reshape(-1)], dtype=bool)
+        status = np.full(good.size, Status.OK.value, dtype="U24")
+        status[~good] = [s.value for s in found.status.reshape(-1)[~good]]
+        return status.reshape(self.batch), np.flatnonzero(good)
+
+    def _rates(self, found: Positions, here: Configuration | None, good: Index, status: Any) -> Part:
+        """Rates at the positions ``good`` of the flat batch; those that are no regular ones are marked in ``status``."""
         bodies = self.freedoms.bodies
-        if bodies:
-            found = self._without_spin(found, bodies)
-        status = np.array([s.value for s in found.status.reshape(-1)], dtype="U24").reshape(self.batch)
-        good = np.flatnonzero(status.reshape(-1) == Status.OK.value)
-        here = found.here[0] if len(found.here) == 1 and good.size == found.here[0].T else None
         here = here or self.evaluated(found.x.reshape(self.system.n_state, status.size)[:, good], good)
         which, choices = found.which.reshape(-1)[good], found.choices
         solver = closure_solver(here, choices, which)
@@ -206,7 +253,7 @@ class Run:
             solver = closure_solver(here, choices, which)
         if bodies:
             choices, which, solver = held_well(here, choices, which, self.leading)
-        velocity, acceleration = (self.values(kind)[:, good] for kind in ("velocity", "acceleration"))
+        velocity, acceleration = (values[:, good] for values in self._driver_rates)
         moved = rates(here, solver, self.leading, velocity[self.lead], acceleration[self.lead], bodies)
         if len(self.lead) < len(self.columns):
             moved = dataclasses.replace(moved, contradiction=self._disagreement(here, moved, good))
@@ -214,7 +261,10 @@ class Run:
             choices, which = solver.choices, solver.which
         held = tuple(choice.held for choice in choices)
         tracks = () if bodies else found.tracks
-        return Motions(here, moved, self.batch, good, status, self.t, self.columns, held, which, tracks), solver, found
+        n = good.size
+        flags = np.full(n, Status.OK.value, dtype="U24")
+        motions = Motions(here, moved, (n,), np.arange(n), flags, self.t, self.columns, held, which, tracks)
+        return Part(motions, solver, good)
 
     def _disagreement(self, here: Configuration, moved: Rates, good: Index) -> Array:
         """How far given positions and rates of dependent drivers are from those that the leading ones bring, ``(T,)``."""
@@ -271,9 +321,9 @@ class Run:
         return x
 
 
-def _raise_unreached(run: Run, motions: Motions, last: Array, solution: Solution) -> None:
+def _raise_unreached(run: Run, status: Any, last: Array, solution: Solution) -> None:
     """Named errors for positions that were not solved, with the solution so far."""
-    flat = motions.status.reshape(-1)
+    flat = status.reshape(-1)
     bad = np.flatnonzero(flat != Status.OK.value)
     if bad.size:
         first = int(bad[0])
@@ -305,9 +355,9 @@ def self_length(batch: tuple[int, ...]) -> int:
     return batch[-1] if batch else 1
 
 
-def _check_drivers(run: Run, motions: Motions) -> None:
-    worst = float(motions.rates.contradiction.max(initial=0.0))
-    stuck = run.loops is None and run.freedoms.dependent and not motions.good.size
+def _check_drivers(run: Run, motions: list[Motions], status: Any) -> None:
+    worst = max((float(part.rates.contradiction.max(initial=0.0)) for part in motions), default=0.0)
+    stuck = run.loops is None and run.freedoms.dependent and not (status == Status.OK.value).any()
     if worst > CONTRADICTION or stuck:
         names, mobility = ", ".join(run.motions), free_motion(run.system, run.x, run.columns).mobility
         raise IndeterminateError(
@@ -359,6 +409,8 @@ def _solve(m: Mechanism, motions: Mapping[str, Any] | None, on_reach: str, force
     if faults:
         raise DeclarationError(f"solve {m.name!r}", faults)
     run = Run(m, motions)
+    if run.loops is None and _in_blocks(run, forces):
+        return _solve_in_blocks(run, on_reach, forces)
     solver: ChosenSystem | SparseSolver
     if run.loops is not None:
         moved, solver, reached = move_sparse(run.system, run.x, run.columns, run.loops, run.given())
@@ -366,13 +418,47 @@ def _solve(m: Mechanism, motions: Mapping[str, Any] | None, on_reach: str, force
     else:
         moved, solver, found = run.move()
         reached, kind = found.reached, Analysis
-    _check_drivers(run, moved)
+    _check_drivers(run, [moved], moved.status)
     solved = kind(moved, None)
     if forces is not None:
         solved = kind(moved, forces_of(run, moved, solver, solved.user_coordinates, *forces))
     solution = Solution(solved)
     if on_reach == "raise":
-        _raise_unreached(run, moved, reached, solution)
+        _raise_unreached(run, moved.status, reached, solution)
+    return solution
+
+
+def _in_blocks(run: Run, forces: tuple[str, str] | None) -> bool:
+    """Whether positions can be solved block by block: many of them, and nothing that looks at all of them at once."""
+    if int(np.prod(run.batch)) <= BLOCK or run.freedoms.bodies:
+        return False
+    return forces is None or (forces[0] == "loop_wrench" and all(_by_position(load) for load in run.loads))
+
+
+def _by_position(load: Load) -> bool:
+    """Whether a load is a matter of each position by itself: one of values, not of callables that see the whole batch."""
+    if not dataclasses.is_dataclass(load):
+        return False
+    return not any(callable(getattr(load, field.name)) for field in dataclasses.fields(load))
+
+
+def _solve_in_blocks(run: Run, on_reach: str, forces: tuple[str, str] | None) -> Solution:
+    parts, status, found = run.move_in_blocks()
+    _check_drivers(run, [part.motions for part in parts], status)
+    places = [part.places for part in parts]
+    x = np.full((run.system.n_state, status.size), np.nan)
+    for part in parts:
+        x[:, part.places] = part.motions.here.x
+    coordinates = continued(run.system, x, run.batch, found.tracks)
+    flat = coordinates.reshape(run.system.n_freedoms, status.size)
+    solved = []
+    for part in parts:
+        mine = flat[:, part.places]
+        wrenches = None if forces is None else _forces(run, part.motions, part.solver, mine, part.places, *forces)
+        solved.append(Analysis(part.motions, wrenches, mine))
+    solution = Solution(Blocks(solved, places, run.batch, status, run.t))
+    if on_reach == "raise":
+        _raise_unreached(run, status, found.reached, solution)
     return solution
 
 
@@ -380,9 +466,22 @@ def forces_of(
     run: Run, moved: Motions, solver: ChosenSystem | SparseSolver, coordinates: Array, method: str, redundant: str
 ) -> Forces:
     """Loads, and the wrenches of all pairs that balance them, at the positions of a run."""
-    inertia = inertia_wrenches(moved.here, moved.rates)
     flat = coordinates.reshape(run.system.n_freedoms, int(np.prod(run.batch)))[:, moved.good]
-    site = Site(moved.here, moved.rates, flat, run.batch, moved.good, run.t)
+    return _forces(run, moved, solver, flat, moved.good, method, redundant)
+
+
+def _forces(
+    run: Run,
+    moved: Motions,
+    solver: ChosenSystem | SparseSolver,
+    coordinates: Array,
+    places: Index,
+    method: str,
+    redundant: str,
+) -> Forces:
+    """Loads and wrenches at positions of coordinates ``(F, T)`` that stand at the ``places`` of the flat batch."""
+    inertia = inertia_wrenches(moved.here, moved.rates)
+    site = Site(moved.here, moved.rates, coordinates, run.batch, places, run.t)
     site.collect(run.loads)
     loads = inertia + site.scaled(site.external + site.internal)
     held = np.zeros_like(loads)

@@ -45,7 +45,7 @@ SHIFT = 0.02
 """Largest shift of a node in that last closing."""
 FAIR = 1e3
 """Condition number of the closure equations above which another choice of rows and columns is tried."""
-ROUNDING = 1e-15
+ROUNDING = 1e-14
 """Closure residual that nodes are brought to, so that what is interpolated between them needs no correction."""
 PAST = 2
 """Nodes from which the next one is predicted."""

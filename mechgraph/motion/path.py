@@ -7,6 +7,7 @@ as good as rounding allows; what is then not closed is corrected by Newton, all 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -22,6 +23,8 @@ BLOCK = 512
 """Positions evaluated together, so that what is computed on the way stays in the cache of a core (measured)."""
 FINER = 5
 """Times that nodes are put between nodes at most."""
+HALVINGS = 3
+"""Halvings of a gap at a time at most."""
 WORTH = 6
 """Positions for every new node from which on they are worth their time."""
 EXACT = 1e-14
@@ -34,8 +37,8 @@ GAIN = 1e-3
 class Positions:
     """States ``(nx, C, N)``, statuses ``(C, N)``, and per position the index of the choice that serves it.
 
-    ``here`` are the evaluations of all positions, block by block, where they are solved. ``tracks`` hold, for every case that was followed in
-    one go, path lengths and states ``(nx, K)`` of the nodes and the path lengths of the positions.
+    ``here`` are the evaluations of all positions, block by block, where they are solved. ``tracks`` hold, for every case
+    that was followed in one go, path lengths and states ``(nx, K)`` of the nodes and the path lengths of the positions.
     """
 
     x: Array
@@ -45,6 +48,25 @@ class Positions:
     reached: Array
     here: tuple[Configuration, ...] = ()
     tracks: tuple[tuple[Array, Array, Array] | None, ...] = ()
+
+
+def _filled(nodes: list[Node], gaps: Index, found: list[tuple[Node | None, float]]) -> tuple[list[Node], Index]:
+    """Nodes with those ``found`` in their ``gaps``, and into how many parts every gap is to be cut next."""
+    between: dict[int, list[tuple[Node | None, float]]] = {}
+    for gap, item in zip(gaps.tolist(), found, strict=True):
+        between.setdefault(gap, []).append(item)
+    out, parts = [], []
+    for i, node in enumerate(nodes):
+        mine = between.get(i, [])
+        error = max((e for _, e in mine), default=0.0)
+        halvings = 0
+        while error * GAIN > EXACT and halvings < HALVINGS:
+            error *= GAIN
+            halvings += 1
+        kept = [new for new, _ in mine if new is not None]
+        out += [node, *kept]
+        parts += [2**halvings] * (len(kept) + 1)
+    return out, np.array(parts[:-1], dtype=np.intp)
 
 
 Case = tuple[Array, Index, np.ndarray, Array, tuple[Configuration, ...], tuple[Array, Array, Array] | None]
@@ -136,30 +158,25 @@ class Follower(Marcher):
         return np.cumsum(np.sqrt((np.diff(points, axis=1) ** 2).sum(axis=0)))
 
     def _finer(self, track: Track, values: Array, at: Array) -> list[Node]:
-        """The nodes of a track with further ones between them, until interpolation is exact or they are too many to be worth it."""
+        """The nodes of a track with further ones between them, until interpolation is exact or they are too many to be worth it.
+
+        First one in the middle of every gap, which tells the error there; then as many as that error asks for.
+        """
         nodes = list(track.nodes)
-        points = np.concatenate([nodes[0].drive[:, None], values], axis=1)
         lengths = np.concatenate([[0.0], at])
-        open_ = [a.choice == b.choice for a, b in zip(nodes[:-1], nodes[1:], strict=True)]
+        points = np.concatenate([nodes[0].drive[:, None], values], axis=1)
+        parts = np.array([2 if a.choice == b.choice else 1 for a, b in pairwise(nodes)], dtype=np.intp)
         for _ in range(FINER):
-            gaps = np.flatnonzero(open_)
-            if not gaps.size or gaps.size * WORTH > len(at):
+            if not (parts > 1).any() or int(parts.sum()) * WORTH > len(at):
                 break
-            middle = np.array([0.5 * (nodes[i].at + nodes[i + 1].at) for i in gaps])
+            gaps = np.repeat(np.arange(len(parts)), parts - 1)
+            place = np.array([n.at for n in nodes])
+            share = np.concatenate([np.arange(1, n) / n for n in parts])
+            middle = place[gaps] + share * (place[gaps + 1] - place[gaps])
             drives = np.stack([np.interp(middle, lengths, row) for row in points])
             guess = Interpolation(self.system, nodes, self.rows)(middle, drives)
             found = self._closed_nodes(guess, middle, drives, np.array([nodes[i].choice for i in gaps]))
-            between = dict(zip(gaps.tolist(), found, strict=True))
-            finer, again = [], []
-            for i, node in enumerate(nodes):
-                finer.append(node)
-                new, error = between.get(i, (None, 0.0))
-                more = GAIN * error > EXACT
-                if new is not None:
-                    finer.append(new)
-                    again.append(more)
-                again.append(more)
-            nodes, open_ = finer, again[:-1]
+            nodes, parts = _filled(nodes, gaps, found)
         return nodes
 
     def _closed_nodes(self, x: Array, at: Array, drives: Array, choice_of: Index) -> list[tuple[Node | None, float]]:
