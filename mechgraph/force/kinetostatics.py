@@ -27,7 +27,7 @@ from mechgraph.motion.assembly import CLOSED, assembled, assembled_at, named_col
 from mechgraph.motion.follow import SparseSolver
 from mechgraph.motion.idle import Idle, held_well, spin_angles
 from mechgraph.motion.march import SINGULAR, Status
-from mechgraph.motion.path import BLOCK, Follower, Positions
+from mechgraph.motion.path import BLOCK, Follower, Positions, in_blocks
 from mechgraph.motion.rates import DEAD_POINT, Rates, closure_solver, distance_to_dead_point, rates
 from mechgraph.motion.system import Configuration, Index, System
 from mechgraph.numerics.linear import Choice, ChosenSystem, independent_rows, rank_of, singular_values
@@ -218,7 +218,7 @@ class Run:
             at = np.cumsum([0, *(here.T for here in found.here)])
             pieces = [(good[i:j], here) for (i, j), here in zip(pairwise(at), found.here, strict=True)]
         else:
-            pieces = [(good[i : i + BLOCK], None) for i in range(0, max(1, good.size), BLOCK)]
+            pieces = [(places, None) for places in in_blocks(good)]
         for places, here in pieces:
             part = self._rates(found, here, places, status)
             if part.places.size or not parts:
@@ -470,6 +470,13 @@ def forces_of(
     return _forces(run, moved, solver, flat, moved.good, method, redundant)
 
 
+def _site(run: Run, moved: Motions, coordinates: Array, places: Index) -> Site:
+    """All loads, acting."""
+    site = Site(moved.here, moved.rates, coordinates, run.batch, places, run.t)
+    site.collect(run.loads)
+    return site
+
+
 def _forces(
     run: Run,
     moved: Motions,
@@ -481,8 +488,7 @@ def _forces(
 ) -> Forces:
     """Loads and wrenches at positions of coordinates ``(F, T)`` that stand at the ``places`` of the flat batch."""
     inertia = inertia_wrenches(moved.here, moved.rates)
-    site = Site(moved.here, moved.rates, coordinates, run.batch, places, run.t)
-    site.collect(run.loads)
+    site = _site(run, moved, coordinates, places)
     loads = inertia + site.scaled(site.external + site.internal)
     held = np.zeros_like(loads)
     holds: tuple[tuple[str, bool, Array], ...] = ()

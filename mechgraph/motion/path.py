@@ -19,7 +19,7 @@ from mechgraph.numerics.linear import Choice, ChosenSystem
 
 GAPS = 20
 """Most gaps behind which a path is taken up again."""
-BLOCK = 512
+BLOCK = 1024
 """Positions evaluated together, so that what is computed on the way stays in the cache of a core (measured)."""
 FINER = 5
 """Times that nodes are put between nodes at most."""
@@ -48,6 +48,11 @@ class Positions:
     reached: Array
     here: tuple[Configuration, ...] = ()
     tracks: tuple[tuple[Array, Array, Array] | None, ...] = ()
+
+
+def in_blocks(places: Index) -> list[Index]:
+    """Places in parts of about equal size, at most ``BLOCK`` each; at least one part."""
+    return [np.asarray(part) for part in np.array_split(places, max(1, -(-len(places) // BLOCK)))]
 
 
 def _filled(nodes: list[Node], gaps: Index, found: list[tuple[Node | None, float]]) -> tuple[list[Node], Index]:
@@ -218,8 +223,7 @@ class Follower(Marcher):
         kinds = np.unique(choice_of[inside])
         for choice in kinds:
             mine = inside[choice_of[inside] == choice]
-            for begin in range(0, mine.size, BLOCK):
-                part = mine[begin : begin + BLOCK]
+            for part in in_blocks(mine):
                 guess = self.system.at(predict(at[part], values[:, part]))
                 here, total, done = self.correct(guess, int(choice), CONVERGED)
                 states[:, part] = here.x
