@@ -25,7 +25,7 @@ def move_wrench(X: Array, f: Array) -> Array:
     return np.concatenate([rotate(X[:, :3], f[:3]) + cross(X[:, 3], force), force])
 
 
-def _direction(column: Callable[[int], Array], v: Sequence[float]) -> Array | None:
+def direction(column: Callable[[int], Array], v: Sequence[float]) -> Array | None:
     """``R v`` for a constant ``v`` with few nonzero parts, ``R`` by its columns; None where ``v`` is zero."""
     parts = [column(i) if c == 1.0 else c * column(i) for i, c in enumerate(v) if c != 0.0]
     return sum(parts[1:], start=parts[0]) if parts else None
@@ -37,7 +37,7 @@ def moved_screw(column: Callable[[int], Array], free: Sequence[float], line: Seq
     A screw has a bound part ``line`` (a rotation or a force) and a free part (a translation or a couple). Returns
     ``(R line, R free + p x R line)``, the bound and the free part in the outer frame; only the columns needed are asked for.
     """
-    bound, loose = _direction(column, line), _direction(column, free)
+    bound, loose = direction(column, line), direction(column, free)
     if bound is None:
         like = column(3) if loose is None else loose
         return np.zeros_like(like), like * 0.0 if loose is None else loose

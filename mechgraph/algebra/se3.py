@@ -97,7 +97,11 @@ def quaternion_product(a: Array, b: Array) -> Array:
 def quaternion_exp(v: Array) -> Array:
     """Unit quaternion of a rotation vector ``(3, ...)``: ``(cos |v|/2, sin(|v|/2) v/|v|)``."""
     half = 0.5 * np.sqrt((v * v).sum(axis=0))
-    return np.concatenate([np.cos(half)[None], 0.5 * np.sinc(half / np.pi) * v])
+    zero = half == 0.0
+    out = np.empty((4, *v.shape[1:]))
+    out[0] = np.cos(half)
+    np.multiply(v, 0.5 * (np.sin(half) + zero) / (half + zero), out=out[1:])
+    return out
 
 
 def quaternion_log(q: Array) -> Array:

@@ -15,8 +15,9 @@ from mechgraph.force.methods import Wrenches, given_effort_loads, internal_state
 from mechgraph.force.site import Site, kinetic_power, user_poses, user_twists
 from mechgraph.formulation.state import State
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.motion.path import Tracks, continued
 from mechgraph.motion.rates import Rates
-from mechgraph.motion.system import Configuration, Index, System
+from mechgraph.motion.system import Configuration, Index
 from mechgraph.numerics.linear import add_at
 from mechgraph.result.solution import Checks, MaterialPoint
 from mechgraph.structure.reaction import (
@@ -43,7 +44,7 @@ class Motions:
     driven: Index
     held: tuple[Index, ...]
     which: Index
-    tracks: tuple[tuple[Array, Array, Array] | None, ...] = ()
+    tracks: Tracks = ()
 
 
 @dataclass(frozen=True)
@@ -61,27 +62,6 @@ class Forces:
     hold: Array
     holds: tuple[tuple[str, bool, Array], ...]
     solver: Any = None
-
-
-def continued(
-    s: System, x: Array, batch: tuple[int, ...], tracks: tuple[tuple[Array, Array, Array] | None, ...]
-) -> Array:
-    """User coordinates ``(F, *batch)`` of states ``(nx, positions)``, rotations continued along the path, nodes between included."""
-    start = s.start_coordinates(s.m.start)
-    turning = any(len(factor) > 1 for g in s.groups for factor in g.row.factors)
-    if not turning or not tracks or any(track is None for track in tracks):
-        q = s.coordinates_of(x.reshape(s.n_state, *(batch or (1,))), start)
-        return q.reshape(s.n_freedoms, *batch)
-    cases = x.reshape(s.n_state, len(tracks), x.shape[1] // len(tracks))
-    out = np.empty((s.n_freedoms, *cases.shape[1:]))
-    for c, track in enumerate(tracks):
-        at, nodes, along = track or (np.zeros(0), x[:, :0], np.zeros(0))
-        order = np.argsort(np.concatenate([at, along]), kind="stable")
-        q = s.coordinates_of(np.concatenate([nodes, cases[:, c]], axis=1)[:, order], start)
-        back = np.empty_like(order)
-        back[order] = np.arange(len(order))
-        out[:, c] = q[:, back[len(at) :]]
-    return out.reshape(s.n_freedoms, *batch)
 
 
 class Analysis:
@@ -346,15 +326,7 @@ class Analysis:
 
     def state(self, index: Any) -> State:
         """Screws and loads at one position, user's units, global origin."""
-        try:
-            flat = np.arange(int(np.prod(self.batch))).reshape(self.batch)[index]
-        except IndexError:
-            text = f"state({index!r}): no such position in a batch {self.batch}; give one index an axis"
-            raise MechgraphError(text) from None
-        if np.ndim(flat):
-            raise MechgraphError(
-                f"state({index!r}): names {np.size(flat)} positions of a batch {self.batch}; give one index an axis"
-            )
+        flat = flat_place(self.batch, index)
         found = np.flatnonzero(self.motions.good == flat)
         if not found.size:
             raise MechgraphError(
@@ -400,6 +372,25 @@ class Analysis:
             if not (j < len(couples) and couples[j]):
                 out[:3, j] = self._L * out[:3, j] + cross(self._system.par.origin[:, None], out[3:, j])
         return out
+
+
+def flat_place(batch: tuple[int, ...], index: Any) -> int:
+    """Place in the flat batch of the one position that an index names.
+
+    Raises
+    ------
+    MechgraphError
+    """
+    try:
+        flat = np.arange(int(np.prod(batch))).reshape(batch)[index]
+    except IndexError:
+        text = f"state({index!r}): no such position in a batch {batch}; give one index an axis"
+        raise MechgraphError(text) from None
+    if np.ndim(flat):
+        raise MechgraphError(
+            f"state({index!r}): names {np.size(flat)} positions of a batch {batch}; give one index an axis"
+        )
+    return int(flat)
 
 
 def largest_of(values: Array) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import MechgraphError
-from mechgraph.force.analysis import Analysis
+from mechgraph.force.analysis import Analysis, flat_place
 from mechgraph.formulation.state import State
 from mechgraph.motion.system import Index
 from mechgraph.result.solution import Checks, MaterialPoint
@@ -120,15 +120,7 @@ class Blocks:
 
     def state(self, index: Any) -> State:
         """Screws and loads at one position, user's units, global origin."""
-        try:
-            flat = np.arange(self._count).reshape(self.batch)[index]
-        except IndexError:
-            text = f"state({index!r}): no such position in a batch {self.batch}; give one index an axis"
-            raise MechgraphError(text) from None
-        if np.ndim(flat):
-            raise MechgraphError(
-                f"state({index!r}): names {np.size(flat)} positions of a batch {self.batch}; give one index an axis"
-            )
+        flat = flat_place(self.batch, index)
         for part, at in zip(self._parts, self._places, strict=True):
             found = np.flatnonzero(at == flat)
             if found.size:

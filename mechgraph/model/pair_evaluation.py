@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mechgraph.algebra.screw import moved_screw
+from mechgraph.algebra.screw import direction, moved_screw
 from mechgraph.algebra.se3 import (
     Array,
     compose,
@@ -103,12 +103,28 @@ def _stacked(parts: list[tuple[Array, Array]]) -> Array:
 
 def twist_of(freedom: Freedom, before: int, pitch: Array, frames: Frames) -> tuple[Array, Array]:
     """Unit twist of one freedom that is constant in frame ``before``: angular and linear part, ``(3, n, T)``."""
+    angular, linear = twist_parts(freedom, before, pitch, frames)
+    origin = _columns(frames, before)(3)
+    moment = np.zeros(origin.shape) if angular is None else cross(origin, angular)
+    if linear is not None:
+        moment += linear
+    return np.zeros(origin.shape) if angular is None else angular, moment
+
+
+def twist_parts(freedom: Freedom, before: int, pitch: Array, frames: Frames) -> tuple[Array | None, Array | None]:
+    """Angular part of the unit twist of a freedom, and its linear part at the origin of its frame; None where they vanish."""
     column = _columns(frames, before)
-    angular, linear = moved_screw(column, freedom.twist[3:], freedom.twist[:3])
+    angular, linear = direction(column, freedom.twist[:3]), direction(column, freedom.twist[3:])
     for i, per_pitch in enumerate(freedom.per_pitch[3:]):
         if per_pitch:
-            linear = linear + per_pitch * pitch * column(i)
+            more = per_pitch * pitch * column(i)
+            linear = more if linear is None else linear + more
     return angular, linear
+
+
+def frame_origin(before: int, frames: Frames) -> Array:
+    """Origin of a frame, ``(3, n, T)``."""
+    return _columns(frames, before)(3)
 
 
 def components_of(components: tuple[Component, ...], pitch: Array, frames: Frames) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.motion.interpolation import Interpolation
 from mechgraph.motion.march import CONVERGED, CORRECTION, ROUNDING, SHORTEST_STEP, Marcher, Node, Status, Track
-from mechgraph.motion.system import Configuration, Index
+from mechgraph.motion.system import Configuration, Index, System
 from mechgraph.numerics.linear import Choice, ChosenSystem
 
 GAPS = 20
@@ -27,10 +27,14 @@ HALVINGS = 3
 """Halvings of a gap at a time at most."""
 WORTH = 6
 """Positions for every new node from which on they are worth their time."""
-EXACT = 1e-14
+EXACT = 3e-14
 """Error of interpolation that needs no correction."""
 GAIN = 1e-3
 """Part of the error of interpolation that nodes twice as dense leave (at most)."""
+
+
+Tracks = tuple[tuple[Array, Array, Array] | None, ...]
+"""For every case path lengths and states ``(nx, K)`` of the nodes and path lengths of the positions, where it was followed in one go."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +51,12 @@ class Positions:
     which: Index
     reached: Array
     here: tuple[Configuration, ...] = ()
-    tracks: tuple[tuple[Array, Array, Array] | None, ...] = ()
+    tracks: Tracks = ()
+
+
+def fits_one_block(count: int) -> bool:
+    """Whether so many positions are evaluated in one piece."""
+    return count <= BLOCK
 
 
 def in_blocks(places: Index) -> list[Index]:
@@ -71,10 +80,34 @@ def _filled(nodes: list[Node], gaps: Index, found: list[tuple[Node | None, float
         kept = [new for new, _ in mine if new is not None]
         out += [node, *kept]
         parts += [2**halvings] * (len(kept) + 1)
-    return out, np.array(parts[:-1], dtype=np.intp)
+    cut = np.array(parts[:-1], dtype=np.intp)
+    for _ in range(HALVINGS):
+        # neighbours at most twice as dense: interpolation reaches over both
+        cut[1:] = np.maximum(cut[1:], cut[:-1] // 2)
+        cut[:-1] = np.maximum(cut[:-1], cut[1:] // 2)
+    return out, cut
 
 
 Case = tuple[Array, Index, np.ndarray, Array, tuple[Configuration, ...], tuple[Array, Array, Array] | None]
+
+
+def continued(s: System, x: Array, batch: tuple[int, ...], tracks: Tracks) -> Array:
+    """User coordinates ``(F, *batch)`` of states ``(nx, positions)``, rotations continued along the path, nodes between included."""
+    start = s.start_coordinates(s.m.start)
+    turning = any(len(factor) > 1 for g in s.groups for factor in g.row.factors)
+    if not turning or not tracks or any(track is None for track in tracks):
+        q = s.coordinates_of(x.reshape(s.n_state, *(batch or (1,))), start)
+        return q.reshape(s.n_freedoms, *batch)
+    cases = x.reshape(s.n_state, len(tracks), x.shape[1] // len(tracks))
+    out = np.empty((s.n_freedoms, *cases.shape[1:]))
+    for c, track in enumerate(tracks):
+        at, nodes, along = track or (np.zeros(0), x[:, :0], np.zeros(0))
+        order = np.argsort(np.concatenate([at, along]), kind="stable")
+        q = s.coordinates_of(np.concatenate([nodes, cases[:, c]], axis=1)[:, order], start)
+        back = np.empty_like(order)
+        back[order] = np.arange(len(order))
+        out[:, c] = q[:, back[len(at) :]]
+    return out.reshape(s.n_freedoms, *batch)
 
 
 class Follower(Marcher):

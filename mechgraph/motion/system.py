@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.screw import cross_twist
-from mechgraph.algebra.se3 import Array, compose, inverse, pose_log
+from mechgraph.algebra.se3 import Array, compose, cross, inverse, pose_log
 from mechgraph.model import pair_evaluation as evaluation
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import PairType
@@ -93,6 +93,11 @@ class System:
     def weld(self, g: Group) -> Array:
         """Constant relative poses of pairs without freedom, ``(3, 4, n, 1)``."""
         return compose(self.par.marker_a[:, :, g.pairs], self.marker_b_inverse[:, :, g.pairs])
+
+    @cached_property
+    def owners(self) -> Place:
+        """For every freedom its pair."""
+        return compact(np.repeat(np.arange(len(self.m.pairs)), np.diff(self.first_column)))
 
     @cached_property
     def carriers(self) -> list[Place]:
@@ -271,9 +276,18 @@ class Configuration:
         """Twists of all freedoms ``(6, F, T)``."""
         s = self.system
         out = np.empty((6, s.n_freedoms, self.T))
+        points = np.empty((3, s.n_freedoms, self.T))
+        slides = []
         for g, frames in zip(s.groups, self._columns, strict=True):
             for freedom, before, at in zip(g.row.freedoms, g.row.frame_before, g.at_columns, strict=True):
-                out[:3, at], out[3:, at] = evaluation.twist_of(freedom, before, s.par.pitch[g.pairs], frames)
+                turn, slide = evaluation.twist_parts(freedom, before, s.par.pitch[g.pairs], frames)
+                out[:3, at] = 0.0 if turn is None else turn
+                points[:, at] = 0.0 if turn is None else evaluation.frame_origin(before, frames)
+                if slide is not None:
+                    slides.append((at, slide))
+        cross(points, out[:3], out[3:])
+        for at, slide in slides:
+            out[3:, at] += slide
         return out
 
     @cached_property

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
 from mechgraph.force.analysis import Analysis, Motions
-from mechgraph.force.kinetostatics import CONTRADICTION, Run, forces_of
+from mechgraph.force.kinetostatics import CONTRADICTION, forces_of
+from mechgraph.force.run import Run
 from mechgraph.model.load import Load
 from mechgraph.model.motion_law import Motion
 from mechgraph.motion.lockstep import Lockstep
