@@ -166,10 +166,8 @@ def rotation_log(R: Array) -> Array:
         np.subtract(R[j, k], R[k, j], out=s[i, ...])
     s *= 0.5
     sine = np.sqrt((s * s).sum(axis=0))
-    angle = np.arctan2(sine, cosine)
-    # below this size sine and angle are the same number
-    sine[...] = np.where(sine < 1e-8, angle + (angle == 0.0), sine)
-    s *= angle / sine
+    small = sine < 1e-8
+    s *= np.where(small, 1.0, np.arctan2(sine, cosine) / np.where(small, 1.0, sine))
     return s
 
 

@@ -300,6 +300,8 @@ class Marcher:
             square = float(np.prod([(at - p) / (s - p) for p in others])) ** 2
             lean = sum(1.0 / (s - p) for p in others)
             dq += (1.0 - 2.0 * (at - s) * lean) * square * y[:, k] + (at - s) * square * d[:, k]
+        # nothing would correct what is extrapolated into freedoms that are held
+        dq[self.choices[last.choice].held] = 0.0
         return dq, 2 * len(past)
 
     @staticmethod
