@@ -37,7 +37,7 @@ def verdict(r: DeterminacyReport) -> str:
 
 
 def _near(r: DeterminacyReport) -> str:
-    if not r.near or r.margin is None or r.dropped is None:
+    if not r.near or r.contradicting_drives or r.margin is None or r.dropped is None:
         return ""
     if r.dead_point:
         return f" Near a dead point: {weakest_drive(r)} hardly moves when the mechanism does."
@@ -239,7 +239,7 @@ def _finite(r: DeterminacyReport) -> list[str]:
 
 
 def _margin(r: DeterminacyReport) -> list[str]:
-    if r.dead_point and r.geometry:
+    if r.dead_point and r.geometry and not r.contradicting_drives:
         return [
             f"Near a dead point of {weakest_drive(r)}: it moves {r.geometry.freedoms.drive:.2g} times as much as the freedom that moves "
             "most, so its effort and the reactions grow without bound."
