@@ -5,7 +5,8 @@ import pytest
 
 import mechgraph as mg
 from mechgraph.motion.assembly import assembled, named_columns, scaled_system
-from mechgraph.motion.path import Follower, Status
+from mechgraph.motion.march import Status
+from mechgraph.motion.path import Follower
 from mechgraph.motion.system import System
 from mechgraph.topology.linkgraph import link_graph
 

@@ -6,6 +6,8 @@ the origin. Power is the plain product ``w . M + v . F``: no swap matrix.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, cross, rotate
@@ -23,35 +25,45 @@ def move_wrench(X: Array, f: Array) -> Array:
     return np.concatenate([rotate(X[:, :3], f[:3]) + cross(X[:, 3], force), force])
 
 
-def _direction(R: Array, v: Array) -> Array | None:
-    """``R v`` for a constant ``v`` with few nonzero parts; None where ``v`` is zero."""
-    parts = [R[:, i] if c == 1.0 else c * R[:, i] for i, c in enumerate(v) if c != 0.0]
+def direction(column: Callable[[int], Array], v: Sequence[float]) -> Array | None:
+    """``R v`` for a constant ``v`` with few nonzero parts, ``R`` by its columns; None where ``v`` is zero."""
+    parts = [column(i) if c == 1.0 else c * column(i) for i, c in enumerate(v) if c != 0.0]
     return sum(parts[1:], start=parts[0]) if parts else None
 
 
-def move_constant(X: Array, free: Array, line: Array) -> tuple[Array, Array]:
-    """Directions and moments of a constant screw moved by ``X``.
+def moved_screw(column: Callable[[int], Array], free: Sequence[float], line: Sequence[float]) -> tuple[Array, Array]:
+    """Directions and moments of a constant screw moved by a pose that is given by its columns.
 
     A screw has a bound part ``line`` (a rotation or a force) and a free part (a translation or a couple). Returns
-    ``(R line, R free + p x R line)``, the bound and the free part in the outer frame.
+    ``(R line, R free + p x R line)``, the bound and the free part in the outer frame; only the columns needed are asked for.
     """
-    R, p = X[:, :3], X[:, 3]
-    bound, loose = _direction(R, line), _direction(R, free)
+    bound, loose = direction(column, line), direction(column, free)
     if bound is None:
-        zero = np.zeros(X.shape[:1] + X.shape[2:])
-        return zero, zero if loose is None else loose
-    moment = cross(p, bound)
+        like = column(3) if loose is None else loose
+        return np.zeros_like(like), like * 0.0 if loose is None else loose
+    moment = cross(column(3), bound)
     return bound, moment if loose is None else moment + loose
+
+
+def move_constant(X: Array, free: Array, line: Array) -> tuple[Array, Array]:
+    """``moved_screw`` for a pose ``X (3, 4, ...)``."""
+    return moved_screw(lambda i: X[:, i], free.tolist(), line.tolist())
 
 
 def cross_twist(V: Array, S: Array) -> Array:
     """Rate of a twist ``S`` that moves with a body of twist ``V``: ``ad(V) S = (w x s_w, w x s_v + v x s_w)``."""
-    return np.concatenate([cross(V[:3], S[:3]), cross(V[:3], S[3:]) + cross(V[3:], S[:3])])
+    out = np.empty(np.broadcast_shapes(V.shape, S.shape))
+    cross(V[:3], S[:3], out[:3])
+    cross(V[:3], S[3:], out[3:])
+    out[3:] += cross(V[3:], S[:3])
+    return out
 
 
 def shift_wrench(f: Array, point: Array) -> Array:
     """Wrench about the origin, taken about ``point``: ``(M - point x F, F)``."""
-    return np.concatenate([f[:3] - cross(point, f[3:]), f[3:]])
+    out = np.array(f)
+    out[:3] -= cross(point, f[3:])
+    return out
 
 
 def power(V: Array, f: Array) -> Array:

@@ -12,12 +12,16 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-def cross(a: Array, b: Array) -> Array:
-    """Vector product of ``(3, ...)`` arrays along the first axis."""
-    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
+def cross(a: Array, b: Array, out: Array | None = None) -> Array:
+    """Vector product of ``(3, ...)`` arrays along the first axis, into ``out`` where given."""
+    if out is None:
+        out = np.empty(a.shape if a.shape == b.shape else np.broadcast_shapes(a.shape, b.shape))
+    part = np.empty(out.shape[1:])
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        np.multiply(a[j], b[k], out=out[i, ...])
-        out[i] -= a[k] * b[j]
+        row = out[i, ...]
+        np.multiply(a[j], b[k], out=row)
+        np.multiply(a[k], b[j], out=part)
+        row -= part
     return out
 
 
@@ -29,12 +33,22 @@ def skew(a: Array) -> Array:
 
 def rotate(R: Array, v: Array) -> Array:
     """``R v`` for ``(3, 3, ...)`` and ``(3, ...)``."""
-    return R[:, 0] * v[0] + R[:, 1] * v[1] + R[:, 2] * v[2]
+    out = np.asarray(R[:, 0] * v[0])
+    part = np.empty_like(out)
+    for i in (1, 2):
+        np.multiply(R[:, i], v[i], out=part)
+        out += part
+    return out
 
 
 def rotate_back(R: Array, v: Array) -> Array:
     """``R^T v`` for ``(3, 3, ...)`` and ``(3, ...)``."""
-    return R[0] * v[0] + R[1] * v[1] + R[2] * v[2]
+    out = np.asarray(R[0] * v[0])
+    part = np.empty_like(out)
+    for i in (1, 2):
+        np.multiply(R[i], v[i], out=part)
+        out += part
+    return out
 
 
 def identity(*batch: int) -> Array:
@@ -47,7 +61,11 @@ def identity(*batch: int) -> Array:
 
 def compose(X: Array, Y: Array) -> Array:
     """Product ``X Y`` of two poses."""
-    out = X[:, 0, None] * Y[0] + X[:, 1, None] * Y[1] + X[:, 2, None] * Y[2]
+    out = np.asarray(X[:, 0, None] * Y[0])
+    part = np.empty_like(out)
+    for i in (1, 2):
+        np.multiply(X[:, i, None], Y[i], out=part)
+        out += part
     out[:, 3] += X[:, 3]
     return out
 
@@ -79,7 +97,11 @@ def quaternion_product(a: Array, b: Array) -> Array:
 def quaternion_exp(v: Array) -> Array:
     """Unit quaternion of a rotation vector ``(3, ...)``: ``(cos |v|/2, sin(|v|/2) v/|v|)``."""
     half = 0.5 * np.sqrt((v * v).sum(axis=0))
-    return np.concatenate([np.cos(half)[None], 0.5 * np.sinc(half / np.pi) * v])
+    zero = half == 0.0
+    out = np.empty((4, *v.shape[1:]))
+    out[0] = np.cos(half)
+    np.multiply(v, 0.5 * (np.sin(half) + zero) / (half + zero), out=out[1:])
+    return out
 
 
 def quaternion_log(q: Array) -> Array:
@@ -139,11 +161,14 @@ def rotation_log(R: Array) -> Array:
     cosine = 0.5 * (R[0, 0] + R[1, 1] + R[2, 2] - 1.0)
     if not (cosine > -0.5).all():
         return quaternion_log(matrix_quaternion(R))
-    s = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    s = np.empty((3, *R.shape[2:]))
+    for i, j, k in ((0, 2, 1), (1, 0, 2), (2, 1, 0)):
+        np.subtract(R[j, k], R[k, j], out=s[i, ...])
+    s *= 0.5
     sine = np.sqrt((s * s).sum(axis=0))
     small = sine < 1e-8
-    factor = np.where(small, 1.0, np.arctan2(sine, cosine) / np.where(small, 1.0, sine))
-    return np.asarray(factor * s)
+    s *= np.where(small, 1.0, np.arctan2(sine, cosine) / np.where(small, 1.0, sine))
+    return s
 
 
 def pose_exp(s: Array) -> Array:
@@ -169,8 +194,18 @@ def pose_log(X: Array) -> Array:
     """
     w = rotation_log(X[:, :3])
     angle2 = (w * w).sum(axis=0)
-    small = angle2 < 1e-6
-    half = 0.5 * np.sqrt(np.where(small, 1.0, angle2))
-    c = np.where(small, 1 / 12 + angle2 / 720, (1 - half / np.tan(half)) / (4 * half**2))
+    if (angle2 < 1e-6).all():
+        c = 1 / 12 + angle2 / 720
+    else:
+        small = angle2 < 1e-6
+        half = 0.5 * np.sqrt(np.where(small, 1.0, angle2))
+        c = np.where(small, 1 / 12 + angle2 / 720, (1 - half / np.tan(half)) / (4 * half**2))
+    out = np.empty((6, *X.shape[2:]))
     wp = cross(w, X[:, 3])
-    return np.concatenate([w, X[:, 3] - 0.5 * wp + c * cross(w, wp)])
+    out[:3] = w
+    cross(w, wp, out[3:])
+    out[3:] *= c
+    wp *= 0.5
+    out[3:] -= wp
+    out[3:] += X[:, 3]
+    return out

@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from mechgraph.algebra.screw import shift_wrench
 from mechgraph.algebra.se3 import Array, cross, rotate
 from mechgraph.errors import MechgraphError
 from mechgraph.force.methods import Wrenches, given_effort_loads, internal_state
 from mechgraph.force.site import Site, kinetic_power, user_poses, user_twists
 from mechgraph.formulation.state import State
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.motion.path import Tracks, continued
 from mechgraph.motion.rates import Rates
 from mechgraph.motion.system import Configuration, Index
 from mechgraph.numerics.linear import add_at
@@ -22,7 +24,6 @@ from mechgraph.structure.reaction import (
     UNIQUE,
     PairFrames,
     Stress,
-    at_pair_points,
     least_reactions,
     orthonormal_stress,
     pair_power,
@@ -43,7 +44,7 @@ class Motions:
     driven: Index
     held: tuple[Index, ...]
     which: Index
-    tracks: tuple[tuple[Array, Array, Array] | None, ...] = ()
+    tracks: Tracks = ()
 
 
 @dataclass(frozen=True)
@@ -66,8 +67,8 @@ class Forces:
 class Analysis:
     """The values of a Solution (implements ``result.solution.Values``)."""
 
-    def __init__(self, motions: Motions, forces: Forces | None) -> None:
-        self.motions, self.forces = motions, forces
+    def __init__(self, motions: Motions, forces: Forces | None, coordinates: Array | None = None) -> None:
+        self.motions, self.forces, self._coordinates = motions, forces, coordinates
         self.mechanism: Mechanism = motions.here.system.m
         self.batch, self.t = motions.batch, motions.t
         self.has_forces = forces is not None
@@ -79,17 +80,24 @@ class Analysis:
     def _out(self, values: Array) -> Array:
         """``(..., T)`` of the solved positions -> batch first ``(*batch, ...)``, NaN where not solved; read-only."""
         rows = np.moveaxis(values, -1, 0)
-        full = np.full((int(np.prod(self.batch)), *rows.shape[1:]), np.nan)
-        full[self.motions.good] = rows
+        total = int(np.prod(self.batch))
+        if self.motions.good.size == total:
+            full = np.array(rows, order="C")
+        else:
+            full = np.full((total, *rows.shape[1:]), np.nan)
+            full[self.motions.good] = rows
         out = full.reshape((*self.batch, *rows.shape[1:]))
         out.setflags(write=False)
         return out
 
     def _user_wrench(self, f: Array) -> Array:
         """Wrench about the internal origin -> user's units about the global origin, ``(6, ...)``."""
-        force = self._L * f[3:]
+        out = np.empty(f.shape)
         origin = self._system.par.origin.reshape(3, *(1,) * (f.ndim - 1))
-        return np.concatenate([self._L**2 * f[:3] + cross(origin, force), force])
+        np.multiply(f[3:], self._L, out=out[3:])
+        np.multiply(f[:3], self._L**2, out=out[:3])
+        out[:3] += cross(origin, out[3:])
+        return out
 
     def _columns(self, pair: int) -> slice:
         first = self._system.first_column
@@ -109,24 +117,11 @@ class Analysis:
     @cached_property
     def user_coordinates(self) -> Array:
         """Coordinates ``(F, *batch)`` in the user's units, rotations continued along the last batch axis."""
-        s = self._system
-        x = np.full((s.n_state, int(np.prod(self.batch))), np.nan)
+        if self._coordinates is not None:
+            return self._coordinates
+        x = np.full((self._system.n_state, int(np.prod(self.batch))), np.nan)
         x[:, self.motions.good] = self._here.x
-        start = s.start_coordinates(self.mechanism.start)
-        tracks = self.motions.tracks
-        if not tracks or any(track is None for track in tracks):
-            q = s.coordinates_of(x.reshape(s.n_state, *(self.batch or (1,))), start)
-            return q.reshape(s.n_freedoms, *self.batch)
-        cases = x.reshape(s.n_state, len(tracks), x.shape[1] // len(tracks))
-        out = np.empty((s.n_freedoms, *cases.shape[1:]))
-        for c, track in enumerate(tracks):
-            at, nodes, along = track or (np.zeros(0), x[:, :0], np.zeros(0))
-            order = np.argsort(np.concatenate([at, along]), kind="stable")
-            q = s.coordinates_of(np.concatenate([nodes, cases[:, c]], axis=1)[:, order], start)
-            back = np.empty_like(order)
-            back[order] = np.arange(len(order))
-            out[:, c] = q[:, back[len(at) :]]
-        return out.reshape(s.n_freedoms, *self.batch)
+        return continued(self._system, x, self.batch, self.motions.tracks)
 
     def coordinates(self, pair: int) -> tuple[Array, Array, Array]:
         """Coordinates, rates, accelerations of a pair."""
@@ -166,9 +161,13 @@ class Analysis:
     # --- forces --------------------------------------------------------------------------------------------------------
 
     @cached_property
-    def _loads(self) -> Array:
+    def _applied(self) -> Array:
         forces = self._need_forces()
-        return forces.inertia + forces.site.scaled(forces.site.external + forces.site.internal) + forces.hold
+        return forces.site.scaled(forces.site.external + forces.site.internal) + forces.hold
+
+    @cached_property
+    def _loads(self) -> Array:
+        return self._need_forces().inertia + self._applied
 
     @cached_property
     def _stress(self) -> Stress:
@@ -191,24 +190,32 @@ class Analysis:
         touched = np.sqrt((stress * stress).sum(axis=-2)) > UNIQUE * scale
         return np.where(touched, np.nan, values)
 
-    def wrenches(self, pair: int) -> tuple[Array, Array]:
-        """Reaction and total wrench about the global origin."""
+    def reaction(self, pair: int) -> Array:
+        """Reaction about the global origin."""
+        return self._about_origin(self._solved[0][:, pair], self._stress.wrenches[:, pair])
+
+    def total(self, pair: int) -> Array:
+        """Total wrench about the global origin."""
         reactions, efforts = self._solved
-        far = self._system.par.origin / self._L
         columns = self._columns(pair)
         work = (self._here.E[:, columns] * efforts[columns]).sum(axis=1)
-        stress = self._stress.wrenches[:, pair]
         stress_work = np.einsum("fst,cft->cst", self._stress.efforts[columns], self._here.E[:, columns])
-        out = []
-        for value, state in ((reactions[:, pair], stress), (reactions[:, pair] + work, stress + stress_work)):
-            shifted = np.concatenate([state[:3] + cross(far[:, None, None], state[3:]), state[3:]])
-            out.append(self._out(self._masked(self._user_wrench(value), shifted, 1.0 + float(np.linalg.norm(far)))))
-        return out[0], out[1]
+        return self._about_origin(reactions[:, pair] + work, self._stress.wrenches[:, pair] + stress_work)
+
+    def _about_origin(self, value: Array, stress: Array) -> Array:
+        """Wrench ``(6, T)`` in the user's units about the global origin, NaN where ``stress (6, s, T)`` has a part."""
+        wrench = self._user_wrench(value)
+        if stress.shape[1]:
+            far = self._system.par.origin / self._L
+            shifted = np.concatenate([stress[:3] + cross(far[:, None, None], stress[3:]), stress[3:]])
+            wrench = self._masked(wrench, shifted, 1.0 + float(np.linalg.norm(far)))
+        return self._out(wrench)
 
     def reaction_at_pair(self, pair: int) -> Array:
         """Reaction about the origin of marker B."""
-        local = at_pair_points(self._here, self._solved[0])[:, pair]
-        stress = at_pair_points(self._here, self._stress.wrenches)[:, pair]
+        point = self._here.pair_points[:, pair]
+        local = shift_wrench(self._solved[0][:, pair], point)
+        stress = shift_wrench(self._stress.wrenches[:, pair], point[:, None])
         scale = np.repeat([self._L**2, self._L], 3)[:, None]
         return self._out(self._masked(scale * local, stress))
 
@@ -232,11 +239,15 @@ class Analysis:
         return {name: self._out(value) for name, value in zip(names, values, strict=True)}
 
     @cached_property
+    def _given(self) -> Array:
+        """Given efforts ``(F, T)``."""
+        return self._need_forces().site.scaled_efforts()
+
+    @cached_property
     def _driver_efforts(self) -> Array:
         """What drivers add to given efforts, ``(F, T)``; zero elsewhere."""
-        forces = self._need_forces()
         out = np.zeros_like(self._solved[1])
-        given = forces.site.scaled_efforts()
+        given = self._given
         driven = self.motions.driven
         out[driven] = self._solved[1][driven] - given[driven]
         return out
@@ -248,7 +259,7 @@ class Analysis:
         """Efforts of all kinds and of the driver alone."""
         columns = self._columns(pair)
         own = self._driver_efforts[columns]
-        total = own + self._need_forces().site.scaled_efforts()[columns]
+        total = own + self._given[columns]
         unit = self._effort_units(columns)
         stress = self._stress.efforts[columns]
         return self._out(self._masked(unit * total, stress)), self._out(self._masked(unit * own, stress))
@@ -273,50 +284,49 @@ class Analysis:
 
     # --- checks and states -----------------------------------------------------------------------------------------------
 
+    def closure(self) -> Array:
+        """Closure error."""
+        return self._out(self._here.closure)
+
     def checks(self) -> Checks:
         """Closure error, equilibrium and power."""
-        closure = self._out(self._here.closure)
+        closure = self.closure()
         if self.forces is None:
             nothing = np.full(self.batch, np.nan)
             return Checks(closure, nothing, nothing)
-        return Checks(closure, self._out(self._equilibrium()), self._out(self._power()))
+        residual, wrench = self.equilibrium()
+        gap, term = self.power()
+        return Checks(closure, self._out(residual / (wrench or 1.0)), self._out(gap / (term or 1.0)))
 
-    def _equilibrium(self) -> Array:
+    def equilibrium(self) -> tuple[Array, float]:
+        """Residual ``(T,)`` of the equilibrium of all links and of ``S^T w = effort``, and the largest wrench in the batch."""
         here, s = self._here, self._system
         reactions, _ = self._solved
-        given = self._need_forces().site.scaled_efforts()
-        totals = reactions + here.pair_sums(here.E * (given + self._driver_efforts))
+        totals = here.pair_sums(here.E * (self._given + self._driver_efforts))
+        totals += reactions
         balance = self._loads.copy()
         add_at(balance, s.b, totals)
         add_at(balance, s.a, -totals)
-        balance = np.delete(balance, s.graph.frame, axis=1)
+        balance[:, s.graph.frame] = 0.0
         forces = self._need_forces()
-        applied = forces.site.scaled(forces.site.external + forces.site.internal)
-        largest = max(np.abs(part).max(initial=0.0) for part in (totals, applied, forces.inertia, forces.hold))
+        applied = self._applied - forces.hold
+        largest = max(largest_of(part) for part in (totals, applied, forces.inertia, forces.hold))
         residual = np.abs(balance).max(axis=(0, 1), initial=0.0)
         work = np.abs(pair_power(here, reactions)).max(axis=0, initial=0.0)
-        return np.maximum(residual, work) / (largest or 1.0)
+        return np.maximum(residual, work), largest
 
-    def _power(self) -> Array:
-        forces, rates = self._need_forces(), self.motions.rates
-        applied = forces.site.scaled(forces.site.external + forces.site.internal) + forces.hold
-        by_load = (rates.V * applied).sum(axis=0)
-        by_effort = rates.dq * (self._driver_efforts + forces.site.scaled_efforts())
-        kinetic = kinetic_power(rates, forces.inertia)
-        largest = max(np.abs(part).max(initial=0.0) for part in (by_load, by_effort, kinetic))
-        return (by_load.sum(axis=0) + by_effort.sum(axis=0) - kinetic.sum(axis=0)) / (largest or 1.0)
+    def power(self) -> tuple[Array, float]:
+        """Driver power + load power - rate of kinetic energy ``(T,)``, and the largest term in the batch."""
+        rates = self.motions.rates
+        by_load = (rates.V * self._applied).sum(axis=0)
+        by_effort = rates.dq * (self._driver_efforts + self._given)
+        kinetic = kinetic_power(rates, self._need_forces().inertia)
+        largest = max(largest_of(part) for part in (by_load, by_effort, kinetic))
+        return by_load.sum(axis=0) + by_effort.sum(axis=0) - kinetic.sum(axis=0), largest
 
     def state(self, index: Any) -> State:
         """Screws and loads at one position, user's units, global origin."""
-        try:
-            flat = np.arange(int(np.prod(self.batch))).reshape(self.batch)[index]
-        except IndexError:
-            text = f"state({index!r}): no such position in a batch {self.batch}; give one index an axis"
-            raise MechgraphError(text) from None
-        if np.ndim(flat):
-            raise MechgraphError(
-                f"state({index!r}): names {np.size(flat)} positions of a batch {self.batch}; give one index an axis"
-            )
+        flat = flat_place(self.batch, index)
         found = np.flatnonzero(self.motions.good == flat)
         if not found.size:
             raise MechgraphError(
@@ -362,3 +372,27 @@ class Analysis:
             if not (j < len(couples) and couples[j]):
                 out[:3, j] = self._L * out[:3, j] + cross(self._system.par.origin[:, None], out[3:, j])
         return out
+
+
+def flat_place(batch: tuple[int, ...], index: Any) -> int:
+    """Place in the flat batch of the one position that an index names.
+
+    Raises
+    ------
+    MechgraphError
+    """
+    try:
+        flat = np.arange(int(np.prod(batch))).reshape(batch)[index]
+    except IndexError:
+        text = f"state({index!r}): no such position in a batch {batch}; give one index an axis"
+        raise MechgraphError(text) from None
+    if np.ndim(flat):
+        raise MechgraphError(
+            f"state({index!r}): names {np.size(flat)} positions of a batch {batch}; give one index an axis"
+        )
+    return int(flat)
+
+
+def largest_of(values: Array) -> float:
+    """Largest size of a number in an array; 0 for none."""
+    return float(max(values.max(initial=0.0), -values.min(initial=0.0)))

@@ -7,39 +7,30 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeadPointError, DeclarationError, IndeterminateError, ReachError
 from mechgraph.force.analysis import Analysis, Forces, Motions
-from mechgraph.force.large import Given, SparseAnalysis, certified_loops, move_sparse, refuse_dense
-from mechgraph.force.methods import METHODS, Problem, chosen_for_all
+from mechgraph.force.blocks import Blocks
+from mechgraph.force.large import SparseAnalysis, move_sparse
+from mechgraph.force.methods import METHODS, Problem
+from mechgraph.force.run import Run, self_length
 from mechgraph.force.site import Site, inertia_wrenches
-from mechgraph.model.drive import Drive
 from mechgraph.model.load import Load
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.motion_law import Motion
 from mechgraph.motion import idle
-from mechgraph.motion.assembly import CLOSED, assembled, assembled_at, named_columns, state_rows
+from mechgraph.motion.assembly import assembled_at
 from mechgraph.motion.follow import SparseSolver
-from mechgraph.motion.idle import Idle, held_well, spin_angles
-from mechgraph.motion.path import SINGULAR, Follower, Positions, Status
-from mechgraph.motion.rates import DEAD_POINT, Rates, closure_solver, distance_to_dead_point, rates
-from mechgraph.motion.system import Configuration, Index, System
-from mechgraph.numerics.linear import Choice, ChosenSystem, independent_rows, rank_of, singular_values
+from mechgraph.motion.march import Status
+from mechgraph.motion.path import continued, fits_one_block
+from mechgraph.motion.system import Index
+from mechgraph.numerics.linear import ChosenSystem
 from mechgraph.result.solution import Solution
 from mechgraph.structure.freedom import free_motion
 from mechgraph.structure.report import check
 
 CONTRADICTION = 1e-6
 """Relative part of the closure rates that drivers may leave open before they count as contradicting each other."""
-
-TURNS_BACK = 60
-"""Most steps in which the spin of passive bodies is taken back."""
-LONGEST_TURN = 0.25
-"""Longest such step (radians)."""
-DOUBTFUL = 1e4
-"""Condition number of the closure equations from which on the distance to a dead point is looked at."""
 
 ON_REACH = ("raise", "flag")
 REDUNDANT = ("nan", "minimum_norm")
@@ -49,230 +40,9 @@ def _option(what: str, value: Any, allowed: Iterable[str]) -> list[str]:
     return [] if value in allowed else [f"{what} = {value!r}: expected one of {', '.join(map(repr, allowed))}"]
 
 
-def _as_motion(value: Any, name: str, faults: list[str]) -> Motion | None:
-    if isinstance(value, Motion):
-        return value
-    try:
-        return Motion(value)
-    except DeclarationError as error:
-        faults += [f"drive {name!r}: {fault}" for fault in error.faults]
-        return None
-
-
-def driven(m: Mechanism, motions: Mapping[str, Any] | None) -> tuple[Mechanism, dict[str, Motion]]:
-    """The mechanism with its drives, and the motion of each by full name.
-
-    Motions given by name go to the declared drives, or become the drives where none is declared; the others use the motion
-    stored with them.
-    """
-    if motions is not None and not isinstance(motions, Mapping):
-        raise DeclarationError(
-            f"solve {m.name!r}",
-            [f"motions = {type(motions).__name__}: expected a mapping driver -> motion, e.g. {{'A': angles}}"],
-        )
-    given = dict(motions or {})
-    faults: list[str] = []
-    if not m.drives and given:
-        faults += [f"drive {name!r}: {why}" for name in given if (why := m.freedom_fault(name, single=True))]
-        if not faults:
-            m = m.replace(drives=[Drive(name) for name in given])
-    known = {m.full_name(d.freedom): d for d in m.drives}
-    out: dict[str, Motion] = {}
-    for name, value in given.items():
-        why = m.freedom_fault(name, single=True)
-        if why or m.full_name(name) not in known:
-            faults.append(f"motion of {name!r}: {why or 'is not a drive'}; drives: {', '.join(known) or 'none'}")
-            continue
-        if m.full_name(name) in out:
-            faults.append(f"motion of {name!r}: {m.full_name(name)} is given twice")
-            continue
-        motion = _as_motion(value, name, faults)
-        if motion is not None:
-            out[m.full_name(name)] = motion
-    for name, drive in known.items():
-        if name not in out and drive.motion is not None:
-            out[name] = drive.motion
-        elif name not in out and not faults:
-            faults.append(f"drive {name!r} has no motion; give one: {{{name!r}: angles or mg.Motion(...)}}")
-    if faults:
-        raise DeclarationError(f"solve {m.name!r}", faults)
-    return m, {name: out[name] for name in known}
-
-
-def _batch(m: Mechanism, motions: Mapping[str, Motion]) -> tuple[int, ...]:
-    try:
-        batch = np.broadcast_shapes(*(motion.shape for motion in motions.values()))
-        if 0 in batch:
-            raise DeclarationError(f"solve {m.name!r}", ["the motions have no positions; give at least one"])
-        return batch
-    except ValueError:
-        shapes = ", ".join(f"{name} {motion.shape}" for name, motion in motions.items())
-        raise DeclarationError(
-            f"solve {m.name!r}", [f"the motions describe different numbers of positions: {shapes}"]
-        ) from None
-
-
-class Run:
-    """One call of ``solve``: drivers, positions and rates."""
-
-    def __init__(self, m: Mechanism, motions: Mapping[str, Any] | None) -> None:
-        self.m, self.motions = driven(m, motions)
-        self.batch = _batch(self.m, self.motions)
-        first = {name: float(np.asarray(motion.position).reshape(-1)[0]) for name, motion in self.motions.items()}
-        self.system, self.x = assembled(self.m, first)
-        self.columns, _ = named_columns(self.m, self.system, dict.fromkeys(self.motions, 0.0))
-        self.unit = np.where(self.system.is_length[self.columns], self.system.par.L, 1.0)
-        self.t = next((motion.t for motion in self.motions.values() if motion.t is not None), None)
-        self.loops = certified_loops(self.system, self.x, self.columns)
-        if self.loops is not None:
-            return
-        self.freedoms = free_motion(self.system, self.x, self.columns)
-        self.lead = np.arange(len(self.columns))
-        if self.freedoms.dependent:
-            rank = rank_of(singular_values(self.freedoms.null[self.columns]), 1e-8)
-            order = [int(c) for c in self.columns]
-            chosen = independent_rows(self.freedoms.null, order, rank)
-            self.lead = np.array([order.index(c) for c in sorted(chosen, key=order.index)], dtype=np.intp)
-        self._check_determinate()
-        refuse_dense(self.system)
-
-    @property
-    def loads(self) -> tuple[Load, ...]:
-        """The loads that act."""
-        return self.m.loads
-
-    def _check_determinate(self) -> None:
-        free = self.freedoms.undriven
-        if free:
-            names = ", ".join(dict.fromkeys(name for motion in free for name in motion.names))
-            count = f"{len(free)} freedom{'s are' if len(free) > 1 else ' is'}"
-            raise IndeterminateError(
-                f"mechanism {self.m.name!r}: {count} left free that {'are' if len(free) > 1 else 'is'} neither driven nor passive "
-                f"(moving: {names}). Drive as many more, or change a pair",
-                check(self.m),
-            )
-
-    @property
-    def leading(self) -> Index:
-        """The drivers that lead: independent ones; drivers that depend on them are checked to agree."""
-        return self.columns[self.lead]
-
-    def values(self, kind: str) -> Array:
-        """Driver positions, velocities or accelerations ``(d, T)`` in internal units."""
-        T = int(np.prod(self.batch))
-        rows = [np.broadcast_to(getattr(motion, kind), self.batch).reshape(T) for motion in self.motions.values()]
-        return np.array(rows).reshape(len(rows), T) / self.unit[:, None]
-
-    def given(self) -> Given:
-        """What the motions of the drivers say."""
-        rows = (self.values(kind) for kind in ("position", "velocity", "acceleration"))
-        return Given(self.batch, self.t, *rows)
-
-    def positions(self) -> Positions:
-        """All positions, followed along the last batch axis."""
-        cases = int(np.prod(self.batch[:-1]))
-        path = self.values("position")[self.lead].reshape(len(self.lead), cases, self_length(self.batch))
-        return Follower(self.system, self.leading, self.freedoms.hold).follow(self.x, path)
-
-    def evaluated(self, x: Array, at: Index) -> Configuration:
-        """States ``x (nx, T)`` evaluated, which stand at the places ``at`` of the flat batch."""
-        return self.system.at(x)
-
-    def case(self, c: int) -> tuple[System, Array]:
-        """System and start ``(nx,)`` of one case of the batch."""
-        return self.system, self.x
-
-    def move(self) -> tuple[Motions, ChosenSystem, Positions]:
-        """Positions and rates."""
-        found = self.positions()
-        bodies = self.freedoms.bodies
-        if bodies:
-            found = self._without_spin(found, bodies)
-        status = np.array([s.value for s in found.status.reshape(-1)], dtype="U24").reshape(self.batch)
-        good = np.flatnonzero(status.reshape(-1) == Status.OK.value)
-        here = found.here if found.here is not None and good.size == found.here.T else None
-        here = here or self.evaluated(found.x.reshape(self.system.n_state, status.size)[:, good], good)
-        which, choices = found.which.reshape(-1)[good], found.choices
-        solver = closure_solver(here, choices, which)
-        open_ = here.closure > CLOSED
-        if open_.any():
-            status.reshape(-1)[good[open_]] = Status.NOT_CLOSED.value
-        dead = self._dead(here, solver, choices, which) | open_
-        if dead.any():
-            status.reshape(-1)[good[dead & ~open_]] = Status.DEAD_POINT.value
-            good, which = good[~dead], which[~dead]
-            here = here.part(np.flatnonzero(~dead))
-            solver = closure_solver(here, choices, which)
-        if bodies:
-            choices, which, solver = held_well(here, choices, which, self.leading)
-        velocity, acceleration = (self.values(kind)[:, good] for kind in ("velocity", "acceleration"))
-        moved = rates(here, solver, self.leading, velocity[self.lead], acceleration[self.lead], bodies)
-        if len(self.lead) < len(self.columns):
-            moved = dataclasses.replace(moved, contradiction=self._disagreement(here, moved, good))
-            solver = chosen_for_all(here.J, [], self.columns)
-            choices, which = solver.choices, solver.which
-        held = tuple(choice.held for choice in choices)
-        tracks = () if bodies else found.tracks
-        return Motions(here, moved, self.batch, good, status, self.t, self.columns, held, which, tracks), solver, found
-
-    def _disagreement(self, here: Configuration, moved: Rates, good: Index) -> Array:
-        """How far given positions and rates of dependent drivers are from those that the leading ones bring, ``(T,)``."""
-        turns = self.values("position")[:, good] - here.x[state_rows(self.system, self.columns)]
-        turns -= np.where(self.system.is_length[self.columns], 0.0, 2 * np.pi)[:, None] * np.round(turns / (2 * np.pi))
-        out = np.abs(turns).max(axis=0, initial=0.0)
-        for given, found in (("velocity", moved.dq), ("acceleration", moved.ddq)):
-            asked = self.values(given)[:, good]
-            size = np.abs(found).max(axis=0, initial=0.0) + np.abs(asked).max(axis=0, initial=0.0)
-            gap = np.abs(found[self.columns] - asked).max(axis=0, initial=0.0)
-            out = np.maximum(out, gap / np.where(size > 0, size, 1.0))
-        return np.maximum(out, moved.contradiction)
-
-    def _dead(
-        self, here: Configuration, solver: ChosenSystem, choices: list[Choice], which: Index
-    ) -> NDArray[np.bool_]:
-        """Positions so near to a dead point that their rates would be noise."""
-        dead = solver.condition > SINGULAR
-        doubtful = np.flatnonzero((solver.condition > DOUBTFUL) & ~dead)
-        if doubtful.size:
-            few = here.part(doubtful)
-            near = distance_to_dead_point(few, closure_solver(few, choices, which[doubtful]), self.leading)
-            dead[doubtful] = np.logical_not(near > DEAD_POINT)
-        return dead
-
-    def _without_spin(self, found: Positions, bodies: tuple[Idle, ...]) -> Positions:
-        """The same positions with passive bodies not spinning from the start to the first and from one to the next."""
-        x = found.x.copy()
-        for c in range(x.shape[1]):
-            at = np.flatnonzero(found.status[c] == Status.OK)
-            if at.size:
-                system, start = self.case(c)
-                path = np.concatenate([start[:, None], x[:, c, at]], axis=1)
-                which = found.which[c, np.concatenate([at[:1], at])]
-                x[:, c, at] = self._turned_back(system, path, found.choices, which, bodies)[:, 1:]
-        return dataclasses.replace(found, x=x, here=None)
-
-    def _turned_back(
-        self, system: System, x: Array, choices: list[Choice], which: Index, bodies: tuple[Idle, ...]
-    ) -> Array:
-        follower = Follower(system, self.leading)
-        for _ in range(TURNS_BACK):
-            here = system.at(x)
-            follower.choices, which, solver = held_well(here, choices, which, self.leading)
-            choices = follower.choices
-            angles, unit = spin_angles(here, bodies, solver.null_of_columns())
-            if np.abs(angles).max(initial=0.0) < 1e-9:
-                break
-            turned = system.advance(x, -np.einsum("fpt,pt->ft", unit, np.clip(angles, -LONGEST_TURN, LONGEST_TURN)))
-            closed, shift = follower.closed_again(turned, which)
-            if not (shift < LONGEST_TURN).all():
-                break
-            x = closed
-        return x
-
-
-def _raise_unreached(run: Run, motions: Motions, last: Array, solution: Solution) -> None:
+def _raise_unreached(run: Run, status: Any, last: Array, solution: Solution) -> None:
     """Named errors for positions that were not solved, with the solution so far."""
-    flat = motions.status.reshape(-1)
+    flat = status.reshape(-1)
     bad = np.flatnonzero(flat != Status.OK.value)
     if bad.size:
         first = int(bad[0])
@@ -299,14 +69,9 @@ def _raise_unreached(run: Run, motions: Motions, last: Array, solution: Solution
         )
 
 
-def self_length(batch: tuple[int, ...]) -> int:
-    """Number of positions of one case."""
-    return batch[-1] if batch else 1
-
-
-def _check_drivers(run: Run, motions: Motions) -> None:
-    worst = float(motions.rates.contradiction.max(initial=0.0))
-    stuck = run.loops is None and run.freedoms.dependent and not motions.good.size
+def _check_drivers(run: Run, motions: list[Motions], status: Any) -> None:
+    worst = max((float(part.rates.contradiction.max(initial=0.0)) for part in motions), default=0.0)
+    stuck = run.loops is None and run.freedoms.dependent and not (status == Status.OK.value).any()
     if worst > CONTRADICTION or stuck:
         names, mobility = ", ".join(run.motions), free_motion(run.system, run.x, run.columns).mobility
         raise IndeterminateError(
@@ -358,6 +123,8 @@ def _solve(m: Mechanism, motions: Mapping[str, Any] | None, on_reach: str, force
     if faults:
         raise DeclarationError(f"solve {m.name!r}", faults)
     run = Run(m, motions)
+    if run.loops is None and _in_blocks(run, forces):
+        return _solve_in_blocks(run, on_reach, forces)
     solver: ChosenSystem | SparseSolver
     if run.loops is not None:
         moved, solver, reached = move_sparse(run.system, run.x, run.columns, run.loops, run.given())
@@ -365,13 +132,47 @@ def _solve(m: Mechanism, motions: Mapping[str, Any] | None, on_reach: str, force
     else:
         moved, solver, found = run.move()
         reached, kind = found.reached, Analysis
-    _check_drivers(run, moved)
+    _check_drivers(run, [moved], moved.status)
     solved = kind(moved, None)
     if forces is not None:
         solved = kind(moved, forces_of(run, moved, solver, solved.user_coordinates, *forces))
     solution = Solution(solved)
     if on_reach == "raise":
-        _raise_unreached(run, moved, reached, solution)
+        _raise_unreached(run, moved.status, reached, solution)
+    return solution
+
+
+def _in_blocks(run: Run, forces: tuple[str, str] | None) -> bool:
+    """Whether positions can be solved block by block: many of them, and nothing that looks at all of them at once."""
+    if fits_one_block(int(np.prod(run.batch))) or run.freedoms.bodies:
+        return False
+    return forces is None or (forces[0] == "loop_wrench" and all(_by_position(load) for load in run.loads))
+
+
+def _by_position(load: Load) -> bool:
+    """Whether a load is a matter of each position by itself: one of values, not of callables that see the whole batch."""
+    if not dataclasses.is_dataclass(load):
+        return False
+    return not any(callable(getattr(load, field.name)) for field in dataclasses.fields(load))
+
+
+def _solve_in_blocks(run: Run, on_reach: str, forces: tuple[str, str] | None) -> Solution:
+    parts, status, found = run.move_in_blocks()
+    _check_drivers(run, [part.motions for part in parts], status)
+    places = [part.places for part in parts]
+    x = np.full((run.system.n_state, status.size), np.nan)
+    for part in parts:
+        x[:, part.places] = part.motions.here.x
+    coordinates = continued(run.system, x, run.batch, found.tracks)
+    flat = coordinates.reshape(run.system.n_freedoms, status.size)
+    solved = []
+    for part in parts:
+        mine = flat[:, part.places]
+        wrenches = None if forces is None else _forces(run, part.motions, part.solver, mine, part.places, *forces)
+        solved.append(Analysis(part.motions, wrenches, mine))
+    solution = Solution(Blocks(solved, places, run.batch, status, run.t))
+    if on_reach == "raise":
+        _raise_unreached(run, status, found.reached, solution)
     return solution
 
 
@@ -379,10 +180,29 @@ def forces_of(
     run: Run, moved: Motions, solver: ChosenSystem | SparseSolver, coordinates: Array, method: str, redundant: str
 ) -> Forces:
     """Loads, and the wrenches of all pairs that balance them, at the positions of a run."""
-    inertia = inertia_wrenches(moved.here, moved.rates)
     flat = coordinates.reshape(run.system.n_freedoms, int(np.prod(run.batch)))[:, moved.good]
-    site = Site(moved.here, moved.rates, flat, run.batch, moved.good, run.t)
+    return _forces(run, moved, solver, flat, moved.good, method, redundant)
+
+
+def _site(run: Run, moved: Motions, coordinates: Array, places: Index) -> Site:
+    """All loads, acting."""
+    site = Site(moved.here, moved.rates, coordinates, run.batch, places, run.t)
     site.collect(run.loads)
+    return site
+
+
+def _forces(
+    run: Run,
+    moved: Motions,
+    solver: ChosenSystem | SparseSolver,
+    coordinates: Array,
+    places: Index,
+    method: str,
+    redundant: str,
+) -> Forces:
+    """Loads and wrenches at positions of coordinates ``(F, T)`` that stand at the ``places`` of the flat batch."""
+    inertia = inertia_wrenches(moved.here, moved.rates)
+    site = _site(run, moved, coordinates, places)
     loads = inertia + site.scaled(site.external + site.internal)
     held = np.zeros_like(loads)
     holds: tuple[tuple[str, bool, Array], ...] = ()

@@ -20,7 +20,7 @@ from mechgraph.force.least import least_change
 from mechgraph.motion.assembly import CLOSED
 from mechgraph.motion.follow import SparseFollower, SparseNode, SparseSolver, sparse_rates
 from mechgraph.motion.loops import LoopSystem
-from mechgraph.motion.path import Status
+from mechgraph.motion.march import Status
 from mechgraph.motion.rates import DEAD_POINT, Rates
 from mechgraph.motion.system import Configuration, Index, System
 from mechgraph.structure.reaction import PairFrames, Stress, pair_power, reaction_part, split_stress

@@ -56,11 +56,10 @@ def loop_wrench(problem: Problem) -> Wrenches:
     """
     here = problem.here
     tree = tree_wrenches(here, problem.loads)
-    owner = np.repeat(np.arange(len(here.system.m.pairs)), np.diff(here.system.first_column))
-    rhs = problem.efforts - (here.S * tree[:, owner]).sum(axis=0)
+    rhs = problem.efforts - (here.S * tree[:, here.system.owners]).sum(axis=0)
     x = problem.solver.solve_transposed(rhs[:, None])
-    totals = tree + here.pair_wrenches(x)[:, :, 0]
-    return Wrenches(totals, here.pair_wrenches(problem.solver.null_of_transpose()))
+    tree += here.pair_wrenches(x)[:, :, 0]
+    return Wrenches(tree, here.pair_wrenches(problem.solver.null_of_transpose()))
 
 
 def tree_wrenches(here: Configuration, loads: Array) -> Array:

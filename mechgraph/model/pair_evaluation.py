@@ -6,11 +6,12 @@ All functions take ``n`` pairs of one type at ``T`` positions: state numbers ``x
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mechgraph.algebra.screw import move_constant
+from mechgraph.algebra.screw import direction, moved_screw
 from mechgraph.algebra.se3 import (
     Array,
     compose,
@@ -23,6 +24,7 @@ from mechgraph.algebra.se3 import (
     quaternion_product,
     skew,
 )
+from mechgraph.model.pair_frames import Frame
 
 if TYPE_CHECKING:
     from mechgraph.model.pair import Component, Freedom, PairType
@@ -70,40 +72,83 @@ def frames_of(row: PairType, pitch: Array, x: Array, base: Array | None = None) 
     return frames
 
 
-def twists_of(row: PairType, pitch: Array, frames: list[Array]) -> Array:
+Frames = Sequence[Array] | Sequence[Frame]
+
+
+def _columns(frames: Frames, k: int) -> Callable[[int], Array]:
+    """Column of a frame by its index: axes 0, 1, 2 and the origin 3, ``(3, n, T)``."""
+    X = frames[k]
+    return X.column if isinstance(X, Frame) else lambda i: X[:, i]
+
+
+def twists_of(row: PairType, pitch: Array, frames: Frames) -> Array:
     """Unit twists of the freedoms, ``(6, f, n, T)``, in the frame in which ``frames`` are given."""
     return freedoms_of(row.freedoms, row.frame_before, pitch, frames)
 
 
-def freedoms_of(freedoms: tuple[Freedom, ...], before: tuple[int, ...], pitch: Array, frames: list[Array]) -> Array:
+def freedoms_of(freedoms: tuple[Freedom, ...], before: tuple[int, ...], pitch: Array, frames: Frames) -> Array:
     """Unit twists of freedoms, each constant in the frame of its index in ``before``, ``(6, n freedoms, n, T)``."""
-    out = np.empty((6, len(freedoms), *frames[0].shape[2:]))
-    for j, freedom in enumerate(freedoms):
-        X = frames[before[j]]
-        twist = np.array(freedom.twist)
-        out[:3, j], out[3:, j] = move_constant(X, twist[3:], twist[:3])
-        for i, per_pitch in enumerate(freedom.per_pitch[3:]):
-            if per_pitch:
-                out[3:, j] += per_pitch * pitch * X[:, i]
+    if not freedoms:
+        return np.empty((6, 0, *_columns(frames, 0)(3).shape[1:]))
+    parts = [twist_of(freedom, k, pitch, frames) for freedom, k in zip(freedoms, before, strict=True)]
+    return _stacked(parts)
+
+
+def _stacked(parts: list[tuple[Array, Array]]) -> Array:
+    out = np.empty((6, len(parts), *parts[0][0].shape[1:]))
+    for j, (first, second) in enumerate(parts):
+        out[:3, j], out[3:, j] = first, second
     return out
 
 
-def components_of(components: tuple[Component, ...], pitch: Array, frames: list[Array]) -> Array:
+def twist_of(freedom: Freedom, before: int, pitch: Array, frames: Frames) -> tuple[Array, Array]:
+    """Unit twist of one freedom that is constant in frame ``before``: angular and linear part, ``(3, n, T)``."""
+    angular, linear = twist_parts(freedom, before, pitch, frames)
+    origin = _columns(frames, before)(3)
+    moment = np.zeros(origin.shape) if angular is None else cross(origin, angular)
+    if linear is not None:
+        moment += linear
+    return np.zeros(origin.shape) if angular is None else angular, moment
+
+
+def twist_parts(freedom: Freedom, before: int, pitch: Array, frames: Frames) -> tuple[Array | None, Array | None]:
+    """Angular part of the unit twist of a freedom, and its linear part at the origin of its frame; None where they vanish."""
+    column = _columns(frames, before)
+    angular, linear = direction(column, freedom.twist[:3]), direction(column, freedom.twist[3:])
+    for i, per_pitch in enumerate(freedom.per_pitch[3:]):
+        if per_pitch:
+            more = per_pitch * pitch * column(i)
+            linear = more if linear is None else linear + more
+    return angular, linear
+
+
+def frame_origin(before: int, frames: Frames) -> Array:
+    """Origin of a frame, ``(3, n, T)``."""
+    return _columns(frames, before)(3)
+
+
+def components_of(components: tuple[Component, ...], pitch: Array, frames: Frames) -> Array:
     """Wrenches of components, each constant in its frame, ``(6, n components, n, T)``."""
-    out = np.empty((6, len(components), *frames[0].shape[2:]))
-    for j, c in enumerate(components):
-        X = frames[c.frame]
-        wrench = np.array(c.wrench)
-        if c.at_b:
-            X = np.concatenate([X[:, :3], frames[-1][:, 3:]], axis=1)
-        out[3:, j], out[:3, j] = move_constant(X, wrench[:3], wrench[3:])
-        for i, per_pitch in enumerate(c.per_pitch[:3]):
-            if per_pitch:
-                out[:3, j] += per_pitch * pitch * X[:, i]
-    return out
+    if not components:
+        return np.empty((6, 0, *_columns(frames, 0)(3).shape[1:]))
+    return _stacked([component_of(c, pitch, frames) for c in components])
 
 
-def efforts_of(row: PairType, pitch: Array, frames: list[Array]) -> Array:
+def component_of(c: Component, pitch: Array, frames: Frames) -> tuple[Array, Array]:
+    """Wrench of one component: moment and force, ``(3, n, T)``."""
+    axes, end = _columns(frames, c.frame), _columns(frames, len(frames) - 1)
+
+    def column(i: int) -> Array:
+        return end(3) if i == 3 and c.at_b else axes(i)
+
+    force, moment = moved_screw(column, c.wrench[:3], c.wrench[3:])
+    for i, per_pitch in enumerate(c.per_pitch[:3]):
+        if per_pitch:
+            moment = moment + per_pitch * pitch * axes(i)
+    return moment, force
+
+
+def efforts_of(row: PairType, pitch: Array, frames: Frames) -> Array:
     """Effort wrenches ``E``, one a freedom, ``(6, f, n, T)``; combined to ``E (S^T E)^-1`` where the row asks for it."""
     E = components_of(row.efforts, pitch, frames)
     if not row.computed_efforts:

@@ -15,7 +15,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.motion.assembly import state_rows
 from mechgraph.motion.loops import LoopSystem
-from mechgraph.motion.path import (
+from mechgraph.motion.march import (
     ACCEPTED,
     AIM,
     CONVERGED,

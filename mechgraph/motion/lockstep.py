@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.motion.assembly import state_rows
-from mechgraph.motion.path import CORRECTION
+from mechgraph.motion.march import CORRECTION
 from mechgraph.motion.system import Index, System
 from mechgraph.numerics.linear import Choice, ChosenSystem, choose
 

@@ -48,7 +48,7 @@ def rates(
 
     ``J q' = 0`` and ``J q'' = -bias``, the driven part known; passive freedoms of ``bodies`` at rest (see ``motion.idle``).
     """
-    dq, gap_v = _completed(here, solver, columns, velocity, np.zeros((here.J.shape[0], here.T)))
+    dq, gap_v = _completed(here, solver, columns, velocity, None)
     V = here.link_twists(dq)
     Z = solver.null_of_columns() if bodies else np.zeros((len(dq), 0, here.T))
     if bodies:
@@ -56,17 +56,18 @@ def rates(
         G = idle.passive_twists(here, bodies, points, Z)
         dq += np.einsum("fpt,pt->ft", Z, idle.resting_part(G, idle.body_twists(bodies, points, V)))
         V = here.link_twists(dq)
-    bias = here.loop_sums(here.bias(dq, V))
+    relative = here.bias(dq, V)
+    bias = here.loop_sums(relative)
     turning = (dq * dq).max(axis=0, initial=0.0)
     ddq, gap_a = _completed(here, solver, columns, acceleration, bias, turning)
-    A = here.link_accelerations(dq, ddq, V)
+    A = here.accelerations_with(ddq, relative)
     if bodies:
         now = idle.body_accelerations(bodies, points, V, A)
         change = np.linalg.solve(np.einsum("ipt,iqt->tpq", G, G), idle.turning_part(bodies, points, V, G).T[..., None])[
             ..., 0
         ].T
         ddq += np.einsum("fpt,pt->ft", Z, idle.resting_part(G, now) - change)
-        A = here.link_accelerations(dq, ddq, V)
+        A = here.accelerations_with(ddq, relative)
     return Rates(dq, ddq, V, A, np.maximum(gap_v, gap_a))
 
 
@@ -88,11 +89,22 @@ def distance_to_dead_point(here: Configuration, solver: ChosenSystem, columns: I
 
 
 def _completed(
-    here: Configuration, solver: ChosenSystem, columns: Index, driven: Array, known: Array, size: Array | float = 0.0
+    here: Configuration,
+    solver: ChosenSystem,
+    columns: Index,
+    driven: Array,
+    known: Array | None,
+    size: Array | float = 0.0,
 ) -> tuple[Array, Array]:
-    rhs = -np.einsum("idt,dt->it", here.J[:, columns], driven) - known
+    """Rates ``(F, T)`` with ``J q + known = 0`` for given driven ones, and what is left of that, relative ``(T,)``."""
+    rhs = np.zeros((here.J.shape[0], here.T)) if known is None else -known
+    for column, value in zip(columns, driven, strict=True):
+        if value.any():
+            rhs -= here.J[:, column] * value
     q = solver.solve(rhs[:, None])[:, 0]
-    left = np.abs(np.einsum("ift,ft->it", here.J, q) - rhs).max(axis=0, initial=0.0)
+    left = np.abs((here.J * q).sum(axis=1) - rhs).max(axis=0, initial=0.0)
     q[columns] = driven
-    scale = np.abs(q).max(axis=0, initial=0.0) + np.abs(known).max(axis=0, initial=0.0) + size
+    scale = np.abs(q).max(axis=0, initial=0.0) + size
+    if known is not None:
+        scale += np.abs(known).max(axis=0, initial=0.0)
     return q, left / np.where(scale > 0, scale, 1.0)

@@ -15,12 +15,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.screw import cross_twist
-from mechgraph.algebra.se3 import Array, compose, inverse, pose_log
+from mechgraph.algebra.se3 import Array, compose, cross, inverse, pose_log
 from mechgraph.model import pair_evaluation as evaluation
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import PairType
+from mechgraph.model.pair_frames import (
+    Factor,
+    Frame,
+    displaced,
+    factor_values,
+    factors_between,
+    frames_along,
+    moved_marker,
+)
 from mechgraph.model.parameters import Parameters, parameters
 from mechgraph.motion.tree import Tree
+from mechgraph.numerics.linear import Place, compact
 from mechgraph.topology.linkgraph import LinkGraph, link_graph
 
 Index = NDArray[np.intp]
@@ -37,6 +47,16 @@ class Group:
     pairs: Index
     columns: Index
     state_rows: Index
+
+    @cached_property
+    def at_pairs(self) -> Place:
+        """The pairs, as a slice where that can be."""
+        return compact(self.pairs)
+
+    @cached_property
+    def at_columns(self) -> list[Place]:
+        """The columns of every freedom, as slices where that can be."""
+        return [compact(columns) for columns in self.columns]
 
 
 class System:
@@ -59,9 +79,40 @@ class System:
         for g in self.groups:
             self.is_length[g.columns] = np.array([not f.turns for f in g.row.freedoms], dtype=bool)[:, None]
 
+    @cached_property
+    def factors(self) -> list[list[Factor]]:
+        """For every group the factors of its relative poses between the link frames."""
+        par = self.par
+        return [
+            factors_between(
+                g.row, par.pitch[g.pairs], par.marker_a[:, :, g.pairs], self.marker_b_inverse[:, :, g.pairs]
+            )
+            for g in self.groups
+        ]
+
+    def weld(self, g: Group) -> Array:
+        """Constant relative poses of pairs without freedom, ``(3, 4, n, 1)``."""
+        return compose(self.par.marker_a[:, :, g.pairs], self.marker_b_inverse[:, :, g.pairs])
+
+    @cached_property
+    def owners(self) -> Place:
+        """For every freedom its pair."""
+        return compact(np.repeat(np.arange(len(self.m.pairs)), np.diff(self.first_column)))
+
+    @cached_property
+    def carriers(self) -> list[Place]:
+        """For every group the links a of its pairs."""
+        return [compact(self.a[g.pairs]) for g in self.groups]
+
+    @cached_property
+    def chord_ends(self) -> tuple[Place, Place]:
+        """Links a and b of the chords."""
+        return compact(self.a[self.chords]), compact(self.b[self.chords])
+
     def with_parameters(self, par: Parameters) -> System:
         """The same graph with other numbers."""
         out = copy(self)
+        out.__dict__.pop("factors", None)
         out.par, out.marker_b_inverse = par, inverse(par.marker_b)
         rows = [self.m.pairs[int(g.pairs[0])].type.scaled(par.L) for g in self.groups]
         out.groups = [replace(g, row=row) for g, row in zip(self.groups, rows, strict=True)]
@@ -108,6 +159,17 @@ class System:
     def many_loops(self) -> bool:
         """Whether sums along loops are taken with the sparse loop matrix."""
         return len(self.graph.loops) > MANY_LOOPS
+
+    @cached_property
+    def loop_pieces(self) -> list[list[tuple[slice, Array]]]:
+        """For every loop the runs of its columns without a gap, with their signs ``(n, 1)``."""
+        out = []
+        for columns, signs in self.loop_columns:
+            order = np.argsort(columns)
+            breaks = np.flatnonzero(np.diff(columns[order]) != 1) + 1
+            runs = zip(np.split(columns[order], breaks), np.split(signs[order], breaks), strict=True)
+            out.append([(slice(int(c[0]), int(c[-1]) + 1), sign[:, None]) for c, sign in runs if len(c)])
+        return out
 
     @cached_property
     def loops_of_chords(self) -> Array:
@@ -174,15 +236,25 @@ class Configuration:
         self.system = system
         self.x = x
         self.T = x.shape[1]
-        par = system.par
-        P = len(system.m.pairs)
-        local = [evaluation.frames_of(g.row, par.pitch[g.pairs], x[g.state_rows]) for g in system.groups]
-        D = np.empty((3, 4, P, self.T))
-        for g, frames in zip(system.groups, local, strict=True):
-            D[:, :, g.pairs] = frames[-1]
-        relative = compose(compose(par.marker_a, D), system.marker_b_inverse)
-        self.poses = system.tree.poses(relative, par.frame)
-        self._local = local
+        s = system
+        self._values = [
+            factor_values(g.row, factors, x[g.state_rows]) for g, factors in zip(s.groups, s.factors, strict=True)
+        ]
+        relative = np.empty((3, 4, len(s.m.pairs), self.T))
+        for g, factors, values in zip(s.groups, s.factors, self._values, strict=True):
+            relative[:, :, g.at_pairs] = displaced(factors, values) if factors else s.weld(g)
+        self._chords = relative[:, :, s.chords]
+        self.poses = s.tree.poses(relative, s.par.frame)
+
+    @cached_property
+    def _columns(self) -> list[list[Frame]]:
+        """For every group the pair frames 0, 1, ..., by columns."""
+        s = self.system
+        out = []
+        for g, factors, values, links in zip(s.groups, s.factors, self._values, s.carriers, strict=True):
+            base = moved_marker(self.poses[:, :, links], s.par.marker_a[:, :, g.at_pairs])
+            out.append(frames_along(g.row, factors, values, base))
+        return out
 
     def part(self, at: Index) -> Configuration:
         """Some of the positions, evaluated by themselves."""
@@ -193,25 +265,29 @@ class Configuration:
     @cached_property
     def frames(self) -> list[list[Array]]:
         """For every group the pair frames 0, 1, ... about the internal origin."""
-        s = self.system
-        marker = compose(self.poses[:, :, s.a], s.par.marker_a)
-        out = []
-        for g, local in zip(s.groups, self._local, strict=True):
-            base = marker[:, :, g.pairs]
-            seen = {id(local[0]): base}
-            for X in local[1:]:
-                if id(X) not in seen:
-                    seen[id(X)] = compose(base, X)
-            out.append([seen[id(X)] for X in local])
-        return out
+        return [
+            [whole[id(X)] for X in group]
+            for group in self._columns
+            for whole in [{id(X): np.stack([X.column(i) for i in range(4)], axis=1) for X in group}]
+        ]
 
     @cached_property
     def S(self) -> Array:
         """Twists of all freedoms ``(6, F, T)``."""
         s = self.system
         out = np.empty((6, s.n_freedoms, self.T))
-        for g, frames in zip(s.groups, self.frames, strict=True):
-            out[:, g.columns] = evaluation.twists_of(g.row, s.par.pitch[g.pairs], frames)
+        points = np.empty((3, s.n_freedoms, self.T))
+        slides = []
+        for g, frames in zip(s.groups, self._columns, strict=True):
+            for freedom, before, at in zip(g.row.freedoms, g.row.frame_before, g.at_columns, strict=True):
+                turn, slide = evaluation.twist_parts(freedom, before, s.par.pitch[g.pairs], frames)
+                out[:3, at] = 0.0 if turn is None else turn
+                points[:, at] = 0.0 if turn is None else evaluation.frame_origin(before, frames)
+                if slide is not None:
+                    slides.append((at, slide))
+        cross(points, out[:3], out[3:])
+        for at, slide in slides:
+            out[3:, at] += slide
         return out
 
     @cached_property
@@ -219,8 +295,10 @@ class Configuration:
         """Effort wrenches of all freedoms ``(6, F, T)``."""
         s = self.system
         out = np.empty((6, s.n_freedoms, self.T))
-        for g, frames in zip(s.groups, self.frames, strict=True):
-            out[:, g.columns] = evaluation.efforts_of(g.row, s.par.pitch[g.pairs], frames)
+        for g, frames in zip(s.groups, self._columns, strict=True):
+            E = evaluation.efforts_of(g.row, s.par.pitch[g.pairs], frames)
+            for j, at in enumerate(g.at_columns):
+                out[:, at] = E[:, j]
         return out
 
     @cached_property
@@ -252,22 +330,17 @@ class Configuration:
     def pair_points(self) -> Array:
         """Origins of the markers B, ``(3, P, T)``."""
         out = np.empty((3, len(self.system.m.pairs), self.T))
-        for g, frames in zip(self.system.groups, self.frames, strict=True):
-            out[:, g.pairs] = frames[-1][:, 3]
+        for g, frames in zip(self.system.groups, self._columns, strict=True):
+            out[:, g.at_pairs] = frames[-1].column(3)
         return out
 
     @cached_property
     def chord_errors(self) -> Array:
         """Closure errors ``(6, chords, T)``: finite twist from marker B reached through b to that reached through a."""
         s = self.system
-        reached = np.empty((3, 4, len(s.chords), self.T))
-        place = np.full(len(s.m.pairs), -1)
-        place[s.chords] = np.arange(len(s.chords))
-        for g, frames in zip(s.groups, self.frames, strict=True):
-            chord = place[g.pairs]
-            reached[:, :, chord[chord >= 0]] = frames[-1][:, :, chord >= 0]
-        marker_b = compose(self.poses[:, :, s.b[s.chords]], s.par.marker_b[:, :, s.chords])
-        return pose_log(compose(reached, inverse(marker_b)))
+        a, b = s.chord_ends
+        reached = compose(self.poses[:, :, a], self._chords)
+        return pose_log(compose(reached, inverse(self.poses[:, :, b])))
 
     @cached_property
     def closure(self) -> Array:
@@ -286,8 +359,7 @@ class Configuration:
             per_pair = np.zeros((6, len(s.m.pairs), self.T))
             per_pair[:, s.chords] = self.chord_errors
             return self.loop_sums(per_pair)
-        loops = np.einsum("lc,ict->lit", s.loops_of_chords, self.chord_errors)
-        return loops.reshape(-1, self.T)
+        return _combined(s.loops_of_chords, self.chord_errors)
 
     @cached_property
     def J(self) -> Array:
@@ -298,8 +370,10 @@ class Configuration:
         """Columns ``(6, F, T)`` placed with their signs into the rows of every loop."""
         s = self.system
         out = np.zeros((6 * len(s.loop_columns), s.n_freedoms, S.shape[2]))
-        for i, (columns, signs) in enumerate(s.loop_columns):
-            out[6 * i : 6 * i + 6, columns] = signs[:, None] * S[:, columns]
+        for i, pieces in enumerate(s.loop_pieces):
+            rows = out[6 * i : 6 * i + 6]
+            for at, signs in pieces:
+                np.multiply(S[:, at], signs, out=rows[:, at])
         return out
 
     # --- rates -----------------------------------------------------------------------------------------------------
@@ -313,8 +387,11 @@ class Configuration:
         s = self.system
         out = np.zeros((6, len(s.m.pairs), terms.shape[2]))
         for g in s.groups:
-            for columns in g.columns:
-                out[:, g.pairs] += terms[:, columns]
+            for i, at in enumerate(g.at_columns):
+                if i == 0:
+                    out[:, g.at_pairs] = terms[:, at]
+                else:
+                    out[:, g.at_pairs] += terms[:, at]
         return out
 
     def bias(self, dq: Array, V: Array) -> Array:
@@ -322,12 +399,17 @@ class Configuration:
         s = self.system
         moving = self.S * dq
         out = np.zeros((6, len(s.m.pairs), self.T))
-        for g in s.groups:
-            carrier = V[:, s.a[g.pairs]]
+        for g, links in zip(s.groups, s.carriers, strict=True):
+            carrier = V[:, links]
             for factor in g.row.factors:
-                step = sum((moving[:, g.columns[j]] for j in factor[1:]), start=moving[:, g.columns[factor[0]]])
-                out[:, g.pairs] += cross_twist(carrier, step)
-                carrier = carrier + step
+                steps = [moving[:, g.at_columns[j]] for j in factor]
+                step = steps[0] if len(steps) == 1 else steps[0] + steps[1] + steps[2]
+                if factor[0] == 0:
+                    out[:, g.at_pairs] = cross_twist(carrier, step)
+                else:
+                    out[:, g.at_pairs] += cross_twist(carrier, step)
+                if factor[-1] + 1 < g.row.f:
+                    carrier = carrier + step
         return out
 
     def loop_sums(self, per_pair: Array) -> Array:
@@ -336,8 +418,7 @@ class Configuration:
         if s.many_loops:
             flat = per_pair.transpose(1, 0, 2).reshape(per_pair.shape[1], 6 * per_pair.shape[2])
             return np.asarray(s.graph.sparse_loop_matrix @ flat).reshape(-1, per_pair.shape[2])
-        sums = np.einsum("lp,ipt->lit", s.graph.loop_matrix, per_pair)
-        return sums.reshape(sums.shape[0] * sums.shape[1], per_pair.shape[2])
+        return _combined(s.graph.loop_matrix, per_pair)
 
     def pair_wrenches(self, x: Array) -> Array:
         """Pair wrenches ``(6, P, k, T)`` of loop wrenches ``(6 loops, k, T)``: ``w = C^T x``."""
@@ -350,4 +431,16 @@ class Configuration:
 
     def link_accelerations(self, dq: Array, ddq: Array, V: Array) -> Array:
         """Accelerations dV/dt of all links ``(6, N, T)``."""
-        return self.system.tree.sums(self.pair_sums(self.S * ddq) + self.bias(dq, V))
+        return self.accelerations_with(ddq, self.bias(dq, V))
+
+    def accelerations_with(self, ddq: Array, bias: Array) -> Array:
+        """Accelerations dV/dt of all links ``(6, N, T)``, the velocity part ``bias (6, P, T)`` known."""
+        relative = self.pair_sums(self.S * ddq)
+        relative += bias
+        return self.system.tree.sums(relative)
+
+
+def _combined(matrix: Array, terms: Array) -> Array:
+    """Combinations ``(6 rows, T)`` of terms ``(6, n, T)`` by a matrix ``(rows, n)``."""
+    sums = matrix @ terms
+    return sums.swapaxes(0, 1).reshape(sums.shape[0] * sums.shape[1], terms.shape[2])

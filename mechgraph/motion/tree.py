@@ -14,11 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array, compose, identity, inverse
-from mechgraph.numerics.linear import add_at, scattered_sum
+from mechgraph.numerics.linear import Place, add_at, compact, scattered_sum
 from mechgraph.topology.linkgraph import LinkGraph
 
 Index = NDArray[np.intp]
 Level = tuple[Index, NDArray[np.bool_], Index, Index]
+
+Step = tuple[Place, NDArray[np.bool_] | None, Place, Place]
 
 DEEP = 200
 """Levels above which the tree is run through by pointer doubling."""
@@ -42,6 +44,25 @@ class Tree:
         self.deep = len(self.levels) > DEEP
 
     @cached_property
+    def _walk(self) -> list[Step]:
+        """The levels with indices that take no copy where they can; ``forward`` is None where all lead outwards."""
+        return [
+            (compact(pairs), None if forward.all() else forward, compact(parents), compact(children))
+            for pairs, forward, parents, children in self.levels
+        ]
+
+    @cached_property
+    def _back(self) -> Place | None:
+        """Pairs of the tree that lead inwards, from b to a; None where there are none."""
+        back = np.sort(self.pairs[~self.forward])
+        return compact(back) if back.size else None
+
+    @property
+    def _whole(self) -> Step:
+        """All pairs of the tree in one step."""
+        return self.pairs, self.forward, self.parents, self.children
+
+    @cached_property
     def _jumps(self) -> list[Index]:
         """Ancestor of every link after 1, 2, 4, ... levels; the frame stands for all that lie beyond."""
         ancestor = np.full(self.n_links, self.frame, dtype=np.intp)
@@ -53,7 +74,7 @@ class Tree:
         return out
 
     def poses(self, relative: Array, frame: Array) -> Array:
-        """Poses ``(3, 4, N, T)`` of all links from those of b seen from a, ``relative (3, 4, P, T)``."""
+        """Poses ``(3, 4, N, T)`` of all links from those of b seen from a, ``relative (3, 4, P, T)``, which is used up."""
         if not self.deep:
             return self._poses_by_levels(relative, frame)
         X = identity(self.n_links, relative.shape[3])
@@ -67,19 +88,21 @@ class Tree:
     def _poses_by_levels(self, relative: Array, frame: Array) -> Array:
         X = np.empty((3, 4, self.n_links, relative.shape[3]))
         X[:, :, self.frame] = frame
-        for pairs, forward, parents, children in self.levels:
-            step = relative[:, :, pairs]
-            if not forward.all():
-                step[:, :, ~forward] = inverse(step[:, :, ~forward])
-            X[:, :, children] = compose(X[:, :, parents], step)
+        if self._back is not None:
+            relative[:, :, self._back] = inverse(relative[:, :, self._back])
+        for pairs, _, parents, children in self._walk:
+            X[:, :, children] = compose(X[:, :, parents], relative[:, :, pairs])
         return X
 
     def sums(self, relative: Array) -> Array:
         """Sums ``(6, N, T)`` of pair terms ``(6, P, T)`` from the frame to every link, with the sense of the way."""
         out = np.zeros((6, self.n_links, relative.shape[2]))
         if not self.deep:
-            for pairs, forward, parents, children in self.levels:
-                out[:, children] = out[:, parents] + np.where(forward[:, None], 1.0, -1.0) * relative[:, pairs]
+            for pairs, forward, parents, children in self._walk:
+                step = relative[:, pairs]
+                if forward is not None:
+                    step = np.where(forward[:, None], 1.0, -1.0) * step
+                out[:, children] = out[:, parents] + step
             return out
         out[:, self.children] = np.where(self.forward[:, None], 1.0, -1.0) * relative[:, self.pairs]
         for ancestor in self._jumps:
@@ -90,8 +113,11 @@ class Tree:
         """Sums ``(6, N, T)`` of the loads of every link and of all links behind it; the transpose of ``sums``."""
         out = loads.copy()
         if not self.deep:
-            for _, _, parents, children in reversed(self.levels):
-                add_at(out, parents, out[:, children])
+            for _, _, parents, children in reversed(self._walk):
+                if isinstance(parents, slice):
+                    out[:, parents] += out[:, children]
+                else:
+                    add_at(out, parents, out[:, children])
             return out
         for ancestor in reversed(self._jumps):
             moving = out.copy()
@@ -103,5 +129,8 @@ class Tree:
     def wrenches(self, loads: Array, n_pairs: int) -> Array:
         """Pair wrenches ``(6, P, T)`` that carry the loads along the tree, chords free."""
         out = np.zeros((6, n_pairs, loads.shape[2]))
-        out[:, self.pairs] = np.where(self.forward[:, None], -1.0, 1.0) * self.carried(loads)[:, self.children]
+        carried = self.carried(loads)
+        for pairs, forward, _, children in [self._whole] if self.deep else self._walk:
+            step = carried[:, children]
+            out[:, pairs] = -step if forward is None else np.where(forward[:, None], -1.0, 1.0) * step
         return out

@@ -6,6 +6,7 @@ Source for the strategy: Golub and Van Loan, Matrix Computations, section 5.4 (r
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy
@@ -13,6 +14,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
+Place = slice | Index
+"""Places along an axis; a slice takes no copy."""
 
 RANK_TOLERANCE = 1e-9
 """Singular values below this part of the largest count as zero (lengths scaled, so that a matrix has no units)."""
@@ -30,6 +33,8 @@ def rank_of(sigma: Array, tolerance: float = RANK_TOLERANCE) -> int:
 
 WEAK = (1e-3, 1e-8)
 """Part of a row that must be independent of the rows chosen before: wanted, and at least."""
+FEW = 64
+"""Number of places up to which they are added to one by one."""
 VANISHING = 1e-8
 """Size of a row below which it is not chosen."""
 KEEP = 0.1
@@ -60,9 +65,24 @@ def independent_rows(rows: Array, candidates: list[int], count: int) -> list[int
     return chosen
 
 
+def compact(index: Index) -> Place:
+    """An evenly spaced rising index as a slice, any other as it is."""
+    n = len(index)
+    if not n:
+        return index
+    step = int(index[1] - index[0]) if n > 1 else 1
+    if step < 1 or (n > 2 and (np.diff(index) != step).any()):
+        return index
+    return slice(int(index[0]), int(index[-1]) + 1, step)
+
+
 def add_at(out: Array, index: Index, values: Array) -> None:
     """Add ``values (6, n, T)`` to the places ``index (n,)`` of the second axis of ``out``; places may repeat."""
-    np.add.at(np.moveaxis(out, 1, 0), index, np.moveaxis(values, 1, 0))
+    if len(index) > FEW:
+        np.add.at(np.moveaxis(out, 1, 0), index, np.moveaxis(values, 1, 0))
+        return
+    for i, place in enumerate(index):
+        out[:, place] += values[:, i]
 
 
 def scattered_sum(values: Array, index: Index, count: int) -> Array:
@@ -117,32 +137,44 @@ class Factor:
     """
 
     def __init__(self, A: Array) -> None:
-        self._A = np.ascontiguousarray(np.moveaxis(A, -1, 0))
+        self._A = A
+        stacked = np.ascontiguousarray(np.moveaxis(A, -1, 0))
         try:
-            self._inverse = np.linalg.inv(self._A)
+            inverse = np.linalg.inv(stacked)
         except np.linalg.LinAlgError:
-            singular = np.linalg.slogdet(self._A)[0] == 0
-            regular = np.where(singular[:, None, None], np.eye(A.shape[0]), self._A)
-            self._inverse = np.linalg.inv(regular)
-            self._inverse[singular] = np.nan
-        norms = [np.abs(M).sum(axis=2).max(axis=1, initial=0.0) for M in (self._A, self._inverse)]
+            singular = np.linalg.slogdet(stacked)[0] == 0
+            inverse = np.linalg.inv(np.where(singular[:, None, None], np.eye(A.shape[0]), stacked))
+            inverse[singular] = np.nan
+        self._inverse = np.ascontiguousarray(np.moveaxis(inverse, 0, -1))
+
+    @cached_property
+    def condition(self) -> Array:
+        """Condition numbers ``(T,)`` in the infinity norm."""
+        norms = [np.abs(M).sum(axis=1).max(axis=0, initial=0.0) for M in (self._A, self._inverse)]
         with np.errstate(invalid="ignore", over="ignore"):
             product = norms[0] * norms[1]
-        self.condition = np.where(np.isnan(product), np.inf, product)
+        return np.where(np.isnan(product), np.inf, product)
 
     def sign(self) -> Array:
         """Sign of the determinants ``(T,)``."""
-        return np.asarray(np.linalg.slogdet(self._A)[0])
+        return np.asarray(np.linalg.slogdet(np.moveaxis(self._A, -1, 0))[0])
 
     def solve(self, b: Array, transposed: bool = False) -> Array:
         """Solution of ``A x = b`` (or ``A^T x = b``) for ``b (n, k, T)``."""
         A, inverse = self._A, self._inverse
         if transposed:
-            A, inverse = np.swapaxes(A, 1, 2), np.swapaxes(inverse, 1, 2)
-        rhs = np.moveaxis(b, -1, 0)
-        x = inverse @ rhs
-        x = x + inverse @ (rhs - A @ x)
-        return np.asarray(np.moveaxis(x, 0, -1))
+            A, inverse = np.swapaxes(A, 0, 1), np.swapaxes(inverse, 0, 1)
+        x = _times(inverse, b)
+        x += _times(inverse, b - _times(A, x))
+        return x
+
+
+def _times(A: Array, b: Array) -> Array:
+    """``A b`` for ``(m, n, T)`` and ``(n, k, T)``."""
+    out = np.empty((A.shape[0], *b.shape[1:]))
+    for j in range(b.shape[1]):
+        np.einsum("int,nt->it", A, b[:, j], out=out[:, j])
+    return out
 
 
 class ChosenSystem:
@@ -155,15 +187,21 @@ class ChosenSystem:
         self.A = A
         self.choices = choices
         self.which = which
-        self.condition = np.ones(A.shape[2])
         self._parts: list[tuple[Choice, Index, Factor]] = []
         for i, choice in enumerate(choices):
             at = np.flatnonzero(which == i)
             if at.size:
                 square = A[np.ix_(choice.rows, choice.cols)]
                 factor = Factor(square if at.size == A.shape[2] else square[:, :, at])
-                self.condition[at] = factor.condition
                 self._parts.append((choice, at, factor))
+
+    @cached_property
+    def condition(self) -> Array:
+        """Condition numbers of the square parts ``(T,)``."""
+        out = np.ones(self.A.shape[2])
+        for _, at, factor in self._parts:
+            out[at] = factor.condition
+        return out
 
     def solve(self, b: Array) -> Array:
         """``x (n, k, T)`` with ``A x = b`` in the chosen rows; zero in held and fixed columns."""

@@ -61,8 +61,11 @@ class Values(Protocol):
     def coordinates(self, pair: int) -> tuple[Array, Array, Array]:
         """Coordinates, rates and accelerations of the freedoms of a pair, ``(..., f)``."""
 
-    def wrenches(self, pair: int) -> tuple[Array, Array]:
-        """Reaction and total wrench of a pair about the global origin, ``(..., 6)``."""
+    def reaction(self, pair: int) -> Array:
+        """Reaction of a pair about the global origin, ``(..., 6)``."""
+
+    def total(self, pair: int) -> Array:
+        """Total wrench of a pair about the global origin, ``(..., 6)``."""
 
     def reaction_at_pair(self, pair: int) -> Array:
         """Reaction about the origin of marker B, global directions, ``(..., 6)``."""
@@ -116,12 +119,12 @@ class PairResult:
     @property
     def reaction(self) -> Array:
         """Wrench ``(..., 6)``, (M, F) about the global origin, that link a exerts on link b: the constraint part alone."""
-        return self._values.wrenches(self._index)[0]
+        return self._values.reaction(self._index)
 
     @property
     def total(self) -> Array:
         """Reaction and efforts, all that the pair transmits, ``(..., 6)``."""
-        return self._values.wrenches(self._index)[1]
+        return self._values.total(self._index)
 
     @property
     def effort(self) -> Array:

@@ -43,13 +43,7 @@ def reaction_part(here: Configuration, totals: Array, efforts: Array) -> Array:
 
 def pair_power(here: Configuration, totals: Array) -> Array:
     """``S^T w`` of every freedom, ``(F, T)``: the efforts that the total wrenches ``(6, P, T)`` stand for."""
-    return np.asarray((here.S * totals[:, owner_of(here)]).sum(axis=0))
-
-
-def owner_of(here: Configuration) -> Index:
-    """Pair index of every freedom."""
-    counts = np.diff(here.system.first_column)
-    return np.repeat(np.arange(len(counts)), counts)
+    return np.asarray((here.S * totals[:, here.system.owners]).sum(axis=0))
 
 
 def split_stress(here: Configuration, states: Array, driven: Index) -> Stress:

@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
 from mechgraph.force.analysis import Analysis, Motions
-from mechgraph.force.kinetostatics import CONTRADICTION, Run, forces_of
+from mechgraph.force.kinetostatics import CONTRADICTION, forces_of
+from mechgraph.force.run import Run
 from mechgraph.model.load import Load
 from mechgraph.model.motion_law import Motion
 from mechgraph.motion.lockstep import Lockstep
-from mechgraph.motion.path import Positions, Status
+from mechgraph.motion.march import Status
+from mechgraph.motion.path import Positions
 from mechgraph.motion.system import Configuration, Index, System
 from mechgraph.result.solution import Solution
 from mechgraph.variants.fields import Variants

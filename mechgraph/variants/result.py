@@ -15,7 +15,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError, MissingExtraError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion_law import Motion
-from mechgraph.motion.path import Status
+from mechgraph.motion.march import Status
 from mechgraph.variants.sampling import deviation, reach
 from mechgraph.variants.work import Part, Source
 

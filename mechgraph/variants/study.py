@@ -12,8 +12,9 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
-from mechgraph.force.kinetostatics import REDUNDANT, driven
+from mechgraph.force.kinetostatics import REDUNDANT
 from mechgraph.force.methods import METHODS
+from mechgraph.force.run import driven
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion_law import Motion
 from mechgraph.variants.fields import AnyField, clashes, field_values, find_field

@@ -1,0 +1,170 @@
+"""One cycle, positions to all reactions, against dense solves: ``python tests/benchmarks/bench_cycle.py [--profile] [--quick]``.
+
+Timed is all of it: ``mg.solve`` with driver rates and gravity, the reaction of every pair, the efforts of the drivers, the checks. Beside
+it, in the same run, ``np.linalg.solve`` of as many systems as the full equations of the mechanism have (Lee 1977). One BLAS thread.
+"""
+
+import os
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+import mechanisms
+import numpy as np
+from bench_core import seven_r
+
+import mechgraph as mg
+from mechgraph.force import blocks, kinetostatics
+from mechgraph.force.kinetostatics import METHODS
+from mechgraph.force.run import Run
+from mechgraph.motion.march import Marcher
+from mechgraph.motion.path import Follower
+
+TURN = (0.0, 360.0)
+STAGES = (
+    ("assembly, freedoms", Run, "__init__"),
+    ("march", Marcher, "track"),
+    ("nodes between", Follower, "_finer"),
+    ("interpolation, Newton", Follower, "_between"),
+    ("rates", Run, "_rates"),
+    ("loads", kinetostatics, "_site"),
+    ("inertia", kinetostatics, "inertia_wrenches"),
+    ("wrenches", METHODS, "loop_wrench"),
+    ("reactions, output", blocks.Blocks, "reaction"),
+    ("driver efforts", blocks.Blocks, "efforts"),
+    ("checks", blocks.Blocks, "checks"),
+)
+
+
+def with_gravity(m):
+    if any(isinstance(load, mg.Gravity) for load in m.loads):
+        return m
+    return m.replace(loads=[*m.loads, mg.Gravity((0.0, 0.0, -9.81))])
+
+
+def cases():
+    """Mechanism, range of the driver in degrees, size n of the dense system, goal as a multiple of its time."""
+    bricard = mechanisms.bricard_cube()
+    return [
+        ("7R", seven_r(), TURN, 50, 1.0),
+        ("RCSR", mg.load("rcsr"), (150.0, 204.0), 24, 3.0),
+        ("RCSR-CSR", mg.load("rcsr-csr"), (160.0, 214.0), 40, 2.0),
+        ("four-bar", mg.load("four-bar"), TURN, 24, None),
+        ("Bennett", mg.load("bennett"), (30.05, 390.05), 24, None),
+        ("Bricard", bricard.replace(drives=["O1"]), (0.0, 200.0), 42, None),
+    ]
+
+
+def cycle(m, span, n):
+    """A function that solves one cycle and asks for all results."""
+    name = m.drives[0].freedom
+    drive = {name: mg.Motion(np.radians(np.linspace(*span, n, endpoint=False)), 10.0)}
+
+    def run():
+        s = mg.solve(m, drive)
+        for pair in m.pairs:
+            assert s[pair.name].reaction.shape[-1] == 6
+        checks = s.checks
+        assert np.isfinite(s[name.split(".")[0]].drive_effort).all()
+        assert checks.closure.max() < 1e-12
+        assert checks.equilibrium.max() < 1e-12
+        return s
+
+    return run
+
+
+def best(run, repeat):
+    """Shortest of some runs, seconds."""
+    times = []
+    for _ in range(repeat):
+        begin = time.perf_counter()
+        run()
+        times.append(time.perf_counter() - begin)
+    return min(times)
+
+
+def dense(n, count, repeat):
+    rng = np.random.default_rng(0)
+    A, b = rng.normal(size=(count, n, n)), rng.normal(size=(count, n, 1))
+    return best(lambda: np.linalg.solve(A, b), repeat)
+
+
+@contextmanager
+def timed(spent):
+    """Stage times collected in ``spent``."""
+
+    def wrapped(function, label):
+        def run(*args, **more):
+            begin = time.perf_counter()
+            try:
+                return function(*args, **more)
+            finally:
+                spent[label] = spent.get(label, 0.0) + time.perf_counter() - begin
+
+        return run
+
+    kept = []
+    for label, owner, name in STAGES:
+        old = owner[name] if isinstance(owner, dict) else getattr(owner, name)
+        kept.append((owner, name, old))
+        _put(owner, name, wrapped(old, label))
+    try:
+        yield
+    finally:
+        for owner, name, old in kept:
+            _put(owner, name, old)
+
+
+def _put(owner, name, value):
+    if isinstance(owner, dict):
+        owner[name] = value
+    else:
+        setattr(owner, name, value)
+
+
+def profile(run, repeat=7):
+    """Seconds by stage of the fastest of some runs."""
+    found = []
+    for _ in range(repeat):
+        spent = {}
+        with timed(spent):
+            total = best(run, 1)
+        found.append((total, spent))
+    total, spent = min(found, key=lambda item: item[0])
+    return {**spent, "other": total - sum(spent.values())}
+
+
+def main():
+    quick = "--quick" in sys.argv
+    repeat = 3 if quick else 9
+    print(
+        f"{'mechanism':10s} {'positions':>9s} {'ms':>8s} {'1000/s':>8s} {'n':>4s} {'n x n ms':>9s} {'ratio':>6s} {'goal':>6s}"
+    )
+    reference = None
+    for name, bare, span, n, goal in cases():
+        m = with_gravity(bare)
+        lapack = dense(n, 3600, repeat)
+        for count in (73, 3600) if quick else (73, 3600, 36000):
+            seconds = best(cycle(m, span, count), repeat if count < 10000 else 3)
+            line = f"{name:10s} {count:9d} {1e3 * seconds:8.1f} {count / seconds / 1e3:8.1f}"
+            if count == 3600:
+                reference = seconds if name == "RCSR" else reference
+                wanted = f"{goal:6.1f}" if goal else f"  {seconds / reference:4.2f} of RCSR (1.5)"
+                line += f" {n:4d} {1e3 * lapack:9.1f} {seconds / lapack:6.2f} {wanted}"
+            if count == 36000 and name == "7R":
+                line += "  goal 150"
+            print(line, flush=True)
+        if "--profile" in sys.argv:
+            for count in (3600,) if quick else (3600, 36000):
+                parts = profile(cycle(m, span, count), 3 if count > 10000 else 7)
+                for label, value in parts.items():
+                    print(f"    {count:6d} {label:24s} {1e3 * value:8.2f} ms {1e6 * value / count:7.3f} us a position")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,186 @@
+"""Identities of a cycle solved in blocks: the size of the blocks, the method and the way of marching change nothing."""
+
+import mechanisms
+import numpy as np
+import pytest
+from strategies import closed_mechanism, motions, with_drives, with_loads
+
+import mechgraph as mg
+from mechgraph.model import pair_evaluation as evaluation
+from mechgraph.motion import march, path
+from mechgraph.motion.assembly import assembled
+
+POSITIONS = 29
+
+
+def solvable(seed, **more):
+    """A random mechanism with drives and loads of values, and a short motion that it can make."""
+    while True:
+        m = with_drives(closed_mechanism(seed, **more), seed)
+        if m is not None:
+            m = with_loads(m, seed, constant=True)
+            given = motions(m, seed, np.linspace(0.0, 0.1, POSITIONS))
+            if given and (mg.kinematics(m, given, on_reach="flag").status == "ok").all():
+                return m, given
+        seed += 1000
+
+
+def values(s):
+    """Everything that a solution says about pairs, by name."""
+    out = {}
+    for p in s.mechanism.pairs:
+        r = s[p.name]
+        for name in (
+            "position",
+            "velocity",
+            "acceleration",
+            "reaction",
+            "total",
+            "effort",
+            "drive_effort",
+            "force",
+            "moment",
+        ):
+            out[p.name, name] = getattr(r, name)
+        out |= {(p.name, name): value for name, value in r.components.items()}
+    return out
+
+
+def assert_same(a, b, tolerance):
+    """Equal statuses, equal NaN, and numbers equal to a part of the largest of their kind."""
+    np.testing.assert_array_equal(a.status, b.status)
+    first, second = values(a), values(b)
+    assert first.keys() == second.keys()
+    big = max(np.nanmax(np.abs(first[p.name, "total"]), initial=0.0) for p in a.mechanism.pairs)
+    for key, x in first.items():
+        y = second[key]
+        own = key[1] in ("position", "velocity", "acceleration")
+        size = max(1.0, np.nanmax(np.abs(x), initial=0.0)) if own else max(big, 1e-12)
+        np.testing.assert_array_equal(np.isnan(x), np.isnan(y), err_msg=str(key))
+        np.testing.assert_allclose(x, y, rtol=0, atol=tolerance * size, err_msg=str(key))
+
+
+@pytest.fixture
+def small_blocks(monkeypatch):
+    """Blocks of a few positions."""
+    monkeypatch.setattr(path, "BLOCK", 5)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_blocks_agree_with_newton_euler(small_blocks, seed):
+    m, given = solvable(seed)
+    assert_same(mg.solve(m, given), mg.solve(m, given, method="newton_euler"), 1e-9)
+
+
+@pytest.mark.parametrize("seed", range(20, 32))
+def test_size_of_blocks_changes_nothing(monkeypatch, seed):
+    m, given = solvable(seed)
+    whole = mg.solve(m, given, redundant="minimum_norm")
+    monkeypatch.setattr(path, "BLOCK", 4)
+    parts = mg.solve(m, given, redundant="minimum_norm")
+    assert_same(parts, whole, 1e-10)
+    for name in ("closure", "equilibrium"):
+        assert getattr(parts.checks, name).shape == (POSITIONS,)
+        assert getattr(parts.checks, name).max() < 1e-12
+    np.testing.assert_allclose(parts.checks.power, whole.checks.power, atol=1e-10)
+    np.testing.assert_allclose(parts.shaking, whole.shaking, rtol=1e-9, atol=1e-9 * np.abs(whole.shaking).max())
+    for k in m.links:
+        np.testing.assert_allclose(parts.link(k.name).pose, whole.link(k.name).pose, atol=1e-11)
+    one, other = parts.state(17), whole.state(17)
+    np.testing.assert_allclose(one.poses, other.poses, atol=1e-11)
+    np.testing.assert_allclose(one.coordinates, other.coordinates, atol=1e-11)
+
+
+def redundant_cases():
+    bricard = mechanisms.bricard_cube().replace(drives=["O1"])
+    return [
+        (mg.load("four-bar"), "A", (0.0, 6.2)),
+        (mg.load("bennett"), "A", (0.6, 2.9)),
+        (bricard.replace(loads=[mg.Gravity((0.3, -4.0, -9.81))]), "O1", (0.0, 3.0)),
+        (mg.load("rcsr-csr"), "O1", (2.8, 3.6)),
+    ]
+
+
+@pytest.mark.parametrize("i", range(4))
+def test_blocks_of_redundant_loops(monkeypatch, i):
+    m, name, span = redundant_cases()[i]
+    given = {name: mg.Motion(np.linspace(*span, 700), 3.0, 1.0)}
+    whole = mg.solve(m, given, method="newton_euler")
+    monkeypatch.setattr(path, "BLOCK", 100)
+    assert_same(mg.solve(m, given), whole, 1e-9)
+
+
+def test_unreached_positions_in_blocks(small_blocks):
+    m = mg.load("rcsr")
+    s = mg.solve(m, {"O1": np.radians(np.linspace(150.0, 260.0, 60))}, on_reach="flag")
+    ok = s.status == "ok"
+    assert ok[:20].all()
+    assert not ok[-1]
+    assert (np.isnan(s["O2"].reaction).any(axis=-1) == ~ok).all()
+    assert (np.isnan(s.checks.closure) == ~ok).all()
+    with pytest.raises(mg.MechgraphError, match="was not solved"):
+        s.state(59)
+    with pytest.raises(mg.MechgraphError, match="no such position"):
+        s.state(60)
+    with pytest.raises(mg.MechgraphError, match="give one index an axis"):
+        s.state(slice(0, 3))
+
+
+def test_nothing_reached_in_blocks(small_blocks):
+    m = mg.load("rcsr")
+    s = mg.solve(m, {"O1": np.radians(np.linspace(250.0, 260.0, 12))}, on_reach="flag")
+    assert (s.status != "ok").all()
+    assert np.isnan(s["O2"].reaction).all()
+
+
+def test_several_cases_in_blocks(small_blocks):
+    m = mg.load("four-bar")
+    angles = np.linspace(0.0, 1.0, 7) + np.array([[0.0], [2.0]])
+    together = mg.solve(m, {"A": mg.Motion(angles, 2.0)})
+    for case in range(2):
+        alone = mg.solve(m, {"A": mg.Motion(angles[case], 2.0)})
+        np.testing.assert_allclose(together["C"].force[case], alone["C"].force, rtol=1e-9, atol=1e-9)
+
+
+def test_callables_still_see_all_positions(small_blocks):
+    m = mg.load("four-bar")
+    shapes = []
+
+    def force(pose, twist, t):
+        shapes.append(pose.shape)
+        return np.zeros((*pose.shape[:-2], 3))
+
+    mg.solve(m.replace(loads=[*m.loads, mg.Wrench("rocker", force=force)]), {"A": np.linspace(0.0, 1.0, 23)})
+    assert set(shapes) == {(23, 4, 4)}
+
+
+@pytest.mark.parametrize("seed", range(40, 52))
+def test_marching_with_every_node_closed_gives_the_same_positions(monkeypatch, seed):
+    m, given = solvable(seed)
+    quick = mg.kinematics(m, given)
+    monkeypatch.setattr(march, "QUICK", -1.0)
+    careful = mg.kinematics(m, given)
+    for p in m.pairs:
+        np.testing.assert_allclose(quick[p.name].position, careful[p.name].position, atol=1e-9)
+
+
+def test_interpolation_between_dense_nodes_is_closed():
+    s = mg.kinematics(mg.load("four-bar"), {"A": np.linspace(0.0, 2 * np.pi, 20_000)})
+    assert s.checks.closure.max() < 1e-12
+
+
+@pytest.mark.parametrize("seed", range(60, 72))
+def test_frames_by_columns_are_those_of_the_pair_table(seed):
+    m = closed_mechanism(seed)
+    system, x = assembled(m)
+    rng = np.random.default_rng(seed)
+    x = system.advance(x[:, None], 0.5 * rng.normal(size=(system.n_freedoms, 3)))
+    here = system.at(x)
+    for g, frames in zip(system.groups, here.frames, strict=True):
+        local = evaluation.frames_of(g.row, system.par.pitch[g.pairs], x[g.state_rows])
+        for one, other in zip(frames, local, strict=True):
+            base = frames[0]
+            R = np.einsum("ijnt,jknt->iknt", base[:, :3], other[:, :3])
+            p = np.einsum("ijnt,jnt->int", base[:, :3], other[:, 3]) + base[:, 3]
+            np.testing.assert_allclose(one[:, :3], R, atol=1e-13)
+            np.testing.assert_allclose(one[:, 3], p, atol=1e-13)
