@@ -252,7 +252,7 @@ class Marcher:
                 return following, correction, order, Status.OK
         here, total, done = self.correct(here, choice, CONVERGED if sure else NODE_CONVERGED)
         correction = float(np.abs(total).max(initial=0.0))
-        if not done[0] and correction < CORRECTION:
+        if not done[0] and correction < CORRECTION and self._met_in_part(here, choice):
             closed, error = close(self.system, x[:, 0], self.columns, iterations=12, patience=0)
             if error <= 1e-11:
                 here, done = self.system.at(closed[:, None]), np.array([True])
@@ -263,6 +263,13 @@ class Marcher:
         if following.condition > SINGULAR or not self._same_side(last, following):
             return None, correction, order, Status.DEAD_POINT
         return following, correction, order, Status.OK
+
+    def _met_in_part(self, here: Configuration, choice: int) -> bool:
+        """Whether the chosen rows are met and only rows thought redundant are not: another choice may close the loops."""
+        rows = self.choices[choice].rows
+        return len(rows) < here.residual.shape[0] and bool(
+            np.abs(here.residual[rows]).max(initial=0.0) <= NODE_CONVERGED
+        )
 
     def _best_choice(self, here: Configuration, node: Node) -> Node:
         """The node with another choice of rows and columns where its own is poorly conditioned and the other much better."""
