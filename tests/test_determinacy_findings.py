@@ -236,3 +236,17 @@ def test_second_direction_that_was_left_out_is_named() -> None:
     assert line in str(mg.check(mg.Mechanism("gimbal", pairs=[pair])))
     given = pair.replace(second=(0, 1, 0))
     assert "no second direction" not in str(mg.check(mg.Mechanism("gimbal", pairs=[given])))
+
+
+def test_more_drivers_than_motions_are_no_dead_point() -> None:
+    corners = ((0, 0), (-1, 1), (0.5, 2.5), (2, 1.5), (1.5, 0))
+    links = ("frame", "a", "b", "c", "d", "frame")
+    pairs = [mg.Pair(f"P{i}", "R", links[i], links[i + 1], point=(*corners[i], 0), axis=(0, 0, 1)) for i in range(5)]
+    report = mg.check(mg.Mechanism("five-bar", pairs=pairs, drives=["P0", "P1", "P4"]))
+    assert report.verdict.startswith("Over-driven: mobility 2, 3 drivers")
+    assert "ead point" not in str(report)
+
+
+def test_a_driven_structure_says_that_it_is_one() -> None:
+    with pytest.raises(mg.IndeterminateError, match=r"it is a structure \(mobility 0\)"):
+        mg.solve(mg.load("prprrh"), {"O1": [0.0, 0.1]})

@@ -116,7 +116,7 @@ def test_without_matplotlib(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_highlighted_loop_of_a_mechanism_that_was_not_solved() -> None:
     """Links outside the loop are grey; the picture needs no drivers."""
     m = mg.load("rcsr-csr")
-    ax = draw_skeleton(m, highlight=mg.check(m).loop_facts[1].pairs)
+    ax = draw_skeleton(m, highlight=mg.check(m).loops[1])
     colours = {text.get_text(): text.get_color() for text in ax.texts}
     grey = {name for name in m.link_names() if colours.get(name) == colours["link3"]}
     assert {p for p, _ in mg.check(m).loops[1]} == {"O1", "O2", "O5", "O6", "O7"}

@@ -74,11 +74,13 @@ def _check_drivers(run: Run, motions: Motions) -> None:
     stuck = run.loops is None and run.freedoms.dependent and not motions.good.size
     if worst > CONTRADICTION or stuck:
         names, mobility = ", ".join(run.motions), free_motion(run.system, run.x, run.columns).mobility
-        raise IndeterminateError(
-            f"mechanism {run.m.name!r}: the drivers {names} contradict each other: their motions cannot be had together "
-            f"(mobility {mobility}, {len(run.motions)} drivers). Take a driver away, or give motions that agree",
-            check(run.m),
+        why = (
+            f"the drivers {names} contradict each other: their motions cannot be had together (mobility {mobility}, "
+            f"{len(run.motions)} drivers). Take a driver away, or give motions that agree"
         )
+        if not mobility:
+            why = f"it cannot be driven by {names}: it is a structure (mobility 0) where it was assembled. Change a pair, see mg.check"
+        raise IndeterminateError(f"mechanism {run.m.name!r}: {why}", check(run.m))
 
 
 def kinematics(m: Mechanism, motions: Mapping[str, Any] | None = None, *, on_reach: str = "raise") -> Solution:

@@ -40,7 +40,7 @@ def scaled_system(m: Mechanism, q: Array, system: System | None = None) -> Syste
     return raw.with_parameters(par.rescaled(par.origin + par.L * centroid, L * par.L))
 
 
-def close(system: System, x: Array, fixed: Index, iterations: int = 60) -> tuple[Array, float]:
+def close(system: System, x: Array, fixed: Index, iterations: int = 60, patience: int = 8) -> tuple[Array, float]:
     """Close the loops from state ``x (nx,)`` with the coordinates in ``fixed`` kept; smallest change of the others."""
     free = np.setdiff1d(np.arange(system.n_freedoms), fixed)
 
@@ -54,7 +54,13 @@ def close(system: System, x: Array, fixed: Index, iterations: int = 60) -> tuple
         return system.advance(x[:, None], dq)[:, 0]
 
     x, _ = closest_zero(
-        evaluate, advance, x, tolerance=CLOSURE_GOAL, rank_tolerance=ASSEMBLY_RANK, iterations=iterations
+        evaluate,
+        advance,
+        x,
+        tolerance=CLOSURE_GOAL,
+        rank_tolerance=ASSEMBLY_RANK,
+        iterations=iterations,
+        patience=patience,
     )
     return x, float(system.at(x[:, None]).closure[0])
 

@@ -84,7 +84,8 @@ class Interpolation:
     def _windows(self) -> list[tuple[Index, Index]]:
         """Intervals by the number of nodes through which they are interpolated, with these nodes ``(width, n)``, nearest first."""
         n = len(self.nodes)
-        unit = self._slope / np.sqrt((self._slope * self._slope).sum(axis=0))
+        length = np.sqrt((self._slope * self._slope).sum(axis=0))
+        unit = self._slope / np.where(length > 0, length, 1.0)
         same = np.array([a.choice == b.choice for a, b in zip(self.nodes[:-1], self.nodes[1:], strict=True)])
         breaks = np.flatnonzero(~(((unit[:, 1:] * unit[:, :-1]).sum(axis=0) > STRAIGHT_ON) & same[1:] & same[:-1])) + 1
         begin = np.concatenate([[0], breaks])[np.searchsorted(breaks, np.arange(n - 1), side="right")]

@@ -2,7 +2,7 @@
 
 Every variant has its own numbers (``Parameters`` with a batch axis) and its own driver path of the same number of positions. Steps are
 those from position to position, cut where they are long; each is predicted to second order and corrected by Newton, and a variant
-stays in step only where that is beyond doubt: a small correction, the determinant of its closure equations on the same side, a good
+stays in step only where that is beyond doubt: a small correction, no singular position between two of its places, a good
 condition. What falls out of step is marked, and is for ``motion.path`` to follow by itself.
 """
 
@@ -18,7 +18,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.motion.assembly import state_rows
 from mechgraph.motion.march import CORRECTION
 from mechgraph.motion.system import Index, System
-from mechgraph.numerics.linear import Choice, ChosenSystem, choose
+from mechgraph.numerics.linear import Choice, ChosenSystem, choose, singular_between
 
 LONGEST = 0.1
 """Longest step, in driver space (radians, or lengths / L)."""
@@ -44,17 +44,24 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Steps:
-    """States ``(nx, V, N)`` and choices ``which (V, N)``; ``lost (V,)`` the variants that fell out of step."""
+    """States ``(nx, V, N)`` and choices ``which (V, N)``; ``lost (V,)`` the variants that fell out of step.
+
+    ``between (nx, V, K)`` are the states at the start and between positions, ``place_between (K,)`` and ``place (N,)`` the numbers
+    of steps that led there.
+    """
 
     x: Array
     which: Index
     choices: list[Choice]
     lost: Mask
+    between: Array
+    place_between: Array
+    place: Array
 
 
 @dataclass
 class _Front:
-    """Where the variants stand: states ``(nx, V)``, sensitivities ``Z (F, d, V)``, choices and sides.
+    """Where the variants stand: states ``(nx, V)``, sensitivities ``Z (F, d, V)``, choices and chosen parts ``square (n, n, V)`` of J.
 
     ``past`` are the last places: sensitivities there, and the steps in driver space ``(d, V)`` that led away from them.
     """
@@ -62,7 +69,7 @@ class _Front:
     x: Array
     Z: Array
     which: Index
-    side: Array
+    square: Array
     lost: Mask
     past: tuple[tuple[Array, Array], ...] = ()
 
@@ -85,7 +92,7 @@ class Lockstep:
 
     def _corrected(self, front: _Front, x: Array) -> _Front:
         """Newton from states ``x (nx, V)`` for all variants still in step; where they stand then."""
-        out = _Front(x.copy(), front.Z.copy(), front.which.copy(), front.side.copy(), front.lost.copy())
+        out = _Front(x.copy(), front.Z.copy(), front.which.copy(), front.square.copy(), front.lost.copy())
         total = np.zeros((self.system.n_freedoms, x.shape[1]))
         open_ = np.flatnonzero(~out.lost)
         for _ in range(ITERATIONS):
@@ -120,19 +127,33 @@ class Lockstep:
             if len(self.choices[-1].cols) != len(self.choices[0].cols) or not better.size:
                 self.choices.pop()
                 break
-            # the side is carried over to the new choice: both determinants are taken here
-            front.side[at[better]] *= solver.signs()[better] * other.signs()[np.searchsorted(poor, better)]
+            # whether a singular position was passed is asked of the old choice, for the last time
+            old = self._square(J[:, :, better], front.which[at[better]])
+            front.lost[at[better[singular_between(front.square[:, :, at[better]], old)]]] = True
             front.which[at[better]] = len(self.choices) - 1
+            front.square[:, :, at[better]] = self._square(J[:, :, better], front.which[at[better]])
             solver = ChosenSystem(J, self.choices, front.which[at])
         return solver
 
+    def _square(self, J: Array, which: Index) -> Array:
+        """The chosen parts ``(n, n, T)`` of matrices ``J``, each by its own choice."""
+        n = len(self.choices[0].cols)
+        out = np.empty((n, n, J.shape[2]))
+        for i in np.unique(which):
+            at = np.flatnonzero(which == i)
+            out[:, :, at] = J[np.ix_(self.choices[i].rows, self.choices[i].cols, at)]
+        return out
+
     def _settle(self, out: _Front, solver: ChosenSystem, at: Index, done: Mask, J: Array) -> None:
-        """Sensitivities and sides of variants that are where they should be; those on the other side fell out."""
+        """Sensitivities of variants that are where they should be; those that passed a singular position fell out."""
         Z = solver.solve(-J[:, self.columns])
         Z[self.columns, np.arange(len(self.columns))] = 1.0
         out.Z[:, :, at[done]] = Z[:, :, done]
-        crossed = solver.signs() * out.side[at] < 0
-        out.lost[at[done & (crossed | (solver.condition > POOR))]] = True
+        square = self._square(J, out.which[at])
+        passed = np.zeros(at.size, dtype=bool)
+        passed[done] = singular_between(out.square[:, :, at[done]], square[:, :, done])
+        out.square[:, :, at[done]] = square[:, :, done]
+        out.lost[at[done & (passed | (solver.condition > POOR))]] = True
 
     # --- the start of every variant ------------------------------------------------------------------------------------------
 
@@ -146,20 +167,20 @@ class Lockstep:
         first = lead(0.0).at(np.repeat(x[:, None], V, axis=1))
         self.choices = [choose(first.J[:, :, 0], self.columns, keep=self.keep)]
         which = np.zeros(V, dtype=np.intp)
-        side = ChosenSystem(first.J, self.choices, which).signs()
+        square = self._square(first.J, which)
         nothing = np.zeros((self.system.n_freedoms, len(self.columns), V))
-        start = _Front(np.repeat(x[:, None], V, axis=1), nothing, which, side, out)
+        start = _Front(np.repeat(x[:, None], V, axis=1), nothing, which, square, out)
         goal, done = start, out.copy()
         system = self.system
         for strides in STRIDES:
-            front = _Front(start.x, start.Z, start.which.copy(), start.side.copy(), done.copy())
+            front = _Front(start.x, start.Z, start.which.copy(), start.square.copy(), done.copy())
             for s in np.linspace(0.0, 1.0, strides + 1)[1:]:
                 self.system = lead(float(s))
                 front = self._corrected(front, front.x)
             arrived = ~front.lost & ~done
             if strides == STRIDES[0]:
                 goal = front
-            for name in ("x", "Z", "which", "side"):
+            for name in ("x", "Z", "which", "square"):
                 getattr(goal, name)[..., arrived] = getattr(front, name)[..., arrived]
             done |= arrived
             if done.all():
@@ -177,15 +198,22 @@ class Lockstep:
         out = np.full((self.system.n_state, V, N), np.nan)
         which = np.zeros((V, N), dtype=np.intp)
         front = self.front
+        between, place_between, place, steps = [front.x], [0], [], 0
         for n in range(N):
-            change = values[:, :, n] - front.x[self.rows]
-            longest = np.sqrt((change * change).sum(axis=0))[~front.lost].max(initial=0.0)
             begin = front.x[self.rows]
+            change = values[:, :, n] - begin
+            longest = np.sqrt((change * change).sum(axis=0))[~front.lost].max(initial=0.0)
             parts = max(1, int(np.ceil(longest / LONGEST)))
             for part in range(1, parts + 1):
                 front = self._stepped(front, begin + part / parts * change)
+                steps += 1
+                if part < parts:
+                    between.append(front.x)
+                    place_between.append(steps)
+            place.append(steps)
             out[:, :, n], which[:, n] = front.x, front.which
-        return Steps(out, which, self.choices, front.lost)
+        places = (np.array(place_between, dtype=float), np.array(place, dtype=float))
+        return Steps(out, which, self.choices, front.lost, np.stack(between, axis=2), *places)
 
     def _stepped(self, front: _Front, drive: Array) -> _Front:
         change = drive - front.x[self.rows]

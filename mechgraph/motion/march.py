@@ -17,7 +17,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.motion.assembly import close, state_rows
 from mechgraph.motion.system import Configuration, Index, System
-from mechgraph.numerics.linear import Choice, ChosenSystem, Factor, choose
+from mechgraph.numerics.linear import Choice, ChosenSystem, Factor, choose, singular_between
 
 CONVERGED = 1e-13
 """Closure residual that Newton aims at."""
@@ -67,7 +67,7 @@ class Status(Enum):
 class Node:
     """A closed position on the path: state, sensitivity ``Z (F, drivers)``, path length, driver values, choice index.
 
-    ``condition`` of the chosen square part of the closure Jacobian and the ``sign`` of its determinant.
+    ``square`` is the chosen part of the closure Jacobian, with its ``condition`` and the ``sign`` of its determinant.
     """
 
     x: Array
@@ -77,6 +77,7 @@ class Node:
     choice: int
     condition: float
     sign: float
+    square: Array
 
 
 @dataclass
@@ -166,7 +167,7 @@ class Marcher:
         try:
             inverse = np.linalg.inv(square)
         except np.linalg.LinAlgError:
-            return Node(here.x[:, 0], Z, at, drive, choice, np.inf, 0.0), np.inf
+            return Node(here.x[:, 0], Z, at, drive, choice, np.inf, 0.0, square), np.inf
         Z[chosen.cols] = -inverse @ J[chosen.rows[:, None], self.columns]
         step = np.zeros((self.system.n_freedoms, 1))
         step[chosen.cols, 0] = -inverse @ r[chosen.rows]
@@ -175,7 +176,8 @@ class Marcher:
         norms = [float(np.abs(M).sum(axis=1).max(initial=0.0)) for M in (square, inverse)]
         sign = float(np.linalg.slogdet(square)[0])
         condition = norms[0] * norms[1] if len(square) else 1.0
-        return Node(x[:, 0], Z, at, drive, choice, condition if condition == condition else np.inf, sign), size
+        condition = condition if condition == condition else np.inf
+        return Node(x[:, 0], Z, at, drive, choice, condition, sign, square), size
 
     # --- one path ------------------------------------------------------------------------------------------------------
 
@@ -250,8 +252,8 @@ class Marcher:
                 return following, correction, order, Status.OK
         here, total, done = self.correct(here, choice, CONVERGED if sure else NODE_CONVERGED)
         correction = float(np.abs(total).max(initial=0.0))
-        if not done[0] and correction < CORRECTION:
-            closed, error = close(self.system, x[:, 0], self.columns, iterations=12)
+        if not done[0] and correction < CORRECTION and self._met_in_part(here, choice):
+            closed, error = close(self.system, x[:, 0], self.columns, iterations=12, patience=0)
             if error <= 1e-11:
                 here, done = self.system.at(closed[:, None]), np.array([True])
                 correction = float(np.abs(self.system.difference(here.x, x)).max(initial=0.0))
@@ -261,6 +263,13 @@ class Marcher:
         if following.condition > SINGULAR or not self._same_side(last, following):
             return None, correction, order, Status.DEAD_POINT
         return following, correction, order, Status.OK
+
+    def _met_in_part(self, here: Configuration, choice: int) -> bool:
+        """Whether the chosen rows are met and only rows thought redundant are not: another choice may close the loops."""
+        rows = self.choices[choice].rows
+        return len(rows) < here.residual.shape[0] and bool(
+            np.abs(here.residual[rows]).max(initial=0.0) <= NODE_CONVERGED
+        )
 
     def _best_choice(self, here: Configuration, node: Node) -> Node:
         """The node with another choice of rows and columns where its own is poorly conditioned and the other much better."""
@@ -320,21 +329,22 @@ class Marcher:
         return out
 
     def _same_side(self, a: Node, b: Node) -> bool:
-        """Whether no simple singular position lies between two nodes: equal signs of the determinant for one choice."""
-        if a.choice == b.choice and a.sign * b.sign > 0:
-            return True
-        J = self.system.at(np.stack([a.x, b.x], axis=1)).J
-        for choice in dict.fromkeys((a.choice, b.choice)):
-            c = self.choices[choice]
-            signs = Factor(J[np.ix_(c.rows, c.cols)]).sign()
-            if signs[0] * signs[1] > 0:
+        """Whether no singular position lies between two nodes: none on the straight way between their matrices for one choice."""
+        if a.choice == b.choice:
+            if not singular_between(a.square[..., None], b.square[..., None])[0]:
                 return True
+        J = self.system.at(np.stack([a.x, b.x], axis=1)).J
+        others = [self.choices[i] for i in dict.fromkeys((a.choice, b.choice))] if a.choice != b.choice else []
         middle = self.system.advance(a.x[:, None], 0.5 * self.system.difference(b.x[:, None], a.x[:, None]))
-        c = choose(self.system.at(middle).J[:, :, 0], self.columns, keep=self.keep)
-        if len(c.cols) != len(self.choices[a.choice].cols):
-            return False
-        signs = Factor(J[np.ix_(c.rows, c.cols)]).sign()
-        return bool(signs[0] * signs[1] > 0)
+        others.append(choose(self.system.at(middle).J[:, :, 0], self.columns, keep=self.keep))
+        for c in others:
+            square = J[np.ix_(c.rows, c.cols)]
+            if (
+                len(c.cols) == len(self.choices[a.choice].cols)
+                and not singular_between(square[..., :1], square[..., 1:])[0]
+            ):
+                return True
+        return False
 
     def _settle(self, track: Track) -> bool:
         """Close all nodes of a track in one batch, with their sensitivities; whether they are as the march took them to be."""
@@ -354,6 +364,10 @@ class Marcher:
             moved = np.abs(total).max(axis=0, initial=0.0)
             fine &= bool(done.all()) and bool((moved < SHIFT).all())
             fine &= bool((signs * [nodes[i].sign for i in mine] > 0).all())
+            pairs = [t for t in range(1, len(mine)) if mine[t] == mine[t - 1] + 1]
+            chosen = self.choices[choice]
+            square = here.J[np.ix_(chosen.rows, chosen.cols)]
+            fine &= not singular_between(square[:, :, [t - 1 for t in pairs]], square[:, :, pairs]).any()
             for t, i in enumerate(mine):
                 if done[t] and moved[t] < SHIFT:
                     nodes[i] = replace(nodes[i], x=here.x[:, t], Z=Z[:, :, t])

@@ -42,7 +42,8 @@ class Positions:
     """States ``(nx, C, N)``, statuses ``(C, N)``, and per position the index of the choice that serves it.
 
     ``here`` are the evaluations of all positions, block by block, where they are solved. ``tracks`` hold, for every case
-    that was followed in one go, path lengths and states ``(nx, K)`` of the nodes and the path lengths of the positions.
+    that was followed in one go, path lengths and states ``(nx, K)`` of the nodes and the path lengths of the positions; cases that
+    share the arrays of path lengths are continued together.
     """
 
     x: Array
@@ -100,13 +101,18 @@ def continued(s: System, x: Array, batch: tuple[int, ...], tracks: Tracks) -> Ar
         return q.reshape(s.n_freedoms, *batch)
     cases = x.reshape(s.n_state, len(tracks), x.shape[1] // len(tracks))
     out = np.empty((s.n_freedoms, *cases.shape[1:]))
+    together: dict[tuple[int, int], list[int]] = {}
     for c, track in enumerate(tracks):
-        at, nodes, along = track or (np.zeros(0), x[:, :0], np.zeros(0))
+        together.setdefault((id(track and track[0]), id(track and track[2])), []).append(c)
+    for members in together.values():
+        passed = [track for c in members if (track := tracks[c]) is not None]
+        at, _, along = passed[0]
         order = np.argsort(np.concatenate([at, along]), kind="stable")
-        q = s.coordinates_of(np.concatenate([nodes, cases[:, c]], axis=1)[:, order], start)
+        nodes = np.stack([states for _, states, _ in passed], axis=1)
+        q = s.coordinates_of(np.concatenate([nodes, cases[:, members]], axis=2)[:, :, order], start)
         back = np.empty_like(order)
         back[order] = np.arange(len(order))
-        out[:, c] = q[:, back[len(at) :]]
+        out[:, members] = q[:, :, back[len(at) :]]
     return out.reshape(s.n_freedoms, *batch)
 
 
@@ -228,6 +234,7 @@ class Follower(Marcher):
             Z[self.columns, np.arange(len(self.columns))] = 1.0
             error = np.abs(total).max(axis=0, initial=0.0)
             signs = solver.signs()
+            square = here.J[np.ix_(self.choices[choice].rows, self.choices[choice].cols)]
             for t in np.flatnonzero(done & (error < CORRECTION)):
                 i = int(mine[t])
                 node = Node(
@@ -238,6 +245,7 @@ class Follower(Marcher):
                     int(choice),
                     float(solver.condition[t]),
                     signs[t],
+                    square[:, :, t],
                 )
                 out[i] = node, float(error[t])
         return out

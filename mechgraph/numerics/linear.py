@@ -37,6 +37,8 @@ FEW = 64
 """Number of places up to which they are added to one by one."""
 VANISHING = 1e-8
 """Size of a row below which it is not chosen."""
+REAL = 1e-6
+"""Imaginary part of an eigenvalue over its size up to which it counts as real: two equal ones come out as a pair."""
 KEEP = 0.1
 """Part of the smallest singular value that may be lost by holding the columns that are asked for."""
 
@@ -90,6 +92,24 @@ def scattered_sum(values: Array, index: Index, count: int) -> Array:
     to = scipy.sparse.csr_array((np.ones(len(index)), (index, np.arange(len(index)))), shape=(count, len(index)))
     flat = np.moveaxis(values, 1, 0).reshape(len(index), values.shape[0] * values.shape[2])
     return np.moveaxis(np.asarray(to @ flat).reshape(count, values.shape[0], values.shape[2]), 0, 1)
+
+
+def singular_between(A: Array, B: Array) -> NDArray[np.bool_]:
+    """Whether ``A + s (B - A)`` is singular for some ``0 < s < 1``, for batches of square matrices ``(n, n, T)``; ``(T,)``.
+
+    That is where ``A^-1 B`` has a negative real eigenvalue: ``det(A + s (B - A)) = det A prod(1 - s + s mu)``. Unlike the sign of the
+    determinant this also tells where two eigenvalues pass zero together.
+    """
+    out = np.zeros(A.shape[2], dtype=bool)
+    if not A.size:
+        return out
+    X = np.linalg.solve(np.moveaxis(A, -1, 0), np.moveaxis(B, -1, 0))
+    far = np.flatnonzero(~(((X - np.eye(A.shape[0])) ** 2).sum(axis=(1, 2)) < 1.0))
+    if far.size:
+        finite = np.isfinite(X[far]).all(axis=(1, 2))
+        mu = np.linalg.eigvals(np.where(finite[:, None, None], X[far], 0.0))
+        out[far] = ((mu.real < 0) & (np.abs(mu.imag) <= REAL * np.abs(mu))).any(axis=1) | ~finite
+    return out
 
 
 @dataclass(frozen=True)

@@ -27,11 +27,13 @@ def closest_zero(
     rank_tolerance: float,
     longest: float = 0.5,
     iterations: int = 60,
+    patience: int = 8,
 ) -> tuple[Array, float]:
     """Gauss-Newton with limited steps from ``x``: the zero of the residual near to it, or the best point found.
 
     ``evaluate(x)`` gives residual and Jacobian. Steps are limited to ``longest`` (largest component) and halved while the
-    residual grows. Converges linearly to double roots. Returns the point and the largest residual component there.
+    residual grows; after ``patience`` steps without gain it ends. Converges linearly to double roots.
+    Returns the point and the largest residual component there.
     """
     r, J = evaluate(x)
     size = float(np.abs(r).max(initial=0.0))
@@ -57,6 +59,6 @@ def closest_zero(
             best, best_size, stalled = x, size, 0
         else:
             stalled += 1
-        if stalled > 8 or (best_size < 1e-9 and stalled > 1):
+        if stalled > patience or (best_size < 1e-9 and stalled > 1):
             break
     return best, best_size

@@ -85,7 +85,7 @@ def draw_skeleton(
     ghosts: int = 5,
     traces: bool | Sequence[str] = True,
     labels: bool = True,
-    highlight: Sequence[str] = (),
+    highlight: Sequence[str | tuple[str, int]] = (),
     view: tuple[float, float] = (24.0, -58.0),
 ) -> Any:
     """Draw the mechanism at one position, faint at others, with the paths of its pair points. Returns the axes.
@@ -101,7 +101,7 @@ def draw_skeleton(
     ghosts : number of further positions, drawn faintly.
     traces : whether to draw the paths of pair points; or the names of the pairs whose paths are drawn.
     labels : names of pairs (with their type) and links.
-    highlight : names of pairs, e.g. of a loop of the report (``report.loop_facts[0].pairs``): all other links are drawn in grey.
+    highlight : names of pairs, or a loop of the report (``report.loops[0]``): all other links are drawn in grey.
     view : elevation and azimuth in degrees of a spatial mechanism.
 
     Raises
@@ -111,7 +111,8 @@ def draw_skeleton(
         closed; MissingExtraError without matplotlib.
     """
     m, poses, good, size = _poses(s)
-    unknown = [name for name in highlight if name not in {p.name for p in m.pairs}]
+    chosen = [item if isinstance(item, str) else item[0] for item in highlight]
+    unknown = [name for name in chosen if name not in {p.name for p in m.pairs}]
     faults = [f"highlight: there is no pair {name!r}; pairs: {', '.join(p.name for p in m.pairs)}" for name in unknown]
     if not -size <= position < size or position % size not in good:
         faults.append(f"position {position} was not solved, or is none of {size}")
@@ -122,7 +123,7 @@ def draw_skeleton(
     if ax is None:
         ax = pyplot().figure(layout="constrained").add_subplot(projection="3d")
     names = [p.name for p in m.pairs] if traces is True else [] if traces is False else list(traces)
-    colours = _colours(m, highlight)
+    colours = _colours(m, chosen)
     for i in np.unique(np.linspace(0, shape.good.size - 1, ghosts + 1).astype(int)) if ghosts else ():
         if i != t:
             _links(ax, shape, int(i), colours, ghost=True)

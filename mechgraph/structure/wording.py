@@ -37,13 +37,18 @@ def verdict(r: DeterminacyReport) -> str:
 
 
 def _near(r: DeterminacyReport) -> str:
-    if not r.near or r.margin is None or r.dropped is None:
+    if not r.near or r.margin is None or r.dropped is None or _over_driven(r):
         return ""
     if r.dead_point:
         return f" Near a dead point: {weakest_drive(r)} hardly moves when the mechanism does."
     if r.dropped > r.margin * DROPPED:
         return f" Near another verdict: a singular value of {r.dropped:.2g} of the largest was taken for zero."
     return f" Nearly singular: margin {r.margin:.2g}."
+
+
+def _over_driven(r: DeterminacyReport) -> bool:
+    """More drivers than motions: that some of them depend on others is no dead point."""
+    return bool(r.mobility) and len(r.mechanism.drives) > (r.mobility or 0)
 
 
 def weakest_drive(r: DeterminacyReport) -> str:
@@ -239,7 +244,7 @@ def _finite(r: DeterminacyReport) -> list[str]:
 
 
 def _margin(r: DeterminacyReport) -> list[str]:
-    if r.dead_point and r.geometry:
+    if r.dead_point and r.geometry and not _over_driven(r):
         return [
             f"Near a dead point of {weakest_drive(r)}: it moves {r.geometry.freedoms.drive:.2g} times as much as the freedom that moves "
             "most, so its effort and the reactions grow without bound."

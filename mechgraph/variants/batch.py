@@ -68,9 +68,9 @@ class VariantRun(Run):
         self.alone = found.lost
         status = np.full((V, N), Status.OK, dtype=object)
         status[found.lost] = Status.NOT_CLOSED
-        return Positions(
-            found.x, status, found.choices, found.which, self.values("position").reshape(-1, V, N)[..., -1]
-        )
+        tracks = tuple((found.place_between, found.between[:, c], found.place) for c in range(V))
+        last = self.values("position").reshape(-1, V, N)[..., -1]
+        return Positions(found.x, status, found.choices, found.which, last, (), tracks)
 
     def evaluated(self, x: Array, at: Index) -> Configuration:
         """States evaluated with the numbers of their variants, closed to rounding."""

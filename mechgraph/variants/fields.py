@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from mechgraph.algebra.inertia import physical
 from mechgraph.algebra.se3 import Array
-from mechgraph.errors import DeclarationError
 from mechgraph.model.chain import chain_numbers, markers_of_chain
 from mechgraph.model.connection import Marker, Pair
 from mechgraph.model.link import Link
@@ -87,8 +86,10 @@ def find_field(m: Mechanism, name: str) -> AnyField | str:
     )
 
 
-def _link_field(m: Mechanism, link: Link, rest: str) -> Field | None:
+def _link_field(m: Mechanism, link: Link, rest: str) -> Field | str | None:
     i = m.link_index[link.name]
+    if rest == "mass" and link.center is None:
+        return f"'{link.name}.mass': link {link.name!r} has no mass centre; declare center=(x, y, z)"
     if rest == "mass":
         return Field("mass", ((i,),))
     what, _, at = rest.partition(".")
@@ -165,6 +166,9 @@ class Variants:
         if n.inertia.shape[-1] > 1:
             free = np.array([link.unphysical for link in self.mechanism.links])
             ok &= (physical(np.nan_to_num(n.inertia)) | free[:, None]).all(axis=0)
+        for load in self.loads:
+            if _varies(load):
+                ok &= np.array([not _load_of(load, i).faults(self.mechanism) for i in range(self.count)])
         return ok
 
     def one(self, i: int) -> Mechanism:
@@ -215,6 +219,10 @@ def _placed(pair: Pair, n: Declared, k: int) -> Pair:
     return pair.replace(point=markers[0].point, axis=markers[0].axis, second=markers[0].second, **changes)
 
 
+def _varies(load: Load) -> bool:
+    return any(isinstance(getattr(load, f.name), PerCase) for f in dataclasses.fields(load))
+
+
 def _load_of(load: Load, i: int) -> Load:
     varied = {f.name: getattr(load, f.name) for f in dataclasses.fields(load)}
     changes: dict[str, Any] = {k: v.values[i].tolist() for k, v in varied.items() if isinstance(v, PerCase)}
@@ -240,33 +248,68 @@ def field_values(m: Mechanism, fields: Mapping[str, AnyField]) -> dict[str, floa
 def varied(m: Mechanism, fields: Mapping[str, AnyField], values: Array) -> Variants:
     """Variants of a mechanism in which the fields take ``values (fields, count)``."""
     count = values.shape[1]
-    numbers, loads = declared(m), list(m.loads)
-    arrays = {f.name: getattr(numbers, f.name) for f in dataclasses.fields(numbers)}
-    chained = None
-    for field, row in zip(fields.values(), values, strict=True):
+    start, loads = declared(m), list(m.loads)
+    arrays = {f.name: getattr(start, f.name) for f in dataclasses.fields(start)}
+    rows = list(zip(fields.values(), values, strict=True))
+    chained = [(field, row) for field, row in rows if isinstance(field, ChainField)]
+    if chained:
+        arrays |= _chain_markers(m, arrays, chained, count)
+    for field, row in rows:
         if isinstance(field, Field):
-            if arrays[field.array].shape[-1] != count or arrays[field.array] is getattr(numbers, field.array):
-                arrays[field.array] = np.repeat(arrays[field.array][..., :1], count, axis=-1)
+            old = arrays[field.array]
+            if old is getattr(start, field.array):
+                arrays[field.array] = np.repeat(old, count, axis=-1)
             for place in field.places:
                 arrays[field.array][place] = field.scale * row
-        elif isinstance(field, ChainField):
-            if chained is None:
-                start = chain_numbers(m)
-                assert start is not None
-                chained = np.repeat(start[:, :, None], count, axis=2)
-            chained[field.kind, field.index] = row
-        else:
+        elif isinstance(field, LoadField):
             loads[field.index] = _varied_load(loads[field.index], field, row)
-    if chained is not None:
-        arrays |= _chain_markers(arrays, chained)
     return Variants(m, Declared(**arrays), tuple(loads), count)
 
 
-def _chain_markers(arrays: Mapping[str, Array], chained: Array) -> dict[str, Array]:
-    """Markers of a chain from its numbers ``(3, n, count)``, in place of those in ``arrays``."""
-    on_a, on_b = markers_of_chain(chained)
-    X = np.stack([on_a, on_b])
-    return {"point": X[:, :, 3], "axis": X[:, :, 2], "second": X[:, :, 0]}
+def _chain_markers(
+    m: Mechanism, arrays: Mapping[str, Array], chained: Sequence[tuple[ChainField, Array]], count: int
+) -> dict[str, Array]:
+    """Point, axis and second directions of a chain some of whose numbers vary; other markers stay as they are."""
+    start = chain_numbers(m)
+    assert start is not None
+    numbers = np.repeat(start[:, :, None], count, axis=2)
+    for field, row in chained:
+        numbers[field.kind, field.index] = row
+    poses = np.stack(markers_of_chain(numbers))
+    out = {name: np.repeat(arrays[name], count, axis=-1) for name in ("point", "axis", "second")}
+    for side, k in {chain_marker(m, field) for field, _ in chained}:
+        for name, column in (("point", 3), ("axis", 2), ("second", 0)):
+            out[name][side, :, k] = poses[side, :, column, k]
+    return out
+
+
+def chain_marker(m: Mechanism, field: ChainField) -> tuple[int, int]:
+    """Side and pair of the marker that a number of a chain places."""
+    last = len(m.pairs) - 1
+    return (0, field.index + 1) if field.index < last else (1, last)
+
+
+def clashes(m: Mechanism, fields: Mapping[str, AnyField]) -> list[str]:
+    """Parameters that set the same number: two spellings of one, or a number of a chain and of the marker that it places."""
+    placed: dict[Any, str] = {}
+    out = []
+    for name, field in fields.items():
+        mine: list[Any] = [("load", field.index, field.name, field.component)] if isinstance(field, LoadField) else []
+        if isinstance(field, ChainField):
+            mine = [("chain", *dataclasses.astuple(field))]
+        if isinstance(field, Field):
+            mine = [(field.array, str(field.places[0]))]
+            sides = (0, 1) if field.places[0][0] == slice(None) else (field.places[0][0],)
+            if field.array in ("point", "axis", "second"):
+                mine += [("marker", side, field.places[0][2]) for side in sides]
+        elif isinstance(field, ChainField):
+            mine.append(("marker", *chain_marker(m, field)))
+        for key in mine:
+            other = placed.setdefault(key, name)
+            kinds = {isinstance(fields[other], ChainField), isinstance(field, ChainField)}
+            if other != name and (key[0] != "marker" or len(kinds) == 2):
+                out.append(f"{name!r} and {other!r} set the same numbers; name one of them")
+    return out
 
 
 def _varied_load(load: Load, field: LoadField, row: Array) -> Load:
@@ -279,31 +322,20 @@ def _varied_load(load: Load, field: LoadField, row: Array) -> Load:
     return replace(load, **changes)
 
 
-def stacked(mechanisms: Sequence[Mechanism]) -> Variants:
-    """Variants from mechanisms of one topology.
-
-    Raises
-    ------
-    DeclarationError
-        where they differ in more than numbers.
-    """
-    first = mechanisms[0]
-    for i, m in enumerate(mechanisms):
-        if topology_of(m) != topology_of(first):
-            raise DeclarationError(
-                f"variants of {first.name!r}",
-                [f"variant {i} differs in links, pairs, drives or loads from the first; only numbers may differ"],
-            )
-    every = [declared(m) for m in mechanisms]
+def stacked(m: Mechanism, mechanisms: Sequence[Mechanism | None]) -> Variants:
+    """Variants from mechanisms of the topology of ``m``; those that are None or differ in more than numbers are ``missing``."""
+    same = [other is not None and topology_of(other) == topology_of(m) and _alike(m, other) for other in mechanisms]
+    used = [other if ok and other is not None else m for other, ok in zip(mechanisms, same, strict=True)]
+    every = [declared(other) for other in used]
     numbers = Declared(
         **{f.name: np.concatenate([getattr(n, f.name) for n in every], axis=-1) for f in dataclasses.fields(Declared)}
     )
-    loads = tuple(_stacked_loads(group) for group in zip(*(m.loads for m in mechanisms), strict=True))
-    return Variants(first, numbers, loads, len(mechanisms))
+    loads = tuple(_stacked_loads(group) for group in zip(*(other.loads for other in used), strict=True))
+    return Variants(m, numbers, loads, len(used), tuple(i for i, ok in enumerate(same) if not ok))
 
 
 def topology_of(m: Mechanism) -> tuple[Any, ...]:
-    """What variants must share: names, types and ends of pairs, the way they are placed, drives, kinds of loads, the start."""
+    """What variants must share: names, types and ends of pairs, the way they are placed, drives, kinds of loads."""
     return (
         m.link_names(),
         m.frame,
@@ -318,16 +350,22 @@ def topology_of(m: Mechanism) -> tuple[Any, ...]:
     )
 
 
+def _alike(m: Mechanism, other: Mechanism) -> bool:
+    """Whether start, stored motions, and all of the loads that is no number are the same, so that only numbers differ."""
+    if dict(m.start) != dict(other.start) or m.drives != other.drives:
+        return False
+    for one, two in zip(m.loads, other.loads, strict=True):
+        for f in dataclasses.fields(one):
+            a, b = getattr(one, f.name), getattr(two, f.name)
+            if a != b and not (is_numeric(a, np.shape(a)) and is_numeric(b, np.shape(a)) and np.ndim(a) <= 1):
+                return False
+    return True
+
+
 def _stacked_loads(loads: Sequence[Load]) -> Load:
     changes: dict[str, Any] = {}
     for f in dataclasses.fields(loads[0]):
         values = [getattr(load, f.name) for load in loads]
-        if all(v == values[0] for v in values):
-            continue
-        if not all(is_numeric(v, np.shape(values[0])) for v in values):
-            raise DeclarationError(
-                f"variants with load {loads[0].kind}",
-                [f"{f.name} differs from variant to variant and is no number or vector; build it once, outside"],
-            )
-        changes[f.name] = PerCase(np.array(values, dtype=float))
+        if any(v != values[0] for v in values):
+            changes[f.name] = PerCase(np.array(values, dtype=float))
     return replace(loads[0], **changes)

@@ -14,6 +14,8 @@ from mechgraph.result.solution import LinkResult, PairResult, Solution
 
 Output = str | Callable[[Solution], Any]
 
+RESERVED = ("status", "variant", "position", "positions not solved")
+"""Names that tables of a study use themselves."""
 OF_SOLUTION = ("shaking",)
 OF_CHECKS = ("closure", "equilibrium", "power")
 
@@ -25,7 +27,7 @@ def _properties(kind: type) -> tuple[str, ...]:
 OF_PAIR, OF_LINK = _properties(PairResult), _properties(LinkResult)
 
 
-def named_outputs(m: Mechanism, outputs: Any) -> dict[str, Output]:
+def named_outputs(m: Mechanism, outputs: Any, parameters: Iterable[str]) -> dict[str, Output]:
     """Outputs by name, from a quantity, several, or a mapping name -> quantity or function.
 
     Raises
@@ -45,6 +47,11 @@ def named_outputs(m: Mechanism, outputs: Any) -> dict[str, Output]:
         fault
         for name, what in outputs.items()
         if (fault := None if callable(what) else _fault(m, name, what)) is not None
+    ]
+    faults += [
+        f"{name!r}: this name is taken; give the output another one"
+        for name in outputs
+        if name in {*RESERVED, *parameters}
     ]
     if faults or not outputs:
         raise DeclarationError("study: outputs", faults or ["no outputs; name at least one, e.g. 'A.effort'"])
@@ -78,6 +85,8 @@ def _found(m: Mechanism, text: str) -> Callable[[Solution], Any] | None:
     if owner in m.pair_index and part in OF_PAIR:
         return lambda s: getattr(s[owner], part)
     if owner in m.link_index and part in OF_LINK:
+        if part.startswith("center") and m.link(owner).center is None:
+            return None
         return lambda s: getattr(s.link(owner), part)
     return None
 

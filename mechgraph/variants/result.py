@@ -16,7 +16,7 @@ from mechgraph.errors import DeclarationError, MissingExtraError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion_law import Motion
 from mechgraph.motion.march import Status
-from mechgraph.variants.sampling import reach, spread
+from mechgraph.variants.sampling import deviation, reach
 from mechgraph.variants.work import Part, Source
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ class Study:
     ----------
     parameters : name -> values ``(n,)``.
     outputs : name -> array ``(n, ...)``, NaN where a variant or position was not solved.
-    nominal : name -> array ``(...)`` of the mechanism itself.
+    nominal : name -> array ``(...)`` of the mechanism itself (with the motion of the first variant, where each has its own).
     status : named outcomes ``(n, positions)``.
     messages : variant -> why it could not be solved.
     """
@@ -94,6 +94,9 @@ class Study:
         DeclarationError
             where no such mechanism can be.
         """
+        n = self._values.shape[1]
+        if isinstance(i, bool) or not isinstance(i, int | np.integer) or not -n <= i < n:
+            raise DeclarationError("study", [f"variant {i!r}: expected a whole number from 0 to {n - 1}"])
         return self._source.one(self._values[:, i])
 
     # --- what varies with what ---------------------------------------------------------------------------------------------
@@ -117,6 +120,8 @@ class Study:
     def quantiles(self, name: str, q: Any = (0.00135, 0.5, 0.99865)) -> Array:
         """Quantiles of an output over the variants that were solved, ``(*shape of q, ...)``; NaN where none was."""
         values = self._output(name)
+        if not ((np.asarray(q) >= 0) & (np.asarray(q) <= 1)).all():
+            raise DeclarationError("study", [f"quantiles q = {q!r}: expected numbers from 0 to 1"])
         some = np.isfinite(values).any(axis=0)
         found = np.nanquantile(np.where(some, values, 0.0), q, axis=0)
         return np.where(some, found, np.nan)
@@ -139,10 +144,7 @@ class Study:
         near = self._near_output(name)
         k = len(self._ways)
         return {
-            parameter: (near[1 + j] - near[1 + k + j]) / (2 * self._steps[j])
-            if self._steps[j]
-            else np.zeros_like(near[0])
-            for j, parameter in enumerate(self._ways)
+            parameter: (near[1 + j] - near[1 + k + j]) / (2 * self._steps[j]) for j, parameter in enumerate(self._ways)
         }
 
     @cached_property
@@ -167,8 +169,8 @@ class Study:
         return low, high
 
     def linear_std(self, name: str) -> Array:
-        """Standard deviation to first order, ``sqrt(sum_j (df/dp_j sigma_j)^2)``, parameters independent, sigma their spread."""
-        sigma = [spread(way) for way in self._ways.values()]
+        """Standard deviation to first order, ``sqrt(sum_j (df/dp_j sigma_j)^2)``, of independent parameters."""
+        sigma = [deviation(way) for way in self._ways.values()]
         return np.sqrt(
             sum(
                 ((g * s) ** 2 for g, s in zip(self.sensitivities(name).values(), sigma, strict=True)),
@@ -197,7 +199,7 @@ class Study:
     def to_pandas(self) -> pandas.DataFrame:
         """A DataFrame, one row a variant: parameters, outputs that are one number a variant, positions not solved (``pandas`` extra)."""
         pd = _optional("pandas")
-        single = {name: values for name, values in self.outputs.items() if values.ndim == 1}
+        single = {name: v.reshape(len(v)) for name, v in self.outputs.items() if v.size == len(v)}
         missing = (self.status != Status.OK.value).sum(axis=1)
         return pd.DataFrame({**self.parameters, **single, "positions not solved": missing})
 

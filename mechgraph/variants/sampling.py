@@ -29,6 +29,34 @@ class Levels:
         at = np.minimum((np.asarray(u) * len(self.values)).astype(int), len(self.values) - 1)
         return np.asarray(self.values[at])
 
+    def support(self) -> tuple[float, float]:
+        """Smallest and largest number."""
+        return float(self.values[0]), float(self.values[-1])
+
+    def std(self) -> float:
+        """Standard deviation of the numbers."""
+        return float(self.values.std())
+
+
+@dataclass(frozen=True)
+class Inverse:
+    """A distribution that speaks ``icdf`` and ``standard_deviation`` in place of ``ppf`` and ``std`` (``scipy.stats.Normal``)."""
+
+    distribution: Any
+
+    def ppf(self, u: Any) -> Array:
+        """The number at quantile ``u`` (0 to 1)."""
+        return np.asarray(self.distribution.icdf(u))
+
+    def support(self) -> tuple[float, float]:
+        """Smallest and largest number."""
+        low, high = self.distribution.support()
+        return float(low), float(high)
+
+    def std(self) -> float:
+        """Standard deviation."""
+        return float(self.distribution.standard_deviation())
+
 
 def distributions(parameters: Mapping[str, Any]) -> dict[str, Any]:
     """Every parameter as something with quantiles ``ppf``.
@@ -38,29 +66,45 @@ def distributions(parameters: Mapping[str, Any]) -> dict[str, Any]:
     DeclarationError
         where a value is neither a distribution nor a sequence of numbers.
     """
+    if not isinstance(parameters, Mapping):
+        raise DeclarationError(
+            "study: parameters", [f"{parameters!r}: expected a mapping name -> distribution or numbers"]
+        )
     out, faults = {}, []
     for name, given in parameters.items():
-        if hasattr(given, "ppf"):
-            out[name] = given
-            continue
-        try:
-            levels = np.asarray(given, dtype=float)
-        except (TypeError, ValueError):
-            levels = np.array(np.nan)
-        if levels.ndim != 1 or not levels.size or not np.isfinite(levels).all():
-            faults.append(
-                f"{name!r} = {given!r}: expected a distribution of scipy.stats, e.g. scipy.stats.norm(10, 0.1), or a sequence of numbers"
-            )
+        way = _way(given)
+        if isinstance(way, str):
+            faults.append(f"{name!r} = {given!r}: {way}")
         else:
-            out[name] = Levels(np.sort(levels))
+            out[name] = way
     if faults:
         raise DeclarationError("study: parameters", faults)
     return out
 
 
+def _way(given: Any) -> Any:
+    """Something with quantiles, or what is wrong with it."""
+    way = Inverse(given) if hasattr(given, "icdf") else given
+    if hasattr(way, "ppf") and not hasattr(way, "freeze"):
+        return way if np.isfinite(way.ppf(0.5)) else "has no median; check the arguments of the distribution"
+    try:
+        levels = np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        levels = np.array(np.nan)
+    if levels.ndim != 1 or not levels.size or not np.isfinite(levels).all():
+        return "expected a distribution of scipy.stats with its numbers, e.g. scipy.stats.norm(10, 0.1), or a sequence of numbers"
+    return Levels(np.sort(levels))
+
+
+def deviation(distribution: Any) -> float:
+    """Standard deviation; where a distribution has none, its spread."""
+    found = float(distribution.std())
+    return found if np.isfinite(found) else spread(distribution)
+
+
 def reach(distribution: Any) -> tuple[float, float]:
     """Smallest and largest value; where a distribution has no end, its quantiles at ``TAIL``."""
-    low, high = (float(distribution.ppf(u)) for u in (0.0, 1.0))
+    low, high = (float(end) for end in distribution.support())
     return (
         low if np.isfinite(low) else float(distribution.ppf(TAIL)),
         high if np.isfinite(high) else float(distribution.ppf(1 - TAIL)),

@@ -17,11 +17,11 @@ from mechgraph.force.methods import METHODS
 from mechgraph.force.run import driven
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion_law import Motion
-from mechgraph.variants.fields import AnyField, field_values, find_field
+from mechgraph.variants.fields import AnyField, clashes, field_values, find_field
 from mechgraph.variants.outputs import named_outputs
 from mechgraph.variants.result import Study
 from mechgraph.variants.sampling import SAMPLINGS, distributions, spread
-from mechgraph.variants.work import Part, Source, Task, motion_of_case, solved
+from mechgraph.variants.work import Part, Source, Task, as_rows, motion_of_case, solved
 
 CHUNK = 60_000
 """Positions of all variants that are solved together: bounds the memory."""
@@ -29,6 +29,9 @@ MOST_TOGETHER = 500
 """Variants that are followed together: their arrays stay in the cache."""
 DIFFERENCE = 1e-4
 """Step of the central differences of the sensitivities, as a part of the spread of the parameter."""
+
+SMALLEST = 1e-6
+"""Smallest step of a difference, as a part of the parameter (of one, where that is zero)."""
 
 Progress = Callable[[int, int], None]
 
@@ -78,14 +81,15 @@ def study(
         with all faults of parameters and outputs at once. Errors of the mechanism itself as in ``solve``.
     """
     ways = distributions(parameters)
-    faults = [
+    faults = _argument_faults(m, seed, executor, progress)
+    faults += [
         f"{what} = {value!r}: expected one of {', '.join(known)}"
         for what, value, known in (
             ("sampling", sampling, SAMPLINGS),
             ("method", method, METHODS),
             ("redundant", redundant, REDUNDANT),
         )
-        if value not in known
+        if not isinstance(value, str) or value not in known
     ]
     if not ways:
         faults.append("parameters: none are named")
@@ -94,10 +98,15 @@ def study(
     if faults:
         raise DeclarationError("study", faults)
     source, given = _source(m, ways, motions)
-    kept = named_outputs(source.mechanism, outputs)
+    kept = named_outputs(source.mechanism, outputs, ways)
     values = SAMPLINGS[sampling](list(ways.values()), int(n), np.random.default_rng(seed))
-    paths = {name: _as_rows(name, motion, values.shape[1]) for name, motion in given.items()}
-    steps = np.array([DIFFERENCE * spread(way) for way in ways.values()])
+    paths = {name: _rows_of(name, motion, values.shape[1]) for name, motion in given.items()}
+    steps = np.array(
+        [
+            max(DIFFERENCE * spread(way), SMALLEST * (abs(p) or 1.0))
+            for way, p in zip(ways.values(), source.start, strict=True)
+        ]
+    )
     near = np.concatenate([np.zeros((len(steps), 1)), np.diag(steps), -np.diag(steps)], axis=1) + source.start[:, None]
 
     def task(part: Array, at: slice) -> Task:
@@ -111,6 +120,19 @@ def study(
     return Study(source, ways, values, steps, tuple(kept), paths, parts[0], parts[1:])
 
 
+def _argument_faults(m: Any, seed: Any, executor: Any, progress: Any) -> list[str]:
+    faults = []
+    if not isinstance(m, Mechanism) and not callable(m):
+        faults.append(f"{m!r}: expected a Mechanism, or a function that builds one")
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        faults.append(f"seed = {seed!r}: expected a whole number, not negative")
+    if executor is not None and not hasattr(executor, "submit"):
+        faults.append(f"executor = {executor!r}: expected an Executor of concurrent.futures")
+    if progress is not None and not callable(progress):
+        faults.append(f"progress = {progress!r}: expected a function of the parts done and of all parts")
+    return faults
+
+
 def _source(
     m: Mechanism | Callable[..., Mechanism], ways: Mapping[str, Any], motions: Mapping[str, Any] | None
 ) -> tuple[Source, dict[str, Motion]]:
@@ -119,33 +141,36 @@ def _source(
         own, given = driven(m, motions)
         found = {name: find_field(own, name) for name in names}
         faults = [fault for fault in found.values() if isinstance(fault, str)]
+        fields: dict[str, AnyField] = {name: f for name, f in found.items() if not isinstance(f, str)}
+        faults += clashes(own, fields)
         if faults:
             raise DeclarationError(f"study of {m.name!r}", faults)
-        fields: dict[str, AnyField] = {name: f for name, f in found.items() if not isinstance(f, str)}
         start = field_values(own, fields)
         return Source(own, names, np.array([start[name] for name in names]), fields), given
-    start_values = np.array([float(way.ppf(0.5)) for way in ways.values()])
-    first = m(**dict(zip(names, start_values.tolist(), strict=True)))
+    middle = np.array([float(way.ppf(0.5)) for way in ways.values()])
+    try:
+        first = m(**dict(zip(names, middle.tolist(), strict=True)))
+    except Exception as error:
+        raise DeclarationError(
+            "study", [f"the function failed at the medians of the parameters: {type(error).__name__}: {error}"]
+        ) from error
     if not isinstance(first, Mechanism):
         raise DeclarationError("study", [f"the function gave {type(first).__name__}; expected a Mechanism"])
     own, given = driven(first, motions)
     if own is not first:
         raise DeclarationError(f"study of {first.name!r}", ["declare the drives in the function that builds it"])
-    return Source(own, names, start_values, build=m), given
+    stored = tuple(name for name in given if name not in {own.full_name(key) for key in motions or {}})
+    return Source(own, names, middle, build=m, stored=stored), given
 
 
-def _as_rows(name: str, motion: Motion, count: int) -> Motion:
+def _rows_of(name: str, motion: Motion, count: int) -> Motion:
     """The motion as ``(1 or count, N)``."""
-    shape = motion.shape if len(motion.shape) > 1 else (1, *(motion.shape or (1,)))
-    if len(shape) != 2 or shape[0] not in (1, count) or not shape[1]:
+    out = as_rows(motion)
+    if len(out.shape) != 2 or out.shape[0] not in (1, count) or not out.shape[1]:
         raise DeclarationError(
             "study", [f"motion of {name!r}: shape {motion.shape}; expected positions, or {count} variants x positions"]
         )
-
-    def rows(values: Any) -> Any:
-        return None if values is None else np.broadcast_to(values, motion.shape).reshape(shape)
-
-    return Motion(rows(motion.position), rows(motion.velocity), rows(motion.acceleration), rows(motion.t))
+    return out
 
 
 def _all_solved(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -26,13 +26,17 @@ NOT_SOLVED = "not solved"
 
 @dataclass(frozen=True)
 class Source:
-    """Where variants come from: fields of a mechanism, or a function that builds one; ``start`` are its own values."""
+    """Where variants come from: fields of a mechanism, or a function that builds one; ``start`` are its own values.
+
+    ``stored`` are the drivers whose motion is that stored with the mechanism.
+    """
 
     mechanism: Mechanism
     names: tuple[str, ...]
     start: Array
     fields: Mapping[str, AnyField] | None = None
     build: Build | None = None
+    stored: tuple[str, ...] = ()
 
     def one(self, values: Array) -> Mechanism:
         """The mechanism for ``values (parameters,)``."""
@@ -57,16 +61,14 @@ class Source:
         if self.build is None:
             return self._varied(self.start[:, None] + s * (values - self.start[:, None]))
         if s == 0.0:
-            return stacked([self.mechanism] * values.shape[1])
-        made: list[Mechanism] = []
-        missing = []
-        for i, column in enumerate((self.start[:, None] + s * (values - self.start[:, None])).T):
+            return stacked(self.mechanism, [self.mechanism] * values.shape[1])
+        made: list[Mechanism | None] = []
+        for column in (self.start[:, None] + s * (values - self.start[:, None])).T:
             try:
                 made.append(self.one(column))
             except Exception:  # told where this variant is solved alone
-                made.append(self.mechanism)
-                missing.append(i)
-        return replace(stacked(made), missing=tuple(missing))
+                made.append(None)
+        return stacked(self.mechanism, made)
 
 
 @dataclass(frozen=True)
@@ -134,7 +136,24 @@ def _solved_alone(task: Task, i: int) -> Solution:
     except Exception as error:
         raise DeclarationError("study", [f"the function failed: {type(error).__name__}: {error}"]) from error
     motions = {name: motion_of_case(motion, i) for name, motion in task.motions.items()}
+    own = {m.full_name(d.freedom): d.motion for d in m.drives if d.motion is not None}
+    for name in task.source.stored:
+        if own[name].shape[-1:] != motions[name].shape[-1:]:
+            raise DeclarationError(
+                "study", [f"the motion stored with drive {name!r} has other positions than that of the first"]
+            )
+        motions[name] = as_rows(own[name])
     return solve(m, motions, method=task.method, redundant=task.redundant, on_reach="flag")
+
+
+def as_rows(motion: Motion) -> Motion:
+    """A motion as ``(cases, N)``."""
+    shape = motion.shape if len(motion.shape) > 1 else (1, *(motion.shape or (1,)))
+
+    def rows(values: Any) -> Any:
+        return None if values is None else np.broadcast_to(values, motion.shape).reshape(shape)
+
+    return Motion(rows(motion.position), rows(motion.velocity), rows(motion.acceleration), rows(motion.t))
 
 
 def motion_of_case(motion: Motion, cases: int | slice) -> Motion:

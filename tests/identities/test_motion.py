@@ -273,3 +273,27 @@ def test_rotation_vectors_of_balls_are_continuous_over_turns_of_the_crank():
     assert np.abs(np.diff(q, axis=0)).max() < 0.1
     assert np.abs(q[:361] - q[360:]).max() > 1.0  # the ball has turned with the crank
     np.testing.assert_allclose(s.link("rocker").pose[:361], s.link("rocker").pose[360:], atol=1e-9)
+
+
+def twins(count: int, near: float) -> mg.Mechanism:
+    """``count`` near-parallelograms that share nothing but the driven crank: none can feel the others."""
+    z = (0, 0, 1)
+    pairs = [mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=z)]
+    for i in range(count):
+        x = (3.0 + 0.37 * i) * (-1) ** i
+        pairs += [
+            mg.Pair(f"B{i}", "R", "crank", f"c{i}", point=(0, 1, 0), axis=z),
+            mg.Pair(f"C{i}", "R", f"c{i}", f"r{i}", point=(x, 1 + near, 0), axis=z),
+            mg.Pair(f"D{i}", "R", "frame", f"r{i}", point=(x, 0, 0), axis=z),
+        ]
+    return mg.Mechanism("twins", pairs=pairs, drives=["A"])
+
+
+@pytest.mark.parametrize("near", [1e-2, 1e-3, 1e-4])
+@pytest.mark.parametrize("count", [2, 3, 4])
+@pytest.mark.parametrize("positions", [4, 73])
+def test_loops_that_pass_change_points_together_stay_on_their_branches(near: float, count: int, positions: int) -> None:
+    """Two determinants that change sign together leave their product as it was; the branch is kept all the same."""
+    turn = np.linspace(0, 2 * np.pi, positions)
+    alone, together = (mg.kinematics(twins(n, near), {"A": turn})["D0"].position for n in (1, count))
+    assert np.abs(together - alone).max() < 1e-9
