@@ -160,12 +160,13 @@ class Analysis:
 
     # --- forces --------------------------------------------------------------------------------------------------------
 
-    @cached_property
+    @property
     def _applied(self) -> Array:
         forces = self._need_forces()
-        return forces.site.scaled(forces.site.external + forces.site.internal) + forces.hold
+        applied = forces.site.applied()
+        return applied + forces.hold if forces.holds else applied
 
-    @cached_property
+    @property
     def _loads(self) -> Array:
         return self._need_forces().inertia + self._applied
 
@@ -304,12 +305,12 @@ class Analysis:
         reactions, _ = self._solved
         totals = here.pair_sums(here.E * (self._given + self._driver_efforts))
         totals += reactions
-        balance = self._loads.copy()
+        balance = self._loads
         add_at(balance, s.b, totals)
         add_at(balance, s.a, -totals)
         balance[:, s.graph.frame] = 0.0
         forces = self._need_forces()
-        applied = self._applied - forces.hold
+        applied = self._applied - forces.hold if forces.holds else self._applied
         largest = max(largest_of(part) for part in (totals, applied, forces.inertia, forces.hold))
         residual = np.abs(balance).max(axis=(0, 1), initial=0.0)
         work = np.abs(pair_power(here, reactions)).max(axis=0, initial=0.0)

@@ -15,7 +15,7 @@ from mechgraph.force.blocks import Blocks
 from mechgraph.force.large import SparseAnalysis, move_sparse
 from mechgraph.force.methods import METHODS, Problem
 from mechgraph.force.run import Run, self_length
-from mechgraph.force.site import Site, inertia_wrenches
+from mechgraph.force.site import Site, inertia_wrenches, nothing_like
 from mechgraph.model.load import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.motion import idle
@@ -69,9 +69,9 @@ def _raise_unreached(run: Run, status: Any, last: Array, solution: Solution) -> 
         )
 
 
-def _check_drivers(run: Run, motions: list[Motions], status: Any) -> None:
-    worst = max((float(part.rates.contradiction.max(initial=0.0)) for part in motions), default=0.0)
-    stuck = run.loops is None and run.freedoms.dependent and not (status == Status.OK.value).any()
+def _check_drivers(run: Run, motions: Motions) -> None:
+    worst = float(motions.rates.contradiction.max(initial=0.0))
+    stuck = run.loops is None and run.freedoms.dependent and not motions.good.size
     if worst > CONTRADICTION or stuck:
         names, mobility = ", ".join(run.motions), free_motion(run.system, run.x, run.columns).mobility
         why = (
@@ -134,7 +134,7 @@ def _solve(m: Mechanism, motions: Mapping[str, Any] | None, on_reach: str, force
     else:
         moved, solver, found = run.move()
         reached, kind = found.reached, Analysis
-    _check_drivers(run, [moved], moved.status)
+    _check_drivers(run, moved)
     solved = kind(moved, None)
     if forces is not None:
         solved = kind(moved, forces_of(run, moved, solver, solved.user_coordinates, *forces))
@@ -159,19 +159,21 @@ def _by_position(load: Load) -> bool:
 
 
 def _solve_in_blocks(run: Run, on_reach: str, forces: tuple[str, str] | None) -> Solution:
-    parts, status, found = run.move_in_blocks()
-    _check_drivers(run, [part.motions for part in parts], status)
-    places = [part.places for part in parts]
-    x = np.full((run.system.n_state, status.size), np.nan)
-    for part in parts:
-        x[:, part.places] = part.motions.here.x
-    coordinates = continued(run.system, x, run.batch, found.tracks)
+    found = run.found()
+    status, good = run.outcomes(found)
+    coordinates = continued(run.system, found.x.reshape(-1, status.size), run.batch, found.tracks)
     flat = coordinates.reshape(run.system.n_freedoms, status.size)
-    solved = []
-    for part in parts:
+    solved, places = [], []
+    for part in run.blocks(found, status, good):
+        _check_drivers(run, part.motions)
         mine = flat[:, part.places]
-        wrenches = None if forces is None else _forces(run, part.motions, part.solver, mine, part.places, *forces)
+        wrenches = None
+        if forces is not None:
+            wrenches = _forces(run, part.motions, part.solver, mine, part.places, *forces)
+            wrenches = dataclasses.replace(wrenches, solver=None)
+        part.motions.here.forget()
         solved.append(Analysis(part.motions, wrenches, mine))
+        places.append(part.places)
     solution = Solution(Blocks(solved, places, run.batch, status, run.t))
     if on_reach == "raise":
         _raise_unreached(run, status, found.reached, solution)
@@ -205,15 +207,18 @@ def _forces(
     """Loads and wrenches at positions of coordinates ``(F, T)`` that stand at the ``places`` of the flat batch."""
     inertia = inertia_wrenches(moved.here, moved.rates)
     site = _site(run, moved, coordinates, places)
-    loads = inertia + site.scaled(site.external + site.internal)
-    held = np.zeros_like(loads)
+    loads = site.applied()
+    loads += inertia
+    held = nothing_like(loads)
     holds: tuple[tuple[str, bool, Array], ...] = ()
     bodies = () if run.loops is not None else run.freedoms.bodies
     if bodies and isinstance(solver, ChosenSystem):
         Z = solver.null_of_columns()
         held, sizes = idle.hold(moved.here, bodies, Z, loads, site.scaled_efforts())
         holds = tuple((*name, size) for name, size in zip(idle.hold_names(moved.here, bodies, Z), sizes, strict=True))
-    problem = Problem(moved.here, loads + held, site.scaled_efforts(), run.columns, moved.held, moved.which, solver)
+    if bodies:
+        loads += held
+    problem = Problem(moved.here, loads, site.scaled_efforts(), run.columns, moved.held, moved.which, solver)
     return Forces(inertia, site, METHODS[method](problem), redundant == "nan", held, holds, solver)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -187,35 +187,34 @@ class Run:
 
     def move(self) -> tuple[Motions, ChosenSystem, Positions]:
         """Positions and rates, all in one piece."""
-        found = self._found()
-        status, good = self._outcomes(found)
+        found = self.found()
+        status, good = self.outcomes(found)
         here = found.here[0] if len(found.here) == 1 and good.size == status.size else None
         part = self._rates(found, here, good, status)
         motions = dataclasses.replace(part.motions, batch=self.batch, good=part.places, status=status)
         return motions, part.solver, found
 
-    def move_in_blocks(self) -> tuple[list[Part], Any, Positions]:
-        """Positions and rates, block by block; the statuses of all positions."""
-        found = self._found()
-        status, good = self._outcomes(found)
-        parts: list[Part] = []
-        pieces: list[tuple[Index, Configuration | None]]
+    def blocks(self, found: Positions, status: Any, good: Index) -> Iterator[Part]:
+        """Positions and rates at the places ``good``, block by block; at least one block, those without a regular position left out."""
+        pieces: list[tuple[Index, Configuration | None]] = [(places, None) for places in in_blocks(good)]
         if found.here and good.size == status.size:
             at = np.cumsum([0, *(here.T for here in found.here)])
             pieces = [(good[i:j], here) for (i, j), here in zip(pairwise(at), found.here, strict=True)]
-        else:
-            pieces = [(places, None) for places in in_blocks(good)]
+        left = len(pieces)
+        any_ = False
         for places, here in pieces:
+            left -= 1
             part = self._rates(found, here, places, status)
-            if part.places.size or not parts:
-                parts.append(part)
-        return parts, status, found
+            if part.places.size or not (left or any_):
+                any_ = True
+                yield part
 
-    def _found(self) -> Positions:
+    def found(self) -> Positions:
+        """All positions, passive bodies not spinning."""
         found = self.positions()
         return self._without_spin(found, self.freedoms.bodies) if self.freedoms.bodies else found
 
-    def _outcomes(self, found: Positions) -> tuple[Any, Index]:
+    def outcomes(self, found: Positions) -> tuple[Any, Index]:
         """Statuses of all positions as text, and the flat places of those that were solved."""
         good = np.asarray(found.status.reshape(-1) == Status.OK, dtype=bool)
         status = np.full(good.size, Status.OK.value, dtype="U24")

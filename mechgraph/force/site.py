@@ -32,6 +32,11 @@ def inertia_wrenches(here: Configuration, rates: Rates) -> Array:
     return np.concatenate([cross(c, force) - rotate(R, turning), force])
 
 
+def nothing_like(values: Array) -> Array:
+    """Zeros of a shape that take no memory; they cannot be written to."""
+    return np.broadcast_to(0.0, values.shape)
+
+
 class Site:
     """Collects loads on links and efforts in freedoms; speaks the user's units, about the internal origin.
 
@@ -47,13 +52,15 @@ class Site:
         self.m, self.L = system.m, system.par.L
         self._link = self.m.link_index
         self.external = np.zeros((6, len(self.m.links), here.T))
-        self.internal = np.zeros_like(self.external)
+        self.internal = nothing_like(self.external)
         self.efforts = np.zeros((system.n_freedoms, here.T))
         self._target = self.external
 
     def collect(self, loads: tuple[Load, ...]) -> None:
         """Let all loads act."""
         for load in loads:
+            if load.between_links and not self.internal.flags.writeable:
+                self.internal = np.zeros_like(self.external)
             self._target = self.internal if load.between_links else self.external
             load.act(self)
         if not self._finite():
@@ -69,7 +76,7 @@ class Site:
     def _alone(self, load: Load) -> bool:
         """Whether a load by itself gives finite values."""
         other = copy(self)
-        other.external, other.internal = np.zeros_like(self.external), np.zeros_like(self.internal)
+        other.external, other.internal = np.zeros_like(self.external), nothing_like(self.internal)
         other.efforts = np.zeros_like(self.efforts)
         other._target = other.external
         load.act(other)
@@ -177,7 +184,14 @@ class Site:
 
     def scaled(self, wrench: Array) -> Array:
         """Wrenches in the user's units as internal ones."""
-        return np.concatenate([wrench[:3] / self.L**2, wrench[3:] / self.L])
+        out = np.empty(wrench.shape)
+        np.divide(wrench[:3], self.L**2, out=out[:3])
+        np.divide(wrench[3:], self.L, out=out[3:])
+        return out
+
+    def applied(self) -> Array:
+        """Wrenches of all loads on all links, ``(6, N, T)``, as internal ones."""
+        return self.scaled(self.external + self.internal if self.internal.flags.writeable else self.external)
 
     def scaled_efforts(self) -> Array:
         """Given efforts ``(F, T)`` as internal ones."""

@@ -246,6 +246,11 @@ class Configuration:
         self._chords = relative[:, :, s.chords]
         self.poses = s.tree.poses(relative, s.par.frame)
 
+    def forget(self) -> None:
+        """Give back the memory of what is rarely asked for again (and then computed again)."""
+        for name in ("J", "residual", "chord_errors", "_columns", "frames"):
+            self.__dict__.pop(name, None)
+
     @cached_property
     def _columns(self) -> list[list[Frame]]:
         """For every group the pair frames 0, 1, ..., by columns."""
