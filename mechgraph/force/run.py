@@ -22,11 +22,11 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion_law import Motion
 from mechgraph.motion.assembly import CLOSED, assembled, named_columns, state_rows
 from mechgraph.motion.idle import Idle, held_well, spin_angles
-from mechgraph.motion.march import SINGULAR, Status
+from mechgraph.motion.march import FAIR, SINGULAR, Status
 from mechgraph.motion.path import Follower, Positions, in_blocks
 from mechgraph.motion.rates import DEAD_POINT, Rates, closure_solver, distance_to_dead_point, rates
 from mechgraph.motion.system import Configuration, Index, System
-from mechgraph.numerics.linear import Choice, ChosenSystem, independent_rows, rank_of, singular_values
+from mechgraph.numerics.linear import Choice, ChosenSystem, choose, independent_rows, rank_of, singular_values
 from mechgraph.structure.freedom import free_motion
 from mechgraph.structure.report import check
 
@@ -225,8 +225,7 @@ class Run:
         """Rates at the positions ``good`` of the flat batch; those that are no regular ones are marked in ``status``."""
         bodies = self.freedoms.bodies
         here = here or self.evaluated(found.x.reshape(self.system.n_state, status.size)[:, good], good)
-        which, choices = found.which.reshape(-1)[good], found.choices
-        solver = closure_solver(here, choices, which)
+        choices, which, solver = self._well_chosen(here, found.choices, found.which.reshape(-1)[good])
         open_ = here.closure > CLOSED
         if open_.any():
             status.reshape(-1)[good[open_]] = Status.NOT_CLOSED.value
@@ -250,6 +249,25 @@ class Run:
         flags = np.full(n, Status.OK.value, dtype="U24")
         motions = Motions(here, moved, (n,), np.arange(n), flags, self.t, self.columns, held, which, tracks)
         return Part(motions, solver, good)
+
+    def _well_chosen(
+        self, here: Configuration, choices: list[Choice], which: Index
+    ) -> tuple[list[Choice], Index, ChosenSystem]:
+        """The closure equations; in redundant loops with other independent rows where those of the path are nearly dependent."""
+        solver = closure_solver(here, choices, which)
+        rows = {len(choices[i].rows) for i in np.unique(which)}
+        held = any(choices[i].held.size for i in np.unique(which))
+        if held or rows == {here.J.shape[0]} or not (solver.condition > FAIR).any():
+            return choices, which, solver
+        poor = np.flatnonzero(solver.condition > FAIR)
+        other = choose(here.J[:, :, int(poor[np.argmax(solver.condition[poor])])], self.leading)
+        trial = ChosenSystem(here.J[:, :, poor], [other], np.zeros(poor.size, dtype=np.intp))
+        better = poor[trial.condition < 0.2 * solver.condition[poor]]
+        if rows != {len(other.rows)} or not better.size:
+            return choices, which, solver
+        choices, which = [*choices, other], which.copy()
+        which[better] = len(choices) - 1
+        return choices, which, closure_solver(here, choices, which)
 
     def _disagreement(self, here: Configuration, moved: Rates, good: Index) -> Array:
         """How far given positions and rates of dependent drivers are from those that the leading ones bring, ``(T,)``."""

@@ -55,7 +55,7 @@ def cases():
         ("RCSR", mg.load("rcsr"), (150.0, 204.0), 24, 3.0),
         ("RCSR-CSR", mg.load("rcsr-csr"), (160.0, 214.0), 40, 2.0),
         ("four-bar", mg.load("four-bar"), TURN, 24, None),
-        ("Bennett", mg.load("bennett"), (30.05, 390.05), 24, None),
+        ("Bennett", mg.load("bennett"), (30.055, 390.055), 24, None),
         ("Bricard", bricard.replace(drives=["O1"]), (0.0, 200.0), 42, None),
     ]
 

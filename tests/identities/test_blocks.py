@@ -184,3 +184,12 @@ def test_frames_by_columns_are_those_of_the_pair_table(seed):
             p = np.einsum("ijnt,jnt->int", base[:, :3], other[:, 3]) + base[:, 3]
             np.testing.assert_allclose(one[:, :3], R, atol=1e-13)
             np.testing.assert_allclose(one[:, 3], p, atol=1e-13)
+
+
+def test_rows_are_chosen_anew_where_those_of_the_path_are_nearly_dependent():
+    """A Bennett linkage is regular at 92.5 and 180 degrees, where three of its six closure equations are not."""
+    around = np.array([92.495, 92.5, 92.505, 179.999, 180.0, 180.001])
+    angles = np.radians(np.sort(np.concatenate([np.linspace(30.0, 330.0, 1200, endpoint=False), around])))
+    s = mg.solve(mg.load("bennett"), {"A": mg.Motion(angles, 10.0)})
+    assert s.checks.equilibrium.max() < 3e-13
+    assert s.checks.closure.max() < 1e-12
