@@ -15,9 +15,8 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError, MissingExtraError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion_law import Motion
-from mechgraph.motion.march import Status
 from mechgraph.variants.sampling import deviation, reach
-from mechgraph.variants.work import Part, Source
+from mechgraph.variants.work import STATUSES, Part, Source
 
 if TYPE_CHECKING:
     import pandas
@@ -32,7 +31,6 @@ class Study:
     parameters : name -> values ``(n,)``.
     outputs : name -> array ``(n, ...)``, NaN where a variant or position was not solved.
     nominal : name -> array ``(...)`` of the mechanism itself (with the motion of the first variant, where each has its own).
-    status : named outcomes ``(n, positions)``.
     messages : variant -> why it could not be solved.
     """
 
@@ -50,9 +48,9 @@ class Study:
         self._source, self._ways, self._values, self._steps, self._near = source, ways, values, steps, near
         self.motions = MappingProxyType(dict(motions))
         self.parameters: Mapping[str, Array] = MappingProxyType(dict(zip(ways, values, strict=True)))
-        self.status: NDArray[np.str_] = np.concatenate([part.status for part in parts])
+        self._outcomes: NDArray[np.int8] = np.concatenate([part.status for part in parts])
         shape = next((part.outputs for part in [near, *parts] if part.outputs is not None), None)
-        shapes = {name: self.status.shape[1:] if shape is None else shape[name].shape[1:] for name in names}
+        shapes = {name: self._outcomes.shape[1:] if shape is None else shape[name].shape[1:] for name in names}
         self.outputs: Mapping[str, Array] = MappingProxyType(
             {
                 name: np.concatenate(
@@ -73,8 +71,8 @@ class Study:
             first += len(part.status)
 
     def __repr__(self) -> str:
-        bad = int(self.failed.sum())
-        return f"Study({self._source.mechanism.name!r}, {len(self.status)} variants, {bad} not solved, outputs {', '.join(self.outputs)})"
+        count, bad = len(self._outcomes), int(self.failed.sum())
+        return f"Study({self._source.mechanism.name!r}, {count} variants, {bad} not solved, outputs {', '.join(self.outputs)})"
 
     @property
     def mechanism(self) -> Mechanism:
@@ -82,9 +80,14 @@ class Study:
         return self._source.mechanism
 
     @property
+    def status(self) -> NDArray[np.str_]:
+        """Named outcomes ``(n, positions)``."""
+        return np.asarray(STATUSES[self._outcomes])
+
+    @property
     def failed(self) -> NDArray[np.bool_]:
         """Variants some position of which was not solved, ``(n,)``."""
-        return np.asarray((self.status != Status.OK.value).any(axis=1))
+        return np.asarray(self._outcomes.any(axis=1))
 
     def variant(self, i: int) -> Mechanism:
         """The ``i``-th variant as a mechanism, to be solved and checked by itself.
@@ -183,7 +186,7 @@ class Study:
     def to_xarray(self) -> xarray.Dataset:
         """A Dataset over variants and positions, parameters as coordinates of the variants (``xarray`` extra)."""
         xr = _optional("xarray")
-        N = self.status.shape[1]
+        N = self._outcomes.shape[1]
         data: dict[str, Any] = {}
         for name, values in self.outputs.items():
             placed = values.ndim > 1 and values.shape[1] == N
@@ -200,7 +203,7 @@ class Study:
         """A DataFrame, one row a variant: parameters, outputs that are one number a variant, positions not solved (``pandas`` extra)."""
         pd = _optional("pandas")
         single = {name: v.reshape(len(v)) for name, v in self.outputs.items() if v.size == len(v)}
-        missing = (self.status != Status.OK.value).sum(axis=1)
+        missing = (self._outcomes != 0).sum(axis=1)
         return pd.DataFrame({**self.parameters, **single, "positions not solved": missing})
 
 

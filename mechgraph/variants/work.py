@@ -14,6 +14,7 @@ from mechgraph.errors import DeclarationError, MechgraphError
 from mechgraph.force.kinetostatics import solve
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion_law import Motion
+from mechgraph.motion.march import Status
 from mechgraph.result.solution import Solution
 from mechgraph.variants.batch import solve_together
 from mechgraph.variants.fields import AnyField, Variants, stacked, topology_of, varied
@@ -22,6 +23,8 @@ from mechgraph.variants.outputs import Output, quantity
 Build = Callable[..., Mechanism]
 NOT_SOLVED = "not solved"
 """Status of a variant that could not be built or assembled; its message says why."""
+STATUSES = np.array([*(status.value for status in Status), NOT_SOLVED])
+"""Named outcomes by the number that stands for them, that of a solved position first."""
 
 
 @dataclass(frozen=True)
@@ -85,10 +88,12 @@ class Task:
 
 @dataclass(frozen=True)
 class Part:
-    """What came of a task: outputs ``(count, ...)`` (None where no variant could be solved), status ``(count, N)``, messages."""
+    """What came of a task: outputs ``(count, ...)`` (None where no variant could be solved), messages, and for every position
+    ``(count, N)`` the number of its outcome in ``STATUSES``.
+    """
 
     outputs: dict[str, Array] | None
-    status: NDArray[np.str_]
+    status: NDArray[np.int8]
     messages: dict[int, str]
 
 
@@ -120,7 +125,15 @@ def solved(task: Task) -> Part:
         elif found is not None:
             for v in found.values():
                 v[i] = np.nan
-    return Part(found, status, messages)
+    return Part(found, numbered(status), messages)
+
+
+def numbered(status: NDArray[np.str_]) -> NDArray[np.int8]:
+    """Outcomes as their numbers in ``STATUSES``."""
+    out = np.full(status.shape, len(STATUSES) - 1, dtype=np.int8)
+    for i, name in enumerate(STATUSES):
+        out[status == name] = i
+    return out
 
 
 def _writable(values: Array) -> Array:
