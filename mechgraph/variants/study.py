@@ -5,7 +5,7 @@ from __future__ import annotations
 import concurrent.futures
 import os
 import pickle
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -81,20 +81,10 @@ def study(
         with all faults of parameters and outputs at once. Errors of the mechanism itself as in ``solve``.
     """
     ways = distributions(parameters)
-    faults = _argument_faults(m, seed, executor, progress)
-    faults += [
-        f"{what} = {value!r}: expected one of {', '.join(known)}"
-        for what, value, known in (
-            ("sampling", sampling, SAMPLINGS),
-            ("method", method, METHODS),
-            ("redundant", redundant, REDUNDANT),
-        )
-        if not isinstance(value, str) or value not in known
-    ]
+    named = {"sampling": (sampling, SAMPLINGS), "method": (method, METHODS), "redundant": (redundant, REDUNDANT)}
+    faults = _argument_faults(m, n, seed, executor, progress, named)
     if not ways:
         faults.append("parameters: none are named")
-    if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
-        faults.append(f"n = {n!r}: expected a whole number, at least 1")
     if faults:
         raise DeclarationError("study", faults)
     source, given = _source(m, ways, motions)
@@ -120,12 +110,19 @@ def study(
     return Study(source, ways, values, steps, tuple(kept), paths, parts[0], parts[1:])
 
 
-def _argument_faults(m: Any, seed: Any, executor: Any, progress: Any) -> list[str]:
-    faults = []
+def _argument_faults(
+    m: Any, n: Any, seed: Any, executor: Any, progress: Any, named: Mapping[str, tuple[Any, Iterable[str]]]
+) -> list[str]:
+    faults = [
+        f"{what} = {value!r}: expected one of {', '.join(known)}"
+        for what, (value, known) in named.items()
+        if not isinstance(value, str) or value not in known
+    ]
     if not isinstance(m, Mechanism) and not callable(m):
         faults.append(f"{m!r}: expected a Mechanism, or a function that builds one")
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        faults.append(f"seed = {seed!r}: expected a whole number, not negative")
+    for what, value, least in (("n", n, 1), ("seed", seed, 0)):
+        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+            faults.append(f"{what} = {value!r}: expected a whole number, at least {least}")
     if executor is not None and not hasattr(executor, "submit"):
         faults.append(f"executor = {executor!r}: expected an Executor of concurrent.futures")
     if progress is not None and not callable(progress):
