@@ -81,7 +81,11 @@ def study(
         with all faults of parameters and outputs at once. Errors of the mechanism itself as in ``solve``.
     """
     ways = distributions(parameters)
-    named = {"sampling": (sampling, SAMPLINGS), "method": (method, METHODS), "redundant": (redundant, REDUNDANT)}
+    named: dict[str, tuple[Any, Iterable[str]]] = {
+        "sampling": (sampling, SAMPLINGS),
+        "method": (method, METHODS),
+        "redundant": (redundant, REDUNDANT),
+    }
     faults = _argument_faults(m, n, seed, executor, progress, named)
     if not ways:
         faults.append("parameters: none are named")
