@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -11,8 +12,8 @@ import numpy as np
 from mechgraph.algebra.screw import shift_wrench
 from mechgraph.algebra.se3 import Array, cross, rotate
 from mechgraph.errors import MechgraphError
-from mechgraph.force.methods import Wrenches, given_effort_loads, internal_state
-from mechgraph.force.site import Site, kinetic_power, user_poses, user_twists
+from mechgraph.force.methods import NO_WRENCHES, Wrenches, given_effort_loads, internal_state
+from mechgraph.force.site import Site, inertia_wrenches, kinetic_power, user_poses, user_twists
 from mechgraph.formulation.state import State
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.motion.path import Tracks, continued
@@ -47,21 +48,37 @@ class Motions:
     tracks: Tracks = ()
 
 
-@dataclass(frozen=True)
+@dataclass
 class Forces:
-    """Inertia ``(6, N, T)`` and what loads do (``site``), the wrenches found, and whether redundant reactions are NaN.
+    """What acts at the positions of a batch, and the wrenches of all pairs found for it.
 
-    ``hold (6, N, T)`` keeps passive bodies at rest, ``holds`` are its sizes by name and whether they are couples; ``solver`` the closure
-    equations.
+    ``act`` lets all loads act; ``hold (6, N, T)`` keeps passive bodies at rest, ``holds`` are its sizes by name and whether they are
+    couples; ``solver`` are the closure equations.
     """
 
-    inertia: Array
-    site: Site
-    wrenches: Wrenches
+    rates: Rates
+    act: Callable[[], Site]
     mask_redundant: bool
     hold: Array
-    holds: tuple[tuple[str, bool, Array], ...]
-    solver: Any = None
+    solver: Any
+    holds: tuple[tuple[str, bool, Array], ...] = ()
+    wrenches: Wrenches = NO_WRENCHES
+
+    @cached_property
+    def site(self) -> Site:
+        """What loads do."""
+        return self.act()
+
+    @cached_property
+    def inertia(self) -> Array:
+        """Inertia wrenches of all links, ``(6, N, T)``."""
+        return inertia_wrenches(self.rates.here, self.rates)
+
+    def forget(self) -> None:
+        """Give back the memory of what is not asked for often; it is computed again where it is."""
+        for name in ("site", "inertia"):
+            self.__dict__.pop(name, None)
+        self.wrenches, self.solver = NO_WRENCHES, None
 
 
 class Analysis:
@@ -74,6 +91,15 @@ class Analysis:
         self.has_forces = forces is not None
         self._here, self._system = motions.here, motions.here.system
         self._L = self._system.par.L
+
+    def settle(self) -> None:
+        """Work out reactions, efforts and checks, and give back the memory of all that can be computed again from the motion."""
+        for name in ("_closure", "equilibrium", "power") if self.has_forces else ("_closure",):
+            getattr(self, name)
+        if self.forces is not None:
+            self.forces.forget()
+        self.motions.rates.forget()
+        self._here.forget()
 
     # --- shapes and units ----------------------------------------------------------------------------------------------
 
@@ -287,7 +313,11 @@ class Analysis:
 
     def closure(self) -> Array:
         """Closure error."""
-        return self._out(self._here.closure)
+        return self._out(self._closure)
+
+    @cached_property
+    def _closure(self) -> Array:
+        return self._here.closure
 
     def checks(self) -> Checks:
         """Closure error, equilibrium and power."""
@@ -295,10 +325,11 @@ class Analysis:
         if self.forces is None:
             nothing = np.full(self.batch, np.nan)
             return Checks(closure, nothing, nothing)
-        residual, wrench = self.equilibrium()
-        gap, term = self.power()
+        residual, wrench = self.equilibrium
+        gap, term = self.power
         return Checks(closure, self._out(residual / (wrench or 1.0)), self._out(gap / (term or 1.0)))
 
+    @cached_property
     def equilibrium(self) -> tuple[Array, float]:
         """Residual ``(T,)`` of the equilibrium of all links and of ``S^T w = effort``, and the largest wrench in the batch."""
         here, s = self._here, self._system
@@ -316,6 +347,7 @@ class Analysis:
         work = np.abs(pair_power(here, reactions)).max(axis=0, initial=0.0)
         return np.maximum(residual, work), largest
 
+    @cached_property
     def power(self) -> tuple[Array, float]:
         """Driver power + load power - rate of kinetic energy ``(T,)``, and the largest term in the batch."""
         rates = self.motions.rates

@@ -113,7 +113,7 @@ class Blocks:
             nothing = np.full(self.batch, np.nan)
             return Checks(closure, nothing, nothing)
         ratios = []
-        for found in ([part.equilibrium() for part in self._parts], [part.power() for part in self._parts]):
+        for found in ([part.equilibrium for part in self._parts], [part.power for part in self._parts]):
             largest = max(size for _, size in found) or 1.0
             ratios.append(self._joined([values / largest for values, _ in found]))
         return Checks(closure, *ratios)

@@ -15,7 +15,7 @@ from mechgraph.force.blocks import Blocks
 from mechgraph.force.large import SparseAnalysis, move_sparse
 from mechgraph.force.methods import METHODS, Problem
 from mechgraph.force.run import Run, self_length
-from mechgraph.force.site import Site, inertia_wrenches, nothing_like
+from mechgraph.force.site import Site
 from mechgraph.model.load import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.motion import idle
@@ -170,9 +170,8 @@ def _solve_in_blocks(run: Run, on_reach: str, forces: tuple[str, str] | None) ->
         wrenches = None
         if forces is not None:
             wrenches = _forces(run, part.motions, part.solver, mine, part.places, *forces)
-            wrenches = dataclasses.replace(wrenches, solver=None)
-        part.motions.here.forget()
         solved.append(Analysis(part.motions, wrenches, mine))
+        solved[-1].settle()
         places.append(part.places)
     solution = Solution(Blocks(solved, places, run.batch, status, run.t))
     if on_reach == "raise":
@@ -205,21 +204,20 @@ def _forces(
     redundant: str,
 ) -> Forces:
     """Loads and wrenches at positions of coordinates ``(F, T)`` that stand at the ``places`` of the flat batch."""
-    inertia = inertia_wrenches(moved.here, moved.rates)
-    site = _site(run, moved, coordinates, places)
-    loads = site.applied()
-    loads += inertia
-    held = nothing_like(loads)
-    holds: tuple[tuple[str, bool, Array], ...] = ()
+    nothing = np.broadcast_to(0.0, (6, len(run.m.links), moved.here.T))
+    found = Forces(moved.rates, lambda: _site(run, moved, coordinates, places), redundant == "nan", nothing, solver)
+    efforts = found.site.scaled_efforts()
+    loads = found.site.applied()
+    loads += found.inertia
     bodies = () if run.loops is not None else run.freedoms.bodies
     if bodies and isinstance(solver, ChosenSystem):
         Z = solver.null_of_columns()
-        held, sizes = idle.hold(moved.here, bodies, Z, loads, site.scaled_efforts())
-        holds = tuple((*name, size) for name, size in zip(idle.hold_names(moved.here, bodies, Z), sizes, strict=True))
-    if bodies:
-        loads += held
-    problem = Problem(moved.here, loads, site.scaled_efforts(), run.columns, moved.held, moved.which, solver)
-    return Forces(inertia, site, METHODS[method](problem), redundant == "nan", held, holds, solver)
+        found.hold, sizes = idle.hold(moved.here, bodies, Z, loads, efforts)
+        names = idle.hold_names(moved.here, bodies, Z)
+        found.holds = tuple((*name, size) for name, size in zip(names, sizes, strict=True))
+        loads += found.hold
+    found.wrenches = METHODS[method](Problem(moved.here, loads, efforts, run.columns, moved.held, moved.which, solver))
+    return found
 
 
 def assemble(

@@ -49,6 +49,10 @@ class Wrenches:
     stress: Array
 
 
+NO_WRENCHES = Wrenches(np.empty((6, 0, 0)), np.empty((6, 0, 0, 0)))
+"""Before they are found, and after all that is asked of them has been taken."""
+
+
 def loop_wrench(problem: Problem) -> Wrenches:
     """``w = w_tree + C^T x`` with one wrench ``x`` a loop: ``J^T x = tau - S^T w_tree`` in the undriven freedoms.
 

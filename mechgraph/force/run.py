@@ -240,7 +240,7 @@ class Run:
         velocity, acceleration = (values[:, good] for values in self._driver_rates)
         moved = rates(here, solver, self.leading, velocity[self.lead], acceleration[self.lead], bodies)
         if len(self.lead) < len(self.columns):
-            moved = dataclasses.replace(moved, contradiction=self._disagreement(here, moved, good))
+            moved.contradiction = self._disagreement(here, moved, good)
             solver = chosen_for_all(here.J, [], self.columns)
             choices, which = solver.choices, solver.which
         held = tuple(choice.held for choice in choices)

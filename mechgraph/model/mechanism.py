@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import gc
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -20,6 +21,8 @@ from mechgraph.model.link import Link
 from mechgraph.model.load import Effort, Load, TorsionSpring
 from mechgraph.model.pair import PairType
 from mechgraph.model.values import is_numeric, plain, same_fields
+
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,6 +240,23 @@ class Mechanism:
         """Whether every pair says where it sits (otherwise: a topology, which can be counted, not solved)."""
         return all(pair.has_geometry for pair in self.pairs)
 
+    def once(self, make: Callable[[Mechanism], Made]) -> Made:
+        """``make(self)`` of a function of links, pairs and frame alone: worked out once and kept, copies with other drives too."""
+        if make not in self._kept:
+            enabled = gc.isenabled()
+            gc.disable()  # a search for cyclic garbage would go through all that is made for a large graph again and again
+            try:
+                self._kept[make] = make(self)
+            finally:
+                if enabled:
+                    gc.enable()
+        made: Made = self._kept[make]
+        return made
+
+    @cached_property
+    def _kept(self) -> dict[Callable[..., Any], Any]:
+        return {}
+
     # --- changed copies ----------------------------------------------------------------------------------------------
 
     def replace(self, **changes: Any) -> Mechanism:
@@ -254,6 +274,7 @@ class Mechanism:
             fields["drives"] = tuple(Drive(d) if isinstance(d, str) else d for d in changes["drives"])
         if "loads" in changes:
             fields["loads"] = tuple(changes["loads"])
+        object.__setattr__(out, "_kept", self._kept)
         out._settle(fields, {"start": changes.get("start", self.start)}, item_faults)
         return out
 

@@ -255,7 +255,7 @@ class PairType:
             groups.setdefault(k, []).append(j)
         return tuple(tuple(g) for g in groups.values())
 
-    @property
+    @cached_property
     def nx(self) -> int:
         """Number of state numbers: one for a single freedom, a unit quaternion for a rotation."""
         return sum(1 if len(g) == 1 else 4 for g in self.factors)

@@ -7,7 +7,10 @@ stands and whatever its units: internal position = (R_b offset_b + p_b - center)
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,7 +94,7 @@ class Declared:
 
     def offset(self, m: Mechanism) -> Array:
         """Middle of the markers of every link in its frame, ``(3, N)``: of the first variant."""
-        ends = np.concatenate(_ends(m))
+        ends = np.concatenate(m.once(_ends))
         points = np.concatenate([self.point[0, :, :, 0], self.point[1, :, :, 0]], axis=1)
         count = np.bincount(ends, minlength=len(m.links))
         return np.stack([np.bincount(ends, row, minlength=len(m.links)) for row in points]) / count
@@ -104,7 +107,7 @@ class Declared:
         frame[:, 3, 0] = (offset[:, frame_link] - origin) / L
         placed = np.array([link.center is not None for link in m.links])
         center = np.where(placed[:, None], self.center - offset[:, :, None], 0.0)
-        a, b = _ends(m)
+        a, b = m.once(_ends)
         return Parameters(
             marker_a=self._markers(0, offset[:, a], L),
             marker_b=self._markers(1, offset[:, b], L),
@@ -134,20 +137,28 @@ def _ends(m: Mechanism) -> tuple[Index, Index]:
     return a, b
 
 
+def _rows(vectors: Sequence[Any]) -> Array:
+    """Vectors of three numbers as rows ``(n, 3)``."""
+    return np.fromiter(chain.from_iterable(vectors), float, 3 * len(vectors)).reshape(-1, 3)
+
+
+def _of_sides(m: Mechanism, field: str) -> Array:
+    """A field of the markers on both sides of all pairs, ``(2, 3, P)``."""
+    marked = [k for k, pair in enumerate(m.pairs) if pair.on_a is not None]
+    first = _rows([getattr(pair if pair.on_a is None else pair.on_a, field) for pair in m.pairs])
+    out = np.stack([first, first])
+    out[1, marked] = _rows([getattr(m.pairs[k].on_b, field) for k in marked])
+    return out.transpose(0, 2, 1)
+
+
 def declared(m: Mechanism) -> Declared:
     """The declared numbers of one mechanism with geometry, a batch of one."""
-    placed = [
-        [pair if getattr(pair, side) is None else getattr(pair, side) for pair in m.pairs] for side in ("on_a", "on_b")
-    ]
-    point, axis, second = (
-        np.array([[getattr(marker, field) for marker in side] for side in placed], dtype=float).transpose(0, 2, 1)
-        for field in ("point", "axis", "second")
-    )
+    point, axis, second = (_of_sides(m, field) for field in ("point", "axis", "second"))
     center, inertia = np.zeros((3, len(m.links))), np.zeros((3, 3, len(m.links)))
     at = [i for i, link in enumerate(m.links) if link.center is not None]
-    center[:, at] = np.array([m.links[i].center for i in at], dtype=float).reshape(-1, 3).T
+    center[:, at] = _rows([m.links[i].center for i in at]).T
     turning = [i for i, link in enumerate(m.links) if link.inertia is not None]
-    tensors = np.array([m.links[i].inertia for i in turning], dtype=float).reshape(-1, 3, 3)
+    tensors = _rows([row for i in turning for row in m.links[i].inertia]).reshape(-1, 3, 3)
     inertia[:, :, turning] = np.moveaxis(tensors, 0, -1)
     return Declared(
         point[..., None],
@@ -160,8 +171,8 @@ def declared(m: Mechanism) -> Declared:
     )
 
 
-def parameters(m: Mechanism, origin: Array | None = None, L: float = 1.0) -> Parameters:
-    """The arrays of a mechanism with geometry, about ``origin`` (global) with lengths divided by ``L``."""
+def parameters(m: Mechanism) -> Parameters:
+    """The arrays of a mechanism with geometry as it is declared, about the origin of its frame."""
     numbers = declared(m)
     offset = numbers.offset(m)
-    return numbers.parameters(m, offset, offset[:, m.link_index[m.frame]] if origin is None else origin, L)
+    return numbers.parameters(m, offset, offset[:, m.link_index[m.frame]], 1.0)

@@ -10,7 +10,7 @@ from mechgraph.algebra.se3 import Array, rotate
 from mechgraph.errors import AssemblyError, DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.values import is_numeric
-from mechgraph.motion.system import Configuration, Index, System
+from mechgraph.motion.system import Configuration, Index, System, indexed
 from mechgraph.numerics.newton import closest_zero, least_norm_step
 
 CLOSED = 1e-10
@@ -25,7 +25,7 @@ RESTARTS = 40
 
 def scaled_system(m: Mechanism, q: Array, system: System | None = None) -> System:
     """The system about the centroid of the pair points at coordinates ``q``, with lengths over their RMS distance L."""
-    raw = system or System(m)
+    raw = system or indexed(m)
     here = raw.at(raw.state_of(q[:, None]))
     par = raw.par
     points = here.pair_points[:, :, 0]
@@ -143,7 +143,7 @@ def assembled(m: Mechanism, preferred: Mapping[str, float] | None = None) -> tup
             f"mechanism {m.name!r}",
             [f"pairs {', '.join(bare)} have no geometry; a topology can be counted, not solved"],
         )
-    raw = System(m)
+    raw = indexed(m)
     q = raw.start_coordinates(m.start)
     system = scaled_system(m, q, raw)
     x = system.state_of(q[:, None])[:, 0]
@@ -224,7 +224,7 @@ def assembled_at(
     """
     if guess is not None:
         m = m.replace(start={**m.start, **{m.full_name(k): v for k, v in guess.items()}})
-        raw = scaled_system(m, System(m).start_coordinates(m.start))
+        raw = scaled_system(m, indexed(m).start_coordinates(m.start))
         columns, goal = named_columns(m, raw, values)
         x = raw.state_of(raw.start_coordinates(m.start)[:, None])[:, 0]
         x[state_rows(raw, columns)] = goal

@@ -25,7 +25,7 @@ from mechgraph.motion.march import (
     SHORTEST_STEP,
     Status,
 )
-from mechgraph.motion.rates import Rates
+from mechgraph.motion.rates import Rates, Velocities
 from mechgraph.motion.system import Configuration, Index, System
 from mechgraph.numerics.sparse import SparseFactor
 
@@ -85,12 +85,10 @@ def sparse_rates(
 ) -> Rates:
     """Rates for driver velocities and accelerations ``(d, T)``: ``J q' = 0`` and ``J q'' = -bias``, the driven part known."""
     dq, gap_v = _completed(here, solver, columns, velocity, np.zeros((1, here.T)))
-    V = here.link_twists(dq)
-    pair_bias = here.bias(dq, V)
+    moving = Velocities(here, dq)
     turning = (dq * dq).max(axis=0, initial=0.0)
-    ddq, gap_a = _completed(here, solver, columns, acceleration, here.loop_sums(pair_bias), turning)
-    A = here.system.tree.sums(here.pair_sums(here.S * ddq) + pair_bias)
-    return Rates(dq, ddq, V, A, np.maximum(gap_v, gap_a))
+    ddq, gap_a = _completed(here, solver, columns, acceleration, here.loop_sums(moving.bias), turning)
+    return Rates(moving, ddq, np.maximum(gap_v, gap_a))
 
 
 def _completed(

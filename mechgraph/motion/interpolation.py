@@ -113,17 +113,15 @@ class Interpolation:
 
     def _divided(self, interval: Index, names: Index) -> tuple[Array, Array]:
         """Divided differences over double nodes ``names (w, n)`` for some intervals."""
-        w = len(names)
         z = np.repeat(self._place[names] - self._place[interval], 2, axis=0)
-        column = np.empty((2 * w, self._Z.shape[0], len(interval)))
-        slopes = np.zeros((2 * w - 1, *column.shape[1:]))
-        for k in range(w):
-            dq = self.system.difference(self._x[:, names[k]], self._x[:, interval])
-            column[2 * k] = column[2 * k + 1] = dq
-            rates = (self._Z[:, :, names[k]] * self._slope[:, interval]).sum(axis=1)
-            slopes[2 * k] = self.system.tangent(dq, rates)
+        dq = self.system.difference(self._x[:, names], self._x[:, None, interval])
+        rates = (self._Z[:, :, names] * self._slope[:, None, interval]).sum(axis=1)
+        column = np.repeat(dq.swapaxes(0, 1), 2, axis=0)
+        slopes = np.zeros((len(z) - 1, *column.shape[1:]))
+        slopes[::2] = self.system.tangent(dq, rates).swapaxes(0, 1)
         coefficients = [column[0]]
-        for order in range(1, 2 * w):
+        coefficients = [column[0]]
+        for order in range(1, len(z)):
             width = z[order:] - z[:-order]
             if order == 1:
                 same = width == 0

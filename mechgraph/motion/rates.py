@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -16,19 +16,44 @@ DEAD_POINT = 1e-10
 """Distance to a dead point, in driver coordinates (radians, or lengths / L), below which a position counts as one."""
 
 
-@dataclass(frozen=True)
-class Rates:
-    """Rates of all freedoms ``dq, ddq (F, T)``, link twists ``V`` and accelerations ``A (6, N, T)``.
+class Velocities:
+    """Rates of all freedoms ``dq (F, T)`` at closed positions, and what follows from them."""
+
+    def __init__(self, here: Configuration, dq: Array) -> None:
+        self.here, self.dq = here, dq
+
+    @cached_property
+    def V(self) -> Array:
+        """Twists of all links ``(6, N, T)``."""
+        return self.here.link_twists(self.dq)
+
+    @cached_property
+    def bias(self) -> Array:
+        """Velocity part of the relative accelerations of all pairs ``(6, P, T)``."""
+        return self.here.bias(self.dq, self.V)
+
+
+class Rates(Velocities):
+    """Rates of all freedoms ``dq, ddq (F, T)``, twists ``V`` and accelerations ``A`` of all links ``(6, N, T)``.
 
     ``contradiction (T,)`` is the largest part of the closure rates that no choice of the free rates can meet, relative to the
     terms of the equation.
     """
 
-    dq: Array
-    ddq: Array
-    V: Array
-    A: Array
-    contradiction: Array
+    def __init__(self, velocities: Velocities, ddq: Array, contradiction: Array) -> None:
+        super().__init__(velocities.here, velocities.dq)
+        self.V, self.bias = velocities.V, velocities.bias
+        self.ddq, self.contradiction = ddq, contradiction
+
+    @cached_property
+    def A(self) -> Array:
+        """Accelerations dV/dt of all links ``(6, N, T)``."""
+        return self.here.accelerations_with(self.ddq, self.bias)
+
+    def forget(self) -> None:
+        """Give back the memory of what follows from the rates; what is asked for again is computed again."""
+        for name in ("V", "bias", "A"):
+            self.__dict__.pop(name, None)
 
 
 def closure_solver(here: Configuration, choices: list[Choice], which: Index) -> ChosenSystem:
@@ -49,26 +74,24 @@ def rates(
     ``J q' = 0`` and ``J q'' = -bias``, the driven part known; passive freedoms of ``bodies`` at rest (see ``motion.idle``).
     """
     dq, gap_v = _completed(here, solver, columns, velocity, None)
-    V = here.link_twists(dq)
+    moving = Velocities(here, dq)
     Z = solver.null_of_columns() if bodies else np.zeros((len(dq), 0, here.T))
     if bodies:
         points = idle.rest_points(here, bodies, Z)
         G = idle.passive_twists(here, bodies, points, Z)
-        dq += np.einsum("fpt,pt->ft", Z, idle.resting_part(G, idle.body_twists(bodies, points, V)))
-        V = here.link_twists(dq)
-    relative = here.bias(dq, V)
-    bias = here.loop_sums(relative)
-    turning = (dq * dq).max(axis=0, initial=0.0)
-    ddq, gap_a = _completed(here, solver, columns, acceleration, bias, turning)
-    A = here.accelerations_with(ddq, relative)
+        spin = idle.resting_part(G, idle.body_twists(bodies, points, moving.V))
+        moving = Velocities(here, dq + np.einsum("fpt,pt->ft", Z, spin))
+    turning = (moving.dq * moving.dq).max(axis=0, initial=0.0)
+    ddq, gap_a = _completed(here, solver, columns, acceleration, here.loop_sums(moving.bias), turning)
+    moved = Rates(moving, ddq, np.maximum(gap_v, gap_a))
     if bodies:
-        now = idle.body_accelerations(bodies, points, V, A)
-        change = np.linalg.solve(np.einsum("ipt,iqt->tpq", G, G), idle.turning_part(bodies, points, V, G).T[..., None])[
-            ..., 0
-        ].T
-        ddq += np.einsum("fpt,pt->ft", Z, idle.resting_part(G, now) - change)
-        A = here.accelerations_with(ddq, relative)
-    return Rates(dq, ddq, V, A, np.maximum(gap_v, gap_a))
+        now = idle.body_accelerations(bodies, points, moved.V, moved.A)
+        change = np.linalg.solve(
+            np.einsum("ipt,iqt->tpq", G, G), idle.turning_part(bodies, points, moved.V, G).T[..., None]
+        )[..., 0].T
+        spin = idle.resting_part(G, now) - change
+        moved = Rates(moving, ddq + np.einsum("fpt,pt->ft", Z, spin), moved.contradiction)
+    return moved
 
 
 def distance_to_dead_point(here: Configuration, solver: ChosenSystem, columns: Index) -> Array:

@@ -64,8 +64,9 @@ class System:
 
     def __init__(self, m: Mechanism, graph: LinkGraph | None = None, par: Parameters | None = None) -> None:
         self.m = m
-        self.graph = graph or link_graph(m)
-        self.par = par or parameters(m)
+        self._known: tuple[Array, Configuration] | None = None
+        self.graph = graph or m.once(link_graph)
+        self.par = par or m.once(parameters)
         self.first_column = np.concatenate([[0], np.cumsum([p.type.f for p in m.pairs])]).astype(np.intp)
         self.first_row = np.concatenate([[0], np.cumsum([p.type.nx for p in m.pairs])]).astype(np.intp)
         self.n_freedoms, self.n_state = int(self.first_column[-1]), int(self.first_row[-1])
@@ -113,6 +114,7 @@ class System:
         """The same graph with other numbers."""
         out = copy(self)
         out.__dict__.pop("factors", None)
+        out._known = None
         out.par, out.marker_b_inverse = par, inverse(par.marker_b)
         rows = [self.m.pairs[int(g.pairs[0])].type.scaled(par.L) for g in self.groups]
         out.groups = [replace(g, row=row) for g, row in zip(self.groups, rows, strict=True)]
@@ -225,8 +227,19 @@ class System:
         return out
 
     def at(self, x: Array) -> Configuration:
-        """Evaluate states ``(nx, T)``."""
-        return Configuration(self, x)
+        """Evaluate states ``(nx, T)``; a single one that is asked for again is the configuration known from before."""
+        if x.shape[1] != 1:
+            return Configuration(self, x)
+        if self._known is None or not (self._known[0] == x).all():
+            self._known = x.copy(), Configuration(self, x)
+        return self._known[1]
+
+
+def indexed(m: Mechanism) -> System:
+    """The system of a mechanism with its declared numbers; what follows from links, pairs and frame is worked out once."""
+    out = copy(m.once(System))
+    out.m, out._known = m, None
+    return out
 
 
 class Configuration:
@@ -236,20 +249,35 @@ class Configuration:
         self.system = system
         self.x = x
         self.T = x.shape[1]
-        s = system
-        self._values = [
-            factor_values(g.row, factors, x[g.state_rows]) for g, factors in zip(s.groups, s.factors, strict=True)
+
+    @cached_property
+    def _values(self) -> list[list[list[Array]]]:
+        """For every group the values of the factors of its displacements."""
+        s = self.system
+        return [
+            factor_values(g.row, factors, self.x[g.state_rows]) for g, factors in zip(s.groups, s.factors, strict=True)
         ]
+
+    @cached_property
+    def _placed(self) -> tuple[Array, Array]:
+        """Poses of all links ``(3, 4, N, T)``, and of b seen from a at the chords ``(3, 4, chords, T)``."""
+        s = self.system
         relative = np.empty((3, 4, len(s.m.pairs), self.T))
         for g, factors, values in zip(s.groups, s.factors, self._values, strict=True):
             relative[:, :, g.at_pairs] = displaced(factors, values) if factors else s.weld(g)
-        self._chords = relative[:, :, s.chords]
-        self.poses = s.tree.poses(relative, s.par.frame)
+        chords = relative[:, :, s.chords]
+        return s.tree.poses(relative, s.par.frame), chords
+
+    @property
+    def poses(self) -> Array:
+        """Poses of all links ``(3, 4, N, T)``."""
+        return self._placed[0]
 
     def forget(self) -> None:
-        """Give back the memory of what is rarely asked for again (and then computed again)."""
-        for name in ("J", "residual", "chord_errors", "_columns", "frames"):
-            self.__dict__.pop(name, None)
+        """Give back all memory but that of the states; what is asked for again is computed again."""
+        for name, value in vars(type(self)).items():
+            if isinstance(value, cached_property):
+                self.__dict__.pop(name, None)
 
     @cached_property
     def _columns(self) -> list[list[Frame]]:
@@ -344,8 +372,9 @@ class Configuration:
         """Closure errors ``(6, chords, T)``: finite twist from marker B reached through b to that reached through a."""
         s = self.system
         a, b = s.chord_ends
-        reached = compose(self.poses[:, :, a], self._chords)
-        return pose_log(compose(reached, inverse(self.poses[:, :, b])))
+        poses, chords = self._placed
+        reached = compose(poses[:, :, a], chords)
+        return pose_log(compose(reached, inverse(poses[:, :, b])))
 
     @cached_property
     def closure(self) -> Array:

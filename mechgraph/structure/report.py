@@ -339,7 +339,7 @@ def check(m: Mechanism, at: Mapping[str, float] | None = None, *, thorough: bool
     AssemblyError
         where ``at`` is given and cannot be reached. Without it, loops that cannot be closed are said in ``note``.
     """
-    graph = link_graph(m)
+    graph = m.once(link_graph)
     deep = 6 * len(graph.loops) <= AUTOMATIC if thorough is None else thorough
     if not m.has_geometry:
         return DeterminacyReport(m, graph, "Topology only: no geometry is declared.")

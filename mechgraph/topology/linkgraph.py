@@ -88,7 +88,7 @@ def network(m: Mechanism) -> nx.MultiGraph[str]:
 def link_graph(m: Mechanism) -> LinkGraph:
     """Tree, chords and loops of a mechanism."""
     index = m.link_index
-    ends = tuple((index[p.a], index[p.b]) for p in m.pairs)
+    ends = tuple([(index[p.a], index[p.b]) for p in m.pairs])
     return graph_of_ends(len(m.links), ends, index[m.frame])
 
 
