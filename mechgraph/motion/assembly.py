@@ -11,7 +11,7 @@ from mechgraph.errors import AssemblyError, DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.values import is_numeric
 from mechgraph.motion.system import Configuration, Index, System, indexed
-from mechgraph.numerics.newton import closest_zero, least_norm_step
+from mechgraph.numerics.newton import closest_zeros, least_norm_step
 
 CLOSED = 1e-10
 """Closure error (angle, or length / L) up to which loops count as closed."""
@@ -20,7 +20,9 @@ CLOSURE_GOAL = 1e-13
 ASSEMBLY_RANK = 1e-9
 """Relative singular value below which a direction is left alone while closing."""
 RESTARTS = 40
-"""Perturbed guesses tried where the declared one does not lead to a closed position (fixed seed)."""
+"""Perturbed guesses tried where the declared one does not lead to a closed position (fixed seed), all of them together."""
+FIRST = 8
+"""How many of them are tried before the others."""
 
 
 def scaled_system(m: Mechanism, q: Array, system: System | None = None) -> System:
@@ -42,18 +44,24 @@ def scaled_system(m: Mechanism, q: Array, system: System | None = None) -> Syste
 
 def close(system: System, x: Array, fixed: Index, iterations: int = 60, patience: int = 8) -> tuple[Array, float]:
     """Close the loops from state ``x (nx,)`` with the coordinates in ``fixed`` kept; smallest change of the others."""
+    closed, error = close_all(system, x[:, None], fixed, iterations, patience)
+    return closed[:, 0], float(error[0])
+
+
+def close_all(system: System, x: Array, fixed: Index, iterations: int = 60, patience: int = 8) -> tuple[Array, Array]:
+    """``close`` for states ``(nx, T)``; also the closure errors ``(T,)``."""
     free = np.setdiff1d(np.arange(system.n_freedoms), fixed)
 
     def evaluate(x: Array) -> tuple[Array, Array]:
-        here = system.at(x[:, None])
-        return here.residual[:, 0], here.J[:, free, 0]
+        here = system.at(x)
+        return here.residual, here.J[:, free]
 
     def advance(x: Array, step: Array) -> Array:
-        dq = np.zeros((system.n_freedoms, 1))
-        dq[free, 0] = step
-        return system.advance(x[:, None], dq)[:, 0]
+        dq = np.zeros((system.n_freedoms, x.shape[1]))
+        dq[free] = step
+        return system.advance(x, dq)
 
-    x, _ = closest_zero(
+    x, _ = closest_zeros(
         evaluate,
         advance,
         x,
@@ -62,7 +70,7 @@ def close(system: System, x: Array, fixed: Index, iterations: int = 60, patience
         iterations=iterations,
         patience=patience,
     )
-    return x, float(system.at(x[:, None]).closure[0])
+    return x, system.at(x).closure
 
 
 def lead(system: System, x: Array, columns: Index, goal: Array, longest: float = 0.15) -> tuple[Array, float]:
@@ -192,16 +200,22 @@ def _search(m: Mechanism, system: System, x: Array, preferred: Mapping[str, floa
             best, best_error = closed, error
         if error <= CLOSED:
             return closed, error
+    guesses = []
     for i in range(RESTARTS):
         guess, fixed = attempts[i % 2]
         free = np.setdiff1d(np.arange(system.n_freedoms), fixed)
         dq = np.zeros((system.n_freedoms, 1))
         dq[free, 0] = rng.normal(0.0, 0.2 + 1.3 * i / RESTARTS, len(free))
-        closed, error = close(system, system.advance(guess[:, None], dq)[:, 0], fixed)
-        if error < best_error:
-            best, best_error = closed, error
-        if error <= CLOSED:
-            return closed, error
+        guesses.append(system.advance(guess[:, None], dq)[:, 0])
+    for round_ in (slice(0, FIRST), slice(FIRST, RESTARTS)):
+        states, errors = np.stack(guesses[round_], axis=1), np.empty(len(guesses[round_]))
+        for kind, (_, fixed) in enumerate(attempts[:2]):
+            states[:, kind::2], errors[kind::2] = close_all(system, states[:, kind::2], fixed)
+        found = int(np.argmax(errors <= CLOSED)) if (errors <= CLOSED).any() else int(np.argmin(errors))
+        if errors[found] < best_error:
+            best, best_error = states[:, found], float(errors[found])
+        if best_error <= CLOSED:
+            break
     return best, best_error
 
 

@@ -33,10 +33,14 @@ LONGEST_STEP = 0.35
 """Longest step between nodes, in driver space (radians, or lengths / L)."""
 STRAIGHT = 0.98
 """Smallest ratio of chord to path between two nodes; a path that bends or turns back gets a node there."""
+NEARER = 0.8
+"""Part of the way to the end of the reach that a step takes where one across it has failed."""
 SHORTEST_STEP = 1e-7
 """Step at which the continuation gives up."""
 CORRECTION = 0.06
 """Largest correction that a node may need; keeps the continuation on its branch."""
+LOST = 0.3
+"""Correction from which on Newton is given up: it has left for elsewhere."""
 AIM = 0.005
 """Correction that the step control aims at."""
 QUICK = 0.02
@@ -115,7 +119,7 @@ class Marcher:
         if not len(self.choices[choice].cols):
             return here, total, left <= max(goal, ACCEPTED)
         for round_ in range(ITERATIONS):
-            part = np.flatnonzero(left > goal)
+            part = np.flatnonzero((left > goal) & (np.abs(total).max(axis=0, initial=0.0) < LOST))
             if not part.size:
                 break
             x = here.x.copy()
@@ -206,6 +210,7 @@ class Marcher:
         h = 0.05
         end = lengths[-1]
         failures: list[Status] = []
+        limited = False
         while track.nodes[-1].at < end and track.end is Status.OK:
             last = track.nodes[-1]
             at = self._next(points, lengths, last, h, halts)
@@ -213,7 +218,8 @@ class Marcher:
             following, correction, order, why = self._step(track.nodes, at, drive, quick)
             if following is None:
                 failures.append(why)
-                h = 0.5 * (at - last.at)
+                limited = True
+                h = max(min(0.5 * (at - last.at), NEARER * self._left(track.nodes)), (at - last.at) / 64)
                 if h < SHORTEST_STEP:
                     # beyond a change point positions exist (they lie across), beyond the end of the reach they do not
                     across = failures.count(Status.DEAD_POINT)
@@ -222,8 +228,19 @@ class Marcher:
                 failures.clear()
                 track.nodes.append(following)
                 h = (at - last.at) * min(2.0, max(0.5, (AIM / max(correction, 1e-9)) ** (1 / order)))
-                h = min(max(h, 10 * SHORTEST_STEP), LONGEST_STEP)
+                left = self._left(track.nodes) if limited else np.inf
+                limited = left < np.inf
+                h = min(max(min(h, NEARER * left), 10 * SHORTEST_STEP), LONGEST_STEP)
         return track
+
+    @staticmethod
+    def _left(nodes: list[Node]) -> float:
+        """How far from the last node the reach ends, if it does: rates grow as ``|s* - s|^-1/2`` there; infinite where they do not grow."""
+        if len(nodes) < 2:
+            return np.inf
+        before, last = (float(np.abs(node.Z).max()) for node in nodes[-2:])
+        grown = (last / before) ** 2 - 1.0
+        return (nodes[-1].at - nodes[-2].at) / grown if grown > 0 else np.inf
 
     @staticmethod
     def _next(points: Array, lengths: Array, last: Node, h: float, halts: Array) -> float:

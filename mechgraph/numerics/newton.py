@@ -1,4 +1,4 @@
-"""Least-squares Newton iterations for single points, with damping and restarts; knows no mechanism."""
+"""Least-squares Newton iterations with damping, for many points at a time; knows no mechanism."""
 
 from __future__ import annotations
 
@@ -18,7 +18,16 @@ def least_norm_step(J: Array, r: Array, tolerance: float) -> Array:
     return np.asarray(scipy.linalg.lstsq(J, -r, cond=tolerance, lapack_driver="gelsd", check_finite=False)[0])
 
 
-def closest_zero(
+def least_norm_steps(J: Array, r: Array, tolerance: float) -> Array:
+    """``least_norm_step`` for matrices ``(m, n, T)`` and residuals ``(m, T)``, ``(n, T)``; NaN where one is not finite."""
+    if J.shape[2] == 1:
+        return least_norm_step(J[:, :, 0], r[:, 0], tolerance)[:, None]
+    finite = np.isfinite(J).all(axis=(0, 1)) & np.isfinite(r).all(axis=0)
+    inverse = np.linalg.pinv(np.moveaxis(np.where(finite, J, 0.0), -1, 0), rcond=tolerance)
+    return np.where(finite, -np.einsum("tnm,mt->nt", inverse, np.where(finite, r, 0.0)), np.nan)
+
+
+def closest_zeros(
     evaluate: Callable[[Array], tuple[Array, Array]],
     advance: Callable[[Array, Array], Array],
     x: Array,
@@ -28,37 +37,40 @@ def closest_zero(
     longest: float = 0.5,
     iterations: int = 60,
     patience: int = 8,
-) -> tuple[Array, float]:
-    """Gauss-Newton with limited steps from ``x``: the zero of the residual near to it, or the best point found.
+) -> tuple[Array, Array]:
+    """Gauss-Newton with limited steps from points ``x (nx, T)``: the zero of the residual near to each, or the best point found.
 
-    ``evaluate(x)`` gives residual and Jacobian. Steps are limited to ``longest`` (largest component) and halved while the
-    residual grows; after ``patience`` steps without gain it ends. Converges linearly to double roots.
-    Returns the point and the largest residual component there.
+    ``evaluate(x)`` gives residuals ``(m, T)`` and Jacobians ``(m, n, T)``. Steps are limited to ``longest`` (largest component) and
+    halved while the residual grows; after ``patience`` steps without gain a point is left. Converges linearly to double roots.
+    Returns the points and the largest residual component at each, ``(T,)``.
     """
-    r, J = evaluate(x)
-    size = float(np.abs(r).max(initial=0.0))
-    best, best_size = x, size
-    stalled = 0
+    x = x.copy()
+    r, J = (values.copy() for values in evaluate(x))
+    size = np.abs(r).max(axis=0, initial=0.0)
+    best, best_size, stalled = x.copy(), size.copy(), np.zeros(len(size), dtype=np.intp)
+    at = np.flatnonzero(size > tolerance)
     for _ in range(iterations):
-        if size <= tolerance:
+        step = least_norm_steps(J[..., at], r[:, at], rank_tolerance)
+        biggest = np.abs(step).max(axis=0, initial=0.0)
+        moves = np.isfinite(biggest) & (biggest > 0)
+        at, step = at[moves], step[:, moves] * np.minimum(1.0, longest / biggest[moves])
+        if not at.size:
             break
-        step = least_norm_step(J, r, rank_tolerance)
-        biggest = float(np.abs(step).max(initial=0.0))
-        if not np.isfinite(biggest) or biggest == 0.0:
-            break
-        step *= min(1.0, longest / biggest)
+        before = np.linalg.norm(r[:, at], axis=0)
+        left, begin = np.arange(at.size), x[:, at]
         for _ in range(6):
-            trial = advance(x, step)
-            r_new, J_new = evaluate(trial)
-            size_new = float(np.abs(r_new).max(initial=0.0))
-            if np.linalg.norm(r_new) < np.linalg.norm(r) or size_new <= tolerance:
+            trial = advance(begin[:, left], step[:, left])
+            mine = at[left]
+            x[:, mine] = trial
+            r[:, mine], J[..., mine] = evaluate(trial)
+            size[mine] = np.abs(r[:, mine]).max(axis=0, initial=0.0)
+            left = left[~((np.linalg.norm(r[:, mine], axis=0) < before[left]) | (size[mine] <= tolerance))]
+            if not left.size:
                 break
-            step *= 0.5
-        x, r, J, size = trial, r_new, J_new, size_new
-        if size < 0.999 * best_size:
-            best, best_size, stalled = x, size, 0
-        else:
-            stalled += 1
-        if stalled > patience or (best_size < 1e-9 and stalled > 1):
-            break
+            step[:, left] *= 0.5
+        gained = at[size[at] < 0.999 * best_size[at]]
+        stalled[at] += 1
+        stalled[gained] = 0
+        best[:, gained], best_size[gained] = x[:, gained], size[gained]
+        at = at[(size[at] > tolerance) & (stalled[at] <= patience) & ~((best_size[at] < 1e-9) & (stalled[at] > 1))]
     return best, best_size
