@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -18,13 +19,14 @@ PERPENDICULAR = 1e-6
 
 def second_direction(axis: Any) -> tuple[float, ...]:
     """The global axis least aligned with ``axis``, made perpendicular to it: what fills ``second`` where it is left out."""
-    length = np.linalg.norm(axis)
+    length = math.hypot(*axis)
     if not length > 0:
         return (1.0, 0.0, 0.0)
-    z = np.asarray(axis) / length
-    x = np.eye(3)[int(np.argmin(np.abs(z)))]
-    x = x - (z @ x) * z
-    return tuple((x / np.linalg.norm(x)).tolist())
+    z = [c / length for c in axis]
+    least = min(range(3), key=lambda i: abs(z[i]))
+    x = [(i == least) - z[least] * z[i] for i in range(3)]
+    size = math.hypot(*x)
+    return x[0] / size, x[1] / size, x[2] / size
 
 
 @dataclass(frozen=True)
@@ -50,8 +52,8 @@ class Marker:
         if self.second is not None:
             found.append(vector_fault(self.second, where + "second", direction=True))
         if not any(found):
-            z, x = (np.asarray(v) / np.linalg.norm(v) for v in (self.axis, self.second))
-            cosine = float(z @ x)
+            along = sum(z * x for z, x in zip(self.axis, self.second, strict=True))
+            cosine = along / (math.hypot(*self.axis) * math.hypot(*self.second))
             if abs(cosine) > 1 - 1e-12:
                 found.append(
                     f"{where}second = {self.second!r}: parallel to the axis {self.axis!r}; give another direction"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -23,7 +24,7 @@ class PerCase:
 
 def plain(value: Any) -> Any:
     """Numbers, sequences and arrays as floats and nested tuples; what is no number is kept as it is."""
-    if value is None or callable(value) or isinstance(value, str):
+    if value is None or _floats(value) or callable(value) or isinstance(value, str):
         return value
     try:
         array = np.asarray(value, dtype=float)
@@ -33,11 +34,19 @@ def plain(value: Any) -> Any:
 
 
 def _nested(value: Any) -> Any:
-    return tuple(_nested(v) for v in value) if isinstance(value, list) else value
+    return tuple([_nested(v) for v in value]) if isinstance(value, list) else value
+
+
+def _floats(value: Any) -> bool:
+    """Whether ``value`` is a float or a tuple of floats, which need no reading."""
+    return type(value) is float or (type(value) is tuple and all([type(v) is float for v in value]))
 
 
 def is_numeric(value: Any, shape: tuple[int, ...]) -> bool:
     """Whether ``value`` is an array of finite numbers of the given shape."""
+    if _floats(value):
+        numbers = value if isinstance(value, tuple) else (value,)
+        return shape == ((len(value),) if isinstance(value, tuple) else ()) and all([abs(v) < LARGEST for v in numbers])
     try:
         array = np.asarray(value, dtype=float)
     except (TypeError, ValueError):
@@ -49,7 +58,7 @@ def vector_fault(value: Any, what: str, *, direction: bool = False, hint: str = 
     """The fault of a vector of three numbers, or None; a direction must not be zero."""
     if not is_numeric(value, (3,)):
         return f"{what} = {value!r}: expected three finite numbers{hint}"
-    if direction and not np.linalg.norm(np.asarray(value)) > 1e-12:
+    if direction and not math.hypot(*value) > 1e-12:
         return f"{what} = {value!r}: has length 0; give a direction, e.g. (0, 0, 1)"
     return None
 

@@ -5,6 +5,7 @@ Source: Davis, Direct Methods for Sparse Linear Systems, 2006, chapters 6 and 7;
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -95,6 +96,23 @@ class SparseFactor:
         for perm in (self._lu.perm_r, self._lu.perm_c, self._row_place, self._col_place):
             out *= _parity(perm)
         return out
+
+    @cached_property
+    def distance(self) -> float:
+        """Distance to the nearest singular matrix, ``1 / |A^-1|`` in the 1-norm, estimated (Higham and Tisseur 2000); 0 where singular."""
+        n = self._A.shape[0]
+        if self._lu is None or not n:
+            return 1.0 if not n else 0.0
+        inverse = scipy.sparse.linalg.LinearOperator(
+            (n, n),
+            matvec=lambda b: self.solve(b.reshape(n, 1))[:, 0],
+            rmatvec=lambda b: self.solve(b.reshape(n, 1), transposed=True)[:, 0],
+            matmat=self.solve,
+            rmatmat=lambda b: self.solve(b, transposed=True),
+            dtype=np.dtype(float),
+        )
+        size = float(scipy.sparse.linalg.onenormest(inverse))
+        return 1.0 / size if 0 < size < np.inf else 0.0
 
     def solve(self, b: Array, transposed: bool = False) -> Array:
         """Solution of ``A x = b`` (or ``A^T x = b``) for ``b (n, k)``; NaN where the matrix is singular."""

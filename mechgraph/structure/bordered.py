@@ -15,7 +15,9 @@ from mechgraph.motion.loops import LoopSystem
 from mechgraph.motion.system import Index
 
 SURE = 1e-3
-"""Smallest pivot from which on the bordered system decides; below it the elimination along the loops looks more closely."""
+"""Smallest pivot from which on the bordered system decides."""
+FAR = 1e-8
+"""Distance to a singular matrix (of unit rows) from which on it decides whatever its pivots; below both the elimination looks closer."""
 SHARES = 1e-9
 """Part of a random self-stress below which a loop has none."""
 
@@ -25,7 +27,7 @@ class Bordered:
 
     def __init__(self, loops: LoopSystem, S: Array) -> None:
         self.loops, self._S = loops, S
-        self.sure = loops.smallest > SURE
+        self.sure = loops.smallest > SURE or loops.first.distance > FAR
         self.rank, self.smallest, self.largest = loops.rank, loops.smallest, loops.dropped
 
     def motions(self) -> Array:
