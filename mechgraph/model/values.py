@@ -39,14 +39,14 @@ def _nested(value: Any) -> Any:
 
 def _floats(value: Any) -> bool:
     """Whether ``value`` is a float or a tuple of floats, which need no reading."""
-    return type(value) is float or (type(value) is tuple and all([type(v) is float for v in value]))
+    return type(value) is float or (type(value) is tuple and set(map(type, value)) == {float})
 
 
 def is_numeric(value: Any, shape: tuple[int, ...]) -> bool:
     """Whether ``value`` is an array of finite numbers of the given shape."""
     if _floats(value):
         numbers = value if isinstance(value, tuple) else (value,)
-        return shape == ((len(value),) if isinstance(value, tuple) else ()) and all([abs(v) < LARGEST for v in numbers])
+        return shape == ((len(value),) if isinstance(value, tuple) else ()) and all(abs(v) < LARGEST for v in numbers)
     try:
         array = np.asarray(value, dtype=float)
     except (TypeError, ValueError):
