@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import gc
+import weakref
 
 import mechanisms as known
 import numpy as np
@@ -16,6 +18,7 @@ from strategies import body
 import mechgraph as mg
 from mechgraph.force import large
 from mechgraph.force.large import SparseAnalysis
+from mechgraph.model.parameters import parameters
 from mechgraph.motion import tree
 from mechgraph.motion.assembly import assembled
 from mechgraph.motion.loops import LoopSystem
@@ -292,3 +295,38 @@ def test_a_new_load_leaves_links_and_pairs_as_they_are() -> None:
         m.replace(drives=["nothing"])
     heavier = m.replace(links=[dataclasses.replace(k, mass=0.0, inertia=None) for k in m.links])
     assert heavier != m
+
+
+@pytest.mark.parametrize(
+    ("m", "positions"),
+    [(mg.load("rcsr"), 46), (mg.load("four-bar"), 3000), (ladder(200), 2)],
+    ids=["one piece", "blocks", "sparse"],
+)
+def test_memory_is_given_back_at_once(m: mg.Mechanism, positions: int) -> None:
+    """No cycle of references keeps a solution that is let go, or the mechanism."""
+    m = m.replace(name="to be forgotten")
+    name = m.drives[0].freedom
+    begin = 2.7 if m.start else 0.0
+    gc.collect()
+    gc.disable()
+    try:
+        s = mg.solve(m, {name: np.linspace(begin, begin + 0.3, positions)})
+        assert np.isfinite(s[m.pairs[1].name].reaction).any()
+        here, gone = weakref.ref(s._values), weakref.ref(m)
+        del s
+        assert here() is None
+        del m
+        assert gone() is None
+    finally:
+        gc.enable()
+
+
+def test_graph_and_numbers_are_kept_with_the_mechanism() -> None:
+    """Copies with other drives and loads share them; one with other links has its own."""
+    m = ladder(20)
+    graph, numbers = m.once(link_graph), m.once(parameters)
+    assert m.replace(drives=["J1"], loads=[]).once(link_graph) is graph
+    assert m.replace(drives=["J1"], loads=[]).once(parameters) is numbers
+    heavier = m.replace(links=[dataclasses.replace(k, mass=2 * k.mass) for k in m.links])
+    assert heavier.once(parameters) is not numbers
+    assert_allclose(heavier.once(parameters).mass, 2 * numbers.mass)

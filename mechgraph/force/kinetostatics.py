@@ -129,7 +129,7 @@ def _solve(m: Mechanism, motions: Mapping[str, Any] | None, on_reach: str, force
         return _solve_in_blocks(run, on_reach, forces)
     solver: ChosenSystem | SparseSolver
     if run.loops is not None:
-        moved, solver, reached = move_sparse(run.system, run.x, run.columns, run.loops, run.given())
+        moved, solver, reached = move_sparse(run.start, run.columns, run.loops, run.given())
         kind: type[Analysis] = SparseAnalysis
     else:
         moved, solver, found = run.move()

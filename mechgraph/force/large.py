@@ -48,14 +48,14 @@ class Given:
     acceleration: Array
 
 
-def certified_loops(system: System, x: Array, columns: Index) -> LoopSystem | None:
-    """The bordered closure equations of a large mechanism whose drivers prove to leave nothing free; None for all others.
+def certified_loops(here: Configuration, columns: Index) -> LoopSystem | None:
+    """The bordered closure equations at the start of a large mechanism whose drivers prove to leave nothing free; None for all others.
 
     Small mechanisms, passive freedoms, freedoms left free, dependent drivers and singular positions are for the dense path.
     """
-    if 6 * len(system.graph.loops) < SPARSE_ROWS:
+    if 6 * len(here.system.graph.loops) < SPARSE_ROWS:
         return None
-    loops = LoopSystem.at(system.at(x[:, None]), columns)
+    loops = LoopSystem.at(here, columns)
     if not loops.regular or loops.held:
         return None
     return loops
@@ -78,22 +78,23 @@ def refuse_dense(system: System) -> None:
 
 
 def move_sparse(
-    system: System, x: Array, columns: Index, loops: LoopSystem, given: Given
+    start: Configuration, columns: Index, loops: LoopSystem, given: Given
 ) -> tuple[Motions, SparseSolver, Array]:
-    """Positions and rates for the motion of the drivers, their factors, and the last driver values ``(d, cases)``."""
+    """Positions and rates from a closed start for the motion of the drivers, their factors, and the last driver values ``(d, cases)``."""
+    system = start.system
     N = given.batch[-1] if given.batch else 1
     paths = given.position.reshape(len(columns), -1, N)
     status = np.full(paths.shape[1:], Status.OK.value, dtype="U24")
     nodes: list[SparseNode] = []
     last = np.empty((len(columns), paths.shape[1]))
     for case in range(paths.shape[1]):
-        found, end, last[:, case] = SparseFollower(system, columns, loops).follow(x, paths[:, case])
+        found, end, last[:, case] = SparseFollower(system, columns, loops).follow(start, paths[:, case])
         nodes += found
         if len(found) < N:
             status[case, len(found) :] = (Status.BEYOND_DEAD_POINT if end is Status.DEAD_POINT else end).value
     good = np.flatnonzero(status.reshape(-1) == Status.OK.value)
     states = np.stack([node.x for node in nodes], axis=1) if nodes else np.empty((system.n_state, 0))
-    here = system.at(states)
+    here = start if np.array_equal(states, start.x) else system.at(states)
     solver = SparseSolver(here, nodes)
     flags = np.full(good.size, Status.OK.value, dtype="U24")
     flags[_dead(here, solver, columns)] = Status.DEAD_POINT.value

@@ -121,7 +121,8 @@ class Run:
         self.columns, _ = named_columns(self.m, self.system, dict.fromkeys(self.motions, 0.0))
         self.unit = np.where(self.system.is_length[self.columns], self.system.par.L, 1.0)
         self.t = next((motion.t for motion in self.motions.values() if motion.t is not None), None)
-        self.loops = certified_loops(self.system, self.x, self.columns)
+        self.start = self.system.at(self.x[:, None])
+        self.loops = certified_loops(self.start, self.columns)
         if self.loops is not None:
             return
         self.freedoms = free_motion(self.system, self.x, self.columns)

@@ -113,9 +113,9 @@ class SparseFollower:
         self.system, self.columns, self.loops = system, columns, loops
         self.rows = state_rows(system, columns)
 
-    def follow(self, x: Array, values: Array) -> tuple[list[SparseNode], Status, Array]:
-        """Nodes at the driver values ``(d, N)`` as far as they could be reached, how it ended, and the last driver values."""
-        last = self._node(self.system.at(x[:, None]), self.loops, self.loops.first)
+    def follow(self, start: Configuration, values: Array) -> tuple[list[SparseNode], Status, Array]:
+        """Nodes from a closed start at driver values ``(d, N)`` as far as they were reached, how it ended, and the last driver values."""
+        last = self._node(start, self.loops, self.loops.first)
         before: SparseNode | None = None
         nodes: list[SparseNode] = []
         for goal in values.T:

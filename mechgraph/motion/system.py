@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +65,6 @@ class System:
 
     def __init__(self, m: Mechanism, graph: LinkGraph | None = None, par: Parameters | None = None) -> None:
         self.m = m
-        self._known: tuple[Array, Configuration] | None = None
         self.graph = graph or m.once(link_graph)
         self.par = par or m.once(parameters)
         self.first_column = np.concatenate([[0], np.cumsum([p.type.f for p in m.pairs])]).astype(np.intp)
@@ -114,7 +114,6 @@ class System:
         """The same graph with other numbers."""
         out = copy(self)
         out.__dict__.pop("factors", None)
-        out._known = None
         out.par, out.marker_b_inverse = par, inverse(par.marker_b)
         rows = [self.m.pairs[int(g.pairs[0])].type.scaled(par.L) for g in self.groups]
         out.groups = [replace(g, row=row) for g, row in zip(self.groups, rows, strict=True)]
@@ -227,18 +226,21 @@ class System:
         return out
 
     def at(self, x: Array) -> Configuration:
-        """Evaluate states ``(nx, T)``; a single one that is asked for again is the configuration known from before."""
-        if x.shape[1] != 1:
-            return Configuration(self, x)
-        if self._known is None or not (self._known[0] == x).all():
-            self._known = x.copy(), Configuration(self, x)
-        return self._known[1]
+        """Evaluate states ``(nx, T)``."""
+        return Configuration(self, x)
+
+
+def _indices(m: Mechanism) -> dict[str, Any]:
+    """What a system knows of links, pairs and frame alone."""
+    made = vars(System(m))
+    del made["m"]
+    return made
 
 
 def indexed(m: Mechanism) -> System:
     """The system of a mechanism with its declared numbers; what follows from links, pairs and frame is worked out once."""
-    out = copy(m.once(System))
-    out.m, out._known = m, None
+    out = System.__new__(System)
+    vars(out).update(m.once(_indices), m=m)
     return out
 
 
