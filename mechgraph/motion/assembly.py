@@ -156,10 +156,10 @@ def assembled(m: Mechanism, preferred: Mapping[str, float] | None = None) -> tup
     system = scaled_system(m, q, raw)
     x = system.state_of(q[:, None])[:, 0]
     error = float(system.at(x[:, None]).closure[0])
-    if error <= CLOSED and system.many_loops:
+    if error <= 10 * CLOSURE_GOAL or (error <= CLOSED and system.many_loops):
         return system, x
     if error <= CLOSED:
-        return _settled(system, close(system, x, np.arange(0))[0] if error > CLOSURE_GOAL * 10 else x)
+        return _settled(system, close(system, x, np.arange(0))[0])
     x, error = _search(m, system, x, preferred or {})
     if error > CLOSED:
         best = dict(zip(m.freedom_names(), system.coordinates_of(x[:, None])[:, 0].tolist(), strict=True))

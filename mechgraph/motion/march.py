@@ -138,7 +138,22 @@ class Marcher:
                 left[part] = np.abs(few.residual).max(axis=0, initial=0.0)
                 here = self.system.at(x)
                 break
+        unmet = np.flatnonzero((left > 10 * goal) & (left <= ACCEPTED))
+        if unmet.size and len(self.choices[choice].rows) < here.residual.shape[0]:
+            here, more = self._closer(here, unmet)
+            total += more
         return here, total, left <= max(goal, ACCEPTED)
+
+    def _closer(self, here: Configuration, at: Index) -> tuple[Configuration, Array]:
+        """Positions ``at`` of redundant loops with one more step on rows chosen where the residual is largest, and all steps ``(F, T)``."""
+        few = self.system.at(here.x[:, at])
+        left = np.abs(few.residual).max(axis=0)
+        step = self._step_on(choose(few.J[:, :, int(np.argmax(left))], self.columns, keep=self.keep), few)
+        closer = self.system.at(self.system.advance(few.x, step))
+        better = np.abs(closer.residual).max(axis=0) < left
+        x, more = here.x.copy(), np.zeros((self.system.n_freedoms, here.T))
+        x[:, at[better]], more[:, at[better]] = closer.x[:, better], step[:, better]
+        return self.system.at(x), more
 
     def closed_again(self, x: Array, which: Index) -> tuple[Array, Array]:
         """States closed from near by, each with its choice; also the largest correction ``(T,)``, infinite where it failed."""
@@ -152,7 +167,9 @@ class Marcher:
 
     def newton_step(self, here: Configuration, choice: int) -> Array:
         """One limited Newton step ``(F, T)`` at every state of a configuration."""
-        chosen = self.choices[choice]
+        return self._step_on(self.choices[choice], here)
+
+    def _step_on(self, chosen: Choice, here: Configuration) -> Array:
         J = here.J[np.ix_(chosen.rows, chosen.cols)]
         step = Factor(J).solve(-here.residual[chosen.rows][:, None])[:, 0]
         step = np.where(np.isfinite(step), step, 0.0)

@@ -23,9 +23,9 @@ BLOCK = 1024
 """Positions evaluated together, so that what is computed on the way stays in the cache of a core (measured)."""
 FINER = 5
 """Times that nodes are put between nodes at most."""
-HALVINGS = 3
+HALVINGS = 4
 """Halvings of a gap at a time at most."""
-WORTH = 6
+WORTH = 20
 """Positions for every new node from which on they are worth their time."""
 EXACT = 3e-14
 """Error of interpolation that needs no correction."""

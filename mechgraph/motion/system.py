@@ -232,9 +232,8 @@ class System:
 
 def _indices(m: Mechanism) -> dict[str, Any]:
     """What a system knows of links, pairs and frame alone."""
-    made = vars(System(m))
-    del made["m"]
-    return made
+    made = System(m)
+    return {"factors": made.factors, **{name: value for name, value in vars(made).items() if name != "m"}}
 
 
 def indexed(m: Mechanism) -> System:

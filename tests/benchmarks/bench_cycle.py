@@ -19,7 +19,7 @@ import numpy as np
 from bench_core import seven_r
 
 import mechgraph as mg
-from mechgraph.force import blocks, kinetostatics
+from mechgraph.force import analysis, blocks, kinetostatics
 from mechgraph.force.kinetostatics import METHODS
 from mechgraph.force.run import Run
 from mechgraph.motion.march import Marcher
@@ -33,11 +33,12 @@ STAGES = (
     ("interpolation, Newton", Follower, "_between"),
     ("rates", Run, "_rates"),
     ("loads", kinetostatics, "_site"),
-    ("inertia", kinetostatics, "inertia_wrenches"),
+    ("inertia", analysis, "inertia_wrenches"),
     ("wrenches", METHODS, "loop_wrench"),
-    ("reactions, output", blocks.Blocks, "reaction"),
+    ("reactions, checks", analysis.Analysis, "settle"),
+    ("output", blocks.Blocks, "reaction"),
     ("driver efforts", blocks.Blocks, "efforts"),
-    ("checks", blocks.Blocks, "checks"),
+    ("output of checks", blocks.Blocks, "checks"),
 )
 
 
