@@ -20,7 +20,7 @@ from mechgraph.model.drive import Drive
 from mechgraph.model.load import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion_law import Motion
-from mechgraph.motion.assembly import CLOSED, assembled, named_columns, state_rows
+from mechgraph.motion.assembly import CLOSED, closed_start, named_columns, state_rows
 from mechgraph.motion.idle import Idle, held_well, spin_angles
 from mechgraph.motion.march import FAIR, SINGULAR, Status
 from mechgraph.motion.path import Follower, Positions, in_blocks
@@ -117,11 +117,11 @@ class Run:
         self.m, self.motions = driven(m, motions)
         self.batch = _batch(self.m, self.motions)
         first = {name: float(np.asarray(motion.position).reshape(-1)[0]) for name, motion in self.motions.items()}
-        self.system, self.x = assembled(self.m, first)
+        self.start = closed_start(self.m, first)
+        self.system, self.x = self.start.system, self.start.x[:, 0]
         self.columns, _ = named_columns(self.m, self.system, dict.fromkeys(self.motions, 0.0))
         self.unit = np.where(self.system.is_length[self.columns], self.system.par.L, 1.0)
         self.t = next((motion.t for motion in self.motions.values() if motion.t is not None), None)
-        self.start = self.system.at(self.x[:, None])
         self.loops = certified_loops(self.start, self.columns)
         if self.loops is not None:
             return

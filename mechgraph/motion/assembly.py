@@ -28,18 +28,26 @@ FIRST = 8
 def scaled_system(m: Mechanism, q: Array, system: System | None = None) -> System:
     """The system about the centroid of the pair points at coordinates ``q``, with lengths over their RMS distance L."""
     raw = system or indexed(m)
+    centroid, L = _measure(raw, q) if system or q.any() else m.once(_measure_as_declared)
+    return raw.with_parameters(raw.par.rescaled(raw.par.origin + raw.par.L * centroid, L * raw.par.L))
+
+
+def _measure(raw: System, q: Array) -> tuple[Array, float]:
+    """Centroid ``(3,)`` of the pair points at coordinates ``q``, and their RMS distance from it (with that of the mass centres)."""
     here = raw.at(raw.state_of(q[:, None]))
-    par = raw.par
     points = here.pair_points[:, :, 0]
     centroid = points.mean(axis=1)
-    massive = [i for i, link in enumerate(m.links) if link.center is not None]
+    massive = [i for i, link in enumerate(raw.m.links) if link.center is not None]
     X = here.poses[:, :, massive]
-    centers = (rotate(X[:, :3], par.center[:, massive]) + X[:, 3])[:, :, 0]
+    centers = (rotate(X[:, :3], raw.par.center[:, massive]) + X[:, 3])[:, :, 0]
     distances = np.concatenate([points, centers], axis=1) - centroid[:, None]
     L = float(np.sqrt((distances**2).sum(axis=0).mean()))
-    if 1e-12 * max(1.0, float(np.abs(points).max())) >= L:
-        L = 1.0
-    return raw.with_parameters(par.rescaled(par.origin + par.L * centroid, L * par.L))
+    return centroid, 1.0 if 1e-12 * max(1.0, float(np.abs(points).max())) >= L else L
+
+
+def _measure_as_declared(m: Mechanism) -> tuple[Array, float]:
+    raw = indexed(m)
+    return _measure(raw, np.zeros(raw.n_freedoms))
 
 
 def close(system: System, x: Array, fixed: Index, iterations: int = 60, patience: int = 8) -> tuple[Array, float]:
@@ -135,7 +143,13 @@ def named_columns(m: Mechanism, system: System, values: Mapping[str, float]) -> 
 
 
 def assembled(m: Mechanism, preferred: Mapping[str, float] | None = None) -> tuple[System, Array]:
-    """The scaled system and a closed state near ``start``.
+    """The system and the state of ``closed_start``."""
+    here = closed_start(m, preferred)
+    return here.system, here.x[:, 0]
+
+
+def closed_start(m: Mechanism, preferred: Mapping[str, float] | None = None) -> Configuration:
+    """A closed state near ``start``, of the scaled system.
 
     Tried in this order: as it stands; drives kept at their start; drives at the ``preferred`` values; everything free;
     then guesses around the start, further and further away.
@@ -151,15 +165,15 @@ def assembled(m: Mechanism, preferred: Mapping[str, float] | None = None) -> tup
             f"mechanism {m.name!r}",
             [f"pairs {', '.join(bare)} have no geometry; a topology can be counted, not solved"],
         )
-    raw = indexed(m)
-    q = raw.start_coordinates(m.start)
-    system = scaled_system(m, q, raw)
-    x = system.state_of(q[:, None])[:, 0]
-    error = float(system.at(x[:, None]).closure[0])
+    q = indexed(m).start_coordinates(m.start)
+    system = scaled_system(m, q)
+    here = system.at(system.state_of(q[:, None]))
+    x, error = here.x[:, 0], float(here.closure[0])
     if error <= 10 * CLOSURE_GOAL or (error <= CLOSED and system.many_loops):
-        return system, x
+        return here
     if error <= CLOSED:
-        return _settled(system, close(system, x, np.arange(0))[0])
+        system, x = _settled(system, close(system, x, np.arange(0))[0])
+        return system.at(x[:, None])
     x, error = _search(m, system, x, preferred or {})
     if error > CLOSED:
         best = dict(zip(m.freedom_names(), system.coordinates_of(x[:, None])[:, 0].tolist(), strict=True))
@@ -169,7 +183,8 @@ def assembled(m: Mechanism, preferred: Mapping[str, float] | None = None) -> tup
             error,
             best,
         )
-    return _settled(system, x)
+    system, x = _settled(system, x)
+    return system.at(x[:, None])
 
 
 def _settled(system: System, x: Array) -> tuple[System, Array]:

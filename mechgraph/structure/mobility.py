@@ -77,7 +77,8 @@ def _strokes(system: System, x: Array, null: Array, rng: np.random.Generator, co
     """Closed points reached by random steps along ``null`` and the displacements to them, in units of the stroke."""
     out = []
     for _ in range(count):
-        direction = null @ rng.normal(size=null.shape[1])
+        # of a random vector of all freedoms, so that it does not hang on which basis of the motions was found
+        direction = null @ (null.T @ rng.normal(size=null.shape[0]))
         moved = _step(system, x, direction)
         if moved is not None:
             out.append(moved)
