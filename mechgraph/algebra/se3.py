@@ -33,22 +33,12 @@ def skew(a: Array) -> Array:
 
 def rotate(R: Array, v: Array) -> Array:
     """``R v`` for ``(3, 3, ...)`` and ``(3, ...)``."""
-    out = np.asarray(R[:, 0] * v[0])
-    part = np.empty_like(out)
-    for i in (1, 2):
-        np.multiply(R[:, i], v[i], out=part)
-        out += part
-    return out
+    return np.asarray(np.einsum("ij...,j...->i...", R, v))
 
 
 def rotate_back(R: Array, v: Array) -> Array:
     """``R^T v`` for ``(3, 3, ...)`` and ``(3, ...)``."""
-    out = np.asarray(R[0] * v[0])
-    part = np.empty_like(out)
-    for i in (1, 2):
-        np.multiply(R[i], v[i], out=part)
-        out += part
-    return out
+    return np.asarray(np.einsum("ji...,j...->i...", R, v))
 
 
 def identity(*batch: int) -> Array:
@@ -61,11 +51,7 @@ def identity(*batch: int) -> Array:
 
 def compose(X: Array, Y: Array) -> Array:
     """Product ``X Y`` of two poses."""
-    out = np.asarray(X[:, 0, None] * Y[0])
-    part = np.empty_like(out)
-    for i in (1, 2):
-        np.multiply(X[:, i, None], Y[i], out=part)
-        out += part
+    out = np.asarray(np.einsum("ij...,jk...->ik...", X[:, :3], Y))
     out[:, 3] += X[:, 3]
     return out
 

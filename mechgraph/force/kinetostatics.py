@@ -25,6 +25,7 @@ from mechgraph.motion.march import Status
 from mechgraph.motion.path import continued, fits_one_block
 from mechgraph.motion.system import Index
 from mechgraph.numerics.linear import ChosenSystem
+from mechgraph.numerics.memory import keep_freed_memory
 from mechgraph.result.solution import Solution
 from mechgraph.structure.freedom import free_motion
 from mechgraph.structure.report import check
@@ -124,6 +125,7 @@ def _solve(m: Mechanism, motions: Mapping[str, Any] | None, on_reach: str, force
     faults = _option("on_reach", on_reach, ON_REACH)
     if faults:
         raise DeclarationError(f"solve {m.name!r}", faults)
+    keep_freed_memory()
     run = Run(m, motions)
     if run.loops is None and _in_blocks(run, forces):
         return _solve_in_blocks(run, on_reach, forces)
