@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from mechgraph.motion import idle
 from mechgraph.motion.assembly import assembled_at
 from mechgraph.motion.follow import SparseSolver
 from mechgraph.motion.march import Status
-from mechgraph.motion.path import continued, fits_one_block
+from mechgraph.motion.path import Positions, continued, fits_one_block
 from mechgraph.motion.system import Index
 from mechgraph.numerics.linear import ChosenSystem
 from mechgraph.numerics.memory import keep_freed_memory
@@ -127,7 +127,7 @@ def _solve(m: Mechanism, motions: Mapping[str, Any] | None, on_reach: str, force
         raise DeclarationError(f"solve {m.name!r}", faults)
     keep_freed_memory()
     run = Run(m, motions)
-    if run.loops is None and _in_blocks(run, forces):
+    if run.loops is None and in_blocks(run, forces):
         return _solve_in_blocks(run, on_reach, forces)
     solver: ChosenSystem | SparseSolver
     if run.loops is not None:
@@ -146,7 +146,7 @@ def _solve(m: Mechanism, motions: Mapping[str, Any] | None, on_reach: str, force
     return solution
 
 
-def _in_blocks(run: Run, forces: tuple[str, str] | None) -> bool:
+def in_blocks(run: Run, forces: tuple[str, str] | None) -> bool:
     """Whether positions can be solved block by block: many of them, and nothing that looks at all of them at once."""
     if fits_one_block(int(np.prod(run.batch))) or run.freedoms.bodies:
         return False
@@ -160,21 +160,30 @@ def _by_position(load: Load) -> bool:
     return not any(callable(getattr(load, field.name)) for field in dataclasses.fields(load))
 
 
-def _solve_in_blocks(run: Run, on_reach: str, forces: tuple[str, str] | None) -> Solution:
-    found = run.found()
-    status, good = run.outcomes(found)
+def solved_blocks(
+    run: Run, found: Positions, status: Any, good: Index, forces: tuple[str, str] | None
+) -> Iterator[tuple[Analysis, Index]]:
+    """The positions ``good`` solved block by block, each with its places in the flat batch; ``status`` is kept up to date."""
     coordinates = continued(run.system, found.x.reshape(-1, status.size), run.batch, found.tracks)
     flat = coordinates.reshape(run.system.n_freedoms, status.size)
-    solved, places = [], []
     for part in run.blocks(found, status, good):
-        _check_drivers(run, part.motions)
         mine = flat[:, part.places]
         wrenches = None
         if forces is not None:
             wrenches = _forces(run, part.motions, part.solver, mine, part.places, *forces)
-        solved.append(Analysis(part.motions, wrenches, mine))
-        solved[-1].settle()
-        places.append(part.places)
+        solved = Analysis(part.motions, wrenches, mine)
+        solved.settle()
+        yield solved, part.places
+
+
+def _solve_in_blocks(run: Run, on_reach: str, forces: tuple[str, str] | None) -> Solution:
+    found = run.found()
+    status, good = run.outcomes(found)
+    solved, places = [], []
+    for part, at in solved_blocks(run, found, status, good, forces):
+        _check_drivers(run, part.motions)
+        solved.append(part)
+        places.append(at)
     solution = Solution(Blocks(solved, places, run.batch, status, run.t))
     if on_reach == "raise":
         _raise_unreached(run, status, found.reached, solution)

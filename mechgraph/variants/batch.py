@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
 from mechgraph.force.analysis import Analysis, Motions
-from mechgraph.force.kinetostatics import CONTRADICTION, forces_of
+from mechgraph.force.blocks import Blocks
+from mechgraph.force.kinetostatics import CONTRADICTION, forces_of, in_blocks, solved_blocks
 from mechgraph.force.run import Run
 from mechgraph.model.load import Load
 from mechgraph.model.motion_law import Motion
@@ -92,16 +93,38 @@ def solve_together(
     everyone = np.ones(run.variants.count, dtype=bool)
     if not run.together or run.alone.all():
         return None, everyone
+    try:
+        return (
+            _in_blocks(run, method, redundant)
+            if in_blocks(run, (method, redundant))
+            else _in_one(run, method, redundant)
+        )
+    except DeclarationError:
+        return None, everyone
+
+
+def _in_blocks(run: VariantRun, method: str, redundant: str) -> tuple[Solution, Mask]:
+    found = run.found()
+    status, good = run.outcomes(found)
+    alone = run.alone.copy()
+    parts, places = [], []
+    for part, at in solved_blocks(run, found, status, good, (method, redundant)):
+        alone[at[part.motions.rates.contradiction > CONTRADICTION] // run.batch[1]] = True
+        parts.append(part)
+        places.append(at)
+    alone |= (status != Status.OK.value).any(axis=1)
+    status[alone] = Status.NOT_CLOSED.value
+    return Solution(Blocks(parts, places, run.batch, status, run.t)), alone
+
+
+def _in_one(run: VariantRun, method: str, redundant: str) -> tuple[Solution, Mask]:
     moved, solver, _ = run.move()
     alone = run.alone | (moved.status != Status.OK.value).any(axis=1)
     against = moved.rates.contradiction > CONTRADICTION
     alone[moved.good[against] // run.batch[1]] = True
     moved = _marked(moved, alone)
-    try:
-        bare = Analysis(moved, None)
-        forces = forces_of(run, moved, solver, bare.user_coordinates, method, redundant)
-    except DeclarationError:
-        return None, everyone
+    bare = Analysis(moved, None)
+    forces = forces_of(run, moved, solver, bare.user_coordinates, method, redundant)
     return Solution(Analysis(moved, forces)), alone
 
 

@@ -23,7 +23,7 @@ from mechgraph.variants.result import Study
 from mechgraph.variants.sampling import SAMPLINGS, distributions, spread
 from mechgraph.variants.work import Part, Source, Task, as_rows, motion_of_case, solved
 
-CHUNK = 30_000
+CHUNK = 60_000
 """Positions of all variants that are solved together: bounds the memory."""
 MOST_TOGETHER = 500
 """Variants that are followed together: their arrays stay in the cache."""
