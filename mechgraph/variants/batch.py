@@ -63,6 +63,7 @@ class VariantRun(Run):
         """All positions of the variants that stay in step."""
         lockstep = Lockstep(self._lead(1.0), self.columns, self.freedoms.hold)
         self._begin = lockstep.begin(self.x, self._lead, self.alone)
+        self._begun = ~lockstep.front.lost
         self._systems = lockstep.system
         V, N = self.batch
         found = lockstep.follow(self.values("position").reshape(len(self.columns), V, N))
@@ -72,6 +73,12 @@ class VariantRun(Run):
         tracks = tuple((found.place_between, found.between[:, c], found.place) for c in range(V))
         last = self.values("position").reshape(-1, V, N)[..., -1]
         return Positions(found.x, status, found.choices, found.which, last, (), tracks)
+
+    @property
+    def starts(self) -> Array:
+        """User coordinates ``(F, V)`` of the closed state where each variant begins, NaN where it is not beyond doubt."""
+        q = self._systems.coordinates_of(self._begin[..., None], self.system.start_coordinates(self.m.start))[..., 0]
+        return np.where(self._begun, q, np.nan)
 
     def evaluated(self, x: Array, at: Index) -> Configuration:
         """States evaluated with the numbers of their variants, closed to rounding."""
@@ -84,23 +91,21 @@ class VariantRun(Run):
 
 def solve_together(
     numbers_at: NumbersAt, motions: Mapping[str, Motion], method: str, redundant: str
-) -> tuple[Solution | None, Mask]:
-    """The solution of all variants that can be followed in step (NaN for the others), and which are to be solved alone.
+) -> tuple[Solution | None, Mask, Array | None]:
+    """The solution of all variants that can be followed in step (NaN for the others), which are to be solved alone, and from where.
 
-    A variant is to be solved alone where it cannot be built, falls out of step, or has a position that is not regular.
+    A variant is to be solved alone where it cannot be built, falls out of step, or has a position that is not regular; from the
+    coordinates ``(F, V)`` where it begins, where these are known (not NaN).
     """
     run = VariantRun(numbers_at, motions)
     everyone = np.ones(run.variants.count, dtype=bool)
     if not run.together or run.alone.all():
-        return None, everyone
+        return None, everyone, None
+    solve = _in_blocks if in_blocks(run, (method, redundant)) else _in_one
     try:
-        return (
-            _in_blocks(run, method, redundant)
-            if in_blocks(run, (method, redundant))
-            else _in_one(run, method, redundant)
-        )
+        return *solve(run, method, redundant), run.starts
     except DeclarationError:
-        return None, everyone
+        return None, everyone, None
 
 
 def _in_blocks(run: VariantRun, method: str, redundant: str) -> tuple[Solution, Mask]:

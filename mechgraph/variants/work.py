@@ -100,7 +100,7 @@ class Part:
 def solved(task: Task) -> Part:
     """Solve the variants of a task: together where they can be followed in step, alone where not."""
     count = task.values.shape[1]
-    together, alone = solve_together(
+    together, alone, starts = solve_together(
         lambda s: task.source.variants(task.values, s), task.motions, task.method, task.redundant
     )
     N = max(motion.shape[-1] for motion in task.motions.values())
@@ -112,7 +112,7 @@ def solved(task: Task) -> Part:
     messages = {}
     for i in np.flatnonzero(alone):
         try:
-            s = _solved_alone(task, int(i))
+            s = _solved_alone(task, int(i), None if starts is None else starts[:, i])
         except MechgraphError as error:
             messages[int(i)] = str(error)
             s = None
@@ -140,14 +140,16 @@ def _writable(values: Array) -> Array:
     return np.array(values, dtype=float)
 
 
-def _solved_alone(task: Task, i: int) -> Solution:
-    """One variant by itself, positions out of reach flagged, as a batch ``(1, N)``."""
+def _solved_alone(task: Task, i: int, start: Array | None) -> Solution:
+    """One variant by itself, from coordinates ``start (F,)`` if known; positions out of reach flagged; as a batch ``(1, N)``."""
     try:
         m = task.source.one(task.values[:, i])
     except MechgraphError:
         raise
     except Exception as error:
         raise DeclarationError("study", [f"the function failed: {type(error).__name__}: {error}"]) from error
+    if start is not None and np.isfinite(start).all():
+        m = m.replace(start=dict(zip(m.freedom_names(), start.tolist(), strict=True)))
     motions = {name: motion_of_case(motion, i) for name, motion in task.motions.items()}
     own = {m.full_name(d.freedom): d.motion for d in m.drives if d.motion is not None}
     for name in task.source.stored:
