@@ -330,3 +330,34 @@ def test_graph_and_numbers_are_kept_with_the_mechanism() -> None:
     heavier = m.replace(links=[dataclasses.replace(k, mass=2 * k.mass) for k in m.links])
     assert heavier.once(parameters) is not numbers
     assert_allclose(heavier.once(parameters).mass, 2 * numbers.mass)
+
+
+PATHS = {
+    "on this side again": [0.0, 0.05, 3.0, 0.1, 0.2],
+    "first beyond": [3.0, 0.1, 0.05],
+    "all beyond": [3.0, 3.1],
+    "one beyond": 3.0,
+    "twice": [0.1, 4.0, 0.2, 4.1, 0.3],
+    "there and back": np.concatenate([np.linspace(0.0, 3.0, 7), np.linspace(3.0, -0.3, 9)]),
+}
+
+
+@pytest.mark.parametrize("path", PATHS.values(), ids=PATHS)
+@pytest.mark.parametrize("name", ["ladder", "spatial"])
+def test_what_cannot_be_reached_is_told_as_in_a_small_mechanism(name: str, path: object) -> None:
+    m = LATTICES[name](24)
+    sparse, dense = (solved(m, path, rows, on_reach="flag") for rows in (ALWAYS, NEVER))
+    assert is_sparse(sparse)
+    np.testing.assert_array_equal(sparse.status, dense.status)
+    for key in ("Fx", "Fy"):
+        value, wanted = sparse["J3"].components[key], dense["J3"].components[key]
+        assert_allclose(value, wanted, rtol=1e-6, atol=1e-9 * np.abs(np.nan_to_num(wanted)).max())
+
+
+def test_drivers_that_contradict_each_other() -> None:
+    m = ladder(60).replace(drives=["J0", "J1"])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(large, "SPARSE_ROWS", ALWAYS)
+        with pytest.raises(mg.IndeterminateError, match="contradict"):
+            mg.solve(m, {"J0": 0.1, "J1": 0.3})
+        assert mg.solve(m, {"J0": 0.0, "J1": 0.0}).status == "ok"

@@ -70,10 +70,17 @@ def _raise_unreached(run: Run, status: Any, last: Array, solution: Solution) -> 
         )
 
 
+def _stuck(run: Run, motions: Motions) -> bool:
+    """Whether positions were not reached because the drivers depend on each other."""
+    if run.loops is None:
+        return run.freedoms.dependent and not motions.good.size
+    reached_all = motions.good.size == motions.status.size
+    return not reached_all and free_motion(run.system, run.x, run.columns).dependent
+
+
 def _check_drivers(run: Run, motions: Motions) -> None:
     worst = float(motions.rates.contradiction.max(initial=0.0))
-    stuck = run.loops is None and run.freedoms.dependent and not motions.good.size
-    if worst > CONTRADICTION or stuck:
+    if worst > CONTRADICTION or _stuck(run, motions):
         names, mobility = ", ".join(run.motions), free_motion(run.system, run.x, run.columns).mobility
         why = (
             f"the drivers {names} contradict each other: their motions cannot be had together (mobility {mobility}, "

@@ -88,10 +88,9 @@ def move_sparse(
     nodes: list[SparseNode] = []
     last = np.empty((len(columns), paths.shape[1]))
     for case in range(paths.shape[1]):
-        found, end, last[:, case] = SparseFollower(system, columns, loops).follow(start, paths[:, case])
-        nodes += found
-        if len(found) < N:
-            status[case, len(found) :] = (Status.BEYOND_DEAD_POINT if end is Status.DEAD_POINT else end).value
+        found, ends, last[:, case] = SparseFollower(system, columns, loops).follow(start, paths[:, case])
+        nodes += [node for node in found if node is not None]
+        status[case] = [why.value for why in ends]
     good = np.flatnonzero(status.reshape(-1) == Status.OK.value)
     states = np.stack([node.x for node in nodes], axis=1) if nodes else np.empty((system.n_state, 0))
     here = start if np.array_equal(states, start.x) else system.at(states)

@@ -2,8 +2,7 @@
 
 Every position of the path is a node. From node to node a second-order predictor, Newton with the factors of the last node, a new
 factorization where it slows down, and half the step where the correction is too large. A position where the signs of the pivots
-change against the last one, both about the same bordering, lies behind a dead point. Positions behind the first that could not be
-reached are not tried again (in a small mechanism they are, see ``motion.path``).
+change against the last one, both about the same bordering, lies behind a dead point.
 """
 
 from __future__ import annotations
@@ -25,6 +24,7 @@ from mechgraph.motion.march import (
     SHORTEST_STEP,
     Status,
 )
+from mechgraph.motion.path import GAPS
 from mechgraph.motion.rates import Rates, Velocities
 from mechgraph.motion.system import Configuration, Index, System
 from mechgraph.numerics.sparse import SparseFactor
@@ -113,35 +113,72 @@ class SparseFollower:
         self.system, self.columns, self.loops = system, columns, loops
         self.rows = state_rows(system, columns)
 
-    def follow(self, start: Configuration, values: Array) -> tuple[list[SparseNode], Status, Array]:
-        """Nodes from a closed start at driver values ``(d, N)`` as far as they were reached, how it ended, and the last driver values."""
-        last = self._node(start, self.loops, self.loops.first)
-        before: SparseNode | None = None
-        nodes: list[SparseNode] = []
-        for goal in values.T:
-            failures: list[Status] = []
-            step = LONGEST_STEP
-            while True:
-                way = goal - last.drive
-                length = float(np.linalg.norm(way))
-                part = min(1.0, step / length) if length > 0 else 1.0
-                following, correction, why = self._step(last, before, last.drive + part * way, part == 1.0)
-                if following is None:
-                    failures.append(why)
-                    step = 0.5 * part * length
-                    if step < SHORTEST_STEP:
-                        dead = failures.count(Status.DEAD_POINT)
-                        end = Status.DEAD_POINT if 2 * dead > len(failures) else Status.OUT_OF_REACH
-                        return nodes, end, last.drive
-                    continue
-                failures.clear()
-                step = min(LONGEST_STEP, part * length * min(2.0, max(0.5, (AIM / max(correction, 1e-9)) ** (1 / 3))))
-                step = max(step, 10 * SHORTEST_STEP)
-                before, last = last, following
-                if part == 1.0:
-                    nodes.append(last)
+    def follow(self, start: Configuration, values: Array) -> tuple[list[SparseNode | None], list[Status], Array]:
+        """Nodes from a closed start at driver values ``(d, N)``, None where not reached and why, and where it first ended.
+
+        As in ``motion.path``: behind what cannot be passed the path goes on at the next position on this side of it, and where the
+        first position cannot be reached the path is entered at the one nearest to the start and followed both ways.
+        """
+        first = self._node(start, self.loops, self.loops.first)
+        found = self._along(first, values)
+        if values.shape[1] == 1 or any(node is not None for node in found[0]):
+            return found
+        near = int(np.argmin(((values - first.drive[:, None]) ** 2).sum(axis=0)))
+        ahead, behind = self._along(first, values[:, near:]), self._along(first, values[:, near::-1])
+        if all(node is None for node in ahead[0]):
+            return found
+        return behind[0][:0:-1] + ahead[0], behind[1][:0:-1] + ahead[1], found[2]
+
+    def _along(self, first: SparseNode, values: Array) -> tuple[list[SparseNode | None], list[Status], Array]:
+        nodes: list[SparseNode | None] = []
+        why: list[Status] = []
+        solved, reached = first, None
+        N = values.shape[1]
+        for _ in range(GAPS):
+            at, before = solved, None
+            while len(nodes) < N:
+                at, before, end = self._reached(at, before, values[:, len(nodes)])
+                if end is not Status.OK:
                     break
-        return nodes, Status.OK, last.drive
+                solved = at
+                nodes.append(at)
+                why.append(end)
+            if len(nodes) == N:
+                break
+            reached = at.drive if reached is None else reached
+            beyond = values[:, len(nodes) :] - at.drive[:, None]
+            back = np.flatnonzero((beyond * beyond[:, :1]).sum(axis=0) < 0)
+            gap = int(back[0]) if back.size else beyond.shape[1]
+            nodes += [None] * gap
+            why += [Status.BEYOND_DEAD_POINT if end is Status.DEAD_POINT else end] * gap
+        left = N - len(nodes)
+        nodes, why = nodes + [None] * left, why + [Status.OUT_OF_REACH] * left
+        return nodes, why, solved.drive if reached is None else reached
+
+    def _reached(
+        self, last: SparseNode, before: SparseNode | None, goal: Array
+    ) -> tuple[SparseNode, SparseNode | None, Status]:
+        """The node at driver values ``goal``, or the last one on the way there and why it ends; also the node before it."""
+        failures: list[Status] = []
+        step = LONGEST_STEP
+        while True:
+            way = goal - last.drive
+            length = float(np.linalg.norm(way))
+            part = min(1.0, step / length) if length > 0 else 1.0
+            following, correction, why = self._step(last, before, last.drive + part * way, part == 1.0)
+            if following is None:
+                failures.append(why)
+                step = 0.5 * part * length
+                if step < SHORTEST_STEP:
+                    dead = failures.count(Status.DEAD_POINT)
+                    return last, before, Status.DEAD_POINT if 2 * dead > len(failures) else Status.OUT_OF_REACH
+                continue
+            if part == 1.0:
+                return following, last, Status.OK
+            failures.clear()
+            step = min(LONGEST_STEP, part * length * min(2.0, max(0.5, (AIM / max(correction, 1e-9)) ** (1 / 3))))
+            step = max(step, 10 * SHORTEST_STEP)
+            before, last = last, following
 
     def _node(self, here: Configuration, loops: LoopSystem, factor: SparseFactor) -> SparseNode:
         S = here.S[:, :, 0]

@@ -452,7 +452,7 @@ class Configuration:
         s = self.system
         if s.many_loops:
             flat = per_pair.transpose(1, 0, 2).reshape(per_pair.shape[1], 6 * per_pair.shape[2])
-            return np.asarray(s.graph.sparse_loop_matrix @ flat).reshape(-1, per_pair.shape[2])
+            return np.asarray(s.graph.sparse_loop_matrix @ flat).reshape(6 * len(s.graph.loops), per_pair.shape[2])
         return _combined(s.graph.loop_matrix, per_pair)
 
     def pair_wrenches(self, x: Array) -> Array:
@@ -460,7 +460,7 @@ class Configuration:
         s = self.system
         loops = x.reshape(len(s.graph.loops), 6, *x.shape[1:])
         if s.many_loops:
-            flat = np.asarray(s.graph.sparse_loop_matrix.T @ loops.reshape(len(loops), -1))
+            flat = np.asarray(s.graph.sparse_loop_matrix.T @ loops.reshape(len(loops), loops.size // len(loops)))
             return np.moveaxis(flat.reshape(len(s.m.pairs), 6, *x.shape[1:]), 1, 0)
         return np.asarray(np.einsum("lp,list->ipst", s.graph.loop_matrix, loops))
 
