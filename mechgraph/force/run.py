@@ -34,6 +34,8 @@ TURNS_BACK = 60
 """Most steps in which the spin of passive bodies is taken back."""
 LONGEST_TURN = 0.25
 """Longest such step (radians)."""
+FARTHEST = 1e6
+"""Longest way of a driver from its start (radians, or lengths / L)."""
 DOUBTFUL = 1e4
 """Condition number of the closure equations from which on the distance to a dead point is looked at."""
 
@@ -101,6 +103,24 @@ def _batch(m: Mechanism, motions: Mapping[str, Motion]) -> tuple[int, ...]:
         ) from None
 
 
+def _refuse_far(run: Run) -> None:
+    """A path that no machine runs through would be followed for hours.
+
+    Raises
+    ------
+    DeclarationError
+    """
+    far = np.abs(run.values("position") - run.x[state_rows(run.system, run.columns)][:, None]).max(axis=1)
+    faults = [
+        f"motion of {name!r}: comes {size * unit:.3g} away from the start; expected less than {FARTHEST:g} "
+        f"(radians, or times the size of the mechanism). Angles are in radians"
+        for name, size, unit in zip(run.motions, far, run.unit, strict=True)
+        if size > FARTHEST
+    ]
+    if faults:
+        raise DeclarationError(f"solve {run.m.name!r}", faults)
+
+
 @dataclasses.dataclass(frozen=True)
 class Part:
     """Motions of some of the positions, the closure equations there, and the places of these positions in the flat batch."""
@@ -121,6 +141,7 @@ class Run:
         self.system, self.x = self.start.system, self.start.x[:, 0]
         self.columns, _ = named_columns(self.m, self.system, dict.fromkeys(self.motions, 0.0))
         self.unit = np.where(self.system.is_length[self.columns], self.system.par.L, 1.0)
+        _refuse_far(self)
         self.t = next((motion.t for motion in self.motions.values() if motion.t is not None), None)
         self.loops = certified_loops(self.start, self.columns)
         if self.loops is not None:

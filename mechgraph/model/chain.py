@@ -117,7 +117,7 @@ def _pitches(symbols: list[str], pitch: Any) -> tuple[dict[int, float], list[str
         return {names[key]: value for key, value in pitch.items() if key in names}, wrong
     try:
         values = list(np.asarray(pitch, dtype=float).reshape(-1))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return {}, [f"pitch = {pitch!r}: expected numbers, or a mapping pair -> pitch"]
     if len(values) == len(symbols) and len(takers) < len(symbols):
         values = [values[k] for k in takers]

@@ -80,7 +80,7 @@ def _value_fault(value: Value, what: str, width: int) -> str | None:
         return None
     try:
         array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         array = np.array(np.nan)
     ok = np.isfinite(array).all() and (width == 1 or (array.ndim >= 1 and array.shape[-1] == width))
     wanted = "a finite number" if width == 1 else f"{width} finite numbers"

@@ -28,7 +28,7 @@ def plain(value: Any) -> Any:
         return value
     try:
         array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return value
     return _nested(array.tolist())
 
@@ -49,7 +49,7 @@ def is_numeric(value: Any, shape: tuple[int, ...]) -> bool:
         return shape == ((len(value),) if isinstance(value, tuple) else ()) and all(abs(v) < LARGEST for v in numbers)
     try:
         array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return False
     return array.shape == shape and bool((np.abs(array) < LARGEST).all())
 

@@ -33,6 +33,8 @@ LONGEST_STEP = 0.35
 """Longest step between nodes, in driver space (radians, or lengths / L)."""
 STRAIGHT = 0.98
 """Smallest ratio of chord to path between two nodes; a path that bends or turns back gets a node there."""
+HAIR = 1e-12
+"""Distance at which a place on the path is taken for the path point beside it."""
 NEARER = 0.8
 """Part of the way to the end of the reach that a step takes where one across it has failed."""
 SHORTEST_STEP = 1e-7
@@ -262,8 +264,8 @@ class Marcher:
     @staticmethod
     def _next(points: Array, lengths: Array, last: Node, h: float, halts: Array) -> float:
         """The furthest path point within ``h`` to which the path is straight, or the place at ``h`` where none is within."""
-        ahead = np.arange(*np.searchsorted(lengths, (last.at, last.at + h), side="right"))
-        between = halts[(halts > last.at) & (halts <= last.at + h)]
+        ahead = np.arange(*np.searchsorted(lengths, (last.at, last.at + h + HAIR), side="right"))
+        between = halts[(halts > last.at) & (halts <= last.at + h + HAIR)]
         if not ahead.size:
             return float(min(last.at + h, lengths[-1]))
         distance = np.sqrt(((points[:, ahead] - last.drive[:, None]) ** 2).sum(axis=0))

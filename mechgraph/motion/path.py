@@ -10,15 +10,18 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.motion.interpolation import Interpolation
 from mechgraph.motion.march import CONVERGED, CORRECTION, ROUNDING, SHORTEST_STEP, Marcher, Node, Status, Track
 from mechgraph.motion.system import Configuration, Index, System
-from mechgraph.numerics.linear import Choice, ChosenSystem
+from mechgraph.numerics.linear import Choice, ChosenSystem, singular_between
 
 GAPS = 20
 """Most gaps behind which a path is taken up again."""
+ROUNDS = 12
+"""Times that a path is followed at most, with a node at every position that did not come out as predicted before."""
 BLOCK = 1024
 """Positions evaluated together, so that what is computed on the way stays in the cache of a core (measured)."""
 FINER = 5
@@ -29,6 +32,8 @@ WORTH = 20
 """Positions for every new node from which on they are worth their time."""
 EXACT = 3e-14
 """Error of interpolation that needs no correction."""
+SURE = 1e-6
+"""Error of interpolation from which on a position is asked whether it is on the branch of its nodes (radians, or lengths / L)."""
 GAIN = 1e-3
 """Part of the error of interpolation that nodes twice as dense leave (at most)."""
 
@@ -141,7 +146,7 @@ class Follower(Marcher):
     def _case(self, x: Array, values: Array) -> Case:
         """States, choices, statuses, last driver values reached and evaluation of one case."""
         stops = np.zeros(0, dtype=np.intp)
-        for _ in range(4):
+        for _ in range(ROUNDS):
             track = self.track(x, values, stops)
             at = self._along(track, values)
             nodes = self._finer(track, values, at)
@@ -219,13 +224,14 @@ class Follower(Marcher):
             middle = place[gaps] + share * (place[gaps + 1] - place[gaps])
             drives = np.stack([np.interp(middle, lengths, row) for row in points])
             guess = Interpolation(self.system, nodes, self.rows)(middle, drives)
-            found = self._closed_nodes(guess, middle, drives, np.array([nodes[i].choice for i in gaps]))
+            found = self._closed_nodes(guess, middle, drives, [nodes[i] for i in gaps])
             nodes, parts = _filled(nodes, gaps, found)
         return nodes
 
-    def _closed_nodes(self, x: Array, at: Array, drives: Array, choice_of: Index) -> list[tuple[Node | None, float]]:
-        """Nodes from predicted states, each with the correction that it took; None where it is not beyond doubt."""
+    def _closed_nodes(self, x: Array, at: Array, drives: Array, before: list[Node]) -> list[tuple[Node | None, float]]:
+        """Nodes from predicted states behind the nodes ``before``, each with its correction; None where it is not beyond doubt."""
         out: list[tuple[Node | None, float]] = [(None, 0.0)] * x.shape[1]
+        choice_of = np.array([node.choice for node in before], dtype=np.intp)
         for choice in np.unique(choice_of):
             mine = np.flatnonzero(choice_of == choice)
             here, total, done = self.correct(self.system.at(x[:, mine]), int(choice), ROUNDING)
@@ -235,7 +241,8 @@ class Follower(Marcher):
             error = np.abs(total).max(axis=0, initial=0.0)
             signs = solver.signs()
             square = here.J[np.ix_(self.choices[choice].rows, self.choices[choice].cols)]
-            for t in np.flatnonzero(done & (error < CORRECTION)):
+            other = self._on_other_branch(error, here, [before[i] for i in mine])
+            for t in np.flatnonzero(done & (error < CORRECTION) & ~other):
                 i = int(mine[t])
                 node = Node(
                     here.x[:, t],
@@ -250,6 +257,19 @@ class Follower(Marcher):
                 out[i] = node, float(error[t])
         return out
 
+    def _on_other_branch(self, error: Array, here: Configuration, nodes: list[Node]) -> NDArray[np.bool_]:
+        """Whether a singular position lies between positions that took a correction ``error (T,)`` and nodes of one choice beside them.
+
+        Where the prediction was good nobody needs to ask.
+        """
+        out = np.zeros(error.size, dtype=bool)
+        ask = np.flatnonzero(error > SURE)
+        if ask.size:
+            chosen = self.choices[nodes[0].choice]
+            square = here.part(ask).J[np.ix_(chosen.rows, chosen.cols)]
+            out[ask] = singular_between(np.stack([nodes[t].square for t in ask], axis=2), square)
+        return out
+
     def _between(
         self, nodes: list[Node], values: Array, at: Array
     ) -> tuple[Array, Index, Array, tuple[Configuration, ...]]:
@@ -259,7 +279,8 @@ class Follower(Marcher):
         inside = np.flatnonzero(at <= nodes[-1].at)
         predict = Interpolation(self.system, nodes, self.rows)
         choice_of = np.zeros(values.shape[1], dtype=np.intp)
-        choice_of[inside] = np.array([n.choice for n in nodes], dtype=np.intp)[predict.intervals(at[inside])[1]]
+        next_ = predict.intervals(at)[1]
+        choice_of[inside] = np.array([n.choice for n in nodes], dtype=np.intp)[next_[inside]]
         blocks = []
         kinds = np.unique(choice_of[inside])
         for choice in kinds:
@@ -268,7 +289,9 @@ class Follower(Marcher):
                 guess = self.system.at(predict(at[part], values[:, part]))
                 here, total, done = self.correct(guess, int(choice), CONVERGED)
                 states[:, part] = here.x
-                bad[part] = np.logical_not(done) | (np.abs(total).max(axis=0, initial=0.0) > CORRECTION)
+                error = np.abs(total).max(axis=0, initial=0.0)
+                other = self._on_other_branch(error, here, [nodes[i] for i in next_[part]])
+                bad[part] = np.logical_not(done) | (error > CORRECTION) | other
                 blocks.append(here)
         whole = len(kinds) == 1 and inside.size == values.shape[1]
         return states, choice_of, bad, tuple(blocks) if whole else ()

@@ -297,3 +297,23 @@ def test_loops_that_pass_change_points_together_stay_on_their_branches(near: flo
     turn = np.linspace(0, 2 * np.pi, positions)
     alone, together = (mg.kinematics(twins(n, near), {"A": turn})["D0"].position for n in (1, count))
     assert np.abs(together - alone).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("near", "begin", "positions"),
+    [(1e-6, 0.6205487042125981, 5210), (1e-7, 0.3, 5000), (1e-8, 0.3, 3601), (1e-8, 0.6040731559945676, 5484)],
+)
+def test_no_position_is_on_the_other_branch_near_a_change_point(near: float, begin: float, positions: int) -> None:
+    """A slider-crank with a rod longer than its crank by ``near`` of it turns fully: ``x = cos a + sqrt(l^2 - sin^2 a)``."""
+    rod, z = 1.0 + near, (0, 0, 1)
+    angle = begin + np.linspace(0.0, 4 * np.pi, positions)
+    x = np.cos(angle) + np.sqrt(rod**2 - np.sin(angle) ** 2)
+    pin = (np.cos(begin), np.sin(begin), 0.0)
+    pairs = [
+        mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=z),
+        mg.Pair("B", "R", "crank", "rod", point=pin, axis=z),
+        mg.Pair("C", "R", "rod", "slider", point=(x[0], 0, 0), axis=z),
+        mg.Pair("D", "P", "frame", "slider", point=(x[0], 0, 0), axis=(1, 0, 0)),
+    ]
+    s = mg.kinematics(mg.Mechanism("slider-crank", pairs=pairs, drives=["A"]), {"A": angle - begin})
+    np.testing.assert_allclose(s["D"].position[:, 0], x - x[0], atol=1e-9)
