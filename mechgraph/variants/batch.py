@@ -20,6 +20,7 @@ from mechgraph.motion.lockstep import Lockstep
 from mechgraph.motion.march import Status
 from mechgraph.motion.path import Positions
 from mechgraph.motion.system import Configuration, Index, System
+from mechgraph.numerics.memory import keep_freed_memory
 from mechgraph.result.solution import Solution
 from mechgraph.variants.fields import Variants
 
@@ -97,6 +98,7 @@ def solve_together(
     A variant is to be solved alone where it cannot be built, falls out of step, or has a position that is not regular; from the
     coordinates ``(F, V)`` where it begins, where these are known (not NaN).
     """
+    keep_freed_memory()
     run = VariantRun(numbers_at, motions)
     everyone = np.ones(run.variants.count, dtype=bool)
     if not run.together or run.alone.all():
