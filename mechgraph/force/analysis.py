@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -12,13 +10,12 @@ import numpy as np
 from mechgraph.algebra.screw import shift_wrench
 from mechgraph.algebra.se3 import Array, cross, rotate
 from mechgraph.errors import MechgraphError
-from mechgraph.force.methods import NO_WRENCHES, Wrenches, given_effort_loads, internal_state
-from mechgraph.force.site import Site, inertia_wrenches, kinetic_power, user_poses, user_twists
+from mechgraph.force.found import Forces, Motions
+from mechgraph.force.methods import given_effort_loads, internal_state
+from mechgraph.force.site import kinetic_power, user_poses, user_twists
 from mechgraph.formulation.state import State
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.motion.path import Tracks, continued
-from mechgraph.motion.rates import Rates
-from mechgraph.motion.system import Configuration, Index
+from mechgraph.motion.path import continued
 from mechgraph.numerics.linear import add_at
 from mechgraph.result.solution import Checks, MaterialPoint
 from mechgraph.structure.reaction import (
@@ -30,55 +27,6 @@ from mechgraph.structure.reaction import (
     pair_power,
     reaction_part,
 )
-
-
-@dataclass(frozen=True)
-class Motions:
-    """Positions and rates of a batch: only solved positions are evaluated, ``good`` says which of the flat batch they are."""
-
-    here: Configuration
-    rates: Rates
-    batch: tuple[int, ...]
-    good: Index
-    status: Any
-    t: Any
-    driven: Index
-    held: tuple[Index, ...]
-    which: Index
-    tracks: Tracks = ()
-
-
-@dataclass
-class Forces:
-    """What acts at the positions of a batch, and the wrenches of all pairs found for it.
-
-    ``act`` lets all loads act; ``hold (6, N, T)`` keeps passive bodies at rest, ``holds`` are its sizes by name and whether they are
-    couples; ``solver`` are the closure equations.
-    """
-
-    rates: Rates
-    act: Callable[[], Site]
-    mask_redundant: bool
-    hold: Array
-    solver: Any
-    holds: tuple[tuple[str, bool, Array], ...] = ()
-    wrenches: Wrenches = NO_WRENCHES
-
-    @cached_property
-    def site(self) -> Site:
-        """What loads do."""
-        return self.act()
-
-    @cached_property
-    def inertia(self) -> Array:
-        """Inertia wrenches of all links, ``(6, N, T)``."""
-        return inertia_wrenches(self.rates.here, self.rates)
-
-    def forget(self) -> None:
-        """Give back the memory of what is not asked for often; it is computed again where it is."""
-        for name in ("site", "inertia"):
-            self.__dict__.pop(name, None)
-        self.wrenches, self.solver = NO_WRENCHES, None
 
 
 class Analysis:

@@ -10,8 +10,9 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeadPointError, DeclarationError, IndeterminateError, ReachError
-from mechgraph.force.analysis import Analysis, Forces, Motions
+from mechgraph.force.analysis import Analysis
 from mechgraph.force.blocks import Blocks
+from mechgraph.force.found import Forces, Motions
 from mechgraph.force.large import SparseAnalysis, move_sparse
 from mechgraph.force.methods import METHODS, Problem
 from mechgraph.force.run import Run, self_length

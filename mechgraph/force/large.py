@@ -15,7 +15,8 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import MechgraphError
-from mechgraph.force.analysis import Analysis, Motions
+from mechgraph.force.analysis import Analysis
+from mechgraph.force.found import Motions
 from mechgraph.force.least import least_change
 from mechgraph.motion.assembly import CLOSED
 from mechgraph.motion.follow import SparseFollower, SparseNode, SparseSolver, sparse_rates

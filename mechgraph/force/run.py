@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError, IndeterminateError
-from mechgraph.force.analysis import Motions
+from mechgraph.force.found import Motions
 from mechgraph.force.large import Given, certified_loops, refuse_dense
 from mechgraph.force.methods import chosen_for_all
 from mechgraph.model.drive import Drive

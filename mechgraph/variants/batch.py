@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
-from mechgraph.force.analysis import Analysis, Motions
+from mechgraph.force.analysis import Analysis
 from mechgraph.force.blocks import Blocks
+from mechgraph.force.found import Motions
 from mechgraph.force.kinetostatics import CONTRADICTION, forces_of, in_blocks, solved_blocks
 from mechgraph.force.run import Run
 from mechgraph.model.load import Load

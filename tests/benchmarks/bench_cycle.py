@@ -19,7 +19,7 @@ import numpy as np
 from bench_core import seven_r
 
 import mechgraph as mg
-from mechgraph.force import analysis, blocks, kinetostatics
+from mechgraph.force import analysis, blocks, found, kinetostatics
 from mechgraph.force.kinetostatics import METHODS
 from mechgraph.force.run import Run
 from mechgraph.motion.march import Marcher
@@ -33,7 +33,7 @@ STAGES = (
     ("interpolation, Newton", Follower, "_between"),
     ("rates", Run, "_rates"),
     ("loads", kinetostatics, "_site"),
-    ("inertia", analysis, "inertia_wrenches"),
+    ("inertia", found, "inertia_wrenches"),
     ("wrenches", METHODS, "loop_wrench"),
     ("reactions, checks", analysis.Analysis, "settle"),
     ("output", blocks.Blocks, "reaction"),
