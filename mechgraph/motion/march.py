@@ -296,6 +296,13 @@ class Marcher:
         if not done[0] or correction > CORRECTION:
             return None, correction, order, Status.OUT_OF_REACH
         following = self._best_choice(here, self.node(here, at, drive, choice)[0])
+        if following.condition > FAIR and not sure:
+            # nearly closed is not closed here: the place may lie in a narrow gap of the reach
+            here, more, done = self.correct(here, following.choice, CONVERGED)
+            correction = max(correction, float(np.abs(total + more).max(initial=0.0)))
+            if not done[0] or correction > CORRECTION:
+                return None, correction, order, Status.OUT_OF_REACH
+            following = self.node(here, at, drive, following.choice)[0]
         if following.condition > SINGULAR or not self._same_side(last, following):
             return None, correction, order, Status.DEAD_POINT
         return following, correction, order, Status.OK

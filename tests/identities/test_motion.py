@@ -317,3 +317,24 @@ def test_no_position_is_on_the_other_branch_near_a_change_point(near: float, beg
     ]
     s = mg.kinematics(mg.Mechanism("slider-crank", pairs=pairs, drives=["A"]), {"A": angle - begin})
     np.testing.assert_allclose(s["D"].position[:, 0], x - x[0], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("short", "begin"), [(1.364766307e-6, -0.3855575158413451), (1e-4, 0.2), (1e-5, -0.4), (3e-6, 0.6), (1e-8, 0.5)]
+)
+def test_a_narrow_gap_of_the_reach_is_not_leapt_over(short: float, begin: float) -> None:
+    """A slider-crank whose rod is shorter than its crank by ``short`` of it ends at ``sin a = l``, also where it would go on behind."""
+    rod, z = 1.0 - short, (0, 0, 1)
+    pin, x = (np.cos(begin), np.sin(begin), 0.0), np.cos(begin) + np.sqrt(rod**2 - np.sin(begin) ** 2)
+    pairs = [
+        mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=z),
+        mg.Pair("B", "R", "crank", "rod", point=pin, axis=z),
+        mg.Pair("C", "R", "rod", "slider", point=(x, 0, 0), axis=z),
+        mg.Pair("D", "P", "frame", "slider", point=(x, 0, 0), axis=(1, 0, 0)),
+    ]
+    m = mg.Mechanism("slider-crank", pairs=pairs, drives=["A"])
+    limit = np.arcsin(rod) - begin
+    for beyond in (0.1, 0.5, 1.0):
+        with pytest.raises(mg.ReachError) as caught:
+            mg.kinematics(m, {"A": [0.0, limit + beyond]})
+        assert caught.value.value["A.Rz"] == pytest.approx(limit, abs=1e-6)
