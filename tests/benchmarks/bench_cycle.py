@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import mechanisms
 import numpy as np
-from bench_core import seven_r
+from bench_core import best, seven_r
 
 import mechgraph as mg
 from mechgraph.force import analysis, blocks, found, kinetostatics
@@ -77,16 +77,6 @@ def cycle(m, span, n):
         return s
 
     return run
-
-
-def best(run, repeat):
-    """Shortest of some runs, seconds."""
-    times = []
-    for _ in range(repeat):
-        begin = time.perf_counter()
-        run()
-        times.append(time.perf_counter() - begin)
-    return min(times)
 
 
 def dense(n, count, repeat):

@@ -299,24 +299,33 @@ def test_loops_that_pass_change_points_together_stay_on_their_branches(near: flo
     assert np.abs(together - alone).max() < 1e-9
 
 
+def slider_crank(rod: float, begin: float) -> mg.Mechanism:
+    """Crank of length one at the angle ``begin``: ``x = cos a + sqrt(l^2 - sin^2 a)``."""
+    z, pin = (0, 0, 1), (np.cos(begin), np.sin(begin), 0.0)
+    end = (slide(rod, begin), 0, 0)
+    pairs = [
+        mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=z),
+        mg.Pair("B", "R", "crank", "rod", point=pin, axis=z),
+        mg.Pair("C", "R", "rod", "slider", point=end, axis=z),
+        mg.Pair("D", "P", "frame", "slider", point=end, axis=(1, 0, 0)),
+    ]
+    return mg.Mechanism("slider-crank", pairs=pairs, drives=["A"])
+
+
+def slide(rod, angle):
+    return np.cos(angle) + np.sqrt(rod**2 - np.sin(angle) ** 2)
+
+
 @pytest.mark.parametrize(
     ("near", "begin", "positions"),
     [(1e-6, 0.6205487042125981, 5210), (1e-7, 0.3, 5000), (1e-8, 0.3, 3601), (1e-8, 0.6040731559945676, 5484)],
 )
 def test_no_position_is_on_the_other_branch_near_a_change_point(near: float, begin: float, positions: int) -> None:
-    """A slider-crank with a rod longer than its crank by ``near`` of it turns fully: ``x = cos a + sqrt(l^2 - sin^2 a)``."""
-    rod, z = 1.0 + near, (0, 0, 1)
-    angle = begin + np.linspace(0.0, 4 * np.pi, positions)
-    x = np.cos(angle) + np.sqrt(rod**2 - np.sin(angle) ** 2)
-    pin = (np.cos(begin), np.sin(begin), 0.0)
-    pairs = [
-        mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=z),
-        mg.Pair("B", "R", "crank", "rod", point=pin, axis=z),
-        mg.Pair("C", "R", "rod", "slider", point=(x[0], 0, 0), axis=z),
-        mg.Pair("D", "P", "frame", "slider", point=(x[0], 0, 0), axis=(1, 0, 0)),
-    ]
-    s = mg.kinematics(mg.Mechanism("slider-crank", pairs=pairs, drives=["A"]), {"A": angle - begin})
-    np.testing.assert_allclose(s["D"].position[:, 0], x - x[0], atol=1e-9)
+    """A slider-crank with a rod longer than its crank by ``near`` of it turns fully."""
+    turn = np.linspace(0.0, 4 * np.pi, positions)
+    s = mg.kinematics(slider_crank(1.0 + near, begin), {"A": turn})
+    expected = slide(1.0 + near, begin + turn) - slide(1.0 + near, begin)
+    np.testing.assert_allclose(s["D"].position[:, 0], expected, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -324,16 +333,7 @@ def test_no_position_is_on_the_other_branch_near_a_change_point(near: float, beg
 )
 def test_a_narrow_gap_of_the_reach_is_not_leapt_over(short: float, begin: float) -> None:
     """A slider-crank whose rod is shorter than its crank by ``short`` of it ends at ``sin a = l``, also where it would go on behind."""
-    rod, z = 1.0 - short, (0, 0, 1)
-    pin, x = (np.cos(begin), np.sin(begin), 0.0), np.cos(begin) + np.sqrt(rod**2 - np.sin(begin) ** 2)
-    pairs = [
-        mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=z),
-        mg.Pair("B", "R", "crank", "rod", point=pin, axis=z),
-        mg.Pair("C", "R", "rod", "slider", point=(x, 0, 0), axis=z),
-        mg.Pair("D", "P", "frame", "slider", point=(x, 0, 0), axis=(1, 0, 0)),
-    ]
-    m = mg.Mechanism("slider-crank", pairs=pairs, drives=["A"])
-    limit = np.arcsin(rod) - begin
+    m, limit = slider_crank(1.0 - short, begin), np.arcsin(1.0 - short) - begin
     for beyond in (0.1, 0.5, 1.0):
         with pytest.raises(mg.ReachError) as caught:
             mg.kinematics(m, {"A": [0.0, limit + beyond]})
