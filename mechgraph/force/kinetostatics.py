@@ -16,7 +16,7 @@ from mechgraph.force.found import Forces, Motions
 from mechgraph.force.large import SparseAnalysis, move_sparse
 from mechgraph.force.methods import METHODS, Problem
 from mechgraph.force.run import Run, self_length
-from mechgraph.force.site import Site
+from mechgraph.force.site import Site, nothing
 from mechgraph.model.load import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.motion import idle
@@ -135,7 +135,7 @@ def _solve(m: Mechanism, motions: Mapping[str, Any] | None, on_reach: str, force
         raise DeclarationError(f"solve {m.name!r}", faults)
     keep_freed_memory()
     run = Run(m, motions)
-    if run.loops is None and in_blocks(run, forces):
+    if run.loops is None and by_blocks(run, forces):
         return _solve_in_blocks(run, on_reach, forces)
     solver: ChosenSystem | SparseSolver
     if run.loops is not None:
@@ -154,7 +154,7 @@ def _solve(m: Mechanism, motions: Mapping[str, Any] | None, on_reach: str, force
     return solution
 
 
-def in_blocks(run: Run, forces: tuple[str, str] | None) -> bool:
+def by_blocks(run: Run, forces: tuple[str, str] | None) -> bool:
     """Whether positions can be solved block by block: many of them, and nothing that looks at all of them at once."""
     if fits_one_block(int(np.prod(run.batch))) or run.freedoms.bodies:
         return False
@@ -223,8 +223,8 @@ def _forces(
     redundant: str,
 ) -> Forces:
     """Loads and wrenches at positions of coordinates ``(F, T)`` that stand at the ``places`` of the flat batch."""
-    nothing = np.broadcast_to(0.0, (6, len(run.m.links), moved.here.T))
-    found = Forces(moved.rates, lambda: _site(run, moved, coordinates, places), redundant == "nan", nothing, solver)
+    still = nothing((6, len(run.m.links), moved.here.T))
+    found = Forces(moved.rates, lambda: _site(run, moved, coordinates, places), redundant == "nan", still, solver)
     efforts = found.site.scaled_efforts()
     loads = found.site.applied()
     loads += found.inertia

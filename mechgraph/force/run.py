@@ -103,24 +103,6 @@ def _batch(m: Mechanism, motions: Mapping[str, Motion]) -> tuple[int, ...]:
         ) from None
 
 
-def _refuse_far(run: Run) -> None:
-    """A path that no machine runs through would be followed for hours.
-
-    Raises
-    ------
-    DeclarationError
-    """
-    far = np.abs(run.values("position") - run.x[state_rows(run.system, run.columns)][:, None]).max(axis=1)
-    faults = [
-        f"motion of {name!r}: comes {size * unit:.3g} away from the start; expected less than {FARTHEST:g} "
-        f"(radians, or times the size of the mechanism). Angles are in radians"
-        for name, size, unit in zip(run.motions, far, run.unit, strict=True)
-        if size > FARTHEST
-    ]
-    if faults:
-        raise DeclarationError(f"solve {run.m.name!r}", faults)
-
-
 @dataclasses.dataclass(frozen=True)
 class Part:
     """Motions of some of the positions, the closure equations there, and the places of these positions in the flat batch."""
@@ -141,7 +123,7 @@ class Run:
         self.system, self.x = self.start.system, self.start.x[:, 0]
         self.columns, _ = named_columns(self.m, self.system, dict.fromkeys(self.motions, 0.0))
         self.unit = np.where(self.system.is_length[self.columns], self.system.par.L, 1.0)
-        _refuse_far(self)
+        self._refuse_far()
         self.t = next((motion.t for motion in self.motions.values() if motion.t is not None), None)
         self.loops = certified_loops(self.start, self.columns)
         if self.loops is not None:
@@ -160,6 +142,17 @@ class Run:
     def loads(self) -> tuple[Load, ...]:
         """The loads that act."""
         return self.m.loads
+
+    def _refuse_far(self) -> None:
+        """Refuse a path that would be followed for hours."""
+        far = np.abs(self.values("position") - self.x[state_rows(self.system, self.columns)][:, None]).max(axis=1)
+        faults = [
+            f"motion of {name!r}: comes {size * unit:.3g} away from the start; expected at most {FARTHEST * unit:.3g}"
+            for name, size, unit in zip(self.motions, far, self.unit, strict=True)
+            if size > FARTHEST
+        ]
+        if faults:
+            raise DeclarationError(f"solve {self.m.name!r}", faults)
 
     def _check_determinate(self) -> None:
         free = self.freedoms.undriven
@@ -222,14 +215,14 @@ class Run:
         if found.here and good.size == status.size:
             at = np.cumsum([0, *(here.T for here in found.here)])
             pieces = [(good[i:j], here) for (i, j), here in zip(pairwise(at), found.here, strict=True)]
-        left = len(pieces)
-        any_ = False
+        regular = False
         for places, here in pieces:
-            left -= 1
             part = self._rates(found, here, places, status)
-            if part.places.size or not (left or any_):
-                any_ = True
+            if part.places.size:
+                regular = True
                 yield part
+        if not regular:
+            yield part
 
     def found(self) -> Positions:
         """All positions, passive bodies not spinning."""

@@ -32,9 +32,9 @@ def inertia_wrenches(here: Configuration, rates: Rates) -> Array:
     return np.concatenate([cross(c, force) - rotate(R, turning), force])
 
 
-def nothing_like(values: Array) -> Array:
+def nothing(shape: tuple[int, ...]) -> Array:
     """Zeros of a shape that take no memory; they cannot be written to."""
-    return np.broadcast_to(0.0, values.shape)
+    return np.broadcast_to(0.0, shape)
 
 
 class Site:
@@ -52,7 +52,7 @@ class Site:
         self.m, self.L = system.m, system.par.L
         self._link = self.m.link_index
         self.external = np.zeros((6, len(self.m.links), here.T))
-        self.internal = nothing_like(self.external)
+        self.internal = nothing(self.external.shape)
         self.efforts = np.zeros((system.n_freedoms, here.T))
         self._target = self.external
 
@@ -76,7 +76,7 @@ class Site:
     def _alone(self, load: Load) -> bool:
         """Whether a load by itself gives finite values."""
         other = copy(self)
-        other.external, other.internal = np.zeros_like(self.external), nothing_like(self.internal)
+        other.external, other.internal = np.zeros_like(self.external), nothing(self.internal.shape)
         other.efforts = np.zeros_like(self.efforts)
         other._target = other.external
         load.act(other)

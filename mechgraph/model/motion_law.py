@@ -358,7 +358,7 @@ def _checked_samples(samples: Any) -> tuple[Array, Array]:
     """Return times and values of samples; LawFault where they are no increasing times with one value each."""
     try:
         first, second = samples
-    except (TypeError, ValueError, OverflowError):
+    except (TypeError, ValueError):
         raise LawFault(f"samples must be a pair (times, values), got {samples!r}") from None
     faults: list[str] = []
     times = _numbers(first, "times of the samples", faults)
@@ -430,7 +430,7 @@ class Smooth:
         """Call the function with the array, or value by value where it takes no arrays."""
         try:
             return self.function(t.copy() if t.ndim else float(t))
-        except (TypeError, ValueError, OverflowError):
+        except (TypeError, ValueError):
             if t.ndim == 0:
                 raise
         single = [self.function(float(value)) for value in t.ravel()]
@@ -438,7 +438,7 @@ class Smooth:
             if single and isinstance(single[0], tuple):
                 return tuple(np.reshape(column, t.shape) for column in zip(*single, strict=True))
             return np.reshape(single, t.shape)
-        except (TypeError, ValueError, OverflowError):
+        except (TypeError, ValueError):
             raise LawFault(f"it must return one number a time, got {single[0]!r}") from None
 
     @staticmethod

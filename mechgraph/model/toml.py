@@ -137,7 +137,7 @@ class _Reader:
     def radians(self, value: Any, where: str) -> Any:
         try:
             return np.deg2rad(np.asarray(value, dtype=float)).tolist()
-        except (TypeError, ValueError, OverflowError):
+        except (TypeError, ValueError):
             self.faults.append(f"{where} = {value!r}: expected numbers")
             return value
 
@@ -157,7 +157,7 @@ class _Reader:
             return make(**arguments)
         except DeclarationError as error:
             self.faults += [f"{where}: {fault}" for fault in error.faults]
-        except (TypeError, ValueError, OverflowError) as error:
+        except (TypeError, ValueError) as error:
             self.faults.append(f"{where}: {error}")
         return None
 

@@ -44,9 +44,10 @@ def _floats(value: Any) -> bool:
 
 def is_numeric(value: Any, shape: tuple[int, ...]) -> bool:
     """Whether ``value`` is an array of finite numbers of the given shape."""
+    if type(value) is float:
+        return shape == () and abs(value) < LARGEST
     if _floats(value):
-        numbers = value if isinstance(value, tuple) else (value,)
-        return shape == ((len(value),) if isinstance(value, tuple) else ()) and all(abs(v) < LARGEST for v in numbers)
+        return shape == (len(value),) and all(abs(v) < LARGEST for v in value)
     try:
         array = np.asarray(value, dtype=float)
     except (TypeError, ValueError, OverflowError):

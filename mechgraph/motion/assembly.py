@@ -22,7 +22,7 @@ ASSEMBLY_RANK = 1e-9
 RESTARTS = 40
 """Perturbed guesses tried where the declared one does not lead to a closed position (fixed seed), all of them together."""
 FIRST = 8
-"""How many of them are tried before the others."""
+"""How many of them are tried before the others; an even number, as they are of two kinds in turn."""
 
 
 def scaled_system(m: Mechanism, q: Array, system: System | None = None) -> System:

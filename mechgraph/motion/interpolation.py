@@ -120,7 +120,6 @@ class Interpolation:
         slopes = np.zeros((len(z) - 1, *column.shape[1:]))
         slopes[::2] = self.system.tangent(dq, rates).swapaxes(0, 1)
         coefficients = [column[0]]
-        coefficients = [column[0]]
         for order in range(1, len(z)):
             width = z[order:] - z[:-order]
             if order == 1:

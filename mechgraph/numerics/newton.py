@@ -20,7 +20,7 @@ def least_norm_step(J: Array, r: Array, tolerance: float) -> Array:
 
 def least_norm_steps(J: Array, r: Array, tolerance: float) -> Array:
     """``least_norm_step`` for matrices ``(m, n, T)`` and residuals ``(m, T)``, ``(n, T)``; NaN where one is not finite."""
-    if J.shape[2] == 1:
+    if J.shape[2] == 1:  # of one matrix, which may be large, no inverse is formed
         return least_norm_step(J[:, :, 0], r[:, 0], tolerance)[:, None]
     finite = np.isfinite(J).all(axis=(0, 1)) & np.isfinite(r).all(axis=0)
     inverse = np.linalg.pinv(np.moveaxis(np.where(finite, J, 0.0), -1, 0), rcond=tolerance)

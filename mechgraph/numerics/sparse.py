@@ -101,8 +101,10 @@ class SparseFactor:
     def distance(self) -> float:
         """Distance to the nearest singular matrix, ``1 / |A^-1|`` in the 1-norm, estimated (Higham and Tisseur 2000); 0 where singular."""
         n = self._A.shape[0]
-        if self._lu is None or not n:
-            return 1.0 if not n else 0.0
+        if not n:
+            return 1.0
+        if self._lu is None:
+            return 0.0
         inverse = scipy.sparse.linalg.LinearOperator(
             (n, n),
             matvec=lambda b: self.solve(b.reshape(n, 1))[:, 0],

@@ -13,7 +13,7 @@ from mechgraph.errors import DeclarationError
 from mechgraph.force.analysis import Analysis
 from mechgraph.force.blocks import Blocks
 from mechgraph.force.found import Motions
-from mechgraph.force.kinetostatics import CONTRADICTION, forces_of, in_blocks, solved_blocks
+from mechgraph.force.kinetostatics import CONTRADICTION, by_blocks, forces_of, solved_blocks
 from mechgraph.force.run import Run
 from mechgraph.model.load import Load
 from mechgraph.model.motion_law import Motion
@@ -104,7 +104,7 @@ def solve_together(
     everyone = np.ones(run.variants.count, dtype=bool)
     if not run.together or run.alone.all():
         return None, everyone, None
-    solve = _in_blocks if in_blocks(run, (method, redundant)) else _in_one
+    solve = _in_blocks if by_blocks(run, (method, redundant)) else _in_one
     try:
         return *solve(run, method, redundant), run.starts
     except DeclarationError:

@@ -72,7 +72,8 @@ def study(
     Study
         A variant that cannot be built, assembled or moved has NaN in its outputs and says so in ``status`` and ``messages``; it
         never stops the others. Every variant starts on the branch to which the mechanism itself is led when its numbers change
-        into those of the variant; one for which that is not beyond doubt is solved by itself, as ``solve`` does. A passive body
+        into those of the variant, also where it is then solved by itself because a position is out of reach or near a dead
+        point; one for which that way is not beyond doubt is solved by itself, as ``solve`` does. A passive body
         whose centre is off its line stands as it comes to stand on that way.
 
     Raises
