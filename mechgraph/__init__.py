@@ -1,6 +1,8 @@
 """mechgraph: spatial mechanisms as graphs of links and pairs; determinacy, equations, motion, drivers and reactions."""
 
 from mechgraph.algebra import inertia
+from mechgraph.equations.build import formulate
+from mechgraph.equations.terms import Formulation
 from mechgraph.errors import (
     AssemblyError,
     DeadPointError,
@@ -12,20 +14,18 @@ from mechgraph.errors import (
     ReachError,
 )
 from mechgraph.force.kinetostatics import assemble, kinematics, solve
-from mechgraph.formulation.build import formulate
-from mechgraph.formulation.registry import Formulation
 from mechgraph.model.chain import chain
-from mechgraph.model.connection import Marker, Pair
 from mechgraph.model.drive import Drive
 from mechgraph.model.library import library_names as library
 from mechgraph.model.link import Link
 from mechgraph.model.load import Effort, Gravity, Spring, TorsionSpring, Wrench
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.motion_law import Motion
-from mechgraph.model.pair import Bookkeeping, Component, Freedom, PairType, pair_types
+from mechgraph.model.motion import Motion
+from mechgraph.model.pair import Marker, Pair
+from mechgraph.model.pair_type import Bookkeeping, Component, Freedom, PairType, pair_types
 from mechgraph.model.toml import load, save
+from mechgraph.report.report import DeterminacyReport, check
 from mechgraph.result.solution import Solution
-from mechgraph.structure.report import DeterminacyReport, check
 from mechgraph.variants.result import Study
 from mechgraph.variants.study import study
 

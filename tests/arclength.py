@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mechgraph.motion.assembly import assembled, named_columns, state_rows
+from mechgraph.closure.assembly import assembled, named_columns, state_rows
 
 
 class _Path:

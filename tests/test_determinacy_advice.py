@@ -8,8 +8,8 @@ import pytest
 
 import mechgraph as mg
 from mechgraph.algebra.se3 import rotation_exp
-from mechgraph.structure.advice import Effect
-from mechgraph.structure.report import DeterminacyReport
+from mechgraph.report.report import DeterminacyReport
+from mechgraph.structure.pair_changes import Effect
 
 BUILDERS = {
     "planar": known.planar,

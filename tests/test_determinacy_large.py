@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
-from mechgraph.motion.assembly import assembled
-from mechgraph.structure import freedom, generic, stress
+from mechgraph.closure.assembly import assembled
+from mechgraph.report.facts import counted_ledger
+from mechgraph.structure import generic
+from mechgraph.structure import mobility as freedom
+from mechgraph.structure import uniqueness as stress
 from mechgraph.structure.elimination import Elimination, loop_rows
-from mechgraph.structure.facts import counted_ledger
-from mechgraph.structure.freedom import free_motion
+from mechgraph.structure.mobility import free_motion
 from mechgraph.topology.linkgraph import link_graph
 
 

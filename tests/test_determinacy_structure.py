@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import mechgraph as mg
 from mechgraph.structure.generic import generic
 from mechgraph.topology.linkgraph import link_graph
-from mechgraph.topology.parts import parts_of
+from mechgraph.topology.matching import parts_of
 
 TYPES = ("R", "P", "C", "S", "E", "U", "W", "Sp", "Sg")
 

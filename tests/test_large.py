@@ -16,13 +16,13 @@ from numpy.testing import assert_allclose
 from strategies import body
 
 import mechgraph as mg
+from mechgraph.closure import tree
+from mechgraph.closure.assembly import assembled
+from mechgraph.closure.bordering import LoopSystem
+from mechgraph.closure.tree import Tree
 from mechgraph.force import large
 from mechgraph.force.large import SparseAnalysis
 from mechgraph.model.parameters import parameters
-from mechgraph.motion import tree
-from mechgraph.motion.assembly import assembled
-from mechgraph.motion.loops import LoopSystem
-from mechgraph.motion.tree import Tree
 from mechgraph.topology.linkgraph import link_graph
 
 AGREE = 1e-9

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
-from mechgraph.motion.assembly import assembled, named_columns, scaled_system
-from mechgraph.motion.march import Status
-from mechgraph.motion.path import Follower
-from mechgraph.motion.system import System
+from mechgraph.closure.assembly import assembled, named_columns, scaled_system
+from mechgraph.closure.configuration import System
+from mechgraph.closure.march import Status
+from mechgraph.closure.path import Follower
 from mechgraph.topology.linkgraph import link_graph
 
 OPEN = ("rcsr-csr-printed",)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mechgraph.errors import DeclarationError
-from mechgraph.model.motion_law import LAWS, Motion
+from mechgraph.model.motion import LAWS, Motion
 
 RISES = ["cycloidal", "harmonic", "poly345", "poly4567"]
 H, T, START = 1.7, 0.4, -0.3

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import mechgraph as mg
-from mechgraph.formulation.registry import Term
+from mechgraph.equations.terms import Term
 
 SECTIONS = {
     "7r": ("3.8", 50),

@@ -9,16 +9,16 @@ import numpy as np
 
 from mechgraph.algebra.screw import shift_wrench
 from mechgraph.algebra.se3 import Array, cross, rotate
+from mechgraph.closure.path import continued
+from mechgraph.equations.state import State
 from mechgraph.errors import MechgraphError
+from mechgraph.force.applied_loads import kinetic_power, user_poses, user_twists
+from mechgraph.force.dalembert import given_effort_loads, internal_state
 from mechgraph.force.found import Forces, Motions
-from mechgraph.force.methods import given_effort_loads, internal_state
-from mechgraph.force.site import kinetic_power, user_poses, user_twists
-from mechgraph.formulation.state import State
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.motion.path import continued
 from mechgraph.numerics.linear import add_at
 from mechgraph.result.solution import Checks, MaterialPoint
-from mechgraph.structure.reaction import (
+from mechgraph.structure.reaction_split import (
     UNIQUE,
     PairFrames,
     Stress,

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.closure.configuration import Index
+from mechgraph.equations.state import State
 from mechgraph.errors import MechgraphError
 from mechgraph.force.analysis import Analysis, flat_place
-from mechgraph.formulation.state import State
-from mechgraph.motion.system import Index
 from mechgraph.result.solution import Checks, MaterialPoint
 
 

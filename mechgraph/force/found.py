@@ -8,11 +8,11 @@ from functools import cached_property
 from typing import Any
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.force.methods import NO_WRENCHES, Wrenches
-from mechgraph.force.site import Site, inertia_wrenches
-from mechgraph.motion.path import Tracks
-from mechgraph.motion.rates import Rates
-from mechgraph.motion.system import Configuration, Index
+from mechgraph.closure.configuration import Configuration, Index
+from mechgraph.closure.path import Tracks
+from mechgraph.closure.rates import Rates
+from mechgraph.force.applied_loads import Site, inertia_wrenches
+from mechgraph.force.dalembert import NO_WRENCHES, Wrenches
 
 
 @dataclass(frozen=True)

@@ -9,27 +9,27 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.closure import passive_rest as idle
+from mechgraph.closure.assembly import assembled_at
+from mechgraph.closure.configuration import Index
+from mechgraph.closure.follow import SparseSolver
+from mechgraph.closure.march import Status
+from mechgraph.closure.path import Positions, continued, fits_one_block
 from mechgraph.errors import DeadPointError, DeclarationError, IndeterminateError, ReachError
 from mechgraph.force.analysis import Analysis
+from mechgraph.force.applied_loads import Site, nothing
 from mechgraph.force.blocks import Blocks
+from mechgraph.force.dalembert import METHODS, Problem
 from mechgraph.force.found import Forces, Motions
 from mechgraph.force.large import SparseAnalysis, move_sparse
-from mechgraph.force.methods import METHODS, Problem
 from mechgraph.force.run import Run, self_length
-from mechgraph.force.site import Site, nothing
 from mechgraph.model.load import Load
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.motion import idle
-from mechgraph.motion.assembly import assembled_at
-from mechgraph.motion.follow import SparseSolver
-from mechgraph.motion.march import Status
-from mechgraph.motion.path import Positions, continued, fits_one_block
-from mechgraph.motion.system import Index
 from mechgraph.numerics.linear import ChosenSystem
 from mechgraph.numerics.memory import keep_freed_memory
+from mechgraph.report.report import check
 from mechgraph.result.solution import Solution
-from mechgraph.structure.freedom import free_motion
-from mechgraph.structure.report import check
+from mechgraph.structure.mobility import free_motion
 
 CONTRADICTION = 1e-6
 """Relative part of the closure rates that drivers may leave open before they count as contradicting each other."""

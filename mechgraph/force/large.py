@@ -14,17 +14,17 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.closure.assembly import CLOSED
+from mechgraph.closure.bordering import LoopSystem
+from mechgraph.closure.configuration import Configuration, Index, System
+from mechgraph.closure.follow import SparseFollower, SparseNode, SparseSolver, sparse_rates
+from mechgraph.closure.march import Status
+from mechgraph.closure.rates import DEAD_POINT, Rates
 from mechgraph.errors import MechgraphError
 from mechgraph.force.analysis import Analysis
 from mechgraph.force.found import Motions
 from mechgraph.force.least import least_change
-from mechgraph.motion.assembly import CLOSED
-from mechgraph.motion.follow import SparseFollower, SparseNode, SparseSolver, sparse_rates
-from mechgraph.motion.loops import LoopSystem
-from mechgraph.motion.march import Status
-from mechgraph.motion.rates import DEAD_POINT, Rates
-from mechgraph.motion.system import Configuration, Index, System
-from mechgraph.structure.reaction import PairFrames, Stress, pair_power, reaction_part, split_stress
+from mechgraph.structure.reaction_split import PairFrames, Stress, pair_power, reaction_part, split_stress
 
 SPARSE_ROWS = 300
 """Rows of the closure Jacobian (six a loop) from which on a mechanism is solved sparsely.

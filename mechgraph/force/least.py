@@ -16,10 +16,10 @@ import scipy
 
 from mechgraph.algebra.screw import shift_wrench
 from mechgraph.algebra.se3 import Array
-from mechgraph.motion.follow import SparseNode
-from mechgraph.motion.system import Configuration
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.follow import SparseNode
 from mechgraph.numerics.sparse import Pattern
-from mechgraph.structure.reaction import at_pair_points
+from mechgraph.structure.reaction_split import at_pair_points
 
 
 def least_change(here: Configuration, node: SparseNode, reactions: Array) -> Array:

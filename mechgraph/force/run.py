@@ -12,23 +12,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.closure.assembly import CLOSED, closed_start, named_columns, state_rows
+from mechgraph.closure.configuration import Configuration, Index, System
+from mechgraph.closure.march import FAIR, SINGULAR, Status
+from mechgraph.closure.passive_rest import Idle, held_well, spin_angles
+from mechgraph.closure.path import Follower, Positions, in_blocks
+from mechgraph.closure.rates import DEAD_POINT, Rates, closure_solver, distance_to_dead_point, rates
 from mechgraph.errors import DeclarationError, IndeterminateError
+from mechgraph.force.dalembert import chosen_for_all
 from mechgraph.force.found import Motions
 from mechgraph.force.large import Given, certified_loops, refuse_dense
-from mechgraph.force.methods import chosen_for_all
 from mechgraph.model.drive import Drive
 from mechgraph.model.load import Load
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.motion_law import Motion
-from mechgraph.motion.assembly import CLOSED, closed_start, named_columns, state_rows
-from mechgraph.motion.idle import Idle, held_well, spin_angles
-from mechgraph.motion.march import FAIR, SINGULAR, Status
-from mechgraph.motion.path import Follower, Positions, in_blocks
-from mechgraph.motion.rates import DEAD_POINT, Rates, closure_solver, distance_to_dead_point, rates
-from mechgraph.motion.system import Configuration, Index, System
+from mechgraph.model.motion import Motion
 from mechgraph.numerics.linear import Choice, ChosenSystem, choose, independent_rows, rank_of, singular_values
-from mechgraph.structure.freedom import free_motion
-from mechgraph.structure.report import check
+from mechgraph.report.report import check
+from mechgraph.structure.mobility import free_motion
 
 TURNS_BACK = 60
 """Most steps in which the spin of passive bodies is taken back."""

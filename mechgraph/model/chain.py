@@ -9,10 +9,10 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array, identity, inverse
 from mechgraph.errors import DeclarationError
-from mechgraph.model.connection import Marker, Pair
 from mechgraph.model.link import Link
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair import TABLE
+from mechgraph.model.pair import Marker, Pair
+from mechgraph.model.pair_type import TABLE
 from mechgraph.model.values import is_numeric, plain
 
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mechgraph.errors import DeclarationError, MissingExtraError
-from mechgraph.model.connection import Marker
 from mechgraph.model.load import LENGTH, Load
-from mechgraph.model.motion_law import Motion
+from mechgraph.model.motion import Motion
+from mechgraph.model.pair import Marker
 from mechgraph.model.values import plain
 
 if TYPE_CHECKING:

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy
 
-from mechgraph.model.connection import Pair
 from mechgraph.model.conversion import UNIT_NAMES
 from mechgraph.model.drive import Drive
 from mechgraph.model.link import Link
 from mechgraph.model.load import LOADS
-from mechgraph.model.pair import PairType
+from mechgraph.model.pair import Pair
+from mechgraph.model.pair_type import PairType
 from mechgraph.model.values import is_numeric
 
 if TYPE_CHECKING:

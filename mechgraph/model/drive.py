@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mechgraph.model.motion_law import Motion
+from mechgraph.model.motion import Motion
 
 
 @dataclass(frozen=True)

@@ -13,13 +13,13 @@ from typing import Any, TypeVar
 import numpy as np
 
 from mechgraph.errors import DeclarationError
-from mechgraph.model.connection import Marker, Pair
 from mechgraph.model.conversion import converted
 from mechgraph.model.declaration import declaration_faults, flat_start, item_faults
 from mechgraph.model.drive import Drive
 from mechgraph.model.link import Link
 from mechgraph.model.load import Effort, Load, TorsionSpring
-from mechgraph.model.pair import PairType
+from mechgraph.model.pair import Marker, Pair
+from mechgraph.model.pair_type import PairType
 from mechgraph.model.values import is_numeric, plain, same_fields
 
 Made = TypeVar("Made")

@@ -1,507 +1,205 @@
-"""The pair table: a pair type is a row of data. To add a pair type, add a row (or pass a PairType of your own).
-
-A row is an ordered list of elementary freedoms, each a constant unit twist in the marker frame left by the freedoms before
-it, its reaction components, each a constant wrench in a named frame ``k`` (the marker frame left after ``k`` single
-freedoms), and one effort wrench for every freedom, so that ``S^T E = 1``. Nothing branches on the symbol.
-"""
+"""Pairs of a mechanism: the edges of the graph, and where they sit on their links."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from copy import copy
-from dataclasses import dataclass, replace
-from functools import cached_property
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from mechgraph.document import Document, Table, to_text
-from mechgraph.errors import DeclarationError
-from mechgraph.model import pair_evaluation as evaluation
-from mechgraph.model.values import is_numeric
+from mechgraph.algebra.se3 import Array
+from mechgraph.model.pair_type import TABLE, PairType
+from mechgraph.model.values import is_numeric, number_fault, plain, vector_fault
 
-Six = tuple[float, float, float, float, float, float]
-
-UNIT_TWISTS: dict[str, Six] = {
-    name: tuple(float(i == j) for j in range(6))  # type: ignore[misc]
-    for i, name in enumerate(("Rx", "Ry", "Rz", "Tx", "Ty", "Tz"))
-}
-UNIT_WRENCHES: dict[str, Six] = {
-    name: tuple(float(i == j) for j in range(6))  # type: ignore[misc]
-    for i, name in enumerate(("Mx", "My", "Mz", "Fx", "Fy", "Fz"))
-}
-ROTATION = ("Rx", "Ry", "Rz")
+PERPENDICULAR = 1e-6
+"""Largest cosine between axis and second direction that counts as perpendicular where a pair type needs it."""
 
 
-def _six(value: object) -> Six:
-    array = np.asarray(value, dtype=float)
-    if array.shape != (6,) or not np.isfinite(array).all():
-        raise ValueError(f"expected six finite numbers, got {value!r}")
-    return tuple(array.tolist())
+def second_direction(axis: Any) -> tuple[float, ...]:
+    """The global axis least aligned with ``axis``, made perpendicular to it: what fills ``second`` where it is left out."""
+    length = math.hypot(*axis)
+    if not length > 0:
+        return (1.0, 0.0, 0.0)
+    z = [c / length for c in axis]
+    least = min(range(3), key=lambda i: abs(z[i]))
+    x = [(i == least) - z[least] * z[i] for i in range(3)]
+    size = math.hypot(*x)
+    return x[0] / size, x[1] / size, x[2] / size
 
 
 @dataclass(frozen=True)
-class Freedom:
-    """One freedom: a constant unit twist ``twist + pitch * per_pitch``, angular part first.
+class Marker:
+    """A marker frame on a link: origin ``point``, z along ``axis``, x along ``second`` (projected perpendicular to z)."""
 
-    The angular part has length one (a turn) or zero (a slide; then the linear part has length one). ``per_pitch`` is the
-    part that is multiplied by the pitch of the pair, as in a helical pair.
-    """
+    point: Any = (0.0, 0.0, 0.0)
+    axis: Any = (0.0, 0.0, 1.0)
+    second: Any = None
 
-    name: str
-    twist: Six
-    per_pitch: Six = (0.0,) * 6
+    def __post_init__(self) -> None:
+        for field in ("point", "axis", "second"):
+            object.__setattr__(self, field, plain(getattr(self, field)))
+        if self.second is None and is_numeric(self.axis, (3,)):
+            object.__setattr__(self, "second", second_direction(self.axis))
 
-    @property
-    def label(self) -> str:
-        """The freedom as the table shows it: ``Rz``, or ``Rz+pitch*Tz`` where the pitch enters."""
-        moved = [name for name, unit in UNIT_TWISTS.items() if np.dot(unit, self.per_pitch)]
-        return "+".join([self.name, *(f"pitch*{name}" for name in moved)])
-
-    @property
-    def turns(self) -> bool:
-        """Whether the coordinate is an angle (radians) rather than a length."""
-        return any(self.twist[:3])
-
-
-@dataclass(frozen=True)
-class Component:
-    """One reaction component or effort: a constant wrench ``wrench + pitch * per_pitch`` in frame ``frame``.
-
-    Its origin is that of the frame, or of marker B where ``at_b``.
-    """
-
-    name: str
-    wrench: Six
-    frame: int = 0
-    per_pitch: Six = (0.0,) * 6
-    at_b: bool = False
-
-    @property
-    def is_couple(self) -> bool:
-        """Whether the component is a couple (unit of a moment) rather than a force."""
-        return not any(self.wrench[3:])
-
-
-@dataclass(frozen=True)
-class Bookkeeping:
-    """How a ledger in Lee's manner writes the pair: a free dual force plus parts along the axis, under conditions.
-
-    The dual force has six unknowns; ``conditions`` are unit twists of frame 0 to which it is reciprocal (equations) and
-    ``along`` the components that the pair does transmit along its axis (unknowns). Source: Lee 1977, section 3.3.
-    """
-
-    conditions: tuple[Freedom, ...]
-    along: tuple[Component, ...]
-
-    @property
-    def unknowns(self) -> int:
-        """Number of unknowns, ``6 + len(along)``."""
-        return 6 + len(self.along)
-
-    @property
-    def equations(self) -> int:
-        """Number of constraint equations, ``len(conditions)``."""
-        return len(self.conditions)
-
-
-def _freedoms(given: Sequence[object], faults: list[str]) -> tuple[tuple[Freedom, ...], tuple[int, ...]]:
-    """Freedoms and the index of the frame before each; three freedoms of one rotation share theirs."""
-    out: list[Freedom] = []
-    frames: list[int] = []
-    for item in given:
-        before = len(out)
-        if item == "rotation":
-            out += [Freedom(name, UNIT_TWISTS[name]) for name in ROTATION]
-            frames += [before] * 3
-            continue
-        if isinstance(item, str):
-            head, _, tail = (part.strip() for part in item.replace("pitch*", "pitch ").partition("+"))
-            slide = tail.removeprefix("pitch").strip()
-            if head not in UNIT_TWISTS or (tail and slide not in UNIT_TWISTS):
-                faults.append(
-                    f"freedom {item!r}: unknown; give one of {', '.join(UNIT_TWISTS)}, 'rotation', 'Rz + pitch Tz' "
-                    "or a Freedom"
+    def faults(self, where: str, square: bool) -> list[str]:
+        """What is wrong with this marker; ``square`` where the second direction must be perpendicular as given."""
+        found = [
+            vector_fault(self.point, where + "point"),
+            vector_fault(self.axis, where + "axis", direction=True),
+        ]
+        if self.second is not None:
+            found.append(vector_fault(self.second, where + "second", direction=True))
+        if not any(found):
+            along = sum(z * x for z, x in zip(self.axis, self.second, strict=True))
+            cosine = along / (math.hypot(*self.axis) * math.hypot(*self.second))
+            if abs(cosine) > 1 - 1e-12:
+                found.append(
+                    f"{where}second = {self.second!r}: parallel to the axis {self.axis!r}; give another direction"
                 )
-                continue
-            item = Freedom(head, UNIT_TWISTS[head], UNIT_TWISTS[slide] if tail else (0.0,) * 6)
-        if not isinstance(item, Freedom):
-            faults.append(f"freedom {item!r}: expected a name, 'rotation' or a Freedom")
-            continue
-        bad = [row for row in (item.twist, item.per_pitch) if not is_numeric(row, (6,))]
-        if bad:
-            faults.append(f"freedom {item.name!r}: twist {bad[0]!r}: expected six finite numbers, angular part first")
-            continue
-        out.append(item)
-        frames.append(before)
-    return tuple(out), tuple(frames)
+            elif square and abs(cosine) > PERPENDICULAR:
+                found.append(
+                    f"{where}second = {self.second!r}: not perpendicular to the axis {self.axis!r} (cosine {cosine:.3g}); "
+                    "this pair type needs the true direction"
+                )
+        return [fault for fault in found if fault]
+
+    def pose(self) -> Array:
+        """The marker as a pose ``(3, 4)`` in the frame of its link."""
+        z = np.asarray(self.axis) / np.linalg.norm(self.axis)
+        x = np.asarray(self.second) - (z @ np.asarray(self.second)) * z
+        x /= np.linalg.norm(x)
+        return np.column_stack([x, np.cross(z, x), z, np.asarray(self.point)])
 
 
-def _component(item: object, faults: list[str], what: str) -> Component | None:
-    """A component from ``Component``, ``"Fz@2"`` or ``("Fz", 2)``."""
-    if isinstance(item, Component):
-        bad = [row for row in (item.wrench, item.per_pitch) if not is_numeric(row, (6,))]
-        if bad:
-            faults.append(f"{what} {item.name!r}: wrench {bad[0]!r}: expected six finite numbers, moment part first")
-            return None
-        return item
-    name, frame = item if isinstance(item, tuple) and len(item) == 2 else (item, 0)
-    if isinstance(name, str) and "@" in name:
-        name, _, frame = name.partition("@")
-    if name not in UNIT_WRENCHES or not str(frame).isdigit():
-        faults.append(
-            f"{what} {item!r}: expected one of {', '.join(UNIT_WRENCHES)}, with '@k' for frame k, or a Component"
-        )
-        return None
-    return Component(name, UNIT_WRENCHES[name], int(frame))
-
-
-@dataclass(frozen=True, init=False)
-class PairType:
-    """A row of the pair table.
+@dataclass(frozen=True)
+class Pair:
+    """A kinematic pair from link ``a`` to link ``b``; its reaction is the wrench that ``a`` exerts on ``b``.
 
     Parameters
     ----------
-    symbol, name : e.g. ``"Sc"``, ``"sphere in slotted cylinder"``; the symbol starts with a letter.
-    freedoms : in order; each one of ``"Rx" .. "Tz"``, ``"Rz + pitch Tz"``, ``"rotation"`` (three freedoms kept as one
-        rotation) or a ``Freedom``.
-    reactions : components that do no work, each ``"Fx"`` (frame 0), ``"Fz@2"`` (frame 2) or a ``Component``; None where no
-        constant components exist: the null space of ``S^T`` serves then, named n1, n2, ...
-    efforts : one for every freedom; None for a unit couple about each turn and a unit force along each slide through
-        the origin of marker B (where these are not dual to the freedoms, their combinations that are, position by position).
-    bookkeeping : how Lee's ledger writes the pair; None counts ``(6 - f, 0)``.
-    directed : whether the pair has an axis (False for a sphere or a weld).
-    square_second : whether the second direction must be perpendicular to the axis as given.
-
-    Raises
-    ------
-    DeclarationError
-        naming every fault: unknown names, reactions not reciprocal to the freedoms at random positions, ``S^T E != 1``.
+    name : its name in the graph; freedoms are named ``"name.Rz"`` after it.
+    type : a symbol of the pair table or a PairType.
+    a, b : the links. Groove, plane and slot belong to ``a``.
+    point, axis, second : marker in global coordinates at the declared configuration (all coordinates zero).
+    pitch, lead : advance per radian or per turn, right-hand positive; exactly one where the type needs it.
+    on_a, on_b : instead of point/axis, a Marker on each link in that link's own frame.
     """
 
-    symbol: str
     name: str
-    freedoms: tuple[Freedom, ...]
-    reactions: tuple[Component, ...] | None
-    efforts: tuple[Component, ...]
-    bookkeeping: Bookkeeping | None
-    directed: bool
-    square_second: bool
-    frame_before: tuple[int, ...]
-    computed_efforts: bool
+    type: PairType
+    a: str
+    b: str
+    point: Any = None
+    axis: Any = None
+    second: Any = None
+    pitch: float | None = None
+    lead: float | None = None
+    on_a: Marker | None = None
+    on_b: Marker | None = None
 
     def __init__(
         self,
-        symbol: str,
-        name: str = "",
+        name: str,
+        type: str | PairType,
+        a: str,
+        b: str,
         *,
-        freedoms: Sequence[object],
-        reactions: Sequence[object] | None = None,
-        efforts: Sequence[object] | None = None,
-        bookkeeping: Bookkeeping | None = None,
-        directed: bool = True,
-        square_second: bool = False,
+        point: Any = None,
+        axis: Any = None,
+        second: Any = None,
+        pitch: float | None = None,
+        lead: float | None = None,
+        on_a: Marker | None = None,
+        on_b: Marker | None = None,
     ) -> None:
-        faults = _fill(
-            self,
-            symbol,
-            name,
-            freedoms,
-            reactions,
-            efforts,
-            bookkeeping,
-            directed=directed,
-            square_second=square_second,
-        )
-        if not faults and efforts is None:
-            object.__setattr__(self, "computed_efforts", not _dual_at_random(self))
-        if not faults:
-            faults += _row_faults(self)
-        if faults:
-            raise DeclarationError(f"pair type {symbol!r}", faults)
-
-    def scaled(self, L: float) -> PairType:
-        """The row with its lengths divided by ``L``: pitches of turns given as numbers, arms of forces; itself where it has none."""
-        freedoms = tuple(
-            replace(f, twist=_six((*f.twist[:3], *(v / L for v in f.twist[3:])))) if f.turns and any(f.twist[3:]) else f
-            for f in self.freedoms
-        )
-        reactions = self.reactions if self.reactions is None else tuple(_scaled_arm(c, L) for c in self.reactions)
-        efforts = tuple(_scaled_arm(c, L) for c in self.efforts)
-        if (freedoms, reactions, efforts) == (self.freedoms, self.reactions, self.efforts):
-            return self
-        out = copy(self)
-        for key, value in (("freedoms", freedoms), ("reactions", reactions), ("efforts", efforts)):
-            object.__setattr__(out, key, value)
-        return out
+        row = TABLE.get(type, type) if isinstance(type, str) else type
+        axis, second, point = plain(axis), plain(second), plain(point)
+        if axis is None and point is not None and isinstance(row, PairType) and not row.directed:
+            axis = (0.0, 0.0, 1.0)
+        if second is None and is_numeric(axis, (3,)):
+            second = second_direction(axis)
+        for key, value in {
+            "name": name,
+            "type": row,
+            "a": a,
+            "b": b,
+            "point": point,
+            "axis": axis,
+            "second": second,
+            "pitch": plain(pitch),
+            "lead": plain(lead),
+            "on_a": on_a,
+            "on_b": on_b,
+        }.items():
+            object.__setattr__(self, key, value)
 
     @property
-    def f(self) -> int:
-        """Number of freedoms."""
-        return len(self.freedoms)
+    def has_geometry(self) -> bool:
+        """Whether the pair says where it sits."""
+        return self.point is not None or self.axis is not None or self.on_a is not None or self.on_b is not None
 
     @property
-    def component_names(self) -> tuple[str, ...]:
-        """Names of the reaction components, in order."""
-        if self.reactions is None:
-            return tuple(f"n{i + 1}" for i in range(6 - self.f))
-        return tuple(c.name for c in self.reactions)
-
-    @cached_property
-    def factors(self) -> tuple[tuple[int, ...], ...]:
-        """Freedoms grouped by factor: one index for a single freedom, three for a rotation."""
-        groups: dict[int, list[int]] = {}
-        for j, k in enumerate(self.frame_before):
-            groups.setdefault(k, []).append(j)
-        return tuple(tuple(g) for g in groups.values())
-
-    @cached_property
-    def nx(self) -> int:
-        """Number of state numbers: one for a single freedom, a unit quaternion for a rotation."""
-        return sum(1 if len(g) == 1 else 4 for g in self.factors)
-
-    @cached_property
-    def takes_pitch(self) -> bool:
-        """Whether a pair of this type needs a pitch."""
-        rows = [f.per_pitch for f in self.freedoms] + [c.per_pitch for c in self.reactions or ()]
-        return any(any(row) for row in rows)
+    def pitch_per_radian(self) -> float:
+        """Advance per radian; 0 where the type takes none."""
+        if self.lead is not None:
+            return self.lead / (2 * np.pi)
+        return 0.0 if self.pitch is None else self.pitch
 
     @property
-    def drivable(self) -> tuple[bool, ...]:
-        """Which freedoms take a drive: the single ones, not those of a rotation."""
-        single = {g[0] for g in self.factors if len(g) == 1}
-        return tuple(j in single for j in range(self.f))
+    def markers(self) -> tuple[Marker, Marker]:
+        """The markers on ``a`` and ``b``; for the point/axis form one marker in coinciding frames."""
+        if self.on_a is not None and self.on_b is not None:
+            return self.on_a, self.on_b
+        marker = Marker(self.point, self.axis, self.second)
+        return marker, marker
 
     @property
-    def unknowns_and_equations(self) -> tuple[int, int]:
-        """Lee's ledger entry of the row; ``(6 - f, 0)`` without a bookkeeping."""
-        return (self.bookkeeping.unknowns, self.bookkeeping.equations) if self.bookkeeping else (6 - self.f, 0)
+    def freedom_names(self) -> tuple[str, ...]:
+        """Full names of the freedoms, ``"B.Tz"``."""
+        if not isinstance(self.type, PairType):
+            return ()
+        return tuple(f"{self.name}.{f.name}" for f in self.type.freedoms)
 
-    def __repr__(self) -> str:
-        return f"PairType({self.symbol!r}, {self.name!r}, f={self.f})"
+    def replace(self, **changes: Any) -> Pair:
+        """A copy with fields changed."""
+        return Pair(**{**{k: getattr(self, k) for k in self.__dataclass_fields__}, **changes})
 
+    def faults(self) -> list[str]:
+        """What is wrong with this pair by itself, one line each."""
+        where = f"pair {self.name!r}: "
+        if not isinstance(self.name, str) or not self.name:
+            return [f"pair {self.name!r}: the name must be a non-empty text"]
+        if not isinstance(self.type, PairType):
+            return [f"{where}unknown type {self.type!r}; known: {', '.join(TABLE)}, or pass a PairType"]
+        found: list[str | None] = []
+        if self.a == self.b:
+            found.append(f"{where}joins link {self.a!r} to itself; a pair joins two links")
+        found += list(self._pitch_faults(where))
+        if (self.on_a is None) != (self.on_b is None):
+            missing = "on_b" if self.on_b is None else "on_a"
+            found.append(f"{where}{missing} is missing; a pair by markers needs one on each link")
+        elif self.on_a is not None and self.on_b is not None:
+            if self.point is not None or self.axis is not None:
+                found.append(f"{where}has both point/axis and markers on_a/on_b; give one form")
+            for side, marker in (("on_a.", self.on_a), ("on_b.", self.on_b)):
+                found += marker.faults(where + side, self.type.square_second)
+        elif self.has_geometry:
+            if self.point is None:
+                found.append(f"{where}has an axis but no point; give point=(x, y, z)")
+            if self.axis is None:
+                found.append(f"{where}has a point but no axis; type {self.type.symbol} needs axis=(x, y, z)")
+            if self.point is not None and self.axis is not None:
+                found += Marker(self.point, self.axis, self.second).faults(where, self.type.square_second)
+        return [fault for fault in found if fault]
 
-def _fill(
-    row: PairType,
-    symbol: str,
-    name: str,
-    freedoms: Sequence[object],
-    reactions: Sequence[object] | None,
-    efforts: Sequence[object] | None = None,
-    bookkeeping: Bookkeeping | None = None,
-    *,
-    directed: bool = True,
-    square_second: bool = False,
-) -> list[str]:
-    """Set the fields of a new row; the faults of what is given, before any number is tried."""
-    faults: list[str] = []
-    if not isinstance(symbol, str) or not symbol.isidentifier():
-        faults.append(f"symbol {symbol!r}: expected letters and digits, starting with a letter")
-    rows, before = _freedoms(freedoms, faults)
-    parts = None
-    if reactions is not None:
-        parts = tuple(c for c in (_component(r, faults, "reaction") for r in reactions) if c is not None)
-    if efforts is None:
-        work = tuple(_dual_effort(f, k) for f, k in zip(rows, before, strict=True))
-    else:
-        work = tuple(c for c in (_component(e, faults, "effort") for e in efforts) if c is not None)
-    fields = {
-        "symbol": symbol,
-        "name": name or str(symbol),
-        "freedoms": rows,
-        "reactions": parts,
-        "efforts": work,
-        "bookkeeping": bookkeeping,
-        "directed": directed,
-        "square_second": square_second,
-        "frame_before": before,
-        "computed_efforts": False,
-    }
-    for key, value in fields.items():
-        object.__setattr__(row, key, value)
-    return faults
-
-
-def _scaled_arm(c: Component, L: float) -> Component:
-    """A force component with its moment (an arm) divided by ``L``; couples have none."""
-    if c.is_couple or not any(c.wrench[:3]):
-        return c
-    return replace(c, wrench=_six((*(v / L for v in c.wrench[:3]), *c.wrench[3:])))
-
-
-def _dual_effort(freedom: Freedom, frame: int) -> Component:
-    """Unit couple about a turn, or unit force along a slide through the origin of marker B."""
-    w, v = freedom.twist[:3], freedom.twist[3:]
-    if freedom.turns:
-        return Component("M" + freedom.name[1:], (*w, 0.0, 0.0, 0.0), frame, at_b=True)
-    return Component("F" + freedom.name[1:], (0.0, 0.0, 0.0, *v), frame, at_b=True)
-
-
-def _dual_at_random(row: PairType) -> bool:
-    """Whether ``S^T E = 1`` at random positions (fixed seed)."""
-    x = evaluation.random_coordinates(row, np.random.default_rng(12345), 1, 7)
-    pitch = np.array([[0.3]])
-    frames = evaluation.frames_of(row, pitch, x)
-    S, E = evaluation.twists_of(row, pitch, frames), evaluation.efforts_of(row, pitch, frames)
-    unit = np.einsum("ifnt,ignt->fgnt", S, E)
-    return not row.f or bool(np.abs(unit - np.eye(row.f)[:, :, None, None]).max() < 1e-9)
-
-
-def _row_faults(row: PairType) -> list[str]:
-    """Faults of a row, seen at random positions (fixed seed): unit twists, reciprocity, ranks, ``S^T E = 1``."""
-    faults = []
-    for j, freedom in enumerate(row.freedoms):
-        w, v = np.array(freedom.twist[:3]), np.array(freedom.twist[3:])
-        if len(row.factors) and (j,) in row.factors and abs(np.linalg.norm(w if w.any() else v) - 1) > 1e-12:
-            faults.append(
-                f"freedom {freedom.name}: the twist {freedom.twist} is not a unit twist; divide it by its length"
-            )
-    names = [f.name for f in row.freedoms]
-    if len(set(names)) < len(names):
-        faults.append(
-            f"freedoms {', '.join(names)}: names repeat; give each a name of its own through Freedom(name, twist)"
-        )
-    if len(set(row.component_names)) < len(row.component_names):
-        faults.append(f"reactions {', '.join(row.component_names)}: names repeat")
-    if len(row.efforts) != row.f:
-        faults.append(f"efforts: {len(row.efforts)} given for {row.f} freedoms; give one for each")
-    if row.reactions is not None and len(row.reactions) != 6 - row.f:
-        faults.append(f"reactions: {len(row.reactions)} given, expected 6 - f = {6 - row.f}")
-    legal = {0, *np.cumsum([len(g) for g in row.factors]).tolist()}
-    for c in (*(row.reactions or ()), *row.efforts):
-        if c.frame not in legal:
-            faults.append(f"component {c.name}: there is no frame {c.frame}; frames of this row: {sorted(legal)}")
-    if row.f > 6:
-        faults.append(f"freedoms: {row.f} given, a pair has at most 6")
-    if faults:
-        return faults
-    rng = np.random.default_rng(12345)
-    x = evaluation.random_coordinates(row, rng, 1, 7)
-    pitch = np.array([[0.3]])
-    frames = evaluation.frames_of(row, pitch, x)
-    S = evaluation.twists_of(row, pitch, frames)
-    if row.f and min(np.linalg.matrix_rank(S[:, :, 0, t], tol=1e-9) for t in range(7)) < row.f:
-        faults.append(f"freedoms {', '.join(names)}: not independent at random positions")
-        return faults
-    W = evaluation.reactions_of(row, pitch, frames)
-    if not _dual_at_random(row):
-        faults.append("efforts: S^T E is not the unit matrix at random positions; give efforts dual to the freedoms")
-    work = np.einsum("ifnt,icnt->fcnt", S, W)
-    for i, name in enumerate(row.component_names):
-        worst = np.abs(work[:, i]).max(initial=0.0)
-        if worst > 1e-9:
-            faults.append(
-                f"reaction {name}: does work on the freedoms (power {worst:.3g} at a random position); "
-                "reactions must be reciprocal: try another frame, or reactions=None"
-            )
-    if not faults and row.f < 6 and np.linalg.matrix_rank(W[:, :, 0, 0], tol=1e-9) < 6 - row.f:
-        faults.append(f"reactions {', '.join(row.component_names)}: not independent")
-    return faults
-
-
-_AXIS = (Freedom("Tz", UNIT_TWISTS["Tz"]), Freedom("Rz", UNIT_TWISTS["Rz"]))
-_FZ = Component("Fz", UNIT_WRENCHES["Fz"])
-_MZ = Component("Mz", UNIT_WRENCHES["Mz"])
-_SCREW_FZ = Component("Fz", UNIT_WRENCHES["Fz"], 0, (0.0, 0.0, -1.0, 0.0, 0.0, 0.0))
-
-
-class PairTable(Mapping[str, PairType]):
-    """The pair table: symbol -> PairType; prints as a table."""
-
-    def __init__(self, rows: Sequence[PairType]) -> None:
-        self._rows = {row.symbol: row for row in rows}
-
-    def __getitem__(self, symbol: str) -> PairType:
-        return self._rows[symbol]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._rows)
-
-    def __len__(self) -> int:
-        return len(self._rows)
-
-    def __str__(self) -> str:
-        rows = []
-        for row in self.values():
-            reactions = " ".join(f"{c.name}@{c.frame}" for c in row.reactions or ()) or " ".join(row.component_names)
-            unknowns, equations = row.unknowns_and_equations
-            rows.append(
-                (
-                    row.symbol,
-                    row.name,
-                    str(row.f),
-                    " ".join(f.label for f in row.freedoms) or "none",
-                    reactions or "none",
-                    f"{unknowns} / {equations}",
-                )
-            )
-        header = ("symbol", "name", "f", "freedoms in order", "reactions @ frame", "Lee's ledger")
-        return to_text(Document("Pair types", (Table(header, tuple(rows)),)))
-
-
-def _row(symbol: str, name: str, freedoms: Sequence[object], reactions: Sequence[object], **rest: Any) -> PairType:
-    """A row of the table, not tried at random positions: a test does that for all of them, once and not at every start."""
-    row = object.__new__(PairType)
-    _fill(row, symbol, name, freedoms, reactions, **rest)
-    return row
-
-
-TABLE = PairTable(
-    [
-        _row(
-            "R",
-            "revolute",
-            freedoms=["Rz"],
-            reactions=["Fx", "Fy", "Fz", "Mx", "My"],
-            bookkeeping=Bookkeeping(_AXIS, (_FZ,)),
-        ),
-        _row(
-            "P",
-            "prismatic",
-            freedoms=["Tz"],
-            reactions=["Fx", "Fy", "Mx", "My", "Mz"],
-            bookkeeping=Bookkeeping(_AXIS, (_MZ,)),
-        ),
-        _row(
-            "H",
-            "helical",
-            freedoms=["Rz + pitch Tz"],
-            reactions=["Fx", "Fy", "Mx", "My", _SCREW_FZ],
-            bookkeeping=Bookkeeping(_AXIS, (_SCREW_FZ,)),
-        ),
-        _row(
-            "C",
-            "cylindrical",
-            freedoms=["Rz", "Tz"],
-            reactions=["Fx", "Fy", "Mx", "My"],
-            bookkeeping=Bookkeeping(_AXIS, ()),
-        ),
-        _row(
-            "U",
-            "universal (slotted sphere)",
-            freedoms=["Rz", "Rx"],
-            reactions=["Fx", "Fy", "Fz", "My@1"],
-            square_second=True,
-        ),
-        _row("S", "spherical", freedoms=["rotation"], reactions=["Fx", "Fy", "Fz"], directed=False),
-        _row("E", "planar", freedoms=["Tx", "Ty", "Rz"], reactions=["Fz", "Mx", "My"]),
-        _row(
-            "Sc",
-            "sphere in slotted cylinder",
-            freedoms=["Tz", "Ry", "Rx"],
-            reactions=["Fx@1", "Fy@1", "Mz@2"],
-            square_second=True,
-        ),
-        _row("Sg", "sphere in groove", freedoms=["Tz", "rotation"], reactions=["Fx@1", "Fy@1"]),
-        _row(
-            "Cp", "cylinder on plane", freedoms=["Tx", "Ty", "Rz", "Rx"], reactions=["Fz@2", "My@3"], square_second=True
-        ),
-        _row("Sp", "sphere on plane", freedoms=["Tx", "Ty", "rotation"], reactions=["Fz@2"]),
-        _row("W", "weld", freedoms=[], reactions=["Fx", "Fy", "Fz", "Mx", "My", "Mz"], directed=False),
-    ]
-)
-
-
-def pair_types() -> PairTable:
-    """The pair table of mechgraph: a mapping symbol -> PairType that prints as a table."""
-    return TABLE
+    def _pitch_faults(self, where: str) -> Iterator[str | None]:
+        given = [(n, v) for n, v in (("pitch", self.pitch), ("lead", self.lead)) if v is not None]
+        if not self.type.takes_pitch:
+            yield from (f"{where}{n} = {v!r}: type {self.type.symbol} has no pitch; leave it out" for n, v in given)
+        elif len(given) == 2:
+            yield f"{where}has both pitch and lead; give exactly one (lead = 2 pi pitch)"
+        elif not given and self.has_geometry:
+            yield f"{where}type {self.type.symbol} needs a pitch (advance per radian) or a lead (advance per turn)"
+        yield from (number_fault(v, where + n) for n, v in given)

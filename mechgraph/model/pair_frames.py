@@ -15,7 +15,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array, compose, quaternion_matrix, rotate, skew
 
 if TYPE_CHECKING:
-    from mechgraph.model.pair import PairType
+    from mechgraph.model.pair_type import PairType
 
 
 def screw_coefficients(twist: Array) -> list[Array | None]:

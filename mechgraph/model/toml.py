@@ -19,15 +19,15 @@ import tomli_w
 
 from mechgraph.errors import DeclarationError, FileError
 from mechgraph.model.chain import chain
-from mechgraph.model.connection import Marker, Pair
 from mechgraph.model.conversion import UNIT_NAMES
 from mechgraph.model.drive import Drive
 from mechgraph.model.library import library_names, library_path
 from mechgraph.model.link import Link
 from mechgraph.model.load import LOADS
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.motion_law import Motion
-from mechgraph.model.pair import TABLE, Bookkeeping, Component, Freedom, PairType
+from mechgraph.model.motion import Motion
+from mechgraph.model.pair import Marker, Pair
+from mechgraph.model.pair_type import TABLE, Bookkeeping, Component, Freedom, PairType
 from mechgraph.model.values import is_numeric
 
 SCHEMA = 1

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.equations.state import State
 from mechgraph.errors import DeclarationError
-from mechgraph.formulation.state import State
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.values import vector_fault
 from mechgraph.result import export

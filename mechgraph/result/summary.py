@@ -9,8 +9,8 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Table
-from mechgraph.model.connection import Pair
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.pair import Pair
 from mechgraph.result.solution import Solution
 from mechgraph.result.units import unit_of
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.closure.assembly import assembled
 from mechgraph.errors import DeclarationError
-from mechgraph.force.site import user_poses
+from mechgraph.force.applied_loads import user_poses
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.motion.assembly import assembled
 from mechgraph.result.solution import Solution
 from mechgraph.show.canvas import FAINT, INK, MUTED, PALETTE, pyplot, toolkit
 

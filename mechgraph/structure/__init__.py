@@ -1,1 +1,1 @@
-"""Graph and geometry together: mobility, passive freedoms, self-stress and uniqueness, the determinacy report."""
+"""Graph and geometry together: mobility, finite motion, passive freedoms, self-stress and uniqueness, pair changes."""

@@ -11,8 +11,8 @@ import numpy as np
 import scipy
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.motion.loops import LoopSystem
-from mechgraph.motion.system import Index
+from mechgraph.closure.bordering import LoopSystem
+from mechgraph.closure.configuration import Index
 
 SURE = 1e-3
 """Smallest pivot from which on the bordered system decides."""

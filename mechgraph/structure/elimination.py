@@ -18,7 +18,7 @@ import scipy
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array, cross
-from mechgraph.motion.system import Index
+from mechgraph.closure.configuration import Index
 
 Mask = NDArray[np.bool_]
 

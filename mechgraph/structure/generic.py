@@ -8,14 +8,14 @@ import numpy as np
 
 from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array, rotation_exp
-from mechgraph.model import pair_evaluation as evaluation
+from mechgraph.closure.bordering import LoopSystem
+from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair import PairType
-from mechgraph.motion.loops import LoopSystem
+from mechgraph.model.pair_type import PairType
 from mechgraph.numerics.linear import rank_of, singular_values
 from mechgraph.structure.bordered import Bordered
 from mechgraph.structure.elimination import Elimination, LoopRows, loop_rows
-from mechgraph.structure.freedom import LARGE
+from mechgraph.structure.mobility import LARGE
 from mechgraph.topology.linkgraph import LinkGraph
 
 GENERIC_RANK = 1e-7

@@ -1,109 +1,193 @@
-"""Finite mobility: motions followed over small and larger strokes with the loops kept closed, not judged by one rank.
-
-Random unit motions of the null space are taken as first steps and the loops closed again. What returns (instantaneous freedom) is
-told from what stays (finite freedom) by the displacement left; at points reached the count is made again, so that branch points and
-shaky positions do not mislead.
-"""
+"""Free motions of a closed position: mobility, what drivers leave free, and which of that is passive."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
+from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array
-from mechgraph.motion.assembly import CLOSED, close
-from mechgraph.motion.system import System
-from mechgraph.numerics.linear import rank_of, singular_values
-from mechgraph.structure.freedom import motions_of
+from mechgraph.closure.bordering import LoopSystem
+from mechgraph.closure.configuration import Configuration, Index, System
+from mechgraph.closure.passive_rest import Idle
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.numerics.linear import RANK_TOLERANCE, independent_rows, rank_of, singular_values
+from mechgraph.structure.bordered import Bordered
+from mechgraph.structure.elimination import Elimination, loop_rows
+from mechgraph.structure.passive import STILL, PassiveMotion, passive_motions
 
-STROKE = 0.05
-"""Length of a trial step (radians, or lengths / L)."""
-FAR_STEPS = 6
-"""Further steps of that length over which the motion is followed."""
-KEPT = 0.05
-"""Part of a trial step that must be left after closing for it to count as motion."""
-SEED = 7
+NEAR = 1e-3
+"""Margin below which a position is called nearly singular, and part of a motion below which a driver is near a dead point."""
+LARGE = 96
+"""Rows of the closure Jacobian above which rank and motions come from elimination along the loops, not from one dense matrix."""
+ELIMINATION_RANK = 1e-9
+"""Part of a unit row below which a pivot of the elimination counts as zero."""
+DEPENDENT = 1e-8
+"""Part of a unit motion below which the weakest driver counts as standing still: drivers depend, or a dead point."""
+ROUNDING = 1e-11
+"""Part of a unit rate that counts as zero."""
 
 
 @dataclass(frozen=True)
-class FiniteMotion:
-    """What following the motions showed.
+class FreeMotion:
+    """A motion that is neither driven nor passive: unit rates and the names of the freedoms that move."""
 
-    Attributes
-    ----------
-    mobility : dimension of the set of closed positions near by.
-    rank_nearby : largest rank of the closure Jacobian at closed positions near by.
-    stroke : length over which a motion was followed with the loops closed (0 where nothing moves).
-    null_nearby : motions ``(F, M)`` at the neighbour of that rank.
+    rates: Array
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Freedoms:
+    """What can move at a closed position.
+
+    ``rank`` of the closure Jacobian; ``margin`` smallest singular value kept and ``dropped`` largest one dropped, as parts of the
+    largest (pivots against unit rows where a large mechanism was eliminated along its loops); ``null (F, M)`` orthonormal motions;
+    ``dependent`` whether drivers cannot move independently, ``drive`` how strongly the weakest of them moves (against the freedom that
+    moves most; small near a dead point); ``passive`` and ``undriven`` motions with the drivers at rest;
+    ``hold`` freedoms whose rest stops the passive motions.
     """
 
-    mobility: int
-    rank_nearby: int
-    stroke: float
-    null_nearby: Array
+    rank: int
+    margin: float
+    dropped: float
+    null: Array
+    dependent: bool
+    passive: tuple[PassiveMotion, ...]
+    undriven: tuple[FreeMotion, ...]
+    hold: Index
+    drive: float = 1.0
+
+    @property
+    def mobility(self) -> int:
+        """Freedoms minus rank."""
+        return self.null.shape[1]
+
+    @property
+    def bodies(self) -> tuple[Idle, ...]:
+        """The links that have passive freedoms, each a body."""
+        return tuple(Idle(link) for link in sorted({link for p in self.passive for link in p.links}))
 
 
-def finite_motion(system: System, x: Array) -> FiniteMotion:
-    """Follow the motions of a closed state ``x (nx,)``.
+def is_large(system: System) -> bool:
+    """Whether the closure Jacobian is too large for one dense decomposition."""
+    return 6 * len(system.graph.loops) > LARGE
 
-    Where the closure Jacobian has full row rank the dimension is its nullity (implicit function theorem); otherwise motions
-    are followed and the displacements that stay are counted.
+
+def elimination(here: Configuration, dropped: Index | None = None) -> Bordered | Elimination:
+    """The closure Jacobian at one position, with some columns left out: bordered and factored, or eliminated along the loops."""
+    s = here.system
+    quick = Bordered(LoopSystem.at(here, np.zeros(0, dtype=np.intp) if dropped is None else dropped), here.S[:, :, 0])
+    if quick.sure:
+        return quick
+    rows = loop_rows(here.S[:, :, 0], s.loop_columns)
+    points = here.pair_points[:, :, 0]
+    at = [points[:, [k for k, _ in loop]] for loop in s.graph.loops]
+    return Elimination(rows if dropped is None else rows.without(dropped), at, ELIMINATION_RANK)
+
+
+def _motions(here: Configuration) -> tuple[int, float, float, Array]:
+    """Rank, margin, largest dropped and orthonormal motions."""
+    if is_large(here.system):
+        found = elimination(here)
+        return found.rank, found.smallest, found.largest, found.motions()
+    J = here.J[:, :, 0]
+    sigma = singular_values(J)
+    rank = rank_of(sigma)
+    margin = float(sigma[rank - 1] / sigma[0]) if rank else 1.0
+    rest = sigma[rank:]
+    dropped = float(rest[0] / sigma[0]) if rest.size and sigma[0] > 0 else 0.0
+    return rank, margin, dropped, motions_of(J)
+
+
+def _left_free(here: Configuration, null: Array, columns: Index) -> Array:
+    """Orthonormal motions with the freedoms ``columns`` at rest."""
+    if not len(columns) or not null.shape[1]:
+        return null
+    if is_large(here.system):
+        return np.asarray(null @ null_space(null[columns], 1e-8))
+    free = np.setdiff1d(np.arange(null.shape[0]), columns)
+    inner = motions_of(here.J[:, free, 0])
+    left = np.zeros((null.shape[0], inner.shape[1]))
+    left[free] = inner
+    return left
+
+
+def _drive(null: Array, columns: Index) -> float:
+    """Smallest singular value of the drivers' part in the motions, over the part of the freedom that moves most."""
+    if not len(columns):
+        return 1.0
+    if len(columns) > null.shape[1]:
+        return 0.0
+    most = float(np.sqrt((null**2).sum(axis=1).max()))
+    return float(singular_values(null[columns])[-1]) / most
+
+
+def free_motion(system: System, x: Array, columns: Index) -> Freedoms:
+    """Mobility at a closed state ``x (nx,)`` and what drivers in ``columns`` leave free."""
+    here = system.at(x[:, None])
+    rank, margin, gone, null = _motions(here)
+    drive = _drive(null, columns)
+    left = _left_free(here, null, columns)
+    passive = passive_motions(here, left, columns)
+    if not len(columns) and passive and len(passive) == null.shape[1]:
+        # nothing else can move: what could be driven is an input, not an idle freedom
+        drivable = [c for c, _ in single_freedoms(system.m)]
+        passive = [p for p in passive if not (np.abs(p.rates[drivable]) > STILL).any()]
+    undriven = _complement(system, left, passive)
+    hold = np.zeros(0, dtype=np.intp)
+    if passive:
+        _, pivots = scipy.linalg.qr(np.stack([p.rates for p in passive]), mode="r", pivoting=True)
+        hold = np.sort(pivots[: len(passive)]).astype(np.intp)
+    return Freedoms(rank, margin, gone, null, drive < DEPENDENT, tuple(passive), tuple(undriven), hold, drive)
+
+
+def motions_of(J: Array) -> Array:
+    """Orthonormal motions ``(F, M)`` with ``J q' = 0``."""
+    return null_space(J, RANK_TOLERANCE) if J.shape[0] else np.eye(J.shape[1])
+
+
+def _complement(system: System, left: Array, passive: list[PassiveMotion]) -> list[FreeMotion]:
+    """Motions of ``left`` that are not passive: in each one freedom moves while those of the other motions rest.
+
+    These freedoms are the first independent ones in the order in which drivers are wanted, so a motion is what one more driver does.
     """
-    J = system.at(x[:, None]).J[:, :, 0]
-    null = motions_of(J)
-    rank = J.shape[1] - null.shape[1]
-    if not null.shape[1]:
-        return FiniteMotion(0, rank, 0.0, null)
-    rng = np.random.default_rng(SEED)
-    regular = rank == J.shape[0]
-    reached = _strokes(system, x, null, rng, 1 if regular else 2 * null.shape[1])
-    best, rank_nearby, null_nearby = (null.shape[1] if regular else 0), rank, null
-    for i, (point, _) in enumerate(reached[:3]):
-        there = motions_of(system.at(point[:, None]).J[:, :, 0])
-        rank_there = J.shape[1] - there.shape[1]
-        if rank_there > rank_nearby or (not i and rank_there == rank):
-            rank_nearby, null_nearby = rank_there, there
-        if regular:
-            continue
-        moves = [change for _, change in _strokes(system, point, there, rng, there.shape[1] + 1)]
-        if moves:
-            best = max(best, rank_of(singular_values(np.stack(moves)), KEPT))
-    stroke = _followed(system, *reached[0]) if reached and best else 0.0
-    return FiniteMotion(best, rank_nearby, stroke, null_nearby)
-
-
-def _strokes(system: System, x: Array, null: Array, rng: np.random.Generator, count: int) -> list[tuple[Array, Array]]:
-    """Closed points reached by random steps along ``null`` and the displacements to them, in units of the stroke."""
+    if left.shape[1] == len(passive):
+        return []
+    rest = left
+    if passive:
+        P, _ = np.linalg.qr(np.stack([p.rates for p in passive], axis=1))
+        rest = left - P @ (P.T @ left)
+        U, s, _ = np.linalg.svd(rest, full_matrices=False)
+        rest = U[:, : left.shape[1] - len(passive)]
+    m = system.m
+    Q, _ = np.linalg.qr(rest)
+    order = drive_order(m, passive)
+    order += [c for c in range(system.n_freedoms) if c not in set(order)]
+    chosen = independent_rows(Q, order, Q.shape[1])
+    basis = np.linalg.solve(Q[chosen].T, Q.T)
+    basis /= np.abs(basis).max(axis=1, keepdims=True)
+    names = m.freedom_names()
     out = []
-    for _ in range(count):
-        # of a random vector of all freedoms, so that it does not hang on which basis of the motions was found
-        direction = null @ (null.T @ rng.normal(size=null.shape[0]))
-        moved = _step(system, x, direction)
-        if moved is not None:
-            out.append(moved)
+    for rates in np.where(np.abs(basis) < ROUNDING, 0.0, basis):
+        moving = tuple(names[i] for i in np.flatnonzero(np.abs(rates) > STILL))
+        out.append(FreeMotion(rates, moving))
     return out
 
 
-def _step(system: System, x: Array, direction: Array) -> tuple[Array, Array] | None:
-    direction = direction * (STROKE / np.abs(direction).max())
-    guess = system.advance(x[:, None], direction[:, None])[:, 0]
-    point, error = close(system, guess, np.zeros(0, dtype=np.intp))
-    change = system.difference(point[:, None], x[:, None])[:, 0] / STROKE
-    return (point, change) if error <= CLOSED and np.abs(change).max() > KEPT else None
+def single_freedoms(m: Mechanism) -> list[tuple[int, str]]:
+    """Freedoms that take a drive, as (column, name)."""
+    single = [d for p in m.pairs for d in p.type.drivable]
+    return [(i, n) for i, (n, s) in enumerate(zip(m.freedom_names(), single, strict=True)) if s]
 
 
-def _followed(system: System, x: Array, change: Array) -> float:
-    """Stroke over which the motion can be continued in the same sense."""
-    stroke = STROKE * float(np.abs(change).max())
-    for _ in range(FAR_STEPS):
-        null = motions_of(system.at(x[:, None]).J[:, :, 0])
-        direction = null @ (null.T @ change)
-        if not np.abs(direction).max(initial=0.0) > 1e-9:
-            break
-        moved = _step(system, x, direction)
-        if moved is None:
-            break
-        x, change = moved
-        stroke += STROKE * float(np.abs(change).max())
-    return stroke
+def drive_order(m: Mechanism, passive: Sequence[PassiveMotion]) -> list[int]:
+    """Freedoms that take a drive in the order in which they are wanted: free of passive motions first, then at the frame."""
+    idle = np.zeros(sum(p.type.f for p in m.pairs), dtype=bool)
+    for p in passive:
+        idle |= np.abs(p.rates) > STILL
+    at_frame = {n: m.frame in (p.a, p.b) for p in m.pairs for n in p.freedom_names}
+    singles = single_freedoms(m)
+    return [i for i, name in sorted(singles, key=lambda item: (idle[item[0]], not at_frame[item[1]], item[0]))]

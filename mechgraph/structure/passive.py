@@ -16,8 +16,8 @@ import numpy as np
 
 from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array, compose, pose_exp
-from mechgraph.model import pair_evaluation as evaluation
-from mechgraph.motion.system import Configuration, Index, System
+from mechgraph.closure.configuration import Configuration, Index, System
+from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.topology.linkgraph import LinkGraph
 
 STILL = 1e-8

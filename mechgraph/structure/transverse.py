@@ -13,9 +13,9 @@ import numpy as np
 
 from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array
-from mechgraph.model.pair import Component
-from mechgraph.motion.system import Configuration
-from mechgraph.structure.reaction import UNIQUE
+from mechgraph.closure.configuration import Configuration
+from mechgraph.model.pair_type import Component
+from mechgraph.structure.reaction_split import UNIQUE
 
 ROUND = 5e-13
 """Entry of a unit direction that counts as zero for its sign."""

@@ -9,6 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.closure.configuration import Configuration, Index, System
+from mechgraph.closure.lockstep import Lockstep
+from mechgraph.closure.march import Status
+from mechgraph.closure.path import Positions
 from mechgraph.errors import DeclarationError
 from mechgraph.force.analysis import Analysis
 from mechgraph.force.blocks import Blocks
@@ -16,11 +20,7 @@ from mechgraph.force.found import Motions
 from mechgraph.force.kinetostatics import CONTRADICTION, by_blocks, forces_of, solved_blocks
 from mechgraph.force.run import Run
 from mechgraph.model.load import Load
-from mechgraph.model.motion_law import Motion
-from mechgraph.motion.lockstep import Lockstep
-from mechgraph.motion.march import Status
-from mechgraph.motion.path import Positions
-from mechgraph.motion.system import Configuration, Index, System
+from mechgraph.model.motion import Motion
 from mechgraph.numerics.memory import keep_freed_memory
 from mechgraph.result.solution import Solution
 from mechgraph.variants.fields import Variants

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from mechgraph.algebra.inertia import physical
 from mechgraph.algebra.se3 import Array
 from mechgraph.model.chain import chain_numbers, markers_of_chain
-from mechgraph.model.connection import Marker, Pair
 from mechgraph.model.link import Link
 from mechgraph.model.load import Load
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.parameters import Declared, declared
 from mechgraph.model.values import PerCase, is_numeric
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError, MissingExtraError
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.motion_law import Motion
+from mechgraph.model.motion import Motion
 from mechgraph.variants.sampling import deviation, reach
 from mechgraph.variants.work import STATUSES, Part, Source
 

@@ -12,11 +12,11 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
+from mechgraph.force.dalembert import METHODS
 from mechgraph.force.kinetostatics import REDUNDANT
-from mechgraph.force.methods import METHODS
 from mechgraph.force.run import driven
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.motion_law import Motion
+from mechgraph.model.motion import Motion
 from mechgraph.variants.fields import AnyField, clashes, field_values, find_field
 from mechgraph.variants.outputs import named_outputs
 from mechgraph.variants.result import Study

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.closure.march import Status
 from mechgraph.errors import DeclarationError, MechgraphError
 from mechgraph.force.kinetostatics import solve
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.motion_law import Motion
-from mechgraph.motion.march import Status
+from mechgraph.model.motion import Motion
 from mechgraph.result.solution import Solution
 from mechgraph.variants.batch import solve_together
 from mechgraph.variants.fields import AnyField, Variants, stacked, topology_of, varied

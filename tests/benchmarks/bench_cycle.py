@@ -19,11 +19,11 @@ import numpy as np
 from bench_core import best, seven_r
 
 import mechgraph as mg
+from mechgraph.closure.march import Marcher
+from mechgraph.closure.path import Follower
 from mechgraph.force import analysis, blocks, found, kinetostatics
 from mechgraph.force.kinetostatics import METHODS
 from mechgraph.force.run import Run
-from mechgraph.motion.march import Marcher
-from mechgraph.motion.path import Follower
 
 TURN = (0.0, 360.0)
 STAGES = (

@@ -6,9 +6,9 @@ import pytest
 from strategies import closed_mechanism, motions, with_drives, with_loads
 
 import mechgraph as mg
-from mechgraph.model import pair_evaluation as evaluation
-from mechgraph.motion import march, path
-from mechgraph.motion.assembly import assembled
+from mechgraph.closure import march, path
+from mechgraph.closure.assembly import assembled
+from mechgraph.model import pair_kinematics as evaluation
 
 POSITIONS = 29
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import mechgraph as mg
 from mechgraph.algebra.se3 import rotation_exp
-from mechgraph.structure.report import DeterminacyReport
+from mechgraph.report.report import DeterminacyReport
 
 BUILDERS = {
     "planar": known.planar,

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import mechgraph as mg
 from mechgraph.algebra import screw, se3
-from mechgraph.model import pair_evaluation as evaluation
+from mechgraph.model import pair_kinematics as evaluation
 
 PITCH = 0.37
 USER_ROWS = {

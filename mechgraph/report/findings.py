@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.closure.configuration import System
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.motion.system import System
 from mechgraph.numerics.linear import rank_of, singular_values
-from mechgraph.structure.freedom import Freedoms
+from mechgraph.structure.mobility import Freedoms
 from mechgraph.structure.passive import STILL, PassiveMotion
 
 MOVES = 1e-5

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from mechgraph.algebra.screw import cross_twist
 from mechgraph.algebra.se3 import Array, compose, cross, inverse, pose_log
-from mechgraph.model import pair_evaluation as evaluation
+from mechgraph.closure.tree import Tree
+from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair import PairType
 from mechgraph.model.pair_frames import (
     Factor,
     Frame,
@@ -29,8 +29,8 @@ from mechgraph.model.pair_frames import (
     frames_along,
     moved_marker,
 )
+from mechgraph.model.pair_type import PairType
 from mechgraph.model.parameters import Parameters, parameters
-from mechgraph.motion.tree import Tree
 from mechgraph.numerics.linear import Place, compact
 from mechgraph.topology.linkgraph import LinkGraph, link_graph
 

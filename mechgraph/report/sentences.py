@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mechgraph.model.connection import second_direction
+from mechgraph.model.pair import second_direction
 
 if TYPE_CHECKING:
-    from mechgraph.structure.report import DeterminacyReport
+    from mechgraph.report.report import DeterminacyReport
 
 NAMED = 8
 """Names in a row that a sentence holds."""

@@ -27,7 +27,7 @@ from mechgraph.algebra.se3 import (
 from mechgraph.model.pair_frames import Frame
 
 if TYPE_CHECKING:
-    from mechgraph.model.pair import Component, Freedom, PairType
+    from mechgraph.model.pair_type import Component, Freedom, PairType
 
 
 def _screw_motion(twist: Array, q: Array) -> Array:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.document import Document, to_latex, to_text
-from mechgraph.formulation.state import State
+from mechgraph.equations.state import State
 from mechgraph.model.mechanism import Mechanism
 
 AXES = ("x", "y", "z")
@@ -218,7 +218,7 @@ class Formulation:
 
     def document(self, components: bool = True) -> Document:
         """The printed formulation as a document."""
-        from mechgraph.formulation.printing import formulation_document
+        from mechgraph.equations.printing import formulation_document
 
         return formulation_document(self, components)
 
@@ -232,7 +232,7 @@ class Formulation:
 
     def coefficients(self) -> CoefficientTable:
         """The nonzero coefficients ``Q(row, column)`` and right sides ``C(row)``, as Lee's Table XIV lists them."""
-        from mechgraph.formulation.printing import coefficient_rows
+        from mechgraph.equations.printing import coefficient_rows
 
         return CoefficientTable(tuple(coefficient_rows(self)))
 

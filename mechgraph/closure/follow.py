@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.motion.assembly import state_rows
-from mechgraph.motion.loops import LoopSystem
-from mechgraph.motion.march import (
+from mechgraph.closure.assembly import state_rows
+from mechgraph.closure.bordering import LoopSystem
+from mechgraph.closure.configuration import Configuration, Index, System
+from mechgraph.closure.march import (
     ACCEPTED,
     AIM,
     CONVERGED,
@@ -24,9 +25,8 @@ from mechgraph.motion.march import (
     SHORTEST_STEP,
     Status,
 )
-from mechgraph.motion.path import GAPS
-from mechgraph.motion.rates import Rates, Velocities
-from mechgraph.motion.system import Configuration, Index, System
+from mechgraph.closure.path import GAPS
+from mechgraph.closure.rates import Rates, Velocities
 from mechgraph.numerics.sparse import SparseFactor
 
 SLOW = 0.1
@@ -116,7 +116,7 @@ class SparseFollower:
     def follow(self, start: Configuration, values: Array) -> tuple[list[SparseNode | None], list[Status], Array]:
         """Nodes from a closed start at driver values ``(d, N)``, None where not reached and why, and where it first ended.
 
-        As in ``motion.path``: behind what cannot be passed the path goes on at the next position on this side of it, and where the
+        As in ``closure.path``: behind what cannot be passed the path goes on at the next position on this side of it, and where the
         first position cannot be reached the path is entered at the one nearest to the start and followed both ways.
         """
         first = self._node(start, self.loops, self.loops.first)

@@ -1,6 +1,6 @@
 """Positions along a path of driver values: nodes on the way, interpolation between them, one Newton for what is left.
 
-Between the nodes of the march (``motion.march``) further ones are put where many positions are asked for, until interpolation is
+Between the nodes of the march (``closure.march``) further ones are put where many positions are asked for, until interpolation is
 as good as rounding allows; what is then not closed is corrected by Newton, all positions of a block together.
 """
 
@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.motion.interpolation import Interpolation
-from mechgraph.motion.march import CONVERGED, CORRECTION, ROUNDING, SHORTEST_STEP, Marcher, Node, Status, Track
-from mechgraph.motion.system import Configuration, Index, System
+from mechgraph.closure.configuration import Configuration, Index, System
+from mechgraph.closure.interpolation import Interpolation
+from mechgraph.closure.march import CONVERGED, CORRECTION, ROUNDING, SHORTEST_STEP, Marcher, Node, Status, Track
 from mechgraph.numerics.linear import Choice, ChosenSystem, singular_between
 
 GAPS = 20

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from mechgraph.document import Bullets, Document, Heading, Paragraph, Table
 from mechgraph.document import Equation as Printed
-from mechgraph.formulation.names import names_of, subscript
-from mechgraph.formulation.registry import Equation, Formulation
+from mechgraph.equations.symbols import names_of, subscript
+from mechgraph.equations.terms import Equation, Formulation
 
 SECTIONS = (
     ("reaction", "Reactions of the pairs"),

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from mechgraph.formulation.build import formulate
-from mechgraph.formulation.registry import Ledger, LedgerRow
+from mechgraph.equations.build import formulate
+from mechgraph.equations.terms import Ledger, LedgerRow
 from mechgraph.model.mechanism import Mechanism
 
 if TYPE_CHECKING:
-    from mechgraph.structure.report import DeterminacyReport
+    from mechgraph.report.report import DeterminacyReport
 
 FINDINGS = ("undriven", "passive", "locked", "drivable", "not_drivable", "advice")
 COUNTED = 300

@@ -3,7 +3,7 @@
 Every variant has its own numbers (``Parameters`` with a batch axis) and its own driver path of the same number of positions. Steps are
 those from position to position, cut where they are long; each is predicted to second order and corrected by Newton, and a variant
 stays in step only where that is beyond doubt: a small correction, no singular position between two of its places, a good
-condition. What falls out of step is marked, and is for ``motion.path`` to follow by itself.
+condition. What falls out of step is marked, and is for ``closure.path`` to follow by itself.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.motion.assembly import state_rows
-from mechgraph.motion.march import CORRECTION
-from mechgraph.motion.system import Index, System
+from mechgraph.closure.assembly import state_rows
+from mechgraph.closure.configuration import Index, System
+from mechgraph.closure.march import CORRECTION
 from mechgraph.numerics.linear import Choice, ChosenSystem, choose, singular_between
 
 LONGEST = 0.1

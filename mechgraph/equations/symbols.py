@@ -7,7 +7,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair import Component, Freedom
+from mechgraph.model.pair_type import Component, Freedom
 
 LETTERS = {"x": "X", "y": "Y", "z": "A"}
 """Letter of a marker direction: A is the pair axis, as in Lee."""

@@ -15,8 +15,8 @@ from enum import Enum
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.motion.assembly import close, state_rows
-from mechgraph.motion.system import Configuration, Index, System
+from mechgraph.closure.assembly import close, state_rows
+from mechgraph.closure.configuration import Configuration, Index, System
 from mechgraph.numerics.linear import Choice, ChosenSystem, Factor, choose, singular_between
 
 CONVERGED = 1e-13

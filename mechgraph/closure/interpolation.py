@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.motion.march import Node
-from mechgraph.motion.system import Index, System
+from mechgraph.closure.configuration import Index, System
+from mechgraph.closure.march import Node
 
 WIDTH = 6
 """Most nodes through which one interpolation goes (each with value and rate)."""

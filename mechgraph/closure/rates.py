@@ -7,9 +7,9 @@ from functools import cached_property
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.motion import idle
-from mechgraph.motion.idle import Idle
-from mechgraph.motion.system import Configuration, Index
+from mechgraph.closure import passive_rest as idle
+from mechgraph.closure.configuration import Configuration, Index
+from mechgraph.closure.passive_rest import Idle
 from mechgraph.numerics.linear import Choice, ChosenSystem
 
 DEAD_POINT = 1e-10
@@ -71,7 +71,7 @@ def rates(
 ) -> Rates:
     """Rates for driver velocities and accelerations ``(d, T)``.
 
-    ``J q' = 0`` and ``J q'' = -bias``, the driven part known; passive freedoms of ``bodies`` at rest (see ``motion.idle``).
+    ``J q' = 0`` and ``J q'' = -bias``, the driven part known; passive freedoms of ``bodies`` at rest (see ``closure.passive_rest``).
     """
     dq, gap_v = _completed(here, solver, columns, velocity, None)
     moving = Velocities(here, dq)

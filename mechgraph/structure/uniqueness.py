@@ -9,14 +9,14 @@ import numpy as np
 
 from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array
-from mechgraph.model.connection import Pair
-from mechgraph.motion.system import Configuration, Index
+from mechgraph.closure.configuration import Configuration, Index
+from mechgraph.model.pair import Pair
 from mechgraph.numerics.linear import RANK_TOLERANCE
 from mechgraph.structure.bordered import Bordered
 from mechgraph.structure.elimination import Elimination
-from mechgraph.structure.freedom import elimination, is_large
-from mechgraph.structure.reaction import UNIQUE, PairFrames, Stress, orthonormal_stress, split_stress
-from mechgraph.structure.readable import Label, SelfStress, combinations, readable, regrouped
+from mechgraph.structure.mobility import elimination, is_large
+from mechgraph.structure.reaction_split import UNIQUE, PairFrames, Stress, orthonormal_stress, split_stress
+from mechgraph.structure.self_stress import Label, SelfStress, combinations, readable, regrouped
 from mechgraph.structure.transverse import Transverse, transverse
 
 PROBES = 6

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
+from mechgraph.equations.symbols import Names, names_of, screw_letter, subscript
+from mechgraph.equations.terms import AXES, Block, Equation, Formulation, Screw, Term, Unknown
 from mechgraph.errors import DeclarationError
-from mechgraph.formulation.names import Names, names_of, screw_letter, subscript
-from mechgraph.formulation.registry import AXES, Block, Equation, Formulation, Screw, Term, Unknown
-from mechgraph.model.connection import Pair
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair import Component
+from mechgraph.model.pair import Pair
+from mechgraph.model.pair_type import Component
 
 
 @dataclass

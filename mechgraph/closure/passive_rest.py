@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, cross, rotation_log
-from mechgraph.motion.system import Configuration, Index
+from mechgraph.closure.configuration import Configuration, Index
 from mechgraph.numerics.linear import Choice, ChosenSystem, choose
 
 LARGEST = 3.0

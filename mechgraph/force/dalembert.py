@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.formulation.build import formulate
-from mechgraph.formulation.registry import Formulation
-from mechgraph.formulation.state import State
-from mechgraph.motion.follow import SparseSolver
-from mechgraph.motion.system import Configuration, Index
+from mechgraph.closure.configuration import Configuration, Index
+from mechgraph.closure.follow import SparseSolver
+from mechgraph.equations.build import formulate
+from mechgraph.equations.state import State
+from mechgraph.equations.terms import Formulation
 from mechgraph.numerics.linear import Choice, ChosenSystem, add_at, choose
 
 CHUNK = 4_000_000

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, cross, rotate, rotate_back, to_matrix
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.rates import Rates
 from mechgraph.errors import DeclarationError
 from mechgraph.model.load import Load, Value
 from mechgraph.model.values import PerCase
-from mechgraph.motion.rates import Rates
-from mechgraph.motion.system import Configuration
 
 
 def inertia_wrenches(here: Configuration, rates: Rates) -> Array:

@@ -11,23 +11,24 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.closure.assembly import assembled, assembled_at, named_columns
+from mechgraph.closure.configuration import Index, System
 from mechgraph.document import Document, to_html, to_markdown, to_text
+from mechgraph.equations.terms import Ledger
 from mechgraph.errors import AssemblyError
-from mechgraph.formulation.registry import Ledger
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.motion.assembly import assembled, assembled_at, named_columns
-from mechgraph.motion.system import Index, System
 from mechgraph.numerics.linear import independent_rows
-from mechgraph.structure import drivers, facts, sections, wording
-from mechgraph.structure.advice import Effect, advice
-from mechgraph.structure.findings import Finding, LoopFact, input_motions, locked_findings, loop_facts, passive_finding
-from mechgraph.structure.freedom import NEAR, Freedoms, free_motion
+from mechgraph.report import drivers, facts, sections
+from mechgraph.report import sentences as wording
+from mechgraph.report.findings import Finding, LoopFact, input_motions, locked_findings, loop_facts, passive_finding
+from mechgraph.structure.finite_motion import FiniteMotion, finite_motion
 from mechgraph.structure.generic import Generic, generic
-from mechgraph.structure.mobility import FiniteMotion, finite_motion
-from mechgraph.structure.readable import SelfStress
-from mechgraph.structure.stress import Uniqueness, self_stresses, uniqueness
+from mechgraph.structure.mobility import NEAR, Freedoms, free_motion
+from mechgraph.structure.pair_changes import Effect, advice
+from mechgraph.structure.self_stress import SelfStress
+from mechgraph.structure.uniqueness import Uniqueness, self_stresses, uniqueness
 from mechgraph.topology.linkgraph import LinkGraph, link_graph
-from mechgraph.topology.parts import Parts, parts_of
+from mechgraph.topology.matching import Parts, parts_of
 
 DOUBT = 1e-11
 """Largest dropped singular value above which it may be more than rounding, so that the verdict is called near."""

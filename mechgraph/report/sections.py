@@ -6,12 +6,12 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from mechgraph.document import Bullets, Document, Heading, Paragraph, Table
-from mechgraph.model.pair import TABLE
-from mechgraph.structure.freedom import NEAR
-from mechgraph.structure.wording import assumed, loop_names, plural, reasons, short
+from mechgraph.model.pair_type import TABLE
+from mechgraph.report.sentences import assumed, loop_names, plural, reasons, short
+from mechgraph.structure.mobility import NEAR
 
 if TYPE_CHECKING:
-    from mechgraph.structure.report import DeterminacyReport
+    from mechgraph.report.report import DeterminacyReport
 
 TERMS = 4
 """Terms of a sum that is printed."""

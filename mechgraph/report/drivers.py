@@ -7,8 +7,8 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.linear import independent_rows
-from mechgraph.structure.findings import Finding, moves_nearby
-from mechgraph.structure.freedom import Freedoms, drive_order, single_freedoms
+from mechgraph.report.findings import Finding, moves_nearby
+from mechgraph.structure.mobility import Freedoms, drive_order, single_freedoms
 from mechgraph.structure.passive import STILL
 
 SHOWN = 8

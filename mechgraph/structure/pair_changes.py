@@ -14,15 +14,15 @@ import numpy as np
 
 from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array
-from mechgraph.model import pair_evaluation as evaluation
-from mechgraph.model.connection import Marker, Pair
+from mechgraph.closure.assembly import named_columns, scaled_system
+from mechgraph.closure.configuration import Configuration, System
+from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair import TABLE, PairType
-from mechgraph.motion.assembly import named_columns, scaled_system
-from mechgraph.motion.system import Configuration, System
+from mechgraph.model.pair import Marker, Pair
+from mechgraph.model.pair_type import TABLE, PairType
 from mechgraph.numerics.linear import RANK_TOLERANCE, singular_values
-from mechgraph.structure.freedom import Freedoms, free_motion
-from mechgraph.structure.mobility import finite_motion
+from mechgraph.structure.finite_motion import finite_motion
+from mechgraph.structure.mobility import Freedoms, free_motion
 
 SIGNIFICANT = 1e-6
 """Power of a unit twist on a unit self-stress above which the twist relieves it."""

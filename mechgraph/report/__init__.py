@@ -1,0 +1,1 @@
+"""The determinacy report: facts, findings, sentences, sections."""
