@@ -13,7 +13,7 @@ from mechgraph.errors import (
     MissingExtraError,
     ReachError,
 )
-from mechgraph.force.kinetostatics import assemble, kinematics, solve
+from mechgraph.kinetostatics import assemble, kinematics, solve
 from mechgraph.model.chain import chain
 from mechgraph.model.drive import Drive
 from mechgraph.model.library import library_names as library

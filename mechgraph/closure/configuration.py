@@ -464,6 +464,14 @@ class Configuration:
             return np.moveaxis(flat.reshape(len(s.m.pairs), 6, *x.shape[1:]), 1, 0)
         return np.asarray(np.einsum("lp,list->ipst", s.graph.loop_matrix, loops))
 
+    def closure_rates(self, dq: Array) -> Array:
+        """``J q'`` for rates ``(F, T)`` without forming J, ``(m, T)``."""
+        return self.loop_sums(self.pair_sums(self.S * dq))
+
+    def closure_bias(self, dq: Array, V: Array) -> Array:
+        """Velocity part of the closure accelerations ``(m, T)``."""
+        return self.loop_sums(self.bias(dq, V))
+
     def link_accelerations(self, dq: Array, ddq: Array, V: Array) -> Array:
         """Accelerations dV/dt of all links ``(6, N, T)``."""
         return self.accelerations_with(ddq, self.bias(dq, V))

@@ -8,45 +8,21 @@ line needs no effort to be held so.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array, cross, rotation_log
+from mechgraph.algebra.se3 import Array, cross
 from mechgraph.closure.configuration import Configuration, Index
-from mechgraph.numerics.linear import Choice, ChosenSystem, choose
-
-LARGEST = 3.0
-"""Largest rate of another freedom for a unit rate of the held one before another freedom is held."""
-TRIES = 8
-
+from mechgraph.closure.driver_path import DriverPath, Positions, Status
+from mechgraph.numerics.continuation import Follower
+from mechgraph.numerics.hermite import Interpolation
 
 @dataclass(frozen=True)
 class Idle:
     """A body with passive freedoms, by one of its links."""
 
     link: int
-
-
-def held_well(
-    here: Configuration, choices: list[Choice], which: Index, columns: Index
-) -> tuple[list[Choice], Index, ChosenSystem]:
-    """Choices such that at every position the held freedoms take a fair part in the passive motions."""
-    choices, which = list(choices), which.copy()
-    solver = ChosenSystem(here.J, choices, which)
-    size = np.abs(solver.null_of_columns()).max(axis=(0, 1), initial=0.0)
-    for _ in range(TRIES):
-        bad = np.flatnonzero(~(size <= LARGEST))
-        if not bad.size:
-            break
-        worst = int(bad[np.argmax(np.nan_to_num(size[bad], nan=np.inf))])
-        choices.append(choose(here.J[:, :, worst], columns))
-        trial = ChosenSystem(here.J[:, :, bad], [choices[-1]], np.zeros(bad.size, dtype=np.intp))
-        better = np.abs(trial.null_of_columns()).max(axis=(0, 1), initial=0.0)
-        take = better < np.nan_to_num(size[bad], nan=np.inf)
-        which[bad[take]] = len(choices) - 1
-        size[bad[take]] = better[take]
-    return choices, which, ChosenSystem(here.J, choices, which)
 
 
 def rest_points(here: Configuration, idle: tuple[Idle, ...], Z: Array) -> list[Array]:
@@ -109,30 +85,120 @@ def body_accelerations(idle: tuple[Idle, ...], points: list[Array], V: Array, A:
     return np.concatenate(out)
 
 
-def spin_angles(here: Configuration, idle: tuple[Idle, ...], Z: Array) -> tuple[Array, Array]:
-    """Angles ``(p, T)`` by which passive turns have carried bodies along a path, and the rates that turn by one radian.
+GAUSS = 8
+"""Points of Gauss and Legendre a step between nodes: the spin integrated over it is exact to rounding."""
+TURNING = 1e-6
+"""Part of a unit motion from which on a body takes part in it."""
 
-    For one passive turn of a body: the part along its axis of the rotation from each position to the next, summed.
-    Bodies with other passive motions are left as they are. Returns the angles and ``Z`` per radian, ``(F, p, T)``.
+
+def unspun(path: DriverPath, found: Positions, bodies: tuple[Idle, ...]) -> Positions:
+    """The same positions with passive bodies not spinning on the way from the start.
+
+    The nodes hold some freedom of every passive body, which turns it along the way by some spin. The angle by which it has to be turned
+    back is the integral of that spin over the track, taken by Gauss and Legendre's rule in every step between nodes, so that it does not
+    hang on which positions were asked for. Bodies with more than one passive motion are left as they are.
     """
-    G = passive_twists(here, idle, rest_points(here, idle, Z), Z)
-    angles = np.zeros(Z.shape[1:])
-    unit = Z.copy()
-    for i, body in enumerate(idle):
-        mine = [p for p in range(Z.shape[1]) if np.abs(G[6 * i : 6 * i + 6, p]).max() > 1e-6]
-        u = G[6 * i : 6 * i + 3, mine[0]]
+    nodes, good = found.tracks.nodes, np.flatnonzero(found.status == Status.OK)
+    interpolation = Interpolation(path, nodes)
+    if not len(interpolation.left) or not good.size:
+        return found
+    spins = _Spins(path, interpolation, found.follower, bodies)
+    x = found.x.copy()
+    x[:, good] = spins.turned_back(found.x[:, good], found.which[good], found.track[good], found.place[good])
+    turned = spins.turned_back(nodes.x, nodes.which, nodes.track, nodes.place)
+    tracks = replace(found.tracks, nodes=replace(nodes, x=turned))
+    return replace(found, x=x, here=None, tracks=tracks)
+
+
+class _Spins:
+    """Spin of passive bodies along tracks: rates at Gauss points, integrals up to any place."""
+
+    def __init__(self, path: DriverPath, interpolation: Interpolation, follower: Follower, bodies: tuple[Idle, ...]) -> None:
+        self.path, self.interpolation, self.follower, self.bodies = path, interpolation, follower, bodies
+        nodes, left = interpolation.nodes, interpolation.left
+        points, self._weights = np.polynomial.legendre.leggauss(GAUSS)
+        self._h = nodes.place[interpolation.right] - nodes.place[left]
+        step = np.repeat(np.arange(len(left)), GAUSS)
+        place = nodes.place[left][step] + np.tile(0.5 * (points + 1.0), len(left)) * self._h[step]
+        track = nodes.track[left][step]
+        drive = follower.paths.drive(track, place)
+        closed = follower.newton.close(interpolation(step, place, drive), drive, track, nodes.which[left][step])
+        here = path.at(closed.x, drive, track)
+        f = path.factored(here, closed.which)
+        self._new_track = np.concatenate([[True], np.diff(track) != 0])
+        axes, _ = _axes(here, bodies, f.motions())
+        rates = (f.sensitivity() * interpolation.slope[:, step]).sum(axis=1)
+        w = here.link_twists(rates)[:3]
+        legendre = np.polynomial.legendre.legvander(points, GAUSS - 1) * (np.arange(GAUSS) + 0.5)
+        self.axis: list[Array | None] = []
+        self._series: list[Array] = []
+        self._before: list[Array] = []
+        first = np.concatenate([[True], np.diff(nodes.track[left]) != 0])
+        for body, axis in zip(bodies, axes, strict=True):
+            if axis is None:
+                self.axis.append(None)
+                self._series.append(np.zeros((0, 0)))
+                self._before.append(np.zeros(0))
+                continue
+            axis = axis * self._senses(axis)
+            spin = -(w[:, body.link] * axis).sum(axis=0).reshape(-1, GAUSS)
+            series = (spin * self._weights) @ legendre
+            whole = self._h * series[:, 0]
+            total = np.cumsum(whole) - whole
+            begin = total[np.flatnonzero(first)][np.cumsum(first) - 1]
+            self.axis.append(axis)
+            self._series.append(series)
+            self._before.append(total - begin)
+
+    def _senses(self, axis: Array) -> Array:
+        """Signs with which an axis does not flip along its track."""
+        along = (axis[:, 1:] * axis[:, :-1]).sum(axis=0)
+        flips = np.concatenate([[1.0], np.where(along < 0, -1.0, 1.0)])
+        flips[self._new_track] = 1.0
+        product = np.cumprod(flips)
+        return product * product[np.flatnonzero(self._new_track)][np.cumsum(self._new_track) - 1]
+
+    def turned_back(self, x: Array, which: Index, track: Index, place: Array) -> Array:
+        """States with every body turned back by the integral of its spin up to their places."""
+        nodes = self.interpolation.nodes
+        has_step = np.isin(track, nodes.track[self.interpolation.left])
+        step = self.interpolation.find(np.where(has_step, track, nodes.track[self.interpolation.left[0]]), place)
+        drive = x[self.path.rows]
+        here = self.path.at(x, drive, track)
+        f = self.path.factored(here, which)
+        Z = f.motions()
+        axes, unit = _axes(here, self.bodies, Z)
+        t = 2.0 * (place - nodes.place[self.interpolation.left[step]]) / self._h[step] - 1.0
+        P = np.polynomial.legendre.legvander(t, GAUSS)
+        integrals = np.empty((len(t), GAUSS))
+        integrals[:, 0] = 0.5 * (t + 1.0)
+        for k in range(1, GAUSS):
+            integrals[:, k] = 0.5 * (P[:, k + 1] - P[:, k - 1]) / (2 * k + 1)
+        dq = np.zeros((Z.shape[0], x.shape[1]))
+        for i, axis in enumerate(axes):
+            known = self.axis[i]
+            if axis is None or known is None:
+                continue
+            angle = self._before[i][step] + self._h[step] * (self._series[i][step] * integrals).sum(axis=1)
+            sense = np.sign((axis * known[:, step * GAUSS]).sum(axis=0))
+            dq += unit[i] * np.where(has_step, sense * angle, 0.0)
+        turned = self.path.advance(x, dq, track)
+        return self.follower.newton.close(turned, drive, track, which).x
+
+
+def _axes(here: Configuration, bodies: tuple[Idle, ...], Z: Array) -> tuple[list[Array | None], list[Array]]:
+    """For every body that has one passive turn its axis ``(3, T)`` and the rates ``(F, T)`` that turn it by one radian; else None."""
+    G = passive_twists(here, bodies, rest_points(here, bodies, Z), Z)
+    axes: list[Array | None] = []
+    units: list[Array] = []
+    for i in range(len(bodies)):
+        mine = [p for p in range(Z.shape[1]) if np.abs(G[6 * i : 6 * i + 6, p]).max() > TURNING]
+        u = G[6 * i : 6 * i + 3, mine[0]] if len(mine) == 1 else np.zeros((3, here.T))
         length = np.sqrt((u * u).sum(axis=0))
-        if len(mine) != 1 or not (length > 1e-6).all():
-            continue
-        axis = u / length
-        sense = np.cumprod(np.concatenate([[1.0], np.where((axis[:, 1:] * axis[:, :-1]).sum(axis=0) < 0, -1.0, 1.0)]))
-        axis = axis * sense
-        R = here.poses[:, :3, body.link]
-        turn = rotation_log(np.einsum("ijt,kjt->ikt", R[..., 1:], R[..., :-1]))
-        spin = 0.5 * (turn * (axis[:, 1:] + axis[:, :-1])).sum(axis=0)
-        angles[mine[0]] = np.concatenate([[0.0], np.cumsum(spin)])
-        unit[:, mine[0]] = Z[:, mine[0]] * sense / length
-    return angles, unit
+        turns = len(mine) == 1 and bool((length > TURNING).all())
+        axes.append(u / length if turns else None)
+        units.append(Z[:, mine[0]] / length if turns else np.zeros((Z.shape[0], here.T)))
+    return axes, units
 
 
 def hold(here: Configuration, idle: tuple[Idle, ...], Z: Array, loads: Array, efforts: Array) -> tuple[Array, Array]:

@@ -9,12 +9,8 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure import passive_rest as idle
 from mechgraph.closure.configuration import Configuration, Index
+from mechgraph.closure.solver import FactoredClosure
 from mechgraph.closure.passive_rest import Idle
-from mechgraph.numerics.linear import Choice, ChosenSystem
-
-DEAD_POINT = 1e-10
-"""Distance to a dead point, in driver coordinates (radians, or lengths / L), below which a position counts as one."""
-
 
 class Velocities:
     """Rates of all freedoms ``dq (F, T)`` at closed positions, and what follows from them."""
@@ -56,14 +52,9 @@ class Rates(Velocities):
             self.__dict__.pop(name, None)
 
 
-def closure_solver(here: Configuration, choices: list[Choice], which: Index) -> ChosenSystem:
-    """The closure Jacobian of a batch, ready to be solved for the free coordinates."""
-    return ChosenSystem(here.J, choices, which)
-
-
 def rates(
     here: Configuration,
-    solver: ChosenSystem,
+    solver: FactoredClosure,
     columns: Index,
     velocity: Array,
     acceleration: Array,
@@ -75,14 +66,14 @@ def rates(
     """
     dq, gap_v = _completed(here, solver, columns, velocity, None)
     moving = Velocities(here, dq)
-    Z = solver.null_of_columns() if bodies else np.zeros((len(dq), 0, here.T))
+    Z = solver.motions() if bodies else np.zeros((len(dq), 0, here.T))
     if bodies:
         points = idle.rest_points(here, bodies, Z)
         G = idle.passive_twists(here, bodies, points, Z)
         spin = idle.resting_part(G, idle.body_twists(bodies, points, moving.V))
         moving = Velocities(here, dq + np.einsum("fpt,pt->ft", Z, spin))
     turning = (moving.dq * moving.dq).max(axis=0, initial=0.0)
-    ddq, gap_a = _completed(here, solver, columns, acceleration, here.loop_sums(moving.bias), turning)
+    ddq, gap_a = _completed(here, solver, columns, acceleration, here.closure_bias(moving.dq, moving.V), turning)
     moved = Rates(moving, ddq, np.maximum(gap_v, gap_a))
     if bodies:
         now = idle.body_accelerations(bodies, points, moved.V, moved.A)
@@ -94,7 +85,7 @@ def rates(
     return moved
 
 
-def distance_to_dead_point(here: Configuration, solver: ChosenSystem, columns: Index) -> Array:
+def distance_to_dead_point(here: Configuration, solver: FactoredClosure, columns: Index) -> Array:
     """How far, in driver coordinates, each position is from a dead point, ``(T,)``.
 
     Near a dead point at ``s*`` the rates per unit of driver motion grow as ``|s* - s|^-1/2``, so that the distance is half of rate
@@ -113,19 +104,22 @@ def distance_to_dead_point(here: Configuration, solver: ChosenSystem, columns: I
 
 def _completed(
     here: Configuration,
-    solver: ChosenSystem,
+    solver: FactoredClosure,
     columns: Index,
     driven: Array,
     known: Array | None,
     size: Array | float = 0.0,
 ) -> tuple[Array, Array]:
     """Rates ``(F, T)`` with ``J q + known = 0`` for given driven ones, and what is left of that, relative ``(T,)``."""
-    rhs = np.zeros((here.J.shape[0], here.T)) if known is None else -known
-    for column, value in zip(columns, driven, strict=True):
-        if value.any():
-            rhs -= here.J[:, column] * value
+    given = np.zeros((here.system.n_freedoms, here.T))
+    if known is None and not driven.any():
+        return given, np.zeros(here.T)
+    given[columns] = driven
+    rhs = -here.closure_rates(given) if driven.any() else np.zeros_like(here.residual)
+    if known is not None:
+        rhs -= known
     q = solver.solve(rhs[:, None])[:, 0]
-    left = np.abs((here.J * q).sum(axis=1) - rhs).max(axis=0, initial=0.0)
+    left = np.abs(here.closure_rates(q) - rhs).max(axis=0, initial=0.0)
     q[columns] = driven
     scale = np.abs(q).max(axis=0, initial=0.0) + size
     if known is not None:

@@ -199,11 +199,11 @@ class Site:
         return np.where(lengths, self.efforts / self.L, self.efforts / self.L**2)
 
 
-def user_poses(here: Configuration) -> Array:
-    """Poses of the declared link frames in the global frame, ``(N, T, 4, 4)``."""
+def user_poses(here: Configuration, links: slice = slice(None)) -> Array:
+    """Poses of the declared link frames (of some links) in the global frame, ``(N, T, 4, 4)``."""
     par = here.system.par
-    X = here.poses.copy()
-    shift = rotate(X[:, :3], par.offset[..., None])
+    X = here.poses[:, :, links].copy()
+    shift = rotate(X[:, :3], par.offset[:, links, None])
     X[:, 3] = par.L * X[:, 3] + par.origin[:, None, None] - shift
     return to_matrix(X)
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration, Index
-from mechgraph.closure.follow import SparseSolver
+from mechgraph.closure.solver import FactoredClosure
 from mechgraph.equations.build import formulate
 from mechgraph.equations.state import State
 from mechgraph.equations.terms import Formulation
@@ -28,17 +28,15 @@ BAD_CONDITION = 1e8
 class Problem:
     """What a method solves: closed positions with loads (internal units).
 
-    ``loads (6, N, T)`` inertia and applied wrenches, ``efforts (F, T)`` given efforts, ``driven`` and ``held`` the freedoms
-    with unknown effort (``held`` by choice, ``which (T,)`` the choice of a position), ``solver`` the closure equations.
+    ``loads (6, N, T)`` inertia and applied wrenches, ``efforts (F, T)`` given efforts, ``driven`` the freedoms with a driver,
+    ``solver`` the closure equations, which hold what the drivers leave free.
     """
 
     here: Configuration
     loads: Array
     efforts: Array
     driven: Index
-    held: tuple[Index, ...]
-    which: Index
-    solver: ChosenSystem | SparseSolver
+    solver: FactoredClosure
 
 
 @dataclass(frozen=True)
@@ -47,10 +45,6 @@ class Wrenches:
 
     totals: Array
     stress: Array
-
-
-NO_WRENCHES = Wrenches(np.empty((6, 0, 0)), np.empty((6, 0, 0, 0)))
-"""Before they are found, and after all that is asked of them has been taken."""
 
 
 def loop_wrench(problem: Problem) -> Wrenches:
@@ -63,7 +57,7 @@ def loop_wrench(problem: Problem) -> Wrenches:
     rhs = problem.efforts - (here.S * tree[:, here.system.owners]).sum(axis=0)
     x = problem.solver.solve_transposed(rhs[:, None])
     tree += here.pair_wrenches(x)[:, :, 0]
-    return Wrenches(tree, here.pair_wrenches(problem.solver.null_of_transpose()))
+    return Wrenches(tree, here.pair_wrenches(problem.solver.self_stresses()))
 
 
 def tree_wrenches(here: Configuration, loads: Array) -> Array:
@@ -80,13 +74,11 @@ def newton_euler(problem: Problem) -> Wrenches:
     here = problem.here
     totals = np.empty((6, len(here.system.m.pairs), here.T))
     stress: list[tuple[Index, Array]] = []
-    for held in {tuple(part.tolist()) for part in problem.held}:
-        at = np.flatnonzero([tuple(problem.held[i].tolist()) == held for i in problem.which])
-        if at.size:
-            mine = here if at.size == here.T else here.part(at)
-            found = _components_and_efforts(mine, problem.loads[:, :, at], problem.efforts[:, at], problem.driven, held)
-            totals[:, :, at] = found.totals
-            stress.append((at, found.stress))
+    for held, at in problem.solver.by_held():
+        mine = here if at.size == here.T else here.part(at)
+        found = _components_and_efforts(mine, problem.loads[:, :, at], problem.efforts[:, at], problem.driven, held)
+        totals[:, :, at] = found.totals
+        stress.append((at, found.stress))
     out = np.zeros((6, totals.shape[1], max((part.shape[2] for _, part in stress), default=0), here.T))
     for at, part in stress:
         out[:, :, : part.shape[2], at] = part
@@ -94,11 +86,11 @@ def newton_euler(problem: Problem) -> Wrenches:
 
 
 def _components_and_efforts(
-    here: Configuration, loads: Array, efforts: Array, driven: Index, held: tuple[int, ...]
+    here: Configuration, loads: Array, efforts: Array, driven: Index, held: Index
 ) -> Wrenches:
     m = here.system.m
     names = m.freedom_names()
-    f = formulate(m, "minimal", efforts=[names[c] for c in sorted({*driven.tolist(), *held})])
+    f = formulate(m, "minimal", efforts=[names[c] for c in sorted({*driven.tolist(), *held.tolist()})])
     state = internal_state(here, loads + given_effort_loads(here, efforts))
     rows, cols, _, _ = f.pattern
     entries, right = f.entries(state), f.right_side(state)

@@ -37,8 +37,6 @@ FEW = 64
 """Number of places up to which they are added to one by one."""
 VANISHING = 1e-8
 """Size of a row below which it is not chosen."""
-REAL = 1e-6
-"""Imaginary part of an eigenvalue over its size up to which it counts as real: two equal ones come out as a pair."""
 KEEP = 0.1
 """Part of the smallest singular value that may be lost by holding the columns that are asked for."""
 
@@ -94,22 +92,38 @@ def scattered_sum(values: Array, index: Index, count: int) -> Array:
     return np.moveaxis(np.asarray(to @ flat).reshape(count, values.shape[0], values.shape[2]), 0, 1)
 
 
-def singular_between(A: Array, B: Array) -> NDArray[np.bool_]:
-    """Whether ``A + s (B - A)`` is singular for some ``0 < s < 1``, for batches of square matrices ``(n, n, T)``; ``(T,)``.
+def scaled_norm(M: Array) -> Array:
+    """A bound of the spectral radius of all matrices with entries of sizes ``M (n, n, T)``, ``(T,)``.
 
-    That is where ``A^-1 B`` has a negative real eigenvalue: ``det(A + s (B - A)) = det A prod(1 - s + s mu)``. Unlike the sign of the
-    determinant this also tells where two eigenvalues pass zero together.
+    The maximum norm of ``D^-1 M D`` for the best of a few diagonal ``D``, found by power iteration (Collatz and Wielandt), so that
+    it does not depend on the units of rows and columns.
     """
-    out = np.zeros(A.shape[2], dtype=bool)
-    if not A.size:
-        return out
-    X = np.linalg.solve(np.moveaxis(A, -1, 0), np.moveaxis(B, -1, 0))
-    far = np.flatnonzero(~(((X - np.eye(A.shape[0])) ** 2).sum(axis=(1, 2)) < 1.0))
-    if far.size:
-        finite = np.isfinite(X[far]).all(axis=(1, 2))
-        mu = np.linalg.eigvals(np.where(finite[:, None, None], X[far], 0.0))
-        out[far] = ((mu.real < 0) & (np.abs(mu.imag) <= REAL * np.abs(mu))).any(axis=1) | ~finite
-    return out
+    v = np.ones((M.shape[1], M.shape[2]))
+    best = np.full(M.shape[2], np.inf)
+    for _ in range(4):
+        w = np.einsum("ijt,jt->it", M, v)
+        best = np.fmin(best, (w / v).max(axis=0, initial=0.0))
+        v = np.maximum(w, 1e-3 * w.max(axis=0, initial=0.0))
+        v = np.where(v > 0, v, 1.0)
+    return best
+
+
+def parabola_is_regular(P: Array, Q: Array, margin: float) -> NDArray[np.bool_]:
+    """Whether ``1 - s P - s^2 Q`` is regular for all complex ``s`` nearer than ``margin`` to ``-1 <= s <= 1``; ``(n, n, T)`` -> ``(T,)``.
+
+    Its singular points are the inverse eigenvalues of ``[[P, Q], [1, 0]]`` (Tisseur and Meerbergen, The quadratic eigenvalue problem,
+    SIAM Review 43, 2001).
+    """
+    n, T = P.shape[0], P.shape[2]
+    companion = np.zeros((T, 2 * n, 2 * n))
+    companion[:, :n, :n], companion[:, :n, n:] = np.moveaxis(P, -1, 0), np.moveaxis(Q, -1, 0)
+    companion[:, n:, :n] = np.eye(n)
+    finite = np.isfinite(companion).all(axis=(1, 2))
+    t = np.linalg.eigvals(np.where(finite[:, None, None], companion, 0.0))
+    # |1/t - u| >= margin for all u in [-1, 1]
+    s = 1.0 / np.where(t == 0, 1e-300, t)
+    distance = np.abs(s - np.clip(s.real, -1.0, 1.0))
+    return np.asarray((distance >= margin).all(axis=1) & finite)
 
 
 @dataclass(frozen=True)
@@ -123,6 +137,11 @@ class Choice:
     cols: Index
     held: Index
     fixed: Index
+
+    def same(self, other: Choice) -> bool:
+        """Whether two choices are equal."""
+        pairs = ((self.rows, other.rows), (self.cols, other.cols), (self.held, other.held))
+        return all(np.array_equal(a, b) for a, b in pairs)
 
 
 def choose(A: Array, fixed: Index, tolerance: float = RANK_TOLERANCE, keep: Index | None = None) -> Choice:
@@ -175,9 +194,10 @@ class Factor:
             product = norms[0] * norms[1]
         return np.where(np.isnan(product), np.inf, product)
 
-    def sign(self) -> Array:
-        """Sign of the determinants ``(T,)``."""
-        return np.asarray(np.linalg.slogdet(np.moveaxis(self._A, -1, 0))[0])
+    def applied(self, B: Array) -> Array:
+        """``A^-1 B`` for square ``B (n, n, T)``, without refinement."""
+        product = np.moveaxis(self._inverse, -1, 0) @ np.moveaxis(B, -1, 0)
+        return np.moveaxis(product, 0, -1)
 
     def solve(self, b: Array, transposed: bool = False) -> Array:
         """Solution of ``A x = b`` (or ``A^T x = b``) for ``b (n, k, T)``."""
@@ -263,9 +283,11 @@ class ChosenSystem:
             out[np.ix_(choice.held, held, at)] = np.eye(len(held))[:, :, None]
         return out
 
-    def signs(self) -> Array:
-        """Sign of the determinant of the square part at every position."""
-        out = np.ones(self.A.shape[2])
-        for _, at, factor in self._parts:
-            out[at] = factor.sign()
+    def changes(self, other: Array) -> list[tuple[Index, Array]]:
+        """``1 - A^-1 A_other`` of the square parts ``(n, n, T)``, with their places, choice by choice."""
+        out = []
+        for choice, at, factor in self._parts:
+            change = -factor.applied(other[np.ix_(choice.rows, choice.cols, at)])
+            change[np.arange(len(choice.cols)), np.arange(len(choice.cols))] += 1.0
+            out.append((at, change))
         return out

@@ -1,14 +1,181 @@
-"""Least-squares Newton iterations with damping, for many points at a time; knows no mechanism."""
+"""Newton's method for batches: with a problem's own linear equations along tracks, and Gauss-Newton of least change for assembly."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from mechgraph.numerics.tolerances import PATH
+
 Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+
+
+class Factored(Protocol):
+    """The linearized equations at a batch of points, factored."""
+
+    @property
+    def condition(self) -> Array:
+        """Condition numbers ``(n,)``."""
+
+    def solve(self, b: Array) -> Array:
+        """Increments ``(F, k, n)`` for right sides ``(m, k, n)``."""
+
+    def regular_between(self, a: Any, b: Any) -> Mask:
+        """Whether no matrix on the parabola through those at ``a``, here and at ``b`` is singular or nearly so, ``(n,)``."""
+
+
+class Point(Protocol):
+    """The equations evaluated at a batch of points."""
+
+    x: Array
+
+    @property
+    def residual(self) -> Array:
+        """What is left of the equations, ``(m, n)``."""
+
+    def part(self, at: Index) -> Any:
+        """Some of the points."""
+
+
+class Problem(Protocol):
+    """Equations along tracks: states ``x (nx, n)``, increments ``dq (F, n)``, path values ``drive (d, n)``, numbers of ``tracks (n,)``."""
+
+    size: tuple[int, int]
+    """Numbers of increments F and of path values d."""
+
+    def at(self, x: Array, drive: Array, tracks: Index) -> Any:
+        """The equations at states, the path values put in."""
+
+    def chosen(self, point: Any, which: Index) -> Index:
+        """Numbers of the forms of the linear equations that serve the points: other ones than ``which`` where these are poor."""
+
+    def factored(self, point: Any, which: Index) -> Any:
+        """The linear equations at points, each in its form."""
+
+    def sensitivity(self, point: Any, factored: Any) -> Array:
+        """Rates ``Z (F, d, n)`` of the increments with the path values."""
+
+    def advance(self, x: Array, dq: Array, tracks: Index) -> Array:
+        """States after increments."""
+
+    def difference(self, x1: Array, x0: Array) -> Array:
+        """Increments from ``x0`` to ``x1``."""
+
+    def tangent(self, dq: Array, rates: Array) -> Array:
+        """Rates of increments from the rates at the states to which they lead."""
+
+    def corrigible(self, dq: Array, which: Index) -> Array:
+        """Increments without what no correction would reach (freedoms that are held)."""
+
+
+@dataclass
+class Work:
+    """What was done: points evaluated, calls of the evaluation, matrices factored, nodes of the careful march."""
+
+    evaluations: int = 0
+    calls: int = 0
+    factorizations: int = 0
+    careful_nodes: int = 0
+
+
+@dataclass(frozen=True)
+class Closed:
+    """Newton's outcome for a batch: states, sum of corrections ``(F, n)``, sensitivities, conditions, forms, which were closed.
+
+    ``point`` is the evaluation at ``x`` where that was the last thing done for all of them.
+    """
+
+    x: Array
+    total: Array
+    Z: Array
+    condition: Array
+    which: Index
+    done: Mask
+    point: Any = None
+
+    @property
+    def correction(self) -> Array:
+        """Largest correction of a freedom ``(n,)``."""
+        return np.asarray(np.abs(self.total).max(axis=0, initial=0.0))
+
+
+@dataclass
+class Newton:
+    """Newton's method for a batch of points of a problem."""
+
+    problem: Problem
+    work: Work = field(default_factory=Work)
+
+    def nodes(self, x: Array, drive: Array, tracks: Index, which: Index, goal: float | Array) -> Closed:
+        """States corrected until the last step is below ``goal``, with their sensitivities."""
+        return self._run(x, drive, tracks, which, goal, 0.0)
+
+    def close(self, x: Array, drive: Array, tracks: Index, which: Index) -> Closed:
+        """States corrected until the residual is rounding."""
+        return self._run(x, drive, tracks, which, 0.0, PATH.closed)
+
+    def _run(self, x: Array, drive: Array, tracks: Index, which: Index, step_goal: Any, goal: float) -> Closed:
+        F, d = self.problem.size
+        n = x.shape[1]
+        x, which = x.copy(), which.copy()
+        total, Z, condition = np.zeros((F, n)), np.zeros((F, d, n)), np.full(n, np.inf)
+        done, before = np.zeros(n, dtype=bool), np.full(n, np.inf)
+        step_goal = np.broadcast_to(step_goal, n)
+        fresh = np.ones(n, dtype=bool)
+        active, point = np.arange(n), None
+        for _ in range(PATH.iterations):
+            point = self.problem.at(x[:, active], drive[:, active], tracks[active])
+            self._count(active.size, 1, 0)
+            left = np.abs(point.residual).max(axis=0, initial=0.0)
+            near = (left <= goal) | ((left <= PATH.accepted) & (left > 0.5 * before[active]) & (goal > 0))
+            x[:, active[near]] = point.x[:, near]
+            done[active[near]] = True
+            if near.all():
+                break
+            if near.any():
+                keep = np.flatnonzero(~near)
+                active, point, left = active[keep], point.part(keep), left[keep]
+            f = self.problem.factored(point, which[active])
+            self._count(0, 0, active.size)
+            step = f.solve(-point.residual[:, None])[:, 0]
+            size = np.abs(step).max(axis=0, initial=0.0)
+            finite = np.isfinite(size)
+            step = np.where(finite, step, 0.0) * np.minimum(1.0, 0.5 / np.maximum(size, 0.5))
+            x[:, active] = self.problem.advance(point.x, step, tracks[active])
+            total[:, active] += step
+            before[active] = left
+            small = finite & (size <= step_goal[active])
+            # rows that were left out as dependent must be met as well: where they are not, another form is tried once
+            unmet = small & (left > np.maximum(1e3 * step_goal[active], 1e-9))
+            retry = np.flatnonzero(unmet & fresh[active])
+            if retry.size:
+                which[active[retry]] = self.problem.chosen(point.part(retry), np.full(retry.size, -1))
+                fresh[active[retry]] = False
+            finite &= ~unmet
+            finite[retry] = True
+            small &= ~unmet
+            if small.any():
+                Z[:, :, active[small]] = self.problem.sensitivity(point, f)[:, :, small]
+                condition[active[small]] = f.condition[small]
+                done[active[small]] = True
+            lost = np.abs(total[:, active]).max(axis=0, initial=0.0) > PATH.lost
+            active, point = active[finite & ~small & ~lost], None
+            if not active.size:
+                break
+        whole = point is not None and active.size == n
+        return Closed(x, total, Z, condition, which, done, point if whole else None)
+
+    def _count(self, evaluations: int, calls: int, factorizations: int) -> None:
+        self.work.evaluations += evaluations
+        self.work.calls += calls
+        self.work.factorizations += factorizations
 
 
 def least_norm_step(J: Array, r: Array, tolerance: float) -> Array:

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.closure.driver_motion import driven
 from mechgraph.errors import DeclarationError
 from mechgraph.force.dalembert import METHODS
-from mechgraph.force.kinetostatics import REDUNDANT
-from mechgraph.force.run import driven
+from mechgraph.kinetostatics import REDUNDANT
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.variants.fields import AnyField, clashes, field_values, find_field

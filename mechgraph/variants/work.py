@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.march import Status
+from mechgraph.closure.driver_path import Status
 from mechgraph.errors import DeclarationError, MechgraphError
-from mechgraph.force.kinetostatics import solve
+from mechgraph.kinetostatics import solve
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.result.solution import Solution
@@ -59,14 +59,16 @@ class Source:
         assert self.fields is not None
         return varied(self.mechanism, self.fields, values)
 
-    def variants(self, values: Array, s: float) -> Variants:
-        """Variants on the way ``s`` from the mechanism itself (0) to ``values (parameters, count)`` (1)."""
+    def variants(self, values: Array, part: Array) -> Variants:
+        """Variants at a ``part (count,)`` of the way from the mechanism itself (0) to ``values (parameters, count)`` (1)."""
+        on_the_way = self.start[:, None] + part * (values - self.start[:, None])
         if self.build is None:
-            return self._varied(self.start[:, None] + s * (values - self.start[:, None]))
-        if s == 0.0:
-            return stacked(self.mechanism, [self.mechanism] * values.shape[1])
+            return self._varied(on_the_way)
         made: list[Mechanism | None] = []
-        for column in (self.start[:, None] + s * (values - self.start[:, None])).T:
+        for column, moved in zip(on_the_way.T, np.broadcast_to(part > 0, values.shape[1:]), strict=True):
+            if not moved:
+                made.append(self.mechanism)
+                continue
             try:
                 made.append(self.one(column))
             except Exception:  # told where this variant is solved alone
@@ -100,19 +102,20 @@ class Part:
 def solved(task: Task) -> Part:
     """Solve the variants of a task: together where they can be followed in step, alone where not."""
     count = task.values.shape[1]
-    together, alone, starts = solve_together(
-        lambda s: task.source.variants(task.values, s), task.motions, task.method, task.redundant
+    together = solve_together(
+        lambda part: task.source.variants(task.values, part), task.motions, task.method, task.redundant
     )
+    alone = together.alone
     N = max(motion.shape[-1] for motion in task.motions.values())
     status = np.full((count, N), NOT_SOLVED, dtype="U24")
     found: dict[str, Array] | None = None
-    if together is not None:
-        status[~alone] = together.status[~alone]
-        found = {name: _writable(quantity(together, name, what)) for name, what in task.outputs.items()}
+    if together.solution is not None:
+        status[~alone] = together.solution.status[~alone]
+        found = {name: _writable(quantity(together.solution, name, what)) for name, what in task.outputs.items()}
     messages = {}
     for i in np.flatnonzero(alone):
         try:
-            s = _solved_alone(task, int(i), None if starts is None else starts[:, i])
+            s = _solved_alone(task, int(i), together.starts[:, i])
         except MechgraphError as error:
             messages[int(i)] = str(error)
             s = None
@@ -140,7 +143,7 @@ def _writable(values: Array) -> Array:
     return np.array(values, dtype=float)
 
 
-def _solved_alone(task: Task, i: int, start: Array | None) -> Solution:
+def _solved_alone(task: Task, i: int, start: Array) -> Solution:
     """One variant by itself, from coordinates ``start (F,)`` if known; positions out of reach flagged; as a batch ``(1, N)``."""
     try:
         m = task.source.one(task.values[:, i])
@@ -148,7 +151,7 @@ def _solved_alone(task: Task, i: int, start: Array | None) -> Solution:
         raise
     except Exception as error:
         raise DeclarationError("study", [f"the function failed: {type(error).__name__}: {error}"]) from error
-    if start is not None and np.isfinite(start).all():
+    if np.isfinite(start).all():
         m = m.replace(start=dict(zip(m.freedom_names(), start.tolist(), strict=True)))
     motions = {name: motion_of_case(motion, i) for name, motion in task.motions.items()}
     own = {m.full_name(d.freedom): d.motion for d in m.drives if d.motion is not None}

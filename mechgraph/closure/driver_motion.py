@@ -1,0 +1,102 @@
+"""What the drivers are asked to do: the motion of every drive by name, and their values for all positions in internal units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.errors import DeclarationError
+from mechgraph.model.drive import Drive
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.motion import Motion
+
+
+def _as_motion(value: Any, name: str, faults: list[str]) -> Motion | None:
+    if isinstance(value, Motion):
+        return value
+    try:
+        return Motion(value)
+    except DeclarationError as error:
+        faults += [f"drive {name!r}: {fault}" for fault in error.faults]
+        return None
+
+
+def driven(m: Mechanism, motions: Mapping[str, Any] | None) -> tuple[Mechanism, dict[str, Motion]]:
+    """The mechanism with its drives, and the motion of each by full name.
+
+    Motions given by name go to the declared drives, or become the drives where none is declared; the others use the motion
+    stored with them.
+    """
+    if motions is not None and not isinstance(motions, Mapping):
+        raise DeclarationError(
+            f"solve {m.name!r}",
+            [f"motions = {type(motions).__name__}: expected a mapping driver -> motion, e.g. {{'A': angles}}"],
+        )
+    given = dict(motions or {})
+    faults: list[str] = []
+    if not m.drives and given:
+        faults += [f"drive {name!r}: {why}" for name in given if (why := m.freedom_fault(name, single=True))]
+        if not faults:
+            m = m.replace(drives=[Drive(name) for name in given])
+    known = {m.full_name(d.freedom): d for d in m.drives}
+    out: dict[str, Motion] = {}
+    for name, value in given.items():
+        why = m.freedom_fault(name, single=True)
+        if why or m.full_name(name) not in known:
+            faults.append(f"motion of {name!r}: {why or 'is not a drive'}; drives: {', '.join(known) or 'none'}")
+            continue
+        if m.full_name(name) in out:
+            faults.append(f"motion of {name!r}: {m.full_name(name)} is given twice")
+            continue
+        motion = _as_motion(value, name, faults)
+        if motion is not None:
+            out[m.full_name(name)] = motion
+    for name, drive in known.items():
+        if name not in out and drive.motion is not None:
+            out[name] = drive.motion
+        elif name not in out and not faults:
+            faults.append(f"drive {name!r} has no motion; give one: {{{name!r}: angles or mg.Motion(...)}}")
+    if faults:
+        raise DeclarationError(f"solve {m.name!r}", faults)
+    return m, {name: out[name] for name in known}
+
+
+def _batch(m: Mechanism, motions: Mapping[str, Motion]) -> tuple[int, ...]:
+    try:
+        batch = np.broadcast_shapes(*(motion.shape for motion in motions.values()))
+        if 0 in batch:
+            raise DeclarationError(f"solve {m.name!r}", ["the motions have no positions; give at least one"])
+        return batch
+    except ValueError:
+        shapes = ", ".join(f"{name} {motion.shape}" for name, motion in motions.items())
+        raise DeclarationError(
+            f"solve {m.name!r}", [f"the motions describe different numbers of positions: {shapes}"]
+        ) from None
+
+
+class DriverMotion:
+    """The mechanism ``m`` with the drives of a call, the motion of each, and the shape of the batch of positions."""
+
+    def __init__(self, m: Mechanism, motions: Mapping[str, Any] | None) -> None:
+        self.m, self.motions = driven(m, motions)
+        self.batch = _batch(self.m, self.motions)
+        self.t = next((motion.t for motion in self.motions.values() if motion.t is not None), None)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Full names of the driven freedoms."""
+        return tuple(self.motions)
+
+    @property
+    def first(self) -> dict[str, float]:
+        """Driver values at the first position."""
+        return {name: float(np.asarray(motion.position).reshape(-1)[0]) for name, motion in self.motions.items()}
+
+    def values(self, kind: str, batch: tuple[int, ...]) -> Array:
+        """Driver ``position``, ``velocity`` or ``acceleration`` ``(d, T)`` in the user's units, spread over a batch."""
+        T = int(np.prod(batch))
+        rows = [np.broadcast_to(getattr(motion, kind), batch).reshape(T) for motion in self.motions.values()]
+        return np.array(rows).reshape(len(rows), T)

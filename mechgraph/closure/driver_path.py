@@ -1,0 +1,360 @@
+"""Positions along paths of driver values: the closure equations as a problem of path following, and positions read off its nodes.
+
+One driver: the positions asked for lie on one curve, so it is followed once from the start up to the largest and once down to the
+smallest value, whatever the order in which they are asked for, and however many cases ask. Several drivers: the path is the polygon
+start -> first -> second ...
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.closure.assembly import state_rows
+from mechgraph.closure.configuration import Configuration, Index, System
+from mechgraph.closure.solver import ClosureSolver, FactoredClosure
+from mechgraph.numerics.continuation import End, Follower, Tracks, refined
+from mechgraph.numerics.hermite import Interpolation
+from mechgraph.numerics.newton import Work
+from mechgraph.numerics.tolerances import PATH
+from mechgraph.numerics.tracks import Nodes, Paths
+
+Mask = NDArray[np.bool_]
+
+BLOCK = 1024
+"""Positions evaluated together, so that what is computed on the way stays in the cache of a core (measured)."""
+GAPS = 20
+"""Most gaps behind which a path of several drivers is taken up again."""
+
+
+class Status(Enum):
+    """Outcome at one position; the value is the text that a table shows."""
+
+    OK = "ok"
+    DEAD_POINT = "dead point"
+    OUT_OF_REACH = "out of reach"
+    BEYOND_DEAD_POINT = "beyond a dead point"
+    NOT_CLOSED = "loops not closed"
+
+
+def in_blocks(places: Index) -> list[Index]:
+    """Places in parts of about equal size, at most ``BLOCK`` each; at least one part."""
+    return [np.asarray(part) for part in np.array_split(places, max(1, -(-len(places) // BLOCK)))]
+
+
+SystemOf = Callable[[Index], System]
+
+
+class DriverPath:
+    """The closure equations with the coordinates ``columns`` given along a path (implements ``numerics.newton.Problem``).
+
+    ``system_of(variants)`` is the system with the numbers of variants; ``variant_of`` says which variant each track follows.
+    """
+
+    def __init__(self, system: System, solver: ClosureSolver, system_of: SystemOf) -> None:
+        self.system, self.solver = system, solver
+        self.columns = solver.fixed
+        self.rows = state_rows(system, self.columns)
+        self.size = (system.n_freedoms, len(self.columns))
+        self._system_of = system_of
+        self.variant_of: Index = np.zeros(0, dtype=np.intp)
+
+    def at(self, x: Array, drive: Array, tracks: Index) -> Configuration:
+        x = x.copy()
+        x[self.rows] = drive
+        return self._system_of(self.variant_of[tracks]).at(x)
+
+    def chosen(self, point: Configuration, which: Index) -> Index:
+        return self.solver.chosen(point, which)
+
+    def factored(self, point: Configuration, which: Index) -> FactoredClosure:
+        return self.solver.factored(point, which)
+
+    def sensitivity(self, point: Configuration, factored: FactoredClosure) -> Array:
+        return factored.sensitivity()
+
+    def advance(self, x: Array, dq: Array, tracks: Index) -> Array:
+        return self.system.advance(x, dq)
+
+    def difference(self, x1: Array, x0: Array) -> Array:
+        return self.system.difference(x1, x0)
+
+    def tangent(self, dq: Array, rates: Array) -> Array:
+        return self.system.tangent(dq, rates)
+
+    def corrigible(self, dq: Array, which: Index) -> Array:
+        for form in np.unique(which):
+            held = self.solver.held(int(form))
+            if held.size:
+                dq[np.ix_(held, which == form)] = 0.0
+        return dq
+
+
+@dataclass(frozen=True)
+class Request:
+    """Positions asked of one closed start ``x (nx,)`` of a ``variant``: driver values ``(d, n)`` in order, and their flat ``places``."""
+
+    x: Array
+    variant: int
+    values: Array
+    places: Index
+
+
+@dataclass
+class Positions:
+    """States ``(nx, T)``, statuses ``(T,)`` and forms ``(T,)`` of all positions; ``reached (d, T)`` the last driver values before what was
+    not reached; ``here`` the evaluation where all positions were closed in one block.
+
+    ``place (T,)`` and ``track (T,)`` say where on the followed tracks they lie.
+    """
+
+    x: Array
+    status: np.ndarray
+    which: Index
+    reached: Array
+    track: Index
+    place: Array
+    tracks: Tracks
+    follower: Follower
+    here: Configuration | None = None
+    tried: set[tuple[int, int]] = field(default_factory=set)
+
+    def put(self, other: Positions, places: Index) -> None:
+        """Take some places from positions that were followed afterwards."""
+        for name in ("x", "status", "which", "reached"):
+            getattr(self, name)[..., places] = getattr(other, name)[..., places]
+
+    def nodes_of(self, track: int) -> Nodes:
+        """Nodes of a track."""
+        return self.tracks.nodes.take(self.tracks.nodes.track == track)
+
+    @property
+    def work(self) -> Work:
+        """What was done."""
+        return self.tracks.work
+
+
+def follow(path: DriverPath, requests: list[Request], total: int) -> Positions:
+    """States at all positions asked for; ``total`` positions in all."""
+    if path.size[1] == 1:
+        return _one_curve(path, requests, total).followed().positions
+    found = _along_polygons(path, requests, total)
+    for _ in range(GAPS):
+        again = _behind_gaps(path, found, requests)
+        if not again:
+            break
+        more = _along_polygons(path, again, total)
+        for request in again:
+            found.put(more, request.places)
+    return found
+
+
+def _along_polygons(path: DriverPath, requests: list[Request], total: int) -> Positions:
+    """Polygons followed with nodes where interpolation does not do."""
+    legs = _polygons(path, requests, total)
+    for _ in range(REPEATS):
+        found = legs.followed()
+        if not found.bad.size or not legs.stop_at(found.bad):
+            break
+    return found.positions
+
+
+def _behind_gaps(path: DriverPath, found: Positions, requests: list[Request]) -> list[Request]:
+    """Where paths can be taken up again behind what could not be passed: at the next position on this side of it, from the last one solved.
+
+    A path of which no position was reached is entered at its position nearest to the start.
+    """
+    out = []
+    for request in requests:
+        status = found.status[request.places]
+        solved = np.flatnonzero(status == Status.OK)
+        if solved.size in (0, len(status)):
+            continue
+        last = int(solved[-1])
+        beyond = request.values[:, last + 1 :] - found.reached[:, request.places[last]][:, None]
+        back = np.flatnonzero((beyond * beyond[:, :1]).sum(axis=0) < 0) if beyond.shape[1] else np.zeros(0, dtype=np.intp)
+        if not back.size or (last, request.places[0]) in found.tried:
+            continue
+        found.tried.add((last, int(request.places[0])))
+        rest = slice(last + 1 + int(back[0]), None)
+        begin = found.x[:, request.places[last]]
+        out.append(Request(begin, request.variant, request.values[:, rest], request.places[rest]))
+    return out
+
+
+REPEATS = 12
+"""Times that polygons are followed, every time with a node at the positions that did not come out as predicted before."""
+SURE = 1e-4
+"""Correction of an interpolated position from which on it is asked whether it lies on the branch of its nodes."""
+
+
+@dataclass
+class _Found:
+    positions: Positions
+    bad: Index
+
+
+class _Legs:
+    """Tracks through the positions asked for: where each position lies, and reading positions off the nodes."""
+
+    def __init__(self, path: DriverPath, total: int) -> None:
+        self.path, self.total = path, total
+        self.variants: list[int] = []
+        self.starts: list[Array] = []
+        self.points: list[Array] = []
+        self.stops: list[Mask] = []
+        self.asked = np.zeros(total, dtype=bool)
+        self.values = np.empty((path.size[1], total))
+        self.track = np.zeros(total, dtype=np.intp)
+        self.place = np.zeros(total)
+
+    def add(self, request: Request, points: Array, values: Array, places: Index, at: Array) -> None:
+        """A track through ``points (d, M)`` on which the positions ``places`` lie ``at`` path lengths."""
+        self.asked[places] = True
+        self.track[places], self.place[places] = len(self.points), at
+        self.values[:, places] = values
+        self.starts.append(request.x)
+        self.variants.append(request.variant)
+        self.points.append(points)
+        self.stops.append(np.zeros(points.shape[1], dtype=bool))
+
+    def stop_at(self, bad: Index) -> bool:
+        """Let no step pass over positions where interpolation did not do; whether that changes anything."""
+        changed = False
+        for i in bad:
+            stops, length = self.stops[self.track[i]], self._length[self.track[i]]
+            at = int(np.argmin(np.abs(length - self.place[i])))
+            changed |= not stops[at]
+            stops[at] = True
+        return changed
+
+    def followed(self) -> _Found:
+        """All tracks followed and all positions read off."""
+        self.path.variant_of = np.array(self.variants, dtype=np.intp)
+        follower = Follower(self.path)
+        paths = Paths(self.points, self.stops)
+        self._length = paths.length
+        tracks = follower.follow(np.stack(self.starts, axis=1), paths)
+        nodes = refined(follower, tracks.nodes, self.total)
+        tracks = replace(tracks, nodes=nodes)
+        return self._read(follower, tracks)
+
+    def _read(self, follower: Follower, tracks: Tracks) -> _Found:
+        path, nodes = self.path, tracks.nodes
+        last = np.zeros(len(self.points), dtype=np.intp)
+        last[nodes.track] = np.arange(len(nodes))
+        ended = np.array([end is not End.REACHED for end in tracks.end])
+        reach = np.where(ended, nodes.place[last], np.inf)
+        out = Positions(
+            np.full((path.system.n_state, self.total), np.nan),
+            np.full(self.total, Status.OK, dtype=object),
+            np.zeros(self.total, dtype=np.intp),
+            nodes.drive[:, last][:, self.track],
+            self.track,
+            self.place,
+            tracks,
+            follower,
+        )
+        out.status[~self.asked] = Status.NOT_CLOSED
+        inside = np.flatnonzero(self.asked & (self.place <= reach[self.track]))
+        bad = []
+        for _ in range(FINER):
+            interpolation = Interpolation(path, nodes)
+            bad = [part[self._closed(out, interpolation, part, inside.size == self.total)] for part in in_blocks(inside)]
+            wrong = np.concatenate(bad)
+            if not wrong.size or path.size[1] > 1:
+                break
+            more = self._halved(follower, interpolation, wrong)
+            if not len(more):
+                break
+            nodes, inside = Nodes.join([nodes, more]), inside
+        out.tracks = replace(tracks, nodes=nodes)
+        wrong = np.concatenate(bad)
+        out.status[wrong] = Status.NOT_CLOSED
+        out.x[:, wrong] = np.nan
+        for track, crossing in tracks.crossings:
+            out.status[(self.track == track) & (np.abs(self.place - crossing) < PATH.dead_zone)] = Status.DEAD_POINT
+        self._say_why_not(out, tracks, reach)
+        return _Found(out, wrong)
+
+    def _closed(self, out: Positions, interpolation: Interpolation, at: Index, whole: bool) -> Mask:
+        """Positions ``at`` closed from their prediction; which of them are not beyond doubt."""
+        nodes, path = interpolation.nodes, self.path
+        tracks, drive = self.track[at], self.values[:, at]
+        if len(interpolation.left):
+            has_step = np.isin(tracks, nodes.track[interpolation.left])
+        else:
+            has_step = np.zeros(len(at), dtype=bool)
+        first = np.searchsorted(nodes.track, tracks)
+        x, which = nodes.x[:, first], nodes.which[first]
+        left = right = first
+        if has_step.any():
+            step = interpolation.find(tracks[has_step], self.place[at[has_step]])
+            x[:, has_step] = interpolation(step, self.place[at[has_step]], drive[:, has_step])
+            left, right = first.copy(), first.copy()
+            left[has_step], right[has_step] = interpolation.left[step], interpolation.right[step]
+            which[has_step] = nodes.which[left[has_step]]
+        found = out.follower.newton.close(x, drive, tracks, which)
+        out.x[:, at], out.which[at] = found.x, found.which
+        bad = ~found.done | (found.correction > PATH.correction)
+        doubt = np.flatnonzero(~bad & (found.correction > SURE))
+        if doubt.size:
+            here = path.at(found.x[:, doubt], drive[:, doubt], tracks[doubt])
+            a, b = (path.at(n.x, n.drive, n.track) for n in (nodes.take(left[doubt]), nodes.take(right[doubt])))
+            bad[doubt] = ~path.factored(here, found.which[doubt]).regular_between(a, b)
+        if whole and len(at) == self.total:
+            out.here = found.point if not bad.any() else None
+        return bad
+
+    def _halved(self, follower: Follower, interpolation: Interpolation, wrong: Index) -> Nodes:
+        """Nodes in the middle of the steps in which positions did not come out as predicted."""
+        nodes = interpolation.nodes
+        step = np.unique(interpolation.find(self.track[wrong], self.place[wrong]))
+        a, b = interpolation.left[step], interpolation.right[step]
+        place = 0.5 * (nodes.place[a] + nodes.place[b])
+        drive = follower.paths.drive(nodes.track[a], place)
+        found = follower.newton.nodes(interpolation(step, place, drive), drive, nodes.track[a], nodes.which[a], PATH.node)
+        return follower._nodes(found, drive, nodes.track[a], place, sure=True).take(found.done)
+
+    def _say_why_not(self, out: Positions, tracks: Tracks, reach: Array) -> None:
+        """Statuses of the positions behind the end of their track."""
+        for i in np.flatnonzero(self.asked & (self.place > reach[self.track])):
+            end = tracks.end[self.track[i]]
+            near = self.place[i] - reach[self.track[i]] < PATH.dead_zone
+            if end is End.FOLD:
+                out.status[i] = Status.OUT_OF_REACH
+            else:
+                out.status[i] = Status.DEAD_POINT if near else Status.BEYOND_DEAD_POINT
+
+
+FINER = 4
+"""Times that nodes are put where positions did not come out as predicted."""
+
+
+def _one_curve(path: DriverPath, requests: list[Request], total: int) -> _Legs:
+    """One driver: from every start one track up and one down."""
+    legs = _Legs(path, total)
+    for request in requests:
+        begin, value = request.x[path.rows[0]], request.values[0]
+        for sense, mine in ((1.0, value >= begin), (-1.0, value < begin)):
+            if not mine.any():
+                continue
+            way = sense * (value[mine] - begin)
+            points = np.array([[begin, begin + sense * way.max()]]) if way.max() > 0 else np.array([[begin]])
+            legs.add(request, points, value[None, mine], request.places[mine], way)
+    return legs
+
+
+def _polygons(path: DriverPath, requests: list[Request], total: int) -> _Legs:
+    """Several drivers: from every start the polygon through its positions in their order."""
+    legs = _Legs(path, total)
+    for request in requests:
+        points = np.concatenate([request.x[path.rows][:, None], request.values], axis=1)
+        at = np.cumsum(np.sqrt((np.diff(points, axis=1) ** 2).sum(axis=0)))
+        legs.add(request, points, request.values, request.places, at)
+    return legs

@@ -1,0 +1,141 @@
+"""All forces at a block of positions: loads, wrenches of all pairs, reactions and efforts, and the checks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.closure import passive_rest
+from mechgraph.closure.configuration import Configuration, Index
+from mechgraph.closure.passive_rest import Idle
+from mechgraph.closure.rates import Rates
+from mechgraph.closure.solver import FactoredClosure
+from mechgraph.force.applied_loads import Site, inertia_wrenches, kinetic_power
+from mechgraph.force.dalembert import METHODS, Problem, Wrenches
+from mechgraph.model.load import Load
+from mechgraph.numerics.linear import add_at
+from mechgraph.structure.reaction_split import (
+    Stress,
+    least_reactions,
+    orthonormal_stress,
+    pair_power,
+    reaction_part,
+)
+
+
+@dataclass(frozen=True)
+class Hold:
+    """What keeps a passive body at rest: its name, whether it is a couple (of a turn) or a force, and its size ``(T,)``."""
+
+    name: str
+    turns: bool
+    size: Array
+
+
+@dataclass(frozen=True)
+class BlockForces:
+    """Forces at the positions of a block, internal units about the internal origin.
+
+    ``reactions (6, P, T)`` and all ``efforts (F, T)`` (of least norm where redundant), ``given (F, T)`` efforts of loads, ``loads
+    (6, N, T)`` inertia, applied wrenches and what holds passive bodies (``hold (6, N, T)`` that alone, or None), self-stresses
+    ``stress (6, P, s, T)`` with ``stress_efforts (F, s, T)``, ``shaking (6, T)``; ``balance (T,)`` and ``power (T,)`` what is left of
+    equilibrium and power, ``largest`` the largest term of each; ``holds`` by body.
+    """
+
+    reactions: Array
+    efforts: Array
+    given: Array
+    loads: Array
+    hold: Array | None
+    stress: Array
+    stress_efforts: Array
+    shaking: Array
+    balance: Array
+    power: Array
+    largest: tuple[float, float]
+    holds: tuple[Hold, ...] = ()
+
+
+@dataclass(frozen=True)
+class ForceTask:
+    """What is asked of every block: the ``method``, the ``loads``, the ``driven`` freedoms, the passive ``bodies``; ``batch`` and times ``t``."""
+
+    method: str
+    loads: tuple[Load, ...]
+    driven: Index
+    bodies: tuple[Idle, ...]
+    batch: tuple[int, ...]
+    t: object
+
+
+def forces_of_block(task: ForceTask, rates: Rates, f: FactoredClosure, coordinates: Array, places: Index) -> BlockForces:
+    """Forces at positions with user coordinates ``(F, T)`` that stand at the ``places`` of the flat batch."""
+    here = rates.here
+    site = Site(here, rates, coordinates, task.batch, places, task.t)
+    site.collect(task.loads)
+    given, applied, inertia = site.scaled_efforts(), site.applied(), inertia_wrenches(here, rates)
+    loads = applied + inertia
+    hold, holds = None, ()
+    if task.bodies:
+        hold, holds = _held(here, task.bodies, f.motions(), loads, given)
+        loads = loads + hold
+    wrenches = METHODS[task.method](Problem(here, loads, given, task.driven, f))
+    stress = orthonormal_stress(here, wrenches.stress, task.driven)
+    reactions, efforts = _least(here, wrenches, stress)
+    own = np.zeros_like(efforts)
+    own[task.driven] = efforts[task.driven] - given[task.driven]
+    balance, wrench = _balance(here, reactions, own + given, loads, (applied, inertia, hold))
+    power, term = _power(rates, applied if hold is None else applied + hold, own + given, inertia)
+    frame = here.system.graph.frame
+    shaking = np.delete(loads, frame, axis=1).sum(axis=1) + site.scaled(site.internal)[:, frame]
+    return BlockForces(
+        reactions, efforts, given, loads, hold, stress.wrenches, stress.efforts, shaking, balance, power, (wrench, term), holds
+    )
+
+
+def _held(
+    here: Configuration, bodies: tuple[Idle, ...], Z: Array, loads: Array, given: Array
+) -> tuple[Array, tuple[Hold, ...]]:
+    hold, sizes = passive_rest.hold(here, bodies, Z, loads, given)
+    names = passive_rest.hold_names(here, bodies, Z)
+    return hold, tuple(Hold(*name, size) for name, size in zip(names, sizes, strict=True))
+
+
+def _least(here: Configuration, wrenches: Wrenches, stress: Stress) -> tuple[Array, Array]:
+    """Reactions ``(6, P, T)`` and all efforts ``(F, T)``, of least norm where redundant."""
+    efforts = pair_power(here, wrenches.totals)
+    reactions = reaction_part(here, wrenches.totals, efforts)
+    if not stress.wrenches.shape[2]:
+        return reactions, efforts
+    return least_reactions(here, reactions, efforts, stress)
+
+
+def _balance(
+    here: Configuration, reactions: Array, efforts: Array, loads: Array, parts: tuple[Array | None, ...]
+) -> tuple[Array, float]:
+    """Residual ``(T,)`` of the equilibrium of all links and of ``S^T w = effort``, and the largest wrench."""
+    s = here.system
+    totals = here.pair_sums(here.E * efforts)
+    totals += reactions
+    left = loads.copy()
+    add_at(left, s.b, totals)
+    add_at(left, s.a, -totals)
+    left[:, s.graph.frame] = 0.0
+    residual = np.abs(left).max(axis=(0, 1), initial=0.0)
+    work = np.abs(pair_power(here, reactions)).max(axis=0, initial=0.0)
+    return np.maximum(residual, work), max(_largest(part) for part in (totals, *parts) if part is not None)
+
+
+def _power(rates: Rates, applied: Array, efforts: Array, inertia: Array) -> tuple[Array, float]:
+    """Driver power + load power - rate of kinetic energy ``(T,)``, and the largest term."""
+    by_load, by_effort = (rates.V * applied).sum(axis=0), rates.dq * efforts
+    kinetic = kinetic_power(rates, inertia)
+    left = by_load.sum(axis=0) + by_effort.sum(axis=0) - kinetic.sum(axis=0)
+    return left, max(_largest(part) for part in (by_load, by_effort, kinetic))
+
+
+def _largest(values: Array) -> float:
+    """Largest size of a number in an array; 0 for none."""
+    return float(max(values.max(initial=0.0), -values.min(initial=0.0)))

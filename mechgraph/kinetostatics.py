@@ -1,0 +1,400 @@
+"""Kinetostatics and kinematics in one pipeline: drives, start, positions, rates, forces, for one position, a cycle, cases or variants."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.closure.assembly import CLOSED, assembled_at, closed_start, named_columns, state_rows
+from mechgraph.closure.configuration import Configuration, Index, System
+from mechgraph.closure.driver_motion import DriverMotion
+from mechgraph.closure.driver_path import DriverPath, Positions, Request, Status, follow, in_blocks
+from mechgraph.closure.passive_rest import Idle, unspun
+from mechgraph.closure.rates import Rates, distance_to_dead_point, rates
+from mechgraph.closure.solver import ClosureSolver, FactoredClosure, closure_solver
+from mechgraph.errors import DeadPointError, DeclarationError, IndeterminateError, ReachError
+from mechgraph.force.block import BlockForces, ForceTask, forces_of_block
+from mechgraph.force.dalembert import METHODS
+from mechgraph.model.load import Load
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.numerics.linear import independent_rows, rank_of, singular_values
+from mechgraph.numerics.tolerances import PATH
+from mechgraph.report.report import check
+from mechgraph.result.solution import Solution
+from mechgraph.result.trajectory import BlockMotion, Trajectory
+from mechgraph.structure.mobility import Freedoms, free_motion
+
+CONTRADICTION = 1e-6
+"""Relative part of the closure rates that drivers may leave open before they count as contradicting each other."""
+FARTHEST = 1e6
+"""Longest way of a driver from its start (radians, or lengths / L)."""
+ON_REACH = ("raise", "flag")
+REDUNDANT = ("nan", "minimum_norm")
+ENGINES = ("auto", "dense", "sparse")
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to solve: force ``method`` (None: motion alone), what becomes of ``redundant`` reactions, and the ``engine``."""
+
+    method: str | None = "loop_wrench"
+    redundant: str = "nan"
+    engine: str = "auto"
+
+
+@dataclass(frozen=True)
+class Starts:
+    """Where the paths begin: a closed state ``x (nx, V)`` for every variant, and the systems with the numbers of variants.
+
+    ``system_of(variants)`` for variants ``(T,)``; ``loads`` act with the numbers of every variant.
+    """
+
+    x: Array
+    system_of: Callable[[Index], System]
+    loads: tuple[Load, ...]
+
+
+class Pipeline:
+    """One call up to the trajectory. What depends on the graph, the drives and the start alone is found first (``__init__``).
+
+    Attributes
+    ----------
+    system, x : scaled system and closed state at the start.
+    columns, lead : driven freedoms; which of the drivers lead (independent ones; the others are checked to agree).
+    freedoms : what can move, what the drivers leave free, passive freedoms.
+    """
+
+    def __init__(self, drive: DriverMotion, options: Options) -> None:
+        self.drive, self.m, self.options = drive, drive.m, options
+        self.start = closed_start(self.m, drive.first)
+        self.system, self.x = self.start.system, self.start.x[:, 0]
+        self.columns, _ = named_columns(self.m, self.system, dict.fromkeys(drive.names, 0.0))
+        self.unit = np.where(self.system.is_length[self.columns], self.system.par.L, 1.0)
+        self._refuse_far()
+        self.freedoms: Freedoms = free_motion(self.system, self.x, self.columns)
+        self.lead = self._independent()
+        self._check_determinate()
+        self.bodies = self.freedoms.bodies
+
+    # --- drivers ---------------------------------------------------------------------------------------------------------
+
+    def values(self, kind: str, batch: tuple[int, ...]) -> Array:
+        """Driver positions, velocities or accelerations ``(d, T)`` in internal units."""
+        return self.drive.values(kind, batch) / self.unit[:, None]
+
+    def _refuse_far(self) -> None:
+        """Refuse a path that would be followed for hours."""
+        begin = self.x[state_rows(self.system, self.columns)][:, None]
+        far = np.abs(self.values("position", self.drive.batch) - begin).max(axis=1)
+        faults = [
+            f"motion of {name!r}: comes {size * unit:.3g} away from the start; expected at most {FARTHEST * unit:.3g}"
+            for name, size, unit in zip(self.drive.names, far, self.unit, strict=True)
+            if size > FARTHEST
+        ]
+        if faults:
+            raise DeclarationError(f"solve {self.m.name!r}", faults)
+
+    def _independent(self) -> Index:
+        """Which of the drivers lead: as many as can move independently, the first ones first."""
+        if not self.freedoms.dependent:
+            return np.arange(len(self.columns))
+        rank = rank_of(singular_values(self.freedoms.null[self.columns]), 1e-8)
+        order = [int(c) for c in self.columns]
+        chosen = independent_rows(self.freedoms.null, order, rank)
+        return np.array([order.index(c) for c in sorted(chosen, key=order.index)], dtype=np.intp)
+
+    def _check_determinate(self) -> None:
+        free = self.freedoms.undriven
+        if free:
+            names = ", ".join(dict.fromkeys(name for motion in free for name in motion.names))
+            count = f"{len(free)} freedom{'s are' if len(free) > 1 else ' is'}"
+            raise IndeterminateError(
+                f"mechanism {self.m.name!r}: {count} left free that {'are' if len(free) > 1 else 'is'} neither driven nor passive "
+                f"(moving: {names}). Drive as many more, or change a pair",
+                check(self.m),
+            )
+
+    @property
+    def leading(self) -> Index:
+        """The driven freedoms that lead."""
+        return self.columns[self.lead]
+
+    # --- positions -------------------------------------------------------------------------------------------------------
+
+    def run(self, starts: Starts | None = None, batch: tuple[int, ...] | None = None) -> Outcome:
+        """All positions, rates and forces as a trajectory."""
+        batch = self.drive.batch if batch is None else batch
+        starts = starts or Starts(self.x[:, None], lambda variants: self.system, self.m.loads)
+        solver = closure_solver(self.start, self.leading, self.options.engine, self.freedoms.hold)
+        one = starts.x.shape[1] == 1
+        T = int(np.prod(batch))
+        variant = np.zeros(T, dtype=np.intp) if one else np.arange(T) // batch[-1]
+        requests = self._requests(batch, starts)
+        path = DriverPath(self.system, solver, starts.system_of)
+        found = follow(path, requests, T)
+        if self.bodies:
+            found = unspun(path, found, self.bodies)
+        return Outcome(self, starts, batch, variant, found, path)
+
+    def _requests(self, batch: tuple[int, ...], starts: Starts) -> list[Request]:
+        """What is asked of every start: one driver leads all cases along one curve, several lead each case along its own polygon."""
+        values = self.values("position", batch)[self.lead]
+        T, N = values.shape[1], batch[-1] if batch else 1
+        if starts.x.shape[1] == 1:
+            if len(self.lead) == 1:
+                return [Request(starts.x[:, 0], 0, values, np.arange(T))]
+            return [Request(starts.x[:, 0], 0, values[:, i : i + N], np.arange(i, i + N)) for i in range(0, T, N)]
+        begun = np.flatnonzero(np.isfinite(starts.x).all(axis=0))
+        return [Request(starts.x[:, v], v, values[:, v * N : (v + 1) * N], np.arange(v * N, (v + 1) * N)) for v in begun.tolist()]
+
+
+class Outcome:
+    """Positions found, turned into a trajectory block by block."""
+
+    def __init__(
+        self, line: Pipeline, starts: Starts, batch: tuple[int, ...], variant: Index, found: Positions, path: DriverPath
+    ) -> None:
+        self.line, self.starts, self.batch, self.found, self.path = line, starts, batch, found, path
+        self.solver: ClosureSolver = path.solver
+        self.variant = variant
+        self.contradicting = np.zeros(len(variant), dtype=bool)
+        self._velocity, self._acceleration = (line.values(kind, batch) for kind in ("velocity", "acceleration"))
+        coordinates = continued(path, found)
+        self.trajectory = Trajectory(
+            line.system, self.system_at, batch, line.drive.t, line.columns, coordinates, line.options.redundant == "nan"
+        )
+        self._fill()
+
+    def system_at(self, places: Index) -> System:
+        """The system with the numbers of the positions at flat places."""
+        return self.starts.system_of(self.variant[places])
+
+    def _fill(self) -> None:
+        found = self.found
+        good = np.flatnonzero(found.status == Status.OK)
+        bad = np.flatnonzero(found.status != Status.OK)
+        self.trajectory.mark(bad, [status.value for status in found.status[bad]])
+        whole = bool(self.line.bodies) or not all(_by_position(load) for load in self.starts.loads)
+        for places in [good] if whole else in_blocks(good):
+            self._block(places)
+
+    def _block(self, places: Index) -> None:
+        found, line = self.found, self.line
+        here = found.here if found.here is not None and len(places) == found.x.shape[1] else None
+        here = here or self.system_at(places).at(found.x[:, places])
+        which = self.solver.chosen(here, found.which[places])
+        f = self.solver.factored(here, which)
+        open_ = here.closure > CLOSED
+        dead = self._dead(here, f) & ~open_
+        if (open_ | dead).any():
+            self.trajectory.mark(places[open_], Status.NOT_CLOSED.value)
+            self.trajectory.mark(places[dead], Status.DEAD_POINT.value)
+            keep = np.flatnonzero(~(open_ | dead))
+            places, here = places[keep], self.system_at(places[keep]).at(here.x[:, keep])
+            f = f.part(keep, here)
+        if not places.size:
+            return
+        velocity, acceleration = self._velocity[:, places], self._acceleration[:, places]
+        moved = rates(here, f, line.leading, velocity[line.lead], acceleration[line.lead], line.bodies)
+        if len(line.lead) < len(line.columns):
+            moved.contradiction = self._disagreement(here, moved, places)
+        self.contradicting[places] = moved.contradiction > CONTRADICTION
+        motion = BlockMotion(places, moved)
+        self.trajectory.put(motion, self._forces(motion, f) if line.options.method else None)
+
+    def _forces(self, motion: BlockMotion, f: FactoredClosure) -> BlockForces:
+        line = self.line
+        if len(line.lead) < len(line.columns):  # the efforts of all drivers are unknowns
+            solver = closure_solver(line.start, line.columns, line.options.engine, line.freedoms.hold)
+            f = solver.factored(motion.here, solver.chosen(motion.here, np.full(motion.here.T, -1)))
+        assert line.options.method is not None
+        task = ForceTask(line.options.method, self.starts.loads, line.columns, line.bodies, self.batch, line.drive.t)
+        coordinates = self.trajectory.coordinates_at(motion.places)
+        return forces_of_block(task, motion.rates, f, coordinates, motion.places)
+
+    def _dead(self, here: Configuration, f: FactoredClosure) -> Mask:
+        """Positions so near to a dead point that their rates would be noise."""
+        dead = np.asarray(f.condition > PATH.singular)
+        doubtful = np.flatnonzero((f.condition > PATH.doubtful) & ~dead)
+        if doubtful.size:
+            few = here.part(doubtful)
+            near = distance_to_dead_point(few, f.part(doubtful, few), self.line.leading)
+            dead[doubtful] = ~(near > PATH.dead_point)
+        return dead
+
+    def _disagreement(self, here: Configuration, moved: Rates, places: Index) -> Array:
+        """How far given positions and rates of dependent drivers are from those that the leading ones bring, ``(T,)``."""
+        line = self.line
+        turns = line.values("position", self.batch)[:, places] - here.x[state_rows(line.system, line.columns)]
+        turns -= np.where(line.system.is_length[line.columns], 0.0, 2 * np.pi)[:, None] * np.round(turns / (2 * np.pi))
+        out = np.abs(turns).max(axis=0, initial=0.0)
+        for given, found in ((self._velocity, moved.dq), (self._acceleration, moved.ddq)):
+            asked = given[:, places]
+            size = np.abs(found).max(axis=0, initial=0.0) + np.abs(asked).max(axis=0, initial=0.0)
+            gap = np.abs(found[line.columns] - asked).max(axis=0, initial=0.0)
+            out = np.maximum(out, gap / np.where(size > 0, size, 1.0))
+        return np.maximum(out, moved.contradiction)
+
+
+def _by_position(load: Load) -> bool:
+    """Whether a load is a matter of each position by itself: one of values, not of callables that see the whole batch."""
+    if not dataclasses.is_dataclass(load):
+        return False
+    return not any(callable(getattr(load, field.name)) for field in dataclasses.fields(load))
+
+
+def continued(path: DriverPath, found: Positions) -> Array:
+    """User coordinates ``(F, T)`` of all positions, rotation vectors continued along their tracks from the start."""
+    s = path.system
+    start = s.start_coordinates(s.m.start)
+    if all(len(factor) == 1 for g in s.groups for factor in g.row.factors):
+        return s.coordinates_of(found.x)
+    out = np.full((s.n_freedoms, found.x.shape[1]), np.nan)
+    good = np.flatnonzero(found.status == Status.OK)
+    for track, mine in _by_track(found.track[good]):
+        at, nodes = good[mine], found.nodes_of(track)
+        place = np.concatenate([nodes.place, found.place[at]])
+        order = np.argsort(place, kind="stable")
+        states = np.concatenate([nodes.x, found.x[:, at]], axis=1)[:, order]
+        q = s.coordinates_of(states, start)
+        back = np.empty_like(order)
+        back[order] = np.arange(len(order))
+        out[:, at] = q[:, back[len(nodes) :]]
+    return out
+
+
+def _by_track(track: Index) -> list[tuple[int, Index]]:
+    """Positions of every track."""
+    order = np.argsort(track, kind="stable")
+    cuts = np.flatnonzero(np.diff(track[order])) + 1
+    return [(int(track[part[0]]), part) for part in np.split(order, cuts) if part.size]
+
+
+# --- the public face -----------------------------------------------------------------------------------------------------
+
+
+def _option(what: str, value: Any, allowed: Iterable[str]) -> list[str]:
+    return [] if value in allowed else [f"{what} = {value!r}: expected one of {', '.join(map(repr, allowed))}"]
+
+
+def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exception | None:
+    """The named error for the first position that was not solved, with the solution so far."""
+    status = solution.status.reshape(-1)
+    bad = np.flatnonzero(status != Status.OK.value)
+    if not bad.size:
+        return None
+    first = int(bad[0])
+    last = outcome.found.reached[:, first] * line.unit[line.lead]
+    reached = {name: float(v) for name, v in zip(np.array(line.drive.names)[line.lead], last, strict=True)}
+    asked = dict(zip(line.drive.names, (line.values("position", outcome.batch)[:, first] * line.unit).tolist(), strict=True))
+    at = ", ".join(f"{name} = {value:.6g}" for name, value in reached.items())
+    wanted = ", ".join(f"{name} = {value:.6g}" for name, value in asked.items())
+    if status[first] in (Status.DEAD_POINT.value, Status.BEYOND_DEAD_POINT.value):
+        return DeadPointError(
+            f"mechanism {line.m.name!r}: dead point at {at} (asked for position {first}: {wanted}). The drivers do not "
+            "determine the motion there; drive another freedom, stop before it, or use on_reach='flag'",
+            reached,
+            solution,
+        )
+    return ReachError(
+        f"mechanism {line.m.name!r}: position {first} ({wanted}) is out of reach; reached {at}. Use on_reach='flag' for the "
+        "positions that can be reached",
+        reached,
+        solution,
+    )
+
+
+def _check_drivers(line: Pipeline, outcome: Outcome) -> None:
+    unsolved = not (outcome.found.status == Status.OK).any()
+    if not outcome.contradicting.any() and not (line.freedoms.dependent and unsolved):
+        return
+    names, mobility = ", ".join(line.drive.names), line.freedoms.mobility
+    why = (
+        f"the drivers {names} contradict each other: their motions cannot be had together (mobility {mobility}, "
+        f"{len(line.columns)} drivers). Take a driver away, or give motions that agree"
+    )
+    if not mobility:
+        why = f"it cannot be driven by {names}: it is a structure (mobility 0) where it was assembled. Change a pair, see mg.check"
+    raise IndeterminateError(f"mechanism {line.m.name!r}: {why}", check(line.m))
+
+
+def _solve(m: Mechanism, motions: Mapping[str, Any] | None, on_reach: str, options: Options) -> Solution:
+    faults = _option("on_reach", on_reach, ON_REACH) + _option("engine", options.engine, ENGINES)
+    if faults:
+        raise DeclarationError(f"solve {m.name!r}", faults)
+    line = Pipeline(DriverMotion(m, motions), options)
+    outcome = line.run()
+    _check_drivers(line, outcome)
+    solution = Solution(outcome.trajectory)
+    error = _unreached(line, outcome, solution) if on_reach == "raise" else None
+    if error is not None:
+        raise error
+    return solution
+
+
+def kinematics(
+    m: Mechanism, motions: Mapping[str, Any] | None = None, *, on_reach: str = "raise", engine: str = "auto"
+) -> Solution:
+    """Positions, velocities and accelerations of all pairs and links, without forces; see ``solve``."""
+    return _solve(m, motions, on_reach, Options(None, "nan", engine))
+
+
+def solve(
+    m: Mechanism,
+    motions: Mapping[str, Any] | None = None,
+    *,
+    method: str = "loop_wrench",
+    loads: Iterable[Load] | None = None,
+    redundant: str = "nan",
+    on_reach: str = "raise",
+    engine: str = "auto",
+) -> Solution:
+    """Driver efforts and all reactions for given driver motion (kinetostatics; statics where the rates are zero).
+
+    Parameters
+    ----------
+    motions : driver -> ``Motion``, or positions at zero rates; shapes broadcast, the last axis is followed as a path from
+        ``start``, other axes are independent cases. Left out where the drives carry their motion.
+    method : ``"loop_wrench"`` (one unknown wrench a loop) or ``"newton_euler"`` (the printed equations).
+    loads : replace the declared ones.
+    redundant : ``"nan"`` for components that are not unique, or ``"minimum_norm"`` (least ``sum |F|^2 + |M / L|^2``).
+    on_reach : ``"raise"`` or ``"flag"`` (NaN rows, see ``Solution.status``).
+    engine : ``"dense"`` or ``"sparse"`` linear algebra, or ``"auto"``: the faster one for the size. The values are the same.
+
+    Raises
+    ------
+    DeclarationError, AssemblyError, ReachError, DeadPointError, IndeterminateError
+    """
+    faults = _option("method", method, METHODS) + _option("redundant", redundant, REDUNDANT)
+    if faults:
+        raise DeclarationError(f"solve {m.name!r}", faults)
+    if loads is not None:
+        m = m.replace(loads=tuple(loads))
+    return _solve(m, motions, on_reach, Options(method, redundant, engine))
+
+
+def assemble(
+    m: Mechanism, values: Mapping[str, float] | None = None, guess: Mapping[str, Any] | None = None
+) -> Mechanism:
+    """The same mechanism with ``start`` set to closed coordinates at the given values of some freedoms.
+
+    From ``start`` the freedoms named are led to their values in small steps, so that the branch is kept; from a ``guess`` the
+    loops are closed directly.
+
+    Raises
+    ------
+    AssemblyError, ReachError
+    """
+    system, x = assembled_at(m, {} if values is None else values, guess)
+    wanted = {m.full_name(name): float(value) for name, value in (values or {}).items()}
+    q = system.coordinates_of(x[:, None], system.start_coordinates(m.start))[:, 0]
+    start = dict(zip(m.freedom_names(), q.tolist(), strict=True)) | wanted
+    return m.replace(start=start)

@@ -1,0 +1,437 @@
+"""Following many paths of solutions of equations together: a batch of tracks, each with its own place and step.
+
+A track is followed in two ways. The *quick* march predicts every node from those before it and takes one Newton step; afterwards all
+nodes of all tracks are closed in one batch, and every step is certified in one batch by a node in its middle (see ``_certified``).
+Where a step cannot be certified, or the quick march does not get on, the *careful* march takes over from the last certified node: it
+closes and certifies every step by itself and halves it where that fails, down to a smallest step. What lies there is named: a fold,
+where the path turns back, or a crossing with another branch, which is passed on the branch of continuous velocity.
+
+Nothing here knows what the equations are: a ``Problem`` evaluates them.
+Sources: Allgower and Georg, Introduction to Numerical Continuation Methods, 2003, chapters 2 and 6; Govaerts, Numerical Methods for
+Bifurcations of Dynamical Equilibria, 2000, chapter 3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechgraph.numerics.hermite import Interpolation, divided_differences, newton_form
+from mechgraph.numerics.newton import Closed, Newton, Problem, Work
+from mechgraph.numerics.tolerances import PATH
+from mechgraph.numerics.tracks import Nodes, Paths
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+
+
+class End(Enum):
+    """How a track ended."""
+
+    REACHED = "reached"
+    FOLD = "fold"
+    CROSSING = "crossing"
+
+
+@dataclass(frozen=True)
+class Tracks:
+    """Nodes of all tracks, how each ended ``(V,)`` and the crossings passed as (track, place)."""
+
+    nodes: Nodes
+    end: list[End]
+    crossings: list[tuple[int, float]]
+    work: Work
+
+
+class Follower:
+    """Follows the tracks of a problem; see the head of this file."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.work = Work()
+        self.newton = Newton(problem, self.work)
+
+    def follow(self, x: Array, paths: Paths, first: float = PATH.first) -> Tracks:
+        """All tracks from their closed states ``x (nx, V)``; ``first`` is the first step tried."""
+        V = x.shape[1]
+        self.paths, self.ends = paths, [End.REACHED] * V
+        self.crossings: list[tuple[int, float]] = []
+        start = self._start(x)
+        open_ = np.flatnonzero((start.condition <= PATH.singular) & (paths.end > 0))
+        nodes = self._quick(start.take(open_), first)
+        nodes = Nodes.join([start, self._settled(nodes)])
+        nodes = self._cut(self._certified_all(nodes))
+        short = [v for v in range(V) if nodes.place[nodes.track == v].max() < paths.end[v]]
+        for v in short:
+            nodes = self._careful(nodes, v)
+        return Tracks(nodes, self.ends, self.crossings, self.work)
+
+    # --- nodes -----------------------------------------------------------------------------------------------------------
+
+    def _start(self, x: Array) -> Nodes:
+        tracks = np.arange(x.shape[1])
+        drive = self.paths.drive(tracks, np.zeros(len(tracks)))
+        point = self.problem.at(x, drive, tracks)
+        which = self.problem.chosen(point, np.full(len(tracks), -1))
+        f = self.problem.factored(point, which)
+        Z = self.problem.sensitivity(point, f)
+        return Nodes(point.x, Z, drive, tracks, np.zeros(len(tracks)), which, f.condition, np.ones(len(tracks), bool))
+
+    def _nodes(self, found: Closed, drive: Array, track: Index, place: Array, sure: bool) -> Nodes:
+        n = len(place)
+        return Nodes(
+            found.x, found.Z, drive, track, place, found.which, found.condition, np.full(n, sure)
+        )
+
+    def _renewed(self, nodes: Nodes) -> Nodes:
+        """The same nodes in better forms where theirs are poor."""
+        poor = np.flatnonzero(nodes.condition > PATH.fair)
+        if not poor.size:
+            return nodes
+        few = nodes.take(poor)
+        point = self.problem.at(few.x, few.drive, few.track)
+        which = self.problem.chosen(point, few.which)
+        f = self.problem.factored(point, which)
+        Z, condition = nodes.Z.copy(), nodes.condition.copy()
+        Z[:, :, poor], condition[poor] = self.problem.sensitivity(point, f), f.condition
+        new = nodes.which.copy()
+        new[poor] = which
+        return replace(nodes, Z=Z, condition=condition, which=new)
+
+    # --- prediction ------------------------------------------------------------------------------------------------------
+
+    def _ahead(self, last: Nodes, before: Nodes, known: Mask, at: Array, drive: Array) -> tuple[Array, Array]:
+        """Increments ``(F, n)`` from the last nodes to path values, and the order of their error in the step.
+
+        Where the track goes straight on from the node before (``known``) in steps of fair size: Hermite interpolation through both,
+        extrapolated; behind a corner the change of the sensitivity over the last step; else the sensitivity alone.
+        """
+        h, change = at - last.place, drive - last.drive
+        dq = (last.Z * change).sum(axis=1)
+        order = np.full(len(h), 2)
+        came = last.drive - before.drive
+        back = last.place - before.place
+        ratio = h / np.where(back > 0, back, 1.0)
+        size = np.sqrt((came * came).sum(axis=0) * (change * change).sum(axis=0))
+        along = (came * change).sum(axis=0)
+        known = known & (back > 0) & (ratio < 16.0) & (along > 0)
+        straight = known & (along > (1 - 1e-9) * size) & (ratio > 0.25)
+        two = np.flatnonzero(straight)
+        if two.size:
+            a, b = before.take(two), last.take(two)
+            direction = change[:, two] / h[two]
+            y = self.problem.difference(a.x, b.x)
+            rates = np.stack([(b.Z * direction).sum(axis=1), self.problem.tangent(y, (a.Z * direction).sum(axis=1))])
+            values = np.stack([np.zeros_like(y), y])
+            places = np.stack([np.zeros(two.size), a.place - b.place])
+            dq[:, two] = newton_form(*divided_differences(places, values, rates), h[two])
+            order[two] = 4
+        bent = np.flatnonzero(known & ~straight & (ratio < 4.0))
+        if bent.size:
+            dq[:, bent] += 0.5 * ratio[bent] * ((last.Z - before.Z)[:, :, bent] * change[:, bent]).sum(axis=1)
+            order[bent] = 3
+        return self.problem.corrigible(dq, last.which), order
+
+    # --- the quick march -------------------------------------------------------------------------------------------------
+
+    def _quick(self, start: Nodes, first: float) -> Nodes:
+        """Nodes behind the starts, most of them closed by one Newton step only; ends early where that does not do."""
+        out: list[Nodes] = []
+        last = before = start
+        known = np.zeros(len(start), dtype=bool)
+        h = np.full(len(start), first)
+        while len(last):
+            at = self.paths.step(last.track, last.place, h)
+            drive = self.paths.drive(last.track, at)
+            dq, order = self._ahead(last, before, known, at, drive)
+            x = self.problem.advance(last.x, dq, last.track)
+            found = self.newton.nodes(x, drive, last.track, last.which, PATH.quick)
+            good = found.done & (found.correction <= PATH.correction) & (found.condition <= PATH.singular)
+            new = self._nodes(found, drive, last.track, at, sure=False)
+            h = _next_step(at - last.place, found.correction, order, good)
+            if good.all():
+                out.append(new)
+                before, last = last, new
+                known = np.ones(len(new), dtype=bool)
+            else:
+                kept = np.flatnonzero(good)
+                out.append(new.take(kept))
+                before, last = _replaced(before, last, kept), _replaced(last, new, kept)
+                known[kept] = True
+            poor = last.condition > PATH.fair
+            if poor.any():
+                renewed = self._renewed(last)
+                changed = np.flatnonzero(renewed.which != last.which)
+                out.append(renewed.take(changed))
+                known[changed] = False
+                last = renewed
+            going = (last.place < self.paths.end[last.track]) & (h >= PATH.shortest_quick)
+            if not going.all():
+                on = np.flatnonzero(going)
+                last, before, known, h = last.take(on), before.take(on), known[on], h[on]
+        return Nodes.join(out) if out else start.take(np.zeros(0, dtype=np.intp))
+
+    def _settled(self, nodes: Nodes) -> Nodes:
+        """All nodes closed in one batch; those that do not stay where they were marked by a condition without end."""
+        if not len(nodes):
+            return nodes
+        found = self.newton.nodes(nodes.x, nodes.drive, nodes.track, nodes.which, PATH.node)
+        stays = found.done & (found.correction <= PATH.quick) & (found.which == nodes.which)
+        condition = np.where(stays, found.condition, np.inf)
+        return replace(nodes, x=found.x, Z=found.Z, condition=condition)
+
+    # --- the certificate -------------------------------------------------------------------------------------------------
+
+    def _certified(self, nodes: Nodes, left: Index, right: Index) -> tuple[Mask, Nodes]:
+        """Whether no singular point lies on the tracks between nodes ``left`` and ``right``, and the nodes in the middle of the steps.
+
+        The middle is predicted by Hermite interpolation of both ends and closed. The matrix along the track is, up to third order, the
+        parabola through those at both ends and in the middle; no matrix on it, nor near it for complex places, may be singular (see
+        ``Factored.regular_between``). At a crossing or a fold between the ends the parabola has a singular point however short the step.
+        That the middle closes with a small correction and moves on as its neighbours do (see ``_smooth``) excludes that the ends lie on
+        different branches.
+        """
+        a, b = nodes.take(left), nodes.take(right)
+        place = 0.5 * (a.place + b.place)
+        drive = self.paths.drive(a.track, place)
+        x = _middles(self.problem, a, b, drive)
+        found = self.newton.nodes(x, drive, a.track, a.which, PATH.node)
+        middle = self._nodes(found, drive, a.track, place, sure=True)
+        ok = found.done & (found.which == a.which) & (found.correction <= PATH.correction)
+        ok &= np.isfinite(a.condition) & np.isfinite(b.condition)
+        ok &= _smooth(self.problem, a, middle, b, found.correction)
+        test = np.flatnonzero(ok)
+        if test.size:
+            here = self.problem.at(found.x[:, test], drive[:, test], a.track[test])
+            f = self.problem.factored(here, a.which[test])
+            self.work.evaluations += 3 * test.size
+            self.work.factorizations += test.size
+            ends = [self.problem.at(end.x, end.drive, end.track) for end in (a.take(test), b.take(test))]
+            ok[test] &= f.regular_between(*ends)
+        return ok, middle
+
+    def _certified_all(self, nodes: Nodes) -> Nodes:
+        """Nodes with those in the middle of all steps; steps that could not be certified are halved a few times."""
+        for _ in range(PATH.halvings):
+            left, right = nodes.steps
+            open_ = ~nodes.sure[right]
+            left, right = left[open_], right[open_]
+            if not left.size:
+                break
+            ok, middle = self._certified(nodes, left, right)
+            sure = nodes.sure.copy()
+            sure[right[ok]] = True
+            closed = np.flatnonzero(ok | (np.isfinite(middle.condition) & (middle.condition <= PATH.singular)))
+            kept = replace(middle.take(closed), sure=ok[closed])
+            nodes = Nodes.join([replace(nodes, sure=sure), kept])
+        return nodes
+
+    def _cut(self, nodes: Nodes) -> Nodes:
+        """Every track up to its first step that is not certified."""
+        left, right = nodes.steps
+        bad = ~nodes.sure[right]
+        limit = np.full(len(self.paths.end), np.inf)
+        np.minimum.at(limit, nodes.track[left[bad]], nodes.place[left[bad]])
+        return nodes.take((nodes.place <= limit[nodes.track]) & np.isfinite(nodes.condition))
+
+    # --- the careful march -----------------------------------------------------------------------------------------------
+
+    def _careful(self, nodes: Nodes, track: int) -> Nodes:
+        """One track taken up at its last node, every step closed and certified by itself, to its end or to what ends it."""
+        mine = nodes.take(nodes.track == track)
+        others = nodes.take(nodes.track != track)
+        found = [mine]
+        last, before = mine.take(np.array([-1])), mine.take(np.array([-2 if len(mine) > 1 else -1]))
+        known = len(mine) > 1 and before.place[0] < last.place[0]
+        h, end = PATH.shortest_quick, self.paths.end[track]
+        # beyond this condition rounding moves a state by as much as branches that cross are apart (a fold is far beyond its limit there)
+        worst = max(PATH.crossing, 1e3 * float(mine.condition[0]))
+        while last.place[0] < end:
+            at = self.paths.step(last.track, last.place, np.array([h]))
+            drive = self.paths.drive(last.track, at)
+            dq, order = self._ahead(last, before, np.array([known]), at, drive)
+            x = self.problem.advance(last.x, dq, last.track)
+            step = self.newton.nodes(x, drive, last.track, last.which, PATH.node)
+            new = self._nodes(step, drive, last.track, at, sure=True)
+            good = bool(step.done[0]) and step.correction[0] <= PATH.correction and step.condition[0] <= worst
+            middle = None
+            if good and step.which[0] == last.which[0]:
+                pair = Nodes.join([last, new])
+                ok, middle = self._certified(pair, np.array([0]), np.array([1]))
+                good = bool(ok[0])
+            else:
+                good = False
+            h = float(_next_step(at - last.place, step.correction, order, np.array([good]))[0])
+            if good and middle is not None:
+                self.work.careful_nodes += 1
+                found += [middle, new]
+                before, known = middle, True
+                # where the condition grows as towards a fold, as |s* - s|^-1/2: no further than half of what is left
+                grown = float((new.condition[0] / middle.condition[0]) ** 2 - 1.0)
+                if grown > 0:
+                    h = max(min(h, 0.5 * float(new.place[0] - middle.place[0]) / grown), PATH.shortest)
+                last = self._renewed(new)
+                if last.which[0] != new.which[0]:
+                    found.append(last)
+                    known = False
+            elif h < PATH.shortest:
+                beyond = self._passed(Nodes.join(found), track)
+                if beyond is None:
+                    break
+                found.append(beyond)
+                last, known, h = beyond, False, 0.5 * PATH.shortest_quick
+        return Nodes.join([others, *found])
+
+    def _passed(self, nodes: Nodes, track: int) -> Nodes | None:
+        """The node behind a crossing of branches, on the branch of continuous velocity; None at a fold (and the end is named).
+
+        Towards a fold at ``s*`` rates grow as the inverse of the closure matrix, both as ``|s* - s|^-1/2``; towards a crossing they
+        stay. The branch is extrapolated from nodes well before the crossing, where the matrix is still regular, to as far behind it, and
+        must close there with a correction that is small against the distance to any other branch.
+        """
+        last = nodes.take(np.array([len(nodes) - 1]))
+        size = np.abs(nodes.Z).max(axis=(0, 1))
+        earlier = np.flatnonzero(nodes.condition < 0.05 * last.condition[0])
+        if not earlier.size:
+            self.ends[track] = End.FOLD
+            return None
+        reference = int(earlier[-1])
+        growth = np.log(size[-1] / size[reference]) / np.log(last.condition[0] / nodes.condition[reference])
+        if growth > PATH.crossing_growth:
+            self.ends[track] = End.FOLD
+            return None
+        self.ends[track] = End.CROSSING
+        # the inverse of the condition falls to zero in proportion to the distance
+        ratio = nodes.condition[reference] / last.condition[0]
+        left = (last.place[0] - nodes.place[reference]) * ratio / (1.0 - ratio)
+        return self._behind(nodes, track, float(last.place[0] + left))
+
+    def _behind(self, nodes: Nodes, track: int, crossing: float) -> Nodes | None:
+        for distance in (4e-3, 1e-3, 2.5e-4):
+            at = np.array([crossing + distance])
+            if at[0] > self.paths.end[track]:
+                continue
+            smooth = nodes.take((nodes.place <= crossing - 0.5 * distance) & (nodes.which == nodes.which[-1]))
+            smooth = smooth.take(np.unique(smooth.place, return_index=True)[1])
+            if len(smooth) < 3:
+                continue
+            picked = smooth.take(_spread(smooth.place, crossing, distance))
+            base = picked.take(np.array([-1]))
+            drive = self.paths.drive(base.track, at)
+            direction = (drive - base.drive) / (at - base.place)
+            dq = self.problem.difference(picked.x, base.x)
+            rates = self.problem.tangent(dq, (picked.Z * direction).sum(axis=1))
+            form = divided_differences((picked.place - base.place)[:, None], dq.T[:, :, None], rates.T[:, :, None])
+            ahead = self.problem.corrigible(newton_form(*form, at - base.place), base.which)
+            x = self.problem.advance(base.x, ahead, base.track)
+            step = self.newton.nodes(x, drive, base.track, base.which, PATH.node)
+            new = self._renewed(self._nodes(step, drive, base.track, at, sure=True))
+            turn = np.abs((step.Z - base.Z) * direction).max() / max(1.0, float(np.abs(base.Z).max()))
+            if step.done[0] and step.correction[0] <= 1e-2 * distance and turn <= 0.05 and new.condition[0] <= PATH.doubtful:
+                self.crossings.append((track, crossing))
+                self.ends[track] = End.REACHED
+                return new
+        return None
+
+
+def _spread(places: Array, crossing: float, distance: float) -> Index:
+    """A few nodes before a crossing at distances that grow, the nearest last."""
+    wanted = crossing - distance * np.array([16.0, 8.0, 4.0, 2.0, 1.0])
+    return np.unique(np.clip(np.searchsorted(places, wanted), 0, len(places) - 1))
+
+
+def _next_step(h: Array, correction: Array, order: Array, good: Mask) -> Array:
+    """The step that aims at the wanted correction; half of one that failed."""
+    grown = h * np.clip((PATH.aim / np.maximum(correction, 1e-9)) ** (1 / order), 0.5, 2.0)
+    return np.where(good, np.minimum(np.maximum(grown, 10 * PATH.shortest), PATH.longest), 0.5 * h)
+
+
+def _replaced(old: Nodes, new: Nodes, at: Index) -> Nodes:
+    """Nodes with some of them replaced."""
+    values = {}
+    for name in old.__dataclass_fields__:
+        column = getattr(old, name).copy()
+        column[..., at] = getattr(new, name)[..., at]
+        values[name] = column
+    return Nodes(**values)
+
+
+def _middles(problem: Problem, a: Nodes, b: Nodes, drive: Array) -> Array:
+    """States in the middle between neighbours, by Hermite interpolation of both ends."""
+    h = b.place - a.place
+    direction = (b.drive - a.drive) / h
+    y = problem.difference(b.x, a.x)
+    rates = np.stack([(a.Z * direction).sum(axis=1), problem.tangent(y, (b.Z * direction).sum(axis=1))])
+    values, places = np.stack([np.zeros_like(y), y]), np.stack([np.zeros_like(h), h])
+    dq = newton_form(*divided_differences(places, values, rates), 0.5 * h)
+    off = drive - 0.5 * (a.drive + b.drive)
+    dq += 0.5 * ((a.Z + b.Z) * off).sum(axis=1)
+    return problem.advance(a.x, dq, a.track)
+
+
+def _smooth(problem: Problem, a: Nodes, m: Nodes, b: Nodes, correction: Array) -> Mask:
+    """Whether states and rates in the middles ``m`` are those of the Hermite cubic of both ends, against the change of rates over the step.
+
+    On a smooth track ``r_m = 3/2 (x_b - x_a) / h - (r_a + r_b) / 4`` and the correction of ``x_m`` vanishes, both to higher order than
+    the change of rates; where a step leads from one branch onto another by a jump of the rates, the one holds for a jump at a sixth
+    of the step, the other at a quarter, so never both.
+    """
+    h = b.place - a.place
+    direction = (b.drive - a.drive) / h
+    y = problem.difference(b.x, a.x)
+    rates = [(a.Z * direction).sum(axis=1)]
+    for node in (m, b):
+        rates.append(problem.tangent(problem.difference(node.x, a.x), (node.Z * direction).sum(axis=1)))
+    r_a, r_m, r_b = rates
+    gap = np.abs(r_m - 1.5 * y / h + 0.25 * (r_a + r_b)).max(axis=0, initial=0.0)
+    change = np.max([np.abs(p - q).max(axis=0, initial=0.0) for p, q in ((r_a, r_m), (r_m, r_b), (r_a, r_b))], axis=0)
+    off = np.abs(m.drive - 0.5 * (a.drive + b.drive)).max(axis=0, initial=0.0) / h
+    noise = (4.0 * off + 1e-6) * np.abs(r_m).max(axis=0, initial=0.0) + 1e-14 * m.condition / h
+    return np.asarray((gap <= PATH.smooth * change + noise) & (correction <= h * (PATH.smooth * change / 8 + noise)))
+
+
+def refined(follower: Follower, nodes: Nodes, count: int) -> Nodes:
+    """Nodes with further ones between them until interpolation is exact, or until they are too many for ``count`` positions.
+
+    First one in the middle of every step, which tells the error there; then as many as that error asks for.
+    """
+    left, _ = nodes.steps
+    parts = np.full(len(left), 2)
+    exact = follower.newton.nodes(nodes.x, nodes.drive, nodes.track, nodes.which, PATH.exact)
+    nodes = replace(nodes, x=exact.x, Z=np.where(exact.done, exact.Z, nodes.Z))
+    for _ in range(PATH.refinements):
+        if not (parts > 1).any() or int(parts.sum()) * PATH.worth > count:
+            break
+        interpolation = Interpolation(follower.problem, nodes)
+        step = np.repeat(np.arange(len(parts)), parts - 1)
+        share = np.concatenate([np.arange(1, n) / n for n in parts])
+        a, b = interpolation.left[step], interpolation.right[step]
+        place = nodes.place[a] + share * (nodes.place[b] - nodes.place[a])
+        drive, track, which = follower.paths.drive(nodes.track[a], place), nodes.track[a], nodes.which[a]
+        found = follower.newton.nodes(interpolation(step, place, drive), drive, track, which, PATH.exact)
+        good = found.done & (found.correction <= PATH.correction)
+        new = follower._nodes(found, drive, track, place, sure=True).take(good)
+        error = np.zeros(len(parts))
+        np.maximum.at(error, step, np.where(good, found.correction, 0.0))
+        parts = _divisions(error, parts, np.bincount(step[good], minlength=len(parts)))
+        nodes = Nodes.join([nodes, new])
+    return nodes
+
+
+def _divisions(error: Array, parts: Index, added: Index) -> Index:
+    """Into how many parts every step is to be cut next, from the error of interpolation in the step that it lies in."""
+    halvings = np.zeros(len(error), dtype=np.intp)
+    for _ in range(PATH.halvings):
+        above = error > PATH.interpolation / PATH.gain
+        halvings[above] += 1
+        error = np.where(above, error * PATH.gain, error)
+    out = np.repeat(2**halvings, added + 1)
+    for _ in range(PATH.halvings):
+        # neighbours at most twice as dense: interpolation reaches over both
+        out[1:] = np.maximum(out[1:], out[:-1] // 2)
+        out[:-1] = np.maximum(out[:-1], out[1:] // 2)
+    return out

@@ -1,0 +1,83 @@
+"""Every threshold of the numerical work in one place, each with the reason for its size. Randomness is seeded by its users.
+
+Angles are in radians and lengths in units of L throughout, so that one number serves both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class PathTolerances:
+    """Following a path of closed positions (see ``numerics.continuation``)."""
+
+    closed: float = 1e-13
+    """Closure residual that Newton aims at: some ten roundings of numbers of size one."""
+    accepted: float = 1e-11
+    """Residual with which a position counts as closed where rounding lets it come no nearer (poor condition)."""
+    iterations: int = 10
+    """Most Newton steps at a position; from a good prediction two suffice, so more says that there is none."""
+    lost: float = 0.3
+    """Sum of corrections from which on Newton is given up: it has left the neighbourhood of the prediction."""
+    correction: float = 0.06
+    """Largest correction that a prediction may need; the certificate of the step asks for more than that."""
+    aim: float = 0.005
+    """Correction that the step control aims at: one Newton step from there leaves 2.5e-5, two leave 1e-9."""
+    quick: float = 0.02
+    """Correction up to which one Newton step makes a node of the first march; all nodes are closed together afterwards."""
+    node: float = 1e-8
+    """Last Newton step of a node that counts as closed: its square is rounding."""
+    exact: float = 1e-12
+    """The same where many positions are interpolated between the nodes, so that their sensitivities must be exact as well."""
+    first: float = 0.05
+    """First step of a path: there is no past yet to predict from."""
+    longest: float = 0.35
+    """Longest step between nodes; longer ones would be refused by the certificate more often than not."""
+    shortest_quick: float = 2e-3
+    """Step at which the first march stops and the careful one takes over."""
+    shortest: float = 1e-9
+    """Step at which the careful march stops; the end of the reach is known to this, far above the rounding of a driver value."""
+    straight: float = 0.98
+    """Smallest ratio of chord to path between two nodes; a path that bends or turns back gets a node there."""
+    departure: float = 0.7
+    """Largest change of the closure matrix from the middle of a step to its ends, against its inverse in the middle: below one nothing
+    on the parabola through the three is singular; what is left is for the third order, which three matrices do not show."""
+    smooth: float = 0.05
+    """Part of the change of rates over a step by which the rates in its middle may miss those of the Hermite cubic of its ends (and of
+    the sagitta that it makes, by which the state may)."""
+    fair: float = 1e3
+    """Condition number above which another choice of rows and columns is sought."""
+    better: float = 0.2
+    """Part of the condition number that another choice must undercut to be taken."""
+    singular: float = 1e9
+    """Condition number above which a position counts as a dead point: rates would keep fewer than seven digits."""
+    dead_point: float = 1e-10
+    """Distance to a dead point (in driver coordinates) below which a position counts as one."""
+    doubtful: float = 1e4
+    """Condition number from which on that distance is looked at."""
+    dead_zone: float = 1e-7
+    """Distance from the end of a path up to which a position asked for is said to be the dead point itself."""
+    crossing: float = 3e6
+    """Condition number at which the careful march stops before a crossing: rounding over it is far below the distance of the branches
+    there; at a fold the end of the reach is nearer than ``shortest`` before."""
+    crossing_growth: float = 0.5
+    """Power with which rates grow against the inverse of the closure matrix: one at a fold (both as |s* - s|^-1/2), zero at a crossing
+    of branches; half way between decides."""
+    held: float = 3.0
+    """Largest rate of a freedom for a unit rate of the freedom that holds a passive motion, before another one holds it."""
+    interpolation: float = 3e-14
+    """Error of interpolation that needs no correction."""
+    gain: float = 1e-3
+    """Part of that error that nodes twice as dense leave at most (the order is twelve, 2^-12)."""
+    window: int = 6
+    """Most nodes through which one interpolation goes, each with value and rate."""
+    worth: int = 20
+    """Positions for every new node from which on it is worth its time."""
+    halvings: int = 4
+    """Most halvings of a gap between nodes at a time."""
+    refinements: int = 5
+    """Times that nodes are put between nodes at most."""
+
+
+PATH = PathTolerances()

@@ -1,0 +1,103 @@
+"""Tracks: the polylines of path values along which solutions are followed, and the nodes found on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechgraph.numerics.tolerances import PATH
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+
+
+class Paths:
+    """Polylines of path values: for every track its ``points (d, M)``, the first one where it starts.
+
+    ``stops``: for every track which points no step may pass over.
+    """
+
+    def __init__(self, points: list[Array], stops: list[Mask] | None = None) -> None:
+        self.points = points
+        self.stops = stops or [np.zeros(p.shape[1], dtype=bool) for p in points]
+        self.length = [np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(p) ** 2).sum(axis=0)))]) for p in points]
+        self.end = np.array([length[-1] for length in self.length])
+        count = np.array([len(length) for length in self.length])
+        self._last = np.cumsum(count) - 1
+        self._first = self._last - count + 1
+        # one rising key for all tracks: place on the track plus the lengths of the tracks before it
+        self._offset = np.concatenate([[0.0], np.cumsum(self.end + 1.0)[:-1]])
+        self._all = np.concatenate(points, axis=1)
+        self._places = np.concatenate(self.length)
+        self._key = self._places + np.repeat(self._offset, count)
+
+    def drive(self, tracks: Index, at: Array) -> Array:
+        """Path values ``(d, n)`` at places of tracks."""
+        right = np.searchsorted(self._key, at + self._offset[tracks], side="left")
+        right = np.clip(right, np.minimum(self._first[tracks] + 1, self._last[tracks]), self._last[tracks])
+        left = np.maximum(right - 1, self._first[tracks])
+        width = self._places[right] - self._places[left]
+        u = np.where(width > 0, (at - self._places[left]) / np.where(width > 0, width, 1.0), 1.0)
+        # the ends themselves are met exactly
+        return np.where(u >= 1.0, self._all[:, right], self._all[:, left] + u * (self._all[:, right] - self._all[:, left]))
+
+    def step(self, tracks: Index, at: Array, h: Array) -> Array:
+        """Where a step of at most ``h`` leads: to the furthest point within it up to which the path is nearly straight."""
+        out = np.minimum(at + h, self.end[tracks])
+        inside = np.searchsorted(self._key, out + self._offset[tracks], side="right") - 1
+        for i in np.flatnonzero(self._places[inside] > at):
+            out[i] = self._furthest(int(tracks[i]), float(at[i]), float(out[i]))
+        return out
+
+    def _furthest(self, track: int, at: float, limit: float) -> float:
+        length, points = self.length[track], self.points[track]
+        ahead = np.arange(*np.searchsorted(length, (at, limit), side="right"))
+        here = self.drive(np.array([track]), np.array([at]))
+        chord = np.sqrt(((points[:, ahead] - here) ** 2).sum(axis=0))
+        ends = (chord < PATH.straight * (length[ahead] - at)) | np.append(False, self.stops[track][ahead][:-1])
+        bent = np.flatnonzero(ends)
+        return float(length[ahead[max(int(bent[0]) - 1, 0)] if bent.size else ahead[-1]])
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """Points on tracks, in order: state ``x (nx, K)``, sensitivity ``Z (F, d, K)``, path values ``drive (d, K)``, ``track``, ``place``,
+    form ``which``, ``condition`` and whether the step that leads here is ``sure`` ``(K,)``.
+
+    Where the form changes a node stands twice, so that every step between two nodes has one form.
+    """
+
+    x: Array
+    Z: Array
+    drive: Array
+    track: Index
+    place: Array
+    which: Index
+    condition: Array
+    sure: Mask
+
+    def __len__(self) -> int:
+        return len(self.place)
+
+    def take(self, at: Index | Mask) -> Nodes:
+        """Some of the nodes."""
+        return Nodes(*(getattr(self, f.name)[..., at] for f in fields(self)))
+
+    @staticmethod
+    def join(parts: list[Nodes]) -> Nodes:
+        """Nodes sorted by track and place (equal ones in the order given)."""
+        joined = [np.concatenate([getattr(p, f.name) for p in parts], axis=-1) for f in fields(Nodes)]
+        track, place = joined[3], joined[4]
+        order = np.lexsort((place, track))
+        return Nodes(*(values[..., order] for values in joined))
+
+    @property
+    def steps(self) -> tuple[Index, Index]:
+        """First and last node of every step: neighbours on a track, apart."""
+        left = np.flatnonzero((self.track[1:] == self.track[:-1]) & (self.place[1:] > self.place[:-1]))
+        return left, left + 1
+
+

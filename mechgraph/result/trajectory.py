@@ -1,0 +1,369 @@
+"""The trajectory: arrays over positions in internal units, filled block by block, handed out by name in the user's units.
+
+Component axes first, the flat batch of positions last, NaN where a position was not solved. What follows from states and rates alone
+(poses, twists, frames) is not kept but evaluated again where it is asked for, block by block.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from mechgraph.algebra.screw import shift_wrench
+from mechgraph.algebra.se3 import Array, cross, rotate
+from mechgraph.closure.configuration import Configuration, Index, System
+from mechgraph.closure.driver_path import Status, in_blocks
+from mechgraph.closure.rates import Rates, Velocities
+from mechgraph.equations.state import State
+from mechgraph.errors import MechgraphError
+from mechgraph.force.block import BlockForces
+from mechgraph.force.applied_loads import user_poses, user_twists
+from mechgraph.force.dalembert import given_effort_loads, internal_state
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.result.solution import Checks, MaterialPoint
+from mechgraph.structure.reaction_split import UNIQUE, PairFrames
+
+
+@dataclass(frozen=True)
+class BlockMotion:
+    """Motion at the flat ``places`` of a block: states, rates, evaluated."""
+
+    places: Index
+    rates: Rates
+
+    @property
+    def here(self) -> Configuration:
+        """The evaluation of the states."""
+        return self.rates.here
+
+
+KEPT = ("reactions", "efforts", "given", "loads", "hold", "stress", "stress_efforts", "shaking", "balance", "power")
+"""Fields of ``BlockForces`` that are kept for every position."""
+
+
+class Trajectory:
+    """The values of a Solution (implements ``result.solution.Values``).
+
+    ``system_at(places)`` is the system with the numbers of the positions at flat places (they differ between variants); ``driven`` are the
+    freedoms with a driver, ``coordinates (F, T)`` the user's ones of all positions.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        system_at: Callable[[Index], System],
+        batch: tuple[int, ...],
+        t: Any,
+        driven: Index,
+        coordinates: Array,
+        mask_redundant: bool,
+    ) -> None:
+        self.mechanism: Mechanism = system.m
+        self.batch, self.t, self.driven = batch, t, driven
+        self._system, self._system_at, self._mask = system, system_at, mask_redundant
+        self._L = system.par.L
+        self._coordinates = coordinates
+        self._count = int(np.prod(batch))
+        self._status = np.full(self._count, Status.OK.value, dtype="U24")
+        self._kept: dict[str, Array] = {}
+        self._holds: dict[tuple[str, bool], Array] = {}
+        self._largest = np.zeros(2)
+        self._solved = np.zeros(self._count, dtype=bool)
+        self._last: BlockMotion | None = None
+        self.has_forces = False
+
+    # --- filling -------------------------------------------------------------------------------------------------------
+
+    def put(self, motion: BlockMotion, forces: BlockForces | None) -> None:
+        """Keep a block of solved positions."""
+        places, rates = motion.places, motion.rates
+        self._solved[places] = True
+        for name, values in (("x", motion.here.x), ("dq", rates.dq), ("ddq", rates.ddq), ("closure", motion.here.closure)):
+            self._keep(name, places, values)
+        self._last = motion if len(places) == self._count else None
+        if forces is None:
+            return
+        self.has_forces = True
+        self._keep("points", places, motion.here.pair_points)
+        for name in KEPT:
+            values = getattr(forces, name)
+            if values is not None:
+                self._keep(name, places, values)
+        for hold in forces.holds:
+            sizes = self._holds.setdefault((hold.name, hold.turns), np.full(self._count, np.nan))
+            sizes[places] = hold.size
+        self._largest = np.maximum(self._largest, forces.largest)
+
+    def _keep(self, name: str, places: Index, values: Array) -> None:
+        if len(places) == self._count:
+            self._kept[name] = values
+            return
+        if name not in self._kept:
+            self._kept[name] = np.full((*values.shape[:-1], self._count), np.nan)
+        self._kept[name][..., places] = values
+
+    def coordinates_at(self, places: Index) -> Array:
+        """User coordinates ``(F, n)`` at flat places."""
+        return self._coordinates[:, places]
+
+    def mark(self, places: Index, status: Any) -> None:
+        """Say why positions are not solved."""
+        self._status[places] = status
+
+    # --- shapes and units ----------------------------------------------------------------------------------------------
+
+    def _out(self, values: Array) -> Array:
+        """``(..., T)`` -> batch first ``(*batch, ...)``; read-only."""
+        rows = np.array(np.moveaxis(values, -1, 0), order="C")
+        out = rows.reshape((*self.batch, *rows.shape[1:]))
+        out.setflags(write=False)
+        return out
+
+    def _evaluated(self, value: Callable[[BlockMotion], Array]) -> Array:
+        """What a function gives of the motion at all solved positions, block by block, ``(..., T)``."""
+        if self._last is not None:
+            return value(self._last)
+        out: Array | None = None
+        for places in in_blocks(np.flatnonzero(self._solved)):
+            found = value(self._motion(places))
+            if out is None:
+                out = np.full((*found.shape[:-1], self._count), np.nan)
+            out[..., places] = found
+        assert out is not None
+        return out
+
+    def _motion(self, places: Index) -> BlockMotion:
+        """The motion at some places, evaluated again."""
+        here = self._system_at(places).at(self._of("x")[:, places])
+        rates = Rates(Velocities(here, self._of("dq")[:, places]), self._of("ddq")[:, places], np.zeros(len(places)))
+        return BlockMotion(places, rates)
+
+    def _of(self, name: str) -> Array:
+        """A kept array; all NaN where no position was solved."""
+        if name in self._kept:
+            return self._kept[name]
+        s = self._system
+        P, N, F = len(s.m.pairs), len(s.m.links), s.n_freedoms
+        shapes: dict[str, tuple[int, ...]] = {
+            "x": (s.n_state,), "dq": (F,), "ddq": (F,), "closure": (), "points": (3, P), "reactions": (6, P), "efforts": (F,),
+            "given": (F,), "loads": (6, N), "hold": (6, N), "stress": (6, P, 0), "stress_efforts": (F, 0), "shaking": (6,),
+            "balance": (), "power": (),
+        }  # fmt: skip
+        empty = 0.0 if name == "hold" else np.nan
+        return np.broadcast_to(empty, (*shapes[name], self._count))
+
+    def _force(self, name: str) -> Array:
+        if not self.has_forces and self._solved.any():
+            raise MechgraphError("this solution has no forces: it comes from kinematics(); use solve()")
+        return self._of(name)
+
+    def _user_wrench(self, f: Array) -> Array:
+        """Wrench about the internal origin -> user's units about the global origin, ``(6, ...)``."""
+        out = np.empty(f.shape)
+        origin = self._system.par.origin.reshape(3, *(1,) * (f.ndim - 1))
+        np.multiply(f[3:], self._L, out=out[3:])
+        np.multiply(f[:3], self._L**2, out=out[:3])
+        out[:3] += cross(origin, out[3:])
+        return out
+
+    def _columns(self, pair: int) -> slice:
+        first = self._system.first_column
+        return slice(int(first[pair]), int(first[pair + 1]))
+
+    # --- motion --------------------------------------------------------------------------------------------------------
+
+    def status(self) -> Any:
+        """Named outcomes."""
+        return self._status.reshape(self.batch)
+
+    def coordinates(self, pair: int) -> tuple[Array, Array, Array]:
+        """Coordinates, rates, accelerations of a pair."""
+        columns = self._columns(pair)
+        unit = np.where(self._system.is_length[columns], self._L, 1.0)[:, None]
+        position = np.where(self._solved, self._coordinates[columns], np.nan)
+        return self._out(position), self._out(unit * self._of("dq")[columns]), self._out(unit * self._of("ddq")[columns])
+
+    def link(self, link: int) -> tuple[Array, Array, Array]:
+        """Pose, twist and dV/dt of a link."""
+
+        def motion(block: BlockMotion) -> Array:
+            rates, one = block.rates, slice(link, link + 1)
+            pose = np.moveaxis(user_poses(block.here, one)[0], 0, -1).reshape(16, -1)
+            parts = [user_twists(block.here, values[:, one])[:, 0] for values in (rates.V, rates.A)]
+            return np.concatenate([pose, *parts])
+
+        found = self._evaluated(motion)
+        pose = self._out(found[:16].reshape(4, 4, -1))
+        return pose, self._out(found[16:22]), self._out(found[22:])
+
+    def link_point(self, link: int, p: Any) -> MaterialPoint:
+        """Position, velocity and acceleration of a material point."""
+
+        def motion(block: BlockMotion) -> Array:
+            par = block.here.system.par
+            X, V, A = block.here.poses[:, :, link], block.rates.V[:, link], block.rates.A[:, link]
+            local = par.center[:, link] if p is None else ((np.asarray(p, dtype=float) - par.offset[:, link]) / par.L)[:, None]
+            at = rotate(X[:, :3], local) + X[:, 3]
+            velocity = V[3:] + cross(V[:3], at)
+            acceleration = A[3:] + cross(A[:3], at) + cross(V[:3], velocity)
+            return np.concatenate([par.L * at + par.origin[:, None], par.L * velocity, par.L * acceleration])
+
+        found = self._evaluated(motion)
+        return MaterialPoint(*(self._out(found[i : i + 3]) for i in (0, 3, 6)))
+
+    # --- forces --------------------------------------------------------------------------------------------------------
+
+    def _masked(self, values: Array, stress: Array, scale: float = 1.0) -> Array:
+        """NaN where a self-stress has a part; ``stress`` has the stress index as its last but one axis."""
+        if not self._mask or not stress.shape[-2]:
+            return values
+        touched = np.sqrt((stress * stress).sum(axis=-2)) > UNIQUE * scale
+        return np.where(touched, np.nan, values)
+
+    def reaction(self, pair: int) -> Array:
+        """Reaction about the global origin."""
+        return self._about_origin(self._force("reactions")[:, pair], self._of("stress")[:, pair])
+
+    def total(self, pair: int) -> Array:
+        """Total wrench about the global origin."""
+        columns = self._columns(pair)
+        efforts, stress = self._force("efforts")[columns], self._of("stress_efforts")[columns]
+        states = np.concatenate([efforts[:, None], stress], axis=1)
+        E = self._evaluated(lambda block: block.here.E[:, columns])
+        work = np.einsum("cft,fst->cst", E, states)
+        stress_total = self._of("stress")[:, pair] + work[:, 1:]
+        return self._about_origin(self._of("reactions")[:, pair] + work[:, 0], stress_total)
+
+    def _about_origin(self, value: Array, stress: Array) -> Array:
+        """Wrench ``(6, T)`` in the user's units about the global origin, NaN where ``stress (6, s, T)`` has a part."""
+        wrench = self._user_wrench(value)
+        if stress.shape[1]:
+            far = self._system.par.origin / self._L
+            shifted = np.concatenate([stress[:3] + cross(far[:, None, None], stress[3:]), stress[3:]])
+            wrench = self._masked(wrench, shifted, 1.0 + float(np.linalg.norm(far)))
+        return self._out(wrench)
+
+    def reaction_at_pair(self, pair: int) -> Array:
+        """Reaction about the origin of marker B."""
+        reactions, point = self._force("reactions")[:, pair], self._of("points")[:, pair]
+        stress = shift_wrench(self._of("stress")[:, pair], point[:, None])
+        scale = np.repeat([self._L**2, self._L], 3)[:, None]
+        return self._out(self._masked(scale * shift_wrench(reactions, point), stress))
+
+    def components(self, pair: int) -> dict[str, Array]:
+        """Reaction components by name."""
+        self._force("reactions")
+        number, i = self._system.place_of(pair)
+        row = self._system.groups[number].row
+        states = np.concatenate([self._of("reactions")[:, pair][:, None], self._of("stress")[:, pair]], axis=1)
+
+        def components(block: BlockMotion) -> Array:
+            return PairFrames(block.here).components_of(number, i, states[..., block.places])
+
+        found = self._evaluated(components)
+        couples = [c.is_couple for c in row.reactions or ()] or [False] * (6 - row.f)
+        unit = np.where(couples, self._L**2, self._L)[:, None]
+        masked = self._masked(unit * found[:, 0], found[:, 1:])
+        return {name: self._out(part) for name, part in zip(row.component_names, masked, strict=True)}
+
+    def efforts(self, pair: int) -> tuple[Array, Array]:
+        """Efforts of all kinds and of the driver alone."""
+        columns = self._columns(pair)
+        total, given = self._force("efforts")[columns], self._of("given")[columns]
+        driven = np.isin(np.arange(columns.start, columns.stop), self.driven)[:, None]
+        own = np.where(driven, total - given, np.where(np.isnan(given), np.nan, 0.0))
+        unit = np.where(self._system.is_length[columns], self._L, self._L**2)[:, None]
+        stress = self._of("stress_efforts")[columns]
+        return self._out(self._masked(unit * (own + given), stress)), self._out(self._masked(unit * own, stress))
+
+    def shaking(self) -> Array:
+        """Wrench on the frame: loads and inertia of all moving links, and what springs do to the frame."""
+        return self._out(self._user_wrench(self._force("shaking")))
+
+    def link_hold(self, link: int) -> Array:
+        """Wrench that keeps a passive body at rest, about the global origin."""
+        self._force("loads")
+        return self._out(self._user_wrench(self._of("hold")[:, link]))
+
+    def passive_efforts(self) -> dict[str, Array]:
+        """What keeps passive bodies at rest, by body: a couple about the axis of a turn, a force along a slide."""
+        self._force("loads")
+        return {
+            name: self._out((self._L**2 if turns else self._L) * size) for (name, turns), size in self._holds.items()
+        }
+
+    # --- checks and states -----------------------------------------------------------------------------------------------
+
+    def checks(self) -> Checks:
+        """Closure error, equilibrium and power; the last two relative to the largest term in the whole batch."""
+        closure = self._out(self._of("closure"))
+        if not self.has_forces:
+            nothing = np.full(self.batch, np.nan)
+            return Checks(closure, nothing, nothing)
+        wrench, term = (float(size) or 1.0 for size in self._largest)
+        return Checks(closure, self._out(self._of("balance") / wrench), self._out(self._of("power") / term))
+
+    def state(self, index: Any) -> State:
+        """Screws and loads at one position, user's units, global origin."""
+        flat = flat_place(self.batch, index)
+        if not self._solved[flat]:
+            raise MechgraphError(f"state({index!r}): this position was not solved ({self._status[flat]})")
+        block = self._motion(np.array([flat]))
+        here, s = block.here, self._system
+        loads = np.zeros((6, len(s.m.links), 1))
+        if self.has_forces:
+            loads = self._of("loads")[:, :, [flat]] + given_effort_loads(here, self._of("given")[:, [flat]])
+        inner = internal_state(here, loads)
+        rows = [p.type for p in self.mechanism.pairs]
+        unit = np.where(s.is_length, self._L, 1.0)[:, None]
+        return State(
+            coordinates=self._coordinates[:, [flat]],
+            velocities=unit * block.rates.dq,
+            poses=np.moveaxis(user_poses(here)[..., :3, :], (0, 1), (2, 3)),
+            twists=user_twists(here, block.rates.V),
+            reactions=tuple(
+                self._user_screws(w, [c.is_couple for c in row.reactions or ()])
+                for w, row in zip(inner.reactions, rows, strict=True)
+            ),
+            efforts=tuple(
+                self._user_screws(w, [c.is_couple for c in row.efforts])
+                for w, row in zip(inner.efforts, rows, strict=True)
+            ),
+            along=tuple(
+                self._user_screws(w, [c.is_couple for c in row.bookkeeping.along] if row.bookkeeping else [])
+                for w, row in zip(inner.along, rows, strict=True)
+            ),
+            conditions=tuple(user_twists(here, w) if w.shape[1] else w for w in inner.conditions),
+            loads=self._user_wrench(loads),
+        )
+
+    def _user_screws(self, wrenches: Array, couples: list[bool]) -> Array:
+        """Unit wrenches ``(6, n, T)``: arms in the user's length, about the global origin; unit couples stay."""
+        out = wrenches.copy()
+        for j in range(out.shape[1]):
+            if not (j < len(couples) and couples[j]):
+                out[:3, j] = self._L * out[:3, j] + cross(self._system.par.origin[:, None], out[3:, j])
+        return out
+
+
+def flat_place(batch: tuple[int, ...], index: Any) -> int:
+    """Place in the flat batch of the one position that an index names.
+
+    Raises
+    ------
+    MechgraphError
+    """
+    try:
+        flat = np.arange(int(np.prod(batch))).reshape(batch)[index]
+    except IndexError:
+        text = f"state({index!r}): no such position in a batch {batch}; give one index an axis"
+        raise MechgraphError(text) from None
+    if np.ndim(flat):
+        raise MechgraphError(
+            f"state({index!r}): names {np.size(flat)} positions of a batch {batch}; give one index an axis"
+        )
+    return int(flat)
