@@ -1,39 +1,50 @@
-"""Faults of a declaration, collected in one pass over its items."""
+"""Faults of a declaration, all of them at once.
+
+Links and pairs are checked in whole columns (one array of masses, of points, of axes, ...). Only where a column fails are they gone
+through one by one, to say in words what is wrong with which.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
 
-from mechgraph.model.conversion import UNIT_NAMES
+from mechgraph.algebra.inertia import physical
+from mechgraph.model.coupling import Coupling
 from mechgraph.model.drive import Drive
 from mechgraph.model.link import Link
 from mechgraph.model.load import LOADS
-from mechgraph.model.pair import Pair
+from mechgraph.model.numeric import all_finite, is_numeric
+from mechgraph.model.pair import PERPENDICULAR, Pair
 from mechgraph.model.pair_type import PairType
-from mechgraph.model.values import is_numeric
+from mechgraph.units import BASE_UNITS
 
 if TYPE_CHECKING:
     from mechgraph.model.mechanism import Mechanism
 
 
-def _repeated(names: Iterable[Any], what: str) -> list[str]:
+def _repeated(names: Sequence[Any], what: str) -> list[str]:
+    if len(set(names)) == len(names):
+        return []
     return [f"{what} {n!r} is declared {c} times; names must differ" for n, c in Counter(names).items() if c > 1]
 
 
 def _kind_faults(m: Mechanism) -> list[str]:
-    """Items that are no links, pairs, drives or loads at all."""
+    """Items that are no links, pairs, couplings, drives or loads at all."""
     faults = []
     for what, items, kind in (
-        ("link", m.links, Link),
-        ("pair", m.pairs, Pair),
-        ("drive", m.drives, Drive),
+        ("link", m.links, (Link,)),
+        ("pair", m.pairs, (Pair,)),
+        ("coupling", m.couplings, (Coupling,)),
+        ("drive", m.drives, (Drive,)),
         ("load", m.loads, tuple(LOADS.values())),
     ):
+        if set(map(type, items)) <= set(kind):
+            continue
         wrong = [item for item in items if not isinstance(item, kind)]
         faults += [f"{what} {item!r}: is no {what}; use mg.{what.capitalize()}(...)" for item in wrong]
     return faults
@@ -49,22 +60,50 @@ def declaration_faults(m: Mechanism) -> list[str]:
     if faults:
         return faults
     names = m.link_names()
-    known = set(names)
-    for link in m.links:
-        faults += link.faults()
+    if not _links_are_sound(m.links):
+        faults += [fault for link in m.links for fault in link.faults()]
     faults += _repeated(names, "link") + _repeated([p.name for p in m.pairs], "pair")
-    for pair in m.pairs:
-        faults += pair.faults()
-        for end in (pair.a, pair.b):
-            if end is None:
-                faults.append(f"pair {pair.name!r}: is on one link only; name both links")
-            elif end not in known:
-                faults.append(f"pair {pair.name!r}: link {end!r} is not declared (links: {', '.join(map(str, names))})")
+    if not _pairs_are_sound(m.pairs):
+        faults += [fault for pair in m.pairs for fault in pair.faults()]
+    faults += _end_faults(m, names)
+    for key, value in m.units.items():
+        if key not in BASE_UNITS or not isinstance(value, str) or not value:
+            faults.append(f"units: {key} = {value!r}: expected names for {', '.join(BASE_UNITS)}")
+    return faults + _symbol_faults(m) + _reference_faults(m) + _coupling_faults(m)
+
+
+def mapping_faults(**given: Any) -> list[str]:
+    """Arguments that should be mappings and are not."""
+    return [
+        f"{what} = {value!r}: expected a mapping"
+        for what, value in given.items()
+        if value is not None and not isinstance(value, Mapping)
+    ]
+
+
+def _end_faults(m: Mechanism, names: Sequence[str]) -> list[str]:
+    """Ends of pairs and the frame that are no links; links that hang in the air."""
+    known = set(names)
+    faults = []
+    strangers = {end for pair in m.pairs for end in (pair.a, pair.b)} - known
+    if strangers:
+        for pair in m.pairs:
+            for end in (pair.a, pair.b):
+                if end is None:
+                    faults.append(f"pair {pair.name!r}: is on one link only; name both links")
+                elif end in strangers:
+                    declared = ", ".join(map(str, names))
+                    faults.append(f"pair {pair.name!r}: link {end!r} is not declared (links: {declared})")
     if m.frame not in known:
         faults.append(f"frame {m.frame!r}: is no link (links: {', '.join(map(str, names))})")
-    for key, value in m.units.items():
-        if key not in UNIT_NAMES or not isinstance(value, str) or not value:
-            faults.append(f"units: {key} = {value!r}: expected names for {', '.join(UNIT_NAMES)}")
+    elif not strangers:
+        faults += _connection_faults(m)
+    return faults
+
+
+def _symbol_faults(m: Mechanism) -> list[str]:
+    """Pair types that share a symbol and differ."""
+    faults = []
     by_symbol: dict[str, PairType] = {}
     for pair in m.pairs:
         if isinstance(pair.type, PairType):
@@ -73,16 +112,74 @@ def declaration_faults(m: Mechanism) -> list[str]:
                 faults.append(
                     f"pair {pair.name!r}: its type shares the symbol {pair.type.symbol!r} with another type; rename one"
                 )
-    ends = {end for pair in m.pairs for end in (pair.a, pair.b)}
-    if m.frame in known and ends <= known:
-        faults += _connection_faults(m)
-    return faults + _reference_faults(m)
+    return faults
+
+
+def _are_names(names: Sequence[Any]) -> bool:
+    return set(map(type, names)) <= {str} and all(names)
+
+
+def _links_are_sound(links: Sequence[Link]) -> bool:
+    """Whether every link passes, checked in columns; False where it takes a closer look."""
+    masses = [link.mass for link in links]
+    if not _are_names([link.name for link in links]) or not set(map(type, masses)) <= {float}:
+        return False
+    if not all_finite(masses, ()) or min(masses, default=0.0) < 0:
+        return False
+    centers = [link.center for link in links if link.center is not None]
+    if not all_finite(centers, (3,)) or any(link.mass > 0 and link.center is None for link in links):
+        return False
+    solid = [link for link in links if link.inertia is not None]
+    inertias = [link.inertia for link in solid]
+    if not all_finite(inertias, (3, 3)) or any(link.center is None or link.mass == 0 for link in solid):
+        return False
+    tensors = np.array([link.inertia for link in solid if not link.unphysical], dtype=float).reshape(-1, 3, 3)
+    A = np.moveaxis(tensors, 0, -1)
+    return bool(np.array_equal(A, A.swapaxes(0, 1)) and physical(A).all())
+
+
+def _pairs_are_sound(pairs: Sequence[Pair]) -> bool:
+    """Whether every pair passes, checked in columns; False where it takes a closer look."""
+    types = {id(p.type): p.type for p in pairs}.values()
+    if not _are_names([p.name for p in pairs]) or not all(isinstance(t, PairType) for t in types):
+        return False
+    if any(p.a == p.b or (p.on_a is None) != (p.on_b is None) for p in pairs):
+        return False
+    if any(p.type.takes_pitch or p.pitch is not None or p.lead is not None for p in pairs) and any(
+        p.faults() for p in pairs if p.type.takes_pitch or p.pitch is not None or p.lead is not None
+    ):
+        return False
+    markers: list[tuple[Any, bool]] = []
+    for p in pairs:
+        if p.on_a is None:
+            if p.point is not None or p.axis is not None:
+                markers.append((p, p.type.square_second))
+        elif p.point is not None or p.axis is not None:
+            return False
+        else:
+            markers += [(p.on_a, p.type.square_second), (p.on_b, p.type.square_second)]
+    return _markers_are_sound([marker for marker, _ in markers], [square for _, square in markers])
+
+
+def _markers_are_sound(markers: Sequence[Any], square: Sequence[bool]) -> bool:
+    """Whether points, axes and second directions (of markers or of pairs placed by point and axis) are what they must be."""
+    points, axes, seconds = ([getattr(marker, name) for marker in markers] for name in ("point", "axis", "second"))
+    if not markers:
+        return True
+    if not all(all_finite(column, (3,)) for column in (points, axes, seconds)):
+        return False
+    z, x = np.array(axes), np.array(seconds)
+    size = np.sqrt((z * z).sum(axis=1)), np.sqrt((x * x).sum(axis=1))
+    if min(size[0].min(), size[1].min()) <= 1e-12:
+        return False
+    cosine = np.abs((z * x).sum(axis=1)) / (size[0] * size[1])
+    return not (cosine > np.where(square, PERPENDICULAR, 1 - 1e-12)).any()
 
 
 def item_faults(m: Mechanism) -> list[str]:
     """Faults of drives and loads alone, for links and pairs that were checked before."""
     faults = _kind_faults(m)
-    return faults if faults else _reference_faults(m)
+    return faults if faults else _reference_faults(m) + _coupling_faults(m)
 
 
 def _connection_faults(m: Mechanism) -> list[str]:
@@ -110,6 +207,14 @@ def _reference_faults(m: Mechanism) -> list[str]:
     for load in m.loads:
         faults += load.faults(m)
     return faults
+
+
+def _coupling_faults(m: Mechanism) -> list[str]:
+    faults = [fault for coupling in m.couplings for fault in coupling.faults(m)]
+    names = [c.name for c in m.couplings if isinstance(c.name, str) and c.name]
+    shared = [name for name in dict.fromkeys(names) if name in m.pair_index]
+    faults += [f"coupling {name!r}: a pair has that name; names must differ" for name in shared]
+    return faults + _repeated(names, "coupling")
 
 
 def flat_start(m: Mechanism, start: Mapping[str, Any]) -> tuple[dict[str, float], list[str]]:

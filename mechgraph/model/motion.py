@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Annotated, Any, Protocol
 
 import numpy as np
 import scipy
@@ -17,6 +17,8 @@ from numpy.polynomial import Polynomial, chebyshev
 from numpy.typing import ArrayLike, NDArray
 
 from mechgraph.errors import DeclarationError
+from mechgraph.model.field_format import SERIES, Described
+from mechgraph.units import LENGTH, PURE, TIME
 
 __all__ = ["LAWS", "Motion"]
 
@@ -64,7 +66,7 @@ def _numbers(value: Any, what: str, faults: list[str]) -> Array:
 
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)
-class Motion:
+class Motion(Described):
     """What a driver prescribes: position, velocity and acceleration of one freedom, one value a position.
 
     The arrays are broadcast against each other, copied, and read-only. Two motions are equal if all their
@@ -85,10 +87,10 @@ class Motion:
         Values that are not finite real numbers, shapes that do not broadcast; all of them at once.
     """
 
-    position: Array
-    velocity: Array
-    acceleration: Array
-    t: Array | None
+    position: Annotated[Array, SERIES("one a position", LENGTH, PURE, degrees=True, default="this or a sweep")]
+    velocity: Annotated[Array, SERIES("its rate", (1, 0, -1), (0, 0, -1), degrees=True, default="0")]
+    acceleration: Annotated[Array, SERIES("the rate of that", (1, 0, -2), (0, 0, -2), degrees=True, default="0")]
+    t: Annotated[Array | None, SERIES("times, where known", TIME, default="none")]
 
     def __init__(
         self,
@@ -131,7 +133,7 @@ class Motion:
     @property
     def _arrays(self) -> tuple[Array | None, ...]:
         """All arrays, in the order of the parameters."""
-        return self.position, self.velocity, self.acceleration, self.t
+        return tuple(getattr(self, name) for name in self.formats)
 
     def __eq__(self, other: object) -> bool:
         """Compare all arrays exactly; a motion without times differs from one with."""
@@ -149,7 +151,7 @@ class Motion:
     def __repr__(self) -> str:
         """Return the shape and the range of every quantity."""
         parts = [f"shape={self.shape}"] if self.shape else []
-        for name, array in zip(("position", "velocity", "acceleration", "t"), self._arrays, strict=True):
+        for name, array in zip(self.formats, self._arrays, strict=True):
             if array is not None and array.size:
                 low, high = float(array.min()), float(array.max())
                 parts.append(f"{name}={low:g}" if low == high else f"{name}={low:g}..{high:g}")
