@@ -18,7 +18,7 @@ from mechgraph.model.coupling import Coupling
 from mechgraph.model.drive import Drive
 from mechgraph.model.link import Link
 from mechgraph.model.load import LOADS
-from mechgraph.model.numeric import all_finite, is_numeric
+from mechgraph.model.numeric import column, is_numeric
 from mechgraph.model.pair import PERPENDICULAR, Pair
 from mechgraph.model.pair_type import PairType
 from mechgraph.units import BASE_UNITS
@@ -124,18 +124,18 @@ def _links_are_sound(links: Sequence[Link]) -> bool:
     masses = [link.mass for link in links]
     if not _are_names([link.name for link in links]) or not set(map(type, masses)) <= {float}:
         return False
-    if not all_finite(masses, ()) or min(masses, default=0.0) < 0:
+    mass = column(masses, ())
+    if mass is None or (mass < 0).any() or column([link.center for link in links if link.center is not None], (3,)) is None:
         return False
-    centers = [link.center for link in links if link.center is not None]
-    if not all_finite(centers, (3,)) or any(link.mass > 0 and link.center is None for link in links):
+    if any(link.center is None and (link.mass > 0 or link.inertia is not None) for link in links):
         return False
     solid = [link for link in links if link.inertia is not None]
-    inertias = [link.inertia for link in solid]
-    if not all_finite(inertias, (3, 3)) or any(link.center is None or link.mass == 0 for link in solid):
+    tensors = column([link.inertia for link in solid], (3, 3))
+    if tensors is None or any(link.mass == 0 for link in solid):
         return False
-    tensors = np.array([link.inertia for link in solid if not link.unphysical], dtype=float).reshape(-1, 3, 3)
     A = np.moveaxis(tensors, 0, -1)
-    return bool(np.array_equal(A, A.swapaxes(0, 1)) and physical(A).all())
+    meant = np.array([link.unphysical for link in solid], dtype=bool)
+    return bool(((A == A.swapaxes(0, 1)).all(axis=(0, 1)) & physical(A) | meant).all())
 
 
 def _pairs_are_sound(pairs: Sequence[Pair]) -> bool:
@@ -145,34 +145,26 @@ def _pairs_are_sound(pairs: Sequence[Pair]) -> bool:
         return False
     if any(p.a == p.b or (p.on_a is None) != (p.on_b is None) for p in pairs):
         return False
-    if any(p.type.takes_pitch or p.pitch is not None or p.lead is not None for p in pairs) and any(
-        p.faults() for p in pairs if p.type.takes_pitch or p.pitch is not None or p.lead is not None
-    ):
+    takers = {id(t) for t in types if t.takes_pitch}
+    if any(p.faults() for p in pairs if p.pitch is not None or p.lead is not None or id(p.type) in takers):
         return False
-    markers: list[tuple[Any, bool]] = []
-    for p in pairs:
-        if p.on_a is None:
-            if p.point is not None or p.axis is not None:
-                markers.append((p, p.type.square_second))
-        elif p.point is not None or p.axis is not None:
-            return False
-        else:
-            markers += [(p.on_a, p.type.square_second), (p.on_b, p.type.square_second)]
-    return _markers_are_sound([marker for marker, _ in markers], [square for _, square in markers])
+    by_point = [p for p in pairs if p.point is not None or p.axis is not None]
+    by_markers = [p for p in pairs if p.on_a is not None]
+    if any(p.on_a is not None for p in by_point):
+        return False
+    markers = [*by_point, *(p.on_a for p in by_markers), *(p.on_b for p in by_markers)]
+    return _markers_are_sound(markers, [p.type.square_second for p in (*by_point, *by_markers, *by_markers)])
 
 
 def _markers_are_sound(markers: Sequence[Any], square: Sequence[bool]) -> bool:
     """Whether points, axes and second directions (of markers or of pairs placed by point and axis) are what they must be."""
-    points, axes, seconds = ([getattr(marker, name) for marker in markers] for name in ("point", "axis", "second"))
-    if not markers:
-        return True
-    if not all(all_finite(column, (3,)) for column in (points, axes, seconds)):
+    p, z, x = (column([getattr(marker, name) for marker in markers], (3,)) for name in ("point", "axis", "second"))
+    if p is None or z is None or x is None:
         return False
-    z, x = np.array(axes), np.array(seconds)
-    size = np.sqrt((z * z).sum(axis=1)), np.sqrt((x * x).sum(axis=1))
-    if min(size[0].min(), size[1].min()) <= 1e-12:
+    length = np.sqrt((z * z).sum(axis=1)), np.sqrt((x * x).sum(axis=1))
+    if not all((one > 1e-12).all() for one in length):
         return False
-    cosine = np.abs((z * x).sum(axis=1)) / (size[0] * size[1])
+    cosine = np.abs((z * x).sum(axis=1)) / (length[0] * length[1])
     return not (cosine > np.where(square, PERPENDICULAR, 1 - 1e-12)).any()
 
 
@@ -184,13 +176,14 @@ def item_faults(m: Mechanism) -> list[str]:
 
 def _connection_faults(m: Mechanism) -> list[str]:
     place, n = m.link_index, len(m.links)
-    a, b = ([place[end] for end in ends] for ends in zip(*((p.a, p.b) for p in m.pairs), strict=True))
-    graph = scipy.sparse.coo_array((np.ones(len(a)), (a, b)), shape=(n, n))
+    a, b = np.array([place[p.a] for p in m.pairs]), np.array([place[p.b] for p in m.pairs])
+    graph = scipy.sparse.coo_array((np.ones(len(a), dtype=bool), (a, b)), shape=(n, n))
     _, part = scipy.sparse.csgraph.connected_components(graph, directed=False)
+    names = m.link_names()
     return [
-        f"link {name!r} is not connected to the frame {m.frame!r} by any chain of pairs; add the pair that holds it"
-        for name in m.link_names()
-        if part[place[name]] != part[place[m.frame]]
+        f"link {names[i]!r} is not connected to the frame {m.frame!r} by any chain of pairs; add the pair that holds it"
+        for i in np.flatnonzero(part != part[place[m.frame]])
+        if place[names[i]] == i
     ]
 
 

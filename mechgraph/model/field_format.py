@@ -84,7 +84,7 @@ class FieldFormat:
     @property
     def unit(self) -> str:
         """The unit in letters, ``M L²``, ``rad or L``."""
-        if not self.kind.numeric:
+        if self.kind.stands_as is not None:
             return ""
         both = (symbol_of(self.turn) or "rad", symbol_of(self.slide) or "rad")
         if self.slide != self.turn:

@@ -171,14 +171,14 @@ class Mechanism(Formatted):
         """Place of every pair, by name."""
         return MappingProxyType(_places(pair.name for pair in self.pairs))
 
-    @cached_property
-    def _named_pair(self) -> dict[str, int]:
+    def _place_of_named(self, name: str) -> int | None:
         """Place of the first pair that answers to a name, its own or that of one of its freedoms."""
-        out: dict[str, int] = {}
-        for k, pair in enumerate(self.pairs):
-            for name in (pair.name, *pair.freedom_names):
-                out.setdefault(name, k)
-        return out
+        places = [self.pair_index[name]] if name in self.pair_index else []
+        for i, letter in enumerate(name):
+            k = self.pair_index.get(name[:i]) if letter == "." else None
+            if k is not None and name in self.pairs[k].freedom_names:
+                places.append(k)
+        return min(places, default=None)
 
     def link(self, name: str) -> Link:
         """The link of that name."""
@@ -216,8 +216,8 @@ class Mechanism(Formatted):
         found = self._find_freedom(name)
         if isinstance(found, str):
             return found
-        pair, j = found
-        if single and not pair.type.drivable[j]:
+        k, j = found
+        if single and not self.pairs[k].type.drivable[j]:
             return f"freedom {name!r} is part of a rotation; it takes an effort, not a drive, a start angle or a spring"
         return None
 
@@ -226,29 +226,31 @@ class Mechanism(Formatted):
         found = self._find_freedom(name)
         if isinstance(found, str):
             raise DeclarationError(f"mechanism {self.name!r}", [found])
-        return self._named_pair[name], found[1]
+        return found
 
     def full_name(self, name: str) -> str:
         """The full spelling ``"B.Tz"`` of a freedom."""
         k, j = self.freedom(name)
         return self.pairs[k].freedom_names[j]
 
-    def _find_freedom(self, name: Any) -> tuple[Pair, int] | str:
+    def _find_freedom(self, name: Any) -> tuple[int, int] | str:
+        """Index of the pair and of the freedom within it, or why there is none."""
         if not isinstance(name, str):
             return f"freedom {name!r}: expected a name such as 'B' or 'B.Tz'"
-        if name not in self._named_pair:
+        k = self._place_of_named(name)
+        if k is None:
             return f"unknown freedom {name!r} (freedoms: {', '.join(self.freedom_names())})"
-        pair = self.pairs[self._named_pair[name]]
+        pair = self.pairs[k]
         names = pair.freedom_names
         if name in names:
-            return pair, names.index(name)
+            return k, names.index(name)
         if not isinstance(pair.type, PairType):
             return f"pair {name!r} has an unknown type"
         if len(names) == 1:
-            return pair, 0
+            return k, 0
         driven = [d.freedom for d in self.drives if d.freedom in names]
         if len(driven) == 1:
-            return pair, names.index(driven[0])
+            return k, names.index(driven[0])
         if not names:
             return f"pair {name!r} ({pair.type.symbol}) has no freedom"
         able = [n for n, single in zip(names, pair.type.drivable, strict=True) if single]

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 LARGEST = 1e100
 """Numbers from here on are refused: their squares would overflow."""
 
-_DOUBLE = np.dtype(float)
 _FLOAT_ONLY = {float}
 
 
@@ -27,13 +26,15 @@ class PerCase:
 def plain(value: Any) -> Any:
     """Numbers, sequences and arrays as floats and nested tuples; what is no number is kept as it is."""
     kind = type(value)
-    if value is None or kind is float or kind is str or kind is tuple and _all_floats(value) or callable(value):
+    if value is None or kind is float or kind is str or (kind is tuple and _all_floats(value)) or callable(value):
         return value
     try:
-        array = value if kind is np.ndarray and value.dtype is _DOUBLE else np.asarray(value, dtype=float)
+        array = np.asarray(value, dtype=float)
     except (TypeError, ValueError, OverflowError):
         return value
-    return tuple(array.tolist()) if array.ndim == 1 else _as_tuples(array.tolist())
+    if array.ndim == 1:
+        return tuple(array.tolist())
+    return tuple(map(tuple, array.tolist())) if array.ndim == 2 else _as_tuples(array.tolist())
 
 
 def _as_tuples(value: Any) -> Any:
@@ -88,10 +89,10 @@ def same_fields(a: Any, b: Any) -> bool:
     return type(a) is type(b) and all(same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a) if f.compare)
 
 
-def all_finite(values: Sequence[Any], shape: tuple[int, ...]) -> bool:
-    """Whether a whole column of values holds arrays of finite numbers of one shape; False where that takes a closer look."""
+def column(values: Sequence[Any], shape: tuple[int, ...]) -> NDArray[np.float64] | None:
+    """A whole column of values ``(len(values), *shape)``; None where one of them is no array of finite numbers of that shape."""
     try:
-        column = np.array(values, dtype=float)
+        made = np.array(values, dtype=float) if values else np.zeros((0, *shape))
     except (TypeError, ValueError, OverflowError):
-        return False
-    return column.shape == (len(values), *shape) and bool((np.abs(column) < LARGEST).all())
+        return None
+    return made if made.shape == (len(values), *shape) and bool((np.abs(made) < LARGEST).all()) else None

@@ -33,8 +33,11 @@ def second_direction(axis: Any) -> tuple[float, ...]:
     if not length > 0:
         return (1.0, 0.0, 0.0)
     z = [c / length for c in axis]
-    least = min(range(3), key=lambda i: abs(z[i]))
-    x = [(i == least) - z[least] * z[i] for i in range(3)]
+    sizes = [abs(c) for c in z]
+    least = sizes.index(min(sizes))
+    along = z[least]
+    x = [0.0 - along * c for c in z]
+    x[least] = 1.0 - along * along
     size = math.hypot(*x)
     return x[0] / size, x[1] / size, x[2] / size
 
@@ -137,15 +140,14 @@ class Pair(Described):
         on_b: Marker | None = None,
     ) -> None:
         row = TABLE.get(type, type) if isinstance(type, str) else type
-        axis, point = plain(axis), plain(point)
+        point, axis, second = plain(point), plain(axis), plain(second)
         if axis is None and point is not None and isinstance(row, PairType) and not row.directed:
             axis = (0.0, 0.0, 1.0)
         if second is None and is_numeric(axis, (3,)):
             second = second_direction(axis)
-        given = (name, row, a, b, point, axis, second, pitch, lead, on_a, on_b)
-        for key, value in zip(self.formats, given, strict=True):
+        values = (name, row, a, b, point, axis, second, plain(pitch), plain(lead), on_a, on_b)
+        for key, value in zip(self.formats, values, strict=True):
             object.__setattr__(self, key, value)
-        self.read_numbers()
 
     @property
     def has_geometry(self) -> bool:

@@ -130,6 +130,7 @@ def _row(key: str, about: FieldFormat, table: Table) -> tuple[str, ...]:
         kind = "list"
     shown = {TABLE: f"`[{key}]`", TABLES: f"`[[{key}]]`"}.get(about.kind, f"`{key}`")
     default = table.defaults.get(key)
-    words = {False: "false", True: "true"}.get(default, f"{default:g}") if isinstance(default, bool | float) else default
-    fallback = "needed" if key in table.needed else words if isinstance(words, str) and words else ""
+    if isinstance(default, bool | float):
+        default = str(default).lower() if isinstance(default, bool) else f"{default:g}"
+    fallback = "needed" if key in table.needed else default if isinstance(default, str) else ""
     return shown + (" (°)" if about.degrees else ""), kind, about.unit, about.meaning, about.default or fallback
