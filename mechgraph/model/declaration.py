@@ -125,7 +125,11 @@ def _links_are_sound(links: Sequence[Link]) -> bool:
     if not _are_names([link.name for link in links]) or not set(map(type, masses)) <= {float}:
         return False
     mass = column(masses, ())
-    if mass is None or (mass < 0).any() or column([link.center for link in links if link.center is not None], (3,)) is None:
+    if (
+        mass is None
+        or (mass < 0).any()
+        or column([link.center for link in links if link.center is not None], (3,)) is None
+    ):
         return False
     if any(link.center is None and (link.mass > 0 or link.inertia is not None) for link in links):
         return False
@@ -135,7 +139,7 @@ def _links_are_sound(links: Sequence[Link]) -> bool:
         return False
     A = np.moveaxis(tensors, 0, -1)
     meant = np.array([link.unphysical for link in solid], dtype=bool)
-    return bool(((A == A.swapaxes(0, 1)).all(axis=(0, 1)) & physical(A) | meant).all())
+    return bool(((A.swapaxes(0, 1) == A).all(axis=(0, 1)) & physical(A) | meant).all())
 
 
 def _pairs_are_sound(pairs: Sequence[Pair]) -> bool:

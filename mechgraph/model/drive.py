@@ -14,6 +14,4 @@ class Drive(Described):
     """A driven freedom, ``"A"`` or ``"B.Tz"``, with the motion to use where ``solve`` is given none."""
 
     freedom: Annotated[str, FREEDOM_NAME("the driven freedom; not one of a rotation of S, Sg, Sp")]
-    motion: Annotated[
-        Motion | None, TABLE("used where `solve` is given none", table="motion", default="none")
-    ] = None
+    motion: Annotated[Motion | None, TABLE("used where `solve` is given none", table="motion", default="none")] = None

@@ -97,7 +97,9 @@ _SWEEP = OTHER(
     degrees=True,
     rules={"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3},
 )
-_PITCHES = {"anyOf": [{"type": "number"}, NUMBERS.schema, {"type": "object", "additionalProperties": {"type": "number"}}]}
+_PITCHES = {
+    "anyOf": [{"type": "number"}, NUMBERS.schema, {"type": "object", "additionalProperties": {"type": "number"}}]
+}
 _FILE = {
     "schema": INTEGER("number of the format: 1", default="needed", rules={"const": SCHEMA}),
     "pair_type": TABLES("pair types of your own", table="pair_type", default="none"),
@@ -116,8 +118,8 @@ TABLES_OF_FILE: dict[str, Table] = {
     "units": _table(
         None,
         words="Names of the units in which the numbers of the file are given; a consistent set.",
+        first={name: TEXT(f"name of the unit of {name}") for name in BASE_UNITS},
         needed=(),
-        **{name: TEXT(f"name of the unit of {name}") for name in BASE_UNITS},
     ),
     "link": _table(Link),
     "pair": _table(Pair, words="A kinematic pair from link a to link b."),

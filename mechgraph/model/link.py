@@ -67,5 +67,7 @@ class Link(Described):
                 found.append(f"{where}inertia without mass; give mass=")
             if not self.unphysical:
                 impossible = physical_faults(self.inertia)
-                found += [f"{where}inertia: {fault}; no body has it (unphysical=True accepts it)" for fault in impossible]
+                found += [
+                    f"{where}inertia: {fault}; no body has it (unphysical=True accepts it)" for fault in impossible
+                ]
         return found

@@ -5,9 +5,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Protocol
+from typing import Annotated, Any, ClassVar, Protocol, Self
 
 import numpy as np
 
@@ -122,15 +122,22 @@ class _Load(Described):
         found += self.value_faults("")
         return [self.where + fault for fault in found if fault]
 
+    @property
+    def in_freedom(self) -> str | None:
+        """The freedom in which this load acts; None of a load on links."""
+        named = [getattr(self, name) for name, about in self.formats.items() if about.kind is FREEDOM_NAME]
+        return named[0] if named else None
+
+    def with_full_names(self, full_name: Callable[[str], str]) -> Self:
+        """The same with its freedom spelled in full."""
+        names = [name for name, about in self.formats.items() if about.kind is FREEDOM_NAME]
+        return self.replace(**{name: full_name(getattr(self, name)) for name in names}) if names else self
+
     def links(self, names: Nameable) -> tuple[str, ...]:
         """Links that this load acts on: those that it names, or those of the pair of its freedom."""
-        links = []
-        for name, about in self.formats.items():
-            if about.kind is LINK_NAME:
-                links.append(getattr(self, name))
-            elif about.kind is FREEDOM_NAME:
-                links += names.ends_of(getattr(self, name))
-        return tuple(links)
+        if self.in_freedom is not None:
+            return names.ends_of(self.in_freedom)
+        return tuple(getattr(self, name) for name, about in self.formats.items() if about.kind is LINK_NAME)
 
 
 @dataclass(frozen=True, eq=False)

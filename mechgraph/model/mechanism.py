@@ -265,7 +265,7 @@ class Mechanism(Formatted):
         return all(pair.has_geometry for pair in self.pairs)
 
     def once(self, make: Callable[[Mechanism], Made]) -> Made:
-        """``make(self)`` of a function of links, pairs, couplings and frame alone: worked out once and kept, copies with other drives too."""
+        """``make(self)`` of a function of links, pairs, couplings and frame alone: made once and kept, for copies with other drives too."""
         if make not in self._kept:
             enabled = gc.isenabled()
             gc.disable()  # a search for cyclic garbage would go through all that is made for a large graph again and again
@@ -327,12 +327,7 @@ class Mechanism(Formatted):
         drives = [
             dataclasses.replace(d, freedom=name) for d in self.drives if (name := self.full_name(d.freedom)) not in lost
         ]
-        loads = [
-            dataclasses.replace(load, freedom=self.full_name(load.freedom))
-            if "freedom" in load.formats
-            else load
-            for load in self.loads
-        ]
+        loads = [load.with_full_names(self.full_name) for load in self.loads]
         start = {k: v for k, v in self.start.items() if k not in gone}
         pairs = [new if p.name == pair else p for p in self.pairs]
         return self.replace(pairs=pairs, drives=drives, loads=loads, start=start)
@@ -344,12 +339,12 @@ class Mechanism(Formatted):
         """
         base = base_factors(self.units, units)
 
-        def turns(freedom: str) -> bool:
-            k, j = self.freedom(freedom)
-            return self.pairs[k].type.freedoms[j].turns
+        def turns(freedom: str | None) -> bool:
+            k, j = self.freedom(freedom) if freedom is not None else (0, 0)
+            return freedom is not None and self.pairs[k].type.freedoms[j].turns
 
         try:
-            loads = [load.in_units(base, "freedom" in load.formats and turns(load.freedom)) for load in self.loads]
+            loads = [load.in_units(base, turns(load.in_freedom)) for load in self.loads]
         except TypeError:
             raise DeclarationError(
                 "to_units", ["a load is a callable; convert it yourself, or sample it first"]

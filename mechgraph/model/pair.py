@@ -15,12 +15,14 @@ from mechgraph.model.field_format import (
     LINK_NAME,
     NUMBER,
     POINT,
-    TABLE as NESTED,
     TEXT,
     Described,
 )
-from mechgraph.model.pair_type import TABLE, PairType
+from mechgraph.model.field_format import (
+    TABLE as NESTED,
+)
 from mechgraph.model.numeric import is_numeric, number_fault, plain
+from mechgraph.model.pair_type import TABLE, PairType
 from mechgraph.units import LENGTH
 
 PERPENDICULAR = 1e-6
@@ -47,7 +49,11 @@ class Marker(Described):
     """A marker frame on a link: origin ``point``, z along ``axis``, x along ``second`` (projected perpendicular to z)."""
 
     point: Annotated[Any, POINT("origin", LENGTH, default="0")] = (0.0, 0.0, 0.0)
-    axis: Annotated[Any, DIRECTION("z: pair axis, plane normal or groove direction, any length", default="z")] = (0.0, 0.0, 1.0)
+    axis: Annotated[Any, DIRECTION("z: pair axis, plane normal or groove direction, any length", default="z")] = (
+        0.0,
+        0.0,
+        1.0,
+    )
     second: Annotated[Any, DIRECTION("x: second direction", default="global axis least aligned with `axis`")] = None
 
     def __post_init__(self) -> None:

@@ -12,7 +12,8 @@ from mechgraph.model.field_format import TABLE, TABLES, FieldFormat
 from mechgraph.model.file_format import TABLES_OF_FILE, Table
 from mechgraph.model.load import LOADS
 
-def _row(count: int) -> dict[str, Any]:
+
+def _array(count: int) -> dict[str, Any]:
     return {"type": "array", "items": {"type": "number"}, "minItems": count, "maxItems": count}
 
 
@@ -21,10 +22,10 @@ def _series_of(name: str, words: str, one: dict[str, Any]) -> dict[str, Any]:
 
 
 SHARED = {
-    "vector": _row(3),
-    "six": _row(6),
+    "vector": _array(3),
+    "six": _array(6),
     **_series_of("series", "A number, or an array of numbers, one a position.", {"type": "number"}),
-    **_series_of("vector_series", "Three numbers, or an array of such, one a position.", _row(3)),
+    **_series_of("vector_series", "Three numbers, or an array of such, one a position.", _array(3)),
 }
 """Values that many fields share."""
 WIDTH = 130
@@ -53,7 +54,7 @@ def schema_text() -> str:
 def _laid_out(value: Any, depth: int) -> str:
     """JSON in which what fits in a line stands in one."""
     line = json.dumps(value, ensure_ascii=False)
-    if depth + len(line) <= WIDTH and depth > 0 or not isinstance(value, dict | list):
+    if (depth + len(line) <= WIDTH and depth > 0) or not isinstance(value, dict | list):
         return line
     inner, outer = "\n" + "  " * (depth + 1), "\n" + "  " * depth
     if isinstance(value, list):

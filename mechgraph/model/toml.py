@@ -173,7 +173,7 @@ def _with_lists(reader: _Reader, fields: dict[str, Any], where: str) -> None:
 
 def _with_six(reader: _Reader, fields: dict[str, Any], where: str) -> None:
     """Twists and wrenches as tuples."""
-    formats = TABLES_OF_FILE["freedom"].fields | TABLES_OF_FILE["component"].fields
+    formats = {**TABLES_OF_FILE["freedom"].fields, **TABLES_OF_FILE["component"].fields}
     for key, value in fields.items():
         if formats[key].kind is SIX and not is_numeric(value, (6,)):
             reader.faults.append(f"{where}.{key} = {value!r}: expected six finite numbers")

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -77,6 +77,8 @@ class CouplingField:
 
 
 AnyField = Field | ChainField | LoadField | CouplingField
+Finder = Callable[[Mechanism, int, str], AnyField | str | None]
+"""Finds the number of the i-th link, pair, ... by the rest of its name; or says what is wrong with it."""
 
 
 def find_field(m: Mechanism, name: str) -> AnyField | str:
@@ -85,14 +87,18 @@ def find_field(m: Mechanism, name: str) -> AnyField | str:
     if indexed and indexed["what"] in NUMBERS_OF_CHAIN and not indexed["rest"]:
         return _chain_field(m, name, indexed["what"], int(indexed["index"]))
     if indexed and indexed["what"] in INDEXED:
-        items, find = getattr(m, indexed["what"]), INDEXED[indexed["what"]]
-        if int(indexed["index"]) >= len(items):
-            return f"{name!r}: there are {len(items)} {indexed['what']}, counted from 0"
-        return find(m, int(indexed["index"]), indexed["rest"] or "")
-    items = ((m.links, _link_field), (m.pairs, _pair_field), (m.couplings, _coupling_field))
-    for things, find in items:
-        for i, thing in enumerate(things):
-            if name.startswith(thing.name + ".") and (found := find(m, i, name.removeprefix(thing.name + "."))):
+        count = len(getattr(m, indexed["what"]))
+        if int(indexed["index"]) >= count:
+            return f"{name!r}: there are {count} {indexed['what']}, counted from 0"
+        return INDEXED[indexed["what"]](m, int(indexed["index"]), indexed["rest"] or "")
+    named: Sequence[tuple[Sequence[Link | Pair | Coupling], Finder]] = (
+        (m.links, _link_field),
+        (m.pairs, _pair_field),
+        (m.couplings, _coupling_field),
+    )
+    for items, find in named:
+        for i, item in enumerate(items):
+            if name.startswith(item.name + ".") and (found := find(m, i, name.removeprefix(item.name + "."))):
                 return found
     return (
         f"{name!r}: no declared number of that name; expected e.g. {m.links[-1].name}.mass, {m.links[-1].name}.center.x, "
@@ -153,9 +159,7 @@ def _load_field(m: Mechanism, index: int, rest: str) -> LoadField | str:
         return LoadField(index, what, place[0] if place else None)
     shapes = {name: about.kind.shape for name, about in load.formats.items() if about.kind.shape is not None}
     known = ", ".join(name for name, shape in shapes.items() if is_numeric(getattr(load, name), shape))
-    return (
-        f"'loads[{index}].{rest}': no number of that name in load {index} ({load.kind}: {known}; vectors with .x, .y, .z)"
-    )
+    return f"'loads[{index}].{rest}': no number of that name in load {index} ({load.kind}: {known}; vectors with .x, .y, .z)"
 
 
 def _coupling_field(m: Mechanism, index: int, rest: str) -> CouplingField | str:
@@ -169,7 +173,10 @@ def _coupling_field(m: Mechanism, index: int, rest: str) -> CouplingField | str:
     return f"'{c.name}.{rest}': coupling {c.name!r} has the numbers {', '.join(c.freedoms)} and constant"
 
 
-INDEXED = {"loads": _load_field, "couplings": _coupling_field}
+INDEXED: dict[str, Callable[[Mechanism, int, str], AnyField | str]] = {
+    "loads": _load_field,
+    "couplings": _coupling_field,
+}
 """Lists of a mechanism whose items are named by their place, counted from 0."""
 
 
@@ -388,7 +395,9 @@ def stacked(m: Mechanism, mechanisms: Sequence[Mechanism | None]) -> Variants:
         **{f.name: np.concatenate([getattr(n, f.name) for n in every], axis=-1) for f in dataclasses.fields(Declared)}
     )
     loads = tuple(_stacked_loads(group) for group in zip(*(other.loads for other in used), strict=True))
-    couplings = tuple(np.hstack([_declared_coupling(c) for c in group]) for group in zip(*(o.couplings for o in used), strict=True))
+    couplings = tuple(
+        np.hstack([_declared_coupling(c) for c in group]) for group in zip(*(o.couplings for o in used), strict=True)
+    )
     return Variants(m, numbers, loads, len(used), tuple(i for i, ok in enumerate(same) if not ok), couplings)
 
 
