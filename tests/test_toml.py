@@ -1,6 +1,7 @@
 """TOML files: round trip, faults told at once, nothing half-written."""
 
 import contextlib
+import inspect
 import json
 import tomllib
 from collections.abc import Callable
@@ -14,6 +15,7 @@ import pytest
 import mechgraph as mg
 from mechgraph.model import toml
 from mechgraph.model.file_format import SCHEMA as NUMBER
+from mechgraph.model.file_format import TABLES_OF_FILE
 from mechgraph.model.library import library_path
 from mechgraph.model.schema import json_schema, schema_text, with_field_tables
 
@@ -282,6 +284,14 @@ def test_library_files_keep_the_schema(name: str) -> None:
     text = library_path(name).read_text(encoding="utf-8")
     assert text.startswith("#:schema ./mechanism.schema.json\n")
     VALIDATOR.validate(tomllib.loads(text))
+
+
+@pytest.mark.parametrize(
+    "kind", ["pair_type", "freedom", "component", "bookkeeping", "link", "marker", "pair", "drive"]
+)
+def test_a_table_holds_what_its_constructor_takes(kind: str) -> None:
+    table = TABLES_OF_FILE[kind]
+    assert set(table.fields) == set(inspect.signature(table.make).parameters)
 
 
 def test_the_stored_schema_is_the_one_of_the_code(golden: Callable[[str, str], None]) -> None:

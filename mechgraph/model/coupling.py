@@ -76,17 +76,12 @@ class Coupling(Described):
             found.append(number_fault(self.constant, where + "constant"))
         return list(dict.fromkeys(fault for fault in found if fault))
 
-    def with_terms(self, terms: Mapping[str, float] | Iterable[tuple[str, float]]) -> Coupling:
-        """The same name and constant with other terms."""
-        return Coupling(terms, name=self.name, constant=self.constant)
-
     def converted(self, length: float, turns: Sequence[bool]) -> Coupling:
         """The same relation with lengths times ``length``; ``turns`` says which freedoms are angles (the rule stands above)."""
         if not any(turns):
-            constant = None if self.constant is None else self.constant * length
-            return Coupling(self.terms, name=self.name, constant=constant)
+            return self.replace(constant=None if self.constant is None else self.constant * length)
         pairs = zip(self.terms, turns, strict=True)
-        return self.with_terms((name, c if turn else c / length) for (name, c), turn in pairs)
+        return self.replace(terms=[(name, c if turn else c / length) for (name, c), turn in pairs])
 
 
 def _read_terms(given: Any) -> Any:

@@ -253,7 +253,7 @@ VECTOR_SERIES = Kind(
 )
 NUMBERS = Kind("n numbers", {"type": "array", "items": {"type": "number"}})
 FACTS = Kind("table", {"type": "object"}, dict)
-COEFFICIENTS = Kind("table", {"type": "object", "additionalProperties": {"type": "number"}, "minProperties": 1})
+COEFFICIENTS = Kind("table", {"type": "object", "additionalProperties": {"type": "number"}, "minProperties": 1}, dict)
 TABLE = Kind("table", {})
 TABLES = Kind("tables", {})
 OTHER = Kind("", {})

@@ -93,6 +93,8 @@ class _Load(Described):
 
     kind: ClassVar[str]
     """Name of the kind in files."""
+    subject: ClassVar[str]
+    """How messages call it; fields in braces."""
     between_links: ClassVar[bool] = False
     """Whether it is a force that two links exert on each other."""
 
@@ -107,8 +109,8 @@ class _Load(Described):
 
     @property
     def where(self) -> str:
-        """What load it is, for messages."""
-        return f"{self.kind}: "
+        """Which load it is, for messages."""
+        return f"{self.subject.format(**vars(self))}: "
 
     def faults(self, names: Nameable) -> list[str]:
         """What is wrong with this load."""
@@ -145,6 +147,7 @@ class Gravity(_Load):
     """Uniform gravity: force ``m g`` at the mass centre of every link; ``acceleration`` is the vector g."""
 
     kind: ClassVar[str] = "gravity"
+    subject: ClassVar[str] = "gravity"
     acceleration: Annotated[Any, VECTOR("the vector g, global", ACCELERATION)]
 
     def links(self, names: Nameable) -> tuple[str, ...]:
@@ -166,6 +169,7 @@ class Wrench(_Load):
     """
 
     kind: ClassVar[str] = "wrench"
+    subject: ClassVar[str] = "wrench on {link!r}"
     link: Annotated[str, LINK_NAME("the link it acts on")]
     force: Annotated[Value, VECTOR_SERIES("at least one of the two", FORCE, default="none")] = None
     moment: Annotated[Value, VECTOR_SERIES("at least one of the two", MOMENT, default="none")] = None
@@ -177,11 +181,6 @@ class Wrench(_Load):
         str,
         TEXT('`"link"`: force and moment turn with the link; `"global"`: they do not', choices=("global", "link")),
     ] = "global"
-
-    @property
-    def where(self) -> str:
-        """What load it is, for messages."""
-        return f"wrench on {self.link!r}: "
 
     def faults(self, names: Nameable) -> list[str]:
         """What is wrong with this load."""
@@ -209,13 +208,9 @@ class Effort(_Load):
     """
 
     kind: ClassVar[str] = "effort"
+    subject: ClassVar[str] = "effort in {freedom!r}"
     freedom: Annotated[str, FREEDOM_NAME("the freedom, e.g. D or B.Rx", single=False)]
     value: Annotated[Value, SERIES("couple about a turn, force along a slide; + on link b, - on link a", FORCE, MOMENT)]
-
-    @property
-    def where(self) -> str:
-        """What load it is, for messages."""
-        return f"effort in {self.freedom!r}: "
 
     def act(self, site: LoadSite) -> None:
         """Add the effort."""
@@ -230,6 +225,7 @@ class Spring(_Load):
     """
 
     kind: ClassVar[str] = "spring"
+    subject: ClassVar[str] = "spring {a!r} - {b!r}"
     between_links: ClassVar[bool] = True
     a: Annotated[str, LINK_NAME("first link")]
     b: Annotated[str, LINK_NAME("second link")]
@@ -238,11 +234,6 @@ class Spring(_Load):
     stiffness: Annotated[float, NUMBER("force per length", FORCE_PER_LENGTH)]
     free_length: Annotated[float, NUMBER("length without tension", LENGTH, minimum=0.0)] = 0.0
     damping: Annotated[float, NUMBER("force per velocity", FORCE_PER_VELOCITY)] = 0.0
-
-    @property
-    def where(self) -> str:
-        """What load it is, for messages."""
-        return f"spring {self.a!r} - {self.b!r}: "
 
     def act(self, site: LoadSite) -> None:
         """Pull both links towards each other."""
@@ -263,15 +254,11 @@ class TorsionSpring(_Load):
     """A spring (and damper) in a single freedom: effort ``-stiffness (q - free) - damping dq/dt``; for turns and slides."""
 
     kind: ClassVar[str] = "torsion_spring"
+    subject: ClassVar[str] = "torsion spring in {freedom!r}"
     freedom: Annotated[str, FREEDOM_NAME("a single turn or slide")]
     stiffness: Annotated[float, NUMBER("effort per coordinate", FORCE_PER_LENGTH, MOMENT)]
     free: Annotated[float, NUMBER("coordinate without effort", **POSITION)] = 0.0
     damping: Annotated[float, NUMBER("effort per rate", FORCE_PER_VELOCITY, (2, 1, -1))] = 0.0
-
-    @property
-    def where(self) -> str:
-        """What load it is, for messages."""
-        return f"torsion spring in {self.freedom!r}: "
 
     def act(self, site: LoadSite) -> None:
         """Add the effort of the spring."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import gc
 import itertools
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -102,7 +101,7 @@ class Mechanism(Formatted):
             name=name,
             links=link_tuple,
             pairs=pair_tuple,
-            couplings=tuple(couplings),
+            couplings=_named(couplings, pair_tuple),
             drives=_as_drives(drives),
             loads=tuple(loads),
             frame=first if frame is None else frame,
@@ -127,8 +126,8 @@ class Mechanism(Formatted):
         if faults:
             raise DeclarationError(f"mechanism {self.name!r}", faults)
         self._set(start=MappingProxyType(flat))
-        if self.couplings:
-            self._set(couplings=tuple(_in_full(self)))
+        in_full = ([(self.full_name(q), value) for q, value in c.terms] for c in self.couplings)
+        self._set(couplings=tuple(c.replace(terms=t) for c, t in zip(self.couplings, in_full, strict=True)))
 
     def __eq__(self, other: object) -> bool:
         return same_fields(self, other)
@@ -267,13 +266,7 @@ class Mechanism(Formatted):
     def once(self, make: Callable[[Mechanism], Made]) -> Made:
         """``make(self)`` of a function of links, pairs, couplings and frame alone: made once and kept, for copies with other drives too."""
         if make not in self._kept:
-            enabled = gc.isenabled()
-            gc.disable()  # a search for cyclic garbage would go through all that is made for a large graph again and again
-            try:
-                self._kept[make] = make(self)
-            finally:
-                if enabled:
-                    gc.enable()
+            self._kept[make] = make(self)
         made: Made = self._kept[make]
         return made
 
@@ -383,13 +376,14 @@ def _as_drives(drives: Iterable[Any]) -> tuple[Any, ...]:
     return tuple(Drive(d) if isinstance(d, str) else d for d in drives)
 
 
-def _in_full(m: Mechanism) -> Iterable[Coupling]:
-    """The couplings with full freedom names; those without a name are called g1, g2, ... as far as these are free."""
-    taken = {c.name for c in m.couplings} | set(m.pair_index)
+def _named(couplings: Iterable[Any], pairs: Iterable[Any]) -> tuple[Any, ...]:
+    """The couplings; those without a name are called g1, g2, ... as far as these are free."""
+    items = tuple(couplings)
+    if not items:
+        return ()
+    taken = {getattr(item, "name", None) for item in (*items, *pairs) if isinstance(getattr(item, "name", None), str)}
     free = (name for name in (f"g{i}" for i in itertools.count(1)) if name not in taken)
-    for c in m.couplings:
-        terms = tuple((m.full_name(name), value) for name, value in c.terms)
-        yield Coupling(terms, name=c.name or next(free), constant=c.constant)
+    return tuple(c.replace(name=next(free)) if isinstance(c, Coupling) and c.name == "" else c for c in items)
 
 
 def _places(names: Iterable[Any]) -> dict[Any, int]:
