@@ -10,7 +10,7 @@ from mechgraph.equations.terms import AXES, Block, Formulation, ScalarEquation, 
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
-from mechgraph.model.pair_type import Component
+from mechgraph.model.pair_type import Component, Freedom
 
 
 @dataclass
@@ -200,6 +200,10 @@ def _equilibrium(draft: _Draft) -> list[ScalarEquation]:
     """Six equations for every moving link: three of force, three of moment about the origin."""
     m, names = draft.m, draft.names
     touched = {link for load in m.loads for link in load.links(m)}
+    at_link: dict[str, list[tuple[int, float]]] = {link.name: [] for link in m.links}
+    for k, pair in enumerate(m.pairs):
+        at_link[pair.a].append((k, -1.0))
+        at_link[pair.b].append((k, 1.0))
     equations = []
     for index, link in enumerate(m.links):
         if link.name == m.frame:
@@ -207,10 +211,7 @@ def _equilibrium(draft: _Draft) -> list[ScalarEquation]:
         number = names.link_number[link.name]
         printed: list[tuple[str, str]] = []
         terms: list[list[Term]] = [[] for _ in range(6)]
-        for k, pair in enumerate(m.pairs):
-            if link.name not in (pair.a, pair.b):
-                continue
-            sign = 1.0 if pair.b == link.name else -1.0
+        for k, sign in at_link[link.name]:
             printed.append(("+", f"R_{names.reaction[k] if sign > 0 else names.opposite[k]}"))
             for t in draft.acts[k]:
                 terms[t.part].append(Term(t.unknown, sign, t.screw, t.part, t.coupling))
@@ -242,45 +243,32 @@ def _conditions(draft: _Draft) -> list[ScalarEquation]:
     """Lee's constraint equations: the free dual force is reciprocal to the condition twists of its pair."""
     equations = []
     for k, dual in draft.duals.items():
-        pair = draft.m.pairs[k]
-        book = pair.type.bookkeeping
+        book = draft.m.pairs[k].type.bookkeeping
         if book is None:
             continue
-        force, moment = dual[:3], dual[3:]
-        for i, twist in enumerate(book.conditions):
-            letter = screw_letter(twist)
-            direction = f"{letter}_{k + 1}"
-            # the screw is a twist: real part (angular) multiplies the moment, dual part the force
-            screw = Screw(
-                "conditions",
-                k,
-                i,
-                direction if not twist.turns else f"{letter}0_{k + 1}",
-                direction if twist.turns else "",
-                f"{letter}0_{k + 1} = P_{k + 1} x {direction}",
-            )
-            draft.screws.append(screw)
-            at = len(draft.screws) - 1
-            terms = [Term(force[i], 1.0, at, 3 + i) for i in range(3)]
-            if twist.turns:
-                terms += [Term(moment[i], 1.0, at, i) for i in range(3)]
-            what = "moment about" if twist.turns else "force along"
-            equations.append(
-                ScalarEquation(
-                    f"pair {k + 1} ({pair.name}): {what} the axis", pair.name, pair.type.symbol, tuple(terms)
-                )
-            )
-        symbol = draft.names.reaction[k]
-        axis = screw_letter(book.conditions[0])
-        draft.blocks.append(
-            Block(
-                f"F_{symbol} . {axis}_{k + 1} = 0",
-                rf"\hat{{F}}_{{{symbol}}} \cdot \hat{{{axis}}}_{{{k + 1}}} = 0",
-                "condition",
-                pair.name,
-            )
-        )
+        equations += [_condition(draft, k, i, twist, dual) for i, twist in enumerate(book.conditions)]
+        symbol, axis = draft.names.reaction[k], screw_letter(book.conditions[0])
+        text = f"F_{symbol} . {axis}_{k + 1} = 0"
+        latex = rf"\hat{{F}}_{{{symbol}}} \cdot \hat{{{axis}}}_{{{k + 1}}} = 0"
+        draft.blocks.append(Block(text, latex, "condition", draft.m.pairs[k].name))
     return equations
+
+
+def _condition(draft: _Draft, k: int, i: int, twist: Freedom, dual: list[int]) -> ScalarEquation:
+    """The power of the free dual force of pair ``k`` on one condition twist is zero.
+
+    The real (angular) part of the twist multiplies the moment, its dual part the force.
+    """
+    pair, letter = draft.m.pairs[k], screw_letter(twist)
+    direction, moment = f"{letter}_{k + 1}", f"{letter}0_{k + 1}"
+    symbols = (moment, direction) if twist.turns else (direction, "")
+    draft.screws.append(Screw("conditions", k, i, *symbols, f"{moment} = P_{k + 1} x {direction}"))
+    at = len(draft.screws) - 1
+    terms = [Term(dual[j], 1.0, at, 3 + j) for j in range(3)]
+    if twist.turns:
+        terms += [Term(dual[3 + j], 1.0, at, j) for j in range(3)]
+    what = "moment about" if twist.turns else "force along"
+    return ScalarEquation(f"pair {k + 1} ({pair.name}): {what} the axis", pair.name, pair.type.symbol, tuple(terms))
 
 
 def formulate(m: Mechanism, bookkeeping: str = "lee", efforts: Iterable[str] | None = None) -> Formulation:

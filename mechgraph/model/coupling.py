@@ -39,9 +39,13 @@ class Coupling(Described):
     ] = None
 
     def __init__(
-        self, terms: Mapping[str, float] | Iterable[tuple[str, float]], *, name: str = "", constant: float | None = None
+        self,
+        terms: Mapping[str, float] | Iterable[tuple[str, float]],
+        *,
+        name: str | None = None,
+        constant: float | None = None,
     ) -> None:
-        object.__setattr__(self, "name", name)
+        object.__setattr__(self, "name", "" if name is None else name)
         object.__setattr__(self, "terms", _read_terms(terms))
         object.__setattr__(self, "constant", plain(constant))
 

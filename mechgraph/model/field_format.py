@@ -15,6 +15,7 @@ from typing import Any, ClassVar, Self, get_type_hints
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.errors import DeclarationError
 from mechgraph.model.numeric import number_fault, plain, vector_fault
 from mechgraph.units import LENGTH, PURE, Dimension, factor_of, symbol_of
 
@@ -151,7 +152,7 @@ class Described(Formatted):
     def in_units(self, base: tuple[float, float, float], turns: bool = False) -> Self:
         """The same with every number times ``prod_i base_i^dimension_i``; ``turns``: whether the freedom that it names is a turn.
 
-        ``base (3,)`` are the factors of lengths, masses and times. A callable raises a TypeError.
+        ``base (3,)`` are the factors of lengths, masses and times. A callable is refused (DeclarationError).
         """
         changes = {}
         for name, about in self.formats.items():
@@ -161,7 +162,9 @@ class Described(Formatted):
             elif value is not None and about.kind.numeric:
                 factor = factor_of(about.turn if turns else about.slide, base)
                 if callable(value):
-                    raise TypeError(f"{name} is a callable")
+                    raise DeclarationError(
+                        "to_units", [f"{name} of a load is a callable; convert it yourself, or sample it first"]
+                    )
                 if factor != 1.0:
                     changes[name] = plain(np.asarray(value) * factor)
         return self.replace(**changes) if changes else self

@@ -336,18 +336,12 @@ class Mechanism(Formatted):
             k, j = self.freedom(freedom) if freedom is not None else (0, 0)
             return freedom is not None and self.pairs[k].type.freedoms[j].turns
 
-        try:
-            loads = [load.in_units(base, turns(load.in_freedom)) for load in self.loads]
-        except TypeError:
-            raise DeclarationError(
-                "to_units", ["a load is a callable; convert it yourself, or sample it first"]
-            ) from None
         return self.replace(
             links=[link.in_units(base) for link in self.links],
             pairs=[pair.in_units(base) for pair in self.pairs],
             couplings=[c.converted(base[0], [turns(name) for name in c.freedoms]) for c in self.couplings],
             drives=[drive.in_units(base, turns(drive.freedom)) for drive in self.drives],
-            loads=loads,
+            loads=[load.in_units(base, turns(load.in_freedom)) for load in self.loads],
             start={name: value if turns(name) else value * base[0] for name, value in self.start.items()},
             units={**self.units, **units},
         )
