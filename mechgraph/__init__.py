@@ -15,6 +15,7 @@ from mechgraph.errors import (
 )
 from mechgraph.kinetostatics import assemble, kinematics, solve
 from mechgraph.model.chain import chain
+from mechgraph.model.coupling import Coupling
 from mechgraph.model.drive import Drive
 from mechgraph.model.library import library_names as library
 from mechgraph.model.link import Link
@@ -33,6 +34,7 @@ __all__ = [
     "AssemblyError",
     "Bookkeeping",
     "Component",
+    "Coupling",
     "DeadPointError",
     "DeclarationError",
     "DeterminacyReport",

@@ -473,3 +473,26 @@ def test_a_freedom_given_twice_by_two_spellings_is_refused() -> None:
         mg.solve(m, {"A": 0.1, "A.Rz": 0.2})
     with pytest.raises(mg.DeclarationError, match=r"A\.Rz is given twice"):
         mg.check(m, at={"A": 0.1, "A.Rz": 0.2})
+
+
+def test_lengths_in_a_pair_type_of_its_own_change_with_the_units() -> None:
+    """A turn with a pitch given as a number advances the same way in metres and in millimetres."""
+    screw = mg.PairType("Screw", freedoms=[mg.Freedom("Rz", (0, 0, 1, 0, 0, 0.002))])
+    m = door(pairs=hinge(type=screw), units={"length": "m"}).to_units(length="mm")
+    assert m.pairs[0].type.freedoms[0].twist == pytest.approx((0, 0, 1, 0, 0, 2.0))
+    assert mg.kinematics(m, {"A": 1.0}).link("door").pose[2, 3] == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("size", [1, 40])
+def test_a_fault_among_many_sound_items_is_told_alone(size):
+    """Columns find that something is wrong; the words are those of the one item."""
+    links = [*leaf(), *(mg.Link(f"k{i}", 1.0, (0, 0, 0), np.eye(3)) for i in range(size))]
+    ends = ["door", *(f"k{i}" for i in range(size))]
+    more = [mg.Pair(f"P{i}", "S", *ends[i : i + 2], point=(0, 0, i)) for i in range(size)]
+    good = {"links": links, "pairs": [*hinge(), *more]}
+    assert len(door(**good).pairs) == size + 1
+    heavy = [*links[:-1], mg.Link(links[-1].name, 1.0, (0, 0, 0), np.diag([1.0, 1.0, 3.0]))]
+    faults = faults_of(links=heavy, pairs=[*hinge(), *more[:-1], more[-1].replace(point=(0, 0, NAN))])
+    assert len(faults) == 2
+    assert "no body has it" in faults[0]
+    assert "three finite numbers" in faults[1]

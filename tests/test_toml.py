@@ -1,8 +1,10 @@
 """TOML files: round trip, faults told at once, nothing half-written."""
 
 import contextlib
+import inspect
 import json
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +14,12 @@ import pytest
 
 import mechgraph as mg
 from mechgraph.model import toml
-from mechgraph.model.conversion import UNIT_NAMES
+from mechgraph.model.file_format import SCHEMA as NUMBER
+from mechgraph.model.file_format import TABLES_OF_FILE
 from mechgraph.model.library import library_path
-from mechgraph.model.load import LOADS
+from mechgraph.model.schema import json_schema, schema_text, with_field_tables
 
-SCHEMA = json.loads((library_path() / "mechanism.schema.json").read_text(encoding="utf-8"))
+SCHEMA = json_schema()
 VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)
 FOUR_BAR = (library_path("four-bar")).read_text(encoding="utf-8")
 
@@ -283,20 +286,23 @@ def test_library_files_keep_the_schema(name: str) -> None:
     VALIDATOR.validate(tomllib.loads(text))
 
 
-@pytest.mark.parametrize("kind", toml.FIELDS)
-def test_schema_and_loader_know_the_same_fields(kind: str) -> None:
-    table = SCHEMA if kind == "file" else SCHEMA["$defs"][kind]
-    allowed = {*toml.FIELDS[kind], *(f"{field}_deg" for field in toml.ANGLES.get(kind, ()))}
-    assert set(table["properties"]) == allowed
-    assert table["additionalProperties"] is False
-    needed = {*toml.NEEDED.get(kind, ()), *(("kind",) if kind.startswith("load ") else ())}
-    assert set(table.get("required", ())) == needed
+@pytest.mark.parametrize(
+    "kind", ["pair_type", "freedom", "component", "bookkeeping", "link", "marker", "pair", "drive"]
+)
+def test_a_table_holds_what_its_constructor_takes(kind: str) -> None:
+    table = TABLES_OF_FILE[kind]
+    assert set(table.fields) == set(inspect.signature(table.make).parameters)
 
 
-def test_schema_and_loader_know_the_same_kinds() -> None:
-    assert {name.removeprefix("load ") for name in SCHEMA["$defs"] if name.startswith("load ")} == set(LOADS)
-    assert set(SCHEMA["$defs"]["units"]["properties"]) == set(UNIT_NAMES)
-    assert SCHEMA["properties"]["schema"]["const"] == toml.SCHEMA
+def test_the_stored_schema_is_the_one_of_the_code(golden: Callable[[str, str], None]) -> None:
+    golden("../../library/mechanism.schema.json", schema_text())
+
+
+def test_the_tables_of_the_readme_are_those_of_the_code(golden: Callable[[str, str], None]) -> None:
+    text = (library_path() / "README.md").read_text(encoding="utf-8")
+    assert text.count("<!-- fields: ") == 8
+    golden("../../library/README.md", with_field_tables(text))
+    assert SCHEMA["properties"]["schema"]["const"] == NUMBER
 
 
 @pytest.mark.parametrize(

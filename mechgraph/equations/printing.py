@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from mechgraph.document import Bullets, Document, Heading, Paragraph, Table
-from mechgraph.document import Equation as Printed
+from mechgraph.document import Block as Piece
+from mechgraph.document import Bullets, Document, Equation, Heading, Paragraph, Table
 from mechgraph.equations.symbols import names_of, subscript
-from mechgraph.equations.terms import Equation, Formulation
+from mechgraph.equations.terms import Formulation, ScalarEquation
 
 SECTIONS = (
     ("reaction", "Reactions of the pairs"),
     ("effort", "Driver efforts"),
+    ("coupling", "Couplings"),
     ("link", "Equations of motion"),
     ("condition", "Conditions at the pairs"),
 )
+COUPLINGS = "F_C(g, q): what the multiplier M_C(g) or F_C(g) of the coupling g exerts on link b in the freedom q"
+"""What the symbols of couplings mean."""
 
 
 def formulation_document(f: Formulation, components: bool) -> Document:
@@ -23,7 +26,7 @@ def formulation_document(f: Formulation, components: bool) -> Document:
     numbers = names_of(m).link_number
     ledger = f.ledger()
     count = f"{len(f.unknowns)} unknowns, {len(f.equations)} equations"
-    blocks: list = [  # type: ignore[type-arg]
+    blocks: list[Piece] = [
         Paragraph(f"Bookkeeping {f.bookkeeping}: {count}."),
         Table(
             ("kind", "count", "unknowns", "equations"),
@@ -38,6 +41,7 @@ def formulation_document(f: Formulation, components: bool) -> Document:
                 "F_I: inertia of a link, -(m a) and its moment; F_A: applied loads; F_IN: what a driver exerts on link b",
                 "A: pair axis, X and Y: the other directions of the marker (primes: frame after so many freedoms); "
                 "A0 = P x A its moment about the origin, P the origin of its frame",
+                *([COUPLINGS] if m.couplings else []),
                 *(s.meaning for s in f.screws if "{}" in s.dual),
             )
         ),
@@ -46,20 +50,20 @@ def formulation_document(f: Formulation, components: bool) -> Document:
         mine = [b for b in f.blocks if b.kind == kind]
         if mine:
             blocks.append(Heading(title, 2))
-            blocks += [Printed(b.text, b.latex) for b in mine]
+            blocks += [Equation(b.text, b.latex) for b in mine]
     if components:
         blocks.append(Heading("Components", 2))
         blocks += [
-            Printed(f"({i + 1})  {_scalar(f, e, False)}", _scalar(f, e, True)) for i, e in enumerate(f.equations)
+            Equation(f"({i + 1})  {_scalar(f, e, False)}", _scalar(f, e, True)) for i, e in enumerate(f.equations)
         ]
     return Document(f"Equations of {m.name}", tuple(blocks))
 
 
-def _scalar(f: Formulation, equation: Equation, latex: bool) -> str:
+def _scalar(f: Formulation, equation: ScalarEquation, latex: bool) -> str:
     parts = []
     for term in equation.terms:
         symbols = [s for s in (f.coefficient_symbol(term), f.unknowns[term.unknown].name) if s]
-        parts.append(("+" if term.sign > 0 else "-", " ".join(subscript(s) if latex else s for s in symbols)))
+        parts.append(("+" if f.sign_of(term) > 0 else "-", " ".join(subscript(s) if latex else s for s in symbols)))
     parts += [("+", subscript(name) if latex else name) for name in equation.known]
     if not parts:
         return "0 = 0"
@@ -73,6 +77,11 @@ def coefficient_rows(f: Formulation) -> Iterator[tuple[str, int, int, str]]:
         if equation.known:
             yield f"C({i})", i, 0, "-" + " - ".join(equation.known)
     for i, equation in enumerate(f.equations, 1):
+        cells: dict[int, str] = {}
         for term in sorted(equation.terms, key=lambda t: t.unknown):
-            value = ("" if term.sign > 0 else "-") + (f.coefficient_symbol(term) or "1")
-            yield f"Q({i}, {term.unknown + 1})", i, term.unknown + 1, value
+            value, minus = f.coefficient_symbol(term) or "1", f.sign_of(term) < 0
+            before = cells.get(term.unknown)  # a multiplier may act twice on one link
+            joined = f"{before} {'-' if minus else '+'} {value}"
+            cells[term.unknown] = ("-" if minus else "") + value if before is None else joined
+        for unknown, value in cells.items():
+            yield f"Q({i}, {unknown + 1})", i, unknown + 1, value

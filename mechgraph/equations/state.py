@@ -18,6 +18,7 @@ class State:
     efforts : for every pair the effort wrenches ``(6, f, T)``.
     along, conditions : for every pair the axial wrenches and the condition twists of Lee's bookkeeping.
     loads (6, N, T) : inertia and applied wrench of every link.
+    coefficients : for every coupling the coefficients of its freedoms ``(terms, 1 or T)``; the declared ones where left out.
     """
 
     coordinates: Array
@@ -29,3 +30,4 @@ class State:
     along: tuple[Array, ...]
     conditions: tuple[Array, ...]
     loads: Array
+    coefficients: tuple[Array, ...] = ()

@@ -14,7 +14,7 @@ LETTERS = {"x": "X", "y": "Y", "z": "A"}
 
 
 @dataclass(frozen=True)
-class Names:
+class LeeNames:
     """Numbers of links (moving ones first, then the frame) and names of the reactions of pairs."""
 
     link_number: dict[str, int]
@@ -22,7 +22,7 @@ class Names:
     opposite: tuple[str, ...]
 
 
-def names_of(m: Mechanism) -> Names:
+def names_of(m: Mechanism) -> LeeNames:
     """Lee's numbering: moving links 1, 2, ... in the order of declaration, the frame last; ``R_ab`` is a on b."""
     moving = [name for name in m.link_names() if name != m.frame]
     number = {name: i + 1 for i, name in enumerate([*moving, m.frame])}
@@ -33,7 +33,7 @@ def names_of(m: Mechanism) -> Names:
         joined = f"{i}{j}" if max(i, j) < 10 else f"{i},{j}"
         return joined if between[frozenset((first, second))] == 1 else f"{joined}({pair})"
 
-    return Names(
+    return LeeNames(
         number,
         tuple(ends(p.a, p.b, p.name) for p in m.pairs),
         tuple(ends(p.b, p.a, p.name) for p in m.pairs),
@@ -48,6 +48,11 @@ def screw_letter(part: Component | Freedom) -> str:
     if len(nonzero) == 1 and values[nonzero[0]] == 1.0:
         return LETTERS["xyz"[nonzero[0] % 3]] + "'" * frame
     return part.name
+
+
+def factor_text(number: float) -> str:
+    """A factor before a symbol: ``"2.5 "``, nothing for one."""
+    return "" if number == 1 else f"{number:.12g} "
 
 
 def subscript(symbol: str) -> str:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from mechgraph.algebra.se3 import Array
 from mechgraph.document import Document, to_latex, to_text
 from mechgraph.equations.state import State
+from mechgraph.equations.symbols import factor_text
 from mechgraph.model.mechanism import Mechanism
 
 AXES = ("x", "y", "z")
@@ -39,8 +40,8 @@ class Screw:
 class Unknown:
     """An unknown number: a component of a reaction or an effort.
 
-    ``owner`` is the pair, ``group`` what the ledger books it under, ``couple`` whether it is a moment rather than a force;
-    ``freedom`` the freedom of an effort.
+    ``owner`` is the pair or coupling, ``group`` what the ledger books it under, ``couple`` whether it is a moment rather than a
+    force; ``freedom`` the freedom of an effort.
     """
 
     name: str
@@ -53,16 +54,21 @@ class Unknown:
 
 @dataclass(frozen=True)
 class Term:
-    """``sign * coefficient * unknown``: the coefficient is component ``part`` of ``screw`` (0-2 dual, 3-5 real), or 1."""
+    """``sign * coefficient * unknown``: the coefficient is component ``part`` of ``screw`` (0-2 dual, 3-5 real), or 1.
+
+    The multiplier of a coupling acts in a freedom with that coefficient times ``c``, which ``coupling`` places: the ``coupling[1]``-th
+    number of the ``coupling[0]``-th coupling.
+    """
 
     unknown: int
     sign: float
     screw: int | None = None
     part: int = 0
+    coupling: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)
-class Equation:
+class ScalarEquation:
     """One scalar equation ``sum of terms + known = 0``; ``known`` is a component of the load on a link."""
 
     name: str
@@ -76,7 +82,10 @@ class Equation:
 
 @dataclass(frozen=True)
 class Block:
-    """A vector equation as it is printed block-wise: equilibrium of a link, condition of a pair, or a definition."""
+    """A vector equation as it is printed block-wise: equilibrium of a link, condition of a pair, or a definition.
+
+    ``kind`` is ``"link"``, ``"condition"``, ``"reaction"``, ``"effort"`` or ``"coupling"``.
+    """
 
     text: str
     latex: str
@@ -95,7 +104,7 @@ class LedgerRow:
 
 @dataclass(frozen=True)
 class Ledger:
-    """Unknowns against equations by kind: pair symbols, ``driver``, ``link`` (moving); read off the registry.
+    """Unknowns against equations by kind: pair symbols, ``coupling``, ``driver``, ``link`` (moving); read off the registry.
 
     ``balance = equations - unknowns = mobility by count - drivers``: zero is determinate by count, positive leaves freedoms
     undriven, negative is redundant.
@@ -131,7 +140,7 @@ class Formulation:
     mechanism: Mechanism
     bookkeeping: str
     unknowns: tuple[Unknown, ...]
-    equations: tuple[Equation, ...]
+    equations: tuple[ScalarEquation, ...]
     blocks: tuple[Block, ...]
     screws: tuple[Screw, ...]
 
@@ -142,6 +151,8 @@ class Formulation:
         groups: dict[str, int] = {}
         for pair in self.mechanism.pairs:
             groups[pair.type.symbol] = groups.get(pair.type.symbol, 0) + 1
+        if self.mechanism.couplings:
+            groups["coupling"] = len(self.mechanism.couplings)
         groups["driver"] = sum(u.group == "driver" for u in self.unknowns)
         groups["link"] = len(self.mechanism.links) - 1
         rows = {
@@ -179,7 +190,21 @@ class Formulation:
         for i, screw in enumerate(self.screws):
             values[1 + 6 * i : 7 + 6 * i] = getattr(state, screw.kind)[screw.pair][:, screw.index]
         _, _, signs, index = self.pattern
-        return np.asarray(signs[:, None] * values[index])
+        out = np.asarray(signs[:, None] * values[index])
+        if self.mechanism.couplings:
+            out *= self._coupled(state)
+        return out
+
+    def _coupled(self, state: State) -> Array:
+        """What the multipliers of couplings are multiplied by in every term, ``(terms, 1 or T)``; 1 in all other terms."""
+        given = state.coefficients or [np.array(c.coefficients)[:, None] for c in self.mechanism.couplings]
+        width = max(c.shape[1] for c in given)
+        terms = [t.coupling for equation in self.equations for t in equation.terms]
+        out = np.ones((len(terms), width))
+        for i, place in enumerate(terms):
+            if place is not None:
+                out[i] = given[place[0]][place[1]]
+        return out
 
     def right_side(self, state: State) -> Array:
         """Right sides ``(equations, T)``: minus the inertia and applied wrenches."""
@@ -203,18 +228,26 @@ class Formulation:
         """Matrices ``(equations, unknowns, T)`` and right sides ``(equations, T)`` of all positions."""
         rows, cols, _, _ = self.pattern
         A = np.zeros((len(self.equations), len(self.unknowns), state.loads.shape[2]))
-        A[rows, cols] = self.entries(state)
+        np.add.at(A, (rows, cols), self.entries(state))  # a multiplier may act twice on one link
         return A, self.right_side(state)
 
     # --- print -------------------------------------------------------------------------------------------------------
 
     def coefficient_symbol(self, term: Term) -> str:
-        """The symbol of a coefficient, e.g. ``A_1x`` or ``A0_1x``; empty for the number one."""
+        """The symbol of a coefficient, e.g. ``A_1x``, ``A0_1x`` or ``2 A_1x`` of a coupling; empty for the number one."""
         if term.screw is None:
             return ""
         screw = self.screws[term.screw]
         symbol, axis = screw.symbol if term.part >= 3 else screw.dual, AXES[term.part % 3]
-        return symbol.replace("{}", axis) if "{}" in symbol else symbol + axis
+        symbol = symbol.replace("{}", axis) if "{}" in symbol else symbol + axis
+        return symbol if term.coupling is None else factor_text(abs(self._number(term.coupling))) + symbol
+
+    def sign_of(self, term: Term) -> float:
+        """The sign with which a term is printed: that of its number where a coupling gives one."""
+        return term.sign if term.coupling is None else term.sign * float(np.sign(self._number(term.coupling)))
+
+    def _number(self, place: tuple[int, int]) -> float:
+        return self.mechanism.couplings[place[0]].coefficients[place[1]]
 
     def document(self, components: bool = True) -> Document:
         """The printed formulation as a document."""

@@ -11,9 +11,12 @@ from mechgraph.algebra.se3 import Array, identity, inverse
 from mechgraph.errors import DeclarationError
 from mechgraph.model.link import Link
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.numeric import is_numeric, plain
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.pair_type import TABLE
-from mechgraph.model.values import is_numeric, plain
+
+NUMBERS_OF_CHAIN = ("twist", "length", "offset")
+"""What places the link after every pair of a chain, in the order of the rows of its numbers."""
 
 
 def chain_symbols(letters: str) -> tuple[list[str], list[str]]:
@@ -77,7 +80,7 @@ def chain(
     if not faults and n < 2:
         faults.append(f"pairs {letters!r}: a loop needs at least two pairs")
     numbers = {}
-    for what, values in (("twist", twist), ("length", length), ("offset", offset)):
+    for what, values in zip(NUMBERS_OF_CHAIN, (twist, length, offset), strict=True):
         numbers[what] = (0.0,) * n if values is None else plain(values)
         if values is not None and not is_numeric(values, (n,)):
             faults.append(f"{what} = {values!r}: expected {n} finite numbers, one a pair")
@@ -89,7 +92,7 @@ def chain(
     if faults:
         raise DeclarationError(f"chain {title!r}", faults)
     placed = any(v is not None for v in (twist, length, offset))
-    poses = markers_of_chain(np.array([numbers["twist"], numbers["length"], numbers["offset"]])[:, :, None])
+    poses = markers_of_chain(np.array(list(numbers.values()))[:, :, None])
     pairs = []
     for k, symbol in enumerate(symbols):
         markers: dict[str, Any] = {}

@@ -1,39 +1,50 @@
-"""Faults of a declaration, collected in one pass over its items."""
+"""Faults of a declaration, all of them at once.
+
+Links and pairs are checked in whole columns (one array of masses, of points, of axes, ...). Only where a column fails are they gone
+through one by one, to say in words what is wrong with which.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
 
-from mechgraph.model.conversion import UNIT_NAMES
+from mechgraph.algebra.inertia import physical
+from mechgraph.model.coupling import Coupling
 from mechgraph.model.drive import Drive
 from mechgraph.model.link import Link
 from mechgraph.model.load import LOADS
-from mechgraph.model.pair import Pair
+from mechgraph.model.numeric import column, is_numeric
+from mechgraph.model.pair import PERPENDICULAR, Pair
 from mechgraph.model.pair_type import PairType
-from mechgraph.model.values import is_numeric
+from mechgraph.units import BASE_UNITS
 
 if TYPE_CHECKING:
     from mechgraph.model.mechanism import Mechanism
 
 
-def _repeated(names: Iterable[Any], what: str) -> list[str]:
+def _repeated(names: Sequence[Any], what: str) -> list[str]:
+    if len(set(names)) == len(names):
+        return []
     return [f"{what} {n!r} is declared {c} times; names must differ" for n, c in Counter(names).items() if c > 1]
 
 
 def _kind_faults(m: Mechanism) -> list[str]:
-    """Items that are no links, pairs, drives or loads at all."""
+    """Items that are no links, pairs, couplings, drives or loads at all."""
     faults = []
     for what, items, kind in (
-        ("link", m.links, Link),
-        ("pair", m.pairs, Pair),
-        ("drive", m.drives, Drive),
+        ("link", m.links, (Link,)),
+        ("pair", m.pairs, (Pair,)),
+        ("coupling", m.couplings, (Coupling,)),
+        ("drive", m.drives, (Drive,)),
         ("load", m.loads, tuple(LOADS.values())),
     ):
+        if set(map(type, items)) <= set(kind):
+            continue
         wrong = [item for item in items if not isinstance(item, kind)]
         faults += [f"{what} {item!r}: is no {what}; use mg.{what.capitalize()}(...)" for item in wrong]
     return faults
@@ -49,22 +60,50 @@ def declaration_faults(m: Mechanism) -> list[str]:
     if faults:
         return faults
     names = m.link_names()
-    known = set(names)
-    for link in m.links:
-        faults += link.faults()
+    if not _links_are_sound(m.links):
+        faults += [fault for link in m.links for fault in link.faults()]
     faults += _repeated(names, "link") + _repeated([p.name for p in m.pairs], "pair")
-    for pair in m.pairs:
-        faults += pair.faults()
-        for end in (pair.a, pair.b):
-            if end is None:
-                faults.append(f"pair {pair.name!r}: is on one link only; name both links")
-            elif end not in known:
-                faults.append(f"pair {pair.name!r}: link {end!r} is not declared (links: {', '.join(map(str, names))})")
+    if not _pairs_are_sound(m.pairs):
+        faults += [fault for pair in m.pairs for fault in pair.faults()]
+    faults += _end_faults(m, names)
+    for key, value in m.units.items():
+        if key not in BASE_UNITS or not isinstance(value, str) or not value:
+            faults.append(f"units: {key} = {value!r}: expected names for {', '.join(BASE_UNITS)}")
+    return faults + _symbol_faults(m) + _reference_faults(m) + _coupling_faults(m)
+
+
+def mapping_faults(**given: Any) -> list[str]:
+    """Arguments that should be mappings and are not."""
+    return [
+        f"{what} = {value!r}: expected a mapping"
+        for what, value in given.items()
+        if value is not None and not isinstance(value, Mapping)
+    ]
+
+
+def _end_faults(m: Mechanism, names: Sequence[str]) -> list[str]:
+    """Ends of pairs and the frame that are no links; links that hang in the air."""
+    known = set(names)
+    faults = []
+    strangers = {end for pair in m.pairs for end in (pair.a, pair.b)} - known
+    if strangers:
+        for pair in m.pairs:
+            for end in (pair.a, pair.b):
+                if end is None:
+                    faults.append(f"pair {pair.name!r}: is on one link only; name both links")
+                elif end in strangers:
+                    declared = ", ".join(map(str, names))
+                    faults.append(f"pair {pair.name!r}: link {end!r} is not declared (links: {declared})")
     if m.frame not in known:
         faults.append(f"frame {m.frame!r}: is no link (links: {', '.join(map(str, names))})")
-    for key, value in m.units.items():
-        if key not in UNIT_NAMES or not isinstance(value, str) or not value:
-            faults.append(f"units: {key} = {value!r}: expected names for {', '.join(UNIT_NAMES)}")
+    elif not strangers:
+        faults += _connection_faults(m)
+    return faults
+
+
+def _symbol_faults(m: Mechanism) -> list[str]:
+    """Pair types that share a symbol and differ."""
+    faults = []
     by_symbol: dict[str, PairType] = {}
     for pair in m.pairs:
         if isinstance(pair.type, PairType):
@@ -73,27 +112,82 @@ def declaration_faults(m: Mechanism) -> list[str]:
                 faults.append(
                     f"pair {pair.name!r}: its type shares the symbol {pair.type.symbol!r} with another type; rename one"
                 )
-    ends = {end for pair in m.pairs for end in (pair.a, pair.b)}
-    if m.frame in known and ends <= known:
-        faults += _connection_faults(m)
-    return faults + _reference_faults(m)
+    return faults
+
+
+def _are_names(names: Sequence[Any]) -> bool:
+    return set(map(type, names)) <= {str} and all(names)
+
+
+def _links_are_sound(links: Sequence[Link]) -> bool:
+    """Whether every link passes, checked in columns; False where it takes a closer look."""
+    masses = [link.mass for link in links]
+    if not _are_names([link.name for link in links]) or not set(map(type, masses)) <= {float}:
+        return False
+    mass = column(masses, ())
+    if (
+        mass is None
+        or (mass < 0).any()
+        or column([link.center for link in links if link.center is not None], (3,)) is None
+    ):
+        return False
+    if any(link.center is None and (link.mass > 0 or link.inertia is not None) for link in links):
+        return False
+    solid = [link for link in links if link.inertia is not None]
+    tensors = column([link.inertia for link in solid], (3, 3))
+    if tensors is None or any(link.mass == 0 for link in solid):
+        return False
+    A = np.moveaxis(tensors, 0, -1)
+    meant = np.array([link.unphysical for link in solid], dtype=bool)
+    return bool(((A.swapaxes(0, 1) == A).all(axis=(0, 1)) & physical(A) | meant).all())
+
+
+def _pairs_are_sound(pairs: Sequence[Pair]) -> bool:
+    """Whether every pair passes, checked in columns; False where it takes a closer look."""
+    types = {id(p.type): p.type for p in pairs}.values()
+    if not _are_names([p.name for p in pairs]) or not all(isinstance(t, PairType) for t in types):
+        return False
+    if any(p.a == p.b or (p.on_a is None) != (p.on_b is None) for p in pairs):
+        return False
+    takers = {id(t) for t in types if t.takes_pitch}
+    if any(p.faults() for p in pairs if p.pitch is not None or p.lead is not None or id(p.type) in takers):
+        return False
+    by_point = [p for p in pairs if p.point is not None or p.axis is not None]
+    by_markers = [p for p in pairs if p.on_a is not None]
+    if any(p.on_a is not None for p in by_point):
+        return False
+    markers = [*by_point, *(p.on_a for p in by_markers), *(p.on_b for p in by_markers)]
+    return _markers_are_sound(markers, [p.type.square_second for p in (*by_point, *by_markers, *by_markers)])
+
+
+def _markers_are_sound(markers: Sequence[Any], square: Sequence[bool]) -> bool:
+    """Whether points, axes and second directions (of markers or of pairs placed by point and axis) are what they must be."""
+    p, z, x = (column([getattr(marker, name) for marker in markers], (3,)) for name in ("point", "axis", "second"))
+    if p is None or z is None or x is None:
+        return False
+    length = np.sqrt((z * z).sum(axis=1)), np.sqrt((x * x).sum(axis=1))
+    if not all((one > 1e-12).all() for one in length):
+        return False
+    cosine = np.abs((z * x).sum(axis=1)) / (length[0] * length[1])
+    return not (cosine > np.where(square, PERPENDICULAR, 1 - 1e-12)).any()
 
 
 def item_faults(m: Mechanism) -> list[str]:
     """Faults of drives and loads alone, for links and pairs that were checked before."""
     faults = _kind_faults(m)
-    return faults if faults else _reference_faults(m)
+    return faults if faults else _reference_faults(m) + _coupling_faults(m)
 
 
 def _connection_faults(m: Mechanism) -> list[str]:
     place, n = m.link_index, len(m.links)
-    a, b = ([place[end] for end in ends] for ends in zip(*((p.a, p.b) for p in m.pairs), strict=True))
-    graph = scipy.sparse.coo_array((np.ones(len(a)), (a, b)), shape=(n, n))
+    a, b = np.array([place[p.a] for p in m.pairs]), np.array([place[p.b] for p in m.pairs])
+    graph = scipy.sparse.coo_array((np.ones(len(a), dtype=bool), (a, b)), shape=(n, n))
     _, part = scipy.sparse.csgraph.connected_components(graph, directed=False)
+    names = m.link_names()
     return [
-        f"link {name!r} is not connected to the frame {m.frame!r} by any chain of pairs; add the pair that holds it"
-        for name in m.link_names()
-        if part[place[name]] != part[place[m.frame]]
+        f"link {names[i]!r} is not connected to the frame {m.frame!r} by any chain of pairs; add the pair that holds it"
+        for i in np.flatnonzero(part != part[place[m.frame]])
+        if place[names[i]] == i
     ]
 
 
@@ -110,6 +204,14 @@ def _reference_faults(m: Mechanism) -> list[str]:
     for load in m.loads:
         faults += load.faults(m)
     return faults
+
+
+def _coupling_faults(m: Mechanism) -> list[str]:
+    faults = [fault for coupling in m.couplings for fault in coupling.faults(m)]
+    names = [c.name for c in m.couplings if isinstance(c.name, str) and c.name]
+    shared = [name for name in dict.fromkeys(names) if name in m.pair_index]
+    faults += [f"coupling {name!r}: a pair has that name; names must differ" for name in shared]
+    return faults + _repeated(names, "coupling")
 
 
 def flat_start(m: Mechanism, start: Mapping[str, Any]) -> tuple[dict[str, float], list[str]]:

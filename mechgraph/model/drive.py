@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
+from mechgraph.model.field_format import FREEDOM_NAME, TABLE, Described
 from mechgraph.model.motion import Motion
 
 
 @dataclass(frozen=True)
-class Drive:
+class Drive(Described):
     """A driven freedom, ``"A"`` or ``"B.Tz"``, with the motion to use where ``solve`` is given none."""
 
-    freedom: str
-    motion: Motion | None = None
+    freedom: Annotated[str, FREEDOM_NAME("the driven freedom; not one of a rotation of S, Sg, Sp")]
+    motion: Annotated[Motion | None, TABLE("used where `solve` is given none", table="motion", default="none")] = None

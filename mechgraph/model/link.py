@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from mechgraph.algebra.inertia import physical_faults
-from mechgraph.model.values import is_numeric, number_fault, plain, vector_fault
+from mechgraph.model.field_format import FLAG, NUMBER, POINT, TENSOR, TEXT, Described
+from mechgraph.model.numeric import is_numeric
+from mechgraph.units import INERTIA, LENGTH, MASS
 
 
 @dataclass(frozen=True)
-class Link:
+class Link(Described):
     """A link (rigid body).
 
     Parameters
@@ -25,25 +27,36 @@ class Link:
     unphysical : accept an inertia that no body can have.
     """
 
-    name: str
-    mass: float = 0.0
-    center: Any = None
-    inertia: Any = None
-    unphysical: bool = False
+    name: Annotated[str, TEXT("in a chain: `frame`, `link1`, `link2`, ...")]
+    mass: Annotated[float, NUMBER("mass", MASS, minimum=0.0)] = 0.0
+    center: Annotated[
+        Any,
+        POINT(
+            "mass centre in the link's frame (global where pairs are given by point and axis)",
+            LENGTH,
+            default="needed where mass > 0",
+        ),
+    ] = None
+    inertia: Annotated[
+        Any,
+        TENSOR(
+            "tensor about the mass centre, in the link's frame; off-diagonals are minus the products of inertia",
+            INERTIA,
+            default="0",
+        ),
+    ] = None
+    unphysical: Annotated[bool, FLAG("accept an inertia that no body can have")] = False
 
     def __post_init__(self) -> None:
-        for field in ("mass", "center", "inertia"):
-            object.__setattr__(self, field, plain(getattr(self, field)))
+        self.read_numbers()
 
     def faults(self) -> list[str]:
         """What is wrong with this link, one line each."""
         where = f"link {self.name!r}: "
         if not isinstance(self.name, str) or not self.name:
             return [f"link {self.name!r}: the name must be a non-empty text"]
-        found = [number_fault(self.mass, where + "mass", minimum=0.0)]
-        if self.center is not None:
-            found.append(vector_fault(self.center, where + "center"))
-        elif is_numeric(self.mass, ()) and self.mass > 0:
+        found = self.value_faults(where)
+        if self.center is None and is_numeric(self.mass, ()) and self.mass > 0:
             found.append(f"{where}mass = {self.mass:g} without a center; give center=(x, y, z)")
         if self.inertia is not None and not is_numeric(self.inertia, (3, 3)):
             found.append(f"{where}inertia: expected a 3 x 3 tensor of finite numbers, got {self.inertia!r}")
@@ -53,8 +66,8 @@ class Link:
             if self.mass == 0 and np.any(self.inertia):
                 found.append(f"{where}inertia without mass; give mass=")
             if not self.unphysical:
+                impossible = physical_faults(self.inertia)
                 found += [
-                    f"{where}inertia: {fault}; no body has it (unphysical=True accepts it)"
-                    for fault in physical_faults(self.inertia)
+                    f"{where}inertia: {fault}; no body has it (unphysical=True accepts it)" for fault in impossible
                 ]
-        return [fault for fault in found if fault]
+        return found

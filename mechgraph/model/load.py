@@ -6,19 +6,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Protocol
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Protocol, Self
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, rotate
-from mechgraph.model.values import number_fault, plain, same_fields, vector_fault
+from mechgraph.model.field_format import (
+    FREEDOM_NAME,
+    LINK_NAME,
+    NUMBER,
+    POINT,
+    POSITION,
+    SERIES,
+    TEXT,
+    VECTOR,
+    VECTOR_SERIES,
+    Described,
+)
+from mechgraph.model.numeric import same_fields
+from mechgraph.units import ACCELERATION, FORCE, LENGTH, MOMENT
 
 Value = Any
 """A number or vector, an array over positions, or a callable ``(pose, twist, t)``."""
 
-FORCE, MOMENT, LENGTH = (1, 1, -2), (2, 1, -2), (1, 0, 0)
-"""Dimensions as exponents of length, mass and time."""
+FORCE_PER_LENGTH, FORCE_PER_VELOCITY = (0, 1, -2), (0, 1, -1)
 
 
 class LoadSite(Protocol):
@@ -58,7 +70,7 @@ class LoadSite(Protocol):
         """Effort ``(T,)`` in a freedom: + on link b, - on link a."""
 
 
-class Names(Protocol):
+class Nameable(Protocol):
     """The names that a load may refer to."""
 
     @property
@@ -75,60 +87,19 @@ class Names(Protocol):
         """Links a and b of the pair of a freedom."""
 
 
-def _value_fault(value: Value, what: str, width: int) -> str | None:
-    if callable(value):
-        return None
-    try:
-        array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError, OverflowError):
-        array = np.array(np.nan)
-    ok = np.isfinite(array).all() and (width == 1 or (array.ndim >= 1 and array.shape[-1] == width))
-    wanted = "a finite number" if width == 1 else f"{width} finite numbers"
-    return (
-        None
-        if ok
-        else f"{what} = {value!r}: expected {wanted}, an array of them over positions, or a callable (pose, twist, t)"
-    )
-
-
-def _link_fault(names: Names, link: Any, where: str) -> str | None:
-    known = names.link_index
-    return None if link in known else f"{where}unknown link {link!r} (links: {', '.join(known)})"
-
-
-@dataclass(frozen=True)
-class _Turned:
-    """A callable load value carried along by ``Mechanism.moved``."""
-
-    function: Callable[..., Any]
-    pose: tuple[tuple[float, ...], ...]
-
-    def __call__(self, pose: Array, twist: Array, t: Any) -> Array:
-        G = np.asarray(self.pose)
-        R, back = G[:3, :3], np.linalg.inv(G)
-        w, v = twist[..., :3], twist[..., 3:]
-        p = back[:3, 3]
-        local = np.concatenate([w @ R, v @ R + np.cross(p, w @ R)], axis=-1)
-        return np.asarray(self.function(back @ pose @ G, local, t)) @ R.T
-
-
-def _turned(value: Value, pose: Array) -> Value:
-    if value is None:
-        return None
-    if callable(value):
-        return _Turned(value, plain(np.vstack([pose, (0.0, 0.0, 0.0, 1.0)])))
-    return plain(np.asarray(value) @ pose[:3, :3].T)
-
-
 @dataclass(frozen=True, eq=False)
-class _Load:
-    """What all loads share: equality that also holds for arrays."""
+class _Load(Described):
+    """What all loads share: equality that also holds for arrays, and checks of what their fields hold."""
 
+    kind: ClassVar[str]
+    """Name of the kind in files."""
+    subject: ClassVar[str]
+    """How messages call it; fields in braces."""
     between_links: ClassVar[bool] = False
     """Whether it is a force that two links exert on each other."""
-    dimensions: ClassVar[dict[str, tuple[int, int, int]]] = {}
-    freedom_dimensions: ClassVar[dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]]] = {}
-    """Dimensions of fields that depend on the freedom: for a turn, for a slide."""
+
+    def __post_init__(self) -> None:
+        self.read_numbers()
 
     def __eq__(self, other: object) -> bool:
         return same_fields(self, other)
@@ -136,30 +107,52 @@ class _Load:
     def __hash__(self) -> int:
         return hash(type(self).__name__)
 
+    @property
+    def where(self) -> str:
+        """Which load it is, for messages."""
+        return f"{self.subject.format(**vars(self))}: "
+
+    def faults(self, names: Nameable) -> list[str]:
+        """What is wrong with this load."""
+        found: list[str | None] = []
+        for name, about in self.formats.items():
+            value = getattr(self, name)
+            if about.kind is LINK_NAME and value not in names.link_index:
+                found.append(f"unknown link {value!r} (links: {', '.join(names.link_index)})")
+            elif about.kind is FREEDOM_NAME:
+                found.append(names.freedom_fault(value, single=about.single))
+        found += self.value_faults("")
+        return [self.where + fault for fault in found if fault]
+
+    @property
+    def in_freedom(self) -> str | None:
+        """The freedom in which this load acts; None of a load on links."""
+        named = [getattr(self, name) for name, about in self.formats.items() if about.kind is FREEDOM_NAME]
+        return named[0] if named else None
+
+    def with_full_names(self, full_name: Callable[[str], str]) -> Self:
+        """The same with its freedom spelled in full."""
+        names = [name for name, about in self.formats.items() if about.kind is FREEDOM_NAME]
+        return self.replace(**{name: full_name(getattr(self, name)) for name in names}) if names else self
+
+    def links(self, names: Nameable) -> tuple[str, ...]:
+        """Links that this load acts on: those that it names, or those of the pair of its freedom."""
+        if self.in_freedom is not None:
+            return names.ends_of(self.in_freedom)
+        return tuple(getattr(self, name) for name, about in self.formats.items() if about.kind is LINK_NAME)
+
 
 @dataclass(frozen=True, eq=False)
 class Gravity(_Load):
     """Uniform gravity: force ``m g`` at the mass centre of every link; ``acceleration`` is the vector g."""
 
     kind: ClassVar[str] = "gravity"
-    dimensions: ClassVar[dict[str, tuple[int, int, int]]] = {"acceleration": (1, 0, -2)}
-    acceleration: Any
+    subject: ClassVar[str] = "gravity"
+    acceleration: Annotated[Any, VECTOR("the vector g, global", ACCELERATION)]
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "acceleration", plain(self.acceleration))
-
-    def faults(self, names: Names) -> list[str]:
-        """What is wrong with this load."""
-        fault = vector_fault(self.acceleration, "gravity: acceleration")
-        return [fault] if fault else []
-
-    def links(self, names: Names) -> tuple[str, ...]:
-        """Links that this load acts on."""
+    def links(self, names: Nameable) -> tuple[str, ...]:
+        """Links that this load acts on: all that have mass."""
         return names.massive_links()
-
-    def moved(self, pose: Array) -> Gravity:
-        """The same load after a rigid motion of the whole mechanism."""
-        return replace(self, acceleration=_turned(self.acceleration, pose))
 
     def act(self, site: LoadSite) -> None:
         """Add the weight of every link."""
@@ -176,40 +169,23 @@ class Wrench(_Load):
     """
 
     kind: ClassVar[str] = "wrench"
-    dimensions: ClassVar[dict[str, tuple[int, int, int]]] = {"force": FORCE, "moment": MOMENT, "point": LENGTH}
-    link: str
-    force: Value = None
-    moment: Value = None
-    point: Any = None
-    frame: str = "global"
+    subject: ClassVar[str] = "wrench on {link!r}"
+    link: Annotated[str, LINK_NAME("the link it acts on")]
+    force: Annotated[Value, VECTOR_SERIES("at least one of the two", FORCE, default="none")] = None
+    moment: Annotated[Value, VECTOR_SERIES("at least one of the two", MOMENT, default="none")] = None
+    point: Annotated[
+        Any,
+        POINT("material point, in the coordinates of the declared configuration", LENGTH, default="mass centre"),
+    ] = None
+    frame: Annotated[
+        str,
+        TEXT('`"link"`: force and moment turn with the link; `"global"`: they do not', choices=("global", "link")),
+    ] = "global"
 
-    def __post_init__(self) -> None:
-        for field in ("force", "moment", "point"):
-            object.__setattr__(self, field, plain(getattr(self, field)))
-
-    def faults(self, names: Names) -> list[str]:
+    def faults(self, names: Nameable) -> list[str]:
         """What is wrong with this load."""
-        where = f"wrench on {self.link!r}: "
-        found = [_link_fault(names, self.link, where)]
-        if self.frame not in ("global", "link"):
-            found.append(f"{where}frame = {self.frame!r}: expected 'global' or 'link'")
-        if self.force is None and self.moment is None:
-            found.append(f"{where}has neither force nor moment")
-        found += [
-            _value_fault(v, where + n, 3) for n, v in (("force", self.force), ("moment", self.moment)) if v is not None
-        ]
-        if self.point is not None:
-            found.append(vector_fault(self.point, where + "point"))
-        return [fault for fault in found if fault]
-
-    def links(self, names: Names) -> tuple[str, ...]:
-        """Links that this load acts on."""
-        return (self.link,)
-
-    def moved(self, pose: Array) -> Wrench:
-        """The same load after a rigid motion of the whole mechanism."""
-        point = None if self.point is None else plain(pose[:3, :3] @ np.asarray(self.point) + pose[:3, 3])
-        return replace(self, force=_turned(self.force, pose), moment=_turned(self.moment, pose), point=point)
+        nothing = self.force is None and self.moment is None
+        return super().faults(names) + ([f"{self.where}has neither force nor moment"] if nothing else [])
 
     def act(self, site: LoadSite) -> None:
         """Add force and moment."""
@@ -232,28 +208,9 @@ class Effort(_Load):
     """
 
     kind: ClassVar[str] = "effort"
-    freedom_dimensions: ClassVar[dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]]] = {
-        "value": (MOMENT, FORCE)
-    }
-    freedom: str
-    value: Value
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "value", plain(self.value))
-
-    def faults(self, names: Names) -> list[str]:
-        """What is wrong with this load."""
-        where = f"effort in {self.freedom!r}: "
-        found = [names.freedom_fault(self.freedom, single=False), _value_fault(self.value, "value", 1)]
-        return [where + fault for fault in found if fault]
-
-    def links(self, names: Names) -> tuple[str, ...]:
-        """Links that this load acts on."""
-        return names.ends_of(self.freedom)
-
-    def moved(self, pose: Array) -> Effort:
-        """The same load after a rigid motion of the whole mechanism: unchanged."""
-        return self
+    subject: ClassVar[str] = "effort in {freedom!r}"
+    freedom: Annotated[str, FREEDOM_NAME("the freedom, e.g. D or B.Rx", single=False)]
+    value: Annotated[Value, SERIES("couple about a turn, force along a slide; + on link b, - on link a", FORCE, MOMENT)]
 
     def act(self, site: LoadSite) -> None:
         """Add the effort."""
@@ -268,48 +225,15 @@ class Spring(_Load):
     """
 
     kind: ClassVar[str] = "spring"
+    subject: ClassVar[str] = "spring {a!r} - {b!r}"
     between_links: ClassVar[bool] = True
-    dimensions: ClassVar[dict[str, tuple[int, int, int]]] = {
-        "p": LENGTH,
-        "q": LENGTH,
-        "stiffness": (0, 1, -2),
-        "free_length": LENGTH,
-        "damping": (0, 1, -1),
-    }
-    a: str
-    b: str
-    p: Any
-    q: Any
-    stiffness: float
-    free_length: float = 0.0
-    damping: float = 0.0
-
-    def __post_init__(self) -> None:
-        for field in ("p", "q", "stiffness", "free_length", "damping"):
-            object.__setattr__(self, field, plain(getattr(self, field)))
-
-    def faults(self, names: Names) -> list[str]:
-        """What is wrong with this load."""
-        where = f"spring {self.a!r} - {self.b!r}: "
-        found = [
-            _link_fault(names, self.a, where),
-            _link_fault(names, self.b, where),
-            vector_fault(self.p, where + "p"),
-            vector_fault(self.q, where + "q"),
-            number_fault(self.stiffness, where + "stiffness"),
-            number_fault(self.free_length, where + "free_length", minimum=0.0),
-            number_fault(self.damping, where + "damping"),
-        ]
-        return [fault for fault in found if fault]
-
-    def links(self, names: Names) -> tuple[str, ...]:
-        """Links that this load acts on."""
-        return (self.a, self.b)
-
-    def moved(self, pose: Array) -> Spring:
-        """The same load after a rigid motion of the whole mechanism."""
-        p, q = (plain(pose[:3, :3] @ np.asarray(v) + pose[:3, 3]) for v in (self.p, self.q))
-        return replace(self, p=p, q=q)
+    a: Annotated[str, LINK_NAME("first link")]
+    b: Annotated[str, LINK_NAME("second link")]
+    p: Annotated[Any, POINT("point of link a", LENGTH)]
+    q: Annotated[Any, POINT("point of link b", LENGTH)]
+    stiffness: Annotated[float, NUMBER("force per length", FORCE_PER_LENGTH)]
+    free_length: Annotated[float, NUMBER("length without tension", LENGTH, minimum=0.0)] = 0.0
+    damping: Annotated[float, NUMBER("force per velocity", FORCE_PER_VELOCITY)] = 0.0
 
     def act(self, site: LoadSite) -> None:
         """Pull both links towards each other."""
@@ -330,38 +254,11 @@ class TorsionSpring(_Load):
     """A spring (and damper) in a single freedom: effort ``-stiffness (q - free) - damping dq/dt``; for turns and slides."""
 
     kind: ClassVar[str] = "torsion_spring"
-    freedom_dimensions: ClassVar[dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]]] = {
-        "stiffness": (MOMENT, (0, 1, -2)),
-        "free": ((0, 0, 0), LENGTH),
-        "damping": ((2, 1, -1), (0, 1, -1)),
-    }
-    freedom: str
-    stiffness: float
-    free: float = 0.0
-    damping: float = 0.0
-
-    def __post_init__(self) -> None:
-        for field in ("stiffness", "free", "damping"):
-            object.__setattr__(self, field, plain(getattr(self, field)))
-
-    def faults(self, names: Names) -> list[str]:
-        """What is wrong with this load."""
-        where = f"torsion spring in {self.freedom!r}: "
-        found = [
-            names.freedom_fault(self.freedom, single=True),
-            number_fault(self.stiffness, "stiffness"),
-            number_fault(self.free, "free"),
-            number_fault(self.damping, "damping"),
-        ]
-        return [where + fault for fault in found if fault]
-
-    def links(self, names: Names) -> tuple[str, ...]:
-        """Links that this load acts on."""
-        return names.ends_of(self.freedom)
-
-    def moved(self, pose: Array) -> TorsionSpring:
-        """The same load after a rigid motion of the whole mechanism: unchanged."""
-        return self
+    subject: ClassVar[str] = "torsion spring in {freedom!r}"
+    freedom: Annotated[str, FREEDOM_NAME("a single turn or slide")]
+    stiffness: Annotated[float, NUMBER("effort per coordinate", FORCE_PER_LENGTH, MOMENT)]
+    free: Annotated[float, NUMBER("coordinate without effort", **POSITION)] = 0.0
+    damping: Annotated[float, NUMBER("effort per rate", FORCE_PER_VELOCITY, (2, 1, -1))] = 0.0
 
     def act(self, site: LoadSite) -> None:
         """Add the effort of the spring."""

@@ -1,32 +1,39 @@
-"""The mechanism: links, pairs, drives and loads. The only model; everything else is derived from it."""
+"""The mechanism: links, pairs, couplings, drives and loads. The only model; everything else is derived from it."""
 
 from __future__ import annotations
 
 import dataclasses
-import gc
+import itertools
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 
 from mechgraph.errors import DeclarationError
-from mechgraph.model.conversion import converted
-from mechgraph.model.declaration import declaration_faults, flat_start, item_faults
+from mechgraph.model.coupling import Coupling
+from mechgraph.model.declaration import declaration_faults, flat_start, item_faults, mapping_faults
 from mechgraph.model.drive import Drive
+from mechgraph.model.field_format import FACTS, OTHER, TABLE, TABLES, TEXT, Formatted
 from mechgraph.model.link import Link
-from mechgraph.model.load import Effort, Load, TorsionSpring
-from mechgraph.model.pair import Marker, Pair
+from mechgraph.model.load import Load
+from mechgraph.model.numeric import is_numeric, same_fields
+from mechgraph.model.pair import Pair
 from mechgraph.model.pair_type import PairType
-from mechgraph.model.values import is_numeric, plain, same_fields
+from mechgraph.units import base_factors
 
 Made = TypeVar("Made")
+START = {
+    "type": "object",
+    "additionalProperties": {"anyOf": [{"type": "number"}, {"type": "array", "items": {"type": "number"}}]},
+}
+"""JSON Schema of start values."""
 
 
 @dataclass(frozen=True, eq=False)
-class Mechanism:
+class Mechanism(Formatted):
     """A mechanism: a graph whose nodes are links and whose edges are kinematic pairs.
 
     Parameters
@@ -34,6 +41,7 @@ class Mechanism:
     name : for messages and reports.
     links : the first is the frame unless ``frame`` names another; left out, links are inferred from the pairs, massless.
     pairs, drives, loads : see ``Pair``, ``Drive`` (a name alone will do) and the loads.
+    couplings : linear relations between freedoms, see ``Coupling``; kept with full freedom names, ``"A.Rz"``.
     start : pair coordinates near which to assemble, freedom -> value; picks the branch.
     units : names of the units of ``length``, ``mass`` and ``time`` in which the numbers are declared (a consistent set).
     source, description, expected : where it comes from, what it is, and facts that a test checks.
@@ -44,17 +52,31 @@ class Mechanism:
         with all faults at once.
     """
 
-    name: str
-    links: tuple[Link, ...]
-    pairs: tuple[Pair, ...]
-    drives: tuple[Drive, ...]
-    loads: tuple[Load, ...]
-    frame: str
-    start: Mapping[str, float]
-    units: Mapping[str, str]
-    source: str
-    description: str
-    expected: Mapping[str, Any]
+    name: Annotated[str, TEXT("name of the mechanism")]
+    description: Annotated[str, TEXT("what it is", default="empty")]
+    source: Annotated[str, TEXT("where it comes from", default="empty")]
+    frame: Annotated[str, TEXT("the frame link", default="first link")]
+    units: Annotated[Mapping[str, str], TABLE("names of the units of the numbers", table="units", default="no names")]
+    links: Annotated[
+        tuple[Link, ...], TABLES("links; left out, they follow from the pairs, massless", key="link", table="link")
+    ]
+    pairs: Annotated[tuple[Pair, ...], TABLES("pairs", key="pair", table="pair")]
+    couplings: Annotated[
+        tuple[Coupling, ...],
+        TABLES("linear relations between freedoms", key="coupling", table="coupling", default="none"),
+    ]
+    drives: Annotated[tuple[Drive, ...], TABLES("driven freedoms", key="drive", table="drive", default="none")]
+    loads: Annotated[tuple[Load, ...], TABLES("loads", key="load", table="load", default="none")]
+    start: Annotated[
+        Mapping[str, float],
+        OTHER(
+            "pair coordinates near which to assemble, freedom → number, or pair → one number a freedom; "
+            "degrees with `_deg` added to the name",
+            default="all 0",
+            rules=START,
+        ),
+    ]
+    expected: Annotated[Mapping[str, Any], FACTS("facts that a test checks; any names", default="empty")]
 
     def __init__(
         self,
@@ -64,6 +86,7 @@ class Mechanism:
         drives: Iterable[Drive | str] = (),
         loads: Iterable[Load] = (),
         *,
+        couplings: Iterable[Coupling] = (),
         frame: str | None = None,
         start: Mapping[str, Any] | None = None,
         units: Mapping[str, str] | None = None,
@@ -72,45 +95,39 @@ class Mechanism:
         expected: Mapping[str, Any] | None = None,
     ) -> None:
         pair_tuple = tuple(pairs)
-        ends = dict.fromkeys(
-            end for p in pair_tuple if isinstance(p, Pair) for end in (p.a, p.b) if isinstance(end, str)
-        )
-        link_tuple = tuple(links) if links is not None else tuple(Link(end) for end in ends)
+        link_tuple = tuple(links) if links is not None else tuple(map(Link, _ends(pair_tuple)))
         first = next((link.name for link in link_tuple if isinstance(link, Link)), "")
-        fields: dict[str, Any] = {
-            "name": name,
-            "links": link_tuple,
-            "pairs": pair_tuple,
-            "drives": tuple(Drive(d) if isinstance(d, str) else d for d in drives),
-            "loads": tuple(loads),
-            "frame": first if frame is None else frame,
-            "start": MappingProxyType({}),
-            "units": MappingProxyType(dict(units) if isinstance(units, Mapping) else {}),
-            "source": source,
-            "description": description,
-            "expected": MappingProxyType(dict(expected) if isinstance(expected, Mapping) else {}),
-        }
-        mappings = {"units": units, "start": start, "expected": expected}
-        self._settle(fields, mappings, declaration_faults)
+        self._set(
+            name=name,
+            links=link_tuple,
+            pairs=pair_tuple,
+            couplings=_named(couplings, pair_tuple),
+            drives=_as_drives(drives),
+            loads=tuple(loads),
+            frame=first if frame is None else frame,
+            units=MappingProxyType(dict(units) if isinstance(units, Mapping) else {}),
+            source=source,
+            description=description,
+            expected=MappingProxyType(dict(expected) if isinstance(expected, Mapping) else {}),
+        )
+        faults = declaration_faults(self) + mapping_faults(units=units, start=start, expected=expected)
+        self._finish(start, faults)
 
-    def _settle(
-        self, fields: Mapping[str, Any], mappings: Mapping[str, Any], check: Callable[[Mechanism], list[str]]
-    ) -> None:
-        """Set the fields and raise all faults found at once; ``start`` is kept by full freedom names."""
+    def _set(self, **fields: Any) -> None:
         for key, value in fields.items():
             object.__setattr__(self, key, value)
-        faults = check(self)
-        for what, value in mappings.items():
-            if value is not None and not isinstance(value, Mapping):
-                faults.append(f"{what} = {value!r}: expected a mapping")
-        start = mappings["start"]
+
+    def _finish(self, start: Any, faults: list[str]) -> None:
+        """Raise all faults at once, those of ``start`` too; keep start values and couplings by full freedom names."""
         flat: dict[str, float] = {}
         if all(isinstance(p, Pair) for p in self.pairs):
             flat, start_faults = flat_start(self, start if isinstance(start, Mapping) else {})
             faults += start_faults
         if faults:
             raise DeclarationError(f"mechanism {self.name!r}", faults)
-        object.__setattr__(self, "start", MappingProxyType(flat))
+        self._set(start=MappingProxyType(flat))
+        in_full = ([(self.full_name(q), value) for q, value in c.terms] for c in self.couplings)
+        self._set(couplings=tuple(c.replace(terms=t) for c, t in zip(self.couplings, in_full, strict=True)))
 
     def __eq__(self, other: object) -> bool:
         return same_fields(self, other)
@@ -125,7 +142,7 @@ class Mechanism:
         return _rebuilt, (self._arguments(),)
 
     def _arguments(self) -> dict[str, Any]:
-        out = {k: getattr(self, k) for k in self.__dataclass_fields__}
+        out = {k: getattr(self, k) for k in self.formats}
         return {k: dict(v) if isinstance(v, Mapping) else v for k, v in out.items()}
 
     # --- names -----------------------------------------------------------------------------------------------------
@@ -153,14 +170,14 @@ class Mechanism:
         """Place of every pair, by name."""
         return MappingProxyType(_places(pair.name for pair in self.pairs))
 
-    @cached_property
-    def _named_pair(self) -> dict[str, int]:
+    def _place_of_named(self, name: str) -> int | None:
         """Place of the first pair that answers to a name, its own or that of one of its freedoms."""
-        out: dict[str, int] = {}
-        for k, pair in enumerate(self.pairs):
-            for name in (pair.name, *pair.freedom_names):
-                out.setdefault(name, k)
-        return out
+        places = [self.pair_index[name]] if name in self.pair_index else []
+        for i, letter in enumerate(name):
+            k = self.pair_index.get(name[:i]) if letter == "." else None
+            if k is not None and name in self.pairs[k].freedom_names:
+                places.append(k)
+        return min(places, default=None)
 
     def link(self, name: str) -> Link:
         """The link of that name."""
@@ -169,6 +186,10 @@ class Mechanism:
     def pair(self, name: str) -> Pair:
         """The pair of that name."""
         return self.pairs[self.place_of_pair(name)]
+
+    def coupling(self, name: str) -> Coupling:
+        """The coupling of that name."""
+        return self.couplings[self._index(name, _places(c.name for c in self.couplings), "coupling")]
 
     def place_of_link(self, name: str) -> int:
         """Index of the link of that name."""
@@ -194,8 +215,8 @@ class Mechanism:
         found = self._find_freedom(name)
         if isinstance(found, str):
             return found
-        pair, j = found
-        if single and not pair.type.drivable[j]:
+        k, j = found
+        if single and not self.pairs[k].type.drivable[j]:
             return f"freedom {name!r} is part of a rotation; it takes an effort, not a drive, a start angle or a spring"
         return None
 
@@ -204,29 +225,31 @@ class Mechanism:
         found = self._find_freedom(name)
         if isinstance(found, str):
             raise DeclarationError(f"mechanism {self.name!r}", [found])
-        return self._named_pair[name], found[1]
+        return found
 
     def full_name(self, name: str) -> str:
         """The full spelling ``"B.Tz"`` of a freedom."""
         k, j = self.freedom(name)
         return self.pairs[k].freedom_names[j]
 
-    def _find_freedom(self, name: Any) -> tuple[Pair, int] | str:
+    def _find_freedom(self, name: Any) -> tuple[int, int] | str:
+        """Index of the pair and of the freedom within it, or why there is none."""
         if not isinstance(name, str):
             return f"freedom {name!r}: expected a name such as 'B' or 'B.Tz'"
-        if name not in self._named_pair:
+        k = self._place_of_named(name)
+        if k is None:
             return f"unknown freedom {name!r} (freedoms: {', '.join(self.freedom_names())})"
-        pair = self.pairs[self._named_pair[name]]
+        pair = self.pairs[k]
         names = pair.freedom_names
         if name in names:
-            return pair, names.index(name)
+            return k, names.index(name)
         if not isinstance(pair.type, PairType):
             return f"pair {name!r} has an unknown type"
         if len(names) == 1:
-            return pair, 0
+            return k, 0
         driven = [d.freedom for d in self.drives if d.freedom in names]
         if len(driven) == 1:
-            return pair, names.index(driven[0])
+            return k, names.index(driven[0])
         if not names:
             return f"pair {name!r} ({pair.type.symbol}) has no freedom"
         able = [n for n, single in zip(names, pair.type.drivable, strict=True) if single]
@@ -241,15 +264,9 @@ class Mechanism:
         return all(pair.has_geometry for pair in self.pairs)
 
     def once(self, make: Callable[[Mechanism], Made]) -> Made:
-        """``make(self)`` of a function of links, pairs and frame alone: worked out once and kept, copies with other drives too."""
+        """``make(self)`` of a function of links, pairs, couplings and frame alone: made once and kept, for copies with other drives too."""
         if make not in self._kept:
-            enabled = gc.isenabled()
-            gc.disable()  # a search for cyclic garbage would go through all that is made for a large graph again and again
-            try:
-                self._kept[make] = make(self)
-            finally:
-                if enabled:
-                    gc.enable()
+            self._kept[make] = make(self)
         made: Made = self._kept[make]
         return made
 
@@ -261,21 +278,21 @@ class Mechanism:
 
     def replace(self, **changes: Any) -> Mechanism:
         """A copy with the named fields changed, checked again."""
-        unknown = set(changes) - set(self.__dataclass_fields__)
+        unknown = set(changes) - set(self.formats)
         if unknown:
             raise DeclarationError(
                 f"mechanism {self.name!r}", [f"replace: unknown field {k!r}" for k in sorted(unknown)]
             )
         if not set(changes) <= {"drives", "loads", "start"}:
             return Mechanism(**{**self._arguments(), **changes})
+        # links, pairs and couplings stay, and with them what is kept of the graph: only what refers to them is checked again
         out = object.__new__(Mechanism)
-        fields = {k: getattr(self, k) for k in self.__dataclass_fields__}
-        if "drives" in changes:
-            fields["drives"] = tuple(Drive(d) if isinstance(d, str) else d for d in changes["drives"])
-        if "loads" in changes:
-            fields["loads"] = tuple(changes["loads"])
-        object.__setattr__(out, "_kept", self._kept)
-        out._settle(fields, {"start": changes.get("start", self.start)}, item_faults)
+        fields = {k: getattr(self, k) for k in self.formats}
+        fields["drives"] = _as_drives(changes.get("drives", self.drives))
+        fields["loads"] = tuple(changes.get("loads", self.loads))
+        out._set(**fields, _kept=self._kept)
+        start = changes.get("start", self.start)
+        out._finish(start, item_faults(out) + mapping_faults(start=start))
         return out
 
     def with_pair_type(self, pair: str, type: str | PairType, *, pitch: float | None = None) -> Mechanism:
@@ -303,12 +320,7 @@ class Mechanism:
         drives = [
             dataclasses.replace(d, freedom=name) for d in self.drives if (name := self.full_name(d.freedom)) not in lost
         ]
-        loads = [
-            dataclasses.replace(load, freedom=self.full_name(load.freedom))
-            if isinstance(load, Effort | TorsionSpring)
-            else load
-            for load in self.loads
-        ]
+        loads = [load.with_full_names(self.full_name) for load in self.loads]
         start = {k: v for k, v in self.start.items() if k not in gone}
         pairs = [new if p.name == pair else p for p in self.pairs]
         return self.replace(pairs=pairs, drives=drives, loads=loads, start=start)
@@ -318,44 +330,54 @@ class Mechanism:
 
         Needs the present units declared.
         """
-        return converted(self, units)
+        base = base_factors(self.units, units)
+
+        def turns(freedom: str | None) -> bool:
+            k, j = self.freedom(freedom) if freedom is not None else (0, 0)
+            return freedom is not None and self.pairs[k].type.freedoms[j].turns
+
+        return self.replace(
+            links=[link.in_units(base) for link in self.links],
+            pairs=[pair.in_units(base) for pair in self.pairs],
+            couplings=[c.converted(base[0], [turns(name) for name in c.freedoms]) for c in self.couplings],
+            drives=[drive.in_units(base, turns(drive.freedom)) for drive in self.drives],
+            loads=[load.in_units(base, turns(load.in_freedom)) for load in self.loads],
+            start={name: value if turns(name) else value * base[0] for name, value in self.start.items()},
+            units={**self.units, **units},
+        )
 
     def moved(self, pose: Any) -> Mechanism:
         """The whole mechanism after a rigid motion: a 4 x 4 (or 3 x 4) pose. Coordinates of the pairs stay what they are."""
         given = np.asarray(pose, dtype=float) if is_numeric(pose, np.shape(pose)) else np.zeros(0)
         G = given[:3] if given.shape in ((4, 4), (3, 4)) else np.zeros((3, 4))
-        R, p = G[:, :3], G[:, 3]
+        R = G[:, :3]
         if np.abs(R @ R.T - np.eye(3)).max() > 1e-9 or np.linalg.det(R) < 0:
             raise DeclarationError(f"mechanism {self.name!r}", ["moved: expected a 4 x 4 pose with a proper rotation"])
+        return self.replace(
+            links=[link.moved(G) for link in self.links],
+            pairs=[pair.moved(G) for pair in self.pairs],
+            loads=[load.moved(G) for load in self.loads],
+        )
 
-        def at(v: Any) -> Any:
-            return None if v is None else plain(R @ np.asarray(v) + p)
 
-        def turned(v: Any) -> Any:
-            return None if v is None else plain(R @ np.asarray(v))
+def _ends(pairs: Iterable[Any]) -> list[str]:
+    """Names of the links of pairs, each once, in order."""
+    ends = (end for p in pairs if isinstance(p, Pair) for end in (p.a, p.b))
+    return list(dict.fromkeys(end for end in ends if isinstance(end, str)))
 
-        def marker(m: Marker | None) -> Marker | None:
-            return None if m is None else Marker(at(m.point), turned(m.axis), turned(m.second))
 
-        links = [
-            dataclasses.replace(
-                link,
-                center=at(link.center),
-                inertia=None if link.inertia is None else plain(_symmetric(R @ np.asarray(link.inertia) @ R.T)),
-            )
-            for link in self.links
-        ]
-        pairs = [
-            q.replace(
-                point=at(q.point),
-                axis=turned(q.axis),
-                second=turned(q.second),
-                on_a=marker(q.on_a),
-                on_b=marker(q.on_b),
-            )
-            for q in self.pairs
-        ]
-        return self.replace(links=links, pairs=pairs, loads=[load.moved(G) for load in self.loads])
+def _as_drives(drives: Iterable[Any]) -> tuple[Any, ...]:
+    return tuple(Drive(d) if isinstance(d, str) else d for d in drives)
+
+
+def _named(couplings: Iterable[Any], pairs: Iterable[Any]) -> tuple[Any, ...]:
+    """The couplings; those without a name are called g1, g2, ... as far as these are free."""
+    items = tuple(couplings)
+    if not items:
+        return ()
+    taken = {getattr(item, "name", None) for item in (*items, *pairs) if isinstance(getattr(item, "name", None), str)}
+    free = (name for name in (f"g{i}" for i in itertools.count(1)) if name not in taken)
+    return tuple(c.replace(name=next(free)) if isinstance(c, Coupling) and c.name == "" else c for c in items)
 
 
 def _places(names: Iterable[Any]) -> dict[Any, int]:
@@ -364,10 +386,6 @@ def _places(names: Iterable[Any]) -> dict[Any, int]:
     for i, name in enumerate(names):
         out.setdefault(name, i)
     return out
-
-
-def _symmetric(A: Any) -> Any:
-    return (A + A.T) / 2
 
 
 def _rebuilt(arguments: dict[str, Any]) -> Mechanism:

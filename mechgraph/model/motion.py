@@ -1,70 +1,28 @@
-r"""Prescribed motions of a driver, and the laws that generate them.
+"""Prescribed motions of a driver.
 
-A `Motion` holds position, velocity and acceleration of a driven freedom (and, where it is known, the time). A
-law is a row of `LAWS`: an object that says which arguments it takes and evaluates (s, s', s'') at times t.
+A `Motion` holds position, velocity and acceleration of a driven freedom (and, where it is known, the time); the laws that generate them
+stand in ``motion_law``.
 """
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Annotated, Any
 
 import numpy as np
-import scipy
-from numpy.polynomial import Polynomial, chebyshev
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mechgraph.errors import DeclarationError
+from mechgraph.model.field_format import SERIES, Described
+from mechgraph.model.motion_law import LAWS, Array, Law, LawFault, Smooth, read_series
+from mechgraph.units import LENGTH, PURE, TIME
 
 __all__ = ["LAWS", "Motion"]
 
-Array = NDArray[np.float64]
-Rates = tuple[Array, Array, Array]
-"""Position, velocity, acceleration."""
-
-RANGE_TOLERANCE = 1e-12
-"""Times may leave the range of the samples by this part of its length (rounding) and count as its end."""
-
-CHEBYSHEV_POINTS = 32
-"""Points of one panel where a callable is differentiated."""
-
-ROUNDING = 8.0 * float(np.finfo(np.float64).eps)
-"""Relative size below which a Chebyshev coefficient of a callable is taken for rounding."""
-
-DERIVATIVE_TOLERANCE = 1e-6
-"""Largest estimated error of s'' of a callable, relative to max |s''| or 4 max |s| / range^2."""
-
-MISS = 1e3
-"""How many times its rounding the interpolant of a callable may miss a position."""
-
-SINGLE_TIME_RANGES = 7
-"""How many ranges, each a tenth of the one before, are tried about one single time."""
-
-DEEPEST_PANEL = 16
-"""How often the range of a callable is halved at most before it counts as not smooth."""
-
-
-def _numbers(value: Any, what: str, faults: list[str]) -> Array:
-    """Return `value` as a new float64 array; what keeps it from being finite goes to `faults`."""
-    try:
-        array = np.asarray(value)
-    except ValueError:
-        faults.append(f"{what} must be an array of numbers, but its rows differ in length: {value!r}")
-        return np.zeros(())
-    if array.dtype.kind not in "iuf":
-        faults.append(f"{what} must be a real number or an array of them, got {value!r}")
-        return np.zeros(())
-    numbers = np.array(array, dtype=np.float64)
-    if not np.isfinite(numbers).all():
-        where = tuple(int(i) for i in np.argwhere(~np.isfinite(numbers))[0])
-        faults.append(f"{what} must be finite, got {numbers[where]}{f' at index {where}' if where else ''}")
-    return numbers
-
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)
-class Motion:
+class Motion(Described):
     """What a driver prescribes: position, velocity and acceleration of one freedom, one value a position.
 
     The arrays are broadcast against each other, copied, and read-only. Two motions are equal if all their
@@ -85,10 +43,10 @@ class Motion:
         Values that are not finite real numbers, shapes that do not broadcast; all of them at once.
     """
 
-    position: Array
-    velocity: Array
-    acceleration: Array
-    t: Array | None
+    position: Annotated[Array, SERIES("one a position", LENGTH, PURE, degrees=True, default="this or a sweep")]
+    velocity: Annotated[Array, SERIES("its rate", (1, 0, -1), (0, 0, -1), degrees=True, default="0")]
+    acceleration: Annotated[Array, SERIES("the rate of that", (1, 0, -2), (0, 0, -2), degrees=True, default="0")]
+    t: Annotated[Array | None, SERIES("times, where known", TIME, default="none")]
 
     def __init__(
         self,
@@ -105,7 +63,7 @@ class Motion:
         }
         faults: list[str] = []
         arrays = {
-            name: _numbers(0.0 if value is None and name in ("velocity", "acceleration") else value, name, faults)
+            name: read_series(0.0 if value is None and name in ("velocity", "acceleration") else value, name, faults)
             for name, value in given.items()
             if name != "t" or value is not None
         }
@@ -131,7 +89,7 @@ class Motion:
     @property
     def _arrays(self) -> tuple[Array | None, ...]:
         """All arrays, in the order of the parameters."""
-        return self.position, self.velocity, self.acceleration, self.t
+        return tuple(getattr(self, name) for name in self.formats)
 
     def __eq__(self, other: object) -> bool:
         """Compare all arrays exactly; a motion without times differs from one with."""
@@ -149,7 +107,7 @@ class Motion:
     def __repr__(self) -> str:
         """Return the shape and the range of every quantity."""
         parts = [f"shape={self.shape}"] if self.shape else []
-        for name, array in zip(("position", "velocity", "acceleration", "t"), self._arrays, strict=True):
+        for name, array in zip(self.formats, self._arrays, strict=True):
             if array is not None and array.size:
                 low, high = float(array.min()), float(array.max())
                 parts.append(f"{name}={low:g}" if low == high else f"{name}={low:g}..{high:g}")
@@ -220,8 +178,8 @@ class Motion:
         faults = _argument_faults(rule, given)
         if t is None:
             faults.append("t is missing: the times at which the motion is wanted")
-        times = _numbers(0.0 if t is None else t, "t", faults)
-        numbers = {key: _numbers(given[key], key, faults) for key in numeric if key in given}
+        times = read_series(0.0 if t is None else t, "t", faults)
+        numbers = {key: read_series(given[key], key, faults) for key in numeric if key in given}
         if "duration" in numbers and not faults and not (numbers["duration"] > 0).all():
             faults.append(f"duration must be positive, got {duration!r}")
         if not faults:
@@ -248,333 +206,3 @@ def _argument_faults(rule: Law, given: Mapping[str, Any]) -> list[str]:
         return [*faults, f"it needs {needs}"]
     surplus = usable - set(rule.optional) - set(fitting[0])
     return [*faults, f"it needs {needs}, not both"] if surplus & set(given) else faults
-
-
-class LawFault(Exception):
-    """Why a law cannot be evaluated; `Motion.law` raises it as a DeclarationError that names the law."""
-
-
-class Law(Protocol):
-    """A rule that gives position, velocity and acceleration at times t."""
-
-    @property
-    def choices(self) -> tuple[tuple[str, ...], ...]:
-        """Alternative sets of arguments, of which exactly one is needed."""
-
-    @property
-    def optional(self) -> tuple[str, ...]:
-        """Arguments that may be given besides."""
-
-    def rates(self, t: Array, given: Mapping[str, Any]) -> Rates:
-        """Return position, velocity, acceleration at t (shapes that broadcast with t), or raise LawFault."""
-
-
-@dataclass(frozen=True)
-class DwellRise:
-    """Dwell, rise, dwell.
-
-    s = start + rise y(tau), s' = rise / T y'(tau), s'' = rise / T^2 y''(tau), tau = t / T.
-
-    `value`, `first` and `second` are y, y' and y'' on 0 <= tau <= 1, with y(0) = 0 and y(1) = 1. Outside, the
-    position is held and the rates are 0; at the ends themselves they are those of the rise.
-    """
-
-    value: Callable[[Array], Array]
-    first: Callable[[Array], Array]
-    second: Callable[[Array], Array]
-    choices: tuple[tuple[str, ...], ...] = (("rise", "duration"),)
-    optional: tuple[str, ...] = ("start",)
-
-    def rates(self, t: Array, given: Mapping[str, Any]) -> Rates:
-        """Return position, velocity and acceleration at t."""
-        rise, duration = given["rise"], given["duration"]
-        inside = (t >= 0.0) & (t <= duration)
-        tau = np.clip(t / duration, 0.0, 1.0)
-        return (
-            given.get("start", 0.0) + rise * self.value(tau),
-            np.where(inside, rise / duration * self.first(tau), 0.0),
-            np.where(inside, rise / duration**2 * self.second(tau), 0.0),
-        )
-
-
-def _polynomial(*coefficients: float) -> DwellRise:
-    """Return the rise y = sum_k c_k tau^k, coefficients from the constant term up."""
-    y = Polynomial(coefficients)
-    return DwellRise(y, y.deriv(1), y.deriv(2))
-
-
-@dataclass(frozen=True)
-class ConstantSpeed:
-    """Constant speed for all t: s = start + speed t, with speed = rise / duration where those are given."""
-
-    choices: tuple[tuple[str, ...], ...] = (("rise", "duration"), ("speed",))
-    optional: tuple[str, ...] = ("start",)
-
-    def rates(self, t: Array, given: Mapping[str, Any]) -> Rates:
-        """Return position, velocity and acceleration at t."""
-        start = given.get("start", 0.0)
-        if "speed" in given:
-            speed: Array = given["speed"]
-            return start + speed * t, speed, np.zeros(())
-        rise, duration = given["rise"], given["duration"]
-        return start + rise * (t / duration), rise / duration, np.zeros(())
-
-
-@dataclass(frozen=True)
-class Sampled:
-    """Spline through samples, with "not-a-knot" ends (de Boor, A Practical Guide to Splines, 1978).
-
-    Of degree 5 the error of position, velocity and acceleration falls as h^6, h^5 and h^4 with the spacing h,
-    of degree 3 as h^4, h^3, h^2 (for values that are themselves smooth). There is no smoothing: noise in the
-    values is amplified by 1 / h^2 in the acceleration.
-    """
-
-    choices: tuple[tuple[str, ...], ...] = (("samples",),)
-    optional: tuple[str, ...] = ("degree",)
-
-    def rates(self, t: Array, given: Mapping[str, Any]) -> Rates:
-        """Return position, velocity and acceleration at t; outside the range of the samples is a fault."""
-        times, values = _checked_samples(given["samples"])
-        degree = given.get("degree", 5 if times.size >= 6 else 3)
-        if degree not in (3, 5) or times.size <= degree:
-            raise LawFault(f"degree must be 3 (from 4 samples) or 5 (from 6), got {degree!r} with {times.size} samples")
-        margin = RANGE_TOLERANCE * (times[-1] - times[0])
-        outside = t[(t < times[0] - margin) | (t > times[-1] + margin)]
-        if outside.size:
-            span = f"{times[0]:g} to {times[-1]:g}"
-            raise LawFault(f"t = {outside[0]:g} is outside the samples, which run from {span}")
-        middle = (times[0] + times[-1]) / 2.0
-        half = (times[-1] - times[0]) / 2.0
-        spline = scipy.interpolate.make_interp_spline((times - middle) / half, values, k=degree)
-        x = (np.clip(t, times[0], times[-1]) - middle) / half
-        return (
-            np.asarray(spline(x), dtype=np.float64),
-            np.asarray(spline(x, 1), dtype=np.float64) / half,
-            np.asarray(spline(x, 2), dtype=np.float64) / half**2,
-        )
-
-
-def _checked_samples(samples: Any) -> tuple[Array, Array]:
-    """Return times and values of samples; LawFault where they are no increasing times with one value each."""
-    try:
-        first, second = samples
-    except (TypeError, ValueError):
-        raise LawFault(f"samples must be a pair (times, values), got {samples!r}") from None
-    faults: list[str] = []
-    times = _numbers(first, "times of the samples", faults)
-    values = _numbers(second, "values of the samples", faults)
-    if faults:
-        raise LawFault("; ".join(faults))
-    if times.ndim != 1 or values.shape != times.shape or times.size < 4:
-        shapes = f"{times.shape} and {values.shape}"
-        raise LawFault(f"samples must be two lists of the same length, at least 4, got shapes {shapes}")
-    back = np.flatnonzero(np.diff(times) <= 0.0)
-    if back.size:
-        early, late = times[back[0] : back[0] + 2]
-        raise LawFault(f"times of the samples must increase, but {early:g} is followed by {late:g}")
-    return times, values
-
-
-@dataclass(frozen=True)
-class Smooth:
-    """A callable of t: s = f(t), or (s, s', s'') = f(t), taken as they are.
-
-    It is called with arrays, and if it cannot take them (TypeError, ValueError) with one float at a time.
-    Where it returns the position alone, the rates are those of Chebyshev interpolants of degree 31 on panels
-    of the range of t, halved until the last coefficients are down to rounding; coefficients below that are
-    dropped. With n coefficients on a panel of length l the error of s'' is about
-
-        8 eps max(|f| + |t f'| / 4) (2 / l)^2 n^4 / 3
-
-    (Trefethen, Approximation Theory and Approximation Practice, 2013), in practice below 1e-10 of the
-    largest acceleration for a motion of some cycles. An estimate above `DERIVATIVE_TOLERANCE`, or a kink,
-    is a fault and never a wrong number. A range of times is never left; one single time is taken as the
-    middle of a range of length max(1, |t|), or of the first tenth of it, and so on, in which the callable
-    exists and is smooth.
-    """
-
-    function: Callable[[Any], Any]
-    choices: tuple[tuple[str, ...], ...] = ((),)
-    optional: tuple[str, ...] = ()
-
-    def rates(self, t: Array, given: Mapping[str, Any]) -> Rates:
-        """Return position, velocity and acceleration at t."""
-        result = self._called(t)
-        if isinstance(result, tuple):
-            if len(result) != 3:
-                wanted = "the position or (position, velocity, acceleration)"
-                raise LawFault(f"it must return {wanted}, got a tuple of {len(result)}")
-            position, velocity, acceleration = (self._values(part, t) for part in result)
-            return position, velocity, acceleration
-        position = self._values(result, t)
-        if t.size == 0:
-            return position, position, position
-        low, high = float(t.min()), float(t.max())
-        if low < high:
-            return position, *_differentiated(self.position, t, position, low, high)
-        halves = [max(1.0, abs(low)) / 2.0 / 10.0**k for k in range(SINGLE_TIME_RANGES)]
-        for half in halves:
-            try:
-                with np.errstate(all="ignore"):
-                    rates = _differentiated(self.position, t, position, low - half, high + half)
-            except LawFault:
-                continue
-            return position, *rates
-        raise _not_smooth(low)
-
-    def position(self, t: Array) -> Array:
-        """Return the position alone at t, whatever the function returns."""
-        return self._values(self._called(t), t)
-
-    def _called(self, t: Array) -> Any:
-        """Call the function with the array, or value by value where it takes no arrays."""
-        try:
-            return self.function(t.copy() if t.ndim else float(t))
-        except (TypeError, ValueError):
-            if t.ndim == 0:
-                raise
-        single = [self.function(float(value)) for value in t.ravel()]
-        try:
-            if single and isinstance(single[0], tuple):
-                return tuple(np.reshape(column, t.shape) for column in zip(*single, strict=True))
-            return np.reshape(single, t.shape)
-        except (TypeError, ValueError):
-            raise LawFault(f"it must return one number a time, got {single[0]!r}") from None
-
-    @staticmethod
-    def _values(result: Any, t: Array) -> Array:
-        """Return what the function returned as an array of the shape of t."""
-        faults: list[str] = []
-        values = _numbers(result, "what it returns", faults)
-        if faults:
-            raise LawFault("; ".join(faults))
-        if values.shape not in (t.shape, ()):
-            raise LawFault(f"it must return one value a time, shape {t.shape}, got shape {values.shape}")
-        return np.array(np.broadcast_to(values, t.shape))
-
-
-@dataclass(frozen=True)
-class _Panel:
-    """A piece of a callable: Chebyshev coefficients on left <= t <= right, and the rounding in its values."""
-
-    left: float
-    right: float
-    coefficients: Array
-    rounding: float
-
-    @property
-    def slope(self) -> float:
-        """The derivative of the Chebyshev variable, dx/dt = 2 / (right - left)."""
-        return 2.0 / (self.right - self.left)
-
-    @property
-    def error(self) -> float:
-        """Estimated error of the second derivative: rounding times T_n''(1) = n^2 (n^2 - 1) / 3."""
-        n = self.coefficients.size - 1
-        return self.rounding * self.slope**2 * n**2 * (n**2 - 1) / 3.0
-
-    def derivatives(self, t: Array) -> Rates:
-        """Return the interpolant and its two derivatives at t."""
-        x = (2.0 * t - self.left - self.right) / (self.right - self.left)
-        position, velocity, acceleration = (
-            chebyshev.chebval(x, chebyshev.chebder(self.coefficients, k) * self.slope**k) for k in range(3)
-        )
-        return position, velocity, acceleration
-
-
-def _differentiated(
-    function: Callable[[Array], Array], t: Array, position: Array, low: float, high: float
-) -> tuple[Array, Array]:
-    """Return first and second derivative of a function at t, low <= t <= high (`Smooth` has the method).
-
-    The interpolants must also meet the given positions at t, unseen by their nodes, and each other:
-    a jump of the velocity or acceleration from panel to panel is a kink.
-    """
-    velocity, acceleration = np.empty(t.shape), np.empty(t.shape)
-    panels = _panels(function, low, high)
-    for panel in panels:
-        here = (t >= panel.left) & (t <= panel.right)
-        met, velocity[here], acceleration[here] = panel.derivatives(t[here])
-        missed = np.abs(met - position[here]) > MISS * panel.rounding
-        if missed.any():
-            raise _not_smooth(float(t[here][missed][0]))
-    size = max(float(np.abs(panel.coefficients).sum()) for panel in panels)
-    span = high - low
-    fast = DERIVATIVE_TOLERANCE * max(float(np.abs(velocity).max()), 2.0 * size / span)
-    steep = DERIVATIVE_TOLERANCE * max(float(np.abs(acceleration).max()), 4.0 * size / span**2)
-    for panel in panels:
-        if panel.error > steep:
-            raise _not_smooth((panel.left + panel.right) / 2.0)
-    for panel, following in itertools.pairwise(panels):
-        before, after = (side.derivatives(np.array(panel.right)) for side in (panel, following))
-        if abs(before[1] - after[1]) > fast or abs(before[2] - after[2]) > steep:
-            raise _not_smooth(panel.right)
-    return velocity, acceleration
-
-
-def _panels(function: Callable[[Array], Array], low: float, high: float) -> list[_Panel]:
-    """Return panels, in order, whose Chebyshev coefficients go down to rounding.
-
-    The rounding in the values is 8 eps (|f| + |t f'| / 4), the second term from that in t.
-    """
-    nodes = np.asarray(chebyshev.chebpts1(CHEBYSHEV_POINTS))
-    transform = chebyshev.chebvander(nodes, CHEBYSHEV_POINTS - 1).T * (2.0 / CHEBYSHEV_POINTS)
-    transform[0] /= 2.0
-    done: list[_Panel] = []
-    ends = [(low, high)]
-    for _ in range(DEEPEST_PANEL + 1):
-        left, right = np.array(ends).T[:, :, None]
-        times = (left + right) / 2.0 + (right - left) / 2.0 * nodes
-        values = function(times)
-        steep = np.abs(times).max(1) * np.abs(np.diff(values) / np.diff(times)).max(1)
-        rounding = ROUNDING * (np.abs(values).max(1) + steep / 4.0)
-        halves: list[tuple[float, float]] = []
-        for (a, b), coefficients, floor in zip(ends, values @ transform.T, rounding, strict=True):
-            significant = np.flatnonzero(np.abs(coefficients) > floor)
-            length = int(significant[-1]) + 1 if significant.size else 1
-            if length <= CHEBYSHEV_POINTS - 4:
-                done.append(_Panel(a, b, coefficients[:length], float(floor)))
-            else:
-                halves += [(a, (a + b) / 2.0), ((a + b) / 2.0, b)]
-        if not halves:
-            return sorted(done, key=lambda panel: panel.left)
-        ends = halves
-    raise _not_smooth(ends[0][0])
-
-
-def _not_smooth(t: float) -> LawFault:
-    """Return the fault of a callable whose derivatives cannot be found."""
-    return LawFault(
-        f"it is not smooth enough near t = {t:g} to be differentiated twice; "
-        "let it return (position, velocity, acceleration), or use the law 'sampled'"
-    )
-
-
-TURN = 2.0 * np.pi
-
-LAWS: Mapping[str, Law] = {
-    "cycloidal": DwellRise(
-        lambda tau: tau - np.sin(TURN * tau) / TURN,
-        lambda tau: 1.0 - np.cos(TURN * tau),
-        lambda tau: TURN * np.sin(TURN * tau),
-    ),
-    "harmonic": DwellRise(
-        lambda tau: (1.0 - np.cos(np.pi * tau)) / 2.0,
-        lambda tau: np.pi / 2.0 * np.sin(np.pi * tau),
-        lambda tau: np.pi**2 / 2.0 * np.cos(np.pi * tau),
-    ),
-    "poly345": _polynomial(0, 0, 0, 10, -15, 6),
-    "poly4567": _polynomial(0, 0, 0, 0, 35, -84, 70, -20),
-    "constant_speed": ConstantSpeed(),
-    "sampled": Sampled(),
-}
-r"""The laws by name.
-
-With tau = t / duration and a rise of 1 (Norton, Cam Design and Manufacturing Handbook, 2009, double dwell):
-
-- cycloidal: y = tau - sin(2 pi tau) / (2 pi); acceleration continuous, at most 2 pi;
-- harmonic: y = (1 - cos(pi tau)) / 2; acceleration jumps at both ends, at most pi^2 / 2;
-- poly345: y = 10 tau^3 - 15 tau^4 + 6 tau^5; acceleration continuous, at most 10 / sqrt 3;
-- poly4567: y = 35 tau^4 - 84 tau^5 + 70 tau^6 - 20 tau^7; jerk continuous, acceleration at most
-  84 / (5 sqrt 5).
-"""

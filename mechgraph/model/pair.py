@@ -5,13 +5,25 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.model.field_format import (
+    DIRECTION,
+    LINK_NAME,
+    NUMBER,
+    POINT,
+    TEXT,
+    Described,
+)
+from mechgraph.model.field_format import (
+    TABLE as NESTED,
+)
+from mechgraph.model.numeric import is_numeric, number_fault, plain
 from mechgraph.model.pair_type import TABLE, PairType
-from mechgraph.model.values import is_numeric, number_fault, plain, vector_fault
+from mechgraph.units import LENGTH
 
 PERPENDICULAR = 1e-6
 """Largest cosine between axis and second direction that counts as perpendicular where a pair type needs it."""
@@ -23,35 +35,36 @@ def second_direction(axis: Any) -> tuple[float, ...]:
     if not length > 0:
         return (1.0, 0.0, 0.0)
     z = [c / length for c in axis]
-    least = min(range(3), key=lambda i: abs(z[i]))
-    x = [(i == least) - z[least] * z[i] for i in range(3)]
+    sizes = [abs(c) for c in z]
+    least = sizes.index(min(sizes))
+    along = z[least]
+    x = [0.0 - along * c for c in z]
+    x[least] = 1.0 - along * along
     size = math.hypot(*x)
     return x[0] / size, x[1] / size, x[2] / size
 
 
 @dataclass(frozen=True)
-class Marker:
+class Marker(Described):
     """A marker frame on a link: origin ``point``, z along ``axis``, x along ``second`` (projected perpendicular to z)."""
 
-    point: Any = (0.0, 0.0, 0.0)
-    axis: Any = (0.0, 0.0, 1.0)
-    second: Any = None
+    point: Annotated[Any, POINT("origin", LENGTH, default="0")] = (0.0, 0.0, 0.0)
+    axis: Annotated[Any, DIRECTION("z: pair axis, plane normal or groove direction, any length", default="z")] = (
+        0.0,
+        0.0,
+        1.0,
+    )
+    second: Annotated[Any, DIRECTION("x: second direction", default="global axis least aligned with `axis`")] = None
 
     def __post_init__(self) -> None:
-        for field in ("point", "axis", "second"):
-            object.__setattr__(self, field, plain(getattr(self, field)))
+        self.read_numbers()
         if self.second is None and is_numeric(self.axis, (3,)):
             object.__setattr__(self, "second", second_direction(self.axis))
 
     def faults(self, where: str, square: bool) -> list[str]:
         """What is wrong with this marker; ``square`` where the second direction must be perpendicular as given."""
-        found = [
-            vector_fault(self.point, where + "point"),
-            vector_fault(self.axis, where + "axis", direction=True),
-        ]
-        if self.second is not None:
-            found.append(vector_fault(self.second, where + "second", direction=True))
-        if not any(found):
+        found = self.value_faults(where)
+        if not found:
             along = sum(z * x for z, x in zip(self.axis, self.second, strict=True))
             cosine = along / (math.hypot(*self.axis) * math.hypot(*self.second))
             if abs(cosine) > 1 - 1e-12:
@@ -63,7 +76,7 @@ class Marker:
                     f"{where}second = {self.second!r}: not perpendicular to the axis {self.axis!r} (cosine {cosine:.3g}); "
                     "this pair type needs the true direction"
                 )
-        return [fault for fault in found if fault]
+        return found
 
     def pose(self) -> Array:
         """The marker as a pose ``(3, 4)`` in the frame of its link."""
@@ -74,7 +87,7 @@ class Marker:
 
 
 @dataclass(frozen=True)
-class Pair:
+class Pair(Described):
     """A kinematic pair from link ``a`` to link ``b``; its reaction is the wrench that ``a`` exerts on ``b``.
 
     Parameters
@@ -87,17 +100,35 @@ class Pair:
     on_a, on_b : instead of point/axis, a Marker on each link in that link's own frame.
     """
 
-    name: str
-    type: PairType
-    a: str
-    b: str
-    point: Any = None
-    axis: Any = None
-    second: Any = None
-    pitch: float | None = None
-    lead: float | None = None
-    on_a: Marker | None = None
-    on_b: Marker | None = None
+    name: Annotated[str, TEXT("freedoms are named NAME.Rz and so on")]
+    type: Annotated[PairType, TEXT("R P H C U S E Sc Sg Cp Sp W, or a `[[pair_type]]`")]
+    a: Annotated[str, LINK_NAME("first link; groove, plane and slot belong to it; the reaction is that of `a` on `b`")]
+    b: Annotated[str, LINK_NAME("second link")]
+    point: Annotated[Any, POINT("a point of the pair, global, at the declared configuration", LENGTH)] = None
+    axis: Annotated[
+        Any,
+        DIRECTION(
+            "axis, plane normal or groove direction (z of the marker), global, any length", default="z for S and W"
+        ),
+    ] = None
+    second: Annotated[
+        Any,
+        DIRECTION(
+            "x of the marker; must be perpendicular to `axis` for U, Sc, Cp",
+            default="global axis least aligned with `axis`",
+        ),
+    ] = None
+    pitch: Annotated[
+        float | None, NUMBER("advance per radian of H, right-hand positive", LENGTH, default="exactly one")
+    ] = None
+    lead: Annotated[
+        float | None,
+        NUMBER("advance per turn of H", LENGTH, default="of the two", held_in=("pitch", 1 / (2 * np.pi))),
+    ] = None
+    on_a: Annotated[
+        Marker | None, NESTED("marker on link a, in its frame; instead of `point` and `axis`", table="marker")
+    ] = None
+    on_b: Annotated[Marker | None, NESTED("marker on link b, in its frame", table="marker")] = None
 
     def __init__(
         self,
@@ -115,24 +146,13 @@ class Pair:
         on_b: Marker | None = None,
     ) -> None:
         row = TABLE.get(type, type) if isinstance(type, str) else type
-        axis, second, point = plain(axis), plain(second), plain(point)
+        point, axis, second = plain(point), plain(axis), plain(second)
         if axis is None and point is not None and isinstance(row, PairType) and not row.directed:
             axis = (0.0, 0.0, 1.0)
         if second is None and is_numeric(axis, (3,)):
             second = second_direction(axis)
-        for key, value in {
-            "name": name,
-            "type": row,
-            "a": a,
-            "b": b,
-            "point": point,
-            "axis": axis,
-            "second": second,
-            "pitch": plain(pitch),
-            "lead": plain(lead),
-            "on_a": on_a,
-            "on_b": on_b,
-        }.items():
+        values = (name, row, a, b, point, axis, second, plain(pitch), plain(lead), on_a, on_b)
+        for key, value in zip(self.formats, values, strict=True):
             object.__setattr__(self, key, value)
 
     @property
@@ -162,9 +182,9 @@ class Pair:
             return ()
         return tuple(f"{self.name}.{f.name}" for f in self.type.freedoms)
 
-    def replace(self, **changes: Any) -> Pair:
-        """A copy with fields changed."""
-        return Pair(**{**{k: getattr(self, k) for k in self.__dataclass_fields__}, **changes})
+    def in_units(self, base: tuple[float, float, float], turns: bool = False) -> Pair:
+        """The same pair with its numbers, and the lengths in a type of its own, in other units (see ``Described``)."""
+        return super().in_units(base, turns).replace(type=self.type.scaled(1 / base[0]))
 
     def faults(self) -> list[str]:
         """What is wrong with this pair by itself, one line each."""

@@ -1,14 +1,8 @@
-"""Declared numbers by name, and many variants of a mechanism as one set of arrays.
-
-A field is named as it is declared: ``crank.mass``, ``crank.center.x``, ``crank.inertia.xy``, ``B.point.x``, ``B.axis.z``,
-``B.on_a.point.y``, ``B.pitch``, ``loads[0].stiffness``, ``loads[1].force.x``; of a chain ``length[2]``, ``twist[0]``, ``offset[1]``
-(as in ``mg.chain``, counted from 0).
-"""
+"""Many variants of a mechanism as one set of arrays; how their numbers are named, ``number_names`` says."""
 
 from __future__ import annotations
 
 import dataclasses
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -19,132 +13,23 @@ from numpy.typing import NDArray
 from mechgraph.algebra.inertia import physical
 from mechgraph.algebra.se3 import Array
 from mechgraph.model.chain import chain_numbers, markers_of_chain
-from mechgraph.model.link import Link
+from mechgraph.model.coupling import Coupling
 from mechgraph.model.load import Load
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.numeric import PerCase, is_numeric
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.parameters import Declared, declared
-from mechgraph.model.values import PerCase, is_numeric
+from mechgraph.variants.number_names import MARKER, AnyField, ChainField, CouplingField, Field, LoadField, find_field
 
-XYZ = "xyz"
-CHAIN = ("twist", "length", "offset")
-_INDEXED = re.compile(r"(?P<what>\w+)\[(?P<index>\d+)\](?:\.(?P<rest>[\w.]+))?")
-
-Place = tuple[Any, ...]
-
-
-@dataclass(frozen=True)
-class Field:
-    """A declared number: the array of ``Declared`` and the places in it that hold ``scale`` times the number."""
-
-    array: str
-    places: tuple[Place, ...]
-    scale: float = 1.0
-
-    def read(self, numbers: Declared) -> float:
-        """The declared value."""
-        return float(getattr(numbers, self.array)[self.places[0]][..., 0].reshape(-1)[0]) / self.scale
-
-
-@dataclass(frozen=True)
-class ChainField:
-    """Twist, length or offset (``kind`` 0, 1, 2) of the ``index``-th link of a chain."""
-
-    kind: int
-    index: int
-
-
-@dataclass(frozen=True)
-class LoadField:
-    """A number of the ``index``-th load, or a component of a vector of it."""
-
-    index: int
-    name: str
-    component: int | None
-
-
-AnyField = Field | ChainField | LoadField
-
-
-def find_field(m: Mechanism, name: str) -> AnyField | str:
-    """The field of that name, or why there is none."""
-    indexed = _INDEXED.fullmatch(name)
-    if indexed and indexed["what"] in CHAIN and not indexed["rest"]:
-        return _chain_field(m, name, indexed["what"], int(indexed["index"]))
-    if indexed and indexed["what"] == "loads":
-        return _load_field(m, name, int(indexed["index"]), indexed["rest"] or "")
-    for link in m.links:
-        if name.startswith(link.name + ".") and (found := _link_field(m, link, name.removeprefix(link.name + "."))):
-            return found
-    for pair in m.pairs:
-        if name.startswith(pair.name + ".") and (found := _pair_field(m, pair, name.removeprefix(pair.name + "."))):
-            return found
-    return (
-        f"{name!r}: no declared number of that name; expected e.g. {m.links[-1].name}.mass, {m.links[-1].name}.center.x, "
-        f"{m.links[-1].name}.inertia.xx, {m.pairs[0].name}.{'point' if m.pairs[0].point is not None else 'on_a.point'}.x, "
-        "loads[0].stiffness, or length[2] of a chain"
-    )
-
-
-def _link_field(m: Mechanism, link: Link, rest: str) -> Field | str | None:
-    i = m.link_index[link.name]
-    if rest == "mass" and link.center is None:
-        return f"'{link.name}.mass': link {link.name!r} has no mass centre; declare center=(x, y, z)"
-    if rest == "mass":
-        return Field("mass", ((i,),))
-    what, _, at = rest.partition(".")
-    if what == "center" and link.center is not None and at in tuple(XYZ):
-        return Field("center", ((XYZ.index(at), i),))
-    if what == "inertia" and link.inertia is not None and len(at) == 2 and set(at) <= set(XYZ):
-        j, k = XYZ.index(at[0]), XYZ.index(at[1])
-        return Field("inertia", tuple(dict.fromkeys([(j, k, i), (k, j, i)])))
-    return None
-
-
-def _pair_field(m: Mechanism, pair: Pair, rest: str) -> Field | None:
-    k = m.pairs.index(pair)
-    if rest in ("pitch", "lead") and getattr(pair, rest) is not None:
-        return Field("pitch", ((k,),), 1.0 if rest == "pitch" else 1 / (2 * np.pi))
-    sides = {"": slice(None), "on_a": 0, "on_b": 1} if pair.on_a is not None else {"": slice(None)}
-    side, _, tail = rest.partition(".") if rest.startswith("on_") else ("", "", rest)
-    what, _, at = tail.partition(".")
-    if side not in sides or (side == "") != (pair.on_a is None) or at not in tuple(XYZ):
-        return None
-    return Field(what, ((sides[side], XYZ.index(at), k),)) if what in ("point", "axis", "second") else None
-
-
-def _chain_field(m: Mechanism, name: str, what: str, index: int) -> ChainField | str:
-    numbers = chain_numbers(m)
-    if numbers is None:
-        return f"{name!r}: mechanism {m.name!r} is no chain with twist, length and offset of every link"
-    if index >= numbers.shape[1]:
-        return f"{name!r}: the chain has {numbers.shape[1]} links, counted from 0"
-    return ChainField(CHAIN.index(what), index)
-
-
-def _load_field(m: Mechanism, name: str, index: int, rest: str) -> LoadField | str:
-    if index >= len(m.loads):
-        return f"{name!r}: there are {len(m.loads)} loads, counted from 0"
-    load = m.loads[index]
-    what, _, at = rest.partition(".")
-    value = getattr(load, what, None) if what in {f.name for f in dataclasses.fields(load)} else None
-    if is_numeric(value, (3,)) and at in tuple(XYZ):
-        return LoadField(index, what, XYZ.index(at))
-    if is_numeric(value, ()) and not at:
-        return LoadField(index, what, None)
-    known = [
-        f.name for f in dataclasses.fields(load) if is_numeric(getattr(load, f.name), np.shape(getattr(load, f.name)))
-    ]
-    return (
-        f"{name!r}: no number of that name in load {index} ({load.kind}: {', '.join(known)}; vectors with .x, .y, .z)"
-    )
+__all__ = ["AnyField", "Variants", "clashes", "field_values", "find_field", "stacked", "topology_of", "varied"]
 
 
 @dataclass(frozen=True)
 class Variants:
     """``count`` variants of one mechanism: declared numbers and loads with a batch axis (``PerCase`` where a load varies).
 
-    Those ``missing`` could not be built; the numbers of the mechanism itself stand in their places.
+    ``couplings`` hold the coefficients of every coupling and behind them its constant, ``(terms + 1, 1 or count)``; NaN for a constant
+    that is not declared. Those ``missing`` could not be built; the numbers of the mechanism itself stand in their places.
     """
 
     mechanism: Mechanism
@@ -152,6 +37,7 @@ class Variants:
     loads: tuple[Load, ...]
     count: int
     missing: tuple[int, ...] = ()
+    couplings: tuple[Array, ...] = ()
 
     def valid(self) -> NDArray[np.bool_]:
         """Which variants are physical: finite numbers, no negative mass, axes of some length, possible inertias, ``(count,)``."""
@@ -166,6 +52,9 @@ class Variants:
         if n.inertia.shape[-1] > 1:
             free = np.array([link.unphysical for link in self.mechanism.links])
             ok &= (physical(np.nan_to_num(n.inertia)) | free[:, None]).all(axis=0)
+        for c, rows in zip(self.mechanism.couplings, self.couplings, strict=True):
+            used = rows if c.constant is not None else rows[:-1]
+            ok &= np.isfinite(used).all(axis=0) & (rows[:-1] != 0).all(axis=0)
         for load in self.loads:
             if _varies(load):
                 ok &= np.array([not _load_of(load, i).faults(self.mechanism) for i in range(self.count)])
@@ -200,7 +89,9 @@ class Variants:
             for k, link in enumerate(m.links)
         ]
         pairs = [_placed(pair, n, k) for k, pair in enumerate(m.pairs)]
-        return m.replace(links=links, pairs=pairs, loads=[_load_of(load, i) for load in self.loads])
+        couplings = [_coupled(*one, i) for one in zip(m.couplings, self.couplings, strict=True)]
+        loads = [_load_of(load, i) for load in self.loads]
+        return m.replace(links=links, pairs=pairs, couplings=couplings, loads=loads)
 
 
 def _placed(pair: Pair, n: Declared, k: int) -> Pair:
@@ -217,6 +108,18 @@ def _placed(pair: Pair, n: Declared, k: int) -> Pair:
     if pair.on_a is not None:
         return pair.replace(on_a=markers[0], on_b=markers[1], **changes)
     return pair.replace(point=markers[0].point, axis=markers[0].axis, second=markers[0].second, **changes)
+
+
+def _coupled(c: Coupling, rows: Array, i: int) -> Coupling:
+    """A coupling with the numbers of one variant."""
+    *coefficients, constant = rows[:, i if rows.shape[1] > 1 else 0].tolist()
+    terms = zip(c.freedoms, coefficients, strict=True)
+    return c.replace(terms=terms, constant=None if c.constant is None else constant)
+
+
+def _declared_coupling(c: Coupling) -> Array:
+    """Coefficients and constant of a coupling, ``(terms + 1, 1)``; NaN for a constant that is not declared."""
+    return np.array([*c.coefficients, np.nan if c.constant is None else c.constant])[:, None]
 
 
 def _varies(load: Load) -> bool:
@@ -239,6 +142,8 @@ def field_values(m: Mechanism, fields: Mapping[str, AnyField]) -> dict[str, floa
         elif isinstance(field, ChainField):
             assert chained is not None
             out[name] = float(chained[field.kind, field.index])
+        elif isinstance(field, CouplingField):
+            out[name] = float(_declared_coupling(m.couplings[field.index])[field.term, 0])
         else:
             value = np.asarray(getattr(m.loads[field.index], field.name), dtype=float)
             out[name] = float(value if field.component is None else value[field.component])
@@ -248,7 +153,7 @@ def field_values(m: Mechanism, fields: Mapping[str, AnyField]) -> dict[str, floa
 def varied(m: Mechanism, fields: Mapping[str, AnyField], values: Array) -> Variants:
     """Variants of a mechanism in which the fields take ``values (fields, count)``."""
     count = values.shape[1]
-    start, loads = declared(m), list(m.loads)
+    start, loads, couplings = declared(m), list(m.loads), [_declared_coupling(c) for c in m.couplings]
     arrays = {f.name: getattr(start, f.name) for f in dataclasses.fields(start)}
     rows = list(zip(fields.values(), values, strict=True))
     chained = [(field, row) for field, row in rows if isinstance(field, ChainField)]
@@ -263,7 +168,10 @@ def varied(m: Mechanism, fields: Mapping[str, AnyField], values: Array) -> Varia
                 arrays[field.array][place] = field.scale * row
         elif isinstance(field, LoadField):
             loads[field.index] = _varied_load(loads[field.index], field, row)
-    return Variants(m, Declared(**arrays), tuple(loads), count)
+        elif isinstance(field, CouplingField):
+            couplings[field.index] = couplings[field.index] * np.ones(count)
+            couplings[field.index][field.term] = row
+    return Variants(m, Declared(**arrays), tuple(loads), count, couplings=tuple(couplings))
 
 
 def _chain_markers(
@@ -276,9 +184,9 @@ def _chain_markers(
     for field, row in chained:
         numbers[field.kind, field.index] = row
     poses = np.stack(markers_of_chain(numbers))
-    out = {name: np.repeat(arrays[name], count, axis=-1) for name in ("point", "axis", "second")}
+    out = {name: np.repeat(arrays[name], count, axis=-1) for name in MARKER}
     for side, k in {chain_marker(m, field) for field, _ in chained}:
-        for name, column in (("point", 3), ("axis", 2), ("second", 0)):
+        for name, column in zip(MARKER, (3, 2, 0), strict=True):  # origin, z and x of a pose
             out[name][side, :, k] = poses[side, :, column, k]
     return out
 
@@ -295,12 +203,12 @@ def clashes(m: Mechanism, fields: Mapping[str, AnyField]) -> list[str]:
     out = []
     for name, field in fields.items():
         mine: list[Any] = [("load", field.index, field.name, field.component)] if isinstance(field, LoadField) else []
-        if isinstance(field, ChainField):
-            mine = [("chain", *dataclasses.astuple(field))]
+        if isinstance(field, ChainField | CouplingField):
+            mine = [(type(field).__name__, *dataclasses.astuple(field))]
         if isinstance(field, Field):
             mine = [(field.array, str(field.places[0]))]
             sides = (0, 1) if field.places[0][0] == slice(None) else (field.places[0][0],)
-            if field.array in ("point", "axis", "second"):
+            if field.array in MARKER:
                 mine += [("marker", side, field.places[0][2]) for side in sides]
         elif isinstance(field, ChainField):
             mine.append(("marker", *chain_marker(m, field)))
@@ -331,15 +239,19 @@ def stacked(m: Mechanism, mechanisms: Sequence[Mechanism | None]) -> Variants:
         **{f.name: np.concatenate([getattr(n, f.name) for n in every], axis=-1) for f in dataclasses.fields(Declared)}
     )
     loads = tuple(_stacked_loads(group) for group in zip(*(other.loads for other in used), strict=True))
-    return Variants(m, numbers, loads, len(used), tuple(i for i, ok in enumerate(same) if not ok))
+    couplings = tuple(
+        np.hstack([_declared_coupling(c) for c in group]) for group in zip(*(o.couplings for o in used), strict=True)
+    )
+    return Variants(m, numbers, loads, len(used), tuple(i for i, ok in enumerate(same) if not ok), couplings)
 
 
 def topology_of(m: Mechanism) -> tuple[Any, ...]:
-    """What variants must share: names, types and ends of pairs, the way they are placed, drives, kinds of loads."""
+    """What variants must share: names, types and ends of pairs, the way they are placed, couplings, drives, kinds of loads."""
     return (
         m.link_names(),
         m.frame,
         tuple((p.name, p.type, p.a, p.b, p.on_a is None) for p in m.pairs),
+        tuple((c.name, c.freedoms, c.constant is None) for c in m.couplings),
         tuple(d.freedom for d in m.drives),
         tuple(
             (load.kind, *(v for f in dataclasses.fields(load) if isinstance(v := getattr(load, f.name), str)))

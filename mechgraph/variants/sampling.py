@@ -39,7 +39,7 @@ class Levels:
 
 
 @dataclass(frozen=True)
-class Inverse:
+class InverseDistribution:
     """A distribution that speaks ``icdf`` and ``standard_deviation`` in place of ``ppf`` and ``std`` (``scipy.stats.Normal``)."""
 
     distribution: Any
@@ -72,21 +72,21 @@ def distributions(parameters: Mapping[str, Any]) -> dict[str, Any]:
         )
     out, faults = {}, []
     for name, given in parameters.items():
-        way = _way(given)
-        if isinstance(way, str):
-            faults.append(f"{name!r} = {given!r}: {way}")
+        distribution = _with_quantiles(given)
+        if isinstance(distribution, str):
+            faults.append(f"{name!r} = {given!r}: {distribution}")
         else:
-            out[name] = way
+            out[name] = distribution
     if faults:
         raise DeclarationError("study: parameters", faults)
     return out
 
 
-def _way(given: Any) -> Any:
+def _with_quantiles(given: Any) -> Any:
     """Something with quantiles, or what is wrong with it."""
-    way = Inverse(given) if hasattr(given, "icdf") else given
-    if hasattr(way, "ppf") and not hasattr(way, "freeze"):
-        return way if np.isfinite(way.ppf(0.5)) else "has no median; check the arguments of the distribution"
+    found = InverseDistribution(given) if hasattr(given, "icdf") else given
+    if hasattr(found, "ppf") and not hasattr(found, "freeze"):
+        return found if np.isfinite(found.ppf(0.5)) else "has no median; check the arguments of the distribution"
     try:
         levels = np.asarray(given, dtype=float)
     except (TypeError, ValueError):
@@ -119,21 +119,21 @@ def spread(distribution: Any) -> float:
     return (high - low) / 2
 
 
-def _random(ways: Sequence[Any], n: int, rng: np.random.Generator) -> Array:
-    return _quantiles(ways, rng.random((n, len(ways))))
+def _random(distributions: Sequence[Any], n: int, rng: np.random.Generator) -> Array:
+    return _quantiles(distributions, rng.random((n, len(distributions))))
 
 
-def _latin(ways: Sequence[Any], n: int, rng: np.random.Generator) -> Array:
-    return _quantiles(ways, scipy.stats.qmc.LatinHypercube(d=len(ways), seed=rng).random(n))
+def _latin(distributions: Sequence[Any], n: int, rng: np.random.Generator) -> Array:
+    return _quantiles(distributions, scipy.stats.qmc.LatinHypercube(d=len(distributions), seed=rng).random(n))
 
 
-def _grid(ways: Sequence[Any], n: int, rng: np.random.Generator) -> Array:
-    levels = [w.values if isinstance(w, Levels) else w.ppf((np.arange(n) + 0.5) / n) for w in ways]
+def _grid(distributions: Sequence[Any], n: int, rng: np.random.Generator) -> Array:
+    levels = [w.values if isinstance(w, Levels) else w.ppf((np.arange(n) + 0.5) / n) for w in distributions]
     return np.stack([part.reshape(-1) for part in np.meshgrid(*levels, indexing="ij")])
 
 
-def _quantiles(ways: Sequence[Any], u: Array) -> Array:
-    return np.stack([np.asarray(w.ppf(column), dtype=float) for w, column in zip(ways, u.T, strict=True)])
+def _quantiles(distributions: Sequence[Any], u: Array) -> Array:
+    return np.stack([np.asarray(w.ppf(column), dtype=float) for w, column in zip(distributions, u.T, strict=True)])
 
 
 SAMPLINGS: dict[str, Callable[[Sequence[Any], int, np.random.Generator], Array]] = {

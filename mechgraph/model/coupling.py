@@ -1,0 +1,101 @@
+"""Couplings: linear relations between freedoms, as gears, belts and screws impose them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+from mechgraph.model.field_format import COEFFICIENTS, NUMBER, TEXT, Described
+from mechgraph.model.numeric import is_numeric, number_fault, plain
+from mechgraph.units import LENGTH, PURE
+
+if TYPE_CHECKING:
+    from mechgraph.model.mechanism import Mechanism
+
+Terms = tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True, init=False)
+class Coupling(Described):
+    """A linear relation between single freedoms, ``sum_i c_i q_i = constant``; its multiplier is an unknown effort.
+
+    The multiplier m acts with the effort ``c_i m`` in freedom i, so that its power is ``m sum_i c_i q'_i = 0``. The sum is a length
+    where all freedoms are slides (then m is a force, the coefficients are pure numbers) and an angle in all other cases (then m is
+    a moment, the coefficient of a turn is a pure number and that of a slide one over a length). ``to_units`` follows that rule: a
+    constant that is a length is multiplied by the factor of lengths, the coefficient of a slide beside turns is divided by it.
+
+    Parameters
+    ----------
+    terms : freedom -> coefficient, ``{"A": 2.0, "B.Tz": -3.0}``; coefficients finite and not zero.
+    name : differs from the names of all pairs and other couplings; left out, the mechanism names it ``g1``, ``g2``, ...
+    constant : the value of the sum; left out, the sum keeps the value that it has at ``start``.
+    """
+
+    name: Annotated[str, TEXT("name", default="g1, g2, ...")]
+    terms: Annotated[Terms, COEFFICIENTS("freedom → coefficient; single freedoms, none of the rotation of S, Sg, Sp")]
+    constant: Annotated[
+        float | None, NUMBER("value of the sum", LENGTH, PURE, degrees=True, default="its value at `[start]`")
+    ] = None
+
+    def __init__(
+        self,
+        terms: Mapping[str, float] | Iterable[tuple[str, float]],
+        *,
+        name: str | None = None,
+        constant: float | None = None,
+    ) -> None:
+        object.__setattr__(self, "name", "" if name is None else name)
+        object.__setattr__(self, "terms", _read_terms(terms))
+        object.__setattr__(self, "constant", plain(constant))
+
+    @property
+    def freedoms(self) -> tuple[str, ...]:
+        """Names of the freedoms, in order."""
+        return tuple(freedom for freedom, _ in self.terms)
+
+    @property
+    def coefficients(self) -> tuple[float, ...]:
+        """The coefficients, in the order of the freedoms."""
+        return tuple(coefficient for _, coefficient in self.terms)
+
+    def faults(self, m: Mechanism) -> list[str]:
+        """What is wrong with this coupling in a mechanism, one line each."""
+        where = f"coupling {self.name!r}: "
+        if not isinstance(self.name, str):
+            return [f"{where}the name must be a text"]
+        if not _is_terms(self.terms):
+            return [f"{where}terms = {self.terms!r}: expected a mapping freedom -> coefficient"]
+        found: list[str | None] = [] if self.terms else [f"{where}has no terms; name at least one freedom"]
+        seen: dict[str, str] = {}
+        for freedom, c in self.terms:
+            fault = m.freedom_fault(freedom, single=True)
+            found.append(fault and where + fault)
+            if not is_numeric(c, ()) or c == 0:
+                found.append(f"{where}coefficient of {freedom!r} = {c!r}: expected a finite number other than 0")
+            other = freedom if fault else seen.setdefault(m.full_name(freedom), freedom)
+            if other != freedom or self.freedoms.count(freedom) > 1:
+                found.append(f"{where}names the freedom {m.full_name(freedom) if not fault else freedom} twice")
+        if self.constant is not None:
+            found.append(number_fault(self.constant, where + "constant"))
+        return list(dict.fromkeys(fault for fault in found if fault))
+
+    def converted(self, length: float, turns: Sequence[bool]) -> Coupling:
+        """The same relation with lengths times ``length``; ``turns`` says which freedoms are angles (the rule stands above)."""
+        if not any(turns):
+            return self.replace(constant=None if self.constant is None else self.constant * length)
+        pairs = zip(self.terms, turns, strict=True)
+        return self.replace(terms=[(name, c if turn else c / length) for (name, c), turn in pairs])
+
+
+def _read_terms(given: Any) -> Any:
+    """Pairs (freedom, coefficient); what is no mapping and no sequence of pairs is kept as it is."""
+    items = given.items() if isinstance(given, Mapping) else given
+    try:
+        return tuple((name, plain(c)) for name, c in items)
+    except (TypeError, ValueError):
+        return given
+
+
+def _is_terms(terms: Any) -> bool:
+    return isinstance(terms, tuple) and all(isinstance(term, tuple) and len(term) == 2 for term in terms)

@@ -1,0 +1,266 @@
+"""What the fields of a declaration hold, said once, in the annotations of the dataclasses.
+
+    mass: Annotated[float, NUMBER("mass", MASS, minimum=0.0)] = 0.0
+
+Reading and checking a value, the TOML file, its JSON Schema, the tables of the library's README, the conversion of units, rigid motions
+of the whole mechanism and the names of numbers in studies all follow from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Self, get_type_hints
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.errors import DeclarationError
+from mechgraph.model.numeric import number_fault, plain, vector_fault
+from mechgraph.units import LENGTH, PURE, Dimension, factor_of, symbol_of
+
+XYZ = "xyz"
+Schema = Mapping[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Kind:
+    """A kind of value.
+
+    ``words`` name it in tables, ``schema`` is its JSON Schema, ``stands_as`` the type of a value in a file where a reader can tell
+    (None: the constructor tells); ``shape`` that of a number, vector or tensor (None for all else); ``fault(value, what, minimum)``
+    says what is wrong with a value; ``moved(value, pose)`` is the value after a rigid motion ``(3, 4)`` of the whole mechanism.
+    """
+
+    words: str
+    schema: Schema
+    stands_as: type | None = None
+    shape: tuple[int, ...] | None = None
+    numeric: bool = False
+    fault: Callable[[Any, str, float | None], str | None] | None = None
+    moved: Callable[[Any, Array], Any] | None = None
+
+    def __call__(
+        self, meaning: str, dimension: Dimension = PURE, turn: Dimension | None = None, **more: Any
+    ) -> FieldFormat:
+        """A field of this kind; ``dimension`` is that for a slide where ``turn``, that for a turn, is given too."""
+        return FieldFormat(self, meaning, dimension, dimension if turn is None else turn, **more)
+
+    def components(self) -> Mapping[str, tuple[tuple[int, ...], ...]]:
+        """Names of the components as studies spell them, and the places of each in the array; a number has one, named ``""``."""
+        if self.shape == ():
+            return {"": ((),)}
+        if self.shape == (3,):
+            return {name: ((i,),) for i, name in enumerate(XYZ)}
+        if self.shape == (3, 3):
+            places = {a + b: [(i, j), (j, i)] for i, a in enumerate(XYZ) for j, b in enumerate(XYZ)}
+            return {name: tuple(dict.fromkeys(both)) for name, both in places.items()}
+        return {}
+
+
+@dataclass(frozen=True)
+class FieldFormat:
+    """One field: its kind, its meaning in a sentence, and its dimension (``slide`` and ``turn`` differ where a freedom decides).
+
+    ``degrees``: may be given in degrees under its name with ``_deg`` added; ``minimum``: smallest number; ``choices``: the texts allowed;
+    ``key``: its name in files where it is another; ``table``: the table of the file that it holds; ``single``: of the name of a
+    freedom, whether it must not be part of a rotation; ``default``: in words, where the value does not say it; ``held_in``: the array
+    of ``Declared`` that holds the number, and the factor, where the array has another name than the field; ``rules``: more of its schema.
+    """
+
+    kind: Kind
+    meaning: str
+    slide: Dimension = PURE
+    turn: Dimension = PURE
+    degrees: bool = False
+    minimum: float | None = None
+    choices: tuple[str, ...] = ()
+    key: str = ""
+    table: str = ""
+    single: bool = True
+    default: str = ""
+    held_in: tuple[str, float] | None = None
+    rules: Schema = field(default_factory=dict)
+
+    @property
+    def unit(self) -> str:
+        """The unit in letters, ``M L²``, ``rad or L``."""
+        if self.kind.stands_as is not None:
+            return ""
+        both = (symbol_of(self.turn) or "rad", symbol_of(self.slide) or "rad")
+        if self.slide != self.turn:
+            return " or ".join(both).replace("1/", "rad/")
+        return both[0] if self.degrees or self.slide != PURE else ""
+
+    def fault(self, value: Any, what: str) -> str | None:
+        """What is wrong with a value, or None."""
+        if self.choices and value not in self.choices:
+            return f"{what} = {value!r}: expected {' or '.join(map(repr, self.choices))}"
+        return None if self.kind.fault is None else self.kind.fault(value, what, self.minimum)
+
+
+class Formatted:
+    """A dataclass whose annotations say what its fields hold (``FieldFormat``)."""
+
+    formats: ClassVar[Mapping[str, FieldFormat]] = {}
+    """What the fields hold, by their names."""
+    _numeric: ClassVar[tuple[str, ...]] = ()
+    _optional: ClassVar[frozenset[str]] = frozenset()
+
+    def __init_subclass__(cls) -> None:
+        hints = get_type_hints(cls, include_extras=True)
+        found = {name: getattr(hint, "__metadata__", (None,))[0] for name, hint in hints.items()}
+        cls.formats = {name: about for name, about in found.items() if isinstance(about, FieldFormat)}
+        cls._numeric = tuple(name for name, about in cls.formats.items() if about.kind.numeric)
+        cls._optional = frozenset(name for name in cls.formats if getattr(cls, name, ...) is None)
+
+
+class Described(Formatted):
+    """A declared thing whose numbers are read, checked, moved and converted by what its fields hold."""
+
+    def read_numbers(self) -> None:
+        """Turn what the numeric fields hold into floats and tuples of floats; to be called where the fields are set."""
+        for name in self._numeric:
+            value = getattr(self, name)
+            if value is not None and type(value) is not float:
+                object.__setattr__(self, name, plain(value))
+
+    def value_faults(self, where: str) -> list[str]:
+        """What is wrong with the values by themselves; None is none where the field may be left out."""
+        faults = []
+        for name, about in self.formats.items():
+            value = getattr(self, name)
+            if value is not None or name not in self._optional:
+                faults.append(about.fault(value, where + name))
+        return [fault for fault in faults if fault]
+
+    def replace(self, **changes: Any) -> Self:
+        """A copy with fields changed."""
+        return type(self)(**{**{name: getattr(self, name) for name in self.formats}, **changes})
+
+    def moved(self, pose: Array) -> Self:
+        """The same after a rigid motion ``(3, 4)`` of the whole mechanism; itself where nothing in it has a place or direction."""
+        changes = {}
+        for name, about in self.formats.items():
+            value = getattr(self, name)
+            if isinstance(value, Described):
+                changes[name] = value.moved(pose)
+            elif value is not None and about.kind.moved is not None:
+                changes[name] = about.kind.moved(value, pose)
+        return self.replace(**changes) if changes else self
+
+    def in_units(self, base: tuple[float, float, float], turns: bool = False) -> Self:
+        """The same with every number times ``prod_i base_i^dimension_i``; ``turns``: whether the freedom that it names is a turn.
+
+        ``base (3,)`` are the factors of lengths, masses and times. A callable is refused (DeclarationError).
+        """
+        changes = {}
+        for name, about in self.formats.items():
+            value = getattr(self, name)
+            if isinstance(value, Described):
+                changes[name] = value.in_units(base, turns)
+            elif value is not None and about.kind.numeric:
+                factor = factor_of(about.turn if turns else about.slide, base)
+                if callable(value):
+                    raise DeclarationError(
+                        "to_units", [f"{name} of a load is a callable; convert it yourself, or sample it first"]
+                    )
+                if factor != 1.0:
+                    changes[name] = plain(np.asarray(value) * factor)
+        return self.replace(**changes) if changes else self
+
+
+# --- kinds -----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class MovedFunction:
+    """A callable value of a load, carried along by a rigid motion of the whole mechanism."""
+
+    function: Callable[..., Any]
+    pose: tuple[tuple[float, ...], ...]
+
+    def __call__(self, pose: Array, twist: Array, t: Any) -> Array:
+        """The value, asked for in the coordinates before the motion and turned into those after it."""
+        G = np.asarray(self.pose)
+        R, back = G[:3, :3], np.linalg.inv(G)
+        w, v = twist[..., :3], twist[..., 3:]
+        p = back[:3, 3]
+        local = np.concatenate([w @ R, v @ R + np.cross(p, w @ R)], axis=-1)
+        return np.asarray(self.function(back @ pose @ G, local, t)) @ R.T
+
+
+def _moved_point(value: Any, pose: Array) -> Any:
+    return plain(pose[:, :3] @ np.asarray(value) + pose[:, 3])
+
+
+def _turned(value: Any, pose: Array) -> Any:
+    if callable(value):
+        return MovedFunction(value, plain(np.vstack([pose, (0.0, 0.0, 0.0, 1.0)])))
+    return plain(np.asarray(value) @ pose[:, :3].T)
+
+
+def _turned_tensor(value: Any, pose: Array) -> Any:
+    A = pose[:, :3] @ np.asarray(value) @ pose[:, :3].T
+    return plain((A + A.T) / 2)
+
+
+def _series_fault(width: int) -> Callable[[Any, str, float | None], str | None]:
+    """The check of a number or vector that may be an array over positions or a callable."""
+    wanted = "a finite number" if width == 1 else f"{width} finite numbers"
+
+    def fault(value: Any, what: str, minimum: float | None) -> str | None:
+        if callable(value):
+            return None
+        try:
+            array = np.asarray(value, dtype=float)
+        except (TypeError, ValueError, OverflowError):
+            array = np.array(np.nan)
+        if np.isfinite(array).all() and (width == 1 or (array.ndim >= 1 and array.shape[-1] == width)):
+            return None
+        return f"{what} = {value!r}: expected {wanted}, an array of them over positions, or a callable (pose, twist, t)"
+
+    return fault
+
+
+def _vector_fault(value: Any, what: str, minimum: float | None) -> str | None:
+    return vector_fault(value, what)
+
+
+_VECTOR: Schema = {"$ref": "#/$defs/vector"}
+TEXT = Kind("text", {"type": "string"}, str)
+LINK_NAME = Kind("text", {"type": "string"}, str)
+FREEDOM_NAME = Kind("text", {"type": "string"}, str)
+FLAG = Kind("true/false", {"type": "boolean"}, bool)
+INTEGER = Kind("integer", {"type": "integer", "minimum": 0})
+NUMBER = Kind(
+    "number", {"type": "number"}, None, (), True, lambda value, what, least: number_fault(value, what, minimum=least)
+)
+POINT = Kind("3 numbers", _VECTOR, None, (3,), True, _vector_fault, _moved_point)
+VECTOR = Kind("3 numbers", _VECTOR, None, (3,), True, _vector_fault, _turned)
+DIRECTION = Kind(
+    "3 numbers", _VECTOR, None, (3,), True, lambda value, what, _: vector_fault(value, what, direction=True), _turned
+)
+TENSOR = Kind(
+    "3 × 3",
+    {"type": "array", "items": _VECTOR, "minItems": 3, "maxItems": 3},
+    None,
+    (3, 3),
+    True,
+    moved=_turned_tensor,
+)
+SIX = Kind("6 numbers", {"$ref": "#/$defs/six"})
+SERIES = Kind("number(s)", {"$ref": "#/$defs/series"}, None, (), True, _series_fault(1))
+VECTOR_SERIES = Kind(
+    "3 numbers (series)", {"$ref": "#/$defs/vector_series"}, None, (3,), True, _series_fault(3), _turned
+)
+NUMBERS = Kind("n numbers", {"type": "array", "items": {"type": "number"}})
+FACTS = Kind("table", {"type": "object"}, dict)
+COEFFICIENTS = Kind("table", {"type": "object", "additionalProperties": {"type": "number"}, "minProperties": 1}, dict)
+TABLE = Kind("table", {})
+TABLES = Kind("tables", {})
+OTHER = Kind("", {})
+"""A kind that a field describes by itself, in ``rules``."""
+
+POSITION = {"dimension": LENGTH, "turn": PURE, "degrees": True}
+"""Of a field that holds a coordinate: an angle or a length, as the freedom is."""

@@ -1,0 +1,192 @@
+"""The tables of a mechanism file: what each may hold, gathered from the dataclasses that say it (``field_format``).
+
+Said here is only what is in no dataclass: the pieces of a pair type, a chain, a sweep, the units, the number of the format.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from mechgraph.model.coupling import Coupling
+from mechgraph.model.drive import Drive
+from mechgraph.model.field_format import (
+    FLAG,
+    INTEGER,
+    NUMBERS,
+    OTHER,
+    SIX,
+    TABLE,
+    TABLES,
+    TEXT,
+    FieldFormat,
+    Formatted,
+    Schema,
+)
+from mechgraph.model.link import Link
+from mechgraph.model.load import LOADS
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.motion import Motion
+from mechgraph.model.pair import Marker, Pair
+from mechgraph.model.pair_type import Bookkeeping, Component, Freedom, PairType
+from mechgraph.units import BASE_UNITS, LENGTH
+
+SCHEMA = 1
+"""Number of the file format."""
+DEGREES = "_deg"
+"""Ending of the name of an angle that is given in degrees."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """One table of the format: ``make`` builds its object, ``fields`` by their names in files, ``needed`` must be there.
+
+    ``attributes`` are the names of the fields in the object, ``defaults`` what a field left out counts as, ``rules`` more of its schema.
+    """
+
+    make: Any
+    words: str
+    fields: Mapping[str, FieldFormat]
+    needed: tuple[str, ...]
+    attributes: Mapping[str, str]
+    defaults: Mapping[str, Any]
+    rules: Schema = field(default_factory=dict)
+
+    @property
+    def in_degrees(self) -> Mapping[str, str]:
+        """Names of angles given in degrees -> names of the fields."""
+        return {name + DEGREES: name for name, about in self.fields.items() if about.degrees}
+
+
+def _table(
+    make: Any,
+    first: Mapping[str, FieldFormat] | None = None,
+    *,
+    words: str = "",
+    needed: Sequence[str] | None = None,
+    rules: Schema | None = None,
+    **more: FieldFormat,
+) -> Table:
+    """The table of a class (or function): fields that only the file has, those that the class describes, and ``more``."""
+    own = make.formats if inspect.isclass(make) and issubclass(make, Formatted) else {}
+    attributes = {about.key or name: name for name, about in own.items()}
+    fields = {**(first or {}), **{key: own[name] for key, name in attributes.items()}, **more}
+    taken = inspect.signature(make).parameters if make is not None else {}
+    defaults = {key: taken[attributes.get(key, key)].default for key in fields if attributes.get(key, key) in taken}
+    if needed is None:
+        needed = [key for key, value in defaults.items() if value is inspect.Parameter.empty]
+    summary = words or (make.__doc__ or "").partition("\n")[0].replace("``", "")
+    return Table(make, summary, fields, tuple(needed), attributes, defaults, rules or {})
+
+
+def _one_of(how: str, *names: str) -> Schema:
+    return {how: [{"required": [name]} for name in names]}
+
+
+def _named_or(table: str) -> Schema:
+    """JSON Schema of a list of names and tables."""
+    name = {"description": "A name.", "type": "string", "minLength": 1}
+    return {"type": "array", "items": {"anyOf": [name, {"$ref": f"#/$defs/{table}"}]}}
+
+
+_SWEEP = OTHER(
+    "[first, end, step]: first, first + step, ... before the end, which is excluded even where rounding would let it in",
+    LENGTH,
+    degrees=True,
+    rules={"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3},
+)
+_PITCHES = {
+    "anyOf": [{"type": "number"}, NUMBERS.schema, {"type": "object", "additionalProperties": {"type": "number"}}]
+}
+_FILE = {
+    "schema": INTEGER("number of the format: 1", default="needed", rules={"const": SCHEMA}),
+    "pair_type": TABLES("pair types of your own", table="pair_type", default="none"),
+    "chain": TABLE("a single loop by numbers; excludes `[[pair]]`", table="chain"),
+}
+_PER_PITCH = SIX("part multiplied by the pitch of the pair", default="0")
+
+TABLES_OF_FILE: dict[str, Table] = {
+    "file": _table(
+        Mechanism,
+        _FILE,
+        needed=("schema", "name"),
+        words="A mechanism file of mechgraph (TOML), schema number 1. Described field by field in README.md beside this file.",
+        rules={"not": {"required": ["chain", "pair"]}},
+    ),
+    "units": _table(
+        None,
+        words="Names of the units in which the numbers of the file are given; a consistent set.",
+        first={name: TEXT(f"name of the unit of {name}") for name in BASE_UNITS},
+        needed=(),
+    ),
+    "link": _table(Link),
+    "pair": _table(Pair, words="A kinematic pair from link a to link b."),
+    "marker": _table(Marker, words="A marker frame in a link's own frame."),
+    "coupling": _table(Coupling),
+    "chain": _table(
+        None,
+        words="A single closed loop: prod_k D_k(q_k) Tz(offset_k) Tx(length_k) Rx(twist_k) = 1.",
+        needed=("pairs",),
+        pairs=TEXT('symbols in a row: `"RCSR"`, `"RSgC"`; hyphens are skipped'),
+        twist=NUMBERS("of the link after pair k", degrees=True, default="0, if another is given"),
+        length=NUMBERS("likewise", LENGTH, default="0"),
+        offset=NUMBERS("along the axis of pair k", LENGTH, default="0"),
+        pitch=OTHER("of the helical pairs, in order or by name", LENGTH, rules=_PITCHES),
+    ),
+    "drive": _table(Drive),
+    "motion": _table(
+        Motion,
+        words="Motion of a drive, one value a position.",
+        needed=(),
+        rules=_one_of("oneOf", "position", f"position{DEGREES}", "sweep", f"sweep{DEGREES}"),
+        sweep=_SWEEP,
+    ),
+    **{f"load {kind}": _table(load) for kind, load in LOADS.items()},
+    "pair_type": _table(
+        PairType,
+        words="A row of the pair table of the user's own.",
+        symbol=TEXT("what `type` of a pair names; letters and digits", rules={"pattern": "^[A-Za-z_][A-Za-z0-9_]*$"}),
+        name=TEXT("in words", default="the symbol"),
+        freedoms=OTHER(
+            '`"Rx"` ... `"Tz"`, `"Rz + pitch Tz"`, `"rotation"` (three freedoms kept as one rotation), or tables',
+            rules=_named_or("freedom"),
+        ),
+        reactions=OTHER(
+            '6 - f of `"Mx"` ... `"Fz"`, `"Fy@1"` for frame 1, or tables',
+            default="null space, n1, n2, ...",
+            rules=_named_or("component"),
+        ),
+        efforts=OTHER(
+            "one dual to every freedom, as above", default="unit couple or force", rules=_named_or("component")
+        ),
+        bookkeeping=TABLE("how Lee's ledger counts it", table="bookkeeping", default="6 - f unknowns"),
+        directed=FLAG("whether it has an axis"),
+        square_second=FLAG("whether `second` must be perpendicular as given"),
+    ),
+    "freedom": _table(
+        Freedom,
+        words="One elementary freedom: a constant unit twist in the frame left by the freedoms before it.",
+        name=TEXT("name within the pair, e.g. Rz"),
+        twist=SIX("a unit twist, angular part first"),
+        per_pitch=_PER_PITCH,
+    ),
+    "component": _table(
+        Component,
+        words="A constant wrench: a reaction component or an effort.",
+        name=TEXT("name, e.g. Fx"),
+        wrench=SIX("moment first, then force"),
+        frame=INTEGER("frame k after k single freedoms"),
+        per_pitch=_PER_PITCH,
+        at_b=FLAG("whether the origin is that of marker B rather than of the frame"),
+    ),
+    "bookkeeping": _table(
+        Bookkeeping,
+        words="How a ledger in Lee's manner writes the pair: a free dual force and parts along the axis, under conditions.",
+        needed=(),
+        conditions=TABLES("unit twists of frame 0 to which the dual force is reciprocal", table="freedom"),
+        along=TABLES("components that the pair transmits along its axis", table="component"),
+    ),
+}
+TABLES_OF_FILE["load wrench"] = _table(LOADS["wrench"], rules=_one_of("anyOf", "force", "moment"))

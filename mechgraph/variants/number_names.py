@@ -1,0 +1,173 @@
+"""Declared numbers by name.
+
+A number is named as it is declared: ``crank.mass``, ``crank.center.x``, ``crank.inertia.xy``, ``B.point.x``, ``B.axis.z``,
+``B.on_a.point.y``, ``B.pitch``, ``loads[0].stiffness``, ``loads[1].force.x``; of a coupling ``g.A`` and ``g.constant``, or
+``couplings[0].A``; of a chain ``length[2]``, ``twist[0]``, ``offset[1]`` (as in ``mg.chain``, counted from 0). Which fields of a link,
+pair or load are numbers, and of which components, their annotations say (``model.field_format``).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from mechgraph.model.chain import NUMBERS_OF_CHAIN, chain_numbers
+from mechgraph.model.coupling import Coupling
+from mechgraph.model.field_format import Described, FieldFormat
+from mechgraph.model.link import Link
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.numeric import is_numeric
+from mechgraph.model.pair import Marker, Pair
+from mechgraph.model.parameters import Declared
+
+MARKER = tuple(Marker.formats)
+"""Numbers of a marker."""
+SIDES = [name for name, about in Pair.formats.items() if about.table == "marker"]
+"""Fields of a pair that hold its markers, on link a and on link b."""
+_INDEXED = re.compile(r"(?P<what>\w+)\[(?P<index>\d+)\](?:\.(?P<rest>.+))?")
+
+Place = tuple[Any, ...]
+
+
+@dataclass(frozen=True)
+class Field:
+    """A declared number: the array of ``Declared`` and the places in it that hold ``scale`` times the number."""
+
+    array: str
+    places: tuple[Place, ...]
+    scale: float = 1.0
+
+    def read(self, numbers: Declared) -> float:
+        """The declared value."""
+        return float(getattr(numbers, self.array)[self.places[0]][..., 0].reshape(-1)[0]) / self.scale
+
+
+@dataclass(frozen=True)
+class ChainField:
+    """Twist, length or offset (``kind`` 0, 1, 2) of the ``index``-th link of a chain."""
+
+    kind: int
+    index: int
+
+
+@dataclass(frozen=True)
+class LoadField:
+    """A number of the ``index``-th load, or a component of a vector of it."""
+
+    index: int
+    name: str
+    component: int | None
+
+
+@dataclass(frozen=True)
+class CouplingField:
+    """The ``term``-th coefficient of the ``index``-th coupling; behind the last coefficient stands the constant."""
+
+    index: int
+    term: int
+
+
+AnyField = Field | ChainField | LoadField | CouplingField
+Finder = Callable[[Mechanism, int, str], AnyField | str | None]
+"""Finds the number of the i-th link, pair, ... by the rest of its name; or says what is wrong with it."""
+
+
+def find_field(m: Mechanism, name: str) -> AnyField | str:
+    """The field of that name, or why there is none."""
+    indexed = _INDEXED.fullmatch(name)
+    if indexed and indexed["what"] in NUMBERS_OF_CHAIN and not indexed["rest"]:
+        return _chain_field(m, name, indexed["what"], int(indexed["index"]))
+    if indexed and indexed["what"] in INDEXED:
+        count = len(getattr(m, indexed["what"]))
+        if int(indexed["index"]) >= count:
+            return f"{name!r}: there are {count} {indexed['what']}, counted from 0"
+        return INDEXED[indexed["what"]](m, int(indexed["index"]), indexed["rest"] or "")
+    named: Sequence[tuple[Sequence[Link | Pair | Coupling], Finder]] = (
+        (m.links, _link_field),
+        (m.pairs, _pair_field),
+        (m.couplings, _coupling_field),
+    )
+    for items, find in named:
+        for i, item in enumerate(items):
+            if name.startswith(item.name + ".") and (found := find(m, i, name.removeprefix(item.name + "."))):
+                return found
+    return (
+        f"{name!r}: no declared number of that name; expected e.g. {m.links[-1].name}.mass, {m.links[-1].name}.center.x, "
+        f"{m.links[-1].name}.inertia.xx, {m.pairs[0].name}.{'point' if m.pairs[0].point is not None else 'on_a.point'}.x, "
+        "loads[0].stiffness, or length[2] of a chain"
+    )
+
+
+def _component(item: Described, rest: str) -> tuple[tuple[str, ...], FieldFormat, tuple[Place, ...]] | None:
+    """Path, format and places of ``center.x`` or ``on_a.point.x`` in an item; None where it declares no such number."""
+    what, _, at = rest.partition(".")
+    if what not in item.formats:
+        return None
+    about, value = item.formats[what], getattr(item, what)
+    if isinstance(value, Described):
+        inner = _component(value, at)
+        return None if inner is None else ((what, *inner[0]), *inner[1:])
+    if about.kind.shape is None or not is_numeric(value, about.kind.shape) or at not in about.kind.components():
+        return None
+    return (what,), about, about.kind.components()[at]
+
+
+def _link_field(m: Mechanism, i: int, rest: str) -> Field | str | None:
+    link = m.links[i]
+    found = _component(link, rest)
+    if found is None:
+        return None
+    (what,), _, places = found
+    if what == "mass" and link.center is None:
+        return f"'{link.name}.mass': link {link.name!r} has no mass centre; declare center=(x, y, z)"
+    return Field(what, tuple((*place, i) for place in places))
+
+
+def _pair_field(m: Mechanism, k: int, rest: str) -> Field | None:
+    found = _component(m.pairs[k], rest)
+    if found is None:
+        return None
+    (*side, what), about, places = found
+    array, scale = about.held_in or (what, 1.0)
+    where: Place = () if array not in MARKER else (SIDES.index(side[0]),) if side else (slice(None),)
+    return Field(array, tuple((*where, *place, k) for place in places), scale)
+
+
+def _chain_field(m: Mechanism, name: str, what: str, index: int) -> ChainField | str:
+    numbers = chain_numbers(m)
+    if numbers is None:
+        return f"{name!r}: mechanism {m.name!r} is no chain with twist, length and offset of every link"
+    if index >= numbers.shape[1]:
+        return f"{name!r}: the chain has {numbers.shape[1]} links, counted from 0"
+    return ChainField(NUMBERS_OF_CHAIN.index(what), index)
+
+
+def _load_field(m: Mechanism, index: int, rest: str) -> LoadField | str:
+    load = m.loads[index]
+    found = _component(load, rest)
+    if found is not None:
+        (what,), _, (place,) = found
+        return LoadField(index, what, place[0] if place else None)
+    shapes = {name: about.kind.shape for name, about in load.formats.items() if about.kind.shape is not None}
+    known = ", ".join(name for name, shape in shapes.items() if is_numeric(getattr(load, name), shape))
+    return f"'loads[{index}].{rest}': no number of that name in load {index} ({load.kind}: {known}; vectors with .x, .y, .z)"
+
+
+def _coupling_field(m: Mechanism, index: int, rest: str) -> CouplingField | str:
+    c = m.couplings[index]
+    if rest == "constant" and c.constant is not None:
+        return CouplingField(index, len(c.terms))
+    if rest == "constant":
+        return f"'{c.name}.constant': coupling {c.name!r} keeps the value that it has at the start; declare constant="
+    if m.freedom_fault(rest, single=True) is None and m.full_name(rest) in c.freedoms:
+        return CouplingField(index, c.freedoms.index(m.full_name(rest)))
+    return f"'{c.name}.{rest}': coupling {c.name!r} has the numbers {', '.join(c.freedoms)} and constant"
+
+
+INDEXED: dict[str, Callable[[Mechanism, int, str], AnyField | str]] = {
+    "loads": _load_field,
+    "couplings": _coupling_field,
+}
+"""Lists of a mechanism whose items are named by their place, counted from 0."""
