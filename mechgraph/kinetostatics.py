@@ -15,7 +15,7 @@ from mechgraph.closure.assembly import CLOSED, assembled_at, closed_start, named
 from mechgraph.closure.configuration import Configuration, Index, System
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.closure.driver_path import DriverPath, Positions, Request, Status, follow, in_blocks
-from mechgraph.closure.passive_rest import Idle, unspun
+from mechgraph.closure.passive_rest import unspun
 from mechgraph.closure.rates import Rates, distance_to_dead_point, rates
 from mechgraph.closure.solver import ClosureSolver, FactoredClosure, closure_solver
 from mechgraph.errors import DeadPointError, DeclarationError, IndeterminateError, ReachError
@@ -153,7 +153,10 @@ class Pipeline:
                 return [Request(starts.x[:, 0], 0, values, np.arange(T))]
             return [Request(starts.x[:, 0], 0, values[:, i : i + N], np.arange(i, i + N)) for i in range(0, T, N)]
         begun = np.flatnonzero(np.isfinite(starts.x).all(axis=0))
-        return [Request(starts.x[:, v], v, values[:, v * N : (v + 1) * N], np.arange(v * N, (v + 1) * N)) for v in begun.tolist()]
+        return [
+            Request(starts.x[:, v], v, values[:, v * N : (v + 1) * N], np.arange(v * N, (v + 1) * N))
+            for v in begun.tolist()
+        ]
 
 
 class Outcome:
@@ -294,7 +297,9 @@ def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exceptio
     first = int(bad[0])
     last = outcome.found.reached[:, first] * line.unit[line.lead]
     reached = {name: float(v) for name, v in zip(np.array(line.drive.names)[line.lead], last, strict=True)}
-    asked = dict(zip(line.drive.names, (line.values("position", outcome.batch)[:, first] * line.unit).tolist(), strict=True))
+    asked = dict(
+        zip(line.drive.names, (line.values("position", outcome.batch)[:, first] * line.unit).tolist(), strict=True)
+    )
     at = ", ".join(f"{name} = {value:.6g}" for name, value in reached.items())
     wanted = ", ".join(f"{name} = {value:.6g}" for name, value in asked.items())
     if status[first] in (Status.DEAD_POINT.value, Status.BEYOND_DEAD_POINT.value):

@@ -10,7 +10,7 @@ from mechgraph.algebra.se3 import Array, rotate
 from mechgraph.closure.configuration import Configuration, Index, System, indexed
 from mechgraph.errors import AssemblyError, DeclarationError
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.values import is_numeric
+from mechgraph.model.numeric import is_numeric
 from mechgraph.numerics.newton import closest_zeros, least_norm_step
 
 CLOSED = 1e-10

@@ -177,7 +177,9 @@ def _behind_gaps(path: DriverPath, found: Positions, requests: list[Request]) ->
             continue
         last = int(solved[-1])
         beyond = request.values[:, last + 1 :] - found.reached[:, request.places[last]][:, None]
-        back = np.flatnonzero((beyond * beyond[:, :1]).sum(axis=0) < 0) if beyond.shape[1] else np.zeros(0, dtype=np.intp)
+        back = (
+            np.flatnonzero((beyond * beyond[:, :1]).sum(axis=0) < 0) if beyond.shape[1] else np.zeros(0, dtype=np.intp)
+        )
         if not back.size or (last, request.places[0]) in found.tried:
             continue
         found.tried.add((last, int(request.places[0])))
@@ -265,7 +267,9 @@ class _Legs:
         bad = []
         for _ in range(FINER):
             interpolation = Interpolation(path, nodes)
-            bad = [part[self._closed(out, interpolation, part, inside.size == self.total)] for part in in_blocks(inside)]
+            bad = [
+                part[self._closed(out, interpolation, part, inside.size == self.total)] for part in in_blocks(inside)
+            ]
             wrong = np.concatenate(bad)
             if not wrong.size or path.size[1] > 1:
                 break
@@ -318,7 +322,9 @@ class _Legs:
         a, b = interpolation.left[step], interpolation.right[step]
         place = 0.5 * (nodes.place[a] + nodes.place[b])
         drive = follower.paths.drive(nodes.track[a], place)
-        found = follower.newton.nodes(interpolation(step, place, drive), drive, nodes.track[a], nodes.which[a], PATH.node)
+        found = follower.newton.nodes(
+            interpolation(step, place, drive), drive, nodes.track[a], nodes.which[a], PATH.node
+        )
         return follower._nodes(found, drive, nodes.track[a], place, sure=True).take(found.done)
 
     def _say_why_not(self, out: Positions, tracks: Tracks, reach: Array) -> None:

@@ -18,6 +18,7 @@ from mechgraph.closure.driver_path import DriverPath, Positions, Status
 from mechgraph.numerics.continuation import Follower
 from mechgraph.numerics.hermite import Interpolation
 
+
 @dataclass(frozen=True)
 class Idle:
     """A body with passive freedoms, by one of its links."""
@@ -113,7 +114,9 @@ def unspun(path: DriverPath, found: Positions, bodies: tuple[Idle, ...]) -> Posi
 class _Spins:
     """Spin of passive bodies along tracks: rates at Gauss points, integrals up to any place."""
 
-    def __init__(self, path: DriverPath, interpolation: Interpolation, follower: Follower, bodies: tuple[Idle, ...]) -> None:
+    def __init__(
+        self, path: DriverPath, interpolation: Interpolation, follower: Follower, bodies: tuple[Idle, ...]
+    ) -> None:
         self.path, self.interpolation, self.follower, self.bodies = path, interpolation, follower, bodies
         nodes, left = interpolation.nodes, interpolation.left
         points, self._weights = np.polynomial.legendre.leggauss(GAUSS)

@@ -9,8 +9,9 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure import passive_rest as idle
 from mechgraph.closure.configuration import Configuration, Index
-from mechgraph.closure.solver import FactoredClosure
 from mechgraph.closure.passive_rest import Idle
+from mechgraph.closure.solver import FactoredClosure
+
 
 class Velocities:
     """Rates of all freedoms ``dq (F, T)`` at closed positions, and what follows from them."""

@@ -12,7 +12,7 @@ from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.rates import Rates
 from mechgraph.errors import DeclarationError
 from mechgraph.model.load import Load, Value
-from mechgraph.model.values import PerCase
+from mechgraph.model.numeric import PerCase
 
 
 def inertia_wrenches(here: Configuration, rates: Rates) -> Array:

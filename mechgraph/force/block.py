@@ -70,7 +70,9 @@ class ForceTask:
     t: object
 
 
-def forces_of_block(task: ForceTask, rates: Rates, f: FactoredClosure, coordinates: Array, places: Index) -> BlockForces:
+def forces_of_block(
+    task: ForceTask, rates: Rates, f: FactoredClosure, coordinates: Array, places: Index
+) -> BlockForces:
     """Forces at positions with user coordinates ``(F, T)`` that stand at the ``places`` of the flat batch."""
     here = rates.here
     site = Site(here, rates, coordinates, task.batch, places, task.t)
@@ -91,7 +93,18 @@ def forces_of_block(task: ForceTask, rates: Rates, f: FactoredClosure, coordinat
     frame = here.system.graph.frame
     shaking = np.delete(loads, frame, axis=1).sum(axis=1) + site.scaled(site.internal)[:, frame]
     return BlockForces(
-        reactions, efforts, given, loads, hold, stress.wrenches, stress.efforts, shaking, balance, power, (wrench, term), holds
+        reactions,
+        efforts,
+        given,
+        loads,
+        hold,
+        stress.wrenches,
+        stress.efforts,
+        shaking,
+        balance,
+        power,
+        (wrench, term),
+        holds,
     )
 
 

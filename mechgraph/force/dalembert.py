@@ -85,9 +85,7 @@ def newton_euler(problem: Problem) -> Wrenches:
     return Wrenches(totals, out)
 
 
-def _components_and_efforts(
-    here: Configuration, loads: Array, efforts: Array, driven: Index, held: Index
-) -> Wrenches:
+def _components_and_efforts(here: Configuration, loads: Array, efforts: Array, driven: Index, held: Index) -> Wrenches:
     m = here.system.m
     names = m.freedom_names()
     f = formulate(m, "minimal", efforts=[names[c] for c in sorted({*driven.tolist(), *held.tolist()})])
@@ -101,7 +99,7 @@ def _components_and_efforts(
     for begin in range(0, here.T, size):
         span = slice(begin, min(begin + size, here.T))
         A = np.zeros((*shape, span.stop - span.start))
-        A[rows, cols] = entries[:, span]
+        np.add.at(A, (rows, cols), entries[:, span])
         solver = chosen_for_all(A, known)
         parts.append((solver.solve(right[:, None, span])[:, 0], _null(A, solver)))
     u = np.concatenate([p[0] for p in parts], axis=1)

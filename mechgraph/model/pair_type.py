@@ -18,7 +18,7 @@ import numpy as np
 from mechgraph.document import Document, Table, to_text
 from mechgraph.errors import DeclarationError
 from mechgraph.model import pair_kinematics as evaluation
-from mechgraph.model.values import is_numeric
+from mechgraph.model.numeric import is_numeric
 
 Six = tuple[float, float, float, float, float, float]
 

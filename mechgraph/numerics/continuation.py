@@ -83,9 +83,7 @@ class Follower:
 
     def _nodes(self, found: Closed, drive: Array, track: Index, place: Array, sure: bool) -> Nodes:
         n = len(place)
-        return Nodes(
-            found.x, found.Z, drive, track, place, found.which, found.condition, np.full(n, sure)
-        )
+        return Nodes(found.x, found.Z, drive, track, place, found.which, found.condition, np.full(n, sure))
 
     def _renewed(self, nodes: Nodes) -> Nodes:
         """The same nodes in better forms where theirs are poor."""
@@ -331,7 +329,12 @@ class Follower:
             step = self.newton.nodes(x, drive, base.track, base.which, PATH.node)
             new = self._renewed(self._nodes(step, drive, base.track, at, sure=True))
             turn = np.abs((step.Z - base.Z) * direction).max() / max(1.0, float(np.abs(base.Z).max()))
-            if step.done[0] and step.correction[0] <= 1e-2 * distance and turn <= 0.05 and new.condition[0] <= PATH.doubtful:
+            if (
+                step.done[0]
+                and step.correction[0] <= 1e-2 * distance
+                and turn <= 0.05
+                and new.condition[0] <= PATH.doubtful
+            ):
                 self.crossings.append((track, crossing))
                 self.ends[track] = End.REACHED
                 return new

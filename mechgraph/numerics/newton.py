@@ -134,7 +134,7 @@ class Newton:
             point = self.problem.at(x[:, active], drive[:, active], tracks[active])
             self._count(active.size, 1, 0)
             left = np.abs(point.residual).max(axis=0, initial=0.0)
-            near = (left <= goal) | ((left <= PATH.accepted) & (left > 0.5 * before[active]) & (goal > 0))
+            near = (goal > 0) & ((left <= goal) | ((left <= PATH.accepted) & (left > 0.5 * before[active])))
             x[:, active[near]] = point.x[:, near]
             done[active[near]] = True
             if near.all():

@@ -42,7 +42,9 @@ class Paths:
         width = self._places[right] - self._places[left]
         u = np.where(width > 0, (at - self._places[left]) / np.where(width > 0, width, 1.0), 1.0)
         # the ends themselves are met exactly
-        return np.where(u >= 1.0, self._all[:, right], self._all[:, left] + u * (self._all[:, right] - self._all[:, left]))
+        return np.where(
+            u >= 1.0, self._all[:, right], self._all[:, left] + u * (self._all[:, right] - self._all[:, left])
+        )
 
     def step(self, tracks: Index, at: Array, h: Array) -> Array:
         """Where a step of at most ``h`` leads: to the furthest point within it up to which the path is nearly straight."""
@@ -99,5 +101,3 @@ class Nodes:
         """First and last node of every step: neighbours on a track, apart."""
         left = np.flatnonzero((self.track[1:] == self.track[:-1]) & (self.place[1:] > self.place[:-1]))
         return left, left + 1
-
-

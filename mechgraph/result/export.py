@@ -12,7 +12,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import MissingExtraError
 from mechgraph.model.toml import write_whole
-from mechgraph.result.units import unit_of
+from mechgraph.units import unit_of
 
 if TYPE_CHECKING:
     import os

@@ -10,9 +10,9 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.equations.state import State
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.values import vector_fault
+from mechgraph.model.numeric import vector_fault
 from mechgraph.result import export
-from mechgraph.result.units import unit_of
+from mechgraph.units import unit_of
 
 if TYPE_CHECKING:
     import os

@@ -12,7 +12,7 @@ from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Tab
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.result.solution import Solution
-from mechgraph.result.units import unit_of
+from mechgraph.units import unit_of
 
 OK = "ok"
 """Status of a solved position."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -20,8 +19,8 @@ from mechgraph.closure.driver_path import Status, in_blocks
 from mechgraph.closure.rates import Rates, Velocities
 from mechgraph.equations.state import State
 from mechgraph.errors import MechgraphError
-from mechgraph.force.block import BlockForces
 from mechgraph.force.applied_loads import user_poses, user_twists
+from mechgraph.force.block import BlockForces
 from mechgraph.force.dalembert import given_effort_loads, internal_state
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.result.solution import Checks, MaterialPoint
@@ -82,7 +81,12 @@ class Trajectory:
         """Keep a block of solved positions."""
         places, rates = motion.places, motion.rates
         self._solved[places] = True
-        for name, values in (("x", motion.here.x), ("dq", rates.dq), ("ddq", rates.ddq), ("closure", motion.here.closure)):
+        for name, values in (
+            ("x", motion.here.x),
+            ("dq", rates.dq),
+            ("ddq", rates.ddq),
+            ("closure", motion.here.closure),
+        ):
             self._keep(name, places, values)
         self._last = motion if len(places) == self._count else None
         if forces is None:
@@ -185,7 +189,11 @@ class Trajectory:
         columns = self._columns(pair)
         unit = np.where(self._system.is_length[columns], self._L, 1.0)[:, None]
         position = np.where(self._solved, self._coordinates[columns], np.nan)
-        return self._out(position), self._out(unit * self._of("dq")[columns]), self._out(unit * self._of("ddq")[columns])
+        return (
+            self._out(position),
+            self._out(unit * self._of("dq")[columns]),
+            self._out(unit * self._of("ddq")[columns]),
+        )
 
     def link(self, link: int) -> tuple[Array, Array, Array]:
         """Pose, twist and dV/dt of a link."""
@@ -206,7 +214,11 @@ class Trajectory:
         def motion(block: BlockMotion) -> Array:
             par = block.here.system.par
             X, V, A = block.here.poses[:, :, link], block.rates.V[:, link], block.rates.A[:, link]
-            local = par.center[:, link] if p is None else ((np.asarray(p, dtype=float) - par.offset[:, link]) / par.L)[:, None]
+            local = (
+                par.center[:, link]
+                if p is None
+                else ((np.asarray(p, dtype=float) - par.offset[:, link]) / par.L)[:, None]
+            )
             at = rotate(X[:, :3], local) + X[:, 3]
             velocity = V[3:] + cross(V[:3], at)
             acceleration = A[3:] + cross(A[:3], at) + cross(V[:3], velocity)

@@ -8,8 +8,8 @@ import numpy as np
 
 from mechgraph.errors import DeclarationError
 from mechgraph.result.solution import Solution
-from mechgraph.result.units import unit_of
 from mechgraph.show.canvas import INK, MUTED, PALETTE, pyplot
+from mechgraph.units import unit_of
 
 
 def effort_curve(s: Solution, freedom: str | None = None, *, ax: Any = None, marked: int | None = None) -> Any:

@@ -35,7 +35,11 @@ class NumbersPath(DriverPath):
 
     def __init__(self, line: Pipeline, numbers_at: NumbersAt, count: int) -> None:
         keep = line.freedoms.hold
-        super().__init__(line.system, closure_solver(line.start, line.leading, line.options.engine, keep), lambda variants: line.system)
+        super().__init__(
+            line.system,
+            closure_solver(line.start, line.leading, line.options.engine, keep),
+            lambda variants: line.system,
+        )
         self.size = (self.system.n_freedoms, 1)
         self._line, self._numbers_at, self._count = line, numbers_at, count
         self._known: dict[bytes, System] = {}
