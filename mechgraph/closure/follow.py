@@ -14,7 +14,8 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import state_rows
 from mechgraph.closure.bordering import LoopSystem
-from mechgraph.closure.configuration import Configuration, Index, System
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.march import (
     ACCEPTED,
     AIM,

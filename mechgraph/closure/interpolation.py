@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.configuration import Index, System
+from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.march import Node
 
 WIDTH = 6

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import state_rows
-from mechgraph.closure.configuration import Index, System
+from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.march import CORRECTION
 from mechgraph.numerics.linear import Choice, ChosenSystem, choose, singular_between
 

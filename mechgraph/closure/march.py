@@ -16,7 +16,8 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import close, state_rows
-from mechgraph.closure.configuration import Configuration, Index, System
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import Index, System
 from mechgraph.numerics.linear import Choice, ChosenSystem, Factor, choose, singular_between
 
 CONVERGED = 1e-13

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, cross, rotation_log
-from mechgraph.closure.configuration import Configuration, Index
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import Index
 from mechgraph.numerics.linear import Choice, ChosenSystem, choose
 
 LARGEST = 3.0

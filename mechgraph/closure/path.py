@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.configuration import Configuration, Index, System
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.interpolation import Interpolation
 from mechgraph.closure.march import CONVERGED, CORRECTION, ROUNDING, SHORTEST_STEP, Marcher, Node, Status, Track
 from mechgraph.numerics.linear import Choice, ChosenSystem, singular_between

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.configuration import Index
+from mechgraph.closure.indexing import Index
 from mechgraph.equations.state import State
 from mechgraph.errors import MechgraphError
 from mechgraph.force.analysis import Analysis, flat_place

@@ -8,7 +8,8 @@ from functools import cached_property
 from typing import Any
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.configuration import Configuration, Index
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import Index
 from mechgraph.closure.path import Tracks
 from mechgraph.closure.rates import Rates
 from mechgraph.force.applied_loads import Site, inertia_wrenches

@@ -16,7 +16,8 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import CLOSED
 from mechgraph.closure.bordering import LoopSystem
-from mechgraph.closure.configuration import Configuration, Index, System
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.follow import SparseFollower, SparseNode, SparseSolver, sparse_rates
 from mechgraph.closure.march import Status
 from mechgraph.closure.rates import DEAD_POINT, Rates

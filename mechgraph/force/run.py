@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import CLOSED, closed_start, named_columns, state_rows
-from mechgraph.closure.configuration import Configuration, Index, System
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.march import FAIR, SINGULAR, Status
 from mechgraph.closure.passive_rest import Idle, held_well, spin_angles
 from mechgraph.closure.path import Follower, Positions, in_blocks

@@ -12,7 +12,7 @@ from mechgraph.errors import DeclarationError
 from mechgraph.model.link import Link
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker, Pair
-from mechgraph.model.pair_type import TABLE
+from mechgraph.model.pair_table import TABLE
 from mechgraph.model.values import is_numeric, plain
 
 

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.model.pair_type import TABLE, PairType
+from mechgraph.model.pair_table import TABLE
+from mechgraph.model.pair_type import PairType
 from mechgraph.model.values import is_numeric, number_fault, plain, vector_fault
 
 PERPENDICULAR = 1e-6

@@ -27,7 +27,8 @@ from mechgraph.model.load import LOADS
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.model.pair import Marker, Pair
-from mechgraph.model.pair_type import TABLE, Bookkeeping, Component, Freedom, PairType
+from mechgraph.model.pair_table import TABLE
+from mechgraph.model.pair_type import Bookkeeping, Component, Freedom, PairType
 from mechgraph.model.values import is_numeric
 
 SCHEMA = 1

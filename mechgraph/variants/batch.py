@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.configuration import Configuration, Index, System
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.lockstep import Lockstep
 from mechgraph.closure.march import Status
 from mechgraph.closure.path import Positions
