@@ -7,8 +7,8 @@ type of the numbers that come in, real or complex.
 
 from __future__ import annotations
 
-from functools import cached_property
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,23 @@ if TYPE_CHECKING:
     from mechgraph.closure.indexing import ScrewTable, System
 
 Index = NDArray[np.intp]
+
+
+Value = TypeVar("Value")
+
+
+class kept(Generic[Value]):  # noqa: N801 - used as a decorator, as ``cached_property`` is
+    """A ``cached_property`` without its lock, which takes longer than the arithmetic of one position."""
+
+    def __init__(self, make: Callable[[Any], Value]) -> None:
+        self.make, self.__doc__ = make, make.__doc__
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    def __get__(self, instance: Any, owner: type) -> Value:
+        value = instance.__dict__[self.name] = self.make(instance)
+        return value
 
 
 class Configuration:
@@ -41,19 +58,18 @@ class Configuration:
     def forget(self) -> None:
         """Give back all memory but that of the states; what is asked for again is computed again."""
         for name, value in vars(type(self)).items():
-            if isinstance(value, cached_property):
+            if isinstance(value, kept):
                 self.__dict__.pop(name, None)
 
     # --- poses -------------------------------------------------------------------------------------------------------
 
-    @cached_property
+    @kept
     def _steps(self) -> Array:
         """Poses of all factors with the markers beside them, in the sense of the walk: homogeneous, ``(4, 4, steps, T)``."""
         s = self.system
-        batches, tables = s.batches, s.numbers.poses
         dtype = self.x.dtype if s.numbers.is_real else complex
         out = np.empty((16, len(s.walk.parents), self.T), dtype=dtype)
-        for b, C in zip(batches, tables, strict=True):
+        for b, C in zip(s.batches, s.numbers.poses, strict=True):
             values = b.stack.values(self.x.take(b.state_rows, axis=0))
             if C.ndim == 4:
                 out[:, b.at_steps] = np.einsum("cmnt,mnt->cnt", C, values)
@@ -63,17 +79,17 @@ class Configuration:
                 out[:, b.at_steps] = np.matmul(C, values.transpose(1, 0, 2)).transpose(1, 0, 2)
         return out.reshape(4, 4, *out.shape[1:])
 
-    @cached_property
+    @kept
     def _nodes(self) -> Array:
         """Poses of the frames behind all factors ``(3, 4, nodes, T)``, see ``Walk``."""
         return self.system.walk.poses(self._steps, self.system.par.frame)
 
-    @cached_property
+    @kept
     def poses(self) -> Array:
         """Poses of all links ``(3, 4, N, T)``."""
         return self._nodes.take(self.system.walk.link_node, axis=2)
 
-    @cached_property
+    @kept
     def frames(self) -> list[list[Array]]:
         """For every group the pair frames 0, 1, ... about the internal origin; places inside a factor hold its start."""
         out = []
@@ -88,7 +104,7 @@ class Configuration:
         X = self._nodes.take(nodes, axis=2)
         return compose(X, self.system.numbers.constants[:, :, const]) if const.any() else X
 
-    @cached_property
+    @kept
     def pair_points(self) -> Array:
         """Origins of the markers B, ``(3, P, T)``; of a chord, where its link a has it."""
         s = self.system
@@ -109,7 +125,7 @@ class Configuration:
         multiplied(X[:, :3], local, out=out.swapaxes(0, 1))
         return out, X[:, 3]
 
-    @cached_property
+    @kept
     def S(self) -> Array:
         """Twists of all freedoms ``(6, F, T)``."""
         s = self.system
@@ -118,7 +134,7 @@ class Configuration:
         out[1] += cross(origins, out[0])
         return out.reshape(6, s.n_freedoms, self.T)
 
-    @cached_property
+    @kept
     def _local_twists(self) -> Array:
         """The twists in their nodes ``(3, 2, F, T)`` where those of some factors move."""
         s = self.system
@@ -129,7 +145,7 @@ class Configuration:
             s.numbers.place_twists(out, b, b.stack.twists(self.x[b.state_rows], s.par.pitch[b.pairs]))
         return out
 
-    @cached_property
+    @kept
     def E(self) -> Array:
         """Effort wrenches of all freedoms ``(6, F, T)``."""
         s = self.system
@@ -139,7 +155,7 @@ class Configuration:
                 out[:, g.columns] = evaluation.dual(out[:, g.columns], self.S[:, g.columns])
         return out
 
-    @cached_property
+    @kept
     def W(self) -> list[Array]:
         """For every group the reaction wrenches ``(6, 6 - f, n, T)``."""
         s = self.system
@@ -166,7 +182,7 @@ class Configuration:
         out[0] += cross(origins, placed[0])
         return out.reshape(6, *out.shape[2:])
 
-    @cached_property
+    @kept
     def lee_screws(self) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
         """For every pair the axial wrenches ``(6, n, T)`` and condition twists ``(6, n, T)`` of Lee's bookkeeping."""
         s = self.system
@@ -184,10 +200,11 @@ class Configuration:
 
     # --- closure -----------------------------------------------------------------------------------------------------
 
-    @cached_property
+    @kept
     def chord_errors(self) -> Array:
         """Closure errors ``(6, chords, T)``: finite twist from marker B reached through b to that reached through a."""
-        reached, declared = (self._nodes[:, :, places] for places in self.system.chord_nodes)
+        ends, links = self.system.chord_nodes
+        reached, declared = self._nodes[:, :, ends], self._nodes[:, :, links]
         R = multiplied(reached[:, :3], declared[:, :3].swapaxes(0, 1))
         return finite_twist(R, reached[:, 3] - multiplied(R, declared[:, 3:])[:, 0])
 
@@ -201,18 +218,18 @@ class Configuration:
             return self.loop_sums(per_pair)
         return _combined(s.loops_of_chords, self.chord_errors)
 
-    @cached_property
+    @kept
     def closure(self) -> Array:
         """Closure error ``(T,)``: largest of angle and length / L over all loops, and of the other rows."""
         errors = [part.error(self) for part in self.system.rows]
         return errors[0] if len(errors) == 1 else np.max(errors, axis=0)
 
-    @cached_property
+    @kept
     def residual(self) -> Array:
         """What the closure rows leave open ``(n_rows, T)``: loops first, then the others."""
         return _stacked([part.residual(self) for part in self.system.rows])
 
-    @cached_property
+    @kept
     def J(self) -> Array:
         """Closure Jacobian ``(n_rows, F, T)``; of the loops ``J = (C x I6) diag(S_k)``."""
         return _stacked([part.jacobian(self) for part in self.system.rows])

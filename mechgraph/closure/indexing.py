@@ -285,7 +285,7 @@ class System:
         signs = [np.full(len(c), float(sign)) for c, (_, sign) in zip(columns, loop, strict=True)]
         return np.concatenate(columns), np.concatenate(signs)
 
-    @property
+    @cached_property
     def many_loops(self) -> bool:
         """Whether sums along loops are taken with the sparse loop matrix."""
         return len(self.graph.loops) > MANY_LOOPS
@@ -480,11 +480,12 @@ class Numbers:
     @cached_property
     def is_real(self) -> bool:
         """Whether no parameter is complex."""
-        return not any(np.iscomplexobj(part) for part in (self.constants, self.par.pitch))
+        return not any(np.iscomplexobj(part) for part in (self.constants, self.par.pitch, self.par.frame))
 
     @cached_property
     def poses(self) -> list[Array]:
-        """For every batch of factors the coefficients of the poses of its steps with the markers beside them.
+        """For every batch of factors the coefficients of the poses of its steps with the markers beside them, seen from the nodes
+        from which the steps start (from the global frame where that is the frame link).
 
         ``(n, 16, m)`` for one mechanism, a product of matrices; ``(16, m, n, B)`` for variants.
         """
@@ -499,7 +500,10 @@ class Numbers:
                 back, begins * (1 + MARKER_A_INVERSE * n + b.pairs), ends * (1 + MARKER_B_INVERSE * n + b.pairs)
             )
             K = b.stack.coefficients(self.par.pitch[b.pairs], back)
-            C = np.einsum("abnt,bcmnt->acmnt", whole[:, :, left], K)
+            before = whole[:, :, left]
+            starts = self.system.walk.parents[b.steps] == 0
+            before[:, :, starts] = np.einsum("abt,bcnt->acnt", homogeneous(self.par.frame), before[:, :, starts])
+            C = np.einsum("abnt,bcmnt->acmnt", before, K)
             C = np.einsum("acmnt,cdnt->admnt", C, whole[:, :, right])
             C = C.reshape(16, *C.shape[2:])
             out.append(np.ascontiguousarray(C[..., 0].transpose(2, 0, 1)) if C.shape[3] == 1 else C)

@@ -156,6 +156,8 @@ class Walk:
         self.step_of = np.empty(len(order), dtype=np.intp)
         self.step_of[self.first[self.pair] + self.rank] = np.arange(len(order))
         self.levels = self._levels(level[order])
+        self.n_first = int((level == 0).sum())
+        self.widest = int(np.bincount(level).max(initial=0))
 
     def _levels(self, level: Index) -> list[tuple[Place, slice, slice]]:
         """For every level the nodes from which its steps start, the steps, and the nodes to which they lead."""
@@ -175,25 +177,30 @@ class Walk:
         return _doubled(np.concatenate([[0], self.parents]), 0)
 
     def poses(self, relative: Array, frame: Array) -> Array:
-        """Poses ``(3, 4, nodes, T)`` from those of the steps, homogeneous ``(4, 4, steps, T)``, and that of the frame link."""
+        """Poses ``(3, 4, nodes, T)`` from those of the steps, homogeneous ``(4, 4, steps, T)``.
+
+        ``frame (3, 4, 1)`` is the pose of node 0; the steps from there contain it already.
+        """
         n, T = relative.shape[2:]
-        X = np.empty(
-            (3, 4, n + 1, T), dtype=relative.dtype if frame.dtype == float else np.result_type(relative, frame)
-        )
-        X[:, :, 0] = frame
+        X = np.empty((3, 4, n + 1, T), dtype=relative.dtype)
         if len(self.levels) > DEEP:
             X[:, :, 1:] = relative[:3]
             X[:, :, 0] = np.eye(3, 4)[:, :, None]
             for ancestor in self._jumps:
                 X = compose(X[:, :, ancestor], X)
-            return compose(np.broadcast_to(frame[:, :, None], X.shape), X)
-        for parents, steps, nodes in self.levels:
-            if (steps.stop - steps.start) * T <= SMALL_BATCH:
-                multiplied(X[:, :, parents], relative[:, :, steps], out=X[:, :, nodes])
-            else:
-                before = X[:, :, parents]
-                multiplied(before[:, :3], relative[:3, :, steps], out=X[:, :, nodes])
-                X[:, 3, nodes] += before[:, 3]
+            X[:, :, 0] = frame
+            return X
+        X[:, :, 0] = frame
+        X[:, :, 1 : self.n_first + 1] = relative[:3, :, : self.n_first]
+        if self.widest * T <= SMALL_BATCH:
+            there, motion = X.transpose(2, 3, 0, 1), relative.transpose(2, 3, 0, 1)
+            for parents, steps, nodes in self.levels[1:]:
+                np.matmul(there[parents], motion[steps], out=there[nodes])
+            return X
+        for parents, steps, nodes in self.levels[1:]:
+            before = X[:, :, parents]
+            multiplied(before[:, :3], relative[:3, :, steps], out=X[:, :, nodes])
+            X[:, 3, nodes] += before[:, 3]
         return X
 
 
