@@ -233,8 +233,10 @@ def pose_log(X: Array) -> Array:
 def finite_twist(R: Array, p: Array) -> Array:
     """Finite twist of the pose with rotation ``R (3, 3, ...)`` and position ``p (3, ...)``.
 
-    With ``tau = tan(angle/2) axis = 2 sin(angle) axis / (1 + trace)``, rational in the entries of ``R``, ``g = atan(|tau|) / |tau|`` and ``h = (1 - g) / |tau|^2``:
-    ``w = 2 g tau``, ``v = g (p - tau x p) + h (tau . p) tau``. Near a half turn, where ``tau`` has no bound, through quaternions.
+    With ``tau = tan(angle/2) axis = 2 sin(angle) axis / (1 + trace)``, rational in the entries of ``R``,
+    ``g = atan(|tau|) / |tau|`` and ``h = (1 - g) / |tau|^2``:
+    ``w = 2 g tau``, ``v = g (p - tau x p) + h (tau . p) tau``.
+    Near a half turn, where ``tau`` has no bound, through quaternions.
     """
     parts, width = _half_tangents(R)
     if not width < WIDE:

@@ -27,7 +27,7 @@ Index = NDArray[np.intp]
 Value = TypeVar("Value")
 
 
-class kept(Generic[Value]):  # noqa: N801 - used as a decorator, as ``cached_property`` is
+class kept(Generic[Value]):
     """A ``cached_property`` without its lock, which takes longer than the arithmetic of one position."""
 
     def __init__(self, make: Callable[[Any], Value]) -> None:

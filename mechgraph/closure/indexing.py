@@ -1,8 +1,8 @@
 """A mechanism made ready for evaluation: index arrays from the graph, coefficient arrays from the parameters.
 
 What follows from links, pairs and frame alone is worked out once a mechanism (``indexed``); what follows from its numbers is in
-``Numbers`` and is made when first asked for. All single factors of all pairs are evaluated together, whatever types they belong to:
-their places in the walk, their coordinates and coefficients are arrays here, so that no kernel goes through pairs or types.
+``coefficients.Numbers`` and is made when first asked for. All single factors of all pairs are evaluated together, whatever types
+they belong to: their places in the walk, their coordinates and coefficients are arrays, so that no kernel goes through pairs.
 """
 
 from __future__ import annotations
@@ -11,12 +11,14 @@ from collections.abc import Hashable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise, starmap
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.algebra.se3 import Array, cross, homogeneous, identity, inverse
+from mechgraph.algebra.se3 import Array
+from mechgraph.closure.coefficients import MARKER_A, MARKER_B, Numbers
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.rows import LoopRows, Rows, coupling_rows
 from mechgraph.closure.tree import Ranks, Tree, Walk, ranked
@@ -32,8 +34,6 @@ Index = NDArray[np.intp]
 
 MANY_LOOPS = 16
 """Loops above which the loop matrix is applied as a sparse one (measured: from here on it is the faster one)."""
-
-MARKER_A, MARKER_B, MARKER_A_INVERSE, MARKER_B_INVERSE = range(4)
 
 
 @dataclass(frozen=True)
@@ -152,18 +152,18 @@ class System:
 
     def _batch(self, members: Sequence[tuple[Factor, Group, int]]) -> FactorBatch:
         parts = []
-        for number, (factor, g, rank) in enumerate(members):
+        for number, (_, g, rank) in enumerate(members):
             columns, rows = evaluation.places(g.row)[rank]
             ranks = np.full(len(g.pairs), rank, dtype=np.intp)
             steps = self.walk.step_of[self.walk.first[g.pairs] + rank]
-            parts.append((g.columns[columns], g.state_rows[rows], g.pairs, ranks, steps, np.full(len(g.pairs), number)))
-        joined = [np.concatenate(part, axis=-1) for part in zip(*parts, strict=True)]
+            parts.append([g.columns[columns], g.state_rows[rows], g.pairs, ranks, steps, np.full(len(g.pairs), number)])
+        joined: list[Index] = [np.concatenate(part, axis=-1) for part in zip(*parts, strict=True)]
         order = np.argsort(joined[4], kind="stable")
-        columns, rows, pairs, ranks, steps, number = (part[..., order] for part in joined)
-        starts = np.flatnonzero(np.diff(number, prepend=-1))
-        counts = np.diff(starts, append=len(number)).tolist()
-        factors = [members[int(number[i])][0] for i in starts]
-        return FactorBatch(factors[0].stack(factors, counts), pairs, ranks, steps, columns, rows)
+        at_columns, at_rows, pairs, of_pair, at_steps, member = (part[..., order] for part in joined)
+        starts = np.flatnonzero(np.concatenate([[True], member[1:] != member[:-1]]))
+        counts = np.diff(np.append(starts, len(member))).tolist()
+        factors = [members[int(member[i])][0] for i in starts]
+        return FactorBatch(factors[0].stack(factors, counts), pairs, of_pair, at_steps, at_columns, at_rows)
 
     @cached_property
     def _group_of(self) -> Index:
@@ -333,7 +333,7 @@ class System:
     def row_places(self) -> list[slice]:
         """The rows of every contributor."""
         ends = np.cumsum([0, *(len(part.scale) for part in self.rows)]).tolist()
-        return [slice(i, j) for i, j in zip(ends[:-1], ends[1:], strict=True)]
+        return list(starmap(slice, pairwise(ends)))
 
     # --- other numbers -----------------------------------------------------------------------------------------------
 
@@ -460,102 +460,3 @@ def indexed(m: Mechanism) -> System:
     out = System.__new__(System)
     vars(out).update(m.once(_indices), m=m, couplings=getattr(m, "couplings", ()))
     return out
-
-
-class Numbers:
-    """Coefficients of poses and screws of a system, from its parameters; a trailing batch axis of length 1, or one a variant."""
-
-    def __init__(self, system: System) -> None:
-        self.system = system
-        self.par = system.par
-
-    @cached_property
-    def constants(self) -> Array:
-        """Constant poses ``(3, 4, 1 + 4 P, B)``: the identity, markers A, markers B, and their inverses."""
-        A, B = self.par.marker_a, self.par.marker_b
-        batch = max(A.shape[3], B.shape[3])
-        parts = (identity(1, batch), A, B, inverse(A), inverse(B))
-        return np.concatenate([np.broadcast_to(X, (*X.shape[:3], batch)) for X in parts], axis=2)
-
-    @cached_property
-    def is_real(self) -> bool:
-        """Whether no parameter is complex."""
-        return not any(np.iscomplexobj(part) for part in (self.constants, self.par.pitch, self.par.frame))
-
-    @cached_property
-    def poses(self) -> list[Array]:
-        """For every batch of factors the coefficients of the poses of its steps with the markers beside them, seen from the nodes
-        from which the steps start (from the global frame where that is the frame link).
-
-        ``(n, 16, m)`` for one mechanism, a product of matrices; ``(16, m, n, B)`` for variants.
-        """
-        n, last = len(self.system.m.pairs), np.maximum(self.system.n_factors, 1) - 1
-        whole = homogeneous(self.constants)
-        out = []
-        for b in self.system.batches:
-            back = self.system.walk.back[b.steps]
-            begins, ends = b.ranks == 0, b.ranks == last[b.pairs]
-            left = np.where(back, ends * (1 + MARKER_B * n + b.pairs), begins * (1 + MARKER_A * n + b.pairs))
-            right = np.where(
-                back, begins * (1 + MARKER_A_INVERSE * n + b.pairs), ends * (1 + MARKER_B_INVERSE * n + b.pairs)
-            )
-            K = b.stack.coefficients(self.par.pitch[b.pairs], back)
-            before = whole[:, :, left]
-            starts = self.system.walk.parents[b.steps] == 0
-            before[:, :, starts] = np.einsum("abt,bcnt->acnt", homogeneous(self.par.frame), before[:, :, starts])
-            C = np.einsum("abnt,bcmnt->acmnt", before, K)
-            C = np.einsum("acmnt,cdnt->admnt", C, whole[:, :, right])
-            C = C.reshape(16, *C.shape[2:])
-            out.append(np.ascontiguousarray(C[..., 0].transpose(2, 0, 1)) if C.shape[3] == 1 else C)
-        return out
-
-    @cached_property
-    def twists(self) -> Array:
-        """Twists of all freedoms in their nodes, bound and free part ``(3, 2, F, B)``; zero for those that move."""
-        s = self.system
-        batch = max(self.constants.shape[3], self.par.pitch.shape[1])
-        out = np.zeros((3, 2, s.n_freedoms, batch), dtype=np.result_type(self.constants, self.par.pitch))
-        for b in s.batches:
-            S = b.stack.constant_twists(self.par.pitch[b.pairs])
-            if S is not None:
-                self.place_twists(out, b, S)
-        return out
-
-    def place_twists(self, out: Array, b: FactorBatch, S: Array) -> None:
-        """Twists ``(6, f, n, T)`` in the frames before the factors of a batch, written into ``out (3, 2, F, T)`` in their nodes."""
-        X = self.marker_a_if_first(b)
-        for j, columns in enumerate(b.columns):
-            out[:, 0, columns] = np.einsum("ijnt,jnt->int", X[:, :3], S[:3, j])
-            out[:, 1, columns] = np.einsum("ijnt,jnt->int", X[:, :3], S[3:, j])
-            out[:, 1, columns] += cross(X[:, 3], out[:, 0, columns])
-
-    def marker_a_if_first(self, b: FactorBatch) -> Array:
-        """The frames before the factors of a batch in their nodes ``(3, 4, n, B)``: markers A before the first ones of pairs."""
-        return self.constants[:, :, np.where(b.ranks == 0, 1 + MARKER_A * len(self.system.m.pairs) + b.pairs, 0)]
-
-    @cached_property
-    def efforts(self) -> Array:
-        """The efforts of all freedoms in their nodes, force and moment ``(3, 2, F, B)``."""
-        return self._components(self.system.effort_table)
-
-    @cached_property
-    def reactions(self) -> Array:
-        """The constant reaction components in their nodes, force and moment ``(3, 2, K, B)``."""
-        return self._components(self.system.reaction_table)
-
-    def _components(self, table: ScrewTable) -> Array:
-        X = self.constants[:, :, table.const]
-        free = table.free[..., None]
-        if table.per_pitch.any():
-            free = free + table.per_pitch[..., None] * self.par.pitch[table.pairs]
-        batch = max(X.shape[3], free.shape[2])
-        out = np.empty((3, 2, X.shape[2], batch), dtype=np.result_type(X, free))
-        out[:, 0] = np.einsum("ijkt,jk->ikt", X[:, :3], table.bound)
-        out[:, 1] = np.einsum("ijkt,jkt->ikt", X[:, :3], np.broadcast_to(free, (*free.shape[:2], batch)))
-        out[:, 1] += np.where(table.at_b[:, None], 0.0, cross(X[:, 3], out[:, 0]))
-        return out
-
-    @cached_property
-    def ends(self) -> Array:
-        """Origins of the markers B in the frames of their links b, ``(3, 1, P, B)``."""
-        return self.par.marker_b[:, None, 3]

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 
@@ -90,7 +91,7 @@ class CouplingRows:
     coefficient is one. Coordinates are those of the state: turns count on, they are not wrapped.
     """
 
-    def __init__(self, matrix: Array, constant: Array, scale: Array, state_rows: Array) -> None:
+    def __init__(self, matrix: Array, constant: Array, scale: Array, state_rows: NDArray[np.intp]) -> None:
         self.matrix, self.constant, self.scale = matrix, constant, scale
         self._used = np.flatnonzero(matrix.any(axis=0))
         self._state_rows = state_rows[self._used]

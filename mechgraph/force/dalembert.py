@@ -12,8 +12,8 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.indexing import Index
 from mechgraph.closure.follow import SparseSolver
+from mechgraph.closure.indexing import Index
 from mechgraph.equations.build import formulate
 from mechgraph.equations.state import State
 from mechgraph.equations.terms import Formulation

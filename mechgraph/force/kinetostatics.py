@@ -11,8 +11,8 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure import passive_rest as idle
 from mechgraph.closure.assembly import assembled_at
-from mechgraph.closure.indexing import Index
 from mechgraph.closure.follow import SparseSolver
+from mechgraph.closure.indexing import Index
 from mechgraph.closure.march import Status
 from mechgraph.closure.path import Positions, continued, fits_one_block
 from mechgraph.errors import DeadPointError, DeclarationError, IndeterminateError, ReachError

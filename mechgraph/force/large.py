@@ -17,8 +17,8 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import CLOSED
 from mechgraph.closure.bordering import LoopSystem
 from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.follow import SparseFollower, SparseNode, SparseSolver, sparse_rates
+from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.march import Status
 from mechgraph.closure.rates import DEAD_POINT, Rates
 from mechgraph.errors import MechgraphError

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.algebra.se3 import Array, homogeneous, identity, inverse, quaternion_matrix, skew
+from mechgraph.algebra.se3 import Array, homogeneous, inverse, quaternion_matrix, skew
 
 if TYPE_CHECKING:
     from mechgraph.model.pair_type import Freedom
@@ -101,24 +101,30 @@ class ConstantScrew(Factor):
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
+        """The freedoms."""
         return (self.freedom,)
 
     @property
     def kind(self) -> Hashable:
+        """Evaluated together: all of this class."""
         return ConstantScrew
 
     def pose(self, x: Array, pitch: Array) -> Array:
+        """Value of the motion."""
         terms = screw_terms(self.twists(x, pitch)[:, 0])[:3]
         return np.asarray(np.einsum("ijmnt,mnt->ijnt", terms, screw_values(x[0])))
 
     def twists(self, x: Array, pitch: Array) -> Array:
+        """Constant unit twists."""
         return _unit_twists([self], [pitch.shape[0]], pitch)
 
     def scaled(self, L: float) -> Factor:
+        """With lengths over ``L``."""
         scaled = self.freedom.scaled(L)
         return self if scaled is self.freedom else replace(self, freedom=scaled)
 
     def stack(self, factors: Sequence[Factor], counts: Sequence[int]) -> Stack:
+        """Copies evaluated together."""
         return ScrewStack([f for f in factors if isinstance(f, ConstantScrew)], counts)
 
 
@@ -194,28 +200,35 @@ class Rotation(Factor):
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
+        """The freedoms."""
         return self.names
 
     @property
     def holds_rotation(self) -> bool:
+        """Yes."""
         return True
 
     @property
     def kind(self) -> Hashable:
+        """Evaluated together: all of this class."""
         return Rotation
 
     def pose(self, x: Array, pitch: Array) -> Array:
+        """Value of the motion."""
         out = np.zeros((3, 4, *x.shape[1:]), dtype=x.dtype)
         out[:, :3] = quaternion_matrix(x)
         return out
 
     def twists(self, x: Array, pitch: Array) -> Array:
+        """Constant unit twists."""
         return np.eye(6, 3)[:, :, None, None]
 
     def scaled(self, L: float) -> Factor:
+        """With lengths over ``L``."""
         return self
 
     def stack(self, factors: Sequence[Factor], counts: Sequence[int]) -> Stack:
+        """Copies evaluated together."""
         return RotationStack(sum(counts))
 
 

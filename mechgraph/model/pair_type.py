@@ -371,9 +371,10 @@ def _dual_at_random(row: PairType) -> bool:
 def _row_faults(row: PairType) -> list[str]:
     """Faults of a row, seen at random positions (fixed seed): unit twists, reciprocity, ranks, ``S^T E = 1``."""
     faults = []
+    steps = [step for step in row.steps for _ in step.freedoms]
     for j, freedom in enumerate(row.freedoms):
         w, v = np.array(freedom.twist[:3]), np.array(freedom.twist[3:])
-        if (j,) in row.factors and abs(np.linalg.norm(w if w.any() else v) - 1) > 1e-12:
+        if isinstance(steps[j], ConstantScrew) and abs(np.linalg.norm(w if w.any() else v) - 1) > 1e-12:
             faults.append(
                 f"freedom {freedom.name}: the twist {freedom.twist} is not a unit twist; divide it by its length"
             )

@@ -1,0 +1,115 @@
+"""The numbers of a mechanism as the kernel multiplies them: coefficients of the poses of all factors, screws in their frames."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array, cross, homogeneous, identity, inverse
+
+if TYPE_CHECKING:
+    from mechgraph.closure.indexing import FactorBatch, ScrewTable, System
+
+MARKER_A, MARKER_B, MARKER_A_INVERSE, MARKER_B_INVERSE = range(4)
+"""Order of the constant poses in ``Numbers.constants``, after the identity."""
+
+
+class Numbers:
+    """Coefficients of poses and screws of a system, from its parameters; a trailing batch axis of length 1, or one a variant."""
+
+    def __init__(self, system: System) -> None:
+        self.system = system
+        self.par = system.par
+
+    @cached_property
+    def constants(self) -> Array:
+        """Constant poses ``(3, 4, 1 + 4 P, B)``: the identity, markers A, markers B, and their inverses."""
+        A, B = self.par.marker_a, self.par.marker_b
+        batch = max(A.shape[3], B.shape[3])
+        parts = (identity(1, batch), A, B, inverse(A), inverse(B))
+        return np.concatenate([np.broadcast_to(X, (*X.shape[:3], batch)) for X in parts], axis=2)
+
+    @cached_property
+    def is_real(self) -> bool:
+        """Whether no parameter is complex."""
+        return not any(np.iscomplexobj(part) for part in (self.constants, self.par.pitch, self.par.frame))
+
+    @cached_property
+    def poses(self) -> list[Array]:
+        """For every batch of factors the coefficients of the poses of its steps with the markers beside them, seen from the nodes
+        from which the steps start (from the global frame where that is the frame link).
+
+        ``(n, 16, m)`` for one mechanism, a product of matrices; ``(16, m, n, B)`` for variants.
+        """
+        n, last = len(self.system.m.pairs), np.maximum(self.system.n_factors, 1) - 1
+        whole = homogeneous(self.constants)
+        out = []
+        for b in self.system.batches:
+            back = np.asarray(self.system.walk.back[b.steps], dtype=bool)
+            begins, ends = b.ranks == 0, b.ranks == last[b.pairs]
+            left = np.where(back, ends * (1 + MARKER_B * n + b.pairs), begins * (1 + MARKER_A * n + b.pairs))
+            right = np.where(
+                back, begins * (1 + MARKER_A_INVERSE * n + b.pairs), ends * (1 + MARKER_B_INVERSE * n + b.pairs)
+            )
+            K = b.stack.coefficients(self.par.pitch[b.pairs], back)
+            before = whole[:, :, left]
+            starts = self.system.walk.parents[b.steps] == 0
+            before[:, :, starts] = np.einsum("abt,bcnt->acnt", homogeneous(self.par.frame), before[:, :, starts])
+            C = np.einsum("abnt,bcmnt->acmnt", before, K)
+            C = np.einsum("acmnt,cdnt->admnt", C, whole[:, :, right])
+            C = C.reshape(16, *C.shape[2:])
+            out.append(np.ascontiguousarray(C[..., 0].transpose(2, 0, 1)) if C.shape[3] == 1 else C)
+        return out
+
+    @cached_property
+    def twists(self) -> Array:
+        """Twists of all freedoms in their nodes, bound and free part ``(3, 2, F, B)``; zero for those that move."""
+        s = self.system
+        batch = max(self.constants.shape[3], self.par.pitch.shape[1])
+        out = np.zeros((3, 2, s.n_freedoms, batch), dtype=np.result_type(self.constants, self.par.pitch))
+        for b in s.batches:
+            S = b.stack.constant_twists(self.par.pitch[b.pairs])
+            if S is not None:
+                self.place_twists(out, b, S)
+        return out
+
+    def place_twists(self, out: Array, b: FactorBatch, S: Array) -> None:
+        """Twists ``(6, f, n, T)`` in the frames before the factors of a batch, written into ``out (3, 2, F, T)`` in their nodes."""
+        X = self.marker_a_if_first(b)
+        for j, columns in enumerate(b.columns):
+            out[:, 0, columns] = np.einsum("ijnt,jnt->int", X[:, :3], S[:3, j])
+            out[:, 1, columns] = np.einsum("ijnt,jnt->int", X[:, :3], S[3:, j])
+            out[:, 1, columns] += cross(X[:, 3], out[:, 0, columns])
+
+    def marker_a_if_first(self, b: FactorBatch) -> Array:
+        """The frames before the factors of a batch in their nodes ``(3, 4, n, B)``: markers A before the first ones of pairs."""
+        return self.constants[:, :, np.where(b.ranks == 0, 1 + MARKER_A * len(self.system.m.pairs) + b.pairs, 0)]
+
+    @cached_property
+    def efforts(self) -> Array:
+        """The efforts of all freedoms in their nodes, force and moment ``(3, 2, F, B)``."""
+        return self._components(self.system.effort_table)
+
+    @cached_property
+    def reactions(self) -> Array:
+        """The constant reaction components in their nodes, force and moment ``(3, 2, K, B)``."""
+        return self._components(self.system.reaction_table)
+
+    def _components(self, table: ScrewTable) -> Array:
+        X = self.constants[:, :, table.const]
+        free = table.free[..., None]
+        if table.per_pitch.any():
+            free = free + table.per_pitch[..., None] * self.par.pitch[table.pairs]
+        batch = max(X.shape[3], free.shape[2])
+        out = np.empty((3, 2, X.shape[2], batch), dtype=np.result_type(X, free))
+        out[:, 0] = np.einsum("ijkt,jk->ikt", X[:, :3], table.bound)
+        out[:, 1] = np.einsum("ijkt,jkt->ikt", X[:, :3], np.broadcast_to(free, (*free.shape[:2], batch)))
+        out[:, 1] += np.where(table.at_b[:, None], 0.0, cross(X[:, 3], out[:, 0]))
+        return out
+
+    @cached_property
+    def ends(self) -> Array:
+        """Origins of the markers B in the frames of their links b, ``(3, 1, P, B)``."""
+        return self.par.marker_b[:, None, 3]
