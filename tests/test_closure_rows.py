@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass
 
+import mechanisms
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-import mechanisms
 import mechgraph as mg
 from mechgraph.closure.assembly import scaled_system
 from mechgraph.closure.indexing import System

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array, cross, homogeneous, identity, inverse
 
 if TYPE_CHECKING:
-    from mechgraph.closure.indexing import FactorBatch, ScrewTable, System
+    from mechgraph.closure.indexing import FactorBatch, ScrewTable
+    from mechgraph.closure.tree import Walk
+    from mechgraph.model.parameters import Parameters
+
+Index = NDArray[np.intp]
 
 MARKER_A, MARKER_B, MARKER_A_INVERSE, MARKER_B_INVERSE = range(4)
 """Order of the constant poses in ``Numbers.constants``, after the identity."""
@@ -19,15 +25,18 @@ MARKER_A, MARKER_B, MARKER_A_INVERSE, MARKER_B_INVERSE = range(4)
 class Numbers:
     """Coefficients of poses and screws of a system, from its parameters; a trailing batch axis of length 1, or one a variant."""
 
-    def __init__(self, system: System) -> None:
-        self.system = system
-        self.par = system.par
+    def __init__(
+        self, par: Parameters, walk: Walk, batches: Sequence[FactorBatch], n_factors: Index, n_freedoms: int
+    ) -> None:
+        self.par, self.walk, self.batches = par, walk, batches
+        self.n_factors, self.n_freedoms = n_factors, n_freedoms
+        self.n_pairs = len(n_factors)
 
     @cached_property
     def constants(self) -> Array:
         """Constant poses ``(3, 4, 1 + 4 P, B)``: the identity, markers A, markers B, and their inverses."""
         A, B = self.par.marker_a, self.par.marker_b
-        batch = max(A.shape[3], B.shape[3])
+        batch = np.broadcast_shapes(A.shape[3:], B.shape[3:])[0]
         parts = (identity(1, batch), A, B, inverse(A), inverse(B))
         return np.concatenate([np.broadcast_to(X, (*X.shape[:3], batch)) for X in parts], axis=2)
 
@@ -43,11 +52,11 @@ class Numbers:
 
         ``(n, 16, m)`` for one mechanism, a product of matrices; ``(16, m, n, B)`` for variants.
         """
-        n, last = len(self.system.m.pairs), np.maximum(self.system.n_factors, 1) - 1
+        n, last = self.n_pairs, np.maximum(self.n_factors, 1) - 1
         whole = homogeneous(self.constants)
         out = []
-        for b in self.system.batches:
-            back = np.asarray(self.system.walk.back[b.steps], dtype=bool)
+        for b in self.batches:
+            back = np.asarray(self.walk.back[b.steps], dtype=bool)
             begins, ends = b.ranks == 0, b.ranks == last[b.pairs]
             left = np.where(back, ends * (1 + MARKER_B * n + b.pairs), begins * (1 + MARKER_A * n + b.pairs))
             right = np.where(
@@ -55,7 +64,7 @@ class Numbers:
             )
             K = b.stack.coefficients(self.par.pitch[b.pairs], back)
             before = whole[:, :, left]
-            starts = self.system.walk.parents[b.steps] == 0
+            starts = self.walk.parents[b.steps] == 0
             before[:, :, starts] = np.einsum("abt,bcnt->acnt", homogeneous(self.par.frame), before[:, :, starts])
             C = np.einsum("abnt,bcmnt->acmnt", before, K)
             C = np.einsum("acmnt,cdnt->admnt", C, whole[:, :, right])
@@ -66,10 +75,9 @@ class Numbers:
     @cached_property
     def twists(self) -> Array:
         """Twists of all freedoms in their nodes, bound and free part ``(3, 2, F, B)``; zero for those that move."""
-        s = self.system
-        batch = max(self.constants.shape[3], self.par.pitch.shape[1])
-        out = np.zeros((3, 2, s.n_freedoms, batch), dtype=np.result_type(self.constants, self.par.pitch))
-        for b in s.batches:
+        batch = np.broadcast_shapes(self.constants.shape[3:], self.par.pitch.shape[1:])[0]
+        out = np.zeros((3, 2, self.n_freedoms, batch), dtype=np.result_type(self.constants, self.par.pitch))
+        for b in self.batches:
             S = b.stack.constant_twists(self.par.pitch[b.pairs])
             if S is not None:
                 self.place_twists(out, b, S)
@@ -85,24 +93,15 @@ class Numbers:
 
     def marker_a_if_first(self, b: FactorBatch) -> Array:
         """The frames before the factors of a batch in their nodes ``(3, 4, n, B)``: markers A before the first ones of pairs."""
-        return self.constants[:, :, np.where(b.ranks == 0, 1 + MARKER_A * len(self.system.m.pairs) + b.pairs, 0)]
+        return self.constants[:, :, np.where(b.ranks == 0, 1 + MARKER_A * self.n_pairs + b.pairs, 0)]
 
-    @cached_property
-    def efforts(self) -> Array:
-        """The efforts of all freedoms in their nodes, force and moment ``(3, 2, F, B)``."""
-        return self._components(self.system.effort_table)
-
-    @cached_property
-    def reactions(self) -> Array:
-        """The constant reaction components in their nodes, force and moment ``(3, 2, K, B)``."""
-        return self._components(self.system.reaction_table)
-
-    def _components(self, table: ScrewTable) -> Array:
+    def components(self, table: ScrewTable) -> Array:
+        """Wrenches of a table in their nodes, force and moment ``(3, 2, K, B)``; without arms where they act at markers B."""
         X = self.constants[:, :, table.const]
         free = table.free[..., None]
         if table.per_pitch.any():
             free = free + table.per_pitch[..., None] * self.par.pitch[table.pairs]
-        batch = max(X.shape[3], free.shape[2])
+        batch = np.broadcast_shapes(X.shape[3:], free.shape[2:])[0]
         out = np.empty((3, 2, X.shape[2], batch), dtype=np.result_type(X, free))
         out[:, 0] = np.einsum("ijkt,jk->ikt", X[:, :3], table.bound)
         out[:, 1] = np.einsum("ijkt,jkt->ikt", X[:, :3], np.broadcast_to(free, (*free.shape[:2], batch)))

@@ -149,7 +149,7 @@ class Configuration:
     def E(self) -> Array:
         """Effort wrenches of all freedoms ``(6, F, T)``."""
         s = self.system
-        out = self._wrenches(s.effort_table, s.numbers.efforts)
+        out = self._wrenches(s.effort_table, s.effort_numbers)
         for g in s.groups:
             if g.row.computed_efforts:
                 out[:, g.columns] = evaluation.dual(out[:, g.columns], self.S[:, g.columns])
@@ -159,7 +159,7 @@ class Configuration:
     def W(self) -> list[Array]:
         """For every group the reaction wrenches ``(6, 6 - f, n, T)``."""
         s = self.system
-        whole = self._wrenches(s.reaction_table, s.numbers.reactions)
+        whole = self._wrenches(s.reaction_table, s.reaction_numbers)
         out, at = [], 0
         for number, g in enumerate(s.groups):
             if g.row.reactions is None:

@@ -340,13 +340,23 @@ class System:
     @cached_property
     def numbers(self) -> Numbers:
         """What follows from the parameters."""
-        return Numbers(self)
+        return Numbers(self.par, self.walk, self.batches, self.n_factors, self.n_freedoms)
+
+    @cached_property
+    def effort_numbers(self) -> Array:
+        """The efforts of all freedoms in their nodes, force and moment ``(3, 2, F, B)``."""
+        return self.numbers.components(self.effort_table)
+
+    @cached_property
+    def reaction_numbers(self) -> Array:
+        """The constant reaction components in their nodes, force and moment ``(3, 2, K, B)``."""
+        return self.numbers.components(self.reaction_table)
 
     def with_parameters(self, par: Parameters) -> System:
         """The same graph with other numbers."""
         out = copy(self)
         out.par = par
-        for name in ("numbers", "rows", "row_scale"):
+        for name in ("numbers", "effort_numbers", "reaction_numbers", "rows", "row_scale"):
             vars(out).pop(name, None)
         if par.L != self.par.L and any(g.row.has_lengths for g in self.groups):
             rows = [self.m.pairs[int(g.pairs[0])].type.scaled(par.L) for g in self.groups]

@@ -6,13 +6,13 @@ a factor whose twist moves with its coordinate (a frame along a curve) to everyt
 
 from dataclasses import dataclass, replace
 
+import mechanisms
 import numpy as np
 import pytest
+import strategies
 from numpy.testing import assert_allclose
 
-import mechanisms
 import mechgraph as mg
-import strategies
 from mechgraph.algebra import se3
 from mechgraph.closure import tree
 from mechgraph.closure.assembly import close, scaled_system
