@@ -37,8 +37,9 @@ class Numbers:
         """Constant poses ``(3, 4, 1 + 4 P, B)``: the identity, markers A, markers B, and their inverses."""
         A, B = self.par.marker_a, self.par.marker_b
         batch = np.broadcast_shapes(A.shape[3:], B.shape[3:])[0]
-        parts = (identity(1, batch), A, B, inverse(A), inverse(B))
-        return np.concatenate([np.broadcast_to(X, (*X.shape[:3], batch)) for X in parts], axis=2)
+        markers = np.empty((3, 4, 2 * self.n_pairs, batch), dtype=np.result_type(A, B))
+        markers[:, :, : self.n_pairs], markers[:, :, self.n_pairs :] = A, B
+        return np.concatenate([identity(1, batch), markers, inverse(markers)], axis=2)
 
     @cached_property
     def is_real(self) -> bool:

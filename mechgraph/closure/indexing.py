@@ -25,7 +25,7 @@ from mechgraph.closure.tree import Ranks, Tree, Walk, ranked
 from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.model.factors import Factor, FixedStack, Stack
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair_type import PairType
+from mechgraph.model.pair_type import Component, PairType
 from mechgraph.model.parameters import Parameters, parameters
 from mechgraph.numerics.linear import Place, compact
 from mechgraph.topology.linkgraph import LinkGraph, link_graph
@@ -258,20 +258,20 @@ class System:
         """Constant reaction components, group by group, component by component."""
         return self._screw_table([(g, c) for g in self.groups for c in g.row.reactions or ()])
 
-    def _screw_table(self, parts: Sequence[tuple[Group, Any]]) -> ScrewTable:
-        columns = []
+    def _screw_table(self, parts: Sequence[tuple[Group, Component]]) -> ScrewTable:
+        """The components of groups, one after the other, each for all pairs of its group."""
+        counts = [len(g.pairs) for g, _ in parts]
+        places: dict[tuple[int, int], tuple[Index, Index]] = {}
         for g, c in parts:
-            n = len(g.pairs)
-            nodes, const = self.frame_place(g, c.frame)
-            vectors = [
-                np.repeat(np.array(v)[:, None], n, axis=1) for v in (c.wrench[3:], c.wrench[:3], c.per_pitch[:3])
-            ]
-            columns.append((*vectors, g.pairs, nodes, const, np.full(n, c.at_b)))
-        if not columns:
-            nothing = np.zeros(0, dtype=np.intp)
-            vector = np.zeros((3, 0))
-            return ScrewTable(vector, vector, vector, nothing, nothing, nothing, nothing.astype(bool))
-        return ScrewTable(*(np.concatenate(part, axis=-1) for part in zip(*columns, strict=True)))
+            if (id(g), c.frame) not in places:
+                places[id(g), c.frame] = self.frame_place(g, c.frame)
+        wrenches = np.array([(*c.wrench, *c.per_pitch) for _, c in parts]).reshape(len(parts), 12).T
+        vectors = np.repeat(wrenches, counts, axis=1)
+        at_b = np.repeat(np.array([c.at_b for _, c in parts], dtype=bool), counts)
+        nothing = [np.zeros(0, dtype=np.intp)]
+        pairs = np.concatenate([g.pairs for g, _ in parts] or nothing)
+        nodes, const = (np.concatenate([places[id(g), c.frame][side] for g, c in parts] or nothing) for side in (0, 1))
+        return ScrewTable(vectors[3:6], vectors[:3], vectors[6:9], pairs, nodes, const, at_b)
 
     # --- loops -------------------------------------------------------------------------------------------------------
 
@@ -458,11 +458,32 @@ class System:
         return Configuration(self, x)
 
 
+GRAPH_ONLY = (
+    "owners",
+    "pair_ranks",
+    "factor_ranks",
+    "factors_by_pair",
+    "factor_carriers",
+    "moving_batches",
+    "chord_nodes",
+    "column_nodes",
+    "single_rows",
+    "_singles",
+    "_rotations",
+    "effort_table",
+    "reaction_table",
+)
+"""What is made when first asked for and does not depend on numbers."""
+FEW_LOOPS_ONLY = ("loop_columns", "loop_matrix", "loop_pieces", "loops_of_chords")
+"""The same where it is used for few loops only."""
+
+
 def _indices(m: Mechanism) -> dict[str, Any]:
     """What a system knows of links, pairs and frame alone."""
     made = System(m, couplings=())
-    ready = {"numbers": made.numbers}
-    return {**ready, **{name: value for name, value in vars(made).items() if name not in ("m", "couplings")}}
+    for name in ("numbers", *GRAPH_ONLY, *(() if made.many_loops else FEW_LOOPS_ONLY)):
+        getattr(made, name)
+    return {name: value for name, value in vars(made).items() if name not in ("m", "couplings")}
 
 
 def indexed(m: Mechanism) -> System:
