@@ -97,16 +97,16 @@ class Numbers:
         return self.constants[:, :, np.where(b.ranks == 0, 1 + MARKER_A * self.n_pairs + b.pairs, 0)]
 
     def components(self, table: ScrewTable) -> Array:
-        """Wrenches of a table in their nodes, force and moment ``(3, 2, K, B)``; without arms where they act at markers B."""
+        """Wrenches of a table in their nodes, moment and force ``(3, 2, K, B)``; without arms where they act at markers B."""
         X = self.constants[:, :, table.const]
         free = table.free[..., None]
         if table.per_pitch.any():
             free = free + table.per_pitch[..., None] * self.par.pitch[table.pairs]
         batch = np.broadcast_shapes(X.shape[3:], free.shape[2:])[0]
         out = np.empty((3, 2, X.shape[2], batch), dtype=np.result_type(X, free))
-        out[:, 0] = np.einsum("ijkt,jk->ikt", X[:, :3], table.bound)
-        out[:, 1] = np.einsum("ijkt,jkt->ikt", X[:, :3], np.broadcast_to(free, (*free.shape[:2], batch)))
-        out[:, 1] += np.where(table.at_b[:, None], 0.0, cross(X[:, 3], out[:, 0]))
+        out[:, 0] = np.einsum("ijkt,jkt->ikt", X[:, :3], np.broadcast_to(free, (*free.shape[:2], batch)))
+        out[:, 1] = np.einsum("ijkt,jk->ikt", X[:, :3], table.bound)
+        out[:, 0] += np.where(table.at_b[:, None], 0.0, cross(X[:, 3], out[:, 1]))
         return out
 
     @cached_property

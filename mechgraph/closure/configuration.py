@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 Index = NDArray[np.intp]
 
-
 Value = TypeVar("Value")
 
 
@@ -115,24 +114,24 @@ class Configuration:
 
     # --- screws ------------------------------------------------------------------------------------------------------
 
-    def _placed(self, local: Array, X: Array) -> tuple[Array, Array]:
-        """Bound and free parts of screws, ``(3, 2, K, B)`` in frames of poses ``X (3, 4, K, T)``, turned outwards: ``(2, 3, K, T)``.
+    def _screws(self, local: Array, nodes: Index, bound: int, points: Array | None = None) -> Array:
+        """Screws in the outer frame ``(6, K, T)`` from their parts in nodes, ``(3, 2, K, B)``.
 
-        Returns them and the origins of the frames ``(3, K, T)``; the moments of the bound parts are still to be added.
+        Part ``bound`` (0 in a twist, 1 in a wrench) has a line through the origins of the nodes, or through ``points (3, K, T)``
+        where given: ``(R line, R free + p x R line)``.
         """
-        dtype = X.dtype if local.dtype == float else np.result_type(local, X)
-        out = np.empty((2, 3, *X.shape[2:]), dtype=dtype)
+        K, dtype = len(nodes), self._nodes.dtype if local.dtype == float else np.result_type(local, self._nodes)
+        out = np.empty((2, 3, K, self.T), dtype=dtype)
+        X = self._nodes.take(nodes, axis=2)
         multiplied(X[:, :3], local, out=out.swapaxes(0, 1))
-        return out, X[:, 3]
+        out[1 - bound] += cross(X[:, 3] if points is None else points, out[bound])
+        return out.reshape(6, K, self.T)
 
     @kept
     def S(self) -> Array:
         """Twists of all freedoms ``(6, F, T)``."""
         s = self.system
-        local = self._local_twists if s.moving_batches else s.numbers.twists
-        out, origins = self._placed(local, self._nodes.take(s.column_nodes, axis=2))
-        out[1] += cross(origins, out[0])
-        return out.reshape(6, s.n_freedoms, self.T)
+        return self._screws(self._local_twists if s.moving_batches else s.numbers.twists, s.column_nodes, 0)
 
     @kept
     def _local_twists(self) -> Array:
@@ -172,15 +171,13 @@ class Configuration:
 
     def _wrenches(self, table: ScrewTable, local: Array) -> Array:
         """Wrenches ``(6, K, T)`` of components, moment first."""
-        placed, origins = self._placed(local, self._nodes.take(table.nodes, axis=2))
-        if table.b_places.size == len(table.nodes):
-            origins = self.pair_points.take(table.pairs, axis=1)
-        else:
-            origins[:, table.b_places] = self.pair_points.take(table.pairs[table.b_places], axis=1)
-        out = np.empty_like(placed)
-        out[0], out[1] = placed[1], placed[0]
-        out[0] += cross(origins, placed[0])
-        return out.reshape(6, *out.shape[2:])
+        if not table.b_places.size:
+            return self._screws(local, table.nodes, 1)
+        points = self.pair_points.take(table.pairs, axis=1)
+        if table.b_places.size < len(table.nodes):
+            own = np.flatnonzero(~table.at_b)
+            points[:, own] = self._nodes[:, 3].take(table.nodes[own], axis=1)
+        return self._screws(local, table.nodes, 1, points)
 
     @kept
     def lee_screws(self) -> tuple[tuple[Array, ...], tuple[Array, ...]]:

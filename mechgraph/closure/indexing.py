@@ -344,12 +344,12 @@ class System:
 
     @cached_property
     def effort_numbers(self) -> Array:
-        """The efforts of all freedoms in their nodes, force and moment ``(3, 2, F, B)``."""
+        """The efforts of all freedoms in their nodes, moment and force ``(3, 2, F, B)``."""
         return self.numbers.components(self.effort_table)
 
     @cached_property
     def reaction_numbers(self) -> Array:
-        """The constant reaction components in their nodes, force and moment ``(3, 2, K, B)``."""
+        """The constant reaction components in their nodes, moment and force ``(3, 2, K, B)``."""
         return self.numbers.components(self.reaction_table)
 
     def with_parameters(self, par: Parameters) -> System:
