@@ -47,31 +47,39 @@ class Numbers:
         return not any(np.iscomplexobj(part) for part in (self.constants, self.par.pitch, self.par.frame))
 
     @cached_property
-    def poses(self) -> list[Array]:
+    def poses(self) -> list[tuple[Array, tuple[Array, Array] | None]]:
         """For every batch of factors the coefficients of the poses of its steps with the markers beside them, seen from the nodes
         from which the steps start (from the global frame where that is the frame link).
 
-        ``(n, 16, m)`` for one mechanism, a product of matrices; ``(16, m, n, B)`` for variants.
+        For one mechanism the markers are part of the coefficients, ``(n, 16, m)`` for a product of matrices. For variants, of
+        which each has few positions, they stay beside them, ``(4, 4, n, B)``, and where pitches vary coefficients are
+        ``(16, m, n, B)``.
         """
-        n, last = self.n_pairs, np.maximum(self.n_factors, 1) - 1
-        whole = homogeneous(self.constants)
-        out = []
+        out: list[tuple[Array, tuple[Array, Array] | None]] = []
         for b in self.batches:
-            back = np.asarray(self.walk.back[b.steps], dtype=bool)
-            begins, ends = b.ranks == 0, b.ranks == last[b.pairs]
-            left = np.where(back, ends * (1 + MARKER_B * n + b.pairs), begins * (1 + MARKER_A * n + b.pairs))
-            right = np.where(
-                back, begins * (1 + MARKER_A_INVERSE * n + b.pairs), ends * (1 + MARKER_B_INVERSE * n + b.pairs)
-            )
-            K = b.stack.coefficients(self.par.pitch[b.pairs], back)
-            before = whole[:, :, left]
-            starts = self.walk.parents[b.steps] == 0
-            before[:, :, starts] = np.einsum("abt,bcnt->acnt", homogeneous(self.par.frame), before[:, :, starts])
-            C = np.einsum("abnt,bcmnt->acmnt", before, K)
-            C = np.einsum("acmnt,cdnt->admnt", C, whole[:, :, right])
+            C = b.stack.coefficients(self.par.pitch[b.pairs], np.asarray(self.walk.back[b.steps], dtype=bool))
+            left, right = self._beside(b)
+            alone = left.shape[3] == 1 and C.shape[4] == 1
+            if alone:
+                C = np.einsum("abnt,bcmnt->acmnt", left, C)
+                C = np.einsum("acmnt,cdnt->admnt", C, right)
             C = C.reshape(16, *C.shape[2:])
-            out.append(np.ascontiguousarray(C[..., 0].transpose(2, 0, 1)) if C.shape[3] == 1 else C)
+            C = np.ascontiguousarray(C[..., 0].transpose(2, 0, 1)) if C.shape[3] == 1 else C
+            out.append((C, None if alone else (left, right)))
         return out
+
+    def _beside(self, b: FactorBatch) -> tuple[Array, Array]:
+        """Constant poses before and behind the factors of a batch in the sense of the walk, homogeneous ``(4, 4, n, B)``."""
+        n, last = self.n_pairs, np.maximum(self.n_factors, 1) - 1
+        back, begins, ends = self.walk.back[b.steps], b.ranks == 0, b.ranks == last[b.pairs]
+        left = np.where(back, ends * (1 + MARKER_B * n + b.pairs), begins * (1 + MARKER_A * n + b.pairs))
+        right = np.where(
+            back, begins * (1 + MARKER_A_INVERSE * n + b.pairs), ends * (1 + MARKER_B_INVERSE * n + b.pairs)
+        )
+        before, behind = (homogeneous(self.constants[:, :, side]) for side in (left, right))
+        starts = self.walk.parents[b.steps] == 0
+        before[:, :, starts] = np.einsum("abt,bcnt->acnt", homogeneous(self.par.frame), before[:, :, starts])
+        return before, behind
 
     @cached_property
     def twists(self) -> Array:
