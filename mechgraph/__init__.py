@@ -23,7 +23,8 @@ from mechgraph.model.load import Effort, Gravity, Spring, TorsionSpring, Wrench
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.model.pair import Marker, Pair
-from mechgraph.model.pair_type import Bookkeeping, Component, Freedom, PairType, pair_types
+from mechgraph.model.pair_table import pair_types
+from mechgraph.model.pair_type import Bookkeeping, Component, Freedom, PairType
 from mechgraph.model.toml import load, save
 from mechgraph.report.report import DeterminacyReport, check
 from mechgraph.result.solution import Solution

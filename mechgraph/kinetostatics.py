@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import CLOSED, assembled_at, closed_start, named_columns, state_rows
-from mechgraph.closure.configuration import Configuration, Index, System
+from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.closure.driver_path import DriverPath, Positions, Request, Status, follow, in_blocks
+from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.passive_rest import unspun
 from mechgraph.closure.rates import Rates, distance_to_dead_point, rates
 from mechgraph.closure.solver import ClosureSolver, FactoredClosure, closure_solver

@@ -246,16 +246,14 @@ def test_deep_trees_by_pointer_doubling(monkeypatch: pytest.MonkeyPatch) -> None
     system, _ = assembled(m)
     rng = np.random.default_rng(4)
     n, P = len(m.links), len(m.pairs)
-    relative = system.at(system.state_of(rng.uniform(-1, 1, (system.n_freedoms, 2)))).poses[:, :, :1].repeat(P, axis=2)
-    relative[:, 3] += rng.normal(size=(3, P, 2))
+    x = system.state_of(rng.uniform(-1, 1, (system.n_freedoms, 2)))
     terms, loads = rng.normal(size=(6, P, 2)), rng.normal(size=(6, n, 2))
-    frame = system.par.frame
-    shallow = Tree(link_graph(m))
+    shallow, poses = Tree(link_graph(m)), system.at(x).poses
     monkeypatch.setattr(tree, "DEEP", 0)
     deep = Tree(link_graph(m))
     assert deep.deep
     assert not shallow.deep
-    assert_allclose(deep.poses(relative, frame), shallow.poses(relative, frame), atol=1e-11)
+    assert_allclose(system.at(x).poses, poses, atol=1e-11)
     assert_allclose(deep.sums(terms), shallow.sums(terms), atol=1e-11)
     assert_allclose(deep.carried(loads), shallow.carried(loads), atol=1e-11)
 

@@ -5,8 +5,8 @@ import pytest
 
 import mechgraph as mg
 from mechgraph.closure.assembly import assembled, named_columns, scaled_system
-from mechgraph.closure.configuration import System
 from mechgraph.closure.driver_path import Status
+from mechgraph.closure.indexing import System
 from mechgraph.closure.path import Follower
 from mechgraph.topology.linkgraph import link_graph
 

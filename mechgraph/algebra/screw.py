@@ -6,8 +6,6 @@ the origin. Power is the plain product ``w . M + v . F``: no swap matrix.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, cross, rotate
@@ -25,34 +23,19 @@ def move_wrench(X: Array, f: Array) -> Array:
     return np.concatenate([rotate(X[:, :3], f[:3]) + cross(X[:, 3], force), force])
 
 
-def direction(column: Callable[[int], Array], v: Sequence[float]) -> Array | None:
-    """``R v`` for a constant ``v`` with few nonzero parts, ``R`` by its columns; None where ``v`` is zero."""
-    parts = [column(i) if c == 1.0 else c * column(i) for i, c in enumerate(v) if c != 0.0]
-    return sum(parts[1:], start=parts[0]) if parts else None
-
-
-def moved_screw(column: Callable[[int], Array], free: Sequence[float], line: Sequence[float]) -> tuple[Array, Array]:
-    """Directions and moments of a constant screw moved by a pose that is given by its columns.
+def move_constant(X: Array, free: Array, line: Array, at: Array | None = None) -> tuple[Array, Array]:
+    """Direction and moment of a constant screw ``(3,)`` turned by a pose ``X (3, 4, ...)``, its line through ``at (3, ...)``.
 
     A screw has a bound part ``line`` (a rotation or a force) and a free part (a translation or a couple). Returns
-    ``(R line, R free + p x R line)``, the bound and the free part in the outer frame; only the columns needed are asked for.
+    ``(R line, R free + at x R line)``, the bound and the free part in the outer frame; ``at`` is the origin of ``X`` unless given.
     """
-    bound, loose = direction(column, line), direction(column, free)
-    if bound is None:
-        like = column(3) if loose is None else loose
-        return np.zeros_like(like), like * 0.0 if loose is None else loose
-    moment = cross(column(3), bound)
-    return bound, moment if loose is None else moment + loose
-
-
-def move_constant(X: Array, free: Array, line: Array) -> tuple[Array, Array]:
-    """``moved_screw`` for a pose ``X (3, 4, ...)``."""
-    return moved_screw(lambda i: X[:, i], free.tolist(), line.tolist())
+    bound, loose = (np.einsum("ij...,j->i...", X[:, :3], part) for part in (line, free))
+    return bound, loose + cross(X[:, 3] if at is None else at, bound)
 
 
 def cross_twist(V: Array, S: Array) -> Array:
     """Rate of a twist ``S`` that moves with a body of twist ``V``: ``ad(V) S = (w x s_w, w x s_v + v x s_w)``."""
-    out = np.empty(np.broadcast_shapes(V.shape, S.shape))
+    out = np.empty(np.broadcast_shapes(V.shape, S.shape), dtype=np.result_type(V, S))
     cross(V[:3], S[:3], out[:3])
     cross(V[:3], S[3:], out[3:])
     out[3:] += cross(V[3:], S[:3])

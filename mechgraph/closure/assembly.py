@@ -7,7 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, rotate
-from mechgraph.closure.configuration import Configuration, Index, System, indexed
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import Index, System, indexed
 from mechgraph.errors import AssemblyError, DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.numeric import is_numeric

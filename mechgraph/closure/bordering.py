@@ -24,7 +24,8 @@ import scipy
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array, cross
-from mechgraph.closure.configuration import Configuration, Index
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import Index
 from mechgraph.numerics.sparse import Pattern, SparseFactor
 from mechgraph.topology.linkgraph import LinkGraph
 

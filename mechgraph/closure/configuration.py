@@ -1,246 +1,43 @@
-"""A mechanism made ready for evaluation: index arrays from the graph, numbers from the parameters, one batched kernel.
+"""One batched kernel: poses, twists, wrenches and closure of a mechanism at given states.
 
 Everything here is internal: lengths over L, positions about the internal origin (see ``model.parameters``), component axes
-first and positions last. ``S`` are the twists of all freedoms about the internal origin, one column a freedom.
+first and positions last. ``S`` are the twists of all freedoms about the internal origin, one column a freedom. Results have the
+type of the numbers that come in, real or complex.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from copy import copy
-from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.algebra.screw import cross_twist
-from mechgraph.algebra.se3 import Array, compose, cross, inverse, pose_log
-from mechgraph.closure.tree import Tree
+from mechgraph.algebra.screw import cross_twist, move_twist
+from mechgraph.algebra.se3 import Array, compose, cross, finite_twist, multiplied
+from mechgraph.closure.tree import run_sums
 from mechgraph.model import pair_kinematics as evaluation
-from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair_frames import (
-    Factor,
-    Frame,
-    displaced,
-    factor_values,
-    factors_between,
-    frames_along,
-    moved_marker,
-)
-from mechgraph.model.pair_type import PairType
-from mechgraph.model.parameters import Parameters, parameters
-from mechgraph.numerics.linear import Place, compact
-from mechgraph.topology.linkgraph import LinkGraph, link_graph
+
+if TYPE_CHECKING:
+    from mechgraph.closure.indexing import ScrewTable, System
 
 Index = NDArray[np.intp]
 
-MANY_LOOPS = 16
-"""Loops above which the loop matrix is applied as a sparse one (measured: from here on it is the faster one)."""
+Value = TypeVar("Value")
 
 
-@dataclass(frozen=True)
-class Group:
-    """The pairs of one type: their indices, the columns of their freedoms ``(f, n)`` and rows of their state ``(nx, n)``."""
+class kept(Generic[Value]):
+    """A ``cached_property`` without its lock, which takes longer than the arithmetic of one position."""
 
-    row: PairType
-    pairs: Index
-    columns: Index
-    state_rows: Index
+    def __init__(self, make: Callable[[Any], Value]) -> None:
+        self.make, self.__doc__ = make, make.__doc__
 
-    @cached_property
-    def at_pairs(self) -> Place:
-        """The pairs, as a slice where that can be."""
-        return compact(self.pairs)
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
 
-    @cached_property
-    def at_columns(self) -> list[Place]:
-        """The columns of every freedom, as slices where that can be."""
-        return [compact(columns) for columns in self.columns]
-
-
-class System:
-    """A mechanism with geometry, indexed for the kernels."""
-
-    def __init__(self, m: Mechanism, graph: LinkGraph | None = None, par: Parameters | None = None) -> None:
-        self.m = m
-        self.graph = graph or m.once(link_graph)
-        self.par = par or m.once(parameters)
-        self.first_column = np.concatenate([[0], np.cumsum([p.type.f for p in m.pairs])]).astype(np.intp)
-        self.first_row = np.concatenate([[0], np.cumsum([p.type.nx for p in m.pairs])]).astype(np.intp)
-        self.n_freedoms, self.n_state = int(self.first_column[-1]), int(self.first_row[-1])
-        self.a = np.array([a for a, _ in self.graph.ends], dtype=np.intp)
-        self.b = np.array([b for _, b in self.graph.ends], dtype=np.intp)
-        self.chords = np.array(self.graph.chords, dtype=np.intp)
-        self.groups = self._group_pairs()
-        self.tree = Tree(self.graph)
-        self.marker_b_inverse = inverse(self.par.marker_b)
-        self.is_length = np.zeros(self.n_freedoms, dtype=bool)
-        for g in self.groups:
-            self.is_length[g.columns] = np.array([not f.turns for f in g.row.freedoms], dtype=bool)[:, None]
-
-    @cached_property
-    def factors(self) -> list[list[Factor]]:
-        """For every group the factors of its relative poses between the link frames."""
-        par = self.par
-        return [
-            factors_between(
-                g.row, par.pitch[g.pairs], par.marker_a[:, :, g.pairs], self.marker_b_inverse[:, :, g.pairs]
-            )
-            for g in self.groups
-        ]
-
-    def weld(self, g: Group) -> Array:
-        """Constant relative poses of pairs without freedom, ``(3, 4, n, 1)``."""
-        return compose(self.par.marker_a[:, :, g.pairs], self.marker_b_inverse[:, :, g.pairs])
-
-    @cached_property
-    def owners(self) -> Place:
-        """For every freedom its pair."""
-        return compact(np.repeat(np.arange(len(self.m.pairs)), np.diff(self.first_column)))
-
-    @cached_property
-    def carriers(self) -> list[Place]:
-        """For every group the links a of its pairs."""
-        return [compact(self.a[g.pairs]) for g in self.groups]
-
-    @cached_property
-    def chord_ends(self) -> tuple[Place, Place]:
-        """Links a and b of the chords."""
-        return compact(self.a[self.chords]), compact(self.b[self.chords])
-
-    def with_parameters(self, par: Parameters) -> System:
-        """The same graph with other numbers."""
-        out = copy(self)
-        out.__dict__.pop("factors", None)
-        out.par, out.marker_b_inverse = par, inverse(par.marker_b)
-        rows = [self.m.pairs[int(g.pairs[0])].type.scaled(par.L) for g in self.groups]
-        out.groups = [replace(g, row=row) for g, row in zip(self.groups, rows, strict=True)]
-        return out
-
-    @cached_property
-    def loop_columns(self) -> list[tuple[Index, Array]]:
-        """Columns of the freedoms along every loop, and their signs."""
-        return [self._columns_of_loop(loop) for loop in self.graph.loops]
-
-    def _group_pairs(self) -> list[Group]:
-        same: dict[int, list[int]] = {}
-        for k, pair in enumerate(self.m.pairs):
-            same.setdefault(id(pair.type), []).append(k)
-        by_type: dict[PairType, list[int]] = {}
-        for pairs in same.values():
-            by_type.setdefault(self.m.pairs[pairs[0]].type, []).extend(pairs)
-        groups = []
-        for row, pairs in by_type.items():
-            index = np.array(sorted(pairs), dtype=np.intp)
-            columns = self.first_column[index] + np.arange(row.f, dtype=np.intp)[:, None]
-            state = self.first_row[index] + np.arange(row.nx, dtype=np.intp)[:, None]
-            groups.append(Group(row.scaled(self.par.L), index, columns, state))
-        return groups
-
-    @cached_property
-    def _group_of(self) -> Index:
-        out = np.empty(len(self.m.pairs), dtype=np.intp)
-        for number, g in enumerate(self.groups):
-            out[g.pairs] = number
-        return out
-
-    def place_of(self, pair: int) -> tuple[int, int]:
-        """Number of the group of a pair, and its place there."""
-        number = int(self._group_of[pair])
-        return number, int(np.searchsorted(self.groups[number].pairs, pair))
-
-    def _columns_of_loop(self, loop: tuple[tuple[int, int], ...]) -> tuple[Index, Array]:
-        columns = [np.arange(self.first_column[k], self.first_column[k + 1]) for k, _ in loop]
-        signs = [np.full(len(c), float(sign)) for c, (_, sign) in zip(columns, loop, strict=True)]
-        return np.concatenate(columns), np.concatenate(signs)
-
-    @property
-    def many_loops(self) -> bool:
-        """Whether sums along loops are taken with the sparse loop matrix."""
-        return len(self.graph.loops) > MANY_LOOPS
-
-    @cached_property
-    def loop_pieces(self) -> list[list[tuple[slice, Array]]]:
-        """For every loop the runs of its columns without a gap, with their signs ``(n, 1)``."""
-        out = []
-        for columns, signs in self.loop_columns:
-            order = np.argsort(columns)
-            breaks = np.flatnonzero(np.diff(columns[order]) != 1) + 1
-            runs = zip(np.split(columns[order], breaks), np.split(signs[order], breaks), strict=True)
-            out.append([(slice(int(c[0]), int(c[-1]) + 1), sign[:, None]) for c, sign in runs if len(c)])
-        return out
-
-    @cached_property
-    def loops_of_chords(self) -> Array:
-        """Which chord closures make up a loop, ``(loops, chords)`` with signs."""
-        return self.graph.loop_matrix[:, self.chords]
-
-    # --- state numbers -----------------------------------------------------------------------------------------------
-
-    def state_of(self, coordinates: Array) -> Array:
-        """State ``(nx, T)`` from user coordinates ``(F, T)`` (lengths in the user's units)."""
-        q = np.where(self.is_length[:, None], coordinates / self.par.L, coordinates)
-        x = np.empty((self.n_state, q.shape[1]))
-        for g in self.groups:
-            x[g.state_rows] = evaluation.coordinates_to_state(g.row, q[g.columns])
-        return x
-
-    def coordinates_of(self, x: Array, start: Array | None = None) -> Array:
-        """User coordinates ``(F, ..., T)`` of states ``(nx, ..., T)``; rotation vectors continued along the last axis."""
-        q = np.empty((self.n_freedoms, *x.shape[1:]))
-        for g in self.groups:
-            near = None if start is None else start[g.columns]
-            q[g.columns] = evaluation.state_to_coordinates(g.row, x[g.state_rows], near)
-        q[self.is_length] *= self.par.L
-        return q
-
-    def start_coordinates(self, start: Mapping[str, float]) -> Array:
-        """User coordinates ``(F,)`` from a mapping freedom -> value, zero elsewhere."""
-        q = np.zeros(self.n_freedoms)
-        for name, value in start.items():
-            k, j = self.m.freedom(name)
-            q[self.first_column[k] + j] = value
-        return q
-
-    def advance(self, x: Array, dq: Array) -> Array:
-        """States after increments ``dq (F, ...)``."""
-        out = np.empty((self.n_state, *np.broadcast_shapes(x.shape[1:], dq.shape[1:])))
-        for g in self.groups:
-            out[g.state_rows] = evaluation.advance(g.row, x[g.state_rows], dq[g.columns])
-        return out
-
-    def difference(self, x1: Array, x0: Array) -> Array:
-        """Increments ``(F, ...)`` from ``x0`` to ``x1``."""
-        out = np.empty((self.n_freedoms, *np.broadcast_shapes(x1.shape[1:], x0.shape[1:])))
-        for g in self.groups:
-            out[g.columns] = evaluation.difference(g.row, x1[g.state_rows], x0[g.state_rows])
-        return out
-
-    def tangent(self, dq: Array, rates: Array) -> Array:
-        """Rates of increments ``dq (F, ...)`` at the state that they lead to, from the rates of the freedoms there."""
-        out = np.empty_like(rates)
-        for g in self.groups:
-            out[g.columns] = evaluation.tangent(g.row, dq[g.columns], rates[g.columns])
-        return out
-
-    def at(self, x: Array) -> Configuration:
-        """Evaluate states ``(nx, T)``."""
-        return Configuration(self, x)
-
-
-def _indices(m: Mechanism) -> dict[str, Any]:
-    """What a system knows of links, pairs and frame alone."""
-    made = System(m)
-    return {"factors": made.factors, **{name: value for name, value in vars(made).items() if name != "m"}}
-
-
-def indexed(m: Mechanism) -> System:
-    """The system of a mechanism with its declared numbers; what follows from links, pairs and frame is worked out once."""
-    out = System.__new__(System)
-    vars(out).update(m.once(_indices), m=m)
-    return out
+    def __get__(self, instance: Any, owner: type) -> Value:
+        value = instance.__dict__[self.name] = self.make(instance)
+        return value
 
 
 class Configuration:
@@ -251,100 +48,143 @@ class Configuration:
         self.x = x
         self.T = x.shape[1]
 
-    @cached_property
-    def _values(self) -> list[list[list[Array]]]:
-        """For every group the values of the factors of its displacements."""
-        s = self.system
-        return [
-            factor_values(g.row, factors, self.x[g.state_rows]) for g, factors in zip(s.groups, s.factors, strict=True)
-        ]
-
-    @cached_property
-    def _placed(self) -> tuple[Array, Array]:
-        """Poses of all links ``(3, 4, N, T)``, and of b seen from a at the chords ``(3, 4, chords, T)``."""
-        s = self.system
-        relative = np.empty((3, 4, len(s.m.pairs), self.T))
-        for g, factors, values in zip(s.groups, s.factors, self._values, strict=True):
-            relative[:, :, g.at_pairs] = displaced(factors, values) if factors else s.weld(g)
-        chords = relative[:, :, s.chords]
-        return s.tree.poses(relative, s.par.frame), chords
-
-    @property
-    def poses(self) -> Array:
-        """Poses of all links ``(3, 4, N, T)``."""
-        return self._placed[0]
-
-    def forget(self) -> None:
-        """Give back all memory but that of the states; what is asked for again is computed again."""
-        for name, value in vars(type(self)).items():
-            if isinstance(value, cached_property):
-                self.__dict__.pop(name, None)
-
-    @cached_property
-    def _columns(self) -> list[list[Frame]]:
-        """For every group the pair frames 0, 1, ..., by columns."""
-        s = self.system
-        out = []
-        for g, factors, values, links in zip(s.groups, s.factors, self._values, s.carriers, strict=True):
-            base = moved_marker(self.poses[:, :, links], s.par.marker_a[:, :, g.at_pairs])
-            out.append(frames_along(g.row, factors, values, base))
-        return out
-
     def part(self, at: Index) -> Configuration:
         """Some of the positions, evaluated by themselves."""
         par = self.system.par
         system = self.system if par.batch == 1 else self.system.with_parameters(par.taken(at))
         return Configuration(system, self.x[:, at])
 
-    @cached_property
-    def frames(self) -> list[list[Array]]:
-        """For every group the pair frames 0, 1, ... about the internal origin."""
-        return [
-            [whole[id(X)] for X in group]
-            for group in self._columns
-            for whole in [{id(X): np.stack([X.column(i) for i in range(4)], axis=1) for X in group}]
-        ]
+    def forget(self) -> None:
+        """Give back all memory but that of the states; what is asked for again is computed again."""
+        for name, value in vars(type(self)).items():
+            if isinstance(value, kept):
+                self.__dict__.pop(name, None)
 
-    @cached_property
+    # --- poses -------------------------------------------------------------------------------------------------------
+
+    @kept
+    def _steps(self) -> Array:
+        """Poses of all factors with the markers beside them, in the sense of the walk: homogeneous, ``(4, 4, steps, T)``."""
+        s = self.system
+        dtype = self.x.dtype if s.numbers.is_real else complex
+        out = np.empty((16, len(s.walk.parents), self.T), dtype=dtype)
+        for b, (C, beside) in zip(s.batches, s.numbers.poses, strict=True):
+            values = b.stack.values(self.x.take(b.state_rows, axis=0))
+            if beside is None and isinstance(b.at_steps, slice):
+                np.matmul(C, values.transpose(1, 0, 2), out=out[:, b.at_steps].transpose(1, 0, 2))
+                continue
+            many = C.ndim == 4
+            steps = (
+                np.einsum("cmnt,mnt->cnt", C, values) if many else (C @ values.transpose(1, 0, 2)).transpose(1, 0, 2)
+            )
+            if beside is not None:
+                left, right = beside
+                steps = multiplied(multiplied(left, steps.reshape(4, 4, *steps.shape[1:])), right).reshape(steps.shape)
+            out[:, b.at_steps] = steps
+        return out.reshape(4, 4, *out.shape[1:])
+
+    @kept
+    def _nodes(self) -> Array:
+        """Poses of the frames behind all factors ``(3, 4, nodes, T)``, see ``Walk``."""
+        return self.system.walk.poses(self._steps, self.system.par.frame)
+
+    @kept
+    def poses(self) -> Array:
+        """Poses of all links ``(3, 4, N, T)``."""
+        return self._nodes.take(self.system.walk.link_node, axis=2)
+
+    @kept
+    def frames(self) -> list[list[Array]]:
+        """For every group the pair frames 0, 1, ... about the internal origin; places inside a factor hold its start."""
+        out = []
+        for g in self.system.groups:
+            starts = [*g.row.frame_before, g.row.f]
+            made = {k: self._frame(*self.system.frame_place(g, k)) for k in dict.fromkeys(starts)}
+            out.append([made[k] for k in starts])
+        return out
+
+    def _frame(self, nodes: Index, const: Index) -> Array:
+        """Frames ``(3, 4, n, T)``: poses of nodes with a constant pose behind them."""
+        X = self._nodes.take(nodes, axis=2)
+        return compose(X, self.system.numbers.constants[:, :, const]) if const.any() else X
+
+    @kept
+    def pair_points(self) -> Array:
+        """Origins of the markers B, ``(3, P, T)``; of a chord, where its link a has it."""
+        s = self.system
+        X = self._nodes.take(s.walk.end_node, axis=2)
+        out = multiplied(X[:, :3], s.numbers.ends)[:, 0]
+        out += X[:, 3]
+        return out
+
+    # --- screws ------------------------------------------------------------------------------------------------------
+
+    def _screws(self, local: Array, nodes: Index, bound: int, points: Array | None = None) -> Array:
+        """Screws in the outer frame ``(6, K, T)`` from their parts in nodes, ``(3, 2, K, B)``.
+
+        Part ``bound`` (0 in a twist, 1 in a wrench) has a line through the origins of the nodes, or through ``points (3, K, T)``
+        where given: ``(R line, R free + p x R line)``.
+        """
+        K, dtype = len(nodes), self._nodes.dtype if local.dtype == float else np.result_type(local, self._nodes)
+        out = np.empty((2, 3, K, self.T), dtype=dtype)
+        X = self._nodes.take(nodes, axis=2)
+        multiplied(X[:, :3], local, out=out.swapaxes(0, 1))
+        out[1 - bound] += cross(X[:, 3] if points is None else points, out[bound])
+        return out.reshape(6, K, self.T)
+
+    @kept
     def S(self) -> Array:
         """Twists of all freedoms ``(6, F, T)``."""
         s = self.system
-        out = np.empty((6, s.n_freedoms, self.T))
-        points = np.empty((3, s.n_freedoms, self.T))
-        slides = []
-        for g, frames in zip(s.groups, self._columns, strict=True):
-            for freedom, before, at in zip(g.row.freedoms, g.row.frame_before, g.at_columns, strict=True):
-                turn, slide = evaluation.twist_parts(freedom, before, s.par.pitch[g.pairs], frames)
-                out[:3, at] = 0.0 if turn is None else turn
-                points[:, at] = 0.0 if turn is None else evaluation.frame_origin(before, frames)
-                if slide is not None:
-                    slides.append((at, slide))
-        cross(points, out[:3], out[3:])
-        for at, slide in slides:
-            out[3:, at] += slide
+        return self._screws(self._local_twists if s.moving_batches else s.numbers.twists, s.column_nodes, 0)
+
+    @kept
+    def _local_twists(self) -> Array:
+        """The twists in their nodes ``(3, 2, F, T)`` where those of some factors move."""
+        s = self.system
+        constant = s.numbers.twists
+        shape = (*constant.shape[:3], self.T)
+        out = np.broadcast_to(constant, shape).astype(np.result_type(constant, self.x))
+        for b in s.moving_batches:
+            s.numbers.place_twists(out, b, b.stack.twists(self.x[b.state_rows], s.par.pitch[b.pairs]))
         return out
 
-    @cached_property
+    @kept
     def E(self) -> Array:
         """Effort wrenches of all freedoms ``(6, F, T)``."""
         s = self.system
-        out = np.empty((6, s.n_freedoms, self.T))
-        for g, frames in zip(s.groups, self._columns, strict=True):
-            E = evaluation.efforts_of(g.row, s.par.pitch[g.pairs], frames)
-            for j, at in enumerate(g.at_columns):
-                out[:, at] = E[:, j]
+        out = self._wrenches(s.effort_table, s.effort_numbers)
+        for g in s.groups:
+            if g.row.computed_efforts:
+                out[:, g.columns] = evaluation.dual(out[:, g.columns], self.S[:, g.columns])
         return out
 
-    @cached_property
+    @kept
     def W(self) -> list[Array]:
         """For every group the reaction wrenches ``(6, 6 - f, n, T)``."""
         s = self.system
-        return [
-            evaluation.reactions_of(g.row, s.par.pitch[g.pairs], frames)
-            for g, frames in zip(s.groups, self.frames, strict=True)
-        ]
+        whole = self._wrenches(s.reaction_table, s.reaction_numbers)
+        out, at = [], 0
+        for number, g in enumerate(s.groups):
+            if g.row.reactions is None:
+                out.append(evaluation.reciprocal(self.S[:, g.columns], self.frames[number][-1]))
+                continue
+            count = len(g.row.reactions) * len(g.pairs)
+            out.append(whole[:, at : at + count].reshape(6, len(g.row.reactions), len(g.pairs), self.T))
+            at += count
+        return out
 
-    @cached_property
+    def _wrenches(self, table: ScrewTable, local: Array) -> Array:
+        """Wrenches ``(6, K, T)`` of components, moment first."""
+        if not table.b_places.size:
+            return self._screws(local, table.nodes, 1)
+        points = self.pair_points.take(table.pairs, axis=1)
+        if table.b_places.size < len(table.nodes):
+            own = np.flatnonzero(~table.at_b)
+            points[:, own] = self._nodes[:, 3].take(table.nodes[own], axis=1)
+        return self._screws(local, table.nodes, 1, points)
+
+    @kept
     def lee_screws(self) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
         """For every pair the axial wrenches ``(6, n, T)`` and condition twists ``(6, n, T)`` of Lee's bookkeeping."""
         s = self.system
@@ -355,63 +195,76 @@ class Configuration:
                 continue
             pitch = s.par.pitch[g.pairs]
             wrenches = evaluation.components_of(book.along, pitch, frames)
-            twists = evaluation.freedoms_of(book.conditions, (0,) * len(book.conditions), pitch, frames)
+            twists = evaluation.freedoms_of(book.conditions, pitch, frames[0])
             for i, k in enumerate(g.pairs):
                 along[k], conditions[k] = wrenches[:, :, i], twists[:, :, i]
         return tuple(along), tuple(conditions)
 
-    @cached_property
-    def pair_points(self) -> Array:
-        """Origins of the markers B, ``(3, P, T)``."""
-        out = np.empty((3, len(self.system.m.pairs), self.T))
-        for g, frames in zip(self.system.groups, self._columns, strict=True):
-            out[:, g.at_pairs] = frames[-1].column(3)
-        return out
+    # --- closure -----------------------------------------------------------------------------------------------------
 
-    @cached_property
+    @kept
     def chord_errors(self) -> Array:
         """Closure errors ``(6, chords, T)``: finite twist from marker B reached through b to that reached through a."""
-        s = self.system
-        a, b = s.chord_ends
-        poses, chords = self._placed
-        reached = compose(poses[:, :, a], chords)
-        return pose_log(compose(reached, inverse(poses[:, :, b])))
+        ends, links = self.system.chord_nodes
+        reached, declared = self._nodes[:, :, ends], self._nodes[:, :, links]
+        R = multiplied(reached[:, :3], declared[:, :3].swapaxes(0, 1))
+        return finite_twist(R, reached[:, 3] - multiplied(R, declared[:, 3:])[:, 0])
 
-    @cached_property
-    def closure(self) -> Array:
-        """Closure error ``(T,)``: largest of angle and length / L over all loops."""
-        if not len(self.system.chords):
-            return np.zeros(self.T)
-        e = self.chord_errors
-        angle, length = (np.sqrt((part * part).sum(axis=0)).max(axis=0) for part in (e[:3], e[3:]))
-        return np.maximum(angle, length)
-
-    @cached_property
-    def residual(self) -> Array:
+    @property
+    def loop_errors(self) -> Array:
         """Closure errors of the loops, stacked ``(6 loops, T)``."""
         s = self.system
         if s.many_loops:
-            per_pair = np.zeros((6, len(s.m.pairs), self.T))
+            per_pair = np.zeros((6, len(s.m.pairs), self.T), dtype=self.chord_errors.dtype)
             per_pair[:, s.chords] = self.chord_errors
             return self.loop_sums(per_pair)
         return _combined(s.loops_of_chords, self.chord_errors)
 
-    @cached_property
+    @kept
+    def closure(self) -> Array:
+        """Closure error ``(T,)``: largest of angle and length / L over all loops, and of the other rows."""
+        errors = [part.error(self) for part in self.system.rows]
+        return errors[0] if len(errors) == 1 else np.max(errors, axis=0)
+
+    @kept
+    def residual(self) -> Array:
+        """What the closure rows leave open ``(n_rows, T)``: loops first, then the others."""
+        return _stacked([part.residual(self) for part in self.system.rows])
+
+    @kept
     def J(self) -> Array:
-        """Closure Jacobian ``(6 loops, F, T)``: ``J = (C x I6) diag(S_k)``."""
-        return self.stacked(self.S)
+        """Closure Jacobian ``(n_rows, F, T)``; of the loops ``J = (C x I6) diag(S_k)``."""
+        return _stacked([part.jacobian(self) for part in self.system.rows])
 
     def stacked(self, S: Array) -> Array:
         """Columns ``(6, F, T)`` placed with their signs into the rows of every loop."""
         s = self.system
-        out = np.zeros((6 * len(s.loop_columns), s.n_freedoms, S.shape[2]))
+        out = np.zeros((6 * len(s.loop_pieces), s.n_freedoms, S.shape[2]), dtype=S.dtype)
         for i, pieces in enumerate(s.loop_pieces):
             rows = out[6 * i : 6 * i + 6]
             for at, signs in pieces:
                 np.multiply(S[:, at], signs, out=rows[:, at])
         return out
 
-    # --- rates -----------------------------------------------------------------------------------------------------
+    def closure_rates(self, dq: Array) -> Array:
+        """``J q' (n_rows, T)`` for rates ``dq (F, T)``, without forming ``J``."""
+        return _stacked([part.rates(self, dq) for part in self.system.rows])
+
+    def closure_bias(self, dq: Array, V: Array) -> Array:
+        """Velocity part ``(n_rows, T)`` of the closure accelerations ``J q'' + bias``; zero for couplings."""
+        return _stacked([part.bias(self, dq, V) for part in self.system.rows])
+
+    def row_efforts(self, x: Array) -> Array:
+        """Efforts ``(F, k, T)`` that multipliers ``x (n_rows, k, T)`` of rows other than loops bring into the freedoms."""
+        s = self.system
+        out = np.zeros((s.n_freedoms, *x.shape[1:]), dtype=x.dtype)
+        for part, at in zip(s.rows, s.row_places, strict=True):
+            efforts = part.efforts(self, x[at])
+            if efforts is not None:
+                out += efforts
+        return out
+
+    # --- rates -------------------------------------------------------------------------------------------------------
 
     def link_twists(self, dq: Array) -> Array:
         """Twists of all links ``(6, N, T)`` for rates ``dq (F, T)``, along the tree."""
@@ -419,33 +272,35 @@ class Configuration:
 
     def pair_sums(self, terms: Array) -> Array:
         """Sum of the columns of every pair: ``(6, F, T)`` -> ``(6, P, T)``."""
-        s = self.system
-        out = np.zeros((6, len(s.m.pairs), terms.shape[2]))
-        for g in s.groups:
-            for i, at in enumerate(g.at_columns):
-                if i == 0:
-                    out[:, g.at_pairs] = terms[:, at]
-                else:
-                    out[:, g.at_pairs] += terms[:, at]
-        return out
+        return run_sums(terms, self.system.pair_ranks, len(self.system.m.pairs))
 
     def bias(self, dq: Array, V: Array) -> Array:
-        """Velocity part of the relative accelerations ``(6, P, T)``: ``sum_j ad(V of the frame before j) S_j q'_j``."""
+        """Velocity part of the relative accelerations ``(6, P, T)``.
+
+        ``sum over the factors of a pair of ad(V of the frame before it) S q' + S' q'``, the second term the factor's own rate of
+        its twists (seen from the frame before it): zero for a constant screw and for a rotation.
+        """
         s = self.system
-        moving = self.S * dq
-        out = np.zeros((6, len(s.m.pairs), self.T))
-        for g, links in zip(s.groups, s.carriers, strict=True):
-            carrier = V[:, links]
-            for factor in g.row.factors:
-                steps = [moving[:, g.at_columns[j]] for j in factor]
-                step = steps[0] if len(steps) == 1 else steps[0] + steps[1] + steps[2]
-                if factor[0] == 0:
-                    out[:, g.at_pairs] = cross_twist(carrier, step)
-                else:
-                    out[:, g.at_pairs] += cross_twist(carrier, step)
-                if factor[-1] + 1 < g.row.f:
-                    carrier = carrier + step
-        return out
+        steps = run_sums(self.S * dq, s.factor_ranks, int(s.n_factors.sum()))
+        carriers = V[:, s.factor_carriers]
+        if len(s.factors_by_pair) > 1:
+            carriers = self._carriers(np.array(carriers), steps)
+        out = cross_twist(carriers, steps)
+        for b in s.moving_batches:
+            rates = b.stack.twist_rates(self.x[b.state_rows], dq[b.columns], s.par.pitch[b.pairs])
+            if rates is not None:
+                const = s.numbers.marker_a_if_first(b)
+                frame = compose(self._nodes.take(s.batch_nodes(b), axis=2), const)
+                out[:, s.factor_numbers(b)] += move_twist(frame, rates)
+        return run_sums(out, s.factors_by_pair, len(s.m.pairs))
+
+    def _carriers(self, carriers: Array, steps: Array) -> Array:
+        """Twists of the frames before every factor: that of link a and the factors before it in its pair."""
+        firsts = self.system.factors_by_pair
+        for r in range(1, len(firsts)):
+            places = np.arange(carriers.shape[1])[firsts[r][1]]
+            carriers[:, places] = carriers[:, places - 1] + steps[:, places - 1]
+        return carriers
 
     def loop_sums(self, per_pair: Array) -> Array:
         """Signed sum of pair terms along every loop, stacked ``(6 loops, T)``."""
@@ -453,24 +308,17 @@ class Configuration:
         if s.many_loops:
             flat = per_pair.transpose(1, 0, 2).reshape(per_pair.shape[1], 6 * per_pair.shape[2])
             return np.asarray(s.graph.sparse_loop_matrix @ flat).reshape(6 * len(s.graph.loops), per_pair.shape[2])
-        return _combined(s.graph.loop_matrix, per_pair)
+        return _combined(s.loop_matrix, per_pair)
 
     def pair_wrenches(self, x: Array) -> Array:
-        """Pair wrenches ``(6, P, k, T)`` of loop wrenches ``(6 loops, k, T)``: ``w = C^T x``."""
+        """Pair wrenches ``(6, P, k, T)`` of the loop rows of ``x (n_rows, k, T)``: ``w = C^T x``."""
         s = self.system
-        loops = x.reshape(len(s.graph.loops), 6, *x.shape[1:])
+        n = len(s.graph.loops)
+        loops = x[: 6 * n].reshape(n, 6, *x.shape[1:])
         if s.many_loops:
-            flat = np.asarray(s.graph.sparse_loop_matrix.T @ loops.reshape(len(loops), loops.size // len(loops)))
+            flat = np.asarray(s.graph.sparse_loop_matrix.T @ loops.reshape(n, loops.size // n))
             return np.moveaxis(flat.reshape(len(s.m.pairs), 6, *x.shape[1:]), 1, 0)
-        return np.asarray(np.einsum("lp,list->ipst", s.graph.loop_matrix, loops))
-
-    def closure_rates(self, dq: Array) -> Array:
-        """``J q'`` for rates ``(F, T)`` without forming J, ``(m, T)``."""
-        return self.loop_sums(self.pair_sums(self.S * dq))
-
-    def closure_bias(self, dq: Array, V: Array) -> Array:
-        """Velocity part of the closure accelerations ``(m, T)``."""
-        return self.loop_sums(self.bias(dq, V))
+        return np.asarray(np.einsum("lp,list->ipst", s.loop_matrix, loops))
 
     def link_accelerations(self, dq: Array, ddq: Array, V: Array) -> Array:
         """Accelerations dV/dt of all links ``(6, N, T)``."""
@@ -481,6 +329,11 @@ class Configuration:
         relative = self.pair_sums(self.S * ddq)
         relative += bias
         return self.system.tree.sums(relative)
+
+
+def _stacked(parts: list[Array]) -> Array:
+    """Rows of several contributors, one below the other."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def _combined(matrix: Array, terms: Array) -> Array:

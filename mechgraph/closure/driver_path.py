@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import state_rows
-from mechgraph.closure.configuration import Configuration, Index, System
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.solver import ClosureSolver, FactoredClosure
 from mechgraph.numerics.continuation import End, Follower, Tracks, refined
 from mechgraph.numerics.hermite import Interpolation

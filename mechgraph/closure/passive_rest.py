@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, cross
-from mechgraph.closure.configuration import Configuration, Index
+from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_path import DriverPath, Positions, Status
+from mechgraph.closure.indexing import Index
 from mechgraph.numerics.continuation import Follower
 from mechgraph.numerics.hermite import Interpolation
 

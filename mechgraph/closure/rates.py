@@ -8,7 +8,8 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure import passive_rest as idle
-from mechgraph.closure.configuration import Configuration, Index
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import Index
 from mechgraph.closure.passive_rest import Idle
 from mechgraph.closure.solver import FactoredClosure
 

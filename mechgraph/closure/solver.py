@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.configuration import Configuration, Index
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import Index
 from mechgraph.numerics.linear import Choice, ChosenSystem, choose, parabola_is_regular, scaled_norm
 from mechgraph.numerics.tolerances import PATH
 

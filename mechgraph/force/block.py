@@ -8,7 +8,8 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure import passive_rest
-from mechgraph.closure.configuration import Configuration, Index
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import Index
 from mechgraph.closure.passive_rest import Idle
 from mechgraph.closure.rates import Rates
 from mechgraph.closure.solver import FactoredClosure
@@ -60,7 +61,7 @@ class BlockForces:
 
 @dataclass(frozen=True)
 class ForceTask:
-    """What is asked of every block: the ``method``, the ``loads``, the ``driven`` freedoms, the passive ``bodies``; ``batch`` and times ``t``."""
+    """What is asked of every block: force ``method``, ``loads``, ``driven`` freedoms, passive ``bodies``; ``batch`` and times ``t``."""
 
     method: str
     loads: tuple[Load, ...]
@@ -79,7 +80,8 @@ def forces_of_block(
     site.collect(task.loads)
     given, applied, inertia = site.scaled_efforts(), site.applied(), inertia_wrenches(here, rates)
     loads = applied + inertia
-    hold, holds = None, ()
+    hold: Array | None = None
+    holds: tuple[Hold, ...] = ()
     if task.bodies:
         hold, holds = _held(here, task.bodies, f.motions(), loads, given)
         loads = loads + hold

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.configuration import Configuration, Index
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import Index
 from mechgraph.closure.solver import FactoredClosure
 from mechgraph.equations.build import formulate
 from mechgraph.equations.state import State

@@ -13,7 +13,7 @@ from mechgraph.model.link import Link
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.numeric import is_numeric, plain
 from mechgraph.model.pair import Marker, Pair
-from mechgraph.model.pair_type import TABLE
+from mechgraph.model.pair_table import TABLE
 
 NUMBERS_OF_CHAIN = ("twist", "length", "offset")
 """What places the link after every pair of a chain, in the order of the rows of its numbers."""

@@ -22,7 +22,8 @@ from mechgraph.model.field_format import (
     TABLE as NESTED,
 )
 from mechgraph.model.numeric import is_numeric, number_fault, plain
-from mechgraph.model.pair_type import TABLE, PairType
+from mechgraph.model.pair_table import TABLE
+from mechgraph.model.pair_type import PairType
 from mechgraph.units import LENGTH
 
 PERPENDICULAR = 1e-6

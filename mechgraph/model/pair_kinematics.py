@@ -1,17 +1,18 @@
 """One batched evaluation of every row of the pair table: displacement, twists, reaction and effort wrenches.
 
 All functions take ``n`` pairs of one type at ``T`` positions: state numbers ``x`` are ``(nx, n, T)``, pitches
-``(n, 1)``. A rotation is held as a unit quaternion (four numbers), so it has no chart singularity.
+``(n, 1)``. A rotation is held as a unit quaternion (four numbers), so it has no chart singularity. Numbers may be complex.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
+from itertools import accumulate, pairwise, starmap
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mechgraph.algebra.screw import direction, moved_screw
+from mechgraph.algebra.screw import move_constant, move_twist
 from mechgraph.algebra.se3 import (
     Array,
     compose,
@@ -20,222 +21,199 @@ from mechgraph.algebra.se3 import (
     quaternion_exp,
     quaternion_inverse,
     quaternion_log,
-    quaternion_matrix,
     quaternion_product,
-    skew,
 )
-from mechgraph.model.pair_frames import Frame
 
 if TYPE_CHECKING:
+    from mechgraph.model.factors import Factor
     from mechgraph.model.pair_type import Component, Freedom, PairType
 
 
-def _screw_motion(twist: Array, q: Array) -> Array:
-    """Displacement ``exp(q s)`` for a unit twist ``s = (w, v)`` with ``|w|`` one or zero; ``(6, n, 1)``, ``(n, T)``.
+def places(row: PairType) -> list[tuple[slice, slice]]:
+    """For every factor of a row the places of its freedoms and of its state numbers."""
+    columns = accumulate((len(step.freedoms) for step in row.steps), initial=0)
+    numbers = accumulate((step.n_state for step in row.steps), initial=0)
+    return list(zip(starmap(slice, pairwise(columns)), starmap(slice, pairwise(numbers)), strict=True))
 
-    ``R = 1 + sin q w^ + (1 - cos q) w^2``, ``p = (q (1 + w^2) + (1 - cos q) w^ - sin q w^2) v``.
-    """
-    W = skew(twist[:3])
-    W2 = np.einsum("ij...,jk...->ik...", W, W)
-    v = twist[3:]
-    Wv, W2v = (np.einsum("ij...,j...->i...", M, v) for M in (W, W2))
-    out = identity(*q.shape)
-    if not twist[:3].any():
-        out[:, 3] = v * q
-        return out
-    s, c = np.sin(q), 1.0 - np.cos(q)
-    out[:, :3] += s * W + c * W2
-    out[:, 3] = q * (v + W2v) + c * Wv - s * W2v
-    return out
+
+def _placed(row: PairType) -> Iterator[tuple[Factor, slice, slice]]:
+    for step, (columns, numbers) in zip(row.steps, places(row), strict=True):
+        yield step, columns, numbers
 
 
 def frames_of(row: PairType, pitch: Array, x: Array, base: Array | None = None) -> list[Array]:
     """Frames 0, 1, ... of the pair as poses ``(3, 4, n, T)``, in the frame of ``base`` (marker A where it is None).
 
-    The list is indexed by the number of single freedoms before the frame; places inside a rotation hold its start.
-    The last entry is the frame of marker B.
+    The list is indexed by the number of single freedoms before the frame; places inside a factor of several freedoms hold its
+    start. The last entry is the frame of marker B.
     """
     frames = [identity(*x.shape[1:]) if base is None else base]
-    at = 0
-    for group in row.factors:
-        if len(group) == 1:
-            freedom = row.freedoms[group[0]]
-            twist = np.array(freedom.twist)[:, None, None] + np.array(freedom.per_pitch)[:, None, None] * pitch
-            step = _screw_motion(twist, x[at])
-            at += 1
-        else:
-            step = identity(*x.shape[1:])
-            step[:, :3] = quaternion_matrix(x[at : at + 4])
-            at += 4
-            frames += [frames[-1]] * 2
-        frames.append(compose(frames[-1], step))
+    for step, columns, numbers in _placed(row):
+        frames += [frames[-1]] * (columns.stop - columns.start - 1)
+        frames.append(compose(frames[-1], step.pose(x[numbers], pitch)))
     return frames
 
 
-Frames = Sequence[Array] | Sequence[Frame]
+def twists_of(row: PairType, pitch: Array, frames: Sequence[Array], x: Array | None = None) -> Array:
+    """Twists of the freedoms, ``(6, f, n, T)``, in the frame in which ``frames`` are given.
 
-
-def _columns(frames: Frames, k: int) -> Callable[[int], Array]:
-    """Column of a frame by its index: axes 0, 1, 2 and the origin 3, ``(3, n, T)``."""
-    X = frames[k]
-    return X.column if isinstance(X, Frame) else lambda i: X[:, i]
-
-
-def twists_of(row: PairType, pitch: Array, frames: Frames) -> Array:
-    """Unit twists of the freedoms, ``(6, f, n, T)``, in the frame in which ``frames`` are given."""
-    return freedoms_of(row.freedoms, row.frame_before, pitch, frames)
-
-
-def freedoms_of(freedoms: tuple[Freedom, ...], before: tuple[int, ...], pitch: Array, frames: Frames) -> Array:
-    """Unit twists of freedoms, each constant in the frame of its index in ``before``, ``(6, n freedoms, n, T)``."""
-    if not freedoms:
-        return np.empty((6, 0, *_columns(frames, 0)(3).shape[1:]))
-    parts = [twist_of(freedom, k, pitch, frames) for freedom, k in zip(freedoms, before, strict=True)]
-    return _stacked(parts)
-
-
-def _stacked(parts: list[tuple[Array, Array]]) -> Array:
-    out = np.empty((6, len(parts), *parts[0][0].shape[1:]))
-    for j, (first, second) in enumerate(parts):
-        out[:3, j], out[3:, j] = first, second
+    The state ``x`` may be left out where all twists are constant in their frames.
+    """
+    X = frames[0]
+    out = np.empty((6, row.f, *X.shape[2:]), dtype=X.dtype if x is None else np.result_type(X, x))
+    numbers = np.empty((row.nx, *X.shape[2:])) if x is None else x
+    for step, columns, rows in _placed(row):
+        local = step.twists(numbers[rows], pitch)
+        before = frames[columns.start]
+        for j in range(local.shape[1]):
+            moved = np.broadcast_to(local[:, j], (6, *X.shape[2:]))
+            out[:, columns.start + j] = move_twist(before, moved)
     return out
 
 
-def twist_of(freedom: Freedom, before: int, pitch: Array, frames: Frames) -> tuple[Array, Array]:
-    """Unit twist of one freedom that is constant in frame ``before``: angular and linear part, ``(3, n, T)``."""
-    angular, linear = twist_parts(freedom, before, pitch, frames)
-    origin = _columns(frames, before)(3)
-    moment = np.zeros(origin.shape) if angular is None else cross(origin, angular)
-    if linear is not None:
-        moment += linear
-    return np.zeros(origin.shape) if angular is None else angular, moment
+def freedoms_of(freedoms: tuple[Freedom, ...], pitch: Array, X: Array) -> Array:
+    """Unit twists of freedoms that are constant in the frame of pose ``X``, ``(6, n freedoms, n, T)``."""
+    return _moved([(f.twist[3:], f.per_pitch[3:], f.twist[:3]) for f in freedoms], pitch, [(X, X)] * len(freedoms))
 
 
-def twist_parts(freedom: Freedom, before: int, pitch: Array, frames: Frames) -> tuple[Array | None, Array | None]:
-    """Angular part of the unit twist of a freedom, and its linear part at the origin of its frame; None where they vanish."""
-    column = _columns(frames, before)
-    angular, linear = direction(column, freedom.twist[:3]), direction(column, freedom.twist[3:])
-    for i, per_pitch in enumerate(freedom.per_pitch[3:]):
-        if per_pitch:
-            more = per_pitch * pitch * column(i)
-            linear = more if linear is None else linear + more
-    return angular, linear
-
-
-def frame_origin(before: int, frames: Frames) -> Array:
-    """Origin of a frame, ``(3, n, T)``."""
-    return _columns(frames, before)(3)
-
-
-def components_of(components: tuple[Component, ...], pitch: Array, frames: Frames) -> Array:
+def components_of(components: tuple[Component, ...], pitch: Array, frames: Sequence[Array]) -> Array:
     """Wrenches of components, each constant in its frame, ``(6, n components, n, T)``."""
-    if not components:
-        return np.empty((6, 0, *_columns(frames, 0)(3).shape[1:]))
-    return _stacked([component_of(c, pitch, frames) for c in components])
+    moved = _moved(
+        [(c.wrench[:3], c.per_pitch[:3], c.wrench[3:]) for c in components],
+        pitch,
+        [(frames[c.frame], frames[-1] if c.at_b else frames[c.frame]) for c in components],
+    )
+    out = np.concatenate([moved[3:], moved[:3]])
+    return out if components else np.empty((6, 0, *frames[0].shape[2:]))
 
 
-def component_of(c: Component, pitch: Array, frames: Frames) -> tuple[Array, Array]:
-    """Wrench of one component: moment and force, ``(3, n, T)``."""
-    axes, end = _columns(frames, c.frame), _columns(frames, len(frames) - 1)
+def _moved(
+    screws: list[tuple[Sequence[float], Sequence[float], Sequence[float]]],
+    pitch: Array,
+    poses: list[tuple[Array, Array]],
+) -> Array:
+    """Screws given by free part, free part per pitch, and bound part, moved to the directions of the first of two poses and
+    the origin of the second, ``(6, number, n, T)``: the bound part (rotation or force) first.
+    """
+    if not screws:
+        return np.empty((6, 0, 0, 0))
+    parts = []
+    for (free, per_pitch, bound), (X, at) in zip(screws, poses, strict=True):
+        direction, moment = move_constant(X, np.array(free), np.array(bound), at[:, 3])
+        for i, share in enumerate(per_pitch):
+            if share:
+                moment = moment + share * pitch * X[:, i]
+        parts.append(np.concatenate([direction, moment]))
+    return np.stack(parts, axis=1)
 
-    def column(i: int) -> Array:
-        return end(3) if i == 3 and c.at_b else axes(i)
 
-    force, moment = moved_screw(column, c.wrench[:3], c.wrench[3:])
-    for i, per_pitch in enumerate(c.per_pitch[:3]):
-        if per_pitch:
-            moment = moment + per_pitch * pitch * axes(i)
-    return moment, force
-
-
-def efforts_of(row: PairType, pitch: Array, frames: Frames) -> Array:
+def efforts_of(row: PairType, pitch: Array, frames: Sequence[Array], x: Array | None = None) -> Array:
     """Effort wrenches ``E``, one a freedom, ``(6, f, n, T)``; combined to ``E (S^T E)^-1`` where the row asks for it."""
     E = components_of(row.efforts, pitch, frames)
-    if not row.computed_efforts:
-        return E
-    unit = np.einsum("ifnt,ignt->ntfg", twists_of(row, pitch, frames), E)
-    return np.einsum("ignt,ntgf->ifnt", E, np.linalg.inv(unit))
+    return dual(E, twists_of(row, pitch, frames, x)) if row.computed_efforts else E
 
 
-def reactions_of(row: PairType, pitch: Array, frames: list[Array]) -> Array:
-    """Reaction wrenches ``W``, ``(6, 6 - f, n, T)``: the row's components, or the null space of ``S^T``.
+def dual(E: Array, S: Array) -> Array:
+    """The combinations ``E (S^T E)^-1`` of efforts ``(6, f, n, T)`` that are dual to the twists ``S``."""
+    unit = np.einsum("ifnt,ignt->ntfg", S, E)
+    return np.asarray(np.einsum("ignt,ntgf->ifnt", E, np.linalg.inv(unit)))
 
-    Where the row has no constant components, the null space is taken about the origin of marker B, in its directions.
-    """
+
+def reactions_of(row: PairType, pitch: Array, frames: Sequence[Array], x: Array | None = None) -> Array:
+    """Reaction wrenches ``W``, ``(6, 6 - f, n, T)``: the row's components, or the null space of ``S^T``."""
     if row.reactions is not None:
         return components_of(row.reactions, pitch, frames)
-    if not row.f:
-        return np.broadcast_to(np.eye(6)[:, :, None, None], (6, 6, *frames[0].shape[2:])).copy()
-    S = twists_of(row, pitch, frames)
-    B = frames[-1]
-    local = np.concatenate(
-        [
-            np.einsum("ji...,jf...->if...", B[:, :3], S[:3]),
-            np.einsum(
-                "ji...,jf...->if...",
-                B[:, :3],
-                S[3:] + np.stack([cross(S[:3, j], B[:, 3]) for j in range(row.f)], axis=1),
-            ),
-        ]
-    )
-    U = np.linalg.svd(np.moveaxis(local, (0, 1), (-2, -1)), full_matrices=True)[0][..., row.f :]
-    out = np.empty((6, 6 - row.f, *frames[0].shape[2:]))
-    for j in range(6 - row.f):
-        f = np.moveaxis(U[..., j], -1, 0)
-        force = np.einsum("ij...,j...->i...", B[:, :3], f[3:])
-        out[3:, j] = force
-        out[:3, j] = np.einsum("ij...,j...->i...", B[:, :3], f[:3]) + cross(B[:, 3], force)
-    return out
+    return reciprocal(twists_of(row, pitch, frames, x), frames[-1])
+
+
+def reciprocal(S: Array, B: Array) -> Array:
+    """Wrenches ``(6, 6 - f, n, T)`` that do no work on the twists ``S (6, f, n, T)``: the null space of ``S^T``.
+
+    It is taken about the origin of marker B, in its directions.
+    """
+    f = S.shape[1]
+    if not f:
+        return np.broadcast_to(np.eye(6)[:, :, None, None], (6, 6, *B.shape[2:])).copy()
+    turned = np.einsum("jint,jfnt->ifnt", B[:, :3], S[:3])
+    moved = S[3:] + cross(S[:3], np.broadcast_to(B[:, None, 3], S[:3].shape))
+    local = np.concatenate([turned, np.einsum("jint,jfnt->ifnt", B[:, :3], moved)])
+    null = _null_of_transpose(np.moveaxis(local, (0, 1), (-2, -1)))
+    null = np.moveaxis(null, (-2, -1), (0, 1))
+    force = np.einsum("ijnt,jcnt->icnt", B[:, :3], null[3:])
+    moment = np.einsum("ijnt,jcnt->icnt", B[:, :3], null[:3])
+    return np.concatenate([moment + cross(np.broadcast_to(B[:, None, 3], force.shape), force), force])
+
+
+def _null_of_transpose(S: Array) -> Array:
+    """Bases ``(..., 6, 6 - f)`` of the null spaces of ``S^T`` for ``S (..., 6, f)``.
+
+    Orthonormal for real ``S``. For complex ones that of the real part, corrected by its range ``U`` so that ``S^T N = 0``
+    without a conjugate: ``N - U (S^T U)^-1 S^T N``.
+    """
+    f = S.shape[-1]
+    U = np.linalg.svd(S.real, full_matrices=True)[0]
+    N, U = U[..., f:], U[..., :f]
+    if not np.iscomplexobj(S):
+        return np.asarray(N)
+    St = np.swapaxes(S, -1, -2)
+    return np.asarray(N - U @ np.linalg.solve(St @ U, St @ N))
 
 
 def coordinates_to_state(row: PairType, q: Array) -> Array:
     """State numbers ``(nx, ...)`` from user coordinates ``(f, ...)`` (rotation vectors for rotations)."""
-    parts = [q[g[0]][None] if len(g) == 1 else quaternion_exp(q[g[0] : g[2] + 1]) for g in row.factors]
+    parts = [quaternion_exp(q[columns]) if step.holds_rotation else q[columns] for step, columns, _ in _placed(row)]
     return np.concatenate(parts) if parts else np.empty((0, *q.shape[1:]))
+
+
+def turned(q: Array, v: Array) -> Array:
+    """Unit quaternions ``(4, ...)`` after rotation vectors ``(3, ...)``: ``exp(v) q``, made unit again."""
+    out = quaternion_product(quaternion_exp(v), q)
+    out /= np.sqrt((out * out).sum(axis=0))
+    return out
+
+
+def turn_between(q1: Array, q0: Array) -> Array:
+    """Rotation vector from ``q0`` to ``q1`` by the short way."""
+    return quaternion_log(quaternion_product(q1, quaternion_inverse(q0)))
+
+
+def turn_tangent(v: Array, w: Array) -> Array:
+    """``dexp^-1(v) w = w - v x w / 2 + v x (v x w) / 12 + ...``."""
+    once = cross(v, w)
+    return np.asarray(w - 0.5 * once + cross(v, once) / 12.0)
 
 
 def advance(row: PairType, x: Array, dq: Array) -> Array:
     """State after the increments ``dq`` ``(f, ...)``: added for single freedoms, ``exp(dq) Q`` for rotations."""
-    out = np.empty(np.broadcast_shapes(x.shape, (row.nx, *dq.shape[1:])))
-    at = 0
-    for g in row.factors:
-        if len(g) == 1:
-            out[at] = x[at] + dq[g[0]]
-            at += 1
+    out = np.empty(np.broadcast_shapes(x.shape, (row.nx, *dq.shape[1:])), dtype=np.result_type(x, dq))
+    for step, columns, rows in _placed(row):
+        if step.holds_rotation:
+            out[rows] = turned(x[rows], dq[columns])
         else:
-            q = quaternion_product(quaternion_exp(dq[g[0] : g[2] + 1]), x[at : at + 4])
-            out[at : at + 4] = q / np.sqrt((q * q).sum(axis=0))
-            at += 4
+            out[rows] = x[rows] + dq[columns]
     return out
 
 
 def difference(row: PairType, x1: Array, x0: Array) -> Array:
     """Increments ``dq`` that lead from ``x0`` to ``x1``; the inverse of ``advance`` (rotations by the short way)."""
-    out = np.empty((row.f, *np.broadcast_shapes(x1.shape[1:], x0.shape[1:])))
-    at = 0
-    for g in row.factors:
-        if len(g) == 1:
-            out[g[0]] = x1[at] - x0[at]
-            at += 1
+    out = np.empty((row.f, *np.broadcast_shapes(x1.shape[1:], x0.shape[1:])), dtype=np.result_type(x1, x0))
+    for step, columns, rows in _placed(row):
+        if step.holds_rotation:
+            out[columns] = turn_between(x1[rows], x0[rows])
         else:
-            out[g[0] : g[2] + 1] = quaternion_log(
-                quaternion_product(x1[at : at + 4], quaternion_inverse(x0[at : at + 4]))
-            )
-            at += 4
+            out[columns] = x1[rows] - x0[rows]
     return out
 
 
 def tangent(row: PairType, dq: Array, rates: Array) -> Array:
     """Rates of the increments ``dq`` at the state that they lead to, from the rates ``(f, ...)`` of the freedoms there.
 
-    Unchanged for single freedoms; for a rotation ``dexp^-1(dq) w = w - dq x w / 2 + dq x (dq x w) / 12 + ...``.
+    Unchanged for single freedoms; ``turn_tangent`` for a rotation.
     """
     out = rates.copy()
-    for g in row.factors:
-        if len(g) == 3:
-            v, w = dq[g[0] : g[2] + 1], rates[g[0] : g[2] + 1]
-            turned = cross(v, w)
-            out[g[0] : g[2] + 1] = w - 0.5 * turned + cross(v, turned) / 12.0
+    for step, columns, _ in _placed(row):
+        if step.holds_rotation:
+            out[columns] = turn_tangent(dq[columns], rates[columns])
     return out
 
 
@@ -245,16 +223,13 @@ def state_to_coordinates(row: PairType, x: Array, start: Array | None = None) ->
     The rotation vector at the first position is the one nearest to ``start`` ``(f, n)`` (zero where it is None); at every
     further one that nearest to the one before: of ``v + 2 pi k v/|v|`` the nearest.
     """
-    out = np.empty((row.f, *x.shape[1:]))
-    at = 0
-    for g in row.factors:
-        if len(g) == 1:
-            out[g[0]] = x[at]
-            at += 1
+    out = np.empty((row.f, *x.shape[1:]), dtype=x.dtype)
+    for step, columns, rows in _placed(row):
+        if step.holds_rotation:
+            first = np.zeros(3) if start is None else start[columns]
+            out[columns] = _continued(quaternion_log(x[rows]), first)
         else:
-            first = np.zeros(3) if start is None else start[g[0] : g[2] + 1]
-            out[g[0] : g[2] + 1] = _continued(quaternion_log(x[at : at + 4]), first)
-            at += 4
+            out[columns] = x[rows]
     return out
 
 

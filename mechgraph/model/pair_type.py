@@ -1,4 +1,4 @@
-"""The pair table: a pair type is a row of data. To add a pair type, add a row (or pass a PairType of your own).
+"""A pair type is a row of data: freedoms, reaction components, efforts, and how Lee's ledger counts it.
 
 A row is an ordered list of elementary freedoms, each a constant unit twist in the marker frame left by the freedoms before
 it, its reaction components, each a constant wrench in a named frame ``k`` (the marker frame left after ``k`` single
@@ -7,17 +7,17 @@ freedoms), and one effort wrench for every freedom, so that ``S^T E = 1``. Nothi
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from itertools import accumulate
 
 import numpy as np
 
-from mechgraph.document import Document, Table, to_text
 from mechgraph.errors import DeclarationError
 from mechgraph.model import pair_kinematics as evaluation
+from mechgraph.model.factors import ConstantScrew, Factor, Rotation
 from mechgraph.model.numeric import is_numeric
 
 Six = tuple[float, float, float, float, float, float]
@@ -63,6 +63,12 @@ class Freedom:
         """Whether the coordinate is an angle (radians) rather than a length."""
         return any(self.twist[:3])
 
+    def scaled(self, L: float) -> Freedom:
+        """The freedom with its lengths divided by ``L``: the linear part of a turn; itself where it has none."""
+        if not self.turns or not any(self.twist[3:]):
+            return self
+        return replace(self, twist=_six((*self.twist[:3], *(v / L for v in self.twist[3:]))))
+
 
 @dataclass(frozen=True)
 class Component:
@@ -105,36 +111,40 @@ class Bookkeeping:
         return len(self.conditions)
 
 
-def _freedoms(given: Sequence[object], faults: list[str]) -> tuple[tuple[Freedom, ...], tuple[int, ...]]:
-    """Freedoms and the index of the frame before each; three freedoms of one rotation share theirs."""
-    out: list[Freedom] = []
-    frames: list[int] = []
+def _factors(given: Sequence[object], faults: list[str]) -> tuple[Factor, ...]:
+    """The factors that are given as names, freedoms or factors."""
+    out: list[Factor] = []
     for item in given:
-        before = len(out)
-        if item == "rotation":
-            out += [Freedom(name, UNIT_TWISTS[name]) for name in ROTATION]
-            frames += [before] * 3
-            continue
-        if isinstance(item, str):
-            head, _, tail = (part.strip() for part in item.replace("pitch*", "pitch ").partition("+"))
-            slide = tail.removeprefix("pitch").strip()
-            if head not in UNIT_TWISTS or (tail and slide not in UNIT_TWISTS):
-                faults.append(
-                    f"freedom {item!r}: unknown; give one of {', '.join(UNIT_TWISTS)}, 'rotation', 'Rz + pitch Tz' "
-                    "or a Freedom"
-                )
-                continue
-            item = Freedom(head, UNIT_TWISTS[head], UNIT_TWISTS[slide] if tail else (0.0,) * 6)
-        if not isinstance(item, Freedom):
-            faults.append(f"freedom {item!r}: expected a name, 'rotation' or a Freedom")
-            continue
-        bad = [row for row in (item.twist, item.per_pitch) if not is_numeric(row, (6,))]
-        if bad:
-            faults.append(f"freedom {item.name!r}: twist {bad[0]!r}: expected six finite numbers, angular part first")
-            continue
-        out.append(item)
-        frames.append(before)
-    return tuple(out), tuple(frames)
+        if isinstance(item, Factor):
+            out.append(item)
+        elif item == "rotation":
+            out.append(Rotation(tuple(Freedom(name, UNIT_TWISTS[name]) for name in ROTATION)))
+        else:
+            freedom = _named_freedom(item, faults) if isinstance(item, str) else _given_freedom(item, faults)
+            out += [] if freedom is None else [ConstantScrew(freedom)]
+    return tuple(out)
+
+
+def _named_freedom(item: str, faults: list[str]) -> Freedom | None:
+    head, _, tail = (part.strip() for part in item.replace("pitch*", "pitch ").partition("+"))
+    slide = tail.removeprefix("pitch").strip()
+    if head not in UNIT_TWISTS or (tail and slide not in UNIT_TWISTS):
+        faults.append(
+            f"freedom {item!r}: unknown; give one of {', '.join(UNIT_TWISTS)}, 'rotation', 'Rz + pitch Tz' or a Freedom"
+        )
+        return None
+    return Freedom(head, UNIT_TWISTS[head], UNIT_TWISTS[slide] if tail else (0.0,) * 6)
+
+
+def _given_freedom(item: object, faults: list[str]) -> Freedom | None:
+    if not isinstance(item, Freedom):
+        faults.append(f"freedom {item!r}: expected a name, 'rotation' or a Freedom")
+        return None
+    bad = [row for row in (item.twist, item.per_pitch) if not is_numeric(row, (6,))]
+    if bad:
+        faults.append(f"freedom {item.name!r}: twist {bad[0]!r}: expected six finite numbers, angular part first")
+        return None
+    return item
 
 
 def _component(item: object, faults: list[str], what: str) -> Component | None:
@@ -164,7 +174,7 @@ class PairType:
     ----------
     symbol, name : e.g. ``"Sc"``, ``"sphere in slotted cylinder"``; the symbol starts with a letter.
     freedoms : in order; each one of ``"Rx" .. "Tz"``, ``"Rz + pitch Tz"``, ``"rotation"`` (three freedoms kept as one
-        rotation) or a ``Freedom``.
+        rotation), a ``Freedom``, or a ``Factor``: any relative motion, such as that of a frame along a curve.
     reactions : components that do no work, each ``"Fx"`` (frame 0), ``"Fz@2"`` (frame 2) or a ``Component``; None where no
         constant components exist: the null space of ``S^T`` serves then, named n1, n2, ...
     efforts : one for every freedom; None for a unit couple about each turn and a unit force along each slide through
@@ -187,6 +197,7 @@ class PairType:
     bookkeeping: Bookkeeping | None
     directed: bool
     square_second: bool
+    steps: tuple[Factor, ...]
     frame_before: tuple[int, ...]
     computed_efforts: bool
 
@@ -202,7 +213,7 @@ class PairType:
         directed: bool = True,
         square_second: bool = False,
     ) -> None:
-        faults = _fill(
+        faults = fill_row(
             self,
             symbol,
             name,
@@ -222,18 +233,27 @@ class PairType:
 
     def scaled(self, L: float) -> PairType:
         """The row with its lengths divided by ``L``: pitches of turns given as numbers, arms of forces; itself where it has none."""
-        freedoms = tuple(
-            replace(f, twist=_six((*f.twist[:3], *(v / L for v in f.twist[3:])))) if f.turns and any(f.twist[3:]) else f
-            for f in self.freedoms
-        )
-        reactions = self.reactions if self.reactions is None else tuple(_scaled_arm(c, L) for c in self.reactions)
-        efforts = tuple(_scaled_arm(c, L) for c in self.efforts)
-        if (freedoms, reactions, efforts) == (self.freedoms, self.reactions, self.efforts):
+        if not self.has_lengths:
             return self
+        steps = tuple(step.scaled(L) for step in self.steps)
+        scaled = {
+            "steps": steps,
+            "freedoms": tuple(freedom for step in steps for freedom in step.freedoms),
+            "reactions": None if self.reactions is None else tuple(_scaled_arm(c, L) for c in self.reactions),
+            "efforts": tuple(_scaled_arm(c, L) for c in self.efforts),
+        }
         out = copy(self)
-        for key, value in (("freedoms", freedoms), ("reactions", reactions), ("efforts", efforts)):
+        for key, value in scaled.items():
             object.__setattr__(out, key, value)
         return out
+
+    @cached_property
+    def has_lengths(self) -> bool:
+        """Whether numbers of the row are lengths."""
+        components = (*(self.reactions or ()), *self.efforts)
+        return any(step.scaled(2.0) is not step for step in self.steps) or any(
+            _scaled_arm(c, 2.0) is not c for c in components
+        )
 
     @property
     def f(self) -> int:
@@ -250,15 +270,13 @@ class PairType:
     @cached_property
     def factors(self) -> tuple[tuple[int, ...], ...]:
         """Freedoms grouped by factor: one index for a single freedom, three for a rotation."""
-        groups: dict[int, list[int]] = {}
-        for j, k in enumerate(self.frame_before):
-            groups.setdefault(k, []).append(j)
-        return tuple(tuple(g) for g in groups.values())
+        ends = accumulate(len(step.freedoms) for step in self.steps)
+        return tuple(tuple(range(end - len(step.freedoms), end)) for step, end in zip(self.steps, ends, strict=True))
 
     @cached_property
     def nx(self) -> int:
         """Number of state numbers: one for a single freedom, a unit quaternion for a rotation."""
-        return sum(1 if len(g) == 1 else 4 for g in self.factors)
+        return sum(step.n_state for step in self.steps)
 
     @cached_property
     def takes_pitch(self) -> bool:
@@ -269,8 +287,7 @@ class PairType:
     @property
     def drivable(self) -> tuple[bool, ...]:
         """Which freedoms take a drive: the single ones, not those of a rotation."""
-        single = {g[0] for g in self.factors if len(g) == 1}
-        return tuple(j in single for j in range(self.f))
+        return tuple(not step.holds_rotation for step in self.steps for _ in step.freedoms)
 
     @property
     def unknowns_and_equations(self) -> tuple[int, int]:
@@ -281,7 +298,7 @@ class PairType:
         return f"PairType({self.symbol!r}, {self.name!r}, f={self.f})"
 
 
-def _fill(
+def fill_row(
     row: PairType,
     symbol: str,
     name: str,
@@ -297,7 +314,10 @@ def _fill(
     faults: list[str] = []
     if not isinstance(symbol, str) or not symbol.isidentifier():
         faults.append(f"symbol {symbol!r}: expected letters and digits, starting with a letter")
-    rows, before = _freedoms(freedoms, faults)
+    steps = _factors(freedoms, faults)
+    rows = tuple(freedom for step in steps for freedom in step.freedoms)
+    starts = accumulate((len(step.freedoms) for step in steps), initial=0)
+    before = tuple(start for step, start in zip(steps, starts, strict=False) for _ in step.freedoms)
     parts = None
     if reactions is not None:
         parts = tuple(c for c in (_component(r, faults, "reaction") for r in reactions) if c is not None)
@@ -314,6 +334,7 @@ def _fill(
         "bookkeeping": bookkeeping,
         "directed": directed,
         "square_second": square_second,
+        "steps": steps,
         "frame_before": before,
         "computed_efforts": False,
     }
@@ -342,7 +363,7 @@ def _dual_at_random(row: PairType) -> bool:
     x = evaluation.random_coordinates(row, np.random.default_rng(12345), 1, 7)
     pitch = np.array([[0.3]])
     frames = evaluation.frames_of(row, pitch, x)
-    S, E = evaluation.twists_of(row, pitch, frames), evaluation.efforts_of(row, pitch, frames)
+    S, E = evaluation.twists_of(row, pitch, frames, x), evaluation.efforts_of(row, pitch, frames, x)
     unit = np.einsum("ifnt,ignt->fgnt", S, E)
     return not row.f or bool(np.abs(unit - np.eye(row.f)[:, :, None, None]).max() < 1e-9)
 
@@ -350,9 +371,10 @@ def _dual_at_random(row: PairType) -> bool:
 def _row_faults(row: PairType) -> list[str]:
     """Faults of a row, seen at random positions (fixed seed): unit twists, reciprocity, ranks, ``S^T E = 1``."""
     faults = []
+    steps = [step for step in row.steps for _ in step.freedoms]
     for j, freedom in enumerate(row.freedoms):
         w, v = np.array(freedom.twist[:3]), np.array(freedom.twist[3:])
-        if len(row.factors) and (j,) in row.factors and abs(np.linalg.norm(w if w.any() else v) - 1) > 1e-12:
+        if isinstance(steps[j], ConstantScrew) and abs(np.linalg.norm(w if w.any() else v) - 1) > 1e-12:
             faults.append(
                 f"freedom {freedom.name}: the twist {freedom.twist} is not a unit twist; divide it by its length"
             )
@@ -379,11 +401,11 @@ def _row_faults(row: PairType) -> list[str]:
     x = evaluation.random_coordinates(row, rng, 1, 7)
     pitch = np.array([[0.3]])
     frames = evaluation.frames_of(row, pitch, x)
-    S = evaluation.twists_of(row, pitch, frames)
+    S = evaluation.twists_of(row, pitch, frames, x)
     if row.f and min(np.linalg.matrix_rank(S[:, :, 0, t], tol=1e-9) for t in range(7)) < row.f:
         faults.append(f"freedoms {', '.join(names)}: not independent at random positions")
         return faults
-    W = evaluation.reactions_of(row, pitch, frames)
+    W = evaluation.reactions_of(row, pitch, frames, x)
     if not _dual_at_random(row):
         faults.append("efforts: S^T E is not the unit matrix at random positions; give efforts dual to the freedoms")
     work = np.einsum("ifnt,icnt->fcnt", S, W)
@@ -397,111 +419,3 @@ def _row_faults(row: PairType) -> list[str]:
     if not faults and row.f < 6 and np.linalg.matrix_rank(W[:, :, 0, 0], tol=1e-9) < 6 - row.f:
         faults.append(f"reactions {', '.join(row.component_names)}: not independent")
     return faults
-
-
-_AXIS = (Freedom("Tz", UNIT_TWISTS["Tz"]), Freedom("Rz", UNIT_TWISTS["Rz"]))
-_FZ = Component("Fz", UNIT_WRENCHES["Fz"])
-_MZ = Component("Mz", UNIT_WRENCHES["Mz"])
-_SCREW_FZ = Component("Fz", UNIT_WRENCHES["Fz"], 0, (0.0, 0.0, -1.0, 0.0, 0.0, 0.0))
-
-
-class PairTable(Mapping[str, PairType]):
-    """The pair table: symbol -> PairType; prints as a table."""
-
-    def __init__(self, rows: Sequence[PairType]) -> None:
-        self._rows = {row.symbol: row for row in rows}
-
-    def __getitem__(self, symbol: str) -> PairType:
-        return self._rows[symbol]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._rows)
-
-    def __len__(self) -> int:
-        return len(self._rows)
-
-    def __str__(self) -> str:
-        rows = []
-        for row in self.values():
-            reactions = " ".join(f"{c.name}@{c.frame}" for c in row.reactions or ()) or " ".join(row.component_names)
-            unknowns, equations = row.unknowns_and_equations
-            rows.append(
-                (
-                    row.symbol,
-                    row.name,
-                    str(row.f),
-                    " ".join(f.label for f in row.freedoms) or "none",
-                    reactions or "none",
-                    f"{unknowns} / {equations}",
-                )
-            )
-        header = ("symbol", "name", "f", "freedoms in order", "reactions @ frame", "Lee's ledger")
-        return to_text(Document("Pair types", (Table(header, tuple(rows)),)))
-
-
-def _row(symbol: str, name: str, freedoms: Sequence[object], reactions: Sequence[object], **rest: Any) -> PairType:
-    """A row of the table, not tried at random positions: a test does that for all of them, once and not at every start."""
-    row = object.__new__(PairType)
-    _fill(row, symbol, name, freedoms, reactions, **rest)
-    return row
-
-
-TABLE = PairTable(
-    [
-        _row(
-            "R",
-            "revolute",
-            freedoms=["Rz"],
-            reactions=["Fx", "Fy", "Fz", "Mx", "My"],
-            bookkeeping=Bookkeeping(_AXIS, (_FZ,)),
-        ),
-        _row(
-            "P",
-            "prismatic",
-            freedoms=["Tz"],
-            reactions=["Fx", "Fy", "Mx", "My", "Mz"],
-            bookkeeping=Bookkeeping(_AXIS, (_MZ,)),
-        ),
-        _row(
-            "H",
-            "helical",
-            freedoms=["Rz + pitch Tz"],
-            reactions=["Fx", "Fy", "Mx", "My", _SCREW_FZ],
-            bookkeeping=Bookkeeping(_AXIS, (_SCREW_FZ,)),
-        ),
-        _row(
-            "C",
-            "cylindrical",
-            freedoms=["Rz", "Tz"],
-            reactions=["Fx", "Fy", "Mx", "My"],
-            bookkeeping=Bookkeeping(_AXIS, ()),
-        ),
-        _row(
-            "U",
-            "universal (slotted sphere)",
-            freedoms=["Rz", "Rx"],
-            reactions=["Fx", "Fy", "Fz", "My@1"],
-            square_second=True,
-        ),
-        _row("S", "spherical", freedoms=["rotation"], reactions=["Fx", "Fy", "Fz"], directed=False),
-        _row("E", "planar", freedoms=["Tx", "Ty", "Rz"], reactions=["Fz", "Mx", "My"]),
-        _row(
-            "Sc",
-            "sphere in slotted cylinder",
-            freedoms=["Tz", "Ry", "Rx"],
-            reactions=["Fx@1", "Fy@1", "Mz@2"],
-            square_second=True,
-        ),
-        _row("Sg", "sphere in groove", freedoms=["Tz", "rotation"], reactions=["Fx@1", "Fy@1"]),
-        _row(
-            "Cp", "cylinder on plane", freedoms=["Tx", "Ty", "Rz", "Rx"], reactions=["Fz@2", "My@3"], square_second=True
-        ),
-        _row("Sp", "sphere on plane", freedoms=["Tx", "Ty", "rotation"], reactions=["Fz@2"]),
-        _row("W", "weld", freedoms=[], reactions=["Fx", "Fy", "Fz", "Mx", "My", "Mz"], directed=False),
-    ]
-)
-
-
-def pair_types() -> PairTable:
-    """The pair table of mechgraph: a mapping symbol -> PairType that prints as a table."""
-    return TABLE

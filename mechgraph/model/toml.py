@@ -24,7 +24,7 @@ from mechgraph.model.library import library_names, library_path
 from mechgraph.model.load import LOADS
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.numeric import is_numeric
-from mechgraph.model.pair_type import TABLE as PAIR_TABLE
+from mechgraph.model.pair_table import TABLE as PAIR_TABLE
 from mechgraph.model.pair_type import PairType
 
 SWEEP_ROUNDING = 1e-12

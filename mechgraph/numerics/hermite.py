@@ -86,7 +86,7 @@ class Interpolation:
 
     def _windows(self) -> list[tuple[Index, Index]]:
         """Steps by the number of nodes through which they are interpolated, with these nodes ``(width, n)``, nearest first."""
-        nodes, n = self.nodes, len(self.left)
+        n = len(self.left)
         if not n:
             return []
         length = np.sqrt((self.slope * self.slope).sum(axis=0))

@@ -118,7 +118,7 @@ def parabola_is_regular(P: Array, Q: Array, margin: float) -> NDArray[np.bool_]:
     companion = np.zeros((T, 2 * n, 2 * n))
     companion[:, :n, :n], companion[:, :n, n:] = np.moveaxis(P, -1, 0), np.moveaxis(Q, -1, 0)
     companion[:, n:, :n] = np.eye(n)
-    finite = np.isfinite(companion).all(axis=(1, 2))
+    finite: NDArray[np.bool_] = np.asarray(np.isfinite(companion).all(axis=(1, 2)))
     t = np.linalg.eigvals(np.where(finite[:, None, None], companion, 0.0))
     # |1/t - u| >= margin for all u in [-1, 1]
     s = 1.0 / np.where(t == 0, 1e-300, t)

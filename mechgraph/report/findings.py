@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.configuration import System
+from mechgraph.closure.indexing import System
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.linear import rank_of, singular_values
 from mechgraph.structure.mobility import Freedoms

@@ -12,7 +12,7 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import assembled, assembled_at, named_columns
-from mechgraph.closure.configuration import Index, System
+from mechgraph.closure.indexing import Index, System
 from mechgraph.document import Document, to_html, to_markdown, to_text
 from mechgraph.equations.terms import Ledger
 from mechgraph.errors import AssemblyError

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from mechgraph.document import Bullets, Document, Heading, Paragraph, Table
-from mechgraph.model.pair_type import TABLE
+from mechgraph.model.pair_table import TABLE
 from mechgraph.report.sentences import assumed, loop_names, plural, reasons, short
 from mechgraph.structure.mobility import NEAR
 

@@ -14,8 +14,9 @@ import numpy as np
 
 from mechgraph.algebra.screw import shift_wrench
 from mechgraph.algebra.se3 import Array, cross, rotate
-from mechgraph.closure.configuration import Configuration, Index, System
+from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_path import Status, in_blocks
+from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.rates import Rates, Velocities
 from mechgraph.equations.state import State
 from mechgraph.errors import MechgraphError

@@ -12,7 +12,7 @@ import scipy
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.bordering import LoopSystem
-from mechgraph.closure.configuration import Index
+from mechgraph.closure.indexing import Index
 
 SURE = 1e-3
 """Smallest pivot from which on the bordered system decides."""

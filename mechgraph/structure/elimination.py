@@ -18,7 +18,7 @@ import scipy
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array, cross
-from mechgraph.closure.configuration import Index
+from mechgraph.closure.indexing import Index
 
 Mask = NDArray[np.bool_]
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import CLOSED, close
-from mechgraph.closure.configuration import System
+from mechgraph.closure.indexing import System
 from mechgraph.numerics.linear import rank_of, singular_values
 from mechgraph.structure.mobility import motions_of
 

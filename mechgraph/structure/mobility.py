@@ -11,7 +11,8 @@ import scipy
 from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.bordering import LoopSystem
-from mechgraph.closure.configuration import Configuration, Index, System
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.passive_rest import Idle
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.linear import RANK_TOLERANCE, independent_rows, rank_of, singular_values

@@ -15,11 +15,13 @@ import numpy as np
 from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import named_columns, scaled_system
-from mechgraph.closure.configuration import Configuration, System
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import System
 from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker, Pair
-from mechgraph.model.pair_type import TABLE, PairType
+from mechgraph.model.pair_table import TABLE
+from mechgraph.model.pair_type import PairType
 from mechgraph.numerics.linear import RANK_TOLERANCE, singular_values
 from mechgraph.structure.finite_motion import finite_motion
 from mechgraph.structure.mobility import Freedoms, free_motion

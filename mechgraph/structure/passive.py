@@ -16,7 +16,8 @@ import numpy as np
 
 from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array, compose, pose_exp
-from mechgraph.closure.configuration import Configuration, Index, System
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import Index, System
 from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.topology.linkgraph import LinkGraph
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from mechgraph.algebra.screw import shift_wrench
 from mechgraph.algebra.se3 import Array, cross
-from mechgraph.closure.configuration import Configuration, Index
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import Index
 
 DRIVERS_ALONE = 1e-9
 """Part of a self-stress below which its reactions count as none: drivers that strain each other alone."""

@@ -9,7 +9,8 @@ import numpy as np
 
 from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.configuration import Configuration, Index
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import Index
 from mechgraph.model.pair import Pair
 from mechgraph.numerics.linear import RANK_TOLERANCE
 from mechgraph.structure.bordered import Bordered

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.configuration import Configuration, Index, System
+from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.closure.driver_path import DriverPath
+from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.solver import FactoredClosure, closure_solver
 from mechgraph.errors import DeclarationError
 from mechgraph.kinetostatics import Options, Pipeline, Starts

@@ -1,0 +1,123 @@
+"""The numbers of a mechanism as the kernel multiplies them: coefficients of the poses of all factors, screws in their frames."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechgraph.algebra.se3 import Array, cross, homogeneous, identity, inverse
+
+if TYPE_CHECKING:
+    from mechgraph.closure.indexing import FactorBatch, ScrewTable
+    from mechgraph.closure.tree import Walk
+    from mechgraph.model.parameters import Parameters
+
+Index = NDArray[np.intp]
+
+MARKER_A, MARKER_B, MARKER_A_INVERSE, MARKER_B_INVERSE = range(4)
+"""Order of the constant poses in ``Numbers.constants``, after the identity."""
+
+
+class Numbers:
+    """Coefficients of poses and screws of a system, from its parameters; a trailing batch axis of length 1, or one a variant."""
+
+    def __init__(
+        self, par: Parameters, walk: Walk, batches: Sequence[FactorBatch], n_factors: Index, n_freedoms: int
+    ) -> None:
+        self.par, self.walk, self.batches = par, walk, batches
+        self.n_factors, self.n_freedoms = n_factors, n_freedoms
+        self.n_pairs = len(n_factors)
+
+    @cached_property
+    def constants(self) -> Array:
+        """Constant poses ``(3, 4, 1 + 4 P, B)``: the identity, markers A, markers B, and their inverses."""
+        A, B = self.par.marker_a, self.par.marker_b
+        batch = np.broadcast_shapes(A.shape[3:], B.shape[3:])[0]
+        markers = np.empty((3, 4, 2 * self.n_pairs, batch), dtype=np.result_type(A, B))
+        markers[:, :, : self.n_pairs], markers[:, :, self.n_pairs :] = A, B
+        return np.concatenate([identity(1, batch), markers, inverse(markers)], axis=2)
+
+    @cached_property
+    def is_real(self) -> bool:
+        """Whether no parameter is complex."""
+        return not any(np.iscomplexobj(part) for part in (self.constants, self.par.pitch, self.par.frame))
+
+    @cached_property
+    def poses(self) -> list[tuple[Array, tuple[Array, Array] | None]]:
+        """For every batch of factors the coefficients of the poses of its steps with the markers beside them, seen from the nodes
+        from which the steps start (from the global frame where that is the frame link).
+
+        For one mechanism the markers are part of the coefficients, ``(n, 16, m)`` for a product of matrices. For variants, of
+        which each has few positions, they stay beside them, ``(4, 4, n, B)``, and where pitches vary coefficients are
+        ``(16, m, n, B)``.
+        """
+        out: list[tuple[Array, tuple[Array, Array] | None]] = []
+        for b in self.batches:
+            C = b.stack.coefficients(self.par.pitch[b.pairs], np.asarray(self.walk.back[b.steps], dtype=bool))
+            left, right = self._beside(b)
+            alone = left.shape[3] == 1 and C.shape[4] == 1
+            if alone:
+                C = np.einsum("abnt,bcmnt->acmnt", left, C)
+                C = np.einsum("acmnt,cdnt->admnt", C, right)
+            C = C.reshape(16, *C.shape[2:])
+            C = np.ascontiguousarray(C[..., 0].transpose(2, 0, 1)) if C.shape[3] == 1 else C
+            out.append((C, None if alone else (left, right)))
+        return out
+
+    def _beside(self, b: FactorBatch) -> tuple[Array, Array]:
+        """Constant poses before and behind the factors of a batch in the sense of the walk, homogeneous ``(4, 4, n, B)``."""
+        n, last = self.n_pairs, np.maximum(self.n_factors, 1) - 1
+        back, begins, ends = self.walk.back[b.steps], b.ranks == 0, b.ranks == last[b.pairs]
+        left = np.where(back, ends * (1 + MARKER_B * n + b.pairs), begins * (1 + MARKER_A * n + b.pairs))
+        right = np.where(
+            back, begins * (1 + MARKER_A_INVERSE * n + b.pairs), ends * (1 + MARKER_B_INVERSE * n + b.pairs)
+        )
+        before, behind = (homogeneous(self.constants[:, :, side]) for side in (left, right))
+        starts = self.walk.parents[b.steps] == 0
+        before[:, :, starts] = np.einsum("abt,bcnt->acnt", homogeneous(self.par.frame), before[:, :, starts])
+        return before, behind
+
+    @cached_property
+    def twists(self) -> Array:
+        """Twists of all freedoms in their nodes, bound and free part ``(3, 2, F, B)``; zero for those that move."""
+        batch = np.broadcast_shapes(self.constants.shape[3:], self.par.pitch.shape[1:])[0]
+        out = np.zeros((3, 2, self.n_freedoms, batch), dtype=np.result_type(self.constants, self.par.pitch))
+        for b in self.batches:
+            S = b.stack.constant_twists(self.par.pitch[b.pairs])
+            if S is not None:
+                self.place_twists(out, b, S)
+        return out
+
+    def place_twists(self, out: Array, b: FactorBatch, S: Array) -> None:
+        """Twists ``(6, f, n, T)`` in the frames before the factors of a batch, written into ``out (3, 2, F, T)`` in their nodes."""
+        X = self.marker_a_if_first(b)
+        for j, columns in enumerate(b.columns):
+            out[:, 0, columns] = np.einsum("ijnt,jnt->int", X[:, :3], S[:3, j])
+            out[:, 1, columns] = np.einsum("ijnt,jnt->int", X[:, :3], S[3:, j])
+            out[:, 1, columns] += cross(X[:, 3], out[:, 0, columns])
+
+    def marker_a_if_first(self, b: FactorBatch) -> Array:
+        """The frames before the factors of a batch in their nodes ``(3, 4, n, B)``: markers A before the first ones of pairs."""
+        return self.constants[:, :, np.where(b.ranks == 0, 1 + MARKER_A * self.n_pairs + b.pairs, 0)]
+
+    def components(self, table: ScrewTable) -> Array:
+        """Wrenches of a table in their nodes, moment and force ``(3, 2, K, B)``; without arms where they act at markers B."""
+        X = self.constants[:, :, table.const]
+        free = table.free[..., None]
+        if table.per_pitch.any():
+            free = free + table.per_pitch[..., None] * self.par.pitch[table.pairs]
+        batch = np.broadcast_shapes(X.shape[3:], free.shape[2:])[0]
+        out = np.empty((3, 2, X.shape[2], batch), dtype=np.result_type(X, free))
+        out[:, 0] = np.einsum("ijkt,jkt->ikt", X[:, :3], np.broadcast_to(free, (*free.shape[:2], batch)))
+        out[:, 1] = np.einsum("ijkt,jk->ikt", X[:, :3], table.bound)
+        out[:, 0] += np.where(table.at_b[:, None], 0.0, cross(X[:, 3], out[:, 1]))
+        return out
+
+    @cached_property
+    def ends(self) -> Array:
+        """Origins of the markers B in the frames of their links b, ``(3, 1, P, B)``."""
+        return self.par.marker_b[:, None, 3]

@@ -1,0 +1,339 @@
+"""Factors of a pair's displacement: what is turned into poses and twists, one factor after the other.
+
+A factor is a relative motion as a function of its own coordinates: its value (a pose), its twists (one a freedom) and the rate of
+these twists, all in the frame before it. A constant screw and a rotation are the two of the pair table; a frame that travels along
+a curve is one class more. Nothing outside this file knows how a factor is evaluated.
+
+Factors of one kind are evaluated together, whatever pairs they belong to: a ``Stack`` writes the poses of ``n`` of them (and the
+inverse poses) as combinations of a few values of the coordinates with constant coefficients. The constant poses beside a factor
+enter those coefficients once, and a batch of poses is one product of matrices.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechgraph.algebra.se3 import Array, homogeneous, inverse, quaternion_matrix, skew
+
+if TYPE_CHECKING:
+    from mechgraph.model.pair_type import Freedom
+
+Flags = NDArray[np.bool_]
+
+
+class Factor(ABC):
+    """One factor of the displacement of a pair. Coordinates ``x`` are ``(n_state, n, T)``, pitches ``(n, 1)`` or ``(n, T)``."""
+
+    @property
+    @abstractmethod
+    def freedoms(self) -> tuple[Freedom, ...]:
+        """Names of the freedoms, with their twists at coordinates zero."""
+
+    @property
+    def holds_rotation(self) -> bool:
+        """Whether the state is a unit quaternion, moved by ``exp``; otherwise it is the coordinates themselves."""
+        return False
+
+    @property
+    def n_state(self) -> int:
+        """Number of state numbers."""
+        return 4 if self.holds_rotation else len(self.freedoms)
+
+    @property
+    def kind(self) -> Hashable:
+        """Factors of one kind are evaluated together."""
+        return self
+
+    @abstractmethod
+    def pose(self, x: Array, pitch: Array) -> Array:
+        """The relative pose ``(3, 4, n, T)`` of the frame after the factor, seen from the frame before it."""
+
+    @abstractmethod
+    def twists(self, x: Array, pitch: Array) -> Array:
+        """Twists of the freedoms in the frame before the factor, ``(6, f, n, T)``; batch axes of length 1 where constant."""
+
+    def twist_rates(self, x: Array, dq: Array, pitch: Array) -> Array | None:
+        """``sum_j dS_j/dt q'_j (6, n, T)`` seen from the frame before the factor; None where the twists are constant there.
+
+        For a rotation the twists are those of its angular velocity: constant unit turns.
+        """
+        return None
+
+    @abstractmethod
+    def scaled(self, L: float) -> Factor:
+        """The factor with its lengths divided by ``L``; itself where it has none."""
+
+    def stack(self, factors: Sequence[Factor], counts: Sequence[int]) -> Stack:
+        """``counts`` copies each of ``factors`` of this kind, evaluated together."""
+        return PoseStack(self)
+
+
+class Stack(Protocol):
+    """``n`` factors of one kind, for fast evaluation: poses ``sum_i coefficients_i values_i``."""
+
+    def values(self, x: Array) -> Array:
+        """Values ``(m, n, T)`` of the states ``(n_state, n, T)``."""
+
+    def coefficients(self, pitch: Array, back: Flags) -> Array:
+        """Coefficients ``(4, 4, m, n, B)`` of the poses, of the inverse poses where ``back (n,)``."""
+
+    def constant_twists(self, pitch: Array) -> Array | None:
+        """Twists ``(6, f, n, B)`` in the frames before the factors; None where they move with the coordinates."""
+
+    def twists(self, x: Array, pitch: Array) -> Array:
+        """The same ``(6, f, n, T)`` of twists that move."""
+
+    def twist_rates(self, x: Array, dq: Array, pitch: Array) -> Array | None:
+        """See ``Factor.twist_rates``."""
+
+
+@dataclass(frozen=True)
+class ConstantScrew(Factor):
+    """A motion ``exp(q s)`` about a constant unit twist ``s = twist + pitch * per_pitch``: a turn, a slide, a helical motion."""
+
+    freedom: Freedom
+
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        """The freedoms."""
+        return (self.freedom,)
+
+    @property
+    def kind(self) -> Hashable:
+        """Evaluated together: all of this class."""
+        return ConstantScrew
+
+    def pose(self, x: Array, pitch: Array) -> Array:
+        """Value of the motion."""
+        terms = screw_terms(self.twists(x, pitch)[:, 0])[:3]
+        return np.asarray(np.einsum("ijmnt,mnt->ijnt", terms, screw_values(x[0])))
+
+    def twists(self, x: Array, pitch: Array) -> Array:
+        """Constant unit twists."""
+        return _unit_twists([self], [pitch.shape[0]], pitch)
+
+    def scaled(self, L: float) -> Factor:
+        """With lengths over ``L``."""
+        scaled = self.freedom.scaled(L)
+        return self if scaled is self.freedom else replace(self, freedom=scaled)
+
+    def stack(self, factors: Sequence[Factor], counts: Sequence[int]) -> Stack:
+        """Copies evaluated together."""
+        return ScrewStack([f for f in factors if isinstance(f, ConstantScrew)], counts)
+
+
+def _unit_twists(factors: Sequence[ConstantScrew], counts: Sequence[int], pitch: Array) -> Array:
+    """Unit twists ``(6, 1, n, B)`` of constant screws."""
+    base, per_pitch = (
+        np.repeat(np.array([getattr(f.freedom, part) for f in factors]).T, counts, axis=1)[:, None, :, None]
+        for part in ("twist", "per_pitch")
+    )
+    return np.asarray(base + per_pitch * pitch if per_pitch.any() else base)
+
+
+def screw_values(q: Array) -> Array:
+    """``1, sin q, 1 - cos q, q`` of coordinates ``(n, T)``, ``(4, n, T)``."""
+    out = np.empty((4, *q.shape), dtype=q.dtype)
+    out[0] = 1.0
+    np.sin(q, out=out[1])
+    np.cos(q, out=out[2])
+    np.subtract(1.0, out[2], out=out[2])
+    out[3] = q
+    return out
+
+
+def screw_terms(twist: Array) -> Array:
+    """Coefficients ``(4, 4, 4, n, B)`` of ``1, sin q, 1 - cos q, q`` (third axis) in ``exp(q s)`` for unit twists ``(6, n, B)``.
+
+    For ``s = (w, v)``, ``|w|`` one or zero: ``1``, ``[W | -W^2 v]``, ``[W^2 | W v]``, ``[0 | (1 + W^2) v]`` with ``W = w^``.
+    """
+    W, v = skew(twist[:3]), twist[3:]
+    W2 = np.einsum("ijnt,jknt->iknt", W, W)
+    W2v = np.einsum("ijnt,jnt->int", W2, v)
+    out = np.zeros((4, 4, 4, *twist.shape[1:]), dtype=twist.dtype)
+    out[range(4), range(4), 0] = 1.0
+    out[:3, :3, 1], out[:3, 3, 1] = W, -W2v
+    out[:3, :3, 2], out[:3, 3, 2] = W2, np.einsum("ijnt,jnt->int", W, v)
+    out[:3, 3, 3] = v + W2v
+    return out
+
+
+class ScrewStack:
+    """Constant screws together: every pose is linear in ``1, sin q, 1 - cos q, q``."""
+
+    def __init__(self, factors: Sequence[ConstantScrew], counts: Sequence[int]) -> None:
+        self.factors, self.counts = factors, counts
+
+    def values(self, x: Array) -> Array:
+        """``1, sin q, 1 - cos q, q``."""
+        return screw_values(x[0])
+
+    def coefficients(self, pitch: Array, back: Flags) -> Array:
+        """``screw_terms``; ``exp(-q s)`` changes the sign of the odd values, ``sin q`` and ``q``."""
+        out = screw_terms(self.constant_twists(pitch)[:, 0])
+        out[:, :, 1::2, back] *= -1.0
+        return out
+
+    def constant_twists(self, pitch: Array) -> Array:
+        """The unit twists."""
+        return _unit_twists(self.factors, self.counts, pitch)
+
+    def twists(self, x: Array, pitch: Array) -> Array:
+        """The unit twists."""
+        return self.constant_twists(pitch)
+
+    def twist_rates(self, x: Array, dq: Array, pitch: Array) -> None:
+        """None: they are constant."""
+
+
+@dataclass(frozen=True)
+class Rotation(Factor):
+    """A rotation of three freedoms, held as a unit quaternion and moved by ``exp``: no chart, no singularity."""
+
+    names: tuple[Freedom, ...]
+
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        """The freedoms."""
+        return self.names
+
+    @property
+    def holds_rotation(self) -> bool:
+        """Yes."""
+        return True
+
+    @property
+    def kind(self) -> Hashable:
+        """Evaluated together: all of this class."""
+        return Rotation
+
+    def pose(self, x: Array, pitch: Array) -> Array:
+        """Value of the motion."""
+        out = np.zeros((3, 4, *x.shape[1:]), dtype=x.dtype)
+        out[:, :3] = quaternion_matrix(x)
+        return out
+
+    def twists(self, x: Array, pitch: Array) -> Array:
+        """Constant unit twists."""
+        return np.eye(6, 3)[:, :, None, None]
+
+    def scaled(self, L: float) -> Factor:
+        """With lengths over ``L``."""
+        return self
+
+    def stack(self, factors: Sequence[Factor], counts: Sequence[int]) -> Stack:
+        """Copies evaluated together."""
+        return RotationStack(sum(counts))
+
+
+FIRST, SECOND = np.array([1, 2, 3, 1, 1, 2, 0, 0, 0]), np.array([1, 2, 3, 2, 3, 3, 1, 2, 3])
+"""The products of quaternion components of which the entries of a rotation matrix are made: xx yy zz xy xz yz wx wy wz."""
+
+
+def _rotation_terms() -> Array:
+    """Coefficients ``(4, 4, 10)`` of 1 and those products in the pose of a unit quaternion (``quaternion_matrix``)."""
+    out = np.zeros((4, 4, 10))
+    out[range(4), range(4), 0] = 1.0
+    xx, yy, zz, xy, xz, yz, wx, wy, wz = range(1, 10)
+    for i, squares in enumerate(((yy, zz), (xx, zz), (xx, yy))):
+        out[i, i, squares] = -2.0
+    for i, j, product, turn in ((0, 1, xy, wz), (2, 0, xz, wy), (1, 2, yz, wx)):
+        out[i, j, product] = out[j, i, product] = out[j, i, turn] = 2.0
+        out[i, j, turn] = -2.0
+    return out
+
+
+class RotationStack:
+    """Rotations together: the entries of their matrices are linear in the products of quaternion components."""
+
+    def __init__(self, n: int) -> None:
+        self.n = n
+
+    def values(self, x: Array) -> Array:
+        """One and the products ``(10, n, T)``."""
+        out = np.empty((10, *x.shape[1:]), dtype=x.dtype)
+        out[0] = 1.0
+        np.multiply(x[FIRST], x[SECOND], out=out[1:])
+        return out
+
+    def coefficients(self, pitch: Array, back: Flags) -> Array:
+        """The same for all; the inverse is that of the conjugate quaternion, ``wx, wy, wz`` with the other sign."""
+        out = np.repeat(_rotation_terms()[..., None, None], self.n, axis=3)
+        out[:, :, 7:, back] *= -1.0
+        return out
+
+    def constant_twists(self, pitch: Array) -> Array:
+        """Unit turns."""
+        return np.repeat(np.eye(6, 3)[:, :, None, None], self.n, axis=2)
+
+    def twists(self, x: Array, pitch: Array) -> Array:
+        """Unit turns."""
+        return self.constant_twists(pitch)
+
+    def twist_rates(self, x: Array, dq: Array, pitch: Array) -> None:
+        """None: the turns are constant."""
+
+
+class PoseStack:
+    """Copies of one factor of any kind, by its pose: the values are the entries of the pose and of its inverse.
+
+    Only constant screws take the pitch of a pair; the pose of any other factor is asked for with pitch zero.
+    """
+
+    def __init__(self, factor: Factor) -> None:
+        self.factor = factor
+
+    def values(self, x: Array) -> Array:
+        """Entries of the homogeneous pose and of its inverse, ``(32, n, T)``."""
+        X = self.factor.pose(x, np.zeros((x.shape[1], 1)))
+        return np.concatenate([homogeneous(Y).reshape(16, *X.shape[2:]) for Y in (X, inverse(X))])
+
+    def coefficients(self, pitch: Array, back: Flags) -> Array:
+        """Ones: the first sixteen values are the entries of the pose, the others those of its inverse."""
+        pick = np.eye(16).reshape(4, 4, 16)
+        out = np.zeros((4, 4, 32, len(back), 1))
+        out[:, :, :16, ~back, 0], out[:, :, 16:, back, 0] = pick[..., None], pick[..., None]
+        return out
+
+    def constant_twists(self, pitch: Array) -> None:
+        """None: they may move."""
+
+    def twists(self, x: Array, pitch: Array) -> Array:
+        """Those of the factor."""
+        return self.factor.twists(x, pitch)
+
+    def twist_rates(self, x: Array, dq: Array, pitch: Array) -> Array | None:
+        """Those of the factor."""
+        return self.factor.twist_rates(x, dq, pitch)
+
+
+class FixedStack:
+    """No motion: what stands between the markers of pairs without a freedom."""
+
+    def __init__(self, n: int) -> None:
+        self.n = n
+
+    def values(self, x: Array) -> Array:
+        """One."""
+        return np.ones((1, *x.shape[1:]), dtype=x.dtype)
+
+    def coefficients(self, pitch: Array, back: Flags) -> Array:
+        """The identity."""
+        return np.repeat(np.eye(4)[:, :, None, None, None], self.n, axis=3)
+
+    def constant_twists(self, pitch: Array) -> Array:
+        """None of them."""
+        return np.zeros((6, 0, self.n, 1))
+
+    def twists(self, x: Array, pitch: Array) -> Array:
+        """None of them."""
+        return self.constant_twists(pitch)
+
+    def twist_rates(self, x: Array, dq: Array, pitch: Array) -> None:
+        """None."""

@@ -1,0 +1,116 @@
+"""The pair table: twelve pair types as rows of data, looked up by symbol and printed. To add a pair type, add a row."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from mechgraph.document import Document, Table, to_text
+from mechgraph.model.pair_type import UNIT_TWISTS, UNIT_WRENCHES, Bookkeeping, Component, Freedom, PairType, fill_row
+
+_AXIS = (Freedom("Tz", UNIT_TWISTS["Tz"]), Freedom("Rz", UNIT_TWISTS["Rz"]))
+_FZ = Component("Fz", UNIT_WRENCHES["Fz"])
+_MZ = Component("Mz", UNIT_WRENCHES["Mz"])
+_SCREW_FZ = Component("Fz", UNIT_WRENCHES["Fz"], 0, (0.0, 0.0, -1.0, 0.0, 0.0, 0.0))
+
+
+class PairTable(Mapping[str, PairType]):
+    """The pair table: symbol -> PairType; prints as a table."""
+
+    def __init__(self, rows: Sequence[PairType]) -> None:
+        self._rows = {row.symbol: row for row in rows}
+
+    def __getitem__(self, symbol: str) -> PairType:
+        return self._rows[symbol]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._rows)
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __str__(self) -> str:
+        rows = []
+        for row in self.values():
+            reactions = " ".join(f"{c.name}@{c.frame}" for c in row.reactions or ()) or " ".join(row.component_names)
+            unknowns, equations = row.unknowns_and_equations
+            rows.append(
+                (
+                    row.symbol,
+                    row.name,
+                    str(row.f),
+                    " ".join(f.label for f in row.freedoms) or "none",
+                    reactions or "none",
+                    f"{unknowns} / {equations}",
+                )
+            )
+        header = ("symbol", "name", "f", "freedoms in order", "reactions @ frame", "Lee's ledger")
+        return to_text(Document("Pair types", (Table(header, tuple(rows)),)))
+
+
+def _row(symbol: str, name: str, freedoms: Sequence[object], reactions: Sequence[object], **rest: Any) -> PairType:
+    """A row of the table, not tried at random positions: a test does that for all of them, once and not at every start."""
+    row = object.__new__(PairType)
+    fill_row(row, symbol, name, freedoms, reactions, **rest)
+    return row
+
+
+TABLE = PairTable(
+    [
+        _row(
+            "R",
+            "revolute",
+            freedoms=["Rz"],
+            reactions=["Fx", "Fy", "Fz", "Mx", "My"],
+            bookkeeping=Bookkeeping(_AXIS, (_FZ,)),
+        ),
+        _row(
+            "P",
+            "prismatic",
+            freedoms=["Tz"],
+            reactions=["Fx", "Fy", "Mx", "My", "Mz"],
+            bookkeeping=Bookkeeping(_AXIS, (_MZ,)),
+        ),
+        _row(
+            "H",
+            "helical",
+            freedoms=["Rz + pitch Tz"],
+            reactions=["Fx", "Fy", "Mx", "My", _SCREW_FZ],
+            bookkeeping=Bookkeeping(_AXIS, (_SCREW_FZ,)),
+        ),
+        _row(
+            "C",
+            "cylindrical",
+            freedoms=["Rz", "Tz"],
+            reactions=["Fx", "Fy", "Mx", "My"],
+            bookkeeping=Bookkeeping(_AXIS, ()),
+        ),
+        _row(
+            "U",
+            "universal (slotted sphere)",
+            freedoms=["Rz", "Rx"],
+            reactions=["Fx", "Fy", "Fz", "My@1"],
+            square_second=True,
+        ),
+        _row("S", "spherical", freedoms=["rotation"], reactions=["Fx", "Fy", "Fz"], directed=False),
+        _row("E", "planar", freedoms=["Tx", "Ty", "Rz"], reactions=["Fz", "Mx", "My"]),
+        _row(
+            "Sc",
+            "sphere in slotted cylinder",
+            freedoms=["Tz", "Ry", "Rx"],
+            reactions=["Fx@1", "Fy@1", "Mz@2"],
+            square_second=True,
+        ),
+        _row("Sg", "sphere in groove", freedoms=["Tz", "rotation"], reactions=["Fx@1", "Fy@1"]),
+        _row(
+            "Cp", "cylinder on plane", freedoms=["Tx", "Ty", "Rz", "Rx"], reactions=["Fz@2", "My@3"], square_second=True
+        ),
+        _row("Sp", "sphere on plane", freedoms=["Tx", "Ty", "rotation"], reactions=["Fz@2"]),
+        _row("W", "weld", freedoms=[], reactions=["Fx", "Fy", "Fz", "Mx", "My", "Mz"], directed=False),
+    ]
+)
+
+
+def pair_types() -> PairTable:
+    """The pair table of mechgraph: a mapping symbol -> PairType that prints as a table."""
+    return TABLE
