@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array, cross
+from mechgraph.algebra.se3 import Array, cross, rotate, rotate_back
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_path import DriverPath, Positions, Status
 from mechgraph.closure.indexing import Index
@@ -88,7 +88,7 @@ def body_accelerations(idle: tuple[Idle, ...], points: list[Array], V: Array, A:
 
 
 GAUSS = 8
-"""Points of Gauss and Legendre a step between nodes: the spin integrated over it is exact to rounding."""
+"""Points of Gauss and Legendre a step between nodes: what is integrated over it is exact to rounding."""
 TURNING = 1e-6
 """Part of a unit motion from which on a body takes part in it."""
 
@@ -96,98 +96,144 @@ TURNING = 1e-6
 def unspun(path: DriverPath, found: Positions, bodies: tuple[Idle, ...]) -> Positions:
     """The same positions with passive bodies not spinning on the way from the start.
 
-    The nodes hold some freedom of every passive body, which turns it along the way by some spin. The angle by which it has to be turned
-    back is the integral of that spin over the track, taken by Gauss and Legendre's rule in every step between nodes, so that it does not
-    hang on which positions were asked for. Bodies with more than one passive motion are left as they are.
+    Along a track some freedom of every passive body is held, so that the body turns about its axis ``u`` by an angle of no meaning. Where
+    it is when it never spins (``w . u = 0``) follows from the way of the axis alone: a vector across it is carried parallel along
+    ``u(s)``. Against the part ``n`` across ``u`` of a fixed vector ``e`` it turns by ``-integral n' . (u x n) ds``, taken by Gauss and
+    Legendre's rule in every step between nodes, so that it does not hang on which positions were asked for. Bodies with more than one
+    passive motion are left as they are. Source: Bishop, There is more than one way to frame a curve, Amer. Math. Monthly 82, 1975.
     """
     nodes, good = found.tracks.nodes, np.flatnonzero(found.status == Status.OK)
     interpolation = Interpolation(path, nodes)
     if not len(interpolation.left) or not good.size:
         return found
-    spins = _Spins(path, interpolation, found.follower, bodies)
+    carried = _Carried(path, interpolation, found.follower, bodies)
     x = found.x.copy()
-    x[:, good] = spins.turned_back(found.x[:, good], found.which[good], found.track[good], found.place[good])
-    turned = spins.turned_back(nodes.x, nodes.which, nodes.track, nodes.place)
+    x[:, good] = carried.turned(found.x[:, good], found.which[good], found.track[good], found.place[good])
+    turned = carried.turned(nodes.x, nodes.which, nodes.track, nodes.place)
     tracks = replace(found.tracks, nodes=replace(nodes, x=turned))
     return replace(found, x=x, here=None, tracks=tracks)
 
 
-class _Spins:
-    """Spin of passive bodies along tracks: rates at Gauss points, integrals up to any place."""
+class _Carried:
+    """Vectors across the axes of passive bodies, carried parallel along tracks."""
 
-    def __init__(
-        self, path: DriverPath, interpolation: Interpolation, follower: Follower, bodies: tuple[Idle, ...]
-    ) -> None:
+    def __init__(self, path: DriverPath, interpolation: Interpolation, follower: Follower, bodies: tuple[Idle, ...]) -> None:
         self.path, self.interpolation, self.follower, self.bodies = path, interpolation, follower, bodies
         nodes, left = interpolation.nodes, interpolation.left
-        points, self._weights = np.polynomial.legendre.leggauss(GAUSS)
         self._h = nodes.place[interpolation.right] - nodes.place[left]
-        step = np.repeat(np.arange(len(left)), GAUSS)
-        place = nodes.place[left][step] + np.tile(0.5 * (points + 1.0), len(left)) * self._h[step]
-        track = nodes.track[left][step]
-        drive = follower.paths.drive(track, place)
-        closed = follower.newton.close(interpolation(step, place, drive), drive, track, nodes.which[left][step])
-        here = path.at(closed.x, drive, track)
-        f = path.factored(here, closed.which)
-        self._new_track = np.concatenate([[True], np.diff(track) != 0])
-        axes, _ = _axes(here, bodies, f.motions())
-        rates = (f.sensitivity() * interpolation.slope[:, step]).sum(axis=1)
+        self._starts = np.searchsorted(nodes.track, nodes.track[left])
+        self._at_nodes = path.at(nodes.x, nodes.drive, nodes.track)
+        f = path.factored(self._at_nodes, nodes.which)
+        axes, _ = _axes(self._at_nodes, bodies, f.motions())
+        points, weights = np.polynomial.legendre.leggauss(GAUSS)
+        self._to_series = weights[:, None] * np.polynomial.legendre.legvander(points, GAUSS - 1) * (np.arange(GAUSS) + 0.5)
+        here, rates = self._between(0.5 * (points + 1.0))
         w = here.link_twists(rates)[:3]
-        legendre = np.polynomial.legendre.legvander(points, GAUSS - 1) * (np.arange(GAUSS) + 0.5)
-        self.axis: list[Array | None] = []
-        self._series: list[Array] = []
-        self._before: list[Array] = []
-        first = np.concatenate([[True], np.diff(nodes.track[left]) != 0])
-        for body, axis in zip(bodies, axes, strict=True):
-            if axis is None:
-                self.axis.append(None)
-                self._series.append(np.zeros((0, 0)))
-                self._before.append(np.zeros(0))
-                continue
-            axis = axis * self._senses(axis)
-            spin = -(w[:, body.link] * axis).sum(axis=0).reshape(-1, GAUSS)
-            series = (spin * self._weights) @ legendre
-            whole = self._h * series[:, 0]
-            total = np.cumsum(whole) - whole
-            begin = total[np.flatnonzero(first)][np.cumsum(first) - 1]
-            self.axis.append(axis)
-            self._series.append(series)
-            self._before.append(total - begin)
+        self._bodies = [
+            None if axis is None else self._carry(body.link, axis[:, self._starts], here, w[:, body.link])
+            for body, axis in zip(bodies, axes, strict=True)
+        ]
 
-    def _senses(self, axis: Array) -> Array:
-        """Signs with which an axis does not flip along its track."""
-        along = (axis[:, 1:] * axis[:, :-1]).sum(axis=0)
-        flips = np.concatenate([[1.0], np.where(along < 0, -1.0, 1.0)])
-        flips[self._new_track] = 1.0
-        product = np.cumprod(flips)
-        return product * product[np.flatnonzero(self._new_track)][np.cumsum(self._new_track) - 1]
+    def _between(self, parts: Array) -> tuple[Configuration, Array]:
+        """States and rates at parts of all steps."""
+        nodes, left = self.interpolation.nodes, self.interpolation.left
+        step = np.repeat(np.arange(len(left)), len(parts))
+        place = nodes.place[left][step] + np.tile(parts, len(left)) * self._h[step]
+        track, which = nodes.track[left][step], nodes.which[left][step]
+        drive = self.follower.paths.drive(track, place)
+        closed = self.follower.newton.close(self.interpolation(step, place, drive), drive, track, which)
+        here = self.path.at(closed.x, drive, track)
+        rates = self.path.factored(here, closed.which).sensitivity() * self.interpolation.slope[:, step]
+        return here, rates.sum(axis=1)
 
-    def turned_back(self, x: Array, which: Index, track: Index, place: Array) -> Array:
-        """States with every body turned back by the integral of its spin up to their places."""
+    def _carry(self, link: int, axis: Array, here: Configuration, w: Array) -> _Body:
+        """The vector of one body carried along all steps; ``axis (3, steps)`` where the track of each step starts."""
+        R = self._at_nodes.poses[:, :3, link]
+        body_axis = rotate_back(R[:, :, self._starts], axis)
+        across = _perpendicular(body_axis)
+        left, right = (rotate(R[:, :, at], body_axis) for at in (self.interpolation.left, self.interpolation.right))
+        e = _perpendicular(left)
+        u = rotate(here.poses[:, :3, link], np.repeat(body_axis, GAUSS, axis=1))
+        n, length = _across(np.repeat(e, GAUSS, axis=1), u)
+        rate = -(np.repeat(e, GAUSS, axis=1) * u).sum(axis=0) * (cross(w, u) * cross(u, n)).sum(axis=0) / length
+        series = -self._h[:, None] * (rate.reshape(-1, GAUSS) @ self._to_series)
+        # from the reference vector of a step to that of the next, at the node between them
+        end, _ = _across(e, right)
+        turn = np.zeros(len(series))
+        turn[1:] = _angle(e[:, 1:], end[:, :-1], left[:, 1:]) + series[:-1, 0]
+        track = self.interpolation.nodes.track[self.interpolation.left]
+        first = np.concatenate([[True], track[1:] != track[:-1]])
+        at_start = _angle(e, rotate(R[:, :, self._starts], across), left)
+        turn[first] = at_start[first]
+        total = np.cumsum(turn)
+        begin = (total - turn)[np.flatnonzero(first)][np.cumsum(first) - 1]
+        return _Body(body_axis, across, e, total - begin, series)
+
+    def turned(self, x: Array, which: Index, track: Index, place: Array) -> Array:
+        """States with every body turned to where it stands when it does not spin."""
         nodes = self.interpolation.nodes
-        has_step = np.isin(track, nodes.track[self.interpolation.left])
-        step = self.interpolation.find(np.where(has_step, track, nodes.track[self.interpolation.left[0]]), place)
+        tracks = nodes.track[self.interpolation.left]
+        moved = np.isin(track, tracks)
+        step = self.interpolation.find(np.where(moved, track, tracks[0]), place)
         drive = x[self.path.rows]
         here = self.path.at(x, drive, track)
-        f = self.path.factored(here, which)
-        Z = f.motions()
+        Z = self.path.factored(here, which).motions()
         axes, unit = _axes(here, self.bodies, Z)
-        t = 2.0 * (place - nodes.place[self.interpolation.left[step]]) / self._h[step] - 1.0
-        P = np.polynomial.legendre.legvander(t, GAUSS)
-        integrals = np.empty((len(t), GAUSS))
-        integrals[:, 0] = 0.5 * (t + 1.0)
-        for k in range(1, GAUSS):
-            integrals[:, k] = 0.5 * (P[:, k + 1] - P[:, k - 1]) / (2 * k + 1)
+        integrals = _integrals(2.0 * (place - nodes.place[self.interpolation.left[step]]) / self._h[step] - 1.0)
         dq = np.zeros((Z.shape[0], x.shape[1]))
-        for i, axis in enumerate(axes):
-            known = self.axis[i]
-            if axis is None or known is None:
+        for body, known, axis, rates in zip(self.bodies, self._bodies, axes, unit, strict=True):
+            if known is None or axis is None:
                 continue
-            angle = self._before[i][step] + self._h[step] * (self._series[i][step] * integrals).sum(axis=1)
-            sense = np.sign((axis * known[:, step * GAUSS]).sum(axis=0))
-            dq += unit[i] * np.where(has_step, sense * angle, 0.0)
+            R = here.poses[:, :3, body.link]
+            u = rotate(R, known.axis[:, step])
+            n, _ = _across(known.e[:, step], u)
+            angle = known.turn[step] + (known.series[step] * integrals).sum(axis=1)
+            angle = angle - _angle(n, rotate(R, known.across[:, step]), u)
+            angle = np.remainder(angle + np.pi, 2 * np.pi) - np.pi
+            dq += rates * np.where(moved, np.sign((axis * u).sum(axis=0)) * angle, 0.0)
         turned = self.path.advance(x, dq, track)
         return self.follower.newton.close(turned, drive, track, which).x
+
+
+@dataclass(frozen=True)
+class _Body:
+    """One passive body: its ``axis`` and a vector ``across`` it in its own frame, and for every step the reference ``e``, the angle ``turn`` of the
+    carried vector against it where the step begins, and the Legendre ``series`` of its further turning. ``(3, steps)``, ``(steps,)``.
+    """
+
+    axis: Array
+    across: Array
+    e: Array
+    turn: Array
+    series: Array
+
+
+def _integrals(t: Array) -> Array:
+    """Half the integrals of Legendre's polynomials from -1 to ``t (n,)``, ``(n, GAUSS)``."""
+    P = np.polynomial.legendre.legvander(t, GAUSS)
+    out = np.empty((len(t), GAUSS))
+    out[:, 0] = 0.5 * (t + 1.0)
+    k = np.arange(1, GAUSS)
+    out[:, 1:] = 0.5 * (P[:, 2:] - P[:, : GAUSS - 1]) / (2 * k + 1)
+    return out
+
+
+def _perpendicular(u: Array) -> Array:
+    """Unit vectors across unit vectors ``(3, n)``: of the global axis least aligned with each."""
+    e = np.eye(3)[:, np.argmin(np.abs(u), axis=0)]
+    return _across(e, u)[0]
+
+
+def _across(e: Array, u: Array) -> tuple[Array, Array]:
+    """The parts of ``e`` across unit vectors ``u``, of unit length, and their lengths."""
+    r = e - (e * u).sum(axis=0) * u
+    length = np.sqrt((r * r).sum(axis=0))
+    return r / length, length
+
+
+def _angle(a: Array, b: Array, u: Array) -> Array:
+    """Angles from ``a`` to ``b`` about ``u`` (all across ``u``), ``(n,)``."""
+    return np.arctan2((cross(a, b) * u).sum(axis=0), (a * b).sum(axis=0))
 
 
 def _axes(here: Configuration, bodies: tuple[Idle, ...], Z: Array) -> tuple[list[Array | None], list[Array]]:
