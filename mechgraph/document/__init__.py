@@ -26,5 +26,6 @@ __all__ = [
     "Table",
     "to_html",
     "to_latex",
+    "to_markdown",
     "to_text",
 ]

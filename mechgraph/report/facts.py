@@ -48,7 +48,7 @@ def _of_graph(r: DeterminacyReport) -> dict[str, Any]:
         "verdict": r.verdict,
         "note": r.note,
         "determinate": r.determinate,
-        "thorough": r.thorough,
+        "engine": r.engine,
         "links": list(r.links),
         "pairs": list(r.pairs),
         "loops": [

@@ -12,17 +12,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import named_columns, scaled_system
 from mechgraph.closure.configuration import Configuration, System
+from mechgraph.closure.rank import EngineName
 from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.pair_type import TABLE, PairType
-from mechgraph.numerics.linear import RANK_TOLERANCE, singular_values
-from mechgraph.structure.finite_motion import finite_motion
+from mechgraph.numerics.linear import singular_values
+from mechgraph.structure.finite_motion import FiniteMotion
 from mechgraph.structure.mobility import Freedoms, free_motion
+from mechgraph.structure.uniqueness import PROBES, pair_states
 
 SIGNIFICANT = 1e-6
 """Power of a unit twist on a unit self-stress above which the twist relieves it."""
@@ -30,6 +31,9 @@ SHOWN = 6
 """Largest number of single changes, and of sets of changes, reported."""
 FREEING = 3
 """Changes reported that let a structure move."""
+SETS = 48
+"""Redundancy up to which sets of changes that remove all of it are sought; the work grows as its cube."""
+SEED = 29
 BEAM = 12
 """Partial sets of changes kept while searching."""
 
@@ -95,20 +99,23 @@ def wider_types(row: PairType) -> Iterator[PairType]:
                 yield other
 
 
-def changes_of(here: Configuration) -> list[Change]:
-    """All single changes to wider types that leave the drivers in place, with their power on the self-stresses (drivers free)."""
+def changes_of(here: Configuration, freedoms: Freedoms) -> list[Change]:
+    """All single changes to wider types that leave the drivers in place, with their power on the self-stresses (drivers free).
+
+    On all self-stresses where sets of changes are sought, else on random ones, which give the same rank in one pair.
+    """
     system = here.system
-    null = null_space(here.J[:, :, 0].T, RANK_TOLERANCE)
-    C = system.graph.loop_matrix
-    stress = np.einsum("lp,lis->ips", C, null.reshape(C.shape[0], 6, null.shape[1]))
+    count = freedoms.redundancy if freedoms.redundancy <= SETS else PROBES
+    rows = freedoms.closure.random_stress(np.random.default_rng(SEED), count)
+    stress = pair_states(here, np.linalg.qr(rows)[0])[..., 0]
     wider = {row: list(wider_types(row)) for row in dict.fromkeys(p.type for p in system.m.pairs)}
-    place = {int(k): (g, i) for g in system.groups for i, k in enumerate(g.pairs)}
+    place = {int(k): (n, i) for n, g in enumerate(system.groups) for i, k in enumerate(g.pairs)}
     out = []
     driven = {system.m.freedom(d.freedom) for d in system.m.drives}
     for k, pair in enumerate(system.m.pairs):
-        g, i = place[k]
+        number, i = place[k]
         needed = {pair.type.freedoms[j].name for pair_index, j in driven if pair_index == k}
-        base = here.frames[system.groups.index(g)][-1][:, :, i : i + 1]
+        base = here.frames[number][-1][:, :, i : i + 1]
         for row in wider[pair.type]:
             if not needed <= {f.name for f, single in zip(row.freedoms, row.drivable, strict=True) if single}:
                 continue
@@ -170,7 +177,7 @@ def relieving(changes: list[Change], redundancy: int) -> tuple[list[tuple[Change
     beam: list[tuple[tuple[Change, ...], int]] = [((), 0)]
     complete: list[tuple[Change, ...]] = []
     deepest: list[tuple[tuple[Change, ...], int]] = []
-    for _ in range(redundancy):
+    for _ in range(redundancy if redundancy <= SETS else 0):
         grown: dict[frozenset[int], tuple[tuple[Change, ...], int]] = {}
         for parts, removed in beam:
             for c in exact:
@@ -211,7 +218,9 @@ def _spread(singles: list[Change]) -> list[Change]:
     return (first + rest)[:SHOWN]
 
 
-def effect(system: System, x: Array, before: Freedoms, parts: tuple[Change, ...]) -> Effect | None:
+def effect(
+    system: System, x: Array, before: Freedoms, parts: tuple[Change, ...], engine: EngineName = "auto"
+) -> Effect | None:
     """The effect of changes, computed on the changed mechanism at the same position; None where it cannot be built."""
     m = system.m
     q = system.coordinates_of(x[:, None], system.start_coordinates(m.start))[:, 0]
@@ -227,11 +236,10 @@ def effect(system: System, x: Array, before: Freedoms, parts: tuple[Change, ...]
     if float(after_system.at(state[:, None]).closure[0]) > 1e-8:
         return None
     columns, _ = named_columns(changed, after_system, {d.freedom: 0.0 for d in changed.drives})
-    after = free_motion(after_system, state, columns)
-    rows = 6 * len(system.graph.loops)
+    after = free_motion(after_system, state, columns, engine)
     return Effect(
         tuple((m.pairs[c.pair].name, m.pairs[c.pair].type.symbol, c.type.symbol) for c in parts),
-        (rows - before.rank, rows - after.rank),
+        (before.redundancy, after.redundancy),
         (before.mobility, after.mobility),
         (len(before.passive), len(after.passive)),
         tuple(float(np.degrees(c.turn)) for c in parts),
@@ -253,17 +261,19 @@ def with_turned_pair(m: Mechanism, name: str, angle: float) -> Mechanism:
     return m.replace(pairs=[replaced(p) if p.name == name else p for p in m.pairs])
 
 
-def advice(system: System, x: Array, freedoms: Freedoms) -> tuple[Effect, ...]:
+def advice(
+    system: System, x: Array, freedoms: Freedoms, motion: FiniteMotion, engine: EngineName = "auto"
+) -> tuple[Effect, ...]:
     """Pair changes worth making: those that remove redundancy without adding input freedoms; for a structure, those that free it."""
     here = system.at(x[:, None])
-    changes = changes_of(here)
-    redundancy = 6 * len(system.graph.loops) - freedoms.rank
+    redundancy = freedoms.redundancy
+    changes = changes_of(here, freedoms)
     found: list[Effect] = []
     inputs = freedoms.mobility - len(freedoms.passive)
     if redundancy:
         singles, complete = relieving(changes, redundancy)
         for parts in (*_mixed(complete), *singles):
-            done = effect(system, x, freedoms, parts)
+            done = effect(system, x, freedoms, parts, engine)
             if (
                 done
                 and done.mobility[1] - done.passive[1] == inputs
@@ -271,19 +281,20 @@ def advice(system: System, x: Array, freedoms: Freedoms) -> tuple[Effect, ...]:
                 and done not in found
             ):
                 found.append(done)
-    return tuple([*_freeing(system, x, freedoms, changes), *found][: SHOWN + 3])
+    return tuple([*_freeing(system, x, freedoms, changes, motion, engine), *found][: SHOWN + 3])
 
 
-def _freeing(system: System, x: Array, freedoms: Freedoms, changes: list[Change]) -> list[Effect]:
+def _freeing(
+    system: System, x: Array, freedoms: Freedoms, changes: list[Change], motion: FiniteMotion, engine: EngineName
+) -> list[Effect]:
     """For a structure the changes that let it move, those that add fewest freedoms first; nothing for what moves."""
-    motion = finite_motion(system, x) if freedoms.mobility else None
-    if freedoms.mobility - len(freedoms.passive) and not (motion and motion.mobility == 0):
+    if freedoms.mobility - len(freedoms.passive) and motion.mobility:
         return []
     found: list[Effect] = []
     for c in _spread(sorted((c for c in changes if c.added > _relief((c,))), key=lambda c: (c.added, c.pair)))[
         :FREEING
     ]:
-        done = effect(system, x, freedoms, (c,))
+        done = effect(system, x, freedoms, (c,), engine)
         if done and done.mobility[1] - done.passive[1] > freedoms.mobility - len(freedoms.passive):
             found.append(done)
     return found

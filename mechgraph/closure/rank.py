@@ -1,0 +1,208 @@
+"""Rank, motions and self-stresses of the closure equations at one position: one protocol, a dense and a sparse engine behind it.
+
+Both start from the reduced rows ``K`` of all loops (``closure.loop_rows``), so that a self-stress of a single loop is the same in both:
+
+    rank J = rank K,   J q = 0  <=>  K (q / scale) = 0,   J^T x = 0  <=>  x = local self-stresses + those with K^T y = 0.
+
+Dense: singular values of K. Sparse: the bordered system (``closure.bordering``) where its pivots prove the rank, otherwise the
+elimination along the loops (``closure.elimination``).
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Literal, Protocol
+
+import numpy as np
+import scipy
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.closure.bordering import LoopSystem
+from mechgraph.closure.configuration import Configuration, Index
+from mechgraph.closure.elimination import Elimination
+from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
+from mechgraph.numerics.least_norm import singular_range
+from mechgraph.numerics.linear import rank_of
+from mechgraph.numerics.tolerances import RANKS
+from mechgraph.topology.components import component_numbers, labels_of_bipartite
+
+EngineName = Literal["auto", "dense", "sparse"]
+CROSSOVER = 36
+"""Rows from which ``auto`` takes the sparse engine (measured on ladders of four-bars: both take the same time at six loops)."""
+SHARE = 1e-9
+"""Part of a random self-stress below which a row has none."""
+SEED = 23
+
+
+class Solution(Protocol):
+    """What an engine finds about ``K``: self-stresses and motions in the kept rows and scaled free columns."""
+
+    name: Literal["dense", "sparse"]
+    rank: int
+    dropped: float
+
+    @property
+    def shared_in(self) -> Index:
+        """A row that every self-stress that connects loops has a part in."""
+
+    def stresses(self, shares: Array) -> Array:
+        """``y (height, k)`` with ``K^T y = 0`` for shares ``(height - rank, k)`` of the self-stresses."""
+
+    def motions(self) -> Array:
+        """A basis of the ``q / scale`` with ``K (q / scale) = 0``, ``(free columns, nullity)``."""
+
+
+class _Dense:
+    name: Literal["dense", "sparse"] = "dense"
+
+    def __init__(self, reduced: ReducedRows, tolerance: float) -> None:
+        K = reduced.matrix.toarray()
+        self._U, self._s, self._Vt = np.eye(K.shape[0]), np.zeros(0), np.eye(K.shape[1])
+        if K.size:
+            self._U, self._s, self._Vt = np.linalg.svd(K)
+        self.rank = rank_of(self._s, tolerance)
+        rest = self._s[self.rank :]
+        self.dropped = float(rest[0] / self._s[0]) if rest.size and self._s[0] > 0 else 0.0
+
+    @cached_property
+    def shared_in(self) -> Index:
+        Y = self._U[:, self.rank :]
+        return scipy.linalg.qr(Y.T, mode="r", pivoting=True)[1][: Y.shape[1]].astype(np.intp)
+
+    def stresses(self, shares: Array) -> Array:
+        return np.asarray(self._U[:, self.rank :] @ shares)
+
+    def motions(self) -> Array:
+        return np.asarray(self._Vt[self.rank :].T)
+
+
+class _Bordered:
+    name: Literal["dense", "sparse"] = "sparse"
+
+    def __init__(self, loops: LoopSystem) -> None:
+        self.loops, self.rank, self.dropped = loops, loops.rank, 0.0
+
+    @property
+    def shared_in(self) -> Index:
+        return self.loops.shared_rows
+
+    def stresses(self, shares: Array) -> Array:
+        return self.loops.connecting_stress(self.loops.first, shares)
+
+    def motions(self) -> Array:
+        return np.asarray((self.loops.motions(self.loops.first) / self.loops.scale[:, None])[self.loops.free])
+
+
+class _Eliminated:
+    name: Literal["dense", "sparse"] = "sparse"
+
+    def __init__(self, reduced: ReducedRows, tolerance: float) -> None:
+        self._found = Elimination(reduced.matrix, reduced.owners, tolerance)
+        self.rank, self.dropped = self._found.rank, self._found.dropped
+
+    @property
+    def shared_in(self) -> Index:
+        return self._found.zero_rows
+
+    def stresses(self, shares: Array) -> Array:
+        return self._found.stresses(shares)
+
+    def motions(self) -> Array:
+        return self._found.motions()
+
+
+class ClosureRank:
+    """Rank, motions and self-stresses of the closure equations at one position, the columns ``fixed`` left out.
+
+    ``rank``; ``count`` number of rows; ``dropped`` largest value that counted as zero, as part of the largest; ``shared`` number of
+    self-stresses that connect loops; ``engine`` which one ran.
+    """
+
+    def __init__(self, reduced: ReducedRows, solution: Solution) -> None:
+        self.reduced, self._solution = reduced, solution
+        self.engine, self.rank, self.count = solution.name, solution.rank, reduced.rows.count
+        self.shared = reduced.height - solution.rank
+        self.dropped = max(solution.dropped, reduced.dropped)
+
+    @cached_property
+    def margin(self) -> float:
+        """Smallest singular value of K that was kept, as part of the largest; 1 where there is none."""
+        if not self.rank:
+            return 1.0
+        smallest, largest = singular_range(self.reduced.matrix, self.rank, lambda: self.reduced.least_norm)
+        return smallest / largest
+
+    @cached_property
+    def motions(self) -> Array:
+        """Orthonormal motions ``(F, M)`` with the fixed columns at rest."""
+        r = self.reduced
+        y = self._solution.motions()
+        out = np.zeros((len(r.free), y.shape[1]))
+        out[r.free] = np.linalg.qr(y * r.scale[r.free][:, None])[0]
+        return out
+
+    # --- self-stresses -----------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def local(self) -> tuple[Index, Array, Index]:
+        """Loops with self-stresses of their own ``(n,)``, their wrenches ``(6, 6, n)`` of which the first few count, and how many."""
+        some, wrenches = self.reduced.local_stress()
+        return some, wrenches, 6 - self.reduced.kept[some]
+
+    def connecting(self, shares: Array) -> Array:
+        """Self-stresses ``(rows, k)`` that connect loops, for shares ``(shared, k)``; none has a part in the local ones."""
+        return self.reduced.multipliers(self._solution.stresses(shares))
+
+    def random_stress(self, rng: np.random.Generator, count: int) -> Array:
+        """Random self-stresses ``(rows, count)``, each with a part of every one; of size one in the measure of their loops."""
+        r = self.reduced
+        kept = self._solution.stresses(rng.normal(size=(self.shared, count)))
+        dropped = rng.normal(size=(6 * r.loops - int(r.kept.sum()), count))
+        size = np.maximum(np.abs(kept).max(axis=0, initial=0.0), 1.0)
+        return r.multipliers(kept / size, dropped / size)
+
+    @cached_property
+    def sets(self) -> tuple[tuple[int, tuple[int, ...]], ...]:
+        """(number of self-stresses, loops) of every set of loops that self-stresses can connect."""
+        r = self.reduced
+        blocks = r.loops + r.rows.more.shape[0]
+        home = np.arange(blocks)
+        if self.shared:
+            probe = np.abs(self._solution.stresses(np.random.default_rng(SEED).normal(size=(self.shared, 1))))[:, 0]
+            size = np.zeros(blocks)
+            np.maximum.at(size, r.owners, probe)
+            some = np.flatnonzero(size > SHARE * size.max())
+            K = r.matrix.tocoo()
+            touch = scipy.sparse.csr_array((np.ones(K.nnz), (r.owners[K.row], K.col)), shape=(blocks, K.shape[1]))
+            numbers = component_numbers(labels_of_bipartite(touch[some]))
+            home[some] = some[np.unique(numbers, return_index=True)[1]][numbers]
+        count = np.bincount(home[r.owners[self._solution.shared_in]], minlength=blocks)
+        count += np.bincount(home[: r.loops], 6 - r.kept, minlength=blocks).astype(np.intp)
+        order = np.argsort(home[: r.loops], kind="stable")
+        groups = np.split(order, np.flatnonzero(np.diff(home[order])) + 1) if len(order) else []
+        return tuple((int(count[home[g[0]]]), tuple(g.tolist())) for g in groups if count[home[g[0]]])
+
+
+def closure_rank(here: Configuration, fixed: Index | None = None, engine: EngineName = "auto") -> ClosureRank:
+    """Rank, motions and self-stresses at the first position of a configuration, with the columns ``fixed`` at rest."""
+    return rank_of_rows(ClosureRows.at(here), fixed, engine)
+
+
+def rank_of_rows(
+    rows: ClosureRows,
+    fixed: Index | None = None,
+    engine: EngineName = "auto",
+    tolerance: float = RANKS.position,
+    proved: float = RANKS.proved,
+) -> ClosureRank:
+    """The same for rows given as such; pivots of a bordered system above ``proved`` decide by themselves."""
+    fixed = np.zeros(0, dtype=np.intp) if fixed is None else fixed
+    if engine == "dense" or (engine == "auto" and rows.count < CROSSOVER):
+        reduced = ReducedRows(rows, fixed)
+        return ClosureRank(reduced, _Dense(reduced, tolerance))
+    if not rows.more.shape[0]:
+        bordered = LoopSystem(rows, fixed)
+        if bordered.smallest > proved or bordered.first.distance > RANKS.distance:
+            return ClosureRank(bordered, _Bordered(bordered))
+    reduced = ReducedRows(rows, fixed)
+    return ClosureRank(reduced, _Eliminated(reduced, tolerance))
