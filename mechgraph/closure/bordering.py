@@ -199,11 +199,6 @@ class LoopSystem(ReducedRows):
         kept = factor.solve(rhs, transposed=True)[: self._m]
         return self._wrenches(kept, np.zeros((6 * len(self.kept) - self._m, tau.shape[1])))
 
-    @property
-    def shared_rows(self) -> Index:
-        """Kept rows left over by the matching: one for every self-stress that connects loops."""
-        return np.minimum(self._left_rows, max(self._m - 1, 0))
-
     def connecting_stress(self, factor: SparseFactor, shares: Array) -> Array:
         """Multipliers ``(kept rows, k)`` of self-stresses that connect loops, for shares ``(shared, k)``."""
         rhs = np.zeros((self._size, shares.shape[1]))

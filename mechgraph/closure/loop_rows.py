@@ -203,7 +203,7 @@ class ReducedRows:
 
     def _turned(self, b: Array) -> Array:
         """Right sides ``(6 loops, k)`` about the internal origin as turned rows ``(loops, 6, k)``."""
-        rows = b.reshape(self.loops, 6, -1)
+        rows = b.reshape(self.loops, 6, b.shape[1])
         local = np.empty_like(rows)
         local[:, :3] = rows[:, :3]
         moment = cross(np.moveaxis(rows[:, :3], 1, 0), self.measure.middle[:, :, None])

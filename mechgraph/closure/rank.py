@@ -24,7 +24,7 @@ from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
 from mechgraph.numerics.least_norm import singular_range
 from mechgraph.numerics.linear import rank_of
 from mechgraph.numerics.tolerances import RANKS
-from mechgraph.topology.components import component_numbers, labels_of_bipartite
+from mechgraph.topology.components import labels_of_bipartite, members
 
 EngineName = Literal["auto", "dense", "sparse"]
 CROSSOVER = 36
@@ -40,10 +40,6 @@ class Solution(Protocol):
     name: Literal["dense", "sparse"]
     rank: int
     dropped: float
-
-    @property
-    def shared_in(self) -> Index:
-        """A row that every self-stress that connects loops has a part in."""
 
     def stresses(self, shares: Array) -> Array:
         """``y (height, k)`` with ``K^T y = 0`` for shares ``(height - rank, k)`` of the self-stresses."""
@@ -64,11 +60,6 @@ class _Dense:
         rest = self._s[self.rank :]
         self.dropped = float(rest[0] / self._s[0]) if rest.size and self._s[0] > 0 else 0.0
 
-    @cached_property
-    def shared_in(self) -> Index:
-        Y = self._U[:, self.rank :]
-        return scipy.linalg.qr(Y.T, mode="r", pivoting=True)[1][: Y.shape[1]].astype(np.intp)
-
     def stresses(self, shares: Array) -> Array:
         return np.asarray(self._U[:, self.rank :] @ shares)
 
@@ -81,10 +72,6 @@ class _Bordered:
 
     def __init__(self, loops: LoopSystem) -> None:
         self.loops, self.rank, self.dropped = loops, loops.rank, 0.0
-
-    @property
-    def shared_in(self) -> Index:
-        return self.loops.shared_rows
 
     def stresses(self, shares: Array) -> Array:
         return self.loops.connecting_stress(self.loops.first, shares)
@@ -100,10 +87,6 @@ class _Eliminated:
         self._found = Elimination(reduced.matrix, reduced.owners, tolerance)
         self.rank, self.dropped = self._found.rank, self._found.dropped
 
-    @property
-    def shared_in(self) -> Index:
-        return self._found.zero_rows
-
     def stresses(self, shares: Array) -> Array:
         return self._found.stresses(shares)
 
@@ -118,8 +101,8 @@ class ClosureRank:
     self-stresses that connect loops; ``engine`` which one ran.
     """
 
-    def __init__(self, reduced: ReducedRows, solution: Solution) -> None:
-        self.reduced, self._solution = reduced, solution
+    def __init__(self, reduced: ReducedRows, solution: Solution, tolerance: float) -> None:
+        self.reduced, self._solution, self._tolerance = reduced, solution, tolerance
         self.engine, self.rank, self.count = solution.name, solution.rank, reduced.rows.count
         self.shared = reduced.height - solution.rank
         self.dropped = max(solution.dropped, reduced.dropped)
@@ -164,23 +147,34 @@ class ClosureRank:
     @cached_property
     def sets(self) -> tuple[tuple[int, tuple[int, ...]], ...]:
         """(number of self-stresses, loops) of every set of loops that self-stresses can connect."""
+        own = 6 - self.reduced.kept
+        connected = self._connected_blocks() if self.shared else []
+        taken = np.zeros(len(own), dtype=bool)
+        out = []
+        for blocks in connected:
+            loops = [i for i in blocks if i < len(own)]
+            taken[loops] = True
+            count = self.shared if len(connected) == 1 else self._shared_in(blocks)
+            out.append((count + int(own[loops].sum()), tuple(loops)))
+        out += [(int(own[i]), (int(i),)) for i in np.flatnonzero(~taken & (own > 0))]
+        return tuple(sorted(out, key=lambda item: item[1]))
+
+    def _connected_blocks(self) -> list[list[int]]:
+        """Loops (and further rows) with parts of self-stresses that connect loops: those that share freedoms belong together."""
         r = self.reduced
-        blocks = r.loops + r.rows.more.shape[0]
-        home = np.arange(blocks)
-        if self.shared:
-            probe = np.abs(self._solution.stresses(np.random.default_rng(SEED).normal(size=(self.shared, 1))))[:, 0]
-            size = np.zeros(blocks)
-            np.maximum.at(size, r.owners, probe)
-            some = np.flatnonzero(size > SHARE * size.max())
-            K = r.matrix.tocoo()
-            touch = scipy.sparse.csr_array((np.ones(K.nnz), (r.owners[K.row], K.col)), shape=(blocks, K.shape[1]))
-            numbers = component_numbers(labels_of_bipartite(touch[some]))
-            home[some] = some[np.unique(numbers, return_index=True)[1]][numbers]
-        count = np.bincount(home[r.owners[self._solution.shared_in]], minlength=blocks)
-        count += np.bincount(home[: r.loops], 6 - r.kept, minlength=blocks).astype(np.intp)
-        order = np.argsort(home[: r.loops], kind="stable")
-        groups = np.split(order, np.flatnonzero(np.diff(home[order])) + 1) if len(order) else []
-        return tuple((int(count[home[g[0]]]), tuple(g.tolist())) for g in groups if count[home[g[0]]])
+        probe = np.abs(self._solution.stresses(np.random.default_rng(SEED).normal(size=(self.shared, 1))))[:, 0]
+        size = np.zeros(r.loops + r.rows.more.shape[0])
+        np.maximum.at(size, r.owners, probe)
+        some = np.flatnonzero(size > SHARE * size.max())
+        K = r.matrix.tocoo()
+        touch = scipy.sparse.csr_array((np.ones(K.nnz), (r.owners[K.row], K.col)), shape=(len(size), K.shape[1]))
+        return [some[part].tolist() for part in members(labels_of_bipartite(touch[some]))]
+
+    def _shared_in(self, blocks: list[int]) -> int:
+        """Number of self-stresses that connect only these blocks: their rows minus the rank of these."""
+        rows = np.flatnonzero(np.isin(self.reduced.owners, blocks))
+        found = Elimination(self.reduced.matrix[rows], self.reduced.owners[rows], self._tolerance)
+        return len(rows) - found.rank
 
 
 def closure_rank(here: Configuration, fixed: Index | None = None, engine: EngineName = "auto") -> ClosureRank:
@@ -199,10 +193,10 @@ def rank_of_rows(
     fixed = np.zeros(0, dtype=np.intp) if fixed is None else fixed
     if engine == "dense" or (engine == "auto" and rows.count < CROSSOVER):
         reduced = ReducedRows(rows, fixed)
-        return ClosureRank(reduced, _Dense(reduced, tolerance))
+        return ClosureRank(reduced, _Dense(reduced, tolerance), tolerance)
     if not rows.more.shape[0]:
         bordered = LoopSystem(rows, fixed)
         if bordered.smallest > proved or bordered.first.distance > RANKS.distance:
-            return ClosureRank(bordered, _Bordered(bordered))
+            return ClosureRank(bordered, _Bordered(bordered), tolerance)
     reduced = ReducedRows(rows, fixed)
-    return ClosureRank(reduced, _Eliminated(reduced, tolerance))
+    return ClosureRank(reduced, _Eliminated(reduced, tolerance), tolerance)

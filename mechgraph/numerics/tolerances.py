@@ -22,7 +22,7 @@ class RankTolerances:
     distance: float = 1e-8
     """Distance to a singular matrix from which on the bordered system decides whatever its pivots."""
     near: float = 1e-3
-    """Margin, times the number of loops, below which a position is called nearly singular."""
+    """Margin of one loop below which a position is called nearly singular: forces are a thousand times the loads."""
     doubt: float = 1e-11
     """Largest dropped value above which it may be more than rounding."""
     damping: float = 1e-13

@@ -165,8 +165,8 @@ class DeterminacyReport:
 
     @property
     def near_below(self) -> float:
-        """Margin below which a position is called nearly singular; smaller for many loops, over which small singular values spread."""
-        return RANKS.near / max(len(self.graph.loops), 1)
+        """Margin below which a position is called nearly singular; of a regular chain of n loops it goes as 1 / (n + 1)."""
+        return 2.0 * RANKS.near / (1 + max(len(self.graph.loops), 1))
 
     @property
     def dead_point(self) -> bool:

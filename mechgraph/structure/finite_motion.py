@@ -1,22 +1,21 @@
 """Finite mobility: the nullity at regular positions reached by a motion, confirmed by moving on in all its directions.
 
 A position is regular where the closed positions near by form a manifold whose dimension is the nullity n of the closure Jacobian.
-That is confirmed by actual motion: a random step v in the null space N is taken, the loops are closed again by the smallest change,
-and what is left of the step in the null space is compared with it,
+That is confirmed by actual motion: after a random step in the null space the rows that are independent here close all loops, so
+that the others depend on them there too and the rank is constant. Where that fails at every step size, the position is a change point
+or shaky; random steps lead to positions near by, where it is asked again. If none of these is regular, each direction v of the null
+space N is tried by itself and what is left of it once the loops are closed by the smallest change is compared with it:
 
-    kept = N^T (x' - x) / h,   x' closed.
+    kept = N^T (x' - x) / h,   x' closed;
 
-On a manifold kept = v up to the square of step times curvature, so the step is made smaller until it agrees; a direction in which
-nothing moves on (shaky) loses its part of v at every step size. Then each direction is tried by itself, and those that are kept
-count. At a position that is not regular (a change point, or shaky) random steps lead to positions near by, where it is asked again.
+a direction in which nothing moves on loses its part at any step size and does not count.
 So the mobility is never above a nullity on the way. Chords of a curved motion are never ranked against each other: they differ in
 direction by its curvature. Source for the notion: Connelly and Whiteley, Second-order rigidity and prestress stability, 1996.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -31,8 +30,6 @@ STEPS = (0.05, 0.0125, 0.003)
 """Lengths of trial steps (radians, or lengths / L): the first ones tell a motion that returns, the last ones bear curvature."""
 FAR_STEPS = 6
 """Further steps of the first length over which the motion is followed."""
-LOST = 0.25
-"""Part of a direction of average share that may get lost in a random step; more means that a direction was not kept."""
 KEPT = 0.5
 """Part of a step in one direction that must be left for it to count: about 1 on a motion, 0 where it returns."""
 MOVED = 0.05
@@ -40,34 +37,16 @@ MOVED = 0.05
 TRIALS = 6
 """Random steps away from a position that is not regular."""
 FROZEN = 12
-"""Corrections with the equations of the position left; then they are made anew at each."""
-CORRECTIONS = 60
+"""Corrections with the equations of the position left."""
 SLOW = 0.2
-"""Part of the closure error that a correction may leave for these equations to be kept."""
+"""Part of the closure error that such a correction may leave."""
+CORRECTIONS = 60
+"""Corrections with equations made anew; a double root halves its error with each."""
+PATIENCE = 8
+"""Corrections without gain after which closing is given up."""
 LONGEST = 0.5
+"""Largest component of a correction."""
 SEED = 7
-
-
-@dataclass(frozen=True)
-class FiniteMotion:
-    """What following the motions showed.
-
-    Attributes
-    ----------
-    mobility : dimension of the set of closed positions near by.
-    rank_nearby : largest rank of the closure Jacobian at closed positions near by.
-    null_nearby : motions ``(F, M)`` at the neighbour of that rank.
-    """
-
-    mobility: int
-    rank_nearby: int
-    null_nearby: Array
-    follow: Callable[[], float]
-
-    @cached_property
-    def stroke(self) -> float:
-        """Length over which a motion was followed with the loops closed (0 where nothing moves)."""
-        return self.follow() if self.mobility else 0.0
 
 
 @dataclass(frozen=True)
@@ -89,19 +68,25 @@ class _Position:
 
     def moved(self, v: Array, h: float) -> tuple[Array, float] | None:
         """State after a step of ``N v`` of length ``h`` with the loops closed again, and the factor of the step; None where not."""
-        dq = self.found.reduced.scale * (self.N @ v)
-        factor = h / float(np.abs(dq).max())
-        x = self.system.advance(self.x[:, None], factor * dq[:, None])[:, 0]
+        x, factor = self._stepped(v, h)
         closed = _closed(self.system, x, self.found.reduced)
         return None if closed is None else (closed, factor)
+
+    def _stepped(self, v: Array, h: float) -> tuple[Array, float]:
+        dq = self.found.reduced.scale * (self.N @ v)
+        factor = h / float(np.abs(dq).max())
+        return self.system.advance(self.x[:, None], factor * dq[:, None])[:, 0], factor
+
+    def change(self, x: Array) -> Array:
+        """Increments ``(F,)`` from here to a state."""
+        return self.system.difference(x[:, None], self.x[:, None])[:, 0]
 
     def kept(self, v: Array, h: float) -> Array | None:
         """What is left of the step ``v`` in the null space, in units of the step."""
         moved = self.moved(v, h)
         if moved is None:
             return None
-        change = self.system.difference(moved[0][:, None], self.x[:, None])[:, 0]
-        return np.asarray(self.N.T @ (change / self.found.reduced.scale) / moved[1])
+        return np.asarray(self.N.T @ (self.change(moved[0]) / self.found.reduced.scale) / moved[1])
 
     def random(self, rng: np.random.Generator) -> Array:
         """A random direction of size one: of a random vector of all freedoms, so that no basis of the motions matters."""
@@ -109,11 +94,16 @@ class _Position:
         return np.asarray(v / np.linalg.norm(v))
 
     def regular(self, v: Array) -> bool:
-        """Whether a random step is kept in all its parts."""
-        least = LOST / np.sqrt(len(v))
+        """Whether the rows that are independent here close all loops after a random step.
+
+        Then the rank is constant near by: the other rows depend on them not only here. Where it is not, they stay open by the square
+        of the step (a change point) or a higher power (shaky), far above the closure error.
+        """
+        limit = max(10 * CLOSURE_GOAL, 10 * float(self.system.at(self.x[:, None]).closure[0]))
         for h in STEPS:
-            kept = self.kept(v, h)
-            if kept is not None and np.linalg.norm(kept - v) < least:
+            x = self._stepped(v, h)[0]
+            closed = _corrected(self.system, x, self.found.reduced)
+            if closed is not None and float(self.system.at(closed[:, None]).closure[0]) <= limit:
                 return True
         return False
 
@@ -124,6 +114,35 @@ class _Position:
         return int((np.linalg.svd(table, compute_uv=False) > KEPT).sum())
 
 
+@dataclass(frozen=True)
+class FiniteMotion:
+    """What following the motions showed.
+
+    Attributes
+    ----------
+    mobility : dimension of the set of closed positions near by.
+    rank_nearby : largest rank of the closure Jacobian at closed positions near by.
+    begin : a position and a direction in which it moves on; None where nothing moves.
+    """
+
+    mobility: int
+    rank_nearby: int
+    begin: tuple[_Position, Array] | None = field(default=None, repr=False)
+
+    @cached_property
+    def stroke(self) -> float:
+        """Length over which a motion was followed with the loops closed (0 where nothing moves)."""
+        return _followed(*self.begin) if self.begin and self.mobility else 0.0
+
+    @cached_property
+    def null_nearby(self) -> Array | None:
+        """Motions ``(F, M)`` at a position reached by a motion; None where nothing moves."""
+        moved = self.begin and self.begin[0].moved(self.begin[1], STEPS[0])
+        if not self.begin or not moved:
+            return None
+        return _Position.at(self.begin[0].system, moved[0], self.begin[0].engine).found.motions
+
+
 def finite_motion(system: System, x: Array, found: ClosureRank, engine: EngineName = "auto") -> FiniteMotion:
     """Follow the motions of a closed state ``x (nx,)`` where ``found`` is the rank of its closure equations.
 
@@ -132,36 +151,33 @@ def finite_motion(system: System, x: Array, found: ClosureRank, engine: EngineNa
     here = _Position(system, x, found, engine)
     nullity = found.motions.shape[1]
     if not nullity:
-        return FiniteMotion(0, found.rank, found.motions, lambda: 0.0)
+        return FiniteMotion(0, found.rank)
     rng = np.random.default_rng(SEED)
     v = here.random(rng)
     if found.rank == found.count or here.regular(v):
-        return FiniteMotion(nullity, found.rank, found.motions, lambda: _followed(here, v))
+        return FiniteMotion(nullity, found.rank, (here, v))
     return _near_by(here, rng)
 
 
 def _near_by(here: _Position, rng: np.random.Generator) -> FiniteMotion:
     """The mobility about a position that is not regular: the largest of those at positions reached from it."""
-    mobility, best, begin = 0, here.found, None
+    mobility, rank, begin = 0, here.found.rank, None
     for _ in range(TRIALS):
-        v = here.random(rng)
-        moved = here.moved(v, STEPS[0])
+        moved = here.moved(here.random(rng), STEPS[0])
         if moved is None:
             continue
-        change = here.system.difference(moved[0][:, None], here.x[:, None])[:, 0]
+        change = here.change(moved[0])
         if not np.abs(change).max() > MOVED * STEPS[0]:
             continue
         there = _Position.at(here.system, moved[0], here.engine)
-        if there.found.rank > best.rank or begin is None:
-            best = max(there.found, best, key=lambda f: f.rank)
-        onward = there.N.T @ (change / there.found.reduced.scale)
-        size = float(np.linalg.norm(onward))
-        n = there.N.shape[1]
-        dimension = (n if there.regular(there.random(rng)) else there.dimension()) if n and size > 0 else 0
+        rank = max(rank, there.found.rank)
+        if not there.N.shape[1]:
+            continue
+        regular = there.regular(there.random(rng))
+        dimension = there.N.shape[1] if regular else there.dimension()
         if dimension > mobility:
-            mobility, begin = dimension, (there, onward / size)
-    follow = (lambda: STEPS[0] + _followed(*begin)) if begin else (lambda: 0.0)
-    return FiniteMotion(mobility, best.rank, best.motions, follow)
+            mobility, begin = dimension, (there, there.N.T @ (change / there.found.reduced.scale))
+    return FiniteMotion(mobility, rank, begin)
 
 
 def _followed(begin: _Position, v: Array) -> float:
@@ -171,7 +187,7 @@ def _followed(begin: _Position, v: Array) -> float:
         moved = at.moved(v, STEPS[0])
         if moved is None:
             break
-        change = at.system.difference(moved[0][:, None], at.x[:, None])[:, 0]
+        change = at.change(moved[0])
         if not np.abs(change).max() > MOVED * STEPS[0]:
             break
         stroke += float(np.abs(change).max())
@@ -179,29 +195,39 @@ def _followed(begin: _Position, v: Array) -> float:
         v = at.N.T @ (change / at.found.reduced.scale)
         if not np.linalg.norm(v) > MOVED * STEPS[0]:
             break
-        v = v / np.linalg.norm(v)
     return stroke
 
 
+def _corrected(system: System, x: Array, rows: ReducedRows) -> Array | None:
+    """The loops closed from ``x`` in the kept rows of a position near by alone; None where that does not converge quickly."""
+    before = np.inf
+    for _ in range(FROZEN):
+        residual = system.at(x[:, None]).residual[:, 0]
+        error = float(np.abs(rows.kept_part(residual[:, None])).max(initial=0.0))
+        if error <= CLOSURE_GOAL or (error < 10 * CLOSURE_GOAL and error > SLOW * before):
+            return x
+        if error > SLOW * before:
+            return None
+        before = error
+        x = system.advance(x[:, None], rows.correction(residual)[:, None])[:, 0]
+    return None
+
+
 def _closed(system: System, x: Array, rows: ReducedRows) -> Array | None:
-    """The loops closed from ``x`` by small corrections, at first with the equations ``rows`` near by; None where they do not close."""
-    best, least, since, frozen = x, np.inf, 0, True
-    for step in range(CORRECTIONS):
+    """The loops closed from ``x``: with the rows of a position near by where they do, otherwise by Newton; None where not."""
+    quick = _corrected(system, x, rows)
+    if quick is not None and float(system.at(quick[:, None]).closure[0]) <= CLOSED:
+        return quick
+    best, least, since = x, np.inf, 0
+    for _ in range(CORRECTIONS):
         here = system.at(x[:, None])
         residual = here.residual[:, 0]
         error = float(np.abs(residual).max(initial=0.0))
-        if error < least:
-            slow = error > SLOW * least
-            best, least, since = x, error, 0
-        else:
-            slow, since = True, since + 1
-        if error <= CLOSURE_GOAL or since > 8 or (slow and least < 10 * CLOSURE_GOAL):
+        since = since + 1 if error > 0.999 * least else 0
+        best, least = (x, error) if error < least else (best, least)
+        if error <= CLOSURE_GOAL or since > PATIENCE:
             break
-        if frozen and (slow or step > FROZEN):
-            frozen = False
-        if not frozen:
-            rows = ReducedRows(ClosureRows.at(here), np.zeros(0, dtype=np.intp))
-        dq = rows.correction(residual)
+        dq = ReducedRows(ClosureRows.at(here), np.zeros(0, dtype=np.intp)).correction(residual)
         dq = dq * min(1.0, LONGEST / max(float(np.abs(dq).max()), 1e-300))
         x = system.advance(x[:, None], dq[:, None])[:, 0]
     return best if float(system.at(best[:, None]).closure[0]) <= CLOSED else None

@@ -18,11 +18,11 @@ def components_of_edges(count: int, ends: Sequence[tuple[int, int]] | NDArray[np
     return component_numbers(scipy.sparse.csgraph.connected_components(graph, directed=False)[1])
 
 
-def labels_of_bipartite(touch: scipy.sparse.sparray) -> Index:
+def labels_of_bipartite(touch: scipy.sparse.csr_array | scipy.sparse.coo_array) -> Index:
     """For every row of ``touch`` the number of its component: rows that share a column belong together."""
     coo = touch.tocoo()
     rows, columns = (int(n) for n in touch.shape)
-    ends = np.stack([coo.row, rows + coo.col], axis=1)
+    ends = np.stack([coo.row, rows + coo.col], axis=1).astype(np.intp)
     return component_numbers(components_of_edges(rows + columns, ends)[:rows])
 
 
