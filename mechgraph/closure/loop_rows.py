@@ -210,6 +210,16 @@ class ReducedRows:
         local[:, 3:] = (rows[:, 3:] + np.moveaxis(moment, 0, 1)) / self.measure.length[:, None, None]
         return np.asarray(self._turn @ local)
 
+    def open_part(self, residual: Array) -> float:
+        """Largest component of a residual ``(rows,)`` in all rows, those of a loop in its own measure."""
+        loops = np.abs(self._turned(residual[: 6 * self.loops, None])).max(initial=0.0)
+        return float(max(loops, np.abs(residual[6 * self.loops :]).max(initial=0.0)))
+
+    @property
+    def rounding(self) -> float:
+        """Rounding of a residual in the measure of the smallest loop, as positions are of size one."""
+        return 20 * np.finfo(float).eps / min(1.0, float(self.measure.length.min(initial=1.0)))
+
     def kept_part(self, b: Array) -> Array:
         """Right sides ``(rows, k)`` in the kept and the further rows, ``(height, k)``."""
         turned = self._turned(b[: 6 * self.loops])[np.arange(6) < self.kept[:, None]]
@@ -239,7 +249,7 @@ class ReducedRows:
         m = int(self.kept.sum())
         nothing = np.zeros((6 * self.loops - m, kept.shape[1]))
         wrenches = self._wrenches(kept[:m], nothing if dropped is None else dropped)
-        return np.concatenate([np.moveaxis(wrenches, 0, 1).reshape(6 * self.loops, -1), kept[m:]])
+        return np.concatenate([np.moveaxis(wrenches, 0, 1).reshape(6 * self.loops, kept.shape[1]), kept[m:]])
 
     def unit_wrenches(self) -> Array:
         """Loop wrenches ``(6, 6, loops)`` of unit multipliers of the turned rows, one column a row."""

@@ -99,11 +99,12 @@ class _Position:
         Then the rank is constant near by: the other rows depend on them not only here. Where it is not, they stay open by the square
         of the step (a change point) or a higher power (shaky), far above the closure error.
         """
-        limit = max(10 * CLOSURE_GOAL, 10 * float(self.system.at(self.x[:, None]).closure[0]))
+        rows = self.found.reduced
+        already = rows.open_part(self.system.at(self.x[:, None]).residual[:, 0])
+        limit = 10 * max(CLOSURE_GOAL, rows.rounding, already)
         for h in STEPS:
-            x = self._stepped(v, h)[0]
-            closed = _corrected(self.system, x, self.found.reduced)
-            if closed is not None and float(self.system.at(closed[:, None]).closure[0]) <= limit:
+            closed = _corrected(self.system, self._stepped(v, h)[0], rows)
+            if closed is not None and rows.open_part(self.system.at(closed[:, None]).residual[:, 0]) <= limit:
                 return True
         return False
 
@@ -200,11 +201,11 @@ def _followed(begin: _Position, v: Array) -> float:
 
 def _corrected(system: System, x: Array, rows: ReducedRows) -> Array | None:
     """The loops closed from ``x`` in the kept rows of a position near by alone; None where that does not converge quickly."""
-    before = np.inf
+    before, goal = np.inf, max(CLOSURE_GOAL, rows.rounding)
     for _ in range(FROZEN):
         residual = system.at(x[:, None]).residual[:, 0]
         error = float(np.abs(rows.kept_part(residual[:, None])).max(initial=0.0))
-        if error <= CLOSURE_GOAL or (error < 10 * CLOSURE_GOAL and error > SLOW * before):
+        if error <= goal or (error < 10 * goal and error > SLOW * before):
             return x
         if error > SLOW * before:
             return None
