@@ -84,7 +84,7 @@ class ClosureRows:
     first_column: Index
     S: Array
     points: Array
-    more: scipy.sparse.csr_array
+    more: scipy.sparse.csr_array | None = None
 
     @classmethod
     def at(cls, here: Configuration) -> ClosureRows:
@@ -92,24 +92,29 @@ class ClosureRows:
         s = here.system
         loops = 6 * len(s.graph.loops)
         extra = getattr(s, "n_rows", loops) - loops
-        more = here.J[loops:, :, 0] if extra else np.zeros((0, s.n_freedoms))
-        return cls(s.graph, s.first_column, here.S[:, :, 0], here.pair_points[:, :, 0], scipy.sparse.csr_array(more))
+        more = scipy.sparse.csr_array(here.J[loops:, :, 0]) if extra else None
+        return cls(s.graph, s.first_column, here.S[:, :, 0], here.pair_points[:, :, 0], more)
+
+    @property
+    def further(self) -> int:
+        """Number of rows behind those of the loops."""
+        return 0 if self.more is None else int(self.more.shape[0])
 
     @property
     def count(self) -> int:
         """Number of rows."""
-        return 6 * len(self.graph.loops) + int(self.more.shape[0])
+        return 6 * len(self.graph.loops) + self.further
 
 
 class ReducedRows:
     """The rows of every loop turned so that its ``kept (loops,)`` independent ones come first; columns ``fixed`` left out.
 
     ``dropped`` is the largest singular value of the others. Multipliers of the kept rows and of ``rows.more``, one below the other,
-    have the length ``height``.
+    have the length ``height``. ``dense``: whether ``K`` is worked with as a full matrix.
     """
 
-    def __init__(self, rows: ClosureRows, fixed: Index) -> None:
-        self.rows, self.fixed = rows, fixed
+    def __init__(self, rows: ClosureRows, fixed: Index, dense: bool = False) -> None:
+        self.rows, self.fixed, self.dense = rows, fixed, dense
         self.entries = entries_of(rows.graph, rows.first_column)
         self.measure = measure_of(rows.graph, rows.points)
         self._free = np.ones(rows.S.shape[1], dtype=bool)
@@ -117,8 +122,8 @@ class ReducedRows:
         blocks = self._blocks(rows.S)
         largest = np.zeros(rows.S.shape[1])
         np.maximum.at(largest, self.entries.column, np.abs(blocks).max(axis=0, initial=0.0))
-        if rows.more.shape[0]:
-            largest = np.maximum(largest, np.abs(rows.more.toarray()).max(axis=0))
+        if rows.more is not None:
+            largest = np.maximum(largest, abs(rows.more).max(axis=0).toarray())
         self._scale = np.where(largest > 0, 1.0 / np.where(largest > 0, largest, 1.0), 1.0)
         self._reduce(blocks * self._scale[self.entries.column])
 
@@ -130,7 +135,7 @@ class ReducedRows:
     @property
     def height(self) -> int:
         """Number of kept rows and further rows."""
-        return int(self.kept.sum()) + int(self.rows.more.shape[0])
+        return int(self.kept.sum()) + self.rows.further
 
     @property
     def scale(self) -> Array:
@@ -146,7 +151,7 @@ class ReducedRows:
     def owners(self) -> Index:
         """For every kept or further row the number of its loop (further rows count on from the loops)."""
         mine = np.repeat(np.arange(self.loops), self.kept)
-        return np.concatenate([mine, self.loops + np.arange(self.rows.more.shape[0])]).astype(np.intp)
+        return np.concatenate([mine, self.loops + np.arange(self.rows.further)]).astype(np.intp)
 
     def _blocks(self, S: Array) -> Array:
         """Entries ``(6, entries)`` in the measure of their loops, zero in the fixed columns."""
@@ -198,8 +203,22 @@ class ReducedRows:
         cols = np.broadcast_to(place[e.column], (6, len(e.loop)))[self._live]
         shape = (int(starts[-1]), int(self._free.sum()))
         K = scipy.sparse.csr_array((self._turned_blocks(self.rows.S)[self._live], (rows, cols)), shape=shape)
+        if self.rows.more is None:
+            return K
         more = self.rows.more[:, self._free] * self._scale[self._free]
-        return scipy.sparse.csr_array(scipy.sparse.vstack([K, more])) if more.shape[0] else K
+        return scipy.sparse.csr_array(scipy.sparse.vstack([K, more]))
+
+    @cached_property
+    def dense_matrix(self) -> Array:
+        """The same as a full matrix."""
+        e, m = self.entries, int(self.kept.sum())
+        whole = np.zeros((6 * self.loops, len(self._free)))
+        whole[6 * e.loop + np.arange(6)[:, None], e.column] = self._turned_blocks(self.rows.S)
+        K = np.zeros((self.height, int(self._free.sum())))
+        K[:m] = whole[(np.arange(6) < self.kept[:, None]).ravel()][:, self._free]
+        if self.rows.more is not None:
+            K[m:] = (self.rows.more.toarray() * self._scale)[:, self._free]
+        return K
 
     def _turned(self, b: Array) -> Array:
         """Right sides ``(6 loops, k)`` about the internal origin as turned rows ``(loops, 6, k)``."""
@@ -228,7 +247,7 @@ class ReducedRows:
     @cached_property
     def least_norm(self) -> LeastNorm:
         """The normal equations of ``K``, factored."""
-        return LeastNorm(self.matrix)
+        return LeastNorm(self.dense_matrix if self.dense else self.matrix)
 
     def correction(self, residual: Array) -> Array:
         """Smallest ``dq (F,)``, measured in columns of unit size, with ``J dq = -residual (rows,)`` in the kept rows."""

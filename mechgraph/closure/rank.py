@@ -21,7 +21,7 @@ from mechgraph.closure.bordering import LoopSystem
 from mechgraph.closure.configuration import Configuration, Index
 from mechgraph.closure.elimination import Elimination
 from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
-from mechgraph.numerics.least_norm import singular_range
+from mechgraph.numerics.least_norm import singular_ratio
 from mechgraph.numerics.linear import rank_of
 from mechgraph.numerics.tolerances import RANKS
 from mechgraph.topology.components import labels_of_bipartite, members
@@ -41,6 +41,9 @@ class Solution(Protocol):
     rank: int
     dropped: float
 
+    def margin(self) -> float:
+        """Smallest singular value kept, as part of the largest, where there is one."""
+
     def stresses(self, shares: Array) -> Array:
         """``y (height, k)`` with ``K^T y = 0`` for shares ``(height - rank, k)`` of the self-stresses."""
 
@@ -52,13 +55,16 @@ class _Dense:
     name: Literal["dense", "sparse"] = "dense"
 
     def __init__(self, reduced: ReducedRows, tolerance: float) -> None:
-        K = reduced.matrix.toarray()
+        K = reduced.dense_matrix
         self._U, self._s, self._Vt = np.eye(K.shape[0]), np.zeros(0), np.eye(K.shape[1])
         if K.size:
             self._U, self._s, self._Vt = np.linalg.svd(K)
         self.rank = rank_of(self._s, tolerance)
         rest = self._s[self.rank :]
         self.dropped = float(rest[0] / self._s[0]) if rest.size and self._s[0] > 0 else 0.0
+
+    def margin(self) -> float:
+        return float(self._s[self.rank - 1] / self._s[0])
 
     def stresses(self, shares: Array) -> Array:
         return np.asarray(self._U[:, self.rank :] @ shares)
@@ -73,6 +79,9 @@ class _Bordered:
     def __init__(self, loops: LoopSystem) -> None:
         self.loops, self.rank, self.dropped = loops, loops.rank, 0.0
 
+    def margin(self) -> float:
+        return singular_ratio(self.loops.matrix, self.rank, lambda: self.loops.least_norm)
+
     def stresses(self, shares: Array) -> Array:
         return self.loops.connecting_stress(self.loops.first, shares)
 
@@ -84,8 +93,12 @@ class _Eliminated:
     name: Literal["dense", "sparse"] = "sparse"
 
     def __init__(self, reduced: ReducedRows, tolerance: float) -> None:
+        self._reduced = reduced
         self._found = Elimination(reduced.matrix, reduced.owners, tolerance)
         self.rank, self.dropped = self._found.rank, self._found.dropped
+
+    def margin(self) -> float:
+        return singular_ratio(self._reduced.matrix, self.rank, lambda: self._reduced.least_norm)
 
     def stresses(self, shares: Array) -> Array:
         return self._found.stresses(shares)
@@ -110,10 +123,7 @@ class ClosureRank:
     @cached_property
     def margin(self) -> float:
         """Smallest singular value of K that was kept, as part of the largest; 1 where there is none."""
-        if not self.rank:
-            return 1.0
-        smallest, largest = singular_range(self.reduced.matrix, self.rank, lambda: self.reduced.least_norm)
-        return smallest / largest
+        return self._solution.margin() if self.rank else 1.0
 
     @cached_property
     def motions(self) -> Array:
@@ -163,7 +173,7 @@ class ClosureRank:
         """Loops (and further rows) with parts of self-stresses that connect loops: those that share freedoms belong together."""
         r = self.reduced
         probe = np.abs(self._solution.stresses(np.random.default_rng(SEED).normal(size=(self.shared, 1))))[:, 0]
-        size = np.zeros(r.loops + r.rows.more.shape[0])
+        size = np.zeros(r.loops + r.rows.further)
         np.maximum.at(size, r.owners, probe)
         some = np.flatnonzero(size > SHARE * size.max())
         K = r.matrix.tocoo()
@@ -192,9 +202,9 @@ def rank_of_rows(
     """The same for rows given as such; pivots of a bordered system above ``proved`` decide by themselves."""
     fixed = np.zeros(0, dtype=np.intp) if fixed is None else fixed
     if engine == "dense" or (engine == "auto" and rows.count < CROSSOVER):
-        reduced = ReducedRows(rows, fixed)
+        reduced = ReducedRows(rows, fixed, dense=True)
         return ClosureRank(reduced, _Dense(reduced, tolerance), tolerance)
-    if not rows.more.shape[0]:
+    if rows.more is None:
         bordered = LoopSystem(rows, fixed)
         if bordered.smallest > proved or bordered.first.distance > RANKS.distance:
             return ClosureRank(bordered, _Bordered(bordered), tolerance)

@@ -29,20 +29,23 @@ SEED = 3
 
 
 class LeastNorm:
-    """The normal equations of ``K (m, n)``, factored once."""
+    """The normal equations of ``K (m, n)``, full or sparse, factored once."""
 
-    def __init__(self, K: scipy.sparse.csr_array) -> None:
+    def __init__(self, K: Array | scipy.sparse.csr_array) -> None:
         self.K = K
-        self._damping = RANKS.damping * max(1.0, float(abs(K).max()) if K.nnz else 0.0)
-        if K.shape[0]:
-            A = (K @ K.T + self._damping * scipy.sparse.eye_array(K.shape[0])).tocsc()
-            self._lu = scipy.sparse.linalg.splu(
-                A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-            )
+        m = K.shape[0]
+        if isinstance(K, np.ndarray):
+            factor = scipy.linalg.lu_factor(K @ K.T + RANKS.damping * np.eye(m))
+            self._solve: Callable[[Array], Array] = lambda r: scipy.linalg.lu_solve(factor, r)
+        elif m:
+            A = (K @ K.T + RANKS.damping * scipy.sparse.eye_array(m)).tocsc()
+            symmetric = {"SymmetricMode": True}
+            lu = scipy.sparse.linalg.splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=symmetric)
+            self._solve = lu.solve
 
     def multipliers(self, r: Array) -> Array:
         """``(K K^T + d I)^-1 r`` for ``r (m, k)``."""
-        return np.asarray(self._lu.solve(r)) if self.K.shape[0] else r
+        return np.asarray(self._solve(r)) if self.K.shape[0] else r
 
     def solve(self, r: Array) -> Array:
         """Smallest ``(n, k)`` with ``K dq = r`` as far as that can be had, with one step of refinement."""
@@ -50,20 +53,20 @@ class LeastNorm:
         return np.asarray(dq + self.K.T @ self.multipliers(r - self.K @ dq))
 
 
-def singular_range(K: scipy.sparse.csr_array, rank: int, factored: Callable[[], LeastNorm]) -> tuple[float, float]:
-    """Singular value number ``rank`` (the smallest kept) and the largest."""
+def singular_ratio(K: scipy.sparse.csr_array, rank: int, factored: Callable[[], LeastNorm]) -> float:
+    """Singular value number ``rank`` (the smallest kept) over the largest."""
     if min(K.shape) <= WHOLE:
         s = singular_values(K.toarray())
-        return float(s[rank - 1]), float(s[0])
+        return float(s[rank - 1] / s[0])
     normal = factored()
     start = np.random.default_rng(SEED).normal(size=K.shape[1])
-    largest = np.sqrt(_largest(lambda v: K.T @ (K @ v), start))
+    largest = _largest(lambda v: K.T @ (K @ v), start)
 
     def inverse(v: Array) -> Array:
         """``K^T (K K^T)^-2 K``: zero on motions, the inverse square of a singular value elsewhere."""
         return np.asarray(K.T @ normal.multipliers(normal.multipliers(K @ v)))
 
-    return 1.0 / float(np.sqrt(_largest(inverse, inverse(start)))), float(largest)
+    return 1.0 / float(np.sqrt(largest * _largest(inverse, inverse(start))))
 
 
 def _largest(apply: Callable[[Array], Array], v: Array) -> float:

@@ -13,15 +13,11 @@ if TYPE_CHECKING:
     from mechgraph.report.report import DeterminacyReport
 
 FINDINGS = ("undriven", "passive", "locked", "drivable", "not_drivable", "advice")
-COUNTED = 300
-"""Pairs above which a ledger is counted from the pair table instead of read off a formulation."""
 
 
 def ledger(m: Mechanism, bookkeeping: str) -> Ledger:
-    """The ledger of a mechanism: read off its formulation; for many pairs the same counts without building the equations."""
-    if len(m.pairs) <= COUNTED or bookkeeping not in ("lee", "minimal"):
-        return formulate(m, bookkeeping).ledger()
-    return counted_ledger(m, bookkeeping)
+    """The ledger of a mechanism: counted from the pair table, which agrees with what is read off its formulation."""
+    return counted_ledger(m, bookkeeping) if bookkeeping in ("lee", "minimal") else formulate(m, bookkeeping).ledger()
 
 
 def counted_ledger(m: Mechanism, bookkeeping: str) -> Ledger:

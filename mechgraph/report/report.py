@@ -182,7 +182,9 @@ class DeterminacyReport:
     def reactions(self) -> Uniqueness | None:
         """Verdict on every reaction component and effort, with the self-stresses."""
         g = self.geometry
-        return uniqueness(g.system.at(g.x[:, None]), g.driven, self.asked) if g else None
+        if not g:
+            return None
+        return uniqueness(g.system.at(g.x[:, None]), g.driven, self.asked, g.freedoms.driven_closure)
 
     @property
     def unique(self) -> dict[str, dict[str, bool]]:

@@ -228,7 +228,7 @@ def _closed(system: System, x: Array, rows: ReducedRows) -> Array | None:
         best, least = (x, error) if error < least else (best, least)
         if error <= CLOSURE_GOAL or since > PATIENCE:
             break
-        dq = ReducedRows(ClosureRows.at(here), np.zeros(0, dtype=np.intp)).correction(residual)
+        dq = ReducedRows(ClosureRows.at(here), np.zeros(0, dtype=np.intp), rows.dense).correction(residual)
         dq = dq * min(1.0, LONGEST / max(float(np.abs(dq).max()), 1e-300))
         x = system.advance(x[:, None], dq[:, None])[:, 0]
     return best if float(system.at(best[:, None]).closure[0]) <= CLOSED else None

@@ -59,11 +59,13 @@ def random_rows(m: Mechanism, graph: LinkGraph) -> ClosureRows:
     return ClosureRows(graph, first, twists, points, more)
 
 
-def coupling_rows(m: Mechanism, width: int) -> scipy.sparse.csr_array:
+def coupling_rows(m: Mechanism, width: int) -> scipy.sparse.csr_array | None:
     """A row with random coefficients in the freedoms of every coupling."""
     couplings = getattr(m, "couplings", ())
+    if not couplings:
+        return None
     out = np.zeros((len(couplings), width))
-    place = {name: i for i, name in enumerate(m.freedom_names())} if couplings else {}
+    place = {name: i for i, name in enumerate(m.freedom_names())}
     rng = np.random.default_rng(SEED)
     for row, coupling in zip(out, couplings, strict=True):
         row[[place[m.full_name(name)] for name, _ in coupling.terms]] = rng.uniform(0.5, 1.5, len(coupling.terms))

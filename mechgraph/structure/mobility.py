@@ -10,7 +10,7 @@ import scipy
 
 from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.configuration import Configuration, Index, System
+from mechgraph.closure.configuration import Index, System
 from mechgraph.closure.passive_rest import Idle
 from mechgraph.closure.rank import ClosureRank, EngineName, closure_rank
 from mechgraph.model.mechanism import Mechanism
@@ -35,13 +35,14 @@ class FreeMotion:
 class Freedoms:
     """What can move at a closed position.
 
-    ``closure`` the rank of the closure equations with its margin; ``null (F, M)`` orthonormal motions;
+    ``closure`` the rank of the closure equations with its margin, ``driven_closure`` the same with the drivers at rest; ``null (F, M)`` orthonormal motions;
     ``dependent`` whether drivers cannot move independently, ``drive`` how strongly the weakest of them moves (against the freedom that
     moves most; small near a dead point); ``passive`` and ``undriven`` motions with the drivers at rest;
     ``hold`` freedoms whose rest stops the passive motions.
     """
 
     closure: ClosureRank
+    driven_closure: ClosureRank
     null: Array
     dependent: bool
     passive: tuple[PassiveMotion, ...]
@@ -80,13 +81,13 @@ class Freedoms:
         return tuple(Idle(link) for link in sorted({link for p in self.passive for link in p.links}))
 
 
-def _left_free(found: ClosureRank, columns: Index, here: Configuration, engine: EngineName) -> Array:
+def _left_free(found: ClosureRank, at_rest: ClosureRank, columns: Index) -> Array:
     """Orthonormal motions with the freedoms ``columns`` at rest."""
     null = found.motions
     if not len(columns) or not null.shape[1]:
         return null
     if found.engine == "dense":
-        return closure_rank(here, columns, engine).motions
+        return at_rest.motions
     return np.asarray(null @ null_space(null[columns], DEPENDENT))
 
 
@@ -106,7 +107,8 @@ def free_motion(system: System, x: Array, columns: Index, engine: EngineName = "
     found = closure_rank(here, engine=engine)
     null = found.motions
     drive = _drive(null, columns)
-    left = _left_free(found, columns, here, engine)
+    at_rest = closure_rank(here, columns, engine) if len(columns) else found
+    left = _left_free(found, at_rest, columns)
     passive = passive_motions(here, left, columns)
     if not len(columns) and passive and len(passive) == null.shape[1]:
         # nothing else can move: what could be driven is an input, not an idle freedom
@@ -117,7 +119,7 @@ def free_motion(system: System, x: Array, columns: Index, engine: EngineName = "
     if passive:
         _, pivots = scipy.linalg.qr(np.stack([p.rates for p in passive]), mode="r", pivoting=True)
         hold = np.sort(pivots[: len(passive)]).astype(np.intp)
-    return Freedoms(found, null, drive < DEPENDENT, tuple(passive), tuple(undriven), hold, drive)
+    return Freedoms(found, at_rest, null, drive < DEPENDENT, tuple(passive), tuple(undriven), hold, drive)
 
 
 def motions_of(J: Array) -> Array:

@@ -136,13 +136,15 @@ class Uniqueness:
         return self._sums[1]
 
 
-def uniqueness(here: Configuration, driven: Index, engine: EngineName = "auto") -> Uniqueness:
+def uniqueness(
+    here: Configuration, driven: Index, engine: EngineName = "auto", found: ClosureRank | None = None
+) -> Uniqueness:
     """Which reaction components and efforts are unique: those in which no self-stress has a part, drivers in place.
 
-    These self-stresses are the null space of ``[J^T, -E]``: of ``J^T`` in the columns that are not driven.
+    ``found``, where it is known, is the rank of the closure equations with the drivers at rest. These self-stresses are the null space of ``[J^T, -E]``: of ``J^T`` in the columns that are not driven.
     """
     parts = Components(here, driven)
-    found = closure_rank(here, driven, engine)
+    found = found or closure_rank(here, driven, engine)
     count = min(PROBES, found.count - found.rank)
     probes = found.random_stress(np.random.default_rng(SEED), count)
     return Uniqueness(parts, found, parts.table(pair_states(here, probes)))
