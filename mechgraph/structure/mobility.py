@@ -35,7 +35,8 @@ class FreeMotion:
 class Freedoms:
     """What can move at a closed position.
 
-    ``closure`` the rank of the closure equations with its margin, ``driven_closure`` the same with the drivers at rest; ``null (F, M)`` orthonormal motions;
+    ``closure`` the rank of the closure equations with its margin, ``driven_closure`` the same with the drivers at rest;
+    ``null (F, M)`` orthonormal motions;
     ``dependent`` whether drivers cannot move independently, ``drive`` how strongly the weakest of them moves (against the freedom that
     moves most; small near a dead point); ``passive`` and ``undriven`` motions with the drivers at rest;
     ``hold`` freedoms whose rest stops the passive motions.

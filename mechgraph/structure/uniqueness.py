@@ -141,7 +141,8 @@ def uniqueness(
 ) -> Uniqueness:
     """Which reaction components and efforts are unique: those in which no self-stress has a part, drivers in place.
 
-    ``found``, where it is known, is the rank of the closure equations with the drivers at rest. These self-stresses are the null space of ``[J^T, -E]``: of ``J^T`` in the columns that are not driven.
+    ``found``, where it is known, is the rank of the closure equations with the drivers at rest. The self-stresses are the null space
+    of ``[J^T, -E]``: of ``J^T`` in the columns that are not driven.
     """
     parts = Components(here, driven)
     found = found or closure_rank(here, driven, engine)
