@@ -14,7 +14,7 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import named_columns, scaled_system
-from mechgraph.closure.configuration import Configuration, System
+from mechgraph.closure.configuration import Configuration, Index, System
 from mechgraph.closure.rank import EngineName
 from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.model.mechanism import Mechanism
@@ -40,7 +40,8 @@ BEAM = 12
 
 @dataclass(frozen=True)
 class Change:
-    """One pair given another type; ``matrix (f, s)`` is its power on the self-stresses, ``added`` the freedoms added.
+    """One pair given another type; ``matrix (f, s)`` is its power on the self-stresses, ``added`` the freedoms added,
+    ``relief`` the self-stresses that it removes by itself.
 
     ``turn``: angle by which the second direction x is turned about the axis, for types in which it matters.
     """
@@ -49,6 +50,7 @@ class Change:
     type: PairType
     matrix: Array
     added: int
+    relief: int
     turn: float = 0.0
 
 
@@ -107,53 +109,71 @@ def changes_of(here: Configuration, freedoms: Freedoms) -> list[Change]:
     system = here.system
     count = freedoms.redundancy if freedoms.redundancy <= SETS else PROBES
     rows = freedoms.closure.random_stress(np.random.default_rng(SEED), count)
-    stress = pair_states(here, np.linalg.qr(rows)[0])[..., 0]
-    wider = {row: list(wider_types(row)) for row in dict.fromkeys(p.type for p in system.m.pairs)}
-    place = {int(k): (n, i) for n, g in enumerate(system.groups) for i, k in enumerate(g.pairs)}
-    out = []
-    driven = {system.m.freedom(d.freedom) for d in system.m.drives}
-    for k, pair in enumerate(system.m.pairs):
-        number, i = place[k]
-        needed = {pair.type.freedoms[j].name for pair_index, j in driven if pair_index == k}
-        base = here.frames[number][-1][:, :, i : i + 1]
-        for row in wider[pair.type]:
-            if not needed <= {f.name for f, single in zip(row.freedoms, row.drivable, strict=True) if single}:
-                continue
-            plain = S_of(row, base).T @ stress[:, k]
-            out.append(Change(k, row, plain, row.f - pair.type.f))
-            if row.square_second:
-                turn = best_turn(base[..., 0, 0], stress[:, k])
-                power = S_of(row, turned(base, turn)).T @ stress[:, k]
-                if rank_of_absolute(power) > rank_of_absolute(plain):
-                    out.append(Change(k, row, power, row.f - pair.type.f, turn))
+    stress = np.moveaxis(pair_states(here, np.linalg.qr(rows)[0])[..., 0], 1, 0)
+    needed: dict[int, set[str]] = {}
+    for k, j in (system.m.freedom(d.freedom) for d in system.m.drives):
+        needed.setdefault(k, set()).add(system.m.pairs[k].type.freedoms[j].name)
+    out: list[tuple[int, int, Change]] = []
+    for g, group in enumerate(system.groups):
+        base = here.frames[g][-1]
+        for number, row in enumerate(wider_types(system.m.pairs[int(group.pairs[0])].type)):
+            single = {f.name for f, ok in zip(row.freedoms, row.drivable, strict=True) if ok}
+            some = np.array(
+                [i for i, k in enumerate(group.pairs.tolist()) if needed.get(k, set()) <= single], dtype=np.intp
+            )
+            made = _changes_to(row, base[:, :, some], stress[group.pairs[some]], group.pairs[some], row.f - group.row.f)
+            out += [(c.pair, 2 * number + turned, c) for turned, c in made]
+    return [c for _, _, c in sorted(out, key=lambda item: item[:2])]
+
+
+def _changes_to(row: PairType, base: Array, stress: Array, pairs: Index, added: int) -> list[tuple[int, Change]]:
+    """Changes of pairs to one type: as they stand (0), and turned about z (1) where that relieves more; all pairs at once."""
+    plain = _power(row, base, stress)
+    relief = _ranks(plain)
+    out = [(0, Change(int(k), row, plain[i], added, int(relief[i]))) for i, k in enumerate(pairs)]
+    if row.square_second and len(pairs):
+        turns = best_turns(base[..., 0], stress)
+        power = _power(row, turned(base, turns[:, None]), stress)
+        better = _ranks(power)
+        more = np.flatnonzero(better > relief)
+        out += [(1, Change(int(pairs[i]), row, power[i], added, int(better[i]), float(turns[i]))) for i in more]
     return out
 
 
-def S_of(row: PairType, base: Array) -> Array:
-    """Twists ``(6, f)`` of a pair type at coordinates zero in the frame ``base (3, 4, 1, 1)``."""
-    x = evaluation.coordinates_to_state(row, np.zeros((row.f, 1, 1)))
-    frames = evaluation.frames_of(row, np.zeros((1, 1)), x, base)
-    return evaluation.twists_of(row, np.zeros((1, 1)), frames)[:, :, 0, 0]
+def _power(row: PairType, base: Array, stress: Array) -> Array:
+    """Power ``(n, f, s)`` of a pair type at coordinates zero in frames ``base (3, 4, n, 1)`` on self-stresses ``(n, 6, s)``."""
+    n = base.shape[2]
+    pitch = np.zeros((n, 1))
+    x = evaluation.coordinates_to_state(row, np.zeros((row.f, n, 1)))
+    twists = evaluation.twists_of(row, pitch, evaluation.frames_of(row, pitch, x, base))[..., 0]
+    return np.asarray(np.einsum("ifn,nis->nfs", twists, stress))
 
 
-def turned(base: Array, angle: float) -> Array:
-    """A frame turned about its own z."""
+def _ranks(A: Array) -> Array:
+    """Ranks of matrices ``(n, f, s)`` with an absolute tolerance (self-stresses and twists are of size one)."""
+    return (
+        np.asarray((np.linalg.svd(A, compute_uv=False) > SIGNIFICANT).sum(axis=1)) if A.size else np.zeros(len(A), int)
+    )
+
+
+def turned(base: Array, angle: Array | float) -> Array:
+    """Frames turned about their own z."""
     c, s = np.cos(angle), np.sin(angle)
     out = base.copy()
     out[:, 0], out[:, 1] = c * base[:, 0] + s * base[:, 1], c * base[:, 1] - s * base[:, 0]
     return out
 
 
-def best_turn(frame: Array, wrenches: Array) -> float:
-    """Angle from x to the direction across z about which self-stresses ``(6, s)`` bend most, in (-pi/2, pi/2]."""
-    moments = wrenches[:3] - np.cross(frame[:, 3], wrenches[3:].T).T
-    across = frame[:, :2].T @ moments
-    U, s, _ = np.linalg.svd(across)
-    if not s.size or s[0] < SIGNIFICANT:
-        return 0.0
-    angle = float(np.arctan2(U[1, 0], U[0, 0]))
+def best_turns(frames: Array, wrenches: Array) -> Array:
+    """Angles from x to the direction across z about which self-stresses ``(n, 6, s)`` bend most, in (-pi/2, pi/2]."""
+    if not wrenches.shape[2]:
+        return np.zeros(len(wrenches))
+    moments = wrenches[:, :3] - np.cross(frames[:, 3].T[:, :, None], wrenches[:, 3:], axis=1)
+    U, s, _ = np.linalg.svd(np.einsum("ijn,nis->njs", frames[:, :2], moments))
+    angle = np.arctan2(U[:, 1, 0], U[:, 0, 0])
     angle -= np.pi * np.ceil(angle / np.pi - 0.5)
-    return angle if angle > 1e-9 - np.pi / 2 else np.pi / 2
+    angle = np.where(angle > 1e-9 - np.pi / 2, angle, np.pi / 2)
+    return np.where(s[:, 0] < SIGNIFICANT, 0.0, angle)
 
 
 def _relief(parts: tuple[Change, ...]) -> int:
@@ -170,10 +190,9 @@ def relieving(changes: list[Change], redundancy: int) -> tuple[list[tuple[Change
 
     Ranked by how little they change: freedoms added beyond need, then number of changes, then the order of declaration.
     """
-    relief = {id(c): _relief((c,)) for c in changes}
-    useful = [c for c in changes if relief[id(c)]]
-    singles = sorted(useful, key=lambda c: (c.added - relief[id(c)], -relief[id(c)], c.pair))
-    exact = [c for c in singles if c.added == relief[id(c)]]
+    useful = [c for c in changes if c.relief]
+    singles = sorted(useful, key=lambda c: (c.added - c.relief, -c.relief, c.pair))
+    exact = [c for c in singles if c.added == c.relief]
     beam: list[tuple[tuple[Change, ...], int]] = [((), 0)]
     complete: list[tuple[Change, ...]] = []
     deepest: list[tuple[tuple[Change, ...], int]] = []
@@ -291,9 +310,7 @@ def _freeing(
     if freedoms.mobility - len(freedoms.passive) and motion.mobility:
         return []
     found: list[Effect] = []
-    for c in _spread(sorted((c for c in changes if c.added > _relief((c,))), key=lambda c: (c.added, c.pair)))[
-        :FREEING
-    ]:
+    for c in _spread(sorted((c for c in changes if c.added > c.relief), key=lambda c: (c.added, c.pair)))[:FREEING]:
         done = effect(system, x, freedoms, (c,), engine)
         if done and done.mobility[1] - done.passive[1] > freedoms.mobility - len(freedoms.passive):
             found.append(done)
