@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import mechanisms as known
 import numpy as np
 import pytest
+import scipy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lattices import LATTICES
@@ -122,6 +124,29 @@ def test_elimination_of_random_rows(name: str) -> None:
     assert q.shape[1] == K.shape[1] - found.rank
     assert np.abs(K.T @ y).max(initial=0.0) < 1e-8
     assert np.abs(K @ q).max(initial=0.0) < 1e-8 * np.abs(q).max(initial=1.0)
+
+
+@pytest.mark.parametrize("name", ["windows", "grid", "pphchp"])
+def test_rows_behind_those_of_the_loops(name: str) -> None:
+    """Relations between freedoms, one of them twice: rank, motions and self-stresses with them, by both engines."""
+    here, _ = here_and_driven(CASES[name]())
+    rows = ClosureRows.at(here)
+    J = here.J[:, :, 0]
+    more = np.zeros((3, J.shape[1]))
+    more[0, [0, 2]] = 2.0, -3.0
+    more[1, [1, -1]] = 1.0, 0.5
+    more[2] = -2.0 * more[0]
+    whole = np.vstack([J, more])
+    rank = np.linalg.matrix_rank(whole, 1e-9)
+    for engine in ENGINES:
+        found = rank_of_rows(replace(rows, more=scipy.sparse.csr_array(more)), None, engine)  # type: ignore[arg-type]
+        assert (found.rank, found.count) == (rank, len(whole))
+        assert np.abs(whole @ found.motions).max(initial=0.0) < 1e-9
+        assert found.motions.shape[1] == whole.shape[1] - rank
+        stress = found.random_stress(np.random.default_rng(0), 4)
+        assert np.abs(whole.T @ stress).max() < 1e-9 * np.abs(stress).max()
+        assert np.abs(stress[-1]).max() > 0
+        assert sum(n for n, _ in found.sets) == len(whole) - rank
 
 
 # --- the whole report -----------------------------------------------------------------------------------------------------

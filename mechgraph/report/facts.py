@@ -16,8 +16,9 @@ FINDINGS = ("undriven", "passive", "locked", "drivable", "not_drivable", "advice
 
 
 def ledger(m: Mechanism, bookkeeping: str) -> Ledger:
-    """The ledger of a mechanism: counted from the pair table, which agrees with what is read off its formulation."""
-    return counted_ledger(m, bookkeeping) if bookkeeping in ("lee", "minimal") else formulate(m, bookkeeping).ledger()
+    """The ledger of a mechanism: counted from the pair table where that is all there is, else read off its formulation."""
+    countable = bookkeeping in ("lee", "minimal") and not getattr(m, "couplings", ())
+    return counted_ledger(m, bookkeeping) if countable else formulate(m, bookkeeping).ledger()
 
 
 def counted_ledger(m: Mechanism, bookkeeping: str) -> Ledger:

@@ -15,12 +15,8 @@ from mechgraph.closure.passive_rest import Idle
 from mechgraph.closure.rank import ClosureRank, EngineName, closure_rank
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.linear import RANK_TOLERANCE, independent_rows, singular_values
-from mechgraph.structure.passive import STILL, PassiveMotion, passive_motions
-
-DEPENDENT = 1e-8
-"""Part of a unit motion below which the weakest driver counts as standing still: drivers depend, or a dead point."""
-ROUNDING = 1e-11
-"""Part of a unit rate that counts as zero."""
+from mechgraph.numerics.tolerances import MOTIONS
+from mechgraph.structure.passive import PassiveMotion, passive_motions
 
 
 @dataclass(frozen=True)
@@ -89,7 +85,7 @@ def _left_free(found: ClosureRank, at_rest: ClosureRank, columns: Index) -> Arra
         return null
     if found.engine == "dense":
         return at_rest.motions
-    return np.asarray(null @ null_space(null[columns], DEPENDENT))
+    return np.asarray(null @ null_space(null[columns], MOTIONS.dependent))
 
 
 def _drive(null: Array, columns: Index) -> float:
@@ -114,13 +110,13 @@ def free_motion(system: System, x: Array, columns: Index, engine: EngineName = "
     if not len(columns) and passive and len(passive) == null.shape[1]:
         # nothing else can move: what could be driven is an input, not an idle freedom
         drivable = [c for c, _ in single_freedoms(system.m)]
-        passive = [p for p in passive if not (np.abs(p.rates[drivable]) > STILL).any()]
+        passive = [p for p in passive if not (np.abs(p.rates[drivable]) > MOTIONS.still).any()]
     undriven = _complement(system, left, passive)
     hold = np.zeros(0, dtype=np.intp)
     if passive:
         _, pivots = scipy.linalg.qr(np.stack([p.rates for p in passive]), mode="r", pivoting=True)
         hold = np.sort(pivots[: len(passive)]).astype(np.intp)
-    return Freedoms(found, at_rest, null, drive < DEPENDENT, tuple(passive), tuple(undriven), hold, drive)
+    return Freedoms(found, at_rest, null, drive < MOTIONS.dependent, tuple(passive), tuple(undriven), hold, drive)
 
 
 def motions_of(J: Array) -> Array:
@@ -150,8 +146,8 @@ def _complement(system: System, left: Array, passive: list[PassiveMotion]) -> li
     basis /= np.abs(basis).max(axis=1, keepdims=True)
     names = m.freedom_names()
     out = []
-    for rates in np.where(np.abs(basis) < ROUNDING, 0.0, basis):
-        moving = tuple(names[i] for i in np.flatnonzero(np.abs(rates) > STILL))
+    for rates in np.where(np.abs(basis) < MOTIONS.rounding, 0.0, basis):
+        moving = tuple(names[i] for i in np.flatnonzero(np.abs(rates) > MOTIONS.still))
         out.append(FreeMotion(rates, moving))
     return out
 
@@ -166,7 +162,7 @@ def drive_order(m: Mechanism, passive: Sequence[PassiveMotion]) -> list[int]:
     """Freedoms that take a drive in the order in which they are wanted: free of passive motions first, then at the frame."""
     idle = np.zeros(sum(p.type.f for p in m.pairs), dtype=bool)
     for p in passive:
-        idle |= np.abs(p.rates) > STILL
+        idle |= np.abs(p.rates) > MOTIONS.still
     at_frame = {n: m.frame in (p.a, p.b) for p in m.pairs for n in p.freedom_names}
     singles = single_freedoms(m)
     return [i for i, name in sorted(singles, key=lambda item: (idle[item[0]], not at_frame[item[1]], item[0]))]

@@ -21,12 +21,11 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.pair_type import TABLE, PairType
 from mechgraph.numerics.linear import singular_values
+from mechgraph.numerics.tolerances import STRESSES
 from mechgraph.structure.finite_motion import FiniteMotion
 from mechgraph.structure.mobility import Freedoms, free_motion
 from mechgraph.structure.uniqueness import PROBES, pair_states
 
-SIGNIFICANT = 1e-6
-"""Power of a unit twist on a unit self-stress above which the twist relieves it."""
 SHOWN = 6
 """Largest number of single changes, and of sets of changes, reported."""
 FREEING = 3
@@ -152,7 +151,9 @@ def _power(row: PairType, base: Array, stress: Array) -> Array:
 def _ranks(A: Array) -> Array:
     """Ranks of matrices ``(n, f, s)`` with an absolute tolerance (self-stresses and twists are of size one)."""
     return (
-        np.asarray((np.linalg.svd(A, compute_uv=False) > SIGNIFICANT).sum(axis=1)) if A.size else np.zeros(len(A), int)
+        np.asarray((np.linalg.svd(A, compute_uv=False) > STRESSES.relieved).sum(axis=1))
+        if A.size
+        else np.zeros(len(A), int)
     )
 
 
@@ -173,7 +174,7 @@ def best_turns(frames: Array, wrenches: Array) -> Array:
     angle = np.arctan2(U[:, 1, 0], U[:, 0, 0])
     angle -= np.pi * np.ceil(angle / np.pi - 0.5)
     angle = np.where(angle > 1e-9 - np.pi / 2, angle, np.pi / 2)
-    return np.where(s[:, 0] < SIGNIFICANT, 0.0, angle)
+    return np.where(s[:, 0] < STRESSES.relieved, 0.0, angle)
 
 
 def _relief(parts: tuple[Change, ...]) -> int:
@@ -182,7 +183,7 @@ def _relief(parts: tuple[Change, ...]) -> int:
 
 def rank_of_absolute(A: Array) -> int:
     """Rank with an absolute tolerance (self-stresses and twists are of size one)."""
-    return int((singular_values(A) > SIGNIFICANT).sum()) if A.size else 0
+    return int((singular_values(A) > STRESSES.relieved).sum()) if A.size else 0
 
 
 def relieving(changes: list[Change], redundancy: int) -> tuple[list[tuple[Change, ...]], list[tuple[Change, ...]]]:

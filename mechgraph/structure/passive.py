@@ -19,18 +19,11 @@ from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array, compose, pose_exp
 from mechgraph.closure.configuration import Configuration, Index, System
 from mechgraph.model import pair_kinematics as evaluation
+from mechgraph.numerics.tolerances import MOTIONS
 from mechgraph.topology.components import components_of_edges, cut_off, labels_of_bipartite, members
 from mechgraph.topology.linkgraph import LinkGraph
 
-STILL = 1e-8
-"""Part of a unit motion below which a freedom or link counts as standing still."""
-COMMON = 1e-9
-"""Relative singular value below which twists of a border count as common to its pairs."""
-IN_PLACE = 1e-5
-"""Rate at which a pair element may leave its place in a passive motion (differences of step ``STEP``)."""
 STEP = 1e-4
-TIED = 1e-7
-"""Relative singular value below which passive motions depend on each other."""
 LONGEST_SERIES = 40
 """Pairs of one series up to which any two are tried as a border; in longer ones neighbours only."""
 
@@ -61,7 +54,7 @@ class _Search:
         if not self.columns[one] or not self.columns[two]:
             return False
         s = np.linalg.svd(S, compute_uv=False)
-        return S.shape[1] > 6 or bool(s[-1] <= COMMON * s[0])
+        return S.shape[1] > 6 or bool(s[-1] <= MOTIONS.common * s[0])
 
 
 def passive_motions(here: Configuration, left: Array, driven: Index) -> list[PassiveMotion]:
@@ -79,7 +72,7 @@ def passive_motions(here: Configuration, left: Array, driven: Index) -> list[Pas
 
 def still_sets(system: System, rates: Array) -> list[list[int]]:
     """Links that no motion ``rates (F, p)`` moves against each other, joined through pairs that stand still in all of them."""
-    moves = np.concatenate([np.abs(rates).max(axis=1, initial=0.0) >= STILL, [False]])
+    moves = np.concatenate([np.abs(rates).max(axis=1, initial=0.0) >= MOTIONS.still, [False]])
     first = system.first_column
     moving = np.add.reduceat(moves, first[:-1]) * (np.diff(first) > 0) > 0
     ends = [e for e, moved in zip(system.graph.ends, moving.tolist(), strict=True) if not moved]
@@ -141,7 +134,7 @@ def _of_border(search: _Search, links: tuple[int, ...], border: tuple[int, ...])
         rows[6 * i : 6 * i + 6, : len(columns[0])] = first
         rows[6 * i : 6 * i + 6, at : at + len(part)] = -side * here.S[:, part, 0]
         at += len(part)
-    common = null_space(rows, COMMON)
+    common = null_space(rows, MOTIONS.common)
     if not common.shape[1]:
         return []
     moves = np.zeros((system.n_freedoms, common.shape[1]))
@@ -149,7 +142,7 @@ def _of_border(search: _Search, links: tuple[int, ...], border: tuple[int, ...])
     twists = first @ common[: len(columns[0])]
     leaving = np.concatenate([_leaving(search, k, links, moves, twists) for k in border])
     out = []
-    for mix in small_combinations(leaving, IN_PLACE).T:
+    for mix in small_combinations(leaving, MOTIONS.in_place).T:
         rates, twist = moves @ mix, twists @ mix
         scale = np.abs(rates).max()
         scale *= np.sign(rates[np.argmax(np.abs(rates) > (1 - 1e-9) * scale)])
@@ -193,8 +186,8 @@ def _leaving(search: _Search, k: int, links: tuple[int, ...], moves: Array, twis
 def _independent(motion: PassiveMotion, found: list[PassiveMotion]) -> bool:
     """Whether a motion is no combination of those found to which shared freedoms tie it."""
     rates = np.stack([*(p.rates for p in found), motion.rates])
-    moving = scipy.sparse.csr_array(np.abs(rates) > STILL)
+    moving = scipy.sparse.csr_array(np.abs(rates) > MOTIONS.still)
     group = labels_of_bipartite(moving)
     near = rates[group == group[-1]]
     s = np.linalg.svd(near, compute_uv=False)
-    return len(near) == 1 or bool(s[-1] > TIED * s[0])
+    return len(near) == 1 or bool(s[-1] > MOTIONS.tied * s[0])

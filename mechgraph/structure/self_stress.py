@@ -15,11 +15,10 @@ import scipy
 from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Index
+from mechgraph.numerics.tolerances import STRESSES
 from mechgraph.structure.components import Label
 from mechgraph.topology.components import labels_of_bipartite
 
-SHOWN = 1e-6
-"""Part of a self-stress (largest part 1) below which a component is not shown."""
 COMBINED = 300
 """Components of one group up to which combinations across pairs are worked out."""
 
@@ -60,7 +59,7 @@ class Basis:
         parts = [
             (labels[c], float(v))
             for c, v in zip(self.states.indices[at].tolist(), self.states.data[at], strict=True)
-            if abs(v) > SHOWN
+            if abs(v) > STRESSES.shown
         ]
         return SelfStress(
             {f"{pair}:{name}": v for (pair, name), v in parts if not name.startswith("effort")},
@@ -88,7 +87,7 @@ def basis_of(count: int, parts: list[tuple[Index, Index, Array]], connected: lis
         at += n * s
     row, column, value = np.concatenate(rows), np.concatenate(columns), np.concatenate(data)
     states = scipy.sparse.csc_array((value, (row, column)), shape=(count, at))
-    shown = np.abs(value) > SHOWN
+    shown = np.abs(value) > STRESSES.shown
     ties = np.repeat(np.arange(len(connected)), [len(p) for p in connected])
     touch = scipy.sparse.coo_array(
         (
@@ -112,13 +111,15 @@ def combinations(basis: Basis, labels: list[Label], known: set[int]) -> tuple[tu
     starts = np.searchsorted(basis.group, np.arange(basis.groups + 1))
     for group in range(basis.groups):
         mine = basis.states[:, starts[group] : starts[group + 1]]
-        touched = [int(i) for i in np.unique(mine.indices[np.abs(mine.data) > SHOWN]) if int(i) not in known]
+        touched = [int(i) for i in np.unique(mine.indices[np.abs(mine.data) > STRESSES.shown]) if int(i) not in known]
         if len(touched) > COMBINED or group in basis.partly:
             unsought += 1
             continue
         rows = mine.tocsr()[touched].toarray()
         for column in canonical(null_space(rows.T, 1e-9)[None])[0].T:
-            terms = {":".join(labels[i]): float(v) for i, v in zip(touched, column, strict=True) if abs(v) > SHOWN}
+            terms = {
+                ":".join(labels[i]): float(v) for i, v in zip(touched, column, strict=True) if abs(v) > STRESSES.shown
+            }
             out.append((group, SelfStress(terms, {}).text))
     return tuple(out), unsought
 
@@ -132,7 +133,7 @@ def canonical(columns: Array) -> Array:
     if not columns.size:
         return columns
     forward, backward = _echelon(columns), _echelon(columns[:, ::-1])[:, ::-1]
-    terms = [(np.abs(A) > SHOWN).sum(axis=(1, 2)) for A in (forward, backward)]
+    terms = [(np.abs(A) > STRESSES.shown).sum(axis=(1, 2)) for A in (forward, backward)]
     best = np.where((terms[0] <= terms[1])[:, None, None], forward, backward)
     best = best / np.maximum(np.abs(best).max(axis=1, keepdims=True), 1e-300)
     first = np.argmax(np.abs(best) > 1 - 1e-9, axis=1)
@@ -148,13 +149,13 @@ def _echelon(columns: Array) -> Array:
     rows = np.arange(A.shape[1])
     for done in range(s):
         size = np.abs(A[:, :, done:]).max(axis=2)
-        i = np.argmax(size >= SHOWN, axis=1)
+        i = np.argmax(size >= STRESSES.shown, axis=1)
         A[:, :, done:] = np.where((rows[None] < i[:, None])[:, :, None], 0.0, A[:, :, done:])
         j = done + np.argmax(np.abs(A[each, i, done:]), axis=1)
         pivot = A[each, :, j]
         A[each, :, j] = A[:, :, done]
         height = pivot[each, i]
-        pivot = pivot / np.where(np.abs(height) < SHOWN, 1.0, height)[:, None]
+        pivot = pivot / np.where(np.abs(height) < STRESSES.shown, 1.0, height)[:, None]
         A[:, :, done] = 0.0
         A -= pivot[:, :, None] * A[each, i][:, None, :]
         A[:, :, done] = pivot
