@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mechgraph.model.pair import second_direction
+from mechgraph.numerics.tolerances import RANKS
 
 if TYPE_CHECKING:
     from mechgraph.closure.configuration import Index
@@ -90,9 +91,9 @@ def _here(r: DeterminacyReport) -> str:
         return _driven_structure(r)
     if r.reactions is None or r.reactions.is_unique.all():
         more = plural(len(r.passive), "unknown")
-        idle = f" ({plural(len(r.passive), 'passive freedom')} held: {more} more)" if r.passive else ""
+        held = f" ({plural(len(r.passive), 'passive freedom')} held: {more} more)" if r.passive else ""
         state = "Determinate" if r.mobility else "Determinate structure"
-        return f"{state}: {_counts(r)}; every reaction is unique{idle}."
+        return f"{state}: {_counts(r)}; every reaction is unique{held}."
     return f"{_state(r)}, {_tied(r)}{_efforts(r)}."
 
 
@@ -121,7 +122,7 @@ def _state(r: DeterminacyReport) -> str:
 
 
 def _tied(r: DeterminacyReport) -> str:
-    """Which components are not unique, and how they hang together."""
+    """Which components are not unique, and in how many groups of self-stresses."""
     found = r.reactions
     if found is None:
         return ""
@@ -263,7 +264,7 @@ def _margin(r: DeterminacyReport) -> list[str]:
         ]
     if not r.near:
         return []
-    gap = f", largest taken for zero {r.dropped:.1g}" if r.dropped else ""
+    gap = f", largest taken for zero {r.dropped:.1g}" if (r.dropped or 0.0) > RANKS.doubt else ""
     return [
         f"Near another verdict: smallest singular value kept {r.margin:.2g} of the largest{gap}. A small change of dimensions or "
         "position may change mobility and uniqueness; forces may be large."

@@ -108,7 +108,7 @@ def free_motion(system: System, x: Array, columns: Index, engine: EngineName = "
     left = _left_free(found, at_rest, columns)
     passive = passive_motions(here, left, columns)
     if not len(columns) and passive and len(passive) == null.shape[1]:
-        # nothing else can move: what could be driven is an input, not an idle freedom
+        # nothing else can move: what could be driven is an input, not a passive freedom
         drivable = [c for c, _ in single_freedoms(system.m)]
         passive = [p for p in passive if not (np.abs(p.rates[drivable]) > MOTIONS.still).any()]
     undriven = _complement(system, left, passive)
@@ -160,9 +160,9 @@ def single_freedoms(m: Mechanism) -> list[tuple[int, str]]:
 
 def drive_order(m: Mechanism, passive: Sequence[PassiveMotion]) -> list[int]:
     """Freedoms that take a drive in the order in which they are wanted: free of passive motions first, then at the frame."""
-    idle = np.zeros(sum(p.type.f for p in m.pairs), dtype=bool)
+    in_passive = np.zeros(sum(p.type.f for p in m.pairs), dtype=bool)
     for p in passive:
-        idle |= np.abs(p.rates) > MOTIONS.still
+        in_passive |= np.abs(p.rates) > MOTIONS.still
     at_frame = {n: m.frame in (p.a, p.b) for p in m.pairs for n in p.freedom_names}
     singles = single_freedoms(m)
-    return [i for i, name in sorted(singles, key=lambda item: (idle[item[0]], not at_frame[item[1]], item[0]))]
+    return [i for i, name in sorted(singles, key=lambda item: (in_passive[item[0]], not at_frame[item[1]], item[0]))]

@@ -33,6 +33,7 @@ FREEING = 3
 SETS = 48
 """Redundancy up to which sets of changes that remove all of it are sought; the work grows as its cube."""
 SEED = 29
+
 BEAM = 12
 """Partial sets of changes kept while searching."""
 

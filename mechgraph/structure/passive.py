@@ -24,6 +24,7 @@ from mechgraph.topology.components import components_of_edges, cut_off, labels_o
 from mechgraph.topology.linkgraph import LinkGraph
 
 STEP = 1e-4
+"""Step of the central differences that tell whether a pair element leaves its place."""
 LONGEST_SERIES = 40
 """Pairs of one series up to which any two are tried as a border; in longer ones neighbours only."""
 
