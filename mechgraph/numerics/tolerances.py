@@ -47,8 +47,10 @@ class MotionTolerances:
     """Rate at which a pair element may leave its place in a passive motion; central differences of step 1e-4 are good to 1e-8."""
     tied: float = 1e-7
     """Singular value against the largest below which passive motions depend on each other."""
-    proportional: float = 1e-9
-    """Difference from a cosine of one up to which two freedoms move in proportion."""
+    proportional: float = 3e-5
+    """Sine of the angle between the parts of two freedoms in the motions up to which they move in proportion."""
+    error: float = 1e-9
+    """Error of such a part that has to be expected near a singular position: near a dead point parts are small."""
 
 
 @dataclass(frozen=True)

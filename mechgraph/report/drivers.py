@@ -75,11 +75,13 @@ def proportional(m: Mechanism, inputs: Array, able: tuple[Finding, ...]) -> tupl
     if not names or inputs.shape[1] > MOST_INPUTS:
         return ()
     rows = inputs[[column[n] for n in names]]
-    rows = rows / np.linalg.norm(rows, axis=1, keepdims=True)
+    size = np.linalg.norm(rows, axis=1)
+    rows = rows / size[:, None]
     first: list[int] = []
     groups: list[list[str]] = []
     for i, name in enumerate(names):
-        alike = np.flatnonzero(np.abs(np.abs(rows[first] @ rows[i]) - 1) < MOTIONS.proportional)
+        sine = np.sqrt(np.maximum(1.0 - (rows[first] @ rows[i]) ** 2, 0.0))
+        alike = np.flatnonzero(sine < MOTIONS.proportional + MOTIONS.error / np.minimum(size[first], size[i]))
         if alike.size:
             groups[int(alike[0])].append(name)
         else:
