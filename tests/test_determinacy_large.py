@@ -10,7 +10,7 @@ import mechanisms as known
 import numpy as np
 import pytest
 import scipy
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from lattices import LATTICES
 from strategies import closed_mechanism, with_drives
@@ -195,6 +195,7 @@ def test_lattice_reports_do_not_depend_on_the_engine(kind: str, links: int) -> N
 
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10**6))
+@example(64911)  # near a dead point
 def test_random_reports_do_not_depend_on_the_engine(seed: int) -> None:
     m = closed_mechanism(seed)
     assert_same_report(with_drives(m, seed) or m)
@@ -255,3 +256,8 @@ def test_all_self_stresses_are_listed(name: str, engine: Any) -> None:
     Q, _ = np.linalg.qr(listed)
     assert np.abs(found.table - Q @ (Q.T @ found.table)).max(initial=0.0) < 1e-6
     assert [s.text for s in found.first_states(5)] == [s.text for s in found.states[:5]]
+
+
+def test_an_unknown_engine_is_refused() -> None:
+    with pytest.raises(mg.DeclarationError, match="expected one of auto, dense, sparse"):
+        mg.check(mg.load("four-bar"), engine="fast")  # type: ignore[arg-type]

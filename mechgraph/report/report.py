@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from mechgraph.closure.configuration import Index, System
 from mechgraph.closure.rank import EngineName
 from mechgraph.document import Document, to_html, to_markdown, to_text
 from mechgraph.equations.terms import Ledger
-from mechgraph.errors import AssemblyError
+from mechgraph.errors import AssemblyError, DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.linear import independent_rows
 from mechgraph.numerics.tolerances import RANKS
@@ -342,6 +342,8 @@ def check(m: Mechanism, at: Mapping[str, float] | None = None, *, engine: Engine
     AssemblyError
         where ``at`` is given and cannot be reached. Without it, loops that cannot be closed are said in ``note``.
     """
+    if engine not in get_args(EngineName):
+        raise DeclarationError("check", [f"engine = {engine!r}: expected one of {', '.join(get_args(EngineName))}"])
     graph = m.once(link_graph)
     if not m.has_geometry:
         return DeterminacyReport(m, graph, "Topology only: no geometry is declared.", asked=engine)
