@@ -301,13 +301,6 @@ def check(
         list[str] | None,
         typer.Option("--at", metavar="FREEDOM=VALUE", help="Assemble there first: A=30deg, B.Tz=0.02 (repeat)."),
     ] = None,
-    thorough: Annotated[
-        bool | None,
-        typer.Option(
-            "--thorough/--quick",
-            help="Follow the motions over finite strokes and seek pair changes; without either, up to 15 loops.",
-        ),
-    ] = None,
 ) -> None:
     """Print the determinacy report: counts, mobility, redundancy, which reactions are unique, and the verdict.
 
@@ -324,7 +317,7 @@ def check(
             name, value = _named_value(text, "--at")
             values[name] = _values([value], _turns(m, name, f"--at {text!r}"), f"--at {text!r}")[0]
         with _working("checking"):
-            report = mg.check(m, at=values or None, thorough=thorough)
+            report = mg.check(m, at=values or None)
             text = report.to_json() if json else report.to_markdown() if markdown else ""
             document = report.document()
         not_closed = m.has_geometry and report.mobility is None

@@ -390,13 +390,3 @@ def test_interrupted(tmp_path: Path) -> None:
     assert running.returncode == 130
     assert "Traceback" not in error
     assert not list(tmp_path.iterdir())
-
-
-def test_check_quick_and_thorough() -> None:
-    """The same facts; motions and pair changes only where they are asked for."""
-    quick, full = run("check", "four-bar", "--quick"), run("check", "four-bar", "--thorough")
-    assert quick.exit_code == full.exit_code == 0
-    assert "Pair changes were not sought" in quick.stdout
-    assert "Motion checked" in full.stdout
-    assert "Motion checked" not in quick.stdout
-    assert full.stdout == run("check", "four-bar").stdout

@@ -16,18 +16,16 @@ Methods for Bifurcations of Dynamical Equilibria, 2000, chapter 3 (bordered syst
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
-
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from mechgraph.algebra.se3 import Array, cross
+from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
+from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
 from mechgraph.numerics.sparse import Pattern, SparseFactor
-from mechgraph.topology.linkgraph import LinkGraph
+from mechgraph.numerics.tolerances import RANKS
 
 Mask = NDArray[np.bool_]
 
@@ -37,62 +35,10 @@ WORSE = 1e-2
 """Part of the smallest pivot at the position of choice below which a bordering is chosen anew."""
 RETRY = 1e-3
 """Smallest pivot below which another bordering is tried."""
-LOCAL_RANK = 1e-9
-"""Singular value of a loop's own rows (columns of unit length) below which a row of that loop is redundant."""
 SEED = 17
 
 
-@dataclass(frozen=True)
-class Entries:
-    """The nonzero 6-vectors of the closure Jacobian: loop, column and sign of each, loop by loop."""
-
-    loop: Index
-    column: Index
-    sign: Array
-    first: Index
-
-
-def entries_of(graph: LinkGraph, first_column: Index) -> Entries:
-    """All (loop, column) places of the closure Jacobian of a graph whose pairs have their freedoms from ``first_column`` on."""
-    loop, pair, sign = graph.loop_steps
-    width = np.diff(first_column)[pair]
-    step = np.repeat(np.arange(len(loop)), width)
-    within = np.arange(len(step)) - np.repeat(np.cumsum(width) - width, width)
-    first = np.searchsorted(loop[step], np.arange(len(graph.loops) + 1))
-    return Entries(loop[step], first_column[pair[step]] + within, sign[step], first.astype(np.intp))
-
-
-@dataclass(frozen=True)
-class Measure:
-    """Middle ``(3, loops)`` and length ``(loops,)`` of every loop: rows of twists are taken about the one, over the other."""
-
-    middle: Array
-    length: Array
-
-    def rows(self, twists: Array, loop: Index) -> Array:
-        """Twists ``(6, n)`` about the internal origin in the measure of their loops."""
-        moment = cross(twists[:3], self.middle[:, loop])
-        return np.concatenate([twists[:3], (twists[3:] + moment) / self.length[loop]])
-
-    def wrenches(self, y: Array) -> Array:
-        """Loop wrenches ``(6, loops, k)`` about the internal origin from multipliers of those rows; the transpose."""
-        force = y[3:] / self.length[:, None]
-        return np.concatenate([y[:3] + cross(self.middle[:, :, None], force), force])
-
-
-def measure_of(graph: LinkGraph, pair_points: Array) -> Measure:
-    """Middle and size of the pair points ``(3, P)`` of every loop."""
-    loop, pair, _ = graph.loop_steps
-    n = len(graph.loops)
-    points = pair_points[:, pair]
-    count = np.maximum(np.bincount(loop, minlength=n), 1)
-    middle = np.stack([np.bincount(loop, row, minlength=n) for row in points]) / count
-    off = points - middle[:, loop]
-    length = np.sqrt(np.bincount(loop, (off * off).sum(axis=0), minlength=n) / count)
-    return Measure(middle, np.where(length > 0, length, 1.0))
-
-
-class LoopSystem:
+class LoopSystem(ReducedRows):
     """The bordered system chosen at one position, columns ``fixed`` left out; serves positions near by.
 
     ``regular`` whether its pivots prove the rank there; ``rank`` of J without the fixed columns; ``smallest`` pivot; ``redundant``
@@ -101,15 +47,9 @@ class LoopSystem:
     ``shared_in`` a loop of each.
     """
 
-    def __init__(self, graph: LinkGraph, first_column: Index, S: Array, points: Array, fixed: Index) -> None:
-        self.entries, self.measure, self.fixed = entries_of(graph, first_column), measure_of(graph, points), fixed
-        self._free = np.ones(S.shape[1], dtype=bool)
-        self._free[fixed] = False
-        blocks = self._blocks(S)
-        largest = np.zeros(S.shape[1])
-        np.maximum.at(largest, self.entries.column, np.abs(blocks).max(axis=0, initial=0.0))
-        self._scale = np.where(largest > 0, 1.0 / np.where(largest > 0, largest, 1.0), 1.0)
-        self._reduce(blocks * self._scale[self.entries.column])
+    def __init__(self, rows: ClosureRows, fixed: Index) -> None:
+        super().__init__(rows, fixed)
+        S = rows.S
         self._match()
         self.pattern, self._constant = self._border(beside=False)
         self.first = self.factor(S)
@@ -127,41 +67,9 @@ class LoopSystem:
     @classmethod
     def at(cls, here: Configuration, fixed: Index) -> LoopSystem:
         """The system chosen at the first position of a configuration."""
-        s = here.system
-        return cls(s.graph, s.first_column, here.S[:, :, 0], here.pair_points[:, :, 0], fixed)
+        return cls(ClosureRows.at(here), fixed)
 
     # --- the choice ------------------------------------------------------------------------------------------------------
-
-    def _blocks(self, S: Array) -> Array:
-        """Entries ``(6, entries)`` in the measure of their loops, zero in the fixed columns."""
-        e = self.entries
-        return self.measure.rows(S[:, e.column], e.loop) * (e.sign * self._free[e.column])
-
-    def _by_width(self) -> list[tuple[Index, Index]]:
-        """Loops with the same number of entries: their indices ``(n,)`` and entries ``(n, c)``."""
-        width = np.diff(self.entries.first)
-        out = []
-        for c in np.unique(width):
-            loops = np.flatnonzero(width == c)
-            out.append((loops, self.entries.first[loops][:, None] + np.arange(c)))
-        return out
-
-    def _reduce(self, blocks: Array) -> None:
-        """Turn the rows of every loop so that the redundant ones come last; find the motions of single loops."""
-        n = len(self.entries.first) - 1
-        self._turn, self.kept, self.dropped = np.empty((n, 6, 6)), np.zeros(n, dtype=np.intp), 0.0
-        shared = np.bincount(self.entries.column, minlength=len(self._free)) > 1
-        own = self._free & ~shared
-        rows: list[tuple[Array, Index]] = []
-        for loops, at in self._by_width():
-            block = np.moveaxis(blocks[:, at], 0, 1)
-            U, s, _ = np.linalg.svd(block, full_matrices=block.shape[2] < 6)
-            self._turn[loops] = np.swapaxes(U, 1, 2)
-            s = s / np.maximum(s.max(axis=1, initial=0.0), 1.0)[:, None]
-            self.kept[loops] = (s > LOCAL_RANK).sum(axis=1)
-            self.dropped = max(self.dropped, float(s[s <= LOCAL_RANK].max(initial=0.0)))
-            rows += self._own_motions(block, own[self.entries.column[at]], self.entries.column[at])
-        self._own_rows = rows
 
     @staticmethod
     def _own_motions(block: Array, own: Mask, columns: Index) -> list[tuple[Array, Index]]:
@@ -173,7 +81,7 @@ class LoopSystem:
         others = np.eye(c) * ~own[some][:, None]  # columns of other loops, and fixed ones, are at rest
         rows = np.concatenate([block[some] * own[some][:, None], others], axis=1)
         s = np.linalg.svd(rows, compute_uv=False)
-        free = (s <= LOCAL_RANK * np.maximum(s.max(axis=1), 1.0)[:, None]).sum(axis=1)
+        free = (s <= RANKS.loop * np.maximum(s.max(axis=1), 1.0)[:, None]).sum(axis=1)
         mine = np.flatnonzero(free)
         Vt = np.linalg.svd(rows[mine], full_matrices=False)[2]
         out = []
@@ -182,6 +90,16 @@ class LoopSystem:
             null = Vt[with_it, c - 1 - extra] * own[some[mine[with_it]]]
             out.append((null, columns[some[mine[with_it]]]))
         return out
+
+    def _motions_of_single_loops(self) -> list[tuple[Array, Index]]:
+        blocks = self._blocks(self.rows.S) * self._scale[self.entries.column]
+        shared = np.bincount(self.entries.column, minlength=len(self._free)) > 1
+        own = self._free & ~shared
+        rows: list[tuple[Array, Index]] = []
+        for _, at in self._by_width():
+            block = np.moveaxis(blocks[:, at], 0, 1)
+            rows += self._own_motions(block, own[self.entries.column[at]], self.entries.column[at])
+        return rows
 
     def _match(self) -> None:
         """Match kept rows and the rows of single-loop motions to the free columns; what stays over."""
@@ -192,7 +110,7 @@ class LoopSystem:
         rows = [(starts[e.loop][None] + np.arange(6)[:, None])[self._live]]
         cols, data = [np.broadcast_to(place[e.column], (6, len(e.loop)))[self._live]], []
         self._motions = 0
-        for null, columns in self._own_rows:
+        for null, columns in self._motions_of_single_loops():
             keep = np.abs(null) > 0
             number = self._m + self._motions + np.repeat(np.arange(len(null))[:, None], null.shape[1], axis=1)
             rows.append(number[keep])
@@ -203,7 +121,7 @@ class LoopSystem:
         shape = (self._m + self._motions, self._n)
         self._touch = scipy.sparse.csr_array((np.ones(len(self._inner[0])), self._inner[:2]), shape=shape)
         match = scipy.sparse.csgraph.maximum_bipartite_matching(self._touch, perm_type="column")
-        self._left_rows = np.flatnonzero(match < 0)
+        self._left_rows = np.flatnonzero(match < 0).astype(np.intp)
         self._left_cols = np.setdiff1d(np.arange(self._n), match[match >= 0])
         self._matched = int((match >= 0).sum())
         self.shared, self.held = len(self._left_rows), self._motions + len(self._left_cols)
@@ -238,25 +156,11 @@ class LoopSystem:
         )
         return pattern, constant
 
-    @cached_property
-    def _live(self) -> Mask:
-        """Which of the turned entries ``(6, entries)`` stand in the system: kept rows, free columns."""
-        e = self.entries
-        return (np.arange(6)[:, None] < self.kept[e.loop][None]) & self._free[e.column][None]
-
     # --- solving ---------------------------------------------------------------------------------------------------------
 
     def factor(self, S: Array) -> SparseFactor:
         """The system factored for the twists ``S (6, F)`` of one position."""
         return self.pattern.factor(np.concatenate([self._turned_blocks(S)[self._live], self._constant]))
-
-    def _turned_blocks(self, S: Array) -> Array:
-        """Entries ``(6, entries)`` in the turned rows of their loops and columns of unit size."""
-        blocks = self._blocks(S) * self._scale[self.entries.column]
-        turned = np.empty_like(blocks)
-        for loops, at in self._by_width():
-            turned[:, at] = np.moveaxis(self._turn[loops] @ np.moveaxis(blocks[:, at], 0, 1), 0, 1)
-        return turned
 
     def turned_matrix(self, S: Array) -> scipy.sparse.csr_array:
         """``J (6 loops, free columns)`` in turned rows and columns of unit size."""
@@ -273,24 +177,10 @@ class LoopSystem:
         """A length in the middle of those of the loops."""
         return float(np.median(self.measure.length)) if len(self.kept) else 1.0
 
-    def unit_wrenches(self) -> Array:
-        """Loop wrenches ``(6, 6, loops)`` of unit multipliers of the turned rows, one column a row."""
-        return self.measure.wrenches(self._turn.transpose(2, 0, 1)).transpose(0, 2, 1)
-
     def wrenches_of_rows(self, y: Array) -> Array:
         """Loop wrenches ``(6 loops,)`` from multipliers ``(6 loops, 1)`` of the turned rows."""
         rows = np.swapaxes(self._turn, 1, 2) @ y.reshape(len(self.kept), 6, 1)
         return np.moveaxis(self.measure.wrenches(np.moveaxis(rows, 1, 0)), 0, 1).reshape(-1)
-
-    def _turned(self, b: Array) -> Array:
-        """Right sides ``(6 loops, k)`` about the internal origin as turned rows ``(loops, 6, k)``."""
-        loops = len(self.kept)
-        rows = b.reshape(loops, 6, -1)
-        local = np.empty_like(rows)
-        local[:, :3] = rows[:, :3]
-        moment = cross(np.moveaxis(rows[:, :3], 1, 0), self.measure.middle[:, :, None])
-        local[:, 3:] = (rows[:, 3:] + np.moveaxis(moment, 0, 1)) / self.measure.length[:, None, None]
-        return np.asarray(self._turn @ local)
 
     def solve(self, factor: SparseFactor, b: Array) -> Array:
         """``q (F, k)`` with ``J q = b (6 loops, k)`` in the kept rows, zero in fixed columns."""
@@ -310,12 +200,12 @@ class LoopSystem:
         kept = factor.solve(rhs, transposed=True)[: self._m]
         return self._wrenches(kept, np.zeros((6 * len(self.kept) - self._m, tau.shape[1])))
 
-    def _wrenches(self, kept: Array, dropped: Array) -> Array:
-        full = np.empty((len(self.kept), 6, kept.shape[1]))
-        mask = np.arange(6) < self.kept[:, None]
-        full[mask], full[~mask] = kept, dropped
-        rows = np.swapaxes(self._turn, 1, 2) @ full
-        return self.measure.wrenches(np.moveaxis(rows, 1, 0))
+    def connecting_stress(self, factor: SparseFactor, shares: Array) -> Array:
+        """Multipliers ``(kept rows, k)`` of self-stresses that connect loops, for shares ``(shared, k)``."""
+        rhs = np.zeros((self._size, shares.shape[1]))
+        if self.shared:
+            rhs[self._n :] = shares
+        return factor.solve(rhs, transposed=True)[: self._m]
 
     def random_stress(self, factor: SparseFactor, S: Array, rng: np.random.Generator, count: int) -> Array:
         """Random self-stresses ``(6, loops, count)`` for twists ``S (6, F)``, of size one in the measure of their loops.
@@ -337,13 +227,6 @@ class LoopSystem:
         kept = factor.solve(rhs, transposed=True)[: self._m]
         size = np.maximum(np.abs(kept).max(axis=0, initial=0.0), 1.0)
         return self._wrenches(kept / size, local[dropped] / size)
-
-    def local_stress(self) -> tuple[Index, Array]:
-        """Loops with self-stresses of their own, and these as loop wrenches ``(6, 6, n)``, those of rows that were kept left out."""
-        some = np.flatnonzero(self.kept < 6)
-        unit = self.unit_wrenches()[:, :, some]
-        order = (np.arange(6)[:, None] + self.kept[some]) % 6
-        return some, np.take_along_axis(unit, order[None], axis=1)
 
     def motions(self, factor: SparseFactor) -> Array:
         """Motions ``(F, held)`` with the fixed columns at rest, one a held motion."""

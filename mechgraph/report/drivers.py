@@ -7,13 +7,12 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.linear import independent_rows
+from mechgraph.numerics.tolerances import MOTIONS
 from mechgraph.report.findings import Finding, moves_nearby
 from mechgraph.structure.mobility import Freedoms, drive_order, single_freedoms
-from mechgraph.structure.passive import STILL
 
 SHOWN = 8
 """Freedoms named for one motion."""
-PROPORTIONAL = 1e-9
 MOST_INPUTS = 200
 """Input freedoms above which freedoms that move in proportion are not looked for."""
 
@@ -32,7 +31,7 @@ def left_free(m: Mechanism, freedoms: Freedoms) -> tuple[Finding, ...]:
 
 def drivable(m: Mechanism, inputs: Array) -> tuple[Finding, ...]:
     """Freedoms that can serve as a driver here: single freedoms that move in other than passive motions ``inputs (F, M)``."""
-    moves = np.abs(inputs).max(axis=1, initial=0.0) > STILL
+    moves = np.abs(inputs).max(axis=1, initial=0.0) > MOTIONS.still
     return tuple(Finding(f"{n} can drive", (n,)) for i, n in single_freedoms(m) if moves[i])
 
 
@@ -41,7 +40,7 @@ def not_drivable(
 ) -> tuple[Finding, ...]:
     """Single freedoms that cannot drive here, with the reason: a dead point, locked, or moving only passively."""
     good = {name for finding in able for name in finding.freedoms}
-    still = np.abs(freedoms.null).max(axis=1, initial=0.0) < STILL
+    still = np.abs(freedoms.null).max(axis=1, initial=0.0) < MOTIONS.still
     nearby = moves_nearby(null_nearby, len(still))
     out = []
     for i, name in single_freedoms(m):
@@ -76,11 +75,13 @@ def proportional(m: Mechanism, inputs: Array, able: tuple[Finding, ...]) -> tupl
     if not names or inputs.shape[1] > MOST_INPUTS:
         return ()
     rows = inputs[[column[n] for n in names]]
-    rows = rows / np.linalg.norm(rows, axis=1, keepdims=True)
+    size = np.linalg.norm(rows, axis=1)
+    rows = rows / size[:, None]
     first: list[int] = []
     groups: list[list[str]] = []
     for i, name in enumerate(names):
-        alike = np.flatnonzero(np.abs(np.abs(rows[first] @ rows[i]) - 1) < PROPORTIONAL)
+        sine = np.sqrt(np.maximum(1.0 - (rows[first] @ rows[i]) ** 2, 0.0))
+        alike = np.flatnonzero(sine < MOTIONS.proportional + MOTIONS.error / np.minimum(size[first], size[i]))
         if alike.size:
             groups[int(alike[0])].append(name)
         else:

@@ -13,15 +13,12 @@ if TYPE_CHECKING:
     from mechgraph.report.report import DeterminacyReport
 
 FINDINGS = ("undriven", "passive", "locked", "drivable", "not_drivable", "advice")
-COUNTED = 300
-"""Pairs above which a ledger is counted from the pair table instead of read off a formulation."""
 
 
 def ledger(m: Mechanism, bookkeeping: str) -> Ledger:
-    """The ledger of a mechanism: read off its formulation; for many pairs the same counts without building the equations."""
-    if len(m.pairs) <= COUNTED or bookkeeping not in ("lee", "minimal"):
-        return formulate(m, bookkeeping).ledger()
-    return counted_ledger(m, bookkeeping)
+    """The ledger of a mechanism: counted from the pair table where that is all there is, else read off its formulation."""
+    countable = bookkeeping in ("lee", "minimal") and not getattr(m, "couplings", ())
+    return counted_ledger(m, bookkeeping) if countable else formulate(m, bookkeeping).ledger()
 
 
 def counted_ledger(m: Mechanism, bookkeeping: str) -> Ledger:
@@ -48,7 +45,7 @@ def _of_graph(r: DeterminacyReport) -> dict[str, Any]:
         "verdict": r.verdict,
         "note": r.note,
         "determinate": r.determinate,
-        "thorough": r.thorough,
+        "engine": r.engine,
         "links": list(r.links),
         "pairs": list(r.pairs),
         "loops": [

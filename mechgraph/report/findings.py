@@ -11,11 +11,9 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.indexing import System
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.linear import rank_of, singular_values
+from mechgraph.numerics.tolerances import MOTIONS
 from mechgraph.structure.mobility import Freedoms
-from mechgraph.structure.passive import STILL, PassiveMotion
-
-MOVES = 1e-5
-"""Part of a unit motion above which a freedom that stands still here counts as moving near by."""
+from mechgraph.structure.passive import PassiveMotion
 
 
 @dataclass(frozen=True)
@@ -91,7 +89,7 @@ def passive_finding(system: System, motion: PassiveMotion) -> Finding:
     m = system.m
     names = m.link_names()
     links = tuple(names[i] for i in motion.links)
-    freedoms = tuple(n for n, r in zip(m.freedom_names(), motion.rates, strict=True) if abs(r) > STILL)
+    freedoms = tuple(n for n, r in zip(m.freedom_names(), motion.rates, strict=True) if abs(r) > MOTIONS.still)
     pairs = [p for p in m.pairs if any(n in freedoms for n in p.freedom_names)]
     axis = screw_axis(system, motion.twist)
     turning = bool(np.linalg.norm(motion.twist[:3]) > 1e-9)
@@ -110,7 +108,7 @@ def passive_finding(system: System, motion: PassiveMotion) -> Finding:
 def locked_findings(system: System, x: Array, freedoms: Freedoms, null_nearby: Array | None) -> tuple[Finding, ...]:
     """Freedoms that cannot move here, grouped by the reason; those that move in the motions ``null_nearby`` only rest here."""
     m = system.m
-    still = np.abs(freedoms.null).max(axis=1, initial=0.0) < STILL
+    still = np.abs(freedoms.null).max(axis=1, initial=0.0) < MOTIONS.still
     names = m.freedom_names()
     rests = still & moves_nearby(null_nearby, len(names))
     left = {names[i]: i for i in np.flatnonzero(still & ~rests)}
@@ -158,7 +156,7 @@ def moves_nearby(null_nearby: Array | None, count: int) -> NDArray[np.bool_]:
     """Which of ``count`` freedoms move in the motions ``(F, M)`` of a position near by; none where that is not known."""
     if null_nearby is None:
         return np.zeros(count, dtype=bool)
-    return np.asarray(np.abs(null_nearby).max(axis=1, initial=0.0) > MOVES)
+    return np.asarray(np.abs(null_nearby).max(axis=1, initial=0.0) > MOTIONS.nearby)
 
 
 def input_motions(freedoms: Freedoms, null: Array) -> Array:

@@ -6,34 +6,31 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import assembled, assembled_at, named_columns
 from mechgraph.closure.indexing import Index, System
+from mechgraph.closure.rank import EngineName
 from mechgraph.document import Document, to_html, to_markdown, to_text
 from mechgraph.equations.terms import Ledger
-from mechgraph.errors import AssemblyError
+from mechgraph.errors import AssemblyError, DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.linear import independent_rows
+from mechgraph.numerics.tolerances import RANKS
 from mechgraph.report import drivers, facts, sections
 from mechgraph.report import sentences as wording
 from mechgraph.report.findings import Finding, LoopFact, input_motions, locked_findings, loop_facts, passive_finding
 from mechgraph.structure.finite_motion import FiniteMotion, finite_motion
 from mechgraph.structure.generic import Generic, generic
-from mechgraph.structure.mobility import NEAR, Freedoms, free_motion
+from mechgraph.structure.mobility import Freedoms, free_motion
 from mechgraph.structure.pair_changes import Effect, advice
 from mechgraph.structure.self_stress import SelfStress
-from mechgraph.structure.uniqueness import Uniqueness, self_stresses, uniqueness
+from mechgraph.structure.uniqueness import Uniqueness, uniqueness
 from mechgraph.topology.linkgraph import LinkGraph, link_graph
 from mechgraph.topology.matching import Parts, parts_of
-
-DOUBT = 1e-11
-"""Largest dropped singular value above which it may be more than rounding, so that the verdict is called near."""
-AUTOMATIC = 90
-"""Rows of the closure Jacobian up to which motions are followed and advice is sought without being asked."""
 
 
 @dataclass(frozen=True)
@@ -51,14 +48,14 @@ class DeterminacyReport:
     """What the graph alone and the graph with its geometry say about a mechanism; prints as a report.
 
     Facts that need geometry are None (or empty) for a topology, and where the loops cannot be closed (see ``note``).
-    ``thorough``: whether motions are followed over finite strokes and pair changes are sought.
+    What is expensive is worked out when first asked for, at any size; ``engine`` says which one decided the rank.
     """
 
     mechanism: Mechanism
     graph: LinkGraph
     note: str = ""
     geometry: Geometry | None = field(default=None, repr=False)
-    thorough: bool = True
+    asked: EngineName = field(default="auto", repr=False)
 
     # --- the graph alone -----------------------------------------------------------------------------------------------
 
@@ -84,8 +81,18 @@ class DeterminacyReport:
 
     @property
     def mobility_by_count(self) -> int:
-        """Kutzbach mobility, sum of freedoms - 6 loops."""
-        return self.freedom_count - 6 * len(self.graph.loops)
+        """Kutzbach mobility: sum of freedoms - closure equations."""
+        return self.freedom_count - self.equation_count
+
+    @property
+    def equation_count(self) -> int:
+        """Number of closure equations: six a loop, one a coupling."""
+        return 6 * len(self.graph.loops) + len(getattr(self.mechanism, "couplings", ()))
+
+    @property
+    def engine(self) -> str:
+        """Which engine decided the rank here, ``"dense"`` or ``"sparse"``; empty where there is no geometry."""
+        return self.geometry.freedoms.closure.engine if self.geometry else ""
 
     def ledger(self, bookkeeping: str = "lee") -> Ledger:
         """Unknowns against equations in a bookkeeping, ``"lee"`` or ``"minimal"``."""
@@ -94,7 +101,7 @@ class DeterminacyReport:
     @cached_property
     def generic(self) -> Generic:
         """Rank and excess for random geometry: what the topology alone decides."""
-        return generic(self.mechanism, self.graph)
+        return generic(self.mechanism, self.graph, self.asked)
 
     @cached_property
     def parts(self) -> Parts:
@@ -118,12 +125,7 @@ class DeterminacyReport:
     def motion(self) -> FiniteMotion | None:
         """What following the motions over finite strokes showed."""
         g = self.geometry
-        if not g:
-            return None
-        if self.thorough:
-            return finite_motion(g.system, g.x)
-        regular = not self.redundancy  # full row rank: by the implicit function theorem all mobility is finite
-        return FiniteMotion(g.freedoms.mobility, g.freedoms.rank, 0.0, g.freedoms.null) if regular else None
+        return finite_motion(g.system, g.x, g.freedoms.closure, self.asked) if g else None
 
     @property
     def finite_mobility(self) -> int | None:
@@ -132,21 +134,15 @@ class DeterminacyReport:
 
     @property
     def redundancy(self) -> int | None:
-        """6 loops minus rank: number of self-stresses with the drivers free."""
-        return 6 * len(self.graph.loops) - self.geometry.freedoms.rank if self.geometry else None
+        """Closure equations minus rank: number of self-stresses with the drivers free."""
+        return self.geometry.freedoms.redundancy if self.geometry else None
 
     @property
     def excess(self) -> dict[str, int]:
-        """The redundancy by reason: ``structural`` (whatever the dimensions), ``dimensions`` (all along the motion), ``here``.
-
-        Where motions were not followed (``thorough`` is False), the last two are together in ``special``.
-        """
-        if not self.geometry or self.redundancy is None:
+        """The redundancy by reason: ``structural`` (whatever the dimensions), ``dimensions`` (all along the motion), ``here``."""
+        if not self.motion or self.redundancy is None:
             return {}
-        if not self.motion:
-            structural = min(self.generic.excess, self.redundancy)
-            return {"structural": structural, "special": self.redundancy - structural}
-        nearby = 6 * len(self.graph.loops) - self.motion.rank_nearby
+        nearby = self.equation_count - self.motion.rank_nearby
         structural = min(self.generic.excess, nearby)
         return {"structural": structural, "dimensions": nearby - structural, "here": self.redundancy - nearby}
 
@@ -165,12 +161,17 @@ class DeterminacyReport:
         """Whether the verdict is near to another one: a small singular value was kept, or one above rounding dropped."""
         if self.margin is None or self.dropped is None:
             return False
-        return self.margin < NEAR or self.dropped > DOUBT or self.dead_point
+        return self.margin < self.near_below or self.dropped > RANKS.doubt or self.dead_point
+
+    @property
+    def near_below(self) -> float:
+        """Margin below which a position is called nearly singular; of a regular chain of n loops it goes as 1 / (n + 1)."""
+        return 2.0 * RANKS.near / (1 + max(len(self.graph.loops), 1))
 
     @property
     def dead_point(self) -> bool:
         """Whether a driver is near a dead point: it hardly moves when the mechanism moves."""
-        return bool(self.geometry and self.geometry.freedoms.mobility and self.geometry.freedoms.drive < NEAR)
+        return bool(self.geometry and self.geometry.freedoms.mobility and self.geometry.freedoms.drive < RANKS.near)
 
     @property
     def contradicting_drives(self) -> bool:
@@ -181,7 +182,9 @@ class DeterminacyReport:
     def reactions(self) -> Uniqueness | None:
         """Verdict on every reaction component and effort, with the self-stresses."""
         g = self.geometry
-        return uniqueness(g.system.at(g.x[:, None]), g.driven) if g else None
+        if not g:
+            return None
+        return uniqueness(g.system.at(g.x[:, None]), g.driven, self.asked, g.freedoms.driven_closure)
 
     @property
     def unique(self) -> dict[str, dict[str, bool]]:
@@ -192,10 +195,9 @@ class DeterminacyReport:
     def self_stresses(self) -> tuple[SelfStress, ...]:
         """Reaction states without load, with the declared drivers: a canonical sparse basis.
 
-        In a large mechanism those of single loops, and of those across loops the first hundred.
+        Those that connect loops only where they are not more than ``structure.uniqueness.CONNECTING``.
         """
-        g = self.geometry
-        return self_stresses(g.system.at(g.x[:, None]), g.driven, self.reactions) if g and self.reactions else ()
+        return self.reactions.states if self.reactions else ()
 
     @cached_property
     def undriven(self) -> tuple[Finding, ...]:
@@ -251,15 +253,15 @@ class DeterminacyReport:
         asked = [int(c) for c in g.driven] + [place[n] for n in drivers.suggested(m, g.freedoms, self.drivable)]
         kept = set(independent_rows(g.freedoms.null, asked, len(asked)))
         names = tuple(n for n, i in place.items() if i in kept and i in asked[len(g.driven) :])
-        while names and self.thorough:
+        while names:
             # a driver may hold a motion that was passive, and so leave another free
             columns, _ = named_columns(m, g.system, dict.fromkeys([*(d.freedom for d in m.drives), *names], 0.0))
-            after = free_motion(g.system, g.x, columns)
+            after = free_motion(g.system, g.x, columns, self.asked)
             free = [f.rates for f in after.undriven]
             more = drivers.suggested(m, after, drivers.drivable(m, np.stack(free, axis=1))) if free else ()
             together = [*(d.freedom for d in m.drives), *names, *more]
             columns, _ = named_columns(m, g.system, dict.fromkeys(together, 0.0))
-            if not more or free_motion(g.system, g.x, columns).dependent:
+            if not more or free_motion(g.system, g.x, columns, self.asked).dependent:
                 break
             names = (*names, *more)
         return names
@@ -274,13 +276,13 @@ class DeterminacyReport:
         """Nothing left free that is neither driven nor passive, and every reaction and effort unique."""
         if not self.geometry or self.contradicting_drives:
             return False
-        return not self.geometry.freedoms.undriven and all(v for row in self.unique.values() for v in row.values())
+        return not self.geometry.freedoms.undriven and bool(self.reactions and self.reactions.is_unique.all())
 
     @cached_property
     def effects(self) -> tuple[Effect, ...]:
         """Pair changes with their computed effect: they remove redundancy, or free a structure."""
         g = self.geometry
-        return advice(g.system, g.x, g.freedoms) if g and self.thorough else ()
+        return advice(g.system, g.x, g.freedoms, self.motion, self.asked) if g and self.motion else ()
 
     @cached_property
     def advice(self) -> tuple[Finding, ...]:
@@ -327,28 +329,31 @@ class DeterminacyReport:
         return to_html(self.document())
 
 
-def check(m: Mechanism, at: Mapping[str, float] | None = None, *, thorough: bool | None = None) -> DeterminacyReport:
+def check(m: Mechanism, at: Mapping[str, float] | None = None, *, engine: EngineName = "auto") -> DeterminacyReport:
     """The determinacy report of a mechanism: of its graph, and where it has geometry of its closed position at ``start``.
 
     Parameters
     ----------
     at : values of freedoms at which to assemble first, e.g. ``{"A": 0.3}``.
-    thorough : whether to follow the motions over finite strokes and to seek pair changes; left out, up to 15 loops.
+    engine : which engine decides ranks, ``"dense"`` or ``"sparse"``; ``"auto"`` takes the faster one. The report is the same.
 
     Raises
     ------
     AssemblyError
         where ``at`` is given and cannot be reached. Without it, loops that cannot be closed are said in ``note``.
     """
+    if engine not in get_args(EngineName):
+        raise DeclarationError("check", [f"engine = {engine!r}: expected one of {', '.join(get_args(EngineName))}"])
     graph = m.once(link_graph)
-    deep = 6 * len(graph.loops) <= AUTOMATIC if thorough is None else thorough
     if not m.has_geometry:
-        return DeterminacyReport(m, graph, "Topology only: no geometry is declared.")
+        return DeterminacyReport(m, graph, "Topology only: no geometry is declared.", asked=engine)
     try:
         system, x = assembled_at(m, at) if at else assembled(m)
     except AssemblyError as error:
         if at:
             raise
-        return DeterminacyReport(m, graph, f"No facts of geometry: {error}")
+        return DeterminacyReport(m, graph, f"No facts of geometry: {error}", asked=engine)
     columns, _ = named_columns(m, system, {d.freedom: 0.0 for d in m.drives})
-    return DeterminacyReport(m, graph, "", Geometry(system, x, columns, free_motion(system, x, columns)), deep)
+    return DeterminacyReport(
+        m, graph, "", Geometry(system, x, columns, free_motion(system, x, columns, engine)), engine
+    )

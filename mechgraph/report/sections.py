@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from mechgraph.document import Bullets, Document, Heading, Paragraph, Table
 from mechgraph.model.pair_table import TABLE
+from mechgraph.numerics.tolerances import RANKS
 from mechgraph.report.sentences import assumed, loop_names, plural, reasons, short
-from mechgraph.structure.mobility import NEAR
 
 if TYPE_CHECKING:
     from mechgraph.report.report import DeterminacyReport
@@ -37,14 +37,14 @@ def document(r: DeterminacyReport) -> Document:
         found = getattr(r, key)
         if found:
             blocks += [Heading(title, 2), _listed(f.text for f in found)]
-    blocks += _drivers(r) + _reactions(r) + _advice(r) + _loops(r) + _structure(r) + _ledger(r)
+    blocks += _drivers(r) + _reactions(r) + _advice(r) + _loops(r) + _structure(r) + _ledger(r) + _checks(r)
     return Document(f"Determinacy of {r.mechanism.name}", tuple(blocks))
 
 
 def _listed(items: Iterable[str]) -> Bullets:
     texts = list(items)
     more = len(texts) - LISTED
-    return Bullets(tuple(texts[:LISTED] + ([f"... and {more} more (see the JSON)"] if more > 0 else [])))
+    return Bullets(tuple(texts[:LISTED] + ([f"... and {more} more (see report.to_dict())"] if more > 0 else [])))
 
 
 def _facts(r: DeterminacyReport) -> list[Any]:
@@ -53,7 +53,7 @@ def _facts(r: DeterminacyReport) -> list[Any]:
         f"{plural(len(r.links), 'link')} with the frame, {plural(len(r.pairs), 'pair')}, {plural(len(r.loops), 'loop')}, "
         f"{plural(len(r.mechanism.drives), 'driver')}."
     )
-    f, rows = r.freedom_count, 6 * len(r.loops)
+    f, rows = r.freedom_count, r.equation_count
     columns: list[tuple[str, list[int]]] = [
         ("by count", [f, rows, rows, f - rows, 0]),
         ("general geometry", [f, rows, r.generic.rank, r.generic.mobility, r.generic.excess]),
@@ -72,11 +72,10 @@ def _facts(r: DeterminacyReport) -> list[Any]:
 def _mobility(r: DeterminacyReport) -> list[Any]:
     if not r.geometry or not r.mobility or r.margin is None:
         return []
-    finite = "not followed" if r.finite_mobility is None else str(r.finite_mobility)
     return [
         Paragraph(
             f"Mobility {r.mobility} = {plural(r.inputs or 0, 'input freedom')} + {plural(len(r.passive), 'passive freedom')}; "
-            f"finite mobility: {finite}. Margin to a singular position: {r.margin:.3g} (near below {NEAR:g})."
+            f"finite mobility: {r.finite_mobility}. Margin to a singular position: {r.margin:.3g} (near below {r.near_below:.3g})."
         )
     ]
 
@@ -110,7 +109,7 @@ def _reactions(r: DeterminacyReport) -> list[Any]:
             (pair, r.mechanism.pair(pair).type.symbol if len(rows) < LISTED else "", yes or "none", no or "none")
         )
     if len(rows) > LISTED:
-        rows = [*rows[:LISTED], ("...", "", f"and {len(rows) - LISTED} pairs more (see the JSON)", "")]
+        rows = [*rows[:LISTED], ("...", "", f"and {len(rows) - LISTED} pairs more (see report.to_dict())", "")]
     loose = [NOT_UNIQUE] if any(not ok for row in r.unique.values() for ok in row.values()) else []
     table = Table(("pair", "type", "unique", "not unique"), tuple(rows))
     return [Heading("Reactions", 2), table, *(Paragraph(text) for text in loose), *_stresses(r)]
@@ -120,9 +119,11 @@ def _stresses(r: DeterminacyReport) -> list[Any]:
     found = r.reactions
     if not found or not found.count or not r.geometry:
         return []
-    lines = [f"group {s.group + 1}: {s.text}" for s in found.states[:LISTED]]
-    if found.count > len(lines):
-        lines.append(f"... and {found.count - len(lines)} more (see the JSON)")
+    lines = [f"group {s.group + 1}: {s.text}" for s in found.first_states(LISTED)]
+    if found.listed > len(lines):
+        lines.append(f"... and {found.listed - len(lines)} more (report.self_stresses)")
+    if found.count > found.listed:
+        lines.append(f"{found.count - found.listed} that connect loops are too many to be written down")
     blocks: list[Any] = [
         Heading("Self-stresses", 2),
         Paragraph(MEANINGS.format(L=r.geometry.system.par.L)),
@@ -146,7 +147,7 @@ def _sums(combinations: tuple[tuple[int, str], ...]) -> list[Any]:
     lines = [f"group {group + 1}: {text}" for group, text in combinations if text.count(":") <= TERMS]
     more = len(combinations) - len(lines)
     if more:
-        lines.append(f"{'and ' if lines else ''}{more} of more than {TERMS} terms (see the JSON)")
+        lines.append(f"{'and ' if lines else ''}{more} of more than {TERMS} terms (see report.to_dict())")
     return [Paragraph("These sums are unique though their terms are not:"), _listed(lines)]
 
 
@@ -169,9 +170,6 @@ def _types(r: DeterminacyReport) -> list[Any]:
 def _advice(r: DeterminacyReport) -> list[Any]:
     if r.advice:
         return [Heading("Advice", 2), _listed(a.text for a in r.advice), *_types(r)]
-    if r.geometry and not r.thorough and r.redundancy:
-        text = "Pair changes were not sought, as the mechanism is large; check(m, thorough=True) does."
-        return [Heading("Advice", 2), Paragraph(text)]
     return []
 
 
@@ -189,7 +187,7 @@ def _loops(r: DeterminacyReport) -> list[Any]:
         for i, fact in enumerate(r.loop_facts[:LISTED])
     ]
     if len(r.loops) > LISTED:
-        rows.append(("...", f"and {len(r.loops) - LISTED} more (see the JSON)", "", "", ""))
+        rows.append(("...", f"and {len(r.loops) - LISTED} more (see report.to_dict())", "", "", ""))
     table = Table(("loop", "links and pairs", "freedoms", "rank", "excess"), tuple(rows), align="rlrrr")
     return [Heading("Loops", 2), table]
 
@@ -210,6 +208,20 @@ def _structure(r: DeterminacyReport) -> list[Any]:
         for n, loops in r.generic.places[:LISTED]
     ]
     return [Heading("By count alone (unknowns matched to equations)", 2), Bullets(tuple(lines))]
+
+
+def _checks(r: DeterminacyReport) -> list[Any]:
+    if not r.geometry:
+        return []
+    return [
+        Heading("Checks", 2),
+        Paragraph(f"Rank decided by the {r.engine} engine; largest value taken for zero: {_size(r.dropped or 0.0)}."),
+    ]
+
+
+def _size(value: float) -> str:
+    """A rounding error by its power of ten only where it is one."""
+    return "rounding" if value < RANKS.doubt else f"{value:.2g} of the largest"
 
 
 def _ledger(r: DeterminacyReport) -> list[Any]:

@@ -7,9 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mechgraph.model.pair import second_direction
+from mechgraph.numerics.tolerances import RANKS
 
 if TYPE_CHECKING:
+    from mechgraph.closure.configuration import Index
     from mechgraph.report.report import DeterminacyReport
+    from mechgraph.structure.uniqueness import Uniqueness
 
 NAMED = 8
 """Names in a row that a sentence holds."""
@@ -24,9 +27,10 @@ def plural(count: int, one: str, many: str = "") -> str:
     return f"{count} {one if count == 1 else many or one + 's'}"
 
 
-def short(names: tuple[str, ...] | list[str], most: int = NAMED) -> str:
-    """Names in a row, the first few of many."""
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+def short(names: tuple[str, ...] | list[str], most: int = NAMED, count: int | None = None) -> str:
+    """Names in a row, the first few of many (of ``count``, where only those are given)."""
+    more = (len(names) if count is None else count) - most
+    return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")
 
 
 def verdict(r: DeterminacyReport) -> str:
@@ -85,11 +89,11 @@ def _here(r: DeterminacyReport) -> str:
         return f"Under-driven: mobility {r.mobility}, {plural(drivers, 'driver')}, {free}.{shaky}"
     if not r.mobility and drivers:
         return _driven_structure(r)
-    if not _loose(r):
+    if r.reactions is None or r.reactions.is_unique.all():
         more = plural(len(r.passive), "unknown")
-        idle = f" ({plural(len(r.passive), 'passive freedom')} held: {more} more)" if r.passive else ""
+        held = f" ({plural(len(r.passive), 'passive freedom')} held: {more} more)" if r.passive else ""
         state = "Determinate" if r.mobility else "Determinate structure"
-        return f"{state}: {_counts(r)}; every reaction is unique{idle}."
+        return f"{state}: {_counts(r)}; every reaction is unique{held}."
     return f"{_state(r)}, {_tied(r)}{_efforts(r)}."
 
 
@@ -114,32 +118,46 @@ def _state(r: DeterminacyReport) -> str:
         return "A structure (mobility 0)"
     if _shaky(r):
         return f"Shaky structure: its mobility {r.mobility} is only infinitesimal"
-    return f"Moves with mobility {r.mobility if r.finite_mobility is None else r.finite_mobility}"
-
-
-def _loose(r: DeterminacyReport) -> dict[str, list[str]]:
-    """Components that are not unique, by pair."""
-    loose = {pair: [n for n, ok in row.items() if not ok] for pair, row in r.unique.items()}
-    return {pair: names for pair, names in loose.items() if names}
+    return f"Moves with mobility {r.finite_mobility}"
 
 
 def _tied(r: DeterminacyReport) -> str:
-    """Which components are not unique, and how they hang together."""
-    loose = {pair: [n for n in names if not n.startswith("effort")] for pair, names in _loose(r).items()}
-    total = sum(len(names) for names in loose.values())
-    sets: dict[str, list[str]] = {}
-    for pair, names in loose.items():
-        if names:
-            sets.setdefault(_joined(names), []).append(pair)
-    shown = [f"{what} of {short(pairs)}" for what, pairs in list(sets.items())[:SETS]]
+    """Which components are not unique, and in how many groups of self-stresses."""
+    found = r.reactions
+    if found is None:
+        return ""
+    sets = _patterns(found)
+    total = sum(len(names) * len(pairs) for names, pairs in sets)
+    m = r.mechanism
+    shown = [
+        f"{_joined(names)} of {short([m.pairs[k].name for k in pairs[:NAMED]], NAMED, len(pairs))}"
+        for names, pairs in sets[:SETS]
+    ]
     if len(sets) > SETS:
-        shown.append(f"others of {plural(sum(len(p) for p in list(sets.values())[SETS:]), 'further pair')}")
-    groups = r.reactions.groups if r.reactions else 0
-    form = "form one self-stress group" if groups == 1 else f"form {plural(groups, 'self-stress group')}"
-    if r.reactions and r.reactions.sampled:
-        form = f"are tied in {plural(groups, 'connected part')} of the mechanism"
+        shown.append(f"others of {plural(sum(len(p) for _, p in sets[SETS:]), 'further pair')}")
+    form = "form one self-stress group" if found.groups == 1 else f"form {plural(found.groups, 'self-stress group')}"
     components = "reaction component is" if total == 1 else "reaction components are"
     return f"but {total} {components} not unique: {'; '.join(shown)} {form} (redundancy {r.redundancy})"
+
+
+def _patterns(found: Uniqueness) -> list[tuple[list[str], Index]]:
+    """Names of reaction components that are not unique, and the pairs of which they are, in order of declaration."""
+    parts, loose = found.parts, ~found.is_unique
+    pairs = parts.system.m.pairs
+    by_names: dict[tuple[str, ...], list[Index]] = {}
+    for g in parts.system.groups:
+        names = pairs[int(g.pairs[0])].type.component_names
+        mine = loose[parts.first[g.pairs][:, None] + np.arange(len(names))]
+        code = mine @ (1 << np.arange(len(names)))
+        for value in np.unique(code[code > 0]):
+            which = tuple(n for i, n in enumerate(names) if value >> i & 1)
+            by_names.setdefault(which, []).append(g.pairs[code == value])
+    out = [
+        (int(both[0]), list(which), both)
+        for which, some in by_names.items()
+        for both in [np.sort(np.concatenate(some))]
+    ]
+    return [(which, mine) for _, which, mine in sorted(out, key=lambda item: item[0])]
 
 
 def _joined(names: list[str]) -> str:
@@ -147,11 +165,11 @@ def _joined(names: list[str]) -> str:
 
 
 def _efforts(r: DeterminacyReport) -> str:
-    if not r.mechanism.drives:
+    if not r.mechanism.drives or r.reactions is None:
         return ""
-    loose = [n for names in _loose(r).values() for n in names if n.startswith("effort")]
+    parts = r.reactions.parts
     one = len(r.mechanism.drives) == 1
-    if loose:
+    if not r.reactions.is_unique[parts.efforts].all():
         return "; the driver effort is not unique" if one else "; driver efforts are not all unique"
     return "; the driver effort is unique" if one else "; all driver efforts are unique"
 
@@ -222,11 +240,6 @@ def _excess(r: DeterminacyReport) -> list[str]:
         out.append(f"By its special dimensions it is over by {excess['dimensions']} more than with general ones.")
     if excess.get("here"):
         out.append(f"Singular here, by {excess['here']}: positions near by have a higher rank.")
-    if excess.get("special"):
-        out.append(
-            f"Over by {excess['special']} more: by its dimensions or only here. The motion was not followed, as the mechanism is "
-            "large; check(m, thorough=True) does."
-        )
     return out
 
 
@@ -251,7 +264,7 @@ def _margin(r: DeterminacyReport) -> list[str]:
         ]
     if not r.near:
         return []
-    gap = f", largest taken for zero {r.dropped:.1g}" if r.dropped else ""
+    gap = f", largest taken for zero {r.dropped:.1g}" if (r.dropped or 0.0) > RANKS.doubt else ""
     return [
         f"Near another verdict: smallest singular value kept {r.margin:.2g} of the largest{gap}. A small change of dimensions or "
         "position may change mobility and uniqueness; forces may be large."

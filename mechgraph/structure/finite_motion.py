@@ -1,29 +1,118 @@
-"""Finite mobility: motions followed over small and larger strokes with the loops kept closed, not judged by one rank.
+"""Finite mobility: the nullity at regular positions reached by a motion, confirmed by moving on in all its directions.
 
-Random unit motions of the null space are taken as first steps and the loops closed again. What returns (instantaneous freedom) is
-told from what stays (finite freedom) by the displacement left; at points reached the count is made again, so that branch points and
-shaky positions do not mislead.
+A position is regular where the closed positions near by form a manifold whose dimension is the nullity n of the closure Jacobian.
+That is confirmed by actual motion: after a random step in the null space the rows that are independent here close all loops, so
+that the others depend on them there too and the rank is constant. Where that fails at every step size, the position is a change point
+or shaky; random steps lead to positions near by, where it is asked again. If none of these is regular, each direction v of the null
+space N is tried by itself and what is left of it once the loops are closed by the smallest change is compared with it:
+
+    kept = N^T (x' - x) / h,   x' closed;
+
+a direction in which nothing moves on loses its part at any step size and does not count.
+So the mobility is never above a nullity on the way. Chords of a curved motion are never ranked against each other: they differ in
+direction by its curvature. Source for the notion: Connelly and Whiteley, Second-order rigidity and prestress stability, 1996.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.assembly import CLOSED, close
+from mechgraph.closure.assembly import CLOSED, CLOSURE_GOAL
 from mechgraph.closure.indexing import System
-from mechgraph.numerics.linear import rank_of, singular_values
-from mechgraph.structure.mobility import motions_of
+from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
+from mechgraph.closure.rank import ClosureRank, EngineName, closure_rank
 
-STROKE = 0.05
-"""Length of a trial step (radians, or lengths / L)."""
+STEPS = (0.05, 0.0125, 0.003)
+"""Lengths of trial steps (radians, or lengths / L): the first ones tell a motion that returns, the last ones bear curvature."""
 FAR_STEPS = 6
-"""Further steps of that length over which the motion is followed."""
-KEPT = 0.05
-"""Part of a trial step that must be left after closing for it to count as motion."""
+"""Further steps of the first length over which the motion is followed."""
+KEPT = 0.5
+"""Part of a step in one direction that must be left for it to count: about 1 on a motion, 0 where it returns."""
+MOVED = 0.05
+"""Part of a step that must be left for the position reached to count as another one."""
+TRIALS = 6
+"""Random steps away from a position that is not regular."""
+FROZEN = 12
+"""Corrections with the equations of the position left."""
+SLOW = 0.2
+"""Part of the closure error that such a correction may leave."""
+CORRECTIONS = 60
+"""Corrections with equations made anew; a double root halves its error with each."""
+PATIENCE = 8
+"""Corrections without gain after which closing is given up."""
+LONGEST = 0.5
+"""Largest component of a correction."""
 SEED = 7
+
+
+@dataclass(frozen=True)
+class _Position:
+    """A closed position and the motions there, ``N`` orthonormal in columns of unit size."""
+
+    system: System
+    x: Array
+    found: ClosureRank
+    engine: EngineName
+
+    @classmethod
+    def at(cls, system: System, x: Array, engine: EngineName) -> _Position:
+        return cls(system, x, closure_rank(system.at(x[:, None]), engine=engine), engine)
+
+    @cached_property
+    def N(self) -> Array:
+        return np.linalg.qr(self.found.motions / self.found.reduced.scale[:, None])[0]
+
+    def moved(self, v: Array, h: float) -> tuple[Array, float] | None:
+        """State after a step of ``N v`` of length ``h`` with the loops closed again, and the factor of the step; None where not."""
+        x, factor = self._stepped(v, h)
+        closed = _closed(self.system, x, self.found.reduced)
+        return None if closed is None else (closed, factor)
+
+    def _stepped(self, v: Array, h: float) -> tuple[Array, float]:
+        dq = self.found.reduced.scale * (self.N @ v)
+        factor = h / float(np.abs(dq).max())
+        return self.system.advance(self.x[:, None], factor * dq[:, None])[:, 0], factor
+
+    def change(self, x: Array) -> Array:
+        """Increments ``(F,)`` from here to a state."""
+        return self.system.difference(x[:, None], self.x[:, None])[:, 0]
+
+    def kept(self, v: Array, h: float) -> Array | None:
+        """What is left of the step ``v`` in the null space, in units of the step."""
+        moved = self.moved(v, h)
+        if moved is None:
+            return None
+        return np.asarray(self.N.T @ (self.change(moved[0]) / self.found.reduced.scale) / moved[1])
+
+    def random(self, rng: np.random.Generator) -> Array:
+        """A random direction of size one: of a random vector of all freedoms, so that no basis of the motions matters."""
+        v = self.N.T @ rng.normal(size=self.N.shape[0])
+        return np.asarray(v / np.linalg.norm(v))
+
+    def regular(self, v: Array) -> bool:
+        """Whether the rows that are independent here close all loops after a random step.
+
+        Then the rank is constant near by: the other rows depend on them not only here. Where it is not, they stay open by the square
+        of the step (a change point) or a higher power (shaky), far above the closure error.
+        """
+        rows = self.found.reduced
+        already = rows.open_part(self.system.at(self.x[:, None]).residual[:, 0])
+        limit = 10 * max(CLOSURE_GOAL, rows.rounding, already)
+        for h in STEPS:
+            closed = _corrected(self.system, self._stepped(v, h)[0], rows)
+            if closed is not None and rows.open_part(self.system.at(closed[:, None]).residual[:, 0]) <= limit:
+                return True
+        return False
+
+    def dimension(self) -> int:
+        """Number of directions in which a step is kept."""
+        columns = [self.kept(v, STEPS[1]) for v in np.eye(self.N.shape[1])]
+        table = np.stack([c if c is not None else np.zeros(self.N.shape[1]) for c in columns])
+        return int((np.linalg.svd(table, compute_uv=False) > KEPT).sum())
 
 
 @dataclass(frozen=True)
@@ -34,76 +123,112 @@ class FiniteMotion:
     ----------
     mobility : dimension of the set of closed positions near by.
     rank_nearby : largest rank of the closure Jacobian at closed positions near by.
-    stroke : length over which a motion was followed with the loops closed (0 where nothing moves).
-    null_nearby : motions ``(F, M)`` at the neighbour of that rank.
+    begin : a position and a direction in which it moves on; None where nothing moves.
     """
 
     mobility: int
     rank_nearby: int
-    stroke: float
-    null_nearby: Array
+    begin: tuple[_Position, Array] | None = field(default=None, repr=False)
+
+    @cached_property
+    def stroke(self) -> float:
+        """Length over which a motion was followed with the loops closed (0 where nothing moves)."""
+        return _followed(*self.begin) if self.begin and self.mobility else 0.0
+
+    @cached_property
+    def null_nearby(self) -> Array | None:
+        """Motions ``(F, M)`` at a position reached by a motion; None where nothing moves."""
+        moved = self.begin and self.begin[0].moved(self.begin[1], STEPS[0])
+        if not self.begin or not moved:
+            return None
+        return _Position.at(self.begin[0].system, moved[0], self.begin[0].engine).found.motions
 
 
-def finite_motion(system: System, x: Array) -> FiniteMotion:
-    """Follow the motions of a closed state ``x (nx,)``.
+def finite_motion(system: System, x: Array, found: ClosureRank, engine: EngineName = "auto") -> FiniteMotion:
+    """Follow the motions of a closed state ``x (nx,)`` where ``found`` is the rank of its closure equations.
 
-    Where the closure Jacobian has full row rank the dimension is its nullity (implicit function theorem); otherwise motions
-    are followed and the displacements that stay are counted.
+    Where the closure Jacobian has full row rank the dimension is its nullity (implicit function theorem).
     """
-    J = system.at(x[:, None]).J[:, :, 0]
-    null = motions_of(J)
-    rank = J.shape[1] - null.shape[1]
-    if not null.shape[1]:
-        return FiniteMotion(0, rank, 0.0, null)
+    here = _Position(system, x, found, engine)
+    nullity = found.motions.shape[1]
+    if not nullity:
+        return FiniteMotion(0, found.rank)
     rng = np.random.default_rng(SEED)
-    regular = rank == J.shape[0]
-    reached = _strokes(system, x, null, rng, 1 if regular else 2 * null.shape[1])
-    best, rank_nearby, null_nearby = (null.shape[1] if regular else 0), rank, null
-    for i, (point, _) in enumerate(reached[:3]):
-        there = motions_of(system.at(point[:, None]).J[:, :, 0])
-        rank_there = J.shape[1] - there.shape[1]
-        if rank_there > rank_nearby or (not i and rank_there == rank):
-            rank_nearby, null_nearby = rank_there, there
-        if regular:
+    v = here.random(rng)
+    if found.rank == found.count or here.regular(v):
+        return FiniteMotion(nullity, found.rank, (here, v))
+    return _near_by(here, rng)
+
+
+def _near_by(here: _Position, rng: np.random.Generator) -> FiniteMotion:
+    """The mobility about a position that is not regular: the largest of those at positions reached from it."""
+    mobility, rank, begin = 0, here.found.rank, None
+    for _ in range(TRIALS):
+        moved = here.moved(here.random(rng), STEPS[0])
+        if moved is None:
             continue
-        moves = [change for _, change in _strokes(system, point, there, rng, there.shape[1] + 1)]
-        if moves:
-            best = max(best, rank_of(singular_values(np.stack(moves)), KEPT))
-    stroke = _followed(system, *reached[0]) if reached and best else 0.0
-    return FiniteMotion(best, rank_nearby, stroke, null_nearby)
+        change = here.change(moved[0])
+        if not np.abs(change).max() > MOVED * STEPS[0]:
+            continue
+        there = _Position.at(here.system, moved[0], here.engine)
+        rank = max(rank, there.found.rank)
+        if not there.N.shape[1]:
+            continue
+        regular = there.regular(there.random(rng))
+        dimension = there.N.shape[1] if regular else there.dimension()
+        if dimension > mobility:
+            mobility, begin = dimension, (there, there.N.T @ (change / there.found.reduced.scale))
+    return FiniteMotion(mobility, rank, begin)
 
 
-def _strokes(system: System, x: Array, null: Array, rng: np.random.Generator, count: int) -> list[tuple[Array, Array]]:
-    """Closed points reached by random steps along ``null`` and the displacements to them, in units of the stroke."""
-    out = []
-    for _ in range(count):
-        # of a random vector of all freedoms, so that it does not hang on which basis of the motions was found
-        direction = null @ (null.T @ rng.normal(size=null.shape[0]))
-        moved = _step(system, x, direction)
-        if moved is not None:
-            out.append(moved)
-    return out
-
-
-def _step(system: System, x: Array, direction: Array) -> tuple[Array, Array] | None:
-    direction = direction * (STROKE / np.abs(direction).max())
-    guess = system.advance(x[:, None], direction[:, None])[:, 0]
-    point, error = close(system, guess, np.zeros(0, dtype=np.intp))
-    change = system.difference(point[:, None], x[:, None])[:, 0] / STROKE
-    return (point, change) if error <= CLOSED and np.abs(change).max() > KEPT else None
-
-
-def _followed(system: System, x: Array, change: Array) -> float:
-    """Stroke over which the motion can be continued in the same sense."""
-    stroke = STROKE * float(np.abs(change).max())
-    for _ in range(FAR_STEPS):
-        null = motions_of(system.at(x[:, None]).J[:, :, 0])
-        direction = null @ (null.T @ change)
-        if not np.abs(direction).max(initial=0.0) > 1e-9:
-            break
-        moved = _step(system, x, direction)
+def _followed(begin: _Position, v: Array) -> float:
+    """Stroke over which a motion can be continued in the same sense."""
+    stroke, at = 0.0, begin
+    for _ in range(FAR_STEPS + 1):
+        moved = at.moved(v, STEPS[0])
         if moved is None:
             break
-        x, change = moved
-        stroke += STROKE * float(np.abs(change).max())
+        change = at.change(moved[0])
+        if not np.abs(change).max() > MOVED * STEPS[0]:
+            break
+        stroke += float(np.abs(change).max())
+        at = _Position.at(at.system, moved[0], at.engine)
+        v = at.N.T @ (change / at.found.reduced.scale)
+        if not np.linalg.norm(v) > MOVED * STEPS[0]:
+            break
     return stroke
+
+
+def _corrected(system: System, x: Array, rows: ReducedRows) -> Array | None:
+    """The loops closed from ``x`` in the kept rows of a position near by alone; None where that does not converge quickly."""
+    before, goal = np.inf, max(CLOSURE_GOAL, rows.rounding)
+    for _ in range(FROZEN):
+        residual = system.at(x[:, None]).residual[:, 0]
+        error = float(np.abs(rows.kept_part(residual[:, None])).max(initial=0.0))
+        if error <= goal or (error < 10 * goal and error > SLOW * before):
+            return x
+        if error > SLOW * before:
+            return None
+        before = error
+        x = system.advance(x[:, None], rows.correction(residual)[:, None])[:, 0]
+    return None
+
+
+def _closed(system: System, x: Array, rows: ReducedRows) -> Array | None:
+    """The loops closed from ``x``: with the rows of a position near by where they do, otherwise by Newton; None where not."""
+    quick = _corrected(system, x, rows)
+    if quick is not None and float(system.at(quick[:, None]).closure[0]) <= CLOSED:
+        return quick
+    best, least, since = x, np.inf, 0
+    for _ in range(CORRECTIONS):
+        here = system.at(x[:, None])
+        residual = here.residual[:, 0]
+        error = float(np.abs(residual).max(initial=0.0))
+        since = since + 1 if error > 0.999 * least else 0
+        best, least = (x, error) if error < least else (best, least)
+        if error <= CLOSURE_GOAL or since > PATIENCE:
+            break
+        dq = ReducedRows(ClosureRows.at(here), np.zeros(0, dtype=np.intp), rows.dense).correction(residual)
+        dq = dq * min(1.0, LONGEST / max(float(np.abs(dq).max()), 1e-300))
+        x = system.advance(x[:, None], dq[:, None])[:, 0]
+    return best if float(system.at(best[:, None]).closure[0]) <= CLOSED else None

@@ -10,26 +10,13 @@ import scipy
 
 from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.bordering import LoopSystem
-from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.passive_rest import Idle
+from mechgraph.closure.rank import ClosureRank, EngineName, closure_rank
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.numerics.linear import RANK_TOLERANCE, independent_rows, rank_of, singular_values
-from mechgraph.structure.bordered import Bordered
-from mechgraph.structure.elimination import Elimination, loop_rows
-from mechgraph.structure.passive import STILL, PassiveMotion, passive_motions
-
-NEAR = 1e-3
-"""Margin below which a position is called nearly singular, and part of a motion below which a driver is near a dead point."""
-LARGE = 96
-"""Rows of the closure Jacobian above which rank and motions come from elimination along the loops, not from one dense matrix."""
-ELIMINATION_RANK = 1e-9
-"""Part of a unit row below which a pivot of the elimination counts as zero."""
-DEPENDENT = 1e-8
-"""Part of a unit motion below which the weakest driver counts as standing still: drivers depend, or a dead point."""
-ROUNDING = 1e-11
-"""Part of a unit rate that counts as zero."""
+from mechgraph.numerics.linear import RANK_TOLERANCE, independent_rows, singular_values
+from mechgraph.numerics.tolerances import MOTIONS
+from mechgraph.structure.passive import PassiveMotion, passive_motions
 
 
 @dataclass(frozen=True)
@@ -44,22 +31,41 @@ class FreeMotion:
 class Freedoms:
     """What can move at a closed position.
 
-    ``rank`` of the closure Jacobian; ``margin`` smallest singular value kept and ``dropped`` largest one dropped, as parts of the
-    largest (pivots against unit rows where a large mechanism was eliminated along its loops); ``null (F, M)`` orthonormal motions;
+    ``closure`` the rank of the closure equations with its margin, ``driven_closure`` the same with the drivers at rest;
+    ``null (F, M)`` orthonormal motions;
     ``dependent`` whether drivers cannot move independently, ``drive`` how strongly the weakest of them moves (against the freedom that
     moves most; small near a dead point); ``passive`` and ``undriven`` motions with the drivers at rest;
     ``hold`` freedoms whose rest stops the passive motions.
     """
 
-    rank: int
-    margin: float
-    dropped: float
+    closure: ClosureRank
+    driven_closure: ClosureRank
     null: Array
     dependent: bool
     passive: tuple[PassiveMotion, ...]
     undriven: tuple[FreeMotion, ...]
     hold: Index
     drive: float = 1.0
+
+    @property
+    def rank(self) -> int:
+        """Rank of the closure Jacobian."""
+        return self.closure.rank
+
+    @property
+    def redundancy(self) -> int:
+        """Closure equations minus rank."""
+        return self.closure.count - self.closure.rank
+
+    @property
+    def margin(self) -> float:
+        """Smallest singular value kept, as part of the largest."""
+        return self.closure.margin
+
+    @property
+    def dropped(self) -> float:
+        """Largest value that counted as zero, as part of the largest."""
+        return self.closure.dropped
 
     @property
     def mobility(self) -> int:
@@ -72,48 +78,14 @@ class Freedoms:
         return tuple(Idle(link) for link in sorted({link for p in self.passive for link in p.links}))
 
 
-def is_large(system: System) -> bool:
-    """Whether the closure Jacobian is too large for one dense decomposition."""
-    return 6 * len(system.graph.loops) > LARGE
-
-
-def elimination(here: Configuration, dropped: Index | None = None) -> Bordered | Elimination:
-    """The closure Jacobian at one position, with some columns left out: bordered and factored, or eliminated along the loops."""
-    s = here.system
-    quick = Bordered(LoopSystem.at(here, np.zeros(0, dtype=np.intp) if dropped is None else dropped), here.S[:, :, 0])
-    if quick.sure:
-        return quick
-    rows = loop_rows(here.S[:, :, 0], s.loop_columns)
-    points = here.pair_points[:, :, 0]
-    at = [points[:, [k for k, _ in loop]] for loop in s.graph.loops]
-    return Elimination(rows if dropped is None else rows.without(dropped), at, ELIMINATION_RANK)
-
-
-def _motions(here: Configuration) -> tuple[int, float, float, Array]:
-    """Rank, margin, largest dropped and orthonormal motions."""
-    if is_large(here.system):
-        found = elimination(here)
-        return found.rank, found.smallest, found.largest, found.motions()
-    J = here.J[:, :, 0]
-    sigma = singular_values(J)
-    rank = rank_of(sigma)
-    margin = float(sigma[rank - 1] / sigma[0]) if rank else 1.0
-    rest = sigma[rank:]
-    dropped = float(rest[0] / sigma[0]) if rest.size and sigma[0] > 0 else 0.0
-    return rank, margin, dropped, motions_of(J)
-
-
-def _left_free(here: Configuration, null: Array, columns: Index) -> Array:
+def _left_free(found: ClosureRank, at_rest: ClosureRank, columns: Index) -> Array:
     """Orthonormal motions with the freedoms ``columns`` at rest."""
+    null = found.motions
     if not len(columns) or not null.shape[1]:
         return null
-    if is_large(here.system):
-        return np.asarray(null @ null_space(null[columns], 1e-8))
-    free = np.setdiff1d(np.arange(null.shape[0]), columns)
-    inner = motions_of(here.J[:, free, 0])
-    left = np.zeros((null.shape[0], inner.shape[1]))
-    left[free] = inner
-    return left
+    if found.engine == "dense":
+        return at_rest.motions
+    return np.asarray(null @ null_space(null[columns], MOTIONS.dependent))
 
 
 def _drive(null: Array, columns: Index) -> float:
@@ -126,23 +98,25 @@ def _drive(null: Array, columns: Index) -> float:
     return float(singular_values(null[columns])[-1]) / most
 
 
-def free_motion(system: System, x: Array, columns: Index) -> Freedoms:
+def free_motion(system: System, x: Array, columns: Index, engine: EngineName = "auto") -> Freedoms:
     """Mobility at a closed state ``x (nx,)`` and what drivers in ``columns`` leave free."""
     here = system.at(x[:, None])
-    rank, margin, gone, null = _motions(here)
+    found = closure_rank(here, engine=engine)
+    null = found.motions
     drive = _drive(null, columns)
-    left = _left_free(here, null, columns)
+    at_rest = closure_rank(here, columns, engine) if len(columns) else found
+    left = _left_free(found, at_rest, columns)
     passive = passive_motions(here, left, columns)
     if not len(columns) and passive and len(passive) == null.shape[1]:
-        # nothing else can move: what could be driven is an input, not an idle freedom
+        # nothing else can move: what could be driven is an input, not a passive freedom
         drivable = [c for c, _ in single_freedoms(system.m)]
-        passive = [p for p in passive if not (np.abs(p.rates[drivable]) > STILL).any()]
+        passive = [p for p in passive if not (np.abs(p.rates[drivable]) > MOTIONS.still).any()]
     undriven = _complement(system, left, passive)
     hold = np.zeros(0, dtype=np.intp)
     if passive:
         _, pivots = scipy.linalg.qr(np.stack([p.rates for p in passive]), mode="r", pivoting=True)
         hold = np.sort(pivots[: len(passive)]).astype(np.intp)
-    return Freedoms(rank, margin, gone, null, drive < DEPENDENT, tuple(passive), tuple(undriven), hold, drive)
+    return Freedoms(found, at_rest, null, drive < MOTIONS.dependent, tuple(passive), tuple(undriven), hold, drive)
 
 
 def motions_of(J: Array) -> Array:
@@ -172,8 +146,8 @@ def _complement(system: System, left: Array, passive: list[PassiveMotion]) -> li
     basis /= np.abs(basis).max(axis=1, keepdims=True)
     names = m.freedom_names()
     out = []
-    for rates in np.where(np.abs(basis) < ROUNDING, 0.0, basis):
-        moving = tuple(names[i] for i in np.flatnonzero(np.abs(rates) > STILL))
+    for rates in np.where(np.abs(basis) < MOTIONS.rounding, 0.0, basis):
+        moving = tuple(names[i] for i in np.flatnonzero(np.abs(rates) > MOTIONS.still))
         out.append(FreeMotion(rates, moving))
     return out
 
@@ -186,9 +160,9 @@ def single_freedoms(m: Mechanism) -> list[tuple[int, str]]:
 
 def drive_order(m: Mechanism, passive: Sequence[PassiveMotion]) -> list[int]:
     """Freedoms that take a drive in the order in which they are wanted: free of passive motions first, then at the frame."""
-    idle = np.zeros(sum(p.type.f for p in m.pairs), dtype=bool)
+    in_passive = np.zeros(sum(p.type.f for p in m.pairs), dtype=bool)
     for p in passive:
-        idle |= np.abs(p.rates) > STILL
+        in_passive |= np.abs(p.rates) > MOTIONS.still
     at_frame = {n: m.frame in (p.a, p.b) for p in m.pairs for n in p.freedom_names}
     singles = single_freedoms(m)
-    return [i for i, name in sorted(singles, key=lambda item: (idle[item[0]], not at_frame[item[1]], item[0]))]
+    return [i for i, name in sorted(singles, key=lambda item: (in_passive[item[0]], not at_frame[item[1]], item[0]))]

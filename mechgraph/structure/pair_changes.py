@@ -12,33 +12,38 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import named_columns, scaled_system
 from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.indexing import System
+from mechgraph.closure.indexing import Index, System
+from mechgraph.closure.rank import EngineName
 from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.pair_table import TABLE
 from mechgraph.model.pair_type import PairType
-from mechgraph.numerics.linear import RANK_TOLERANCE, singular_values
-from mechgraph.structure.finite_motion import finite_motion
+from mechgraph.numerics.linear import singular_values
+from mechgraph.numerics.tolerances import STRESSES
+from mechgraph.structure.finite_motion import FiniteMotion
 from mechgraph.structure.mobility import Freedoms, free_motion
+from mechgraph.structure.uniqueness import PROBES, pair_states
 
-SIGNIFICANT = 1e-6
-"""Power of a unit twist on a unit self-stress above which the twist relieves it."""
 SHOWN = 6
 """Largest number of single changes, and of sets of changes, reported."""
 FREEING = 3
 """Changes reported that let a structure move."""
+SETS = 48
+"""Redundancy up to which sets of changes that remove all of it are sought; the work grows as its cube."""
+SEED = 29
+
 BEAM = 12
 """Partial sets of changes kept while searching."""
 
 
 @dataclass(frozen=True)
 class Change:
-    """One pair given another type; ``matrix (f, s)`` is its power on the self-stresses, ``added`` the freedoms added.
+    """One pair given another type; ``matrix (f, s)`` is its power on the self-stresses, ``added`` the freedoms added,
+    ``relief`` the self-stresses that it removes by itself.
 
     ``turn``: angle by which the second direction x is turned about the axis, for types in which it matters.
     """
@@ -47,6 +52,7 @@ class Change:
     type: PairType
     matrix: Array
     added: int
+    relief: int
     turn: float = 0.0
 
 
@@ -97,58 +103,81 @@ def wider_types(row: PairType) -> Iterator[PairType]:
                 yield other
 
 
-def changes_of(here: Configuration) -> list[Change]:
-    """All single changes to wider types that leave the drivers in place, with their power on the self-stresses (drivers free)."""
+def changes_of(here: Configuration, freedoms: Freedoms) -> list[Change]:
+    """All single changes to wider types that leave the drivers in place, with their power on the self-stresses (drivers free).
+
+    On all self-stresses where sets of changes are sought, else on random ones, which give the same rank in one pair.
+    """
     system = here.system
-    null = null_space(here.J[:, :, 0].T, RANK_TOLERANCE)
-    C = system.graph.loop_matrix
-    stress = np.einsum("lp,lis->ips", C, null.reshape(C.shape[0], 6, null.shape[1]))
-    wider = {row: list(wider_types(row)) for row in dict.fromkeys(p.type for p in system.m.pairs)}
-    place = {int(k): (g, i) for g in system.groups for i, k in enumerate(g.pairs)}
-    out = []
-    driven = {system.m.freedom(d.freedom) for d in system.m.drives}
-    for k, pair in enumerate(system.m.pairs):
-        g, i = place[k]
-        needed = {pair.type.freedoms[j].name for pair_index, j in driven if pair_index == k}
-        base = here.frames[system.groups.index(g)][-1][:, :, i : i + 1]
-        for row in wider[pair.type]:
-            if not needed <= {f.name for f, single in zip(row.freedoms, row.drivable, strict=True) if single}:
-                continue
-            plain = S_of(row, base).T @ stress[:, k]
-            out.append(Change(k, row, plain, row.f - pair.type.f))
-            if row.square_second:
-                turn = best_turn(base[..., 0, 0], stress[:, k])
-                power = S_of(row, turned(base, turn)).T @ stress[:, k]
-                if rank_of_absolute(power) > rank_of_absolute(plain):
-                    out.append(Change(k, row, power, row.f - pair.type.f, turn))
+    count = freedoms.redundancy if freedoms.redundancy <= SETS else PROBES
+    rows = freedoms.closure.random_stress(np.random.default_rng(SEED), count)
+    stress = np.moveaxis(pair_states(here, np.linalg.qr(rows)[0])[..., 0], 1, 0)
+    needed: dict[int, set[str]] = {}
+    for k, j in (system.m.freedom(d.freedom) for d in system.m.drives):
+        needed.setdefault(k, set()).add(system.m.pairs[k].type.freedoms[j].name)
+    out: list[tuple[int, int, Change]] = []
+    for g, group in enumerate(system.groups):
+        base = here.frames[g][-1]
+        for number, row in enumerate(wider_types(system.m.pairs[int(group.pairs[0])].type)):
+            single = {f.name for f, ok in zip(row.freedoms, row.drivable, strict=True) if ok}
+            some = np.array(
+                [i for i, k in enumerate(group.pairs.tolist()) if needed.get(k, set()) <= single], dtype=np.intp
+            )
+            made = _changes_to(row, base[:, :, some], stress[group.pairs[some]], group.pairs[some], row.f - group.row.f)
+            out += [(c.pair, 2 * number + turned, c) for turned, c in made]
+    return [c for _, _, c in sorted(out, key=lambda item: item[:2])]
+
+
+def _changes_to(row: PairType, base: Array, stress: Array, pairs: Index, added: int) -> list[tuple[int, Change]]:
+    """Changes of pairs to one type: as they stand (0), and turned about z (1) where that relieves more; all pairs at once."""
+    plain = _power(row, base, stress)
+    relief = _ranks(plain)
+    out = [(0, Change(int(k), row, plain[i], added, int(relief[i]))) for i, k in enumerate(pairs)]
+    if row.square_second and len(pairs):
+        turns = best_turns(base[..., 0], stress)
+        power = _power(row, turned(base, turns[:, None]), stress)
+        better = _ranks(power)
+        more = np.flatnonzero(better > relief)
+        out += [(1, Change(int(pairs[i]), row, power[i], added, int(better[i]), float(turns[i]))) for i in more]
     return out
 
 
-def S_of(row: PairType, base: Array) -> Array:
-    """Twists ``(6, f)`` of a pair type at coordinates zero in the frame ``base (3, 4, 1, 1)``."""
-    x = evaluation.coordinates_to_state(row, np.zeros((row.f, 1, 1)))
-    frames = evaluation.frames_of(row, np.zeros((1, 1)), x, base)
-    return evaluation.twists_of(row, np.zeros((1, 1)), frames)[:, :, 0, 0]
+def _power(row: PairType, base: Array, stress: Array) -> Array:
+    """Power ``(n, f, s)`` of a pair type at coordinates zero in frames ``base (3, 4, n, 1)`` on self-stresses ``(n, 6, s)``."""
+    n = base.shape[2]
+    pitch = np.zeros((n, 1))
+    x = evaluation.coordinates_to_state(row, np.zeros((row.f, n, 1)))
+    twists = evaluation.twists_of(row, pitch, evaluation.frames_of(row, pitch, x, base))[..., 0]
+    return np.asarray(np.einsum("ifn,nis->nfs", twists, stress))
 
 
-def turned(base: Array, angle: float) -> Array:
-    """A frame turned about its own z."""
+def _ranks(A: Array) -> Array:
+    """Ranks of matrices ``(n, f, s)`` with an absolute tolerance (self-stresses and twists are of size one)."""
+    return (
+        np.asarray((np.linalg.svd(A, compute_uv=False) > STRESSES.relieved).sum(axis=1))
+        if A.size
+        else np.zeros(len(A), int)
+    )
+
+
+def turned(base: Array, angle: Array | float) -> Array:
+    """Frames turned about their own z."""
     c, s = np.cos(angle), np.sin(angle)
     out = base.copy()
     out[:, 0], out[:, 1] = c * base[:, 0] + s * base[:, 1], c * base[:, 1] - s * base[:, 0]
     return out
 
 
-def best_turn(frame: Array, wrenches: Array) -> float:
-    """Angle from x to the direction across z about which self-stresses ``(6, s)`` bend most, in (-pi/2, pi/2]."""
-    moments = wrenches[:3] - np.cross(frame[:, 3], wrenches[3:].T).T
-    across = frame[:, :2].T @ moments
-    U, s, _ = np.linalg.svd(across)
-    if not s.size or s[0] < SIGNIFICANT:
-        return 0.0
-    angle = float(np.arctan2(U[1, 0], U[0, 0]))
+def best_turns(frames: Array, wrenches: Array) -> Array:
+    """Angles from x to the direction across z about which self-stresses ``(n, 6, s)`` bend most, in (-pi/2, pi/2]."""
+    if not wrenches.shape[2]:
+        return np.zeros(len(wrenches))
+    moments = wrenches[:, :3] - np.cross(frames[:, 3].T[:, :, None], wrenches[:, 3:], axis=1)
+    U, s, _ = np.linalg.svd(np.einsum("ijn,nis->njs", frames[:, :2], moments))
+    angle = np.arctan2(U[:, 1, 0], U[:, 0, 0])
     angle -= np.pi * np.ceil(angle / np.pi - 0.5)
-    return angle if angle > 1e-9 - np.pi / 2 else np.pi / 2
+    angle = np.where(angle > 1e-9 - np.pi / 2, angle, np.pi / 2)
+    return np.where(s[:, 0] < STRESSES.relieved, 0.0, angle)
 
 
 def _relief(parts: tuple[Change, ...]) -> int:
@@ -157,7 +186,7 @@ def _relief(parts: tuple[Change, ...]) -> int:
 
 def rank_of_absolute(A: Array) -> int:
     """Rank with an absolute tolerance (self-stresses and twists are of size one)."""
-    return int((singular_values(A) > SIGNIFICANT).sum()) if A.size else 0
+    return int((singular_values(A) > STRESSES.relieved).sum()) if A.size else 0
 
 
 def relieving(changes: list[Change], redundancy: int) -> tuple[list[tuple[Change, ...]], list[tuple[Change, ...]]]:
@@ -165,14 +194,13 @@ def relieving(changes: list[Change], redundancy: int) -> tuple[list[tuple[Change
 
     Ranked by how little they change: freedoms added beyond need, then number of changes, then the order of declaration.
     """
-    relief = {id(c): _relief((c,)) for c in changes}
-    useful = [c for c in changes if relief[id(c)]]
-    singles = sorted(useful, key=lambda c: (c.added - relief[id(c)], -relief[id(c)], c.pair))
-    exact = [c for c in singles if c.added == relief[id(c)]]
+    useful = [c for c in changes if c.relief]
+    singles = sorted(useful, key=lambda c: (c.added - c.relief, -c.relief, c.pair))
+    exact = [c for c in singles if c.added == c.relief]
     beam: list[tuple[tuple[Change, ...], int]] = [((), 0)]
     complete: list[tuple[Change, ...]] = []
     deepest: list[tuple[tuple[Change, ...], int]] = []
-    for _ in range(redundancy):
+    for _ in range(redundancy if redundancy <= SETS else 0):
         grown: dict[frozenset[int], tuple[tuple[Change, ...], int]] = {}
         for parts, removed in beam:
             for c in exact:
@@ -213,7 +241,9 @@ def _spread(singles: list[Change]) -> list[Change]:
     return (first + rest)[:SHOWN]
 
 
-def effect(system: System, x: Array, before: Freedoms, parts: tuple[Change, ...]) -> Effect | None:
+def effect(
+    system: System, x: Array, before: Freedoms, parts: tuple[Change, ...], engine: EngineName = "auto"
+) -> Effect | None:
     """The effect of changes, computed on the changed mechanism at the same position; None where it cannot be built."""
     m = system.m
     q = system.coordinates_of(x[:, None], system.start_coordinates(m.start))[:, 0]
@@ -229,11 +259,10 @@ def effect(system: System, x: Array, before: Freedoms, parts: tuple[Change, ...]
     if float(after_system.at(state[:, None]).closure[0]) > 1e-8:
         return None
     columns, _ = named_columns(changed, after_system, {d.freedom: 0.0 for d in changed.drives})
-    after = free_motion(after_system, state, columns)
-    rows = 6 * len(system.graph.loops)
+    after = free_motion(after_system, state, columns, engine)
     return Effect(
         tuple((m.pairs[c.pair].name, m.pairs[c.pair].type.symbol, c.type.symbol) for c in parts),
-        (rows - before.rank, rows - after.rank),
+        (before.redundancy, after.redundancy),
         (before.mobility, after.mobility),
         (len(before.passive), len(after.passive)),
         tuple(float(np.degrees(c.turn)) for c in parts),
@@ -255,17 +284,19 @@ def with_turned_pair(m: Mechanism, name: str, angle: float) -> Mechanism:
     return m.replace(pairs=[replaced(p) if p.name == name else p for p in m.pairs])
 
 
-def advice(system: System, x: Array, freedoms: Freedoms) -> tuple[Effect, ...]:
+def advice(
+    system: System, x: Array, freedoms: Freedoms, motion: FiniteMotion, engine: EngineName = "auto"
+) -> tuple[Effect, ...]:
     """Pair changes worth making: those that remove redundancy without adding input freedoms; for a structure, those that free it."""
     here = system.at(x[:, None])
-    changes = changes_of(here)
-    redundancy = 6 * len(system.graph.loops) - freedoms.rank
+    redundancy = freedoms.redundancy
+    changes = changes_of(here, freedoms)
     found: list[Effect] = []
     inputs = freedoms.mobility - len(freedoms.passive)
     if redundancy:
         singles, complete = relieving(changes, redundancy)
         for parts in (*_mixed(complete), *singles):
-            done = effect(system, x, freedoms, parts)
+            done = effect(system, x, freedoms, parts, engine)
             if (
                 done
                 and done.mobility[1] - done.passive[1] == inputs
@@ -273,19 +304,18 @@ def advice(system: System, x: Array, freedoms: Freedoms) -> tuple[Effect, ...]:
                 and done not in found
             ):
                 found.append(done)
-    return tuple([*_freeing(system, x, freedoms, changes), *found][: SHOWN + 3])
+    return tuple([*_freeing(system, x, freedoms, changes, motion, engine), *found][: SHOWN + 3])
 
 
-def _freeing(system: System, x: Array, freedoms: Freedoms, changes: list[Change]) -> list[Effect]:
+def _freeing(
+    system: System, x: Array, freedoms: Freedoms, changes: list[Change], motion: FiniteMotion, engine: EngineName
+) -> list[Effect]:
     """For a structure the changes that let it move, those that add fewest freedoms first; nothing for what moves."""
-    motion = finite_motion(system, x) if freedoms.mobility else None
-    if freedoms.mobility - len(freedoms.passive) and not (motion and motion.mobility == 0):
+    if freedoms.mobility - len(freedoms.passive) and motion.mobility:
         return []
     found: list[Effect] = []
-    for c in _spread(sorted((c for c in changes if c.added > _relief((c,))), key=lambda c: (c.added, c.pair)))[
-        :FREEING
-    ]:
-        done = effect(system, x, freedoms, (c,))
+    for c in _spread(sorted((c for c in changes if c.added > c.relief), key=lambda c: (c.added, c.pair)))[:FREEING]:
+        done = effect(system, x, freedoms, (c,), engine)
         if done and done.mobility[1] - done.passive[1] > freedoms.mobility - len(freedoms.passive):
             found.append(done)
     return found

@@ -13,21 +13,19 @@ from dataclasses import dataclass
 from itertools import combinations, pairwise
 
 import numpy as np
+import scipy
 
 from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array, compose, pose_exp
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index, System
 from mechgraph.model import pair_kinematics as evaluation
+from mechgraph.numerics.tolerances import MOTIONS
+from mechgraph.topology.components import components_of_edges, cut_off, labels_of_bipartite, members
 from mechgraph.topology.linkgraph import LinkGraph
 
-STILL = 1e-8
-"""Part of a unit motion below which a freedom or link counts as standing still."""
-COMMON = 1e-9
-"""Relative singular value below which twists of a border count as common to its pairs."""
-IN_PLACE = 1e-5
-"""Rate at which a pair element may leave its place in a passive motion (differences of step ``STEP``)."""
 STEP = 1e-4
+"""Step of the central differences that tell whether a pair element leaves its place."""
 LONGEST_SERIES = 40
 """Pairs of one series up to which any two are tried as a border; in longer ones neighbours only."""
 
@@ -52,56 +50,35 @@ class _Search:
         self.place = {int(k): (n, i) for n, g in enumerate(self.system.groups) for i, k in enumerate(g.pairs)}
         self.columns = [[c for c in range(*span) if c not in self.driven] for span in self.spans]
 
-    def meet(self, one: int, two: int) -> bool:
+    def common_twist(self, one: int, two: int) -> bool:
         """Whether two pairs have a twist in common."""
         S = self.here.S[:, self.columns[one] + self.columns[two], 0]
         if not self.columns[one] or not self.columns[two]:
             return False
         s = np.linalg.svd(S, compute_uv=False)
-        return S.shape[1] > 6 or bool(s[-1] <= COMMON * s[0])
+        return S.shape[1] > 6 or bool(s[-1] <= MOTIONS.common * s[0])
 
 
 def passive_motions(here: Configuration, left: Array, driven: Index) -> list[PassiveMotion]:
     """Independent passive motions with the freedoms ``driven`` at rest; ``left (F, p)`` are all motions that leave free."""
     if not left.shape[1]:
         return []
-    import networkx as nx
-
     found: list[PassiveMotion] = []
     search = _Search(here, driven)
-    sharing: nx.Graph[int] = nx.Graph()
     for links, border in sorted(_borders(search, left), key=lambda item: (len(item[0]), item[0])):
         for motion in _of_border(search, links, border):
-            moving = np.flatnonzero(np.abs(motion.rates) > STILL).tolist()
-            trial = ~len(found)
-            nx.add_star(sharing, [trial, *moving])
-            tied = [~i for i in nx.node_connected_component(sharing, trial) if i < 0 and i != trial]
-            if _independent(motion, [found[i] for i in sorted(tied)]):
+            if _independent(motion, found):
                 found.append(motion)
-            else:
-                sharing.remove_node(trial)
     return sorted(found, key=lambda p: p.links)
 
 
 def still_sets(system: System, rates: Array) -> list[list[int]]:
     """Links that no motion ``rates (F, p)`` moves against each other, joined through pairs that stand still in all of them."""
-    parent = list(range(system.graph.n_links))
-
-    def root(i: int) -> int:
-        while parent[i] != i:
-            parent[i] = parent[parent[i]]
-            i = parent[i]
-        return i
-
-    size = np.abs(rates).max(axis=1, initial=0.0)
-    for k, (a, b) in enumerate(system.graph.ends):
-        mine = size[system.first_column[k] : system.first_column[k + 1]]
-        if mine.max(initial=0.0) < STILL:
-            parent[root(a)] = root(b)
-    out: dict[int, list[int]] = {}
-    for i in range(len(parent)):
-        out.setdefault(root(i), []).append(i)
-    return list(out.values())
+    moves = np.concatenate([np.abs(rates).max(axis=1, initial=0.0) >= MOTIONS.still, [False]])
+    first = system.first_column
+    moving = np.add.reduceat(moves, first[:-1]) * (np.diff(first) > 0) > 0
+    ends = [e for e, moved in zip(system.graph.ends, moving.tolist(), strict=True) if not moved]
+    return members(components_of_edges(system.graph.n_links, ends))
 
 
 def series(graph: LinkGraph) -> list[list[int]]:
@@ -121,43 +98,28 @@ def series(graph: LinkGraph) -> list[list[int]]:
 def _borders(search: _Search, left: Array) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
     """(links, border pairs) of all sets that a passive motion could move."""
     graph = search.system.graph
-    home: dict[int, int] = {}
+    set_of: dict[int, int] = {}
     sets = still_sets(search.system, left)
     for number, links in enumerate(sets):
-        home |= dict.fromkeys(links, number)
+        set_of |= dict.fromkeys(links, number)
     border: list[list[int]] = [[] for _ in sets]
     for k, (a, b) in enumerate(graph.ends):
-        if home[a] != home[b]:
-            border[home[a]].append(k)
-            border[home[b]].append(k)
+        if set_of[a] != set_of[b]:
+            border[set_of[a]].append(k)
+            border[set_of[b]].append(k)
     seen = set()
     for links, pairs in zip(sets, border, strict=True):
-        if graph.frame not in links and len(pairs) > 1 and all(search.meet(pairs[0], k) for k in pairs[1:]):
+        if graph.frame not in links and len(pairs) > 1 and all(search.common_twist(pairs[0], k) for k in pairs[1:]):
             seen.add(tuple(links))
             yield tuple(links), tuple(pairs)
     for in_series in series(graph):
         few = len(in_series) <= LONGEST_SERIES
         for one, two in combinations(in_series, 2) if few else pairwise(in_series):
-            if search.meet(one, two):
-                cut = _cut_off(graph, one, two)
+            if search.common_twist(one, two):
+                cut = cut_off(graph.n_links, graph.ends, graph.frame, (one, two))
                 if cut not in seen:
                     seen.add(cut)
                     yield cut, (one, two)
-
-
-def _cut_off(graph: LinkGraph, one: int, two: int) -> tuple[int, ...]:
-    """Links that lose the frame when two pairs are cut."""
-    near: list[list[int]] = [[] for _ in range(graph.n_links)]
-    for k, (a, b) in enumerate(graph.ends):
-        if k not in (one, two):
-            near[a].append(b)
-            near[b].append(a)
-    reached, front = {graph.frame}, [graph.frame]
-    while front:
-        fresh = [j for j in near[front.pop()] if j not in reached]
-        reached.update(fresh)
-        front += fresh
-    return tuple(i for i in range(graph.n_links) if i not in reached)
 
 
 def _of_border(search: _Search, links: tuple[int, ...], border: tuple[int, ...]) -> list[PassiveMotion]:
@@ -174,7 +136,7 @@ def _of_border(search: _Search, links: tuple[int, ...], border: tuple[int, ...])
         rows[6 * i : 6 * i + 6, : len(columns[0])] = first
         rows[6 * i : 6 * i + 6, at : at + len(part)] = -side * here.S[:, part, 0]
         at += len(part)
-    common = null_space(rows, COMMON)
+    common = null_space(rows, MOTIONS.common)
     if not common.shape[1]:
         return []
     moves = np.zeros((system.n_freedoms, common.shape[1]))
@@ -182,7 +144,7 @@ def _of_border(search: _Search, links: tuple[int, ...], border: tuple[int, ...])
     twists = first @ common[: len(columns[0])]
     leaving = np.concatenate([_leaving(search, k, links, moves, twists) for k in border])
     out = []
-    for mix in small_combinations(leaving, IN_PLACE).T:
+    for mix in small_combinations(leaving, MOTIONS.in_place).T:
         rates, twist = moves @ mix, twists @ mix
         scale = np.abs(rates).max()
         scale *= np.sign(rates[np.argmax(np.abs(rates) > (1 - 1e-9) * scale)])
@@ -223,9 +185,11 @@ def _leaving(search: _Search, k: int, links: tuple[int, ...], moves: Array, twis
     return np.stack(columns, axis=1)
 
 
-def _independent(motion: PassiveMotion, near: list[PassiveMotion]) -> bool:
+def _independent(motion: PassiveMotion, found: list[PassiveMotion]) -> bool:
     """Whether a motion is no combination of those found to which shared freedoms tie it."""
-    if not near:
-        return True
-    s = np.linalg.svd(np.stack([*(p.rates for p in near), motion.rates]), compute_uv=False)
-    return bool(s[-1] > 1e-7 * s[0])
+    rates = np.stack([*(p.rates for p in found), motion.rates])
+    moving = scipy.sparse.csr_array(np.abs(rates) > MOTIONS.still)
+    group = labels_of_bipartite(moving)
+    near = rates[group == group[-1]]
+    s = np.linalg.svd(near, compute_uv=False)
+    return len(near) == 1 or bool(s[-1] > MOTIONS.tied * s[0])

@@ -11,10 +11,9 @@ from mechgraph.algebra.screw import shift_wrench
 from mechgraph.algebra.se3 import Array, cross
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
+from mechgraph.numerics.tolerances import STRESSES
 
-DRIVERS_ALONE = 1e-9
-"""Part of a self-stress below which its reactions count as none: drivers that strain each other alone."""
-UNIQUE = 1e-7
+UNIQUE = STRESSES.unique
 """Part of a unit self-stress in a component above which the component is not unique (forces and moments / L compared)."""
 
 
@@ -74,12 +73,12 @@ def _orthonormal(reactions: Array, efforts: Array) -> Array:
     """Mixes ``(T, s, s)`` that make states orthonormal in their reactions ``(T, n, s)``; in their efforts where those are all zero."""
     R = np.linalg.qr(reactions, mode="r")
     size = np.abs(np.einsum("tii->ti", R))
-    if (size.min(axis=1) > DRIVERS_ALONE * size.max(axis=1)).all():
+    if (size.min(axis=1) > STRESSES.drivers_alone * size.max(axis=1)).all():
         return np.asarray(np.linalg.inv(R))
     _, sigma, Vt = np.linalg.svd(reactions, full_matrices=False)
     out = np.swapaxes(Vt, 1, 2).copy()
     for t, (mix, values) in enumerate(zip(out, sigma, strict=True)):
-        alone = values <= DRIVERS_ALONE * max(values[0], float(np.abs(efforts[t]).max()))
+        alone = values <= STRESSES.drivers_alone * max(values[0], float(np.abs(efforts[t]).max()))
         mix[:, ~alone] /= values[~alone]
         mix[:, alone] = mix[:, alone] @ np.linalg.inv(np.linalg.qr(efforts[t] @ mix[:, alone], mode="r"))
     return out

@@ -1,22 +1,26 @@
-"""Self-stresses in readable form: a canonical sparse basis over reaction components, and groups of states that share components."""
+"""Self-stresses as a sparse basis over reaction components, the same at any size, and the groups of states that share components.
+
+The basis depends on the space of self-stresses and on the order of declaration only: those of every single loop in reduced echelon
+form, loop by loop, then those that connect loops (without any part in the former) in reduced echelon form together.
+"""
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array
+from mechgraph.closure.indexing import Index
+from mechgraph.numerics.tolerances import STRESSES
+from mechgraph.structure.components import Label
+from mechgraph.topology.components import labels_of_bipartite
 
-SHOWN = 1e-6
-"""Part of a self-stress (largest part 1) below which a component is not shown."""
 COMBINED = 300
 """Components of one group up to which combinations across pairs are worked out."""
-
-Label = tuple[str, str]
 
 
 @dataclass(frozen=True)
@@ -37,110 +41,122 @@ class SelfStress:
         return line.removeprefix("+ ")
 
 
-def readable(table: Array, labels: list[Label]) -> tuple[tuple[SelfStress, ...], Array, Array]:
-    """Canonical self-stresses of ``table (components, s)``; the basis in their order and the group of each."""
-    basis = canonical(table)
-    groups = groups_of(basis)
-    order = np.argsort(groups, kind="stable")
-    basis, groups = basis[:, order], groups[order]
-    states = []
-    for column, group in zip(basis.T, groups, strict=True):
-        shown = [(labels[i], float(column[i])) for i in np.flatnonzero(np.abs(column) > SHOWN)]
-        states.append(
-            SelfStress(
-                {f"{pair}:{name}": v for (pair, name), v in shown if not name.startswith("effort")},
-                {f"{pair}{name[6:].replace(' ', '.')}": v for (pair, name), v in shown if name.startswith("effort")},
-                int(group),
-            )
+@dataclass(frozen=True)
+class Basis:
+    """Self-stresses ``states (components, s)``, sorted by ``group (s,)``; states that share a component belong together.
+
+    ``groups`` is their number; ``partly`` are those not all of whose states are here.
+    """
+
+    states: scipy.sparse.csc_array
+    group: Index
+    groups: int
+    partly: frozenset[int]
+
+    def state(self, i: int, labels: list[Label]) -> SelfStress:
+        """One state by names."""
+        at = slice(int(self.states.indptr[i]), int(self.states.indptr[i + 1]))
+        parts = [
+            (labels[c], float(v))
+            for c, v in zip(self.states.indices[at].tolist(), self.states.data[at], strict=True)
+            if abs(v) > STRESSES.shown
+        ]
+        return SelfStress(
+            {f"{pair}:{name}": v for (pair, name), v in parts if not name.startswith("effort")},
+            {f"{pair}{name[6:].replace(' ', '.')}": v for (pair, name), v in parts if name.startswith("effort")},
+            int(self.group[i]),
         )
-    return tuple(states), basis, groups
 
 
-def combinations(
-    basis: Array, groups: Array, labels: list[Label], known: set[int]
-) -> tuple[tuple[tuple[int, str], ...], int]:
+def basis_of(count: int, parts: list[tuple[Index, Index, Array]], connected: list[Index]) -> Basis:
+    """The basis from self-stresses ``(n, c, s)`` in places ``(n, c)``, in the order of their numbers ``(n,)``.
+
+    Each list of places ``connected`` belongs to one group, by states that are not given.
+    """
+    keys = np.concatenate([np.zeros(0, dtype=np.intp), *(np.repeat(key, v.shape[2]) for key, _, v in parts)])
+    column_of = np.empty(len(keys), dtype=np.intp)
+    column_of[np.argsort(keys, kind="stable")] = np.arange(len(keys))
+    rows, columns, data, at = [np.zeros(0, dtype=np.intp)], [np.zeros(0, dtype=np.intp)], [np.zeros(0)], 0
+    for _, places, values in parts:
+        n, _, s = values.shape
+        made = canonical(values)
+        k, i, j = np.nonzero(made)
+        rows.append(places[k, i])
+        columns.append(column_of[at + k * s + j])
+        data.append(made[k, i, j])
+        at += n * s
+    row, column, value = np.concatenate(rows), np.concatenate(columns), np.concatenate(data)
+    states = scipy.sparse.csc_array((value, (row, column)), shape=(count, at))
+    shown = np.abs(value) > STRESSES.shown
+    ties = np.repeat(np.arange(len(connected)), [len(p) for p in connected])
+    touch = scipy.sparse.coo_array(
+        (
+            np.ones(int(shown.sum()) + len(ties)),
+            (np.concatenate([column[shown], at + ties]), np.concatenate([row[shown], *connected])),
+        ),
+        shape=(at + len(connected), count),
+    )
+    group = labels_of_bipartite(touch)
+    order = np.argsort(group[:at], kind="stable")
+    return Basis(states[:, order], group[:at][order], int(group.max(initial=-1)) + 1, frozenset(group[at:].tolist()))
+
+
+def combinations(basis: Basis, labels: list[Label], known: set[int]) -> tuple[tuple[tuple[int, str], ...], int]:
     """Per group the sums of components that are unique though their terms are not; ``known`` components are left out.
 
     A component that a combination found before ties to others of its pair brings nothing new, so it is among ``known``.
     Also returned: the number of groups that have too many components for it.
     """
     out, unsought = [], 0
-    for group in sorted(set(groups.tolist())):
-        mine = basis[:, groups == group]
-        touched = [int(i) for i in np.flatnonzero(np.abs(mine).max(axis=1) > SHOWN) if int(i) not in known]
-        if len(touched) > COMBINED:
+    starts = np.searchsorted(basis.group, np.arange(basis.groups + 1))
+    for group in range(basis.groups):
+        mine = basis.states[:, starts[group] : starts[group + 1]]
+        touched = [int(i) for i in np.unique(mine.indices[np.abs(mine.data) > STRESSES.shown]) if int(i) not in known]
+        if len(touched) > COMBINED or group in basis.partly:
             unsought += 1
             continue
-        for column in canonical(null_space(mine[touched].T, 1e-9)).T:
-            terms = {":".join(labels[i]): float(v) for i, v in zip(touched, column, strict=True) if abs(v) > SHOWN}
+        rows = mine.tocsr()[touched].toarray()
+        for column in canonical(null_space(rows.T, 1e-9)[None])[0].T:
+            terms = {
+                ":".join(labels[i]): float(v) for i, v in zip(touched, column, strict=True) if abs(v) > STRESSES.shown
+            }
             out.append((group, SelfStress(terms, {}).text))
     return tuple(out), unsought
 
 
-def regrouped(states: Sequence[SelfStress]) -> tuple[SelfStress, ...]:
-    """The states with group numbers made anew: states that share a component belong together."""
-    if len(states) < 2:
-        return tuple(dataclasses.replace(s, group=0) for s in states)
-    import networkx as nx
-
-    names = [{*s.components, *(f"effort {name}" for name in s.efforts)} for s in states]
-    place = {name: i for i, name in enumerate(dict.fromkeys(name for part in names for name in sorted(part)))}
-    graph: nx.Graph[int] = nx.Graph()
-    for i, part in enumerate(names):
-        nx.add_star(graph, [~i, *(place[name] for name in part)])
-    number: dict[int, int] = {}
-    for component in nx.connected_components(graph):
-        number |= dict.fromkeys((~i for i in component if i < 0), len(number))
-    order = {group: n for n, group in enumerate(dict.fromkeys(number[i] for i in range(len(states))))}
-    return tuple(dataclasses.replace(s, group=order[number[i]]) for i, s in enumerate(states))
-
-
 def canonical(columns: Array) -> Array:
-    """A sparse basis of a column space that depends on the space and the order of its rows only.
+    """Sparse bases of column spaces ``(n, c, s)`` that depend on the spaces and the order of their rows only.
 
     Reduced echelon form taken from the first row on and from the last row on; the sparser is kept. Columns are scaled so that
     their largest entry is one.
     """
-    if not columns.shape[1]:
+    if not columns.size:
         return columns
-    forward, backward = _echelon(columns), _echelon(columns[::-1])[::-1]
-    best = min((forward, backward), key=lambda A: int((np.abs(A) > SHOWN).sum()))
-    best = best / np.abs(best).max(axis=0)
-    first = np.argmax(np.abs(best) > 1 - 1e-9, axis=0)
-    best = best * np.sign(best[first, np.arange(best.shape[1])])
+    forward, backward = _echelon(columns), _echelon(columns[:, ::-1])[:, ::-1]
+    terms = [(np.abs(A) > STRESSES.shown).sum(axis=(1, 2)) for A in (forward, backward)]
+    best = np.where((terms[0] <= terms[1])[:, None, None], forward, backward)
+    best = best / np.maximum(np.abs(best).max(axis=1, keepdims=True), 1e-300)
+    first = np.argmax(np.abs(best) > 1 - 1e-9, axis=1)
+    best = best * np.sign(np.take_along_axis(best, first[:, None], axis=1))
     return np.where(np.abs(best) < 1e-9, 0.0, best)
 
 
 def _echelon(columns: Array) -> Array:
-    """Column echelon form with unit pivots in the first rows that can have them (entries against the largest)."""
-    A = columns / np.abs(columns).max()
-    done = 0
-    for i in range(A.shape[0]):
-        if done == A.shape[1]:
-            break
-        j = done + int(np.argmax(np.abs(A[i, done:])))
-        if abs(A[i, j]) < 1e-6:
-            A[i, done:] = 0.0
-            continue
-        A[:, [done, j]] = A[:, [j, done]]
-        A[:, done] /= A[i, done]
-        others = np.delete(np.arange(A.shape[1]), done)
-        A[:, others] -= np.outer(A[:, done], A[i, others])
-        done += 1
+    """Column echelon forms with unit pivots in the first rows that can have them (entries against the largest), all at once."""
+    A = columns / np.maximum(np.abs(columns).max(axis=(1, 2), keepdims=True), 1e-300)
+    n, _, s = A.shape
+    each = np.arange(n)
+    rows = np.arange(A.shape[1])
+    for done in range(s):
+        size = np.abs(A[:, :, done:]).max(axis=2)
+        i = np.argmax(size >= STRESSES.shown, axis=1)
+        A[:, :, done:] = np.where((rows[None] < i[:, None])[:, :, None], 0.0, A[:, :, done:])
+        j = done + np.argmax(np.abs(A[each, i, done:]), axis=1)
+        pivot = A[each, :, j]
+        A[each, :, j] = A[:, :, done]
+        height = pivot[each, i]
+        pivot = pivot / np.where(np.abs(height) < STRESSES.shown, 1.0, height)[:, None]
+        A[:, :, done] = 0.0
+        A -= pivot[:, :, None] * A[each, i][:, None, :]
+        A[:, :, done] = pivot
     return A
-
-
-def groups_of(basis: Array) -> Array:
-    """Group number of every column: columns that share a component belong together."""
-    shown = np.abs(basis) > SHOWN
-    group = np.full(basis.shape[1], -1)
-    for j in range(basis.shape[1]):
-        if group[j] >= 0:
-            continue
-        front, number = [j], int(group.max(initial=-1)) + 1
-        while front:
-            i = front.pop()
-            if group[i] < 0:
-                group[i] = number
-                front += [int(k) for k in np.flatnonzero(shown[shown[:, i]].any(axis=0)) if group[k] < 0]
-    return group

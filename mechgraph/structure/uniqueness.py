@@ -3,205 +3,155 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
-from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
-from mechgraph.model.pair import Pair
-from mechgraph.numerics.linear import RANK_TOLERANCE
-from mechgraph.structure.bordered import Bordered
-from mechgraph.structure.elimination import Elimination
-from mechgraph.structure.mobility import elimination, is_large
-from mechgraph.structure.reaction_split import UNIQUE, PairFrames, Stress, orthonormal_stress, split_stress
-from mechgraph.structure.self_stress import Label, SelfStress, combinations, readable, regrouped
-from mechgraph.structure.transverse import Transverse, transverse
+from mechgraph.closure.rank import ClosureRank, EngineName, closure_rank
+from mechgraph.structure.components import Components
+from mechgraph.structure.reaction_split import UNIQUE
+from mechgraph.structure.self_stress import Basis, SelfStress, basis_of, combinations
+from mechgraph.structure.unique_directions import UniqueDirection, unique_directions
 
 PROBES = 6
-"""Random self-stresses that stand for all of them in a large mechanism."""
-LISTED = 20
-"""Self-stresses of a large mechanism that are worked out at once; the others when asked for."""
-SHARED = 100
-"""Self-stresses across loops of a large mechanism that are worked out at most."""
+"""Random self-stresses that stand for all of them: each has a part of every one, so a component without a part in any is unique."""
+CONNECTING = 200
+"""Self-stresses that connect loops up to which they are worked out; their echelon form is dense, of that width."""
 SEED = 5
 
 
 @dataclass(frozen=True)
 class Uniqueness:
-    """The verdict on reactions at one position.
+    """The verdict on reactions at one position; what is expensive is worked out when first asked for.
 
-    Attributes
-    ----------
-    unique : pair -> component -> bool; ``effort`` (or ``effort Tz``) for driven freedoms.
-    count, groups : number of self-stresses with the drivers in place, and of groups that share components (in a large mechanism: of
-        connected parts in which they lie).
-    states : canonical sparse self-stresses; in a large mechanism the first few (``self_stresses`` gives the others).
-    transverse : directions of force and moment that are unique in a pair though its components are not.
-    combinations : per group the further sums of components that are unique although their terms are not, as text.
-    unsought : groups in which such sums were not sought, as they have too many components; all groups of a large mechanism.
-    weakest, strongest : the largest part of a unit self-stress in a component called unique, the smallest in one called not unique.
-    sampled : whether random self-stresses stood for all of them, as in large mechanisms.
+    ``parts`` the components, ``found`` the closure equations with the drivers at rest, ``table (components, probes)`` their parts in
+    random self-stresses of size one in the measure of every loop, so that the verdict does not depend on how many loops there are.
     """
 
-    unique: dict[str, dict[str, bool]]
-    count: int
-    groups: int
-    states: tuple[SelfStress, ...]
-    transverse: tuple[Transverse, ...]
-    combinations: tuple[tuple[int, str], ...]
-    weakest: float
-    strongest: float
-    unsought: int = 0
-    sampled: bool = False
+    parts: Components
+    found: ClosureRank
+    table: Array
+
+    @property
+    def count(self) -> int:
+        """Number of self-stresses with the drivers in place."""
+        return self.found.count - self.found.rank
+
+    @cached_property
+    def sizes(self) -> Array:
+        """Part of every component in the random self-stresses."""
+        return np.sqrt((self.table**2).sum(axis=1))
+
+    @property
+    def is_unique(self) -> NDArray[np.bool_]:
+        """Whether each component is unique, in the order of ``parts.labels``."""
+        return self.sizes <= UNIQUE
+
+    @property
+    def weakest(self) -> float:
+        """Largest part of a self-stress in a component called unique."""
+        return float(self.sizes[self.is_unique].max(initial=0.0))
+
+    @property
+    def strongest(self) -> float:
+        """Smallest part of a self-stress in a component called not unique."""
+        return float(self.sizes[~self.is_unique].min(initial=np.inf))
+
+    @cached_property
+    def unique(self) -> dict[str, dict[str, bool]]:
+        """Pair -> component -> whether it is unique; ``effort`` (or ``effort Tz``) for driven freedoms."""
+        out: dict[str, dict[str, bool]] = {pair.name: {} for pair in self.parts.system.m.pairs}
+        for (pair, name), ok in zip(self.parts.labels, self.is_unique.tolist(), strict=True):
+            out[pair][name] = ok
+        return out
+
+    @cached_property
+    def basis(self) -> Basis:
+        """Canonical sparse self-stresses: of single loops, then (up to ``CONNECTING``) those that connect loops."""
+        local = self.parts.of_loops(self.found)
+        shared = self.found.shared
+        if not shared:
+            return basis_of(self.parts.count, local, [])
+        if shared > CONNECTING:
+            return basis_of(self.parts.count, local, self._places_of_sets())
+        states = self.parts.table(pair_states(self.parts.here, self.found.connecting(np.eye(shared))))
+        touched = np.flatnonzero(np.abs(states).max(axis=1) > UNIQUE * np.abs(states).max())
+        number = np.array([len(self.parts.system.graph.loops)])
+        return basis_of(self.parts.count, [*local, (number, touched[None], states[touched][None])], [])
+
+    def _places_of_sets(self) -> list[Index]:
+        """For every set of connected loops the components there that are not unique."""
+        loop, pair, _ = self.parts.system.graph.loop_steps
+        home = np.full(len(self.parts.system.graph.loops), -1)
+        sets = [loops for _, loops in self.found.sets if len(loops) > 1]
+        for number, loops in enumerate(sets):
+            home[list(loops)] = number
+        loose = ~self.is_unique
+        steps = [pair[home[loop] == number] for number in range(len(sets))]
+        return [np.flatnonzero(loose & np.isin(self.parts.owners, pairs)) for pairs in steps]
+
+    @property
+    def groups(self) -> int:
+        """Number of groups of self-stresses that share components."""
+        return self.basis.groups
+
+    @property
+    def listed(self) -> int:
+        """Number of self-stresses that can be listed: all but those that connect loops where these are more than ``CONNECTING``."""
+        return len(self.basis.group)
+
+    def first_states(self, count: int) -> tuple[SelfStress, ...]:
+        """The first few self-stresses."""
+        return tuple(self.basis.state(i, self.parts.labels) for i in range(min(count, self.listed)))
+
+    @cached_property
+    def states(self) -> tuple[SelfStress, ...]:
+        """All self-stresses that can be listed."""
+        return self.first_states(self.listed)
+
+    @cached_property
+    def _directions(self) -> tuple[tuple[UniqueDirection, ...], set[int]]:
+        return unique_directions(self.parts, self.table)
+
+    @property
+    def transverse(self) -> tuple[UniqueDirection, ...]:
+        """Directions of force and moment that are unique in a pair though its components are not."""
+        return self._directions[0]
+
+    @cached_property
+    def _sums(self) -> tuple[tuple[tuple[int, str], ...], int]:
+        return combinations(self.basis, self.parts.labels, self._directions[1])
+
+    @property
+    def combinations(self) -> tuple[tuple[int, str], ...]:
+        """Per group the further sums of components that are unique although their terms are not, as text."""
+        return self._sums[0]
+
+    @property
+    def unsought(self) -> int:
+        """Number of groups in which such sums were not sought, as they have too many components."""
+        return self._sums[1]
 
 
-def stress_at(here: Configuration, driven: Index) -> Stress:
-    """Self-stresses at one position with the drivers in place: the null space of ``[J^T, -E]``."""
-    free = np.setdiff1d(np.arange(here.system.n_freedoms), driven)
-    null = null_space(here.J[:, free, 0].T, RANK_TOLERANCE)
-    return orthonormal_stress(here, pair_states(here, null), driven)
+def uniqueness(
+    here: Configuration, driven: Index, engine: EngineName = "auto", found: ClosureRank | None = None
+) -> Uniqueness:
+    """Which reaction components and efforts are unique: those in which no self-stress has a part, drivers in place.
+
+    ``found``, where it is known, is the rank of the closure equations with the drivers at rest. The self-stresses are the null space
+    of ``[J^T, -E]``: of ``J^T`` in the columns that are not driven.
+    """
+    parts = Components(here, driven)
+    found = found or closure_rank(here, driven, engine)
+    count = min(PROBES, found.count - found.rank)
+    probes = found.random_stress(np.random.default_rng(SEED), count)
+    return Uniqueness(parts, found, parts.table(pair_states(here, probes)))
 
 
-def pair_states(here: Configuration, loops: Array) -> Array:
-    """Total pair wrenches ``(6, P, s, 1)`` of loop wrenches ``(6 loops, s)``: ``w = C^T x``."""
-    return here.pair_wrenches(loops[..., None])
-
-
-def uniqueness(here: Configuration, driven: Index) -> Uniqueness:
-    """Which reaction components and efforts are unique: those in which no self-stress has a part."""
-    return _uniqueness_of_many(here, driven) if is_large(here.system) else _uniqueness_of_few(here, driven)
-
-
-def _uniqueness_of_few(here: Configuration, driven: Index) -> Uniqueness:
-    labels, table = component_table(here, stress_at(here, driven), driven)
-    states, basis, groups = readable(table, labels)
-    directions, known = transverse(here, labels, table)
-    sums, unsought = combinations(basis, groups, labels, known)
-    return Uniqueness(
-        count=table.shape[1],
-        groups=len({s.group for s in states}),
-        states=states,
-        transverse=directions,
-        combinations=sums,
-        unsought=unsought,
-        **_verdicts(here, labels, table),
-    )
-
-
-def _uniqueness_of_many(here: Configuration, driven: Index) -> Uniqueness:
-    """By random self-stresses from the elimination along the loops: each has a part of every self-stress there is."""
-    found = elimination(here, driven)
-    rng = np.random.default_rng(SEED)
-    count = 6 * len(here.system.graph.loops) - found.rank
-    probes = found.random_stress(rng, min(PROBES, count))
-    # of size one in the measure of every loop, not as a whole: the verdict does not depend on how many loops there are
-    labels, table = component_table(here, split_stress(here, pair_states(here, probes), driven), driven)
-    verdicts = _verdicts(here, labels, table)
-    directions, _ = transverse(here, labels, table)
-    groups = _group_count(here, found, verdicts["unique"])
-    return Uniqueness(
-        count=count,
-        groups=groups,
-        states=_states_of_many(here, driven, found, LISTED),
-        transverse=directions,
-        combinations=(),
-        unsought=groups,
-        sampled=True,
-        **verdicts,
-    )
-
-
-def self_stresses(here: Configuration, driven: Index, found: Uniqueness) -> tuple[SelfStress, ...]:
-    """All self-stresses in readable form; in a large mechanism those of single loops, and of those across loops the first few."""
-    if not found.sampled:
-        return found.states
-    return _states_of_many(here, driven, elimination(here, driven), found.count)
-
-
-def _group_count(here: Configuration, found: Bordered | Elimination, unique: dict[str, dict[str, bool]]) -> int:
-    """Sets of loops with self-stresses that share a pair some component of which is not unique."""
-    import networkx as nx
-
-    m, loops = here.system.m, here.system.graph.loops
-    home = {i: number for number, (_, members) in enumerate(found.sets) for i in members}
-    graph: nx.Graph[int] = nx.Graph()
-    graph.add_nodes_from(home.values())
-    first: dict[int, int] = {}
-    for i, number in home.items():
-        for k, _ in loops[i]:
-            if not all(unique[m.pairs[k].name].values()):
-                graph.add_edge(number, first.setdefault(k, number))
-    return int(nx.number_connected_components(graph))
-
-
-def _states_of_many(
-    here: Configuration, driven: Index, found: Bordered | Elimination, most: int
-) -> tuple[SelfStress, ...]:
-    """The first ``most`` self-stresses: those of single loops, each made readable by itself, then those across loops."""
-    frames = PairFrames(here)
-    states: list[SelfStress] = []
-    for i, Y in sorted(found.local, key=lambda item: item[0]):
-        if len(states) < most:
-            states += readable(*_of_loop(here, frames, driven, i, Y))[0]
-    left = max(0, min(most - len(states), len(found.zero_rows), SHARED))
-    if left:
-        shared = found.wrenches(np.eye(len(found.zero_rows), left))
-        stress = orthonormal_stress(here, pair_states(here, shared), driven)
-        labels, table = component_table(here, stress, driven)
-        touched = np.flatnonzero(np.abs(table).max(axis=1) > UNIQUE)
-        states += readable(table[touched], [labels[i] for i in touched])[0]
-    return regrouped(states[:most])
-
-
-def _of_loop(here: Configuration, frames: PairFrames, driven: Index, loop: int, Y: Array) -> tuple[Array, list[Label]]:
-    """Parts ``(components, s)`` and labels of self-stresses of one loop alone, given by its wrenches ``Y (6, s)``."""
-    system = here.system
-    labels: list[Label] = []
-    parts: list[Array] = []
-    for k, sign in system.graph.loops[loop]:
-        mine = driven[(driven >= system.first_column[k]) & (driven < system.first_column[k + 1])]
-        efforts = here.S[:, mine, 0].T @ (sign * Y)
-        reactions = sign * Y - here.E[:, mine, 0] @ efforts
-        labels += labels_of(system.m.pairs[k], mine - system.first_column[k])
-        parts += [frames.of_one_pair(k, reactions), efforts]
-    return np.concatenate(parts), labels
-
-
-def component_table(here: Configuration, stress: Stress, driven: Index) -> tuple[list[Label], Array]:
-    """Labels (pair, component) of all components and driver efforts, and their parts ``(components, s)`` in the self-stresses."""
-    m, system = here.system.m, here.system
-    parts = PairFrames(here).components(stress.wrenches)
-    rows: dict[int, Array] = {
-        int(k): part[:, i, :, 0] for g, part in zip(system.groups, parts, strict=True) for i, k in enumerate(g.pairs)
-    }
-    labels: list[Label] = []
-    values: list[Array] = []
-    for k, pair in enumerate(m.pairs):
-        mine = driven[(driven >= system.first_column[k]) & (driven < system.first_column[k + 1])]
-        labels += labels_of(pair, mine - system.first_column[k])
-        values += [rows[k], stress.efforts[mine, :, 0]]
-    return labels, np.concatenate([np.zeros((0, stress.wrenches.shape[2])), *values])
-
-
-def labels_of(pair: Pair, driven: Index) -> list[Label]:
-    """(pair, component) of the reaction components of a pair, then of the efforts of its freedoms ``driven`` (numbers)."""
-    out = [(pair.name, name) for name in pair.type.component_names]
-    if len(driven) == 1:
-        return [*out, (pair.name, "effort")]
-    return out + [(pair.name, f"effort {pair.type.freedoms[j].name}") for j in driven]
-
-
-def _verdicts(here: Configuration, labels: list[Label], table: Array) -> dict[str, Any]:
-    sizes = np.sqrt((table**2).sum(axis=1))
-    verdicts = sizes <= UNIQUE
-    unique: dict[str, dict[str, bool]] = {pair.name: {} for pair in here.system.m.pairs}
-    for (pair_name, name), ok in zip(labels, verdicts, strict=True):
-        unique[pair_name][name] = bool(ok)
-    return {
-        "unique": unique,
-        "weakest": float(sizes[verdicts].max(initial=0.0)),
-        "strongest": float(sizes[~verdicts].min(initial=np.inf)),
-    }
+def pair_states(here: Configuration, rows: Array) -> Array:
+    """Total pair wrenches ``(6, P, s, 1)`` of loop wrenches, the first of ``rows (rows, s)``: ``w = C^T x``."""
+    return here.pair_wrenches(rows[: 6 * len(here.system.graph.loops), :, None])

@@ -13,6 +13,7 @@ import numpy as np
 import scipy
 
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.topology.components import Index, reached
 from mechgraph.topology.linkgraph import LinkGraph
 
 
@@ -40,65 +41,38 @@ class Parts:
 def parts_of(m: Mechanism, graph: LinkGraph) -> Parts:
     """Matching and parts from the graph and the freedoms of the pairs, by maximum flow from unknowns to equations."""
     P, N = len(m.pairs), graph.n_links
-    supply = np.array([6 - p.type.f for p in m.pairs])
-    for drive in m.drives:
-        supply[m.freedom(drive.freedom)[0]] += 1
+    supply = np.array([6 - p.type.f for p in m.pairs], dtype=np.intp)
+    np.add.at(supply, [m.freedom(drive.freedom)[0] for drive in m.drives], 1)
+    pair = np.repeat(np.arange(P), 2)
+    link = np.array(graph.ends, dtype=np.intp).reshape(-1)
+    moving = link != graph.frame
+    pair, link = pair[moving], link[moving]
+    links = np.delete(np.arange(N), graph.frame)
     source, sink = P + N, P + N + 1
-    rows, cols, caps = [], [], []
-    for k, ends in enumerate(graph.ends):
-        rows.append(source)
-        cols.append(k)
-        caps.append(int(supply[k]))
-        for link in ends:
-            if link != graph.frame:
-                rows.append(k)
-                cols.append(P + link)
-                caps.append(12)
-    for link in range(N):
-        if link != graph.frame:
-            rows.append(P + link)
-            cols.append(sink)
-            caps.append(6)
-    network = scipy.sparse.csr_array((np.array(caps, dtype=np.int32), (rows, cols)), shape=(P + N + 2, P + N + 2))
+    rows = np.concatenate([np.full(P, source), pair, P + links])
+    columns = np.concatenate([np.arange(P), P + link, np.full(len(links), sink)])
+    capacity = np.concatenate([supply, np.full(len(pair), 12), np.full(len(links), 6)]).astype(np.int32)
+    network = scipy.sparse.csr_array((capacity, (rows, columns)), shape=(P + N + 2, P + N + 2))
     result = scipy.sparse.csgraph.maximum_flow(network, source, sink)
-    found = result.flow.tocoo()
-    flow = {(int(i), int(j)): int(v) for i, j, v in zip(found.row, found.col, found.data, strict=True) if v > 0}
-    used = np.array([flow.get((source, k), 0) for k in range(P)])
-    filled = np.array([flow.get((P + i, sink), 0) for i in range(N)])
-    near: list[list[int]] = [[link for link in ends if link != graph.frame] for ends in graph.ends]
-    at_link: list[list[int]] = [[] for _ in range(N)]
-    for k, links in enumerate(near):
-        for link in links:
-            at_link[link].append(k)
-    spare_pairs = [k for k in range(P) if used[k] < supply[k]]
-    spare_links = [i for i in range(N) if i != graph.frame and filled[i] < 6]
-    pairs_r, links_r = set(spare_pairs), set[int]()
-    front = list(spare_pairs)
-    while front:
-        k = front.pop()
-        for link in near[k]:
-            if link not in links_r:
-                links_r.add(link)
-                fresh = [j for j in at_link[link] if j not in pairs_r and (j, P + link) in flow]
-                pairs_r.update(fresh)
-                front += fresh
-    links_f, pairs_f = set(spare_links), set[int]()
-    front = list(spare_links)
-    while front:
-        link = front.pop()
-        for k in at_link[link]:
-            if k not in pairs_f:
-                pairs_f.add(k)
-                fresh = [j for j in near[k] if j not in links_f and (k, P + j) in flow]
-                links_f.update(fresh)
-                front += fresh
-    names, pair_names = m.link_names(), tuple(p.name for p in m.pairs)
+    flow = scipy.sparse.csr_array(result.flow)
+    used, filled = flow[[source]].toarray()[0, :P], flow[:, [sink]].toarray()[P : P + N, 0]
+    serves = np.asarray(flow[pair, P + link]).ravel() > 0
+    everywhere, back = (pair, P + link), (P + link[serves], pair[serves])
+    over = _reached(P + N, everywhere, back, np.flatnonzero(used < supply))
+    under = _reached(P + N, everywhere[::-1], back[::-1], P + links[filled[links] < 6])
+    names, pair_names = m.link_names(), [p.name for p in m.pairs]
     return Parts(
         structural_rank=int(result.flow_value),
-        redundant_links=tuple(names[i] for i in sorted(links_r)),
-        redundant_pairs=tuple(pair_names[k] for k in sorted(pairs_r)),
-        free_links=tuple(names[i] for i in sorted(links_f)),
-        free_pairs=tuple(pair_names[k] for k in sorted(pairs_f)),
+        redundant_links=tuple(names[i - P] for i in over if i >= P),
+        redundant_pairs=tuple(pair_names[k] for k in over if k < P),
+        free_links=tuple(names[i - P] for i in under if i >= P),
+        free_pairs=tuple(pair_names[k] for k in under if k < P),
         spare_unknowns=int((supply - used).sum()),
-        spare_equations=int(6 * (N - 1) - filled.sum()),
+        spare_equations=int(6 * len(links) - filled.sum()),
     )
+
+
+def _reached(count: int, out: tuple[Index, Index], back: tuple[Index, Index], starts: Index) -> list[int]:
+    """Nodes on alternating paths from ``starts``: outwards along every edge, back along those that the matching uses."""
+    rows, columns = (np.concatenate([a, b]) for a, b in zip(out, back, strict=True))
+    return reached(scipy.sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(count, count)), starts).tolist()

@@ -1,0 +1,31 @@
+r"""A document as a small frozen tree, and its renderings as text, Markdown, HTML and LaTeX.
+
+The tree knows no mechanism: reports and equation listings are built from headings, paragraphs, bullets,
+tables, equations and preformatted text, and every rendering is a pure function of the tree. All renderings
+are deterministic, end with one newline and hold no trailing spaces. Blocks without content (a table without
+rows, bullets without items, an empty text) render as nothing.
+
+White space in running text (headings, paragraphs, bullets, cells, captions) counts as one space, as in HTML;
+only `Code` and the text form of an `Equation` keep theirs.
+"""
+
+from mechgraph.document.html import to_html
+from mechgraph.document.latex import to_latex
+from mechgraph.document.markdown import to_markdown
+from mechgraph.document.text import to_text
+from mechgraph.document.tree import Block, Bullets, Code, Document, Equation, Heading, Paragraph, Table
+
+__all__ = [
+    "Block",
+    "Bullets",
+    "Code",
+    "Document",
+    "Equation",
+    "Heading",
+    "Paragraph",
+    "Table",
+    "to_html",
+    "to_latex",
+    "to_markdown",
+    "to_text",
+]

@@ -1,0 +1,139 @@
+r"""LaTeX fragments that need no package beyond amsmath."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import assert_never
+
+from mechgraph.document.text import WIDTH, column_widths
+from mechgraph.document.tree import (
+    Block,
+    Bullets,
+    Code,
+    Document,
+    Equation,
+    Heading,
+    Paragraph,
+    Table,
+    joined,
+    kept_lines,
+    plain,
+)
+
+_LATEX_SPECIAL = {
+    "\\": r"\textbackslash{}",
+    "{": r"\{",
+    "}": r"\}",
+    "$": r"\$",
+    "&": r"\&",
+    "#": r"\#",
+    "%": r"\%",
+    "_": r"\_",
+    "^": r"\textasciicircum{}",
+    "~": r"\textasciitilde{}",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+    "|": r"\textbar{}",
+    "`": r"\textasciigrave{}",
+    "[": "{[}",
+    "]": "{]}",
+}
+_LATEX_TABLE = str.maketrans(_LATEX_SPECIAL)
+_LATEX_SECTIONS = ("section", "subsection", "subsubsection", "paragraph", "subparagraph", "subparagraph")
+
+
+def to_latex(document: Document) -> str:
+    r"""Return the document as a LaTeX fragment: sections, itemize, tabular, displayed equations, escaped.
+
+    The title is a ``\section``, headings go down from there. Columns that are wrapped in the text rendering
+    at 80 columns become paragraph columns of the same share of the line. No package beyond amsmath (for what
+    equations use) is needed.
+    """
+    parts = [_section(document.title, 0)]
+    parts += [_block_latex(block) for block in document.blocks]
+    return joined(parts, "\n\n")
+
+
+def _latex(text: str) -> str:
+    """Escape running text for LaTeX; double hyphens stay two hyphens."""
+    return re.sub("-(?=-)", "-{}", plain(text).translate(_LATEX_TABLE))
+
+
+def _section(text: str, level: int) -> str:
+    """Return the sectioning command of a level; nothing for an empty text."""
+    return rf"\{_LATEX_SECTIONS[level]}{{{_latex(text)}}}" if plain(text) else ""
+
+
+def _verbatim(lines: list[str]) -> str:
+    r"""Return lines verbatim; lines that themselves end a verbatim are set one by one in ``\texttt``."""
+    if any(r"\end{verbatim}" in line for line in lines):
+        typed = [re.sub("-(?=-)", "-{}", line.translate(_LATEX_TABLE)).replace(" ", "~") for line in lines]
+        return "\\\\\n".join(rf"\noindent\mbox{{\texttt{{{line}}}}}" for line in typed)
+    return "\n".join([r"\begin{verbatim}", *lines, r"\end{verbatim}"]) if lines else ""
+
+
+def _block_latex(block: Block) -> str:
+    """Render one block as LaTeX; empty where the block is."""
+    match block:
+        case Heading(text, level):
+            return _section(text, level)
+        case Paragraph(text):
+            return _latex(text)
+        case Bullets():
+            return _bullets_latex(block)
+        case Table():
+            return _table_latex(block)
+        case Equation(text, latex):
+            lines = [line for line in kept_lines(latex) if line]
+            return "\n".join([r"\[", *lines, r"\]"]) if lines else _verbatim(kept_lines(text))
+        case Code(text):
+            return _verbatim(kept_lines(text))
+        case _:
+            assert_never(block)
+
+
+def _itemize(lines: list[str]) -> list[str]:
+    """Return lines inside an itemize, or none where there are none."""
+    return [r"\begin{itemize}", *lines, r"\end{itemize}"] if lines else []
+
+
+def _bullets_latex(block: Bullets) -> str:
+    """Render bullets as nested itemize."""
+    lines: list[str] = []
+    for text, nested in block.grouped():
+        lines += [rf"\item {_latex(text)}", *_itemize([rf"\item {_latex(inner)}" for inner in nested])]
+    return "\n".join(_itemize(lines))
+
+
+def _table_latex(table: Table) -> str:
+    """Render a table as a tabular, in a float where it has a caption."""
+    if not table.rows or not table.align:
+        return ""
+    lines = table.lines
+    natural = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    fitted = column_widths(lines, WIDTH)
+    columns = "".join(
+        side if size >= full else rf"p{{{size / WIDTH:.2f}\linewidth}}"
+        for side, size, full in zip(table.align, fitted, natural, strict=True)
+    )
+
+    def row(line: Sequence[str]) -> str:
+        cells = " & ".join(_latex(cell) for cell in line)
+        return rf"{'{}' if cells.startswith('*') else ''}{cells} \\"
+
+    rows = [row(line) for line in lines]
+    if table.header:
+        rows.insert(1, r"\hline")
+    grid = [rf"\begin{{tabular}}{{{columns}}}", *rows, r"\end{tabular}"]
+    if plain(table.caption):
+        return "\n".join(
+            [
+                r"\begin{table}[htbp]",
+                r"\centering",
+                rf"\caption{{{_latex(table.caption)}}}",
+                *grid,
+                r"\end{table}",
+            ]
+        )
+    return "\n".join([r"\begin{center}", *grid, r"\end{center}"])
