@@ -117,7 +117,9 @@ def unspun(path: DriverPath, found: Positions, bodies: tuple[Idle, ...]) -> Posi
 class _Carried:
     """Vectors across the axes of passive bodies, carried parallel along tracks."""
 
-    def __init__(self, path: DriverPath, interpolation: Interpolation, follower: Follower, bodies: tuple[Idle, ...]) -> None:
+    def __init__(
+        self, path: DriverPath, interpolation: Interpolation, follower: Follower, bodies: tuple[Idle, ...]
+    ) -> None:
         self.path, self.interpolation, self.follower, self.bodies = path, interpolation, follower, bodies
         nodes, left = interpolation.nodes, interpolation.left
         self._h = nodes.place[interpolation.right] - nodes.place[left]
@@ -126,7 +128,9 @@ class _Carried:
         f = path.factored(self._at_nodes, nodes.which)
         axes, _ = _axes(self._at_nodes, bodies, f.motions())
         points, weights = np.polynomial.legendre.leggauss(GAUSS)
-        self._to_series = weights[:, None] * np.polynomial.legendre.legvander(points, GAUSS - 1) * (np.arange(GAUSS) + 0.5)
+        self._to_series = (
+            weights[:, None] * np.polynomial.legendre.legvander(points, GAUSS - 1) * (np.arange(GAUSS) + 0.5)
+        )
         here, rates = self._between(0.5 * (points + 1.0))
         w = here.link_twists(rates)[:3]
         self._bodies = [

@@ -394,6 +394,7 @@ def _smooth(problem: Problem, a: Nodes, m: Nodes, b: Nodes, correction: Array) -
     change = np.max([np.abs(p - q).max(axis=0, initial=0.0) for p, q in ((r_a, r_m), (r_m, r_b), (r_a, r_b))], axis=0)
     off = np.abs(m.drive - 0.5 * (a.drive + b.drive)).max(axis=0, initial=0.0) / h
     noise = (4.0 * off + 1e-6) * np.abs(r_m).max(axis=0, initial=0.0) + 1e-14 * m.condition / h
+    noise += PATH.tiny / h  # branches that are no further apart are one
     return np.asarray((gap <= PATH.smooth * change + noise) & (correction <= h * (PATH.smooth * change / 8 + noise)))
 
 

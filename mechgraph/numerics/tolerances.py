@@ -110,6 +110,8 @@ class PathTolerances:
     smooth: float = 0.05
     """Part of the change of rates over a step by which the rates in its middle may miss those of the Hermite cubic of its ends (and of
     the sagitta that it makes, by which the state may)."""
+    tiny: float = 1e-9
+    """Distance between states below which that is not asked: differences of rounding and of numerical derivatives."""
     fair: float = 1e3
     """Condition number above which another choice of rows and columns is sought."""
     better: float = 0.2

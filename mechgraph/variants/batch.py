@@ -27,44 +27,45 @@ from mechgraph.result.solution import Solution
 from mechgraph.variants.fields import Variants
 
 Mask = NDArray[np.bool_]
-NumbersAt = Callable[[Array], Variants]
-"""Variants on the way from the mechanism itself (0) to the variants asked for (1), each at its part of the way ``(V,)``."""
+NumbersAt = Callable[[Array, Index], Variants]
+"""Some of the variants ``(n,)`` (one may stand several times), each at its part ``(n,)`` of the way from the mechanism itself (0) to it (1)."""
 
 
 class NumbersPath(DriverPath):
     """The closure equations while the numbers change, drivers at rest: the path value is the part of the way."""
 
-    def __init__(self, line: Pipeline, numbers_at: NumbersAt, count: int) -> None:
-        keep = line.freedoms.hold
-        super().__init__(
-            line.system,
-            closure_solver(line.start, line.leading, line.options.engine, keep),
-            lambda variants: line.system,
-        )
+    def __init__(self, line: Pipeline, numbers_at: NumbersAt) -> None:
+        solver = closure_solver(line.start, line.leading, line.options.engine, line.freedoms.hold)
+        super().__init__(line.system, solver, lambda variants: line.system)
         self.size = (self.system.n_freedoms, 1)
-        self._line, self._numbers_at, self._count = line, numbers_at, count
-        self._known: dict[bytes, System] = {}
+        self._line, self._numbers_at = line, numbers_at
+        self._known: tuple[bytes, System] | None = None
 
-    def system_at(self, part: Array) -> System:
-        """The system with the numbers of all variants, each at its part of the way ``(V,)``."""
-        key = part.tobytes()
-        if key not in self._known:
+    def system_at(self, part: Array, variants: Index) -> System:
+        """The system with the numbers of variants ``(n,)``, each at its part of the way; that of the last call is kept."""
+        key = part.tobytes() + variants.tobytes()
+        if self._known is None or self._known[0] != key:
             par, m = self.system.par, self._line.m
-            made = self._numbers_at(part).numbers.parameters(m, par.offset, par.origin, par.L)
+            made = self._numbers_at(part, variants).numbers.parameters(m, par.offset, par.origin, par.L)
             # one array with all variants says how many there are
-            mass = np.broadcast_to(made.mass, (len(m.links), self._count))
-            self._known[key] = self.system.with_parameters(dataclasses.replace(made, mass=mass))
-        return self._known[key]
+            mass = np.broadcast_to(made.mass, (len(m.links), len(part)))
+            self._known = key, self.system.with_parameters(dataclasses.replace(made, mass=mass))
+        return self._known[1]
 
     def at(self, x: Array, drive: Array, tracks: Index) -> Configuration:
-        part = np.zeros(self._count)
-        part[tracks] = drive[0]
-        system = self.system_at(part)
-        return system.with_parameters(system.par.taken(tracks)).at(x)
+        """The equations with the numbers at a part of the way."""
+        self._last = drive, tracks
+        return self.system_at(drive[0], tracks).at(x)
 
     def sensitivity(self, point: Configuration, factored: FactoredClosure) -> Array:
-        # the numbers come from a function or a table of any kind: no derivatives, the first prediction is to stay
-        return np.zeros((self.system.n_freedoms, 1, point.T))
+        """Rates with the part of the way, by a forward difference: the numbers come from a function or a table of any kind."""
+        drive, tracks = self._last
+        ahead = self.system_at(drive[0] + DIFFERENCE, tracks).at(point.x).residual - point.residual
+        return factored.solve(-ahead[:, None] / DIFFERENCE)
+
+
+DIFFERENCE = 1e-7
+"""Step of that difference, in parts of the way: half the digits are left, which a prediction does not miss."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -79,23 +80,24 @@ class Together:
     starts: Array
 
 
-def solve_together(numbers_at: NumbersAt, motions: Mapping[str, Motion], method: str, redundant: str) -> Together:
+def solve_together(numbers_at: NumbersAt, count: int, motions: Mapping[str, Motion], options: Options) -> Together:
     """All variants as one batch; NaN for those that are to be solved alone, as they cannot be built or led from the mechanism itself."""
-    variants = numbers_at(np.ones(1))
-    V = variants.count
+    every = np.arange(count)
+    variants, V = numbers_at(np.ones(count), every), count
     nothing = np.full((sum(p.type.f for p in variants.mechanism.pairs), V), np.nan)
-    line = Pipeline(DriverMotion(variants.mechanism, motions), Options(method, redundant))
-    path = NumbersPath(line, numbers_at, V)
-    good = np.flatnonzero(variants.valid())
+    line = Pipeline(DriverMotion(variants.mechanism, motions), options)
+    path = NumbersPath(line, numbers_at)
+    valid = variants.valid()
+    good = np.flatnonzero(valid)
     if not good.size:
         return Together(None, np.ones(V, dtype=bool), nothing)
-    line_of = Paths([np.array([[0.0, 1.0 if v in set(good.tolist()) else 0.0]]) for v in range(V)])
+    line_of = Paths([np.array([[0.0, float(ok)]]) for ok in valid])
     tracks = Follower(path).follow(np.repeat(line.x[:, None], V, axis=1), line_of, first=1.0)
     last = np.zeros(V, dtype=np.intp)
     last[tracks.nodes.track] = np.arange(len(tracks.nodes))
     begun = np.zeros(V, dtype=bool)
     begun[good] = [tracks.end[v] is End.REACHED for v in good]
-    systems = path.system_at(np.ones(V))
+    systems = path.system_at(np.ones(V), every)
     starts = Starts(
         np.where(begun, tracks.nodes.x[:, last], np.nan),
         lambda which: systems.with_parameters(systems.par.taken(which)),

@@ -14,7 +14,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.driver_motion import driven
 from mechgraph.errors import DeclarationError
 from mechgraph.force.dalembert import METHODS
-from mechgraph.kinetostatics import REDUNDANT
+from mechgraph.kinetostatics import ENGINES, REDUNDANT
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.variants.fields import AnyField, clashes, field_values, find_field
@@ -48,6 +48,7 @@ def study(
     executor: concurrent.futures.Executor | None = None,
     method: str = "loop_wrench",
     redundant: str = "nan",
+    engine: str = "auto",
     progress: Progress | None = None,
 ) -> Study:
     """Solve many variants of one mechanism, and what varies with what.
@@ -64,7 +65,7 @@ def study(
     motions : of the drivers as in ``solve``; a leading axis of length ``n`` gives every variant its own.
     sampling : ``"random"``, ``"latin"`` (Latin hypercube) or ``"grid"``.
     executor : any ``concurrent.futures`` Executor, e.g. that of a cluster; left out, the processors of this machine.
-    method, redundant : as in ``solve``.
+    method, redundant, engine : as in ``solve``.
     progress : called with the numbers of parts done and of all parts.
 
     Returns
@@ -86,6 +87,7 @@ def study(
         "sampling": (sampling, SAMPLINGS),
         "method": (method, METHODS),
         "redundant": (redundant, REDUNDANT),
+        "engine": (engine, ENGINES),
     }
     faults = _argument_faults(m, n, seed, executor, progress, named)
     if not ways:
@@ -106,7 +108,7 @@ def study(
 
     def task(part: Array, at: slice) -> Task:
         own = {name: motion_of_case(motion, at) for name, motion in paths.items()}
-        return Task(source, part, own, kept, method, redundant)
+        return Task(source, part, own, kept, method, redundant, engine)
 
     size = max(1, min(MOST_TOGETHER, CHUNK // max(motion.shape[-1] for motion in paths.values())))
     tasks = [task(near, slice(0, 1))]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.driver_path import Status
 from mechgraph.errors import DeclarationError, MechgraphError
-from mechgraph.kinetostatics import solve
+from mechgraph.kinetostatics import Options, solve
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.result.solution import Solution
@@ -60,7 +60,7 @@ class Source:
         return varied(self.mechanism, self.fields, values)
 
     def variants(self, values: Array, part: Array) -> Variants:
-        """Variants at a ``part (count,)`` of the way from the mechanism itself (0) to ``values (parameters, count)`` (1)."""
+        """Variants at a ``part (count,)`` of the way from the mechanism itself (0) to ``values (parameters, count)`` (1), and a bit beyond."""
         on_the_way = self.start[:, None] + part * (values - self.start[:, None])
         if self.build is None:
             return self._varied(on_the_way)
@@ -86,6 +86,7 @@ class Task:
     outputs: Mapping[str, Output]
     method: str
     redundant: str
+    engine: str
 
 
 @dataclass(frozen=True)
@@ -103,7 +104,10 @@ def solved(task: Task) -> Part:
     """Solve the variants of a task: together where they can be followed in step, alone where not."""
     count = task.values.shape[1]
     together = solve_together(
-        lambda part: task.source.variants(task.values, part), task.motions, task.method, task.redundant
+        lambda part, which: task.source.variants(task.values[:, which], part),
+        count,
+        task.motions,
+        Options(task.method, task.redundant, task.engine),
     )
     alone = together.alone
     N = max(motion.shape[-1] for motion in task.motions.values())
@@ -161,7 +165,7 @@ def _solved_alone(task: Task, i: int, start: Array) -> Solution:
                 "study", [f"the motion stored with drive {name!r} has other positions than that of the first"]
             )
         motions[name] = as_rows(own[name])
-    return solve(m, motions, method=task.method, redundant=task.redundant, on_reach="flag")
+    return solve(m, motions, method=task.method, redundant=task.redundant, engine=task.engine, on_reach="flag")
 
 
 def as_rows(motion: Motion) -> Motion:
