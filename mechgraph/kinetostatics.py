@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,9 @@ from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.closure.driver_path import DriverPath, Positions, Request, Status, follow, in_blocks
 from mechgraph.closure.indexing import Index, System
-from mechgraph.closure.passive_rest import unspun
+from mechgraph.closure.passive_rest import Idle, unspun
 from mechgraph.closure.rates import Rates, distance_to_dead_point, rates
-from mechgraph.closure.solver import ClosureSolver, FactoredClosure, closure_solver
+from mechgraph.closure.solver import ENGINES, ClosureSolver, FactoredClosure, closure_solver, engine_for
 from mechgraph.errors import DeadPointError, DeclarationError, IndeterminateError, ReachError
 from mechgraph.force.block import BlockForces, ForceTask, forces_of_block
 from mechgraph.force.dalembert import METHODS
@@ -37,7 +38,6 @@ FARTHEST = 1e6
 """Longest way of a driver from its start (radians, or lengths / L)."""
 ON_REACH = ("raise", "flag")
 REDUNDANT = ("nan", "minimum_norm")
-ENGINES = ("auto", "dense", "sparse")
 
 Mask = NDArray[np.bool_]
 
@@ -70,7 +70,8 @@ class Pipeline:
     ----------
     system, x : scaled system and closed state at the start.
     columns, lead : driven freedoms; which of the drivers lead (independent ones; the others are checked to agree).
-    freedoms : what can move, what the drivers leave free, passive freedoms.
+    solver, engine : the closure equations with the leading drivers given, and what solves them.
+    bodies : links with passive freedoms.
     """
 
     def __init__(self, drive: DriverMotion, options: Options) -> None:
@@ -80,10 +81,20 @@ class Pipeline:
         self.columns, _ = named_columns(self.m, self.system, dict.fromkeys(drive.names, 0.0))
         self.unit = np.where(self.system.is_length[self.columns], self.system.par.L, 1.0)
         self._refuse_far()
-        self.freedoms: Freedoms = free_motion(self.system, self.x, self.columns)
-        self.lead = self._independent()
-        self._check_determinate()
-        self.bodies = self.freedoms.bodies
+        self.engine = engine_for(self.system.n_rows, int(np.prod(drive.batch)), options.engine)
+        self.solver = closure_solver(self.engine, self.columns)
+        self.lead = np.arange(len(self.columns))
+        self.bodies: tuple[Idle, ...] = ()
+        if not self.solver.leaves_nothing_free(self.start):
+            self.lead = self._independent()
+            self._check_determinate()
+            self.bodies = self.freedoms.bodies
+            self.solver = closure_solver(self.engine, self.leading, self.freedoms.hold)
+
+    @cached_property
+    def freedoms(self) -> Freedoms:
+        """What can move at the start, what the drivers leave free, passive freedoms."""
+        return free_motion(self.system, self.x, self.columns, self.engine)
 
     # --- drivers ---------------------------------------------------------------------------------------------------------
 
@@ -134,12 +145,11 @@ class Pipeline:
         """All positions, rates and forces as a trajectory."""
         batch = self.drive.batch if batch is None else batch
         starts = starts or Starts(self.x[:, None], lambda variants: self.system, self.m.loads)
-        solver = closure_solver(self.start, self.leading, self.options.engine, self.freedoms.hold)
         one = starts.x.shape[1] == 1
         T = int(np.prod(batch))
         variant = np.zeros(T, dtype=np.intp) if one else np.arange(T) // batch[-1]
         requests = self._requests(batch, starts)
-        path = DriverPath(self.system, solver, starts.system_of)
+        path = DriverPath(self.system, self.solver, starts.system_of)
         found = follow(path, requests, T)
         if self.bodies:
             found = unspun(path, found, self.bodies)
@@ -217,10 +227,12 @@ class Outcome:
     def _forces(self, motion: BlockMotion, f: FactoredClosure) -> BlockForces:
         line = self.line
         if len(line.lead) < len(line.columns):  # the efforts of all drivers are unknowns
-            solver = closure_solver(line.start, line.columns, line.options.engine, line.freedoms.hold)
+            solver = closure_solver(line.engine, line.columns, line.freedoms.hold)
             f = solver.factored(motion.here, solver.chosen(motion.here, np.full(motion.here.T, -1)))
         assert line.options.method is not None
-        task = ForceTask(line.options.method, self.starts.loads, line.columns, line.bodies, self.batch, line.drive.t)
+        task = ForceTask(
+            line.options.method, self.starts.loads, line.columns, line.bodies, self.batch, line.drive.t, line.options.redundant
+        )
         coordinates = self.trajectory.coordinates_at(motion.places)
         return forces_of_block(task, motion.rates, f, coordinates, motion.places)
 
@@ -320,7 +332,7 @@ def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exceptio
 
 def _check_drivers(line: Pipeline, outcome: Outcome) -> None:
     unsolved = not (outcome.found.status == Status.OK).any()
-    if not outcome.contradicting.any() and not (line.freedoms.dependent and unsolved):
+    if not outcome.contradicting.any() and not (unsolved and line.freedoms.dependent):
         return
     names, mobility = ", ".join(line.drive.names), line.freedoms.mobility
     why = (

@@ -16,6 +16,8 @@ Methods for Bifurcations of Dynamical Equilibria, 2000, chapter 3 (bordered syst
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -94,6 +96,8 @@ class LoopSystem(ReducedRows):
     def _motions_of_single_loops(self) -> list[tuple[Array, Index]]:
         blocks = self._blocks(self.rows.S) * self._scale[self.entries.column]
         shared = np.bincount(self.entries.column, minlength=len(self._free)) > 1
+        if self.rows.more is not None:
+            shared[self.rows.more.indices] = True
         own = self._free & ~shared
         rows: list[tuple[Array, Index]] = []
         for _, at in self._by_width():
@@ -105,10 +109,12 @@ class LoopSystem(ReducedRows):
         """Match kept rows and the rows of single-loop motions to the free columns; what stays over."""
         e = self.entries
         starts = np.concatenate([[0], np.cumsum(self.kept)])
-        self._m, self._n = int(starts[-1]), int(self._free.sum())
+        self._m, self._n = self.height, int(self._free.sum())
         place = np.cumsum(self._free) - 1
-        rows = [(starts[e.loop][None] + np.arange(6)[:, None])[self._live]]
-        cols, data = [np.broadcast_to(place[e.column], (6, len(e.loop)))[self._live]], []
+        more = scipy.sparse.coo_array(self._more)
+        rows = [(starts[e.loop][None] + np.arange(6)[:, None])[self._live], int(starts[-1]) + more.row.astype(np.intp)]
+        cols = [np.broadcast_to(place[e.column], (6, len(e.loop)))[self._live], more.col.astype(np.intp)]
+        data = [more.data]
         self._motions = 0
         for null, columns in self._motions_of_single_loops():
             keep = np.abs(null) > 0
@@ -125,11 +131,16 @@ class LoopSystem(ReducedRows):
         self._left_cols = np.setdiff1d(np.arange(self._n), match[match >= 0])
         self._matched = int((match >= 0).sum())
         self.shared, self.held = len(self._left_rows), self._motions + len(self._left_cols)
-        self.redundant = 6 * len(self.kept) - (self._matched - self._motions)
-        owner = np.concatenate(
-            [np.repeat(np.arange(len(self.kept)), self.kept), np.zeros(self._motions, dtype=np.intp)]
-        )
+        self.redundant = self.rows.count - (self._matched - self._motions)
+        owner = np.concatenate([self.owners, np.zeros(self._motions, dtype=np.intp)])
         self.shared_in = owner[self._left_rows]
+
+    @cached_property
+    def _more(self) -> scipy.sparse.csr_array:
+        """The rows behind those of the loops in the free columns, of unit size; they are the same everywhere."""
+        if self.rows.more is None:
+            return scipy.sparse.csr_array((0, int(self._free.sum())))
+        return scipy.sparse.csr_array(self.rows.more[:, self._free] * self._scale[self._free])
 
     def _border(self, beside: bool) -> tuple[Pattern, Array]:
         """The pattern of the square system and its constant values.
@@ -142,9 +153,10 @@ class LoopSystem(ReducedRows):
         if beside:
             number, support = _shares(self._touch, self._touch.T.tocsr(), self._left_rows)
         else:
-            count = self.kept[self.shared_in]
+            height = np.concatenate([self.kept, np.ones(self.rows.further, dtype=np.intp)])
+            count = height[self.shared_in]
             number = np.repeat(np.arange(self.shared), count)
-            first = np.cumsum(self.kept)[self.shared_in] - count
+            first = np.cumsum(height)[self.shared_in] - count
             support = first[number] + np.arange(len(number)) - (np.cumsum(count) - count)[number]
         held, columns = _shares(self._touch.T.tocsr(), self._touch, self._left_cols.astype(np.intp))
         self._size = self._n + self.shared
@@ -156,6 +168,23 @@ class LoopSystem(ReducedRows):
         )
         return pattern, constant
 
+    @cached_property
+    def _holding(self) -> scipy.sparse.csr_array:
+        """The rows ``G (held, free columns)`` that hold the motions left free."""
+        at, to = self.pattern.places
+        values = np.concatenate([np.zeros(int(self._live.sum())), self._constant])
+        mine = (at >= self._m) & (to < self._n)
+        return scipy.sparse.csr_array((values[mine], (at[mine] - self._m, to[mine])), shape=(self.held, self._n))
+
+    def unheld(self, dq: Array) -> Array:
+        """Increments ``(F, k)`` with the least change that takes the held motions out of them, ``G (dq / scale) = 0``."""
+        G = self._holding
+        y = dq[self._free] / self._scale[self._free][:, None]
+        y = y - G.T @ scipy.sparse.linalg.spsolve(scipy.sparse.csc_array(G @ G.T), G @ y).reshape(self.held, -1)
+        out = dq.copy()
+        out[self._free] = y * self._scale[self._free][:, None]
+        return out
+
     # --- solving ---------------------------------------------------------------------------------------------------------
 
     def factor(self, S: Array) -> SparseFactor:
@@ -163,42 +192,48 @@ class LoopSystem(ReducedRows):
         return self.pattern.factor(np.concatenate([self._turned_blocks(S)[self._live], self._constant]))
 
     def turned_matrix(self, S: Array) -> scipy.sparse.csr_array:
-        """``J (6 loops, free columns)`` in turned rows and columns of unit size."""
+        """``J (rows, free columns)`` in turned rows and columns of unit size; rows behind those of the loops as they are."""
         e = self.entries
         place = np.cumsum(self._free) - 1
         live = np.broadcast_to(self._free[e.column], (6, len(e.loop)))
         rows = (6 * e.loop + np.arange(6)[:, None])[live]
         cols = np.broadcast_to(place[e.column], (6, len(e.loop)))[live]
         shape = (6 * len(self.kept), int(self._free.sum()))
-        return scipy.sparse.csr_array((self._turned_blocks(S)[live], (rows, cols)), shape=shape)
+        J = scipy.sparse.csr_array((self._turned_blocks(S)[live], (rows, cols)), shape=shape)
+        return scipy.sparse.csr_array(scipy.sparse.vstack([J, self._more]))
 
     @property
     def unit(self) -> float:
         """A length in the middle of those of the loops."""
         return float(np.median(self.measure.length)) if len(self.kept) else 1.0
 
-    def wrenches_of_rows(self, y: Array) -> Array:
-        """Loop wrenches ``(6 loops,)`` from multipliers ``(6 loops, 1)`` of the turned rows."""
-        rows = np.swapaxes(self._turn, 1, 2) @ y.reshape(len(self.kept), 6, 1)
-        return np.moveaxis(self.measure.wrenches(np.moveaxis(rows, 1, 0)), 0, 1).reshape(-1)
+    @property
+    def turned_rows(self) -> scipy.sparse.csr_array:
+        """Multipliers of the closure rows for unit ones of the turned rows (wrenches of size ``unit``), ``(rows, rows)``."""
+        n = len(self.kept)
+        blocks = self.unit * self.unit_wrenches()
+        rows = np.broadcast_to(6 * np.arange(n) + np.arange(6)[:, None, None], blocks.shape)
+        cols = np.broadcast_to(6 * np.arange(n) + np.arange(6)[None, :, None], blocks.shape)
+        loops = scipy.sparse.csr_array((blocks.ravel(), (rows.ravel(), cols.ravel())), shape=(6 * n, 6 * n))
+        return scipy.sparse.csr_array(scipy.sparse.block_diag([loops, scipy.sparse.eye_array(self.rows.further)]))
 
     def solve(self, factor: SparseFactor, b: Array) -> Array:
-        """``q (F, k)`` with ``J q = b (6 loops, k)`` in the kept rows, zero in fixed columns."""
+        """``q (F, k)`` with ``J q = b (rows, k)`` in the kept rows, zero in fixed columns."""
         rhs = np.zeros((self._size, b.shape[1]))
-        rhs[: self._m] = self._turned(b)[np.arange(6) < self.kept[:, None]]
+        rhs[: self._m] = self.kept_part(b)
         y = factor.solve(rhs)
         q = np.zeros((len(self._free), b.shape[1]))
         q[self._free] = y[: self._n] * self._scale[self._free][:, None]
         return q
 
     def solve_transposed(self, factor: SparseFactor, tau: Array, shared: Array | None = None) -> Array:
-        """Loop wrenches ``x (6, loops, k)`` with ``J^T x = tau (F, k)`` in the free columns; multiples ``shared`` of the borders."""
+        """Multipliers ``x (rows, k)`` with ``J^T x = tau (F, k)`` in the free columns; multiples ``shared`` of the borders."""
         rhs = np.zeros((self._size, tau.shape[1]))
         rhs[: self._n] = tau[self._free] * self._scale[self._free][:, None]
         if shared is not None:
             rhs[self._n :] = shared
         kept = factor.solve(rhs, transposed=True)[: self._m]
-        return self._wrenches(kept, np.zeros((6 * len(self.kept) - self._m, tau.shape[1])))
+        return self.multipliers(kept)
 
     def connecting_stress(self, factor: SparseFactor, shares: Array) -> Array:
         """Multipliers ``(kept rows, k)`` of self-stresses that connect loops, for shares ``(shared, k)``."""
@@ -208,7 +243,7 @@ class LoopSystem(ReducedRows):
         return factor.solve(rhs, transposed=True)[: self._m]
 
     def random_stress(self, factor: SparseFactor, S: Array, rng: np.random.Generator, count: int) -> Array:
-        """Random self-stresses ``(6, loops, count)`` for twists ``S (6, F)``, of size one in the measure of their loops.
+        """Random self-stresses ``(rows, count)`` for twists ``S (6, F)``, of size one in the measure of their loops.
 
         In the rows that fell away they are random; what these bring to the free columns where they are not zero there (in the
         positions behind the first) the other rows take up.
@@ -226,7 +261,7 @@ class LoopSystem(ReducedRows):
             rhs[self._n :] = rng.normal(size=(self.shared, count))
         kept = factor.solve(rhs, transposed=True)[: self._m]
         size = np.maximum(np.abs(kept).max(axis=0, initial=0.0), 1.0)
-        return self._wrenches(kept / size, local[dropped] / size)
+        return self.multipliers(kept / size, local[dropped] / size)
 
     def motions(self, factor: SparseFactor) -> Array:
         """Motions ``(F, held)`` with the fixed columns at rest, one a held motion."""

@@ -66,34 +66,38 @@ class DriverPath:
         self.variant_of: Index = np.zeros(0, dtype=np.intp)
 
     def at(self, x: Array, drive: Array, tracks: Index) -> Configuration:
+        """See ``numerics.newton.Problem``."""
         x = x.copy()
         x[self.rows] = drive
         return self._system_of(self.variant_of[tracks]).at(x)
 
     def chosen(self, point: Configuration, which: Index) -> Index:
+        """See ``numerics.newton.Problem``."""
         return self.solver.chosen(point, which)
 
     def factored(self, point: Configuration, which: Index) -> FactoredClosure:
+        """See ``numerics.newton.Problem``."""
         return self.solver.factored(point, which)
 
     def sensitivity(self, point: Configuration, factored: FactoredClosure) -> Array:
+        """See ``numerics.newton.Problem``."""
         return factored.sensitivity()
 
     def advance(self, x: Array, dq: Array, tracks: Index) -> Array:
+        """See ``numerics.newton.Problem``."""
         return self.system.advance(x, dq)
 
     def difference(self, x1: Array, x0: Array) -> Array:
+        """See ``numerics.newton.Problem``."""
         return self.system.difference(x1, x0)
 
     def tangent(self, dq: Array, rates: Array) -> Array:
+        """See ``numerics.newton.Problem``."""
         return self.system.tangent(dq, rates)
 
     def corrigible(self, dq: Array, which: Index) -> Array:
-        for form in np.unique(which):
-            held = self.solver.held(int(form))
-            if held.size:
-                dq[np.ix_(held, which == form)] = 0.0
-        return dq
+        """See ``ClosureSolver.corrigible``."""
+        return self.solver.corrigible(dq, which)
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.coefficients import MARKER_A, MARKER_B, Numbers
 from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.rows import LoopRows, Rows, coupling_rows
+from mechgraph.closure.rows import CouplingRows, LoopRows, Rows, coupling_rows
 from mechgraph.closure.tree import Ranks, Tree, Walk, ranked
 from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.model.factors import Factor, FixedStack, Stack
@@ -328,6 +328,17 @@ class System:
     def row_scale(self) -> Array:
         """Factor ``(n_rows,)`` of every row over the user's relation: its multiplier in the user's units is ``scale * x``."""
         return np.concatenate([part.scale for part in self.rows])
+
+    @property
+    def coupling_matrix(self) -> Array:
+        """Coefficients ``(couplings, F)`` of the rows behind those of the loops, internal units."""
+        parts = [part.matrix for part in self.rows[1:] if isinstance(part, CouplingRows)]
+        return np.concatenate([np.zeros((0, self.n_freedoms)), *parts])
+
+    @property
+    def coupled_freedoms(self) -> Index:
+        """Freedoms into which rows other than those of loops bring efforts."""
+        return np.flatnonzero(self.coupling_matrix.any(axis=0))
 
     @cached_property
     def row_places(self) -> list[slice]:

@@ -91,9 +91,8 @@ class ClosureRows:
     def at(cls, here: Configuration) -> ClosureRows:
         """The rows at the first position of a configuration; rows of couplings stand behind those of the loops."""
         s = here.system
-        loops = 6 * len(s.graph.loops)
-        extra = getattr(s, "n_rows", loops) - loops
-        more = scipy.sparse.csr_array(here.J[loops:, :, 0]) if extra else None
+        others = [scipy.sparse.csr_array(part.jacobian(here)[:, :, 0]) for part in s.rows[1:]]
+        more = scipy.sparse.csr_array(scipy.sparse.vstack(others)) if others else None
         return cls(s.graph, s.first_column, here.S[:, :, 0], here.pair_points[:, :, 0], more)
 
     @property

@@ -205,9 +205,8 @@ def rank_of_rows(
     if engine == "dense" or (engine == "auto" and rows.count < CROSSOVER):
         reduced = ReducedRows(rows, fixed, dense=True)
         return ClosureRank(reduced, _Dense(reduced, tolerance), tolerance)
-    if rows.more is None:
-        bordered = LoopSystem(rows, fixed)
-        if bordered.smallest > proved or bordered.first.distance > RANKS.distance:
-            return ClosureRank(bordered, _Bordered(bordered), tolerance)
+    bordered = LoopSystem(rows, fixed)
+    if bordered.smallest > proved or bordered.first.distance > RANKS.distance:
+        return ClosureRank(bordered, _Bordered(bordered), tolerance)
     reduced = ReducedRows(rows, fixed)
     return ClosureRank(reduced, _Eliminated(reduced, tolerance), tolerance)

@@ -14,15 +14,18 @@ from mechgraph.closure.passive_rest import Idle
 from mechgraph.closure.rates import Rates
 from mechgraph.closure.solver import FactoredClosure
 from mechgraph.force.applied_loads import Site, inertia_wrenches, kinetic_power
-from mechgraph.force.dalembert import METHODS, Problem, Wrenches
+from mechgraph.force.dalembert import METHODS, Problem, Wrenches, row_efforts
+from mechgraph.force.reaction_map import reaction_map
 from mechgraph.model.load import Load
 from mechgraph.numerics.linear import add_at
 from mechgraph.structure.reaction_split import (
     Stress,
-    least_reactions,
+    at_pair_points,
+    least_multiples,
     orthonormal_stress,
     pair_power,
     reaction_part,
+    split_stress,
 )
 
 
@@ -41,8 +44,9 @@ class BlockForces:
 
     ``reactions (6, P, T)`` and all ``efforts (F, T)`` (of least norm where redundant), ``given (F, T)`` efforts of loads, ``loads
     (6, N, T)`` inertia, applied wrenches and what holds passive bodies (``hold (6, N, T)`` that alone, or None), self-stresses
-    ``stress (6, P, s, T)`` with ``stress_efforts (F, s, T)``, ``shaking (6, T)``; ``balance (T,)`` and ``power (T,)`` what is left of
-    equilibrium and power, ``largest`` the largest term of each; ``holds`` by body.
+    ``stress (6, P, s, T)`` with ``stress_efforts (F, s, T)``, ``coupled (F, T)`` efforts of couplings, ``shaking (6, T)``; ``balance (T,)`` and ``power (T,)`` what is left of
+    equilibrium and power, ``largest`` the largest term of each; ``holds`` by body. ``multipliers (n, T)`` of the closure rows behind
+    those of the loops with ``multiplier_stress (n, s, T)``, of which ``coupled_stress (F, s, T)`` are the efforts in freedoms.
     """
 
     reactions: Array
@@ -52,6 +56,10 @@ class BlockForces:
     hold: Array | None
     stress: Array
     stress_efforts: Array
+    coupled: Array
+    multipliers: Array
+    multiplier_stress: Array
+    coupled_stress: Array
     shaking: Array
     balance: Array
     power: Array
@@ -69,6 +77,7 @@ class ForceTask:
     bodies: tuple[Idle, ...]
     batch: tuple[int, ...]
     t: object
+    redundant: str
 
 
 def forces_of_block(
@@ -86,22 +95,26 @@ def forces_of_block(
         hold, holds = _held(here, task.bodies, f.motions(), loads, given)
         loads = loads + hold
     wrenches = METHODS[task.method](Problem(here, loads, given, task.driven, f))
-    stress = orthonormal_stress(here, wrenches.stress, task.driven)
-    reactions, efforts = _least(here, wrenches, stress)
-    own = np.zeros_like(efforts)
-    own[task.driven] = efforts[task.driven] - given[task.driven]
-    balance, wrench = _balance(here, reactions, own + given, loads, (applied, inertia, hold))
-    power, term = _power(rates, applied if hold is None else applied + hold, own + given, inertia)
+    found = _least(here, wrenches, f, task)
+    own = np.zeros_like(found.efforts)
+    own[task.driven] = (found.efforts - given - found.coupled)[task.driven]
+    acting = own + given + found.coupled
+    balance, wrench = _balance(here, found.reactions, acting, loads, (applied, inertia, hold))
+    power, term = _power(rates, applied if hold is None else applied + hold, acting, inertia)
     frame = here.system.graph.frame
     shaking = np.delete(loads, frame, axis=1).sum(axis=1) + site.scaled(site.internal)[:, frame]
     return BlockForces(
-        reactions,
-        efforts,
+        found.reactions,
+        found.efforts,
         given,
         loads,
         hold,
-        stress.wrenches,
-        stress.efforts,
+        found.stress.wrenches,
+        found.stress.efforts,
+        found.coupled,
+        found.multipliers,
+        found.multiplier_stress,
+        row_efforts(here, found.multiplier_stress),
         shaking,
         balance,
         power,
@@ -118,13 +131,38 @@ def _held(
     return hold, tuple(Hold(*name, size) for name, size in zip(names, sizes, strict=True))
 
 
-def _least(here: Configuration, wrenches: Wrenches, stress: Stress) -> tuple[Array, Array]:
-    """Reactions ``(6, P, T)`` and all efforts ``(F, T)``, of least norm where redundant."""
-    efforts = pair_power(here, wrenches.totals)
-    reactions = reaction_part(here, wrenches.totals, efforts)
-    if not stress.wrenches.shape[2]:
-        return reactions, efforts
-    return least_reactions(here, reactions, efforts, stress)
+@dataclass(frozen=True)
+class _Found:
+    """Reactions and efforts, of least norm where redundant, with the self-stresses; see ``BlockForces``."""
+
+    reactions: Array
+    efforts: Array
+    stress: Stress
+    multipliers: Array
+    multiplier_stress: Array
+    coupled: Array
+
+
+def _least(here: Configuration, wrenches: Wrenches, f: FactoredClosure, task: ForceTask) -> _Found:
+    """Reactions and efforts of least norm; where random self-stresses stand for all of them only if that is asked for."""
+    totals, multipliers = wrenches.totals, wrenches.multipliers
+    acting = np.union1d(task.driven, here.system.coupled_freedoms)
+    stress = (orthonormal_stress if f.complete else split_stress)(here, wrenches.stress, acting)
+    s = stress.wrenches.shape[2]
+    if s and not f.complete and task.redundant == "minimum_norm":
+        points = at_pair_points(here, reaction_part(here, totals, pair_power(here, totals)))
+        x = f.least([reaction_map(here, t) for t in range(here.T)], points.swapaxes(0, 1).reshape(-1, here.T))
+        totals = totals + here.pair_wrenches(x[:, None])[:, :, 0]
+        multipliers = multipliers - x[6 * len(here.system.graph.loops) :]
+    efforts = pair_power(here, totals)
+    reactions = reaction_part(here, totals, efforts)
+    multiplier_stress = np.einsum("nit,tij->njt", wrenches.multiplier_stress, stress.mix)
+    if s and f.complete:
+        y = least_multiples(here, reactions, efforts, stress)
+        reactions = reactions + np.einsum("cpit,it->cpt", stress.wrenches, y)
+        efforts = efforts + np.einsum("fit,it->ft", stress.efforts, y)
+        multipliers = multipliers + np.einsum("nit,it->nt", multiplier_stress, y)
+    return _Found(reactions, efforts, stress, multipliers, multiplier_stress, row_efforts(here, multipliers[:, None])[:, 0])
 
 
 def _balance(

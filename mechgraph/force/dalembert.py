@@ -42,10 +42,14 @@ class Problem:
 
 @dataclass(frozen=True)
 class Wrenches:
-    """Total pair wrenches ``(6, P, T)`` and self-stress states ``(6, P, s, T)``."""
+    """Total pair wrenches ``(6, P, T)`` and self-stress states ``(6, P, s, T)``; ``multipliers (n, T)`` of the closure rows behind those
+    of the loops, with ``multiplier_stress (n, s, T)``: row ``r`` brings the effort ``J_ri m`` into freedom ``i``.
+    """
 
     totals: Array
     stress: Array
+    multipliers: Array
+    multiplier_stress: Array
 
 
 def loop_wrench(problem: Problem) -> Wrenches:
@@ -58,7 +62,16 @@ def loop_wrench(problem: Problem) -> Wrenches:
     rhs = problem.efforts - (here.S * tree[:, here.system.owners]).sum(axis=0)
     x = problem.solver.solve_transposed(rhs[:, None])
     tree += here.pair_wrenches(x)[:, :, 0]
-    return Wrenches(tree, here.pair_wrenches(problem.solver.self_stresses()))
+    null = problem.solver.self_stresses()
+    loops = 6 * len(here.system.graph.loops)
+    # J^T x counts what a row takes out of a freedom; what it brings is the negative
+    return Wrenches(tree, here.pair_wrenches(null), -x[loops:, 0], -null[loops:])
+
+
+def row_efforts(here: Configuration, multipliers: Array) -> Array:
+    """Efforts ``(F, k, T)`` that multipliers ``(n, k, T)`` of the rows behind those of the loops bring into freedoms."""
+    loops = np.zeros((6 * len(here.system.graph.loops), *multipliers.shape[1:]))
+    return here.row_efforts(np.concatenate([loops, multipliers]))
 
 
 def tree_wrenches(here: Configuration, loads: Array) -> Array:
@@ -73,17 +86,20 @@ def newton_euler(problem: Problem) -> Wrenches:
     different freedoms are held are solved apart.
     """
     here = problem.here
-    totals = np.empty((6, len(here.system.m.pairs), here.T))
-    stress: list[tuple[Index, Array]] = []
+    n = here.system.n_rows - 6 * len(here.system.graph.loops)
+    parts = []
     for held, at in problem.solver.by_held():
         mine = here if at.size == here.T else here.part(at)
-        found = _components_and_efforts(mine, problem.loads[:, :, at], problem.efforts[:, at], problem.driven, held)
-        totals[:, :, at] = found.totals
-        stress.append((at, found.stress))
-    out = np.zeros((6, totals.shape[1], max((part.shape[2] for _, part in stress), default=0), here.T))
-    for at, part in stress:
-        out[:, :, : part.shape[2], at] = part
-    return Wrenches(totals, out)
+        parts.append((at, _components_and_efforts(mine, problem.loads[:, :, at], problem.efforts[:, at], problem.driven, held)))
+    s = max((part.stress.shape[2] for _, part in parts), default=0)
+    P = len(here.system.m.pairs)
+    shapes = {"totals": (6, P), "stress": (6, P, s), "multipliers": (n,), "multiplier_stress": (n, s)}
+    out = {name: np.zeros((*shape, here.T)) for name, shape in shapes.items()}
+    for at, part in parts:
+        k = part.stress.shape[2]
+        out["totals"][..., at], out["multipliers"][..., at] = part.totals, part.multipliers
+        out["stress"][:, :, :k, at], out["multiplier_stress"][:, :k, at] = part.stress, part.multiplier_stress
+    return Wrenches(**out)
 
 
 def _components_and_efforts(here: Configuration, loads: Array, efforts: Array, driven: Index, held: Index) -> Wrenches:
@@ -105,11 +121,9 @@ def _components_and_efforts(here: Configuration, loads: Array, efforts: Array, d
         parts.append((solver.solve(right[:, None, span])[:, 0], _null(A, solver)))
     u = np.concatenate([p[0] for p in parts], axis=1)
     null = np.concatenate([p[1] for p in parts], axis=2)
-    totals = _pair_totals(here, f, state, u) + here.pair_sums(here.E * efforts)
-    stress = np.zeros((6, len(m.pairs), null.shape[1], here.T))
-    for i in range(null.shape[1]):
-        stress[:, :, i] = _pair_totals(here, f, state, null[:, i])
-    return Wrenches(totals, stress)
+    stress, multiplier_stress = _pair_totals(here, f, state, null)
+    totals, multipliers = (part[..., 0, :] for part in _pair_totals(here, f, state, u[:, None]))
+    return Wrenches(totals + here.pair_sums(here.E * efforts), stress, multipliers, multiplier_stress)
 
 
 def chosen_for_all(A: Array, known: list[Choice], fixed: Index | None = None) -> ChosenSystem:
@@ -146,19 +160,27 @@ def _null(A: Array, solver: ChosenSystem) -> Array:
     return flipped.null_of_transpose()
 
 
-def _pair_totals(here: Configuration, f: Formulation, state: State, u: Array) -> Array:
-    """Total pair wrenches from unknowns ``(unknowns, T)`` of the minimal formulation."""
+def _pair_totals(here: Configuration, f: Formulation, state: State, u: Array) -> tuple[Array, Array]:
+    """Total pair wrenches ``(6, P, k, T)`` and multipliers ``(n, k, T)`` from unknowns ``(unknowns, k, T)`` of the minimal formulation."""
     m = here.system.m
-    out = np.zeros((6, len(m.pairs), here.T))
+    out = np.zeros((6, len(m.pairs), *u.shape[1:]))
     at = 0
-    for k, pair in enumerate(m.pairs):
+    for p, pair in enumerate(m.pairs):
         n = 6 - pair.type.f
-        out[:, k] += np.einsum("ict,ct->it", state.reactions[k], u[at : at + n])
+        out[:, p] += np.einsum("ict,ckt->ikt", state.reactions[p], u[at : at + n])
         at += n
+    multipliers = []
     for unknown, value in zip(f.unknowns[at:], u[at:], strict=True):
-        k, j = m.freedom(unknown.freedom)
-        out[:, k] += state.efforts[k][:, j] * value
-    return out
+        if not unknown.freedom:
+            multipliers.append(value)
+            continue
+        p, j = m.freedom(unknown.freedom)
+        out[:, p] += state.efforts[p][:, j, None] * value
+    rows = np.stack(multipliers) if multipliers else np.zeros((0, *u.shape[1:]))
+    brought = row_efforts(here, rows)
+    for i in range(u.shape[1] if multipliers else 0):
+        out[:, :, i] += here.pair_sums(here.E * brought[:, i])
+    return out, rows
 
 
 def given_effort_loads(here: Configuration, efforts: Array) -> Array:
@@ -181,6 +203,11 @@ def internal_state(here: Configuration, loads: Array) -> State:
         for i, k in enumerate(g.pairs):
             reactions[k] = W[:, :, i]
             efforts[k] = here.E[:, g.columns[:, i]]
+    J = here.system.coupling_matrix
+    coefficients = []
+    for row, coupling in zip(J, s.m.couplings, strict=True):
+        places = [s.m.freedom(freedom) for freedom in coupling.freedoms]
+        coefficients.append(np.array([row[s.first_column[k] + j] for k, j in places])[:, None])
     along, conditions = here.lee_screws
     nothing = np.zeros((s.n_freedoms, here.T))
     return State(
@@ -193,6 +220,7 @@ def internal_state(here: Configuration, loads: Array) -> State:
         along,
         conditions,
         loads,
+        tuple(coefficients),
     )
 
 

@@ -29,6 +29,11 @@ class Pattern:
         self._known = False
         self._arrange(np.arange(size, dtype=np.intp), np.arange(size, dtype=np.intp))
 
+    @property
+    def places(self) -> tuple[Index, Index]:
+        """Rows and columns of the values."""
+        return self._rows, self._cols
+
     def _arrange(self, row_place: Index, col_place: Index) -> None:
         """Compressed columns with row ``i`` at ``row_place[i]``, column ``j`` at ``col_place[j]``; where each value goes."""
         self._row_place, self._col_place = row_place, col_place

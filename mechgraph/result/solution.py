@@ -76,6 +76,9 @@ class Values(Protocol):
     def efforts(self, pair: int) -> tuple[Array, Array]:
         """Efforts of all kinds, and those of the driver alone, ``(..., f)``."""
 
+    def multiplier(self, coupling: int) -> Array:
+        """Multiplier of a coupling, ``(...)``."""
+
     def link(self, link: int) -> tuple[Array, Array, Array]:
         """Pose ``(..., 4, 4)``, twist and its rate ``(..., 6)`` of a link."""
 
@@ -171,6 +174,18 @@ class PairResult:
             "total": (moment,) * 3 + (force,) * 3,
             "components": {name: moment if name.startswith("M") else force for name in row.component_names},
         }
+
+
+class CouplingResult:
+    """Values of one coupling ``sum c_i q_i = constant``."""
+
+    def __init__(self, values: Values, index: int) -> None:
+        self._values, self._index = values, index
+
+    @property
+    def effort(self) -> Array:
+        """The multiplier m ``(...)``: the coupling exerts the effort ``c_i m`` in freedom i, + on link b; its power ``m sum c_i q'_i`` is 0."""
+        return self._values.multiplier(self._index)
 
 
 class LinkResult:
@@ -277,6 +292,11 @@ class Solution:
     def link(self, name: str) -> LinkResult:
         """Motion of a link."""
         return LinkResult(self._values, self.mechanism.place_of_link(name))
+
+    def coupling(self, name: str) -> CouplingResult:
+        """Values of a coupling."""
+        m = self.mechanism
+        return CouplingResult(self._values, m.couplings.index(m.coupling(name)))
 
     @property
     def has_forces(self) -> bool:

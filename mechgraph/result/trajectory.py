@@ -41,7 +41,10 @@ class BlockMotion:
         return self.rates.here
 
 
-KEPT = ("reactions", "efforts", "given", "loads", "hold", "stress", "stress_efforts", "shaking", "balance", "power")
+KEPT = (
+    "reactions", "efforts", "given", "loads", "hold", "stress", "stress_efforts", "coupled", "multipliers", "multiplier_stress",
+    "coupled_stress", "shaking", "balance", "power",
+)  # fmt: skip
 """Fields of ``BlockForces`` that are kept for every position."""
 
 
@@ -152,11 +155,11 @@ class Trajectory:
         if name in self._kept:
             return self._kept[name]
         s = self._system
-        P, N, F = len(s.m.pairs), len(s.m.links), s.n_freedoms
+        P, N, F, n = len(s.m.pairs), len(s.m.links), s.n_freedoms, len(s.m.couplings)
         shapes: dict[str, tuple[int, ...]] = {
             "x": (s.n_state,), "dq": (F,), "ddq": (F,), "closure": (), "points": (3, P), "reactions": (6, P), "efforts": (F,),
-            "given": (F,), "loads": (6, N), "hold": (6, N), "stress": (6, P, 0), "stress_efforts": (F, 0), "shaking": (6,),
-            "balance": (), "power": (),
+            "given": (F,), "loads": (6, N), "hold": (6, N), "stress": (6, P, 0), "stress_efforts": (F, 0), "coupled": (F,),
+            "multipliers": (n,), "multiplier_stress": (n, 0), "coupled_stress": (F, 0), "shaking": (6,), "balance": (), "power": (),
         }  # fmt: skip
         empty = 0.0 if name == "hold" else np.nan
         return np.broadcast_to(empty, (*shapes[name], self._count))
@@ -286,12 +289,17 @@ class Trajectory:
     def efforts(self, pair: int) -> tuple[Array, Array]:
         """Efforts of all kinds and of the driver alone."""
         columns = self._columns(pair)
-        total, given = self._force("efforts")[columns], self._of("given")[columns]
+        total, given, coupled = (self._force(name)[columns] for name in ("efforts", "given", "coupled"))
         driven = np.isin(np.arange(columns.start, columns.stop), self.driven)[:, None]
-        own = np.where(driven, total - given, np.where(np.isnan(given), np.nan, 0.0))
+        own = np.where(driven, total - given - coupled, np.where(np.isnan(given), np.nan, 0.0))
         unit = np.where(self._system.is_length[columns], self._L, self._L**2)[:, None]
-        stress = self._of("stress_efforts")[columns]
+        stress = np.where(driven[:, None], self._of("stress_efforts")[columns] - self._of("coupled_stress")[columns], 0.0)
         return self._out(self._masked(unit * (own + given), stress)), self._out(self._masked(unit * own, stress))
+
+    def multiplier(self, coupling: int) -> Array:
+        """The multiplier of a coupling in the user's units: the effort ``c_i m`` in freedom i."""
+        unit = self._L**2 * self._system.row_scale[6 * len(self._system.graph.loops) + coupling]
+        return self._out(self._masked(unit * self._force("multipliers")[coupling], self._of("multiplier_stress")[coupling]))
 
     def shaking(self) -> Array:
         """Wrench on the frame: loads and inertia of all moving links, and what springs do to the frame."""

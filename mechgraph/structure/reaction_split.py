@@ -21,12 +21,13 @@ UNIQUE = STRESSES.unique
 class Stress:
     """Self-stresses: reaction states without load, orthonormal in the measure ``sum |F|^2 + |M / L|^2`` at the pair points.
 
-    ``wrenches (6, P, s, T)`` are the reaction parts about the internal origin, ``efforts (F, s, T)`` what they bring to driven
-    freedoms.
+    ``wrenches (6, P, s, T)`` are the reaction parts about the internal origin, ``efforts (F, s, T)`` what they bring to driven and
+    coupled freedoms; ``mix (T, s, s)`` makes them from the states that they were found from.
     """
 
     wrenches: Array
     efforts: Array
+    mix: Array
 
 
 def at_pair_points(here: Configuration, wrenches: Array) -> Array:
@@ -46,27 +47,27 @@ def pair_power(here: Configuration, totals: Array) -> Array:
     return np.asarray((here.S * totals[:, here.system.owners]).sum(axis=0))
 
 
-def split_stress(here: Configuration, states: Array, driven: Index) -> Stress:
-    """Reaction parts and efforts of total wrench states ``(6, P, s, T)`` that leave all undriven freedoms without effort."""
+def split_stress(here: Configuration, states: Array, acting: Index) -> Stress:
+    """Reaction parts and efforts of total wrench states ``(6, P, s, T)`` with efforts in the freedoms ``acting`` (driven, coupled) alone."""
     s = states.shape[2]
     efforts = np.zeros((here.system.n_freedoms, s, here.T))
     parts = np.empty_like(states)
     for i in range(s):
         tau = pair_power(here, states[:, :, i])
-        efforts[driven, i] = tau[driven]
+        efforts[acting, i] = tau[acting]
         parts[:, :, i] = reaction_part(here, states[:, :, i], efforts[:, i])
-    return Stress(parts, efforts)
+    return Stress(parts, efforts, np.broadcast_to(np.eye(s), (here.T, s, s)))
 
 
-def orthonormal_stress(here: Configuration, states: Array, driven: Index) -> Stress:
+def orthonormal_stress(here: Configuration, states: Array, acting: Index) -> Stress:
     """Self-stresses from independent total wrench states ``(6, P, s, T)``, orthonormal at every position."""
-    found, s = split_stress(here, states, driven), states.shape[2]
+    found, s = split_stress(here, states, acting), states.shape[2]
     if not s:
         return found
     parts, efforts = found.wrenches, found.efforts
     flat = at_pair_points(here, parts).transpose(3, 0, 1, 2).reshape(here.T, 6 * states.shape[1], s)
     mix = _orthonormal(flat, efforts.transpose(2, 0, 1))
-    return Stress(np.einsum("cpit,tij->cpjt", parts, mix), np.einsum("fit,tij->fjt", efforts, mix))
+    return Stress(np.einsum("cpit,tij->cpjt", parts, mix), np.einsum("fit,tij->fjt", efforts, mix), mix)
 
 
 def _orthonormal(reactions: Array, efforts: Array) -> Array:
@@ -84,15 +85,13 @@ def _orthonormal(reactions: Array, efforts: Array) -> Array:
     return out
 
 
-def least_reactions(here: Configuration, reactions: Array, efforts: Array, stress: Stress) -> tuple[Array, Array]:
-    """Reactions and efforts of minimum norm: the part along every self-stress removed."""
+def least_multiples(here: Configuration, reactions: Array, efforts: Array, stress: Stress) -> Array:
+    """Multiples ``(s, T)`` of the self-stresses with which reactions ``(6, P, T)`` have minimum norm: no part along any of them."""
     states = at_pair_points(here, stress.wrenches)
     y = -np.einsum("cpit,cpt->it", states, at_pair_points(here, reactions))
     alone = (states**2).sum(axis=(0, 1)) < 0.5  # drivers that strain each other without any reaction
     y -= np.where(alone, np.einsum("fit,ft->it", stress.efforts, efforts), 0.0)
-    return reactions + np.einsum("cpit,it->cpt", stress.wrenches, y), efforts + np.einsum(
-        "fit,it->ft", stress.efforts, y
-    )
+    return np.asarray(y)
 
 
 class PairFrames:

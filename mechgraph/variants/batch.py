@@ -35,7 +35,7 @@ class NumbersPath(DriverPath):
     """The closure equations while the numbers change, drivers at rest: the path value is the part of the way."""
 
     def __init__(self, line: Pipeline, numbers_at: NumbersAt) -> None:
-        solver = closure_solver(line.start, line.leading, line.options.engine, line.freedoms.hold)
+        solver = closure_solver(line.engine, line.leading, line.freedoms.hold if line.bodies else None)
         super().__init__(line.system, solver, lambda variants: line.system)
         self.size = (self.system.n_freedoms, 1)
         self._line, self._numbers_at = line, numbers_at

@@ -12,9 +12,10 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.driver_motion import driven
+from mechgraph.closure.solver import ENGINES
 from mechgraph.errors import DeclarationError
 from mechgraph.force.dalembert import METHODS
-from mechgraph.kinetostatics import ENGINES, REDUNDANT
+from mechgraph.kinetostatics import REDUNDANT
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.variants.fields import AnyField, clashes, field_values, find_field

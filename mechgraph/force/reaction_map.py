@@ -1,0 +1,32 @@
+"""What multipliers of the closure rows bring to the reaction parts of all pairs, as a sparse matrix of one position."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy
+
+from mechgraph.algebra.screw import shift_wrench
+from mechgraph.algebra.se3 import cross
+from mechgraph.closure.configuration import Configuration
+
+
+def reaction_map(here: Configuration, t: int) -> scipy.sparse.csr_array:
+    """``R (6 P, rows)`` at position ``t``: reaction parts at the pair points for unit wrenches of every loop; other rows bring none."""
+    s = here.system
+    loop, pair, sign = s.graph.loop_steps
+    points = here.pair_points[:, :, t]
+    w = shift_wrench(np.einsum("ij,n->ijn", np.eye(6), sign), points[:, None, pair])
+    owner = np.repeat(np.arange(len(s.m.pairs)), np.diff(s.first_column))
+    E = shift_wrench(here.E[:, :, t], points[:, owner])
+    S = here.S[:, :, t]
+    S = np.concatenate([S[:3], S[3:] + cross(S[:3], points[:, owner])])
+    for g in s.groups:
+        place = np.full(len(s.m.pairs), -1)
+        place[g.pairs] = np.arange(len(g.pairs))
+        mine = np.flatnonzero(place[pair] >= 0)
+        columns = g.columns[:, place[pair[mine]]]
+        effort = np.einsum("ifn,ijn->fjn", S[:, columns], w[:, :, mine])
+        w[:, :, mine] -= np.einsum("ifn,fjn->ijn", E[:, columns], effort)
+    rows = np.broadcast_to(6 * pair + np.arange(6)[:, None, None], w.shape)
+    cols = np.broadcast_to(6 * loop + np.arange(6)[None, :, None], w.shape)
+    return scipy.sparse.csr_array((w.ravel(), (rows.ravel(), cols.ravel())), shape=(6 * len(s.m.pairs), s.n_rows))
