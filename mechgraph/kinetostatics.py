@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -144,7 +144,8 @@ class Pipeline:
     def run(self, starts: Starts | None = None, batch: tuple[int, ...] | None = None) -> Outcome:
         """All positions, rates and forces as a trajectory."""
         batch = self.drive.batch if batch is None else batch
-        starts = starts or Starts(self.x[:, None], lambda variants: self.system, self.m.loads)
+        system = self.system
+        starts = starts or Starts(self.x[:, None], lambda variants: system, self.m.loads)
         one = starts.x.shape[1] == 1
         T = int(np.prod(batch))
         variant = np.zeros(T, dtype=np.intp) if one else np.arange(T) // batch[-1]
@@ -180,16 +181,16 @@ class Outcome:
         self.solver: ClosureSolver = path.solver
         self.variant = variant
         self.contradicting = np.zeros(len(variant), dtype=bool)
+        self._system_at = partial(_system_at, starts, variant)
         self._velocity, self._acceleration = (line.values(kind, batch) for kind in ("velocity", "acceleration"))
         coordinates = continued(path, found)
         self.trajectory = Trajectory(
-            line.system, self.system_at, batch, line.drive.t, line.columns, coordinates, line.options.redundant == "nan"
+            line.system, self._system_at, batch, line.drive.t, line.columns, coordinates, line.options.redundant == "nan"
         )
+        work = found.work
+        work.positions, work.nodes = len(variant), len(found.tracks.nodes)
+        self.trajectory.engine, self.trajectory.work = line.engine, work
         self._fill()
-
-    def system_at(self, places: Index) -> System:
-        """The system with the numbers of the positions at flat places."""
-        return self.starts.system_of(self.variant[places])
 
     def _fill(self) -> None:
         found = self.found
@@ -203,16 +204,17 @@ class Outcome:
     def _block(self, places: Index) -> None:
         found, line = self.found, self.line
         here = found.here if found.here is not None and len(places) == found.x.shape[1] else None
-        here = here or self.system_at(places).at(found.x[:, places])
+        here = here or self._system_at(places).at(found.x[:, places])
         which = self.solver.chosen(here, found.which[places])
         f = self.solver.factored(here, which)
+        found.work.factorizations += here.T
         open_ = here.closure > CLOSED
         dead = self._dead(here, f) & ~open_
         if (open_ | dead).any():
             self.trajectory.mark(places[open_], Status.NOT_CLOSED.value)
             self.trajectory.mark(places[dead], Status.DEAD_POINT.value)
             keep = np.flatnonzero(~(open_ | dead))
-            places, here = places[keep], self.system_at(places[keep]).at(here.x[:, keep])
+            places, here = places[keep], self._system_at(places[keep]).at(here.x[:, keep])
             f = f.part(keep, here)
         if not places.size:
             return
@@ -231,7 +233,13 @@ class Outcome:
             f = solver.factored(motion.here, solver.chosen(motion.here, np.full(motion.here.T, -1)))
         assert line.options.method is not None
         task = ForceTask(
-            line.options.method, self.starts.loads, line.columns, line.bodies, self.batch, line.drive.t, line.options.redundant
+            line.options.method,
+            self.starts.loads,
+            line.columns,
+            line.bodies,
+            self.batch,
+            line.drive.t,
+            line.options.redundant,
         )
         coordinates = self.trajectory.coordinates_at(motion.places)
         return forces_of_block(task, motion.rates, f, coordinates, motion.places)
@@ -258,6 +266,11 @@ class Outcome:
             gap = np.abs(found[line.columns] - asked).max(axis=0, initial=0.0)
             out = np.maximum(out, gap / np.where(size > 0, size, 1.0))
         return np.maximum(out, moved.contradiction)
+
+
+def _system_at(starts: Starts, variant: Index, places: Index) -> System:
+    """The system with the numbers of the positions at flat places."""
+    return starts.system_of(variant[places])
 
 
 def _by_position(load: Load) -> bool:
@@ -309,7 +322,7 @@ def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exceptio
         return None
     first = int(bad[0])
     last = outcome.found.reached[:, first] * line.unit[line.lead]
-    reached = {name: float(v) for name, v in zip(np.array(line.drive.names)[line.lead], last, strict=True)}
+    reached = dict(zip([line.drive.names[i] for i in line.lead], last.tolist(), strict=True))
     asked = dict(
         zip(line.drive.names, (line.values("position", outcome.batch)[:, first] * line.unit).tolist(), strict=True)
     )

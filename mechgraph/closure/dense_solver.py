@@ -18,6 +18,12 @@ TRIES = 8
 """Choices tried for a batch at most."""
 
 
+def independent(here: Configuration, Z: Array) -> bool:
+    """Whether the rates ``Z (F, d, T)`` for unit rates of the fixed columns meet all rows: the fixed columns move independently."""
+    left = [np.abs(here.closure_rates(Z[:, i])).max(initial=0.0) for i in range(Z.shape[1])]
+    return max(left, default=0.0) <= PATH.independent * max(1.0, float(np.abs(Z).max(initial=0.0)))
+
+
 class DenseFactored:
     """Inverses of the independent rows and columns, all positions of a form together."""
 
@@ -105,7 +111,8 @@ class DenseSolver:
         """See the protocol in ``closure.solver``."""
         which = self.chosen(here, np.full(here.T, -1))
         choice = self.choices[int(which[0])]
-        return not choice.held.size and bool((self.factored(here, which).condition < PATH.doubtful).all())
+        f = self.factored(here, which)
+        return not choice.held.size and bool((f.condition < PATH.doubtful).all()) and independent(here, f.sensitivity())
 
     def corrigible(self, dq: Array, which: Index) -> Array:
         """See the protocol in ``closure.solver``."""

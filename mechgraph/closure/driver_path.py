@@ -133,6 +133,8 @@ class Positions:
         """Take some places from positions that were followed afterwards."""
         for name in ("x", "status", "which", "reached"):
             getattr(self, name)[..., places] = getattr(other, name)[..., places]
+        for name in ("evaluations", "calls", "factorizations", "careful"):
+            setattr(self.work, name, getattr(self.work, name) + getattr(other.work, name))
 
     def nodes_of(self, track: int) -> Nodes:
         """Nodes of a track."""

@@ -74,7 +74,9 @@ def measure_of(graph: LinkGraph, pair_points: Array) -> Measure:
     middle = np.stack([np.bincount(loop, row, minlength=n) for row in points]) / count
     off = points - middle[:, loop]
     length = np.sqrt(np.bincount(loop, (off * off).sum(axis=0), minlength=n) / count)
-    return Measure(middle, np.where(length > 0, length, 1.0))
+    # points that coincide but for rounding make no length
+    rounding = 1e-13 * (1.0 + np.sqrt((middle * middle).sum(axis=0)))
+    return Measure(middle, np.where(length > rounding, length, 1.0))
 
 
 @dataclass(frozen=True)

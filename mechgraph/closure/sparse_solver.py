@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.bordering import LoopSystem
 from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.dense_solver import independent
 from mechgraph.closure.indexing import Index
 from mechgraph.numerics.sparse import Pattern, SparseFactor
 from mechgraph.numerics.tolerances import PATH
@@ -94,7 +95,10 @@ class SparseFactored:
         for t, form in enumerate(self._forms):
             turned = form.turned_rows
             part = R[t] @ turned
-            H, J = scipy.sparse.coo_array(part.T @ part), scipy.sparse.coo_array(form.turned_matrix(self.here.S[:, :, t]))
+            H, J = (
+                scipy.sparse.coo_array(part.T @ part),
+                scipy.sparse.coo_array(form.turned_matrix(self.here.S[:, :, t])),
+            )
             rows, size = H.shape[0], H.shape[0] + J.shape[1]
             pattern = Pattern(
                 np.concatenate([H.row, J.row, rows + J.col]).astype(np.intp),
@@ -143,8 +147,9 @@ class SparseSolver:
 
     def leaves_nothing_free(self, here: Configuration) -> bool:
         """See the protocol in ``closure.solver``."""
-        form = self.forms[int(self.chosen(here, np.full(here.T, -1))[0])]
-        return form.regular and not form.held
+        which = self.chosen(here, np.full(here.T, -1))
+        form = self.forms[int(which[0])]
+        return form.regular and not form.held and independent(here, self.factored(here, which).sensitivity())
 
     def corrigible(self, dq: Array, which: Index) -> Array:
         """See ``ClosureSolver``."""

@@ -162,7 +162,9 @@ def _least(here: Configuration, wrenches: Wrenches, f: FactoredClosure, task: Fo
         reactions = reactions + np.einsum("cpit,it->cpt", stress.wrenches, y)
         efforts = efforts + np.einsum("fit,it->ft", stress.efforts, y)
         multipliers = multipliers + np.einsum("nit,it->nt", multiplier_stress, y)
-    return _Found(reactions, efforts, stress, multipliers, multiplier_stress, row_efforts(here, multipliers[:, None])[:, 0])
+    return _Found(
+        reactions, efforts, stress, multipliers, multiplier_stress, row_efforts(here, multipliers[:, None])[:, 0]
+    )
 
 
 def _balance(

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
@@ -90,7 +91,9 @@ def newton_euler(problem: Problem) -> Wrenches:
     parts = []
     for held, at in problem.solver.by_held():
         mine = here if at.size == here.T else here.part(at)
-        parts.append((at, _components_and_efforts(mine, problem.loads[:, :, at], problem.efforts[:, at], problem.driven, held)))
+        f = problem.solver if at.size == here.T else problem.solver.part(at, mine)
+        mine_alone = Problem(mine, problem.loads[:, :, at], problem.efforts[:, at], problem.driven, f)
+        parts.append((at, _components_and_efforts(mine_alone, held)))
     s = max((part.stress.shape[2] for _, part in parts), default=0)
     P = len(here.system.m.pairs)
     shapes = {"totals": (6, P), "stress": (6, P, s), "multipliers": (n,), "multiplier_stress": (n, s)}
@@ -102,28 +105,53 @@ def newton_euler(problem: Problem) -> Wrenches:
     return Wrenches(**out)
 
 
-def _components_and_efforts(here: Configuration, loads: Array, efforts: Array, driven: Index, held: Index) -> Wrenches:
-    m = here.system.m
+def _components_and_efforts(problem: Problem, held: Index) -> Wrenches:
+    here, m = problem.here, problem.here.system.m
     names = m.freedom_names()
-    f = formulate(m, "minimal", efforts=[names[c] for c in sorted({*driven.tolist(), *held.tolist()})])
-    state = internal_state(here, loads + given_effort_loads(here, efforts))
+    f = formulate(m, "minimal", efforts=[names[c] for c in sorted({*problem.driven.tolist(), *held.tolist()})])
+    state = internal_state(here, problem.loads + given_effort_loads(here, problem.efforts))
+    u, null = (_by_choice if problem.solver.complete else _by_saddle)(f, state, here.T)
+    totals, multipliers = (part[..., 0, :] for part in _pair_totals(here, f, state, u[:, None]))
+    totals = totals + here.pair_sums(here.E * problem.efforts)
+    if null is None:
+        loops = problem.solver.self_stresses()
+        stress, multiplier_stress = here.pair_wrenches(loops), -loops[6 * len(here.system.graph.loops) :]
+    else:
+        stress, multiplier_stress = _pair_totals(here, f, state, null)
+    return Wrenches(totals, stress, multipliers, multiplier_stress)
+
+
+def _by_choice(f: Formulation, state: State, T: int) -> tuple[Array, Array]:
+    """Unknowns ``(unknowns, T)`` by independent equations and unknowns, and all solutions ``(unknowns, s, T)`` without load."""
     rows, cols, _, _ = f.pattern
     entries, right = f.entries(state), f.right_side(state)
     shape = (len(f.equations), len(f.unknowns))
     size = max(1, CHUNK // max(1, shape[0] * shape[1]))
     known: list[Choice] = []
     parts = []
-    for begin in range(0, here.T, size):
-        span = slice(begin, min(begin + size, here.T))
+    for begin in range(0, T, size):
+        span = slice(begin, min(begin + size, T))
         A = np.zeros((*shape, span.stop - span.start))
         np.add.at(A, (rows, cols), entries[:, span])
         solver = chosen_for_all(A, known)
         parts.append((solver.solve(right[:, None, span])[:, 0], _null(A, solver)))
-    u = np.concatenate([p[0] for p in parts], axis=1)
-    null = np.concatenate([p[1] for p in parts], axis=2)
-    stress, multiplier_stress = _pair_totals(here, f, state, null)
-    totals, multipliers = (part[..., 0, :] for part in _pair_totals(here, f, state, u[:, None]))
-    return Wrenches(totals + here.pair_sums(here.E * efforts), stress, multipliers, multiplier_stress)
+    return np.concatenate([p[0] for p in parts], axis=1), np.concatenate([p[1] for p in parts], axis=2)
+
+
+def _by_saddle(f: Formulation, state: State, T: int) -> tuple[Array, None]:
+    """Unknowns ``(unknowns, T)`` of least norm, ``[1 A^T; A 0] [u; y] = [0; b]``, sparse; the equations are independent."""
+    rows, cols, _, _ = f.pattern
+    entries, right = f.entries(state), f.right_side(state)
+    shape = (len(f.equations), len(f.unknowns))
+    out = np.empty((shape[1], T))
+    for t in range(T):
+        A = scipy.sparse.coo_array((entries[:, t], (rows, cols)), shape=shape)
+        saddle = scipy.sparse.block_array([[scipy.sparse.eye_array(shape[1]), A.T], [A, None]], format="csc")
+        b = np.concatenate([np.zeros(shape[1]), right[:, t]])
+        lu = scipy.sparse.linalg.splu(saddle)
+        x = lu.solve(b)
+        out[:, t] = (x + lu.solve(b - saddle @ x))[: shape[1]]
+    return out, None
 
 
 def chosen_for_all(A: Array, known: list[Choice], fixed: Index | None = None) -> ChosenSystem:

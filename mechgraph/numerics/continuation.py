@@ -58,16 +58,19 @@ class Follower:
     def follow(self, x: Array, paths: Paths, first: float = PATH.first) -> Tracks:
         """All tracks from their closed states ``x (nx, V)``; ``first`` is the first step tried."""
         V = x.shape[1]
-        self.paths, self.ends = paths, [End.REACHED] * V
+        self.paths = paths
         self.crossings: list[tuple[int, float]] = []
         start = self._start(x)
-        open_ = np.flatnonzero((start.condition <= PATH.singular) & (paths.end > 0))
+        stuck = ~(start.condition <= PATH.singular) & (paths.end > 0)
+        self.ends = [End.CROSSING if here else End.REACHED for here in stuck]
+        open_ = np.flatnonzero(~stuck & (paths.end > 0))
         nodes = self._quick(start.take(open_), first)
         nodes = Nodes.join([start, self._settled(nodes)])
         nodes = self._cut(self._certified_all(nodes))
-        short = [v for v in range(V) if nodes.place[nodes.track == v].max() < paths.end[v]]
-        for v in short:
-            nodes = self._careful(nodes, v)
+        reached = np.zeros(V)
+        np.maximum.at(reached, nodes.track, nodes.place)
+        for v in np.flatnonzero((reached < paths.end) & ~stuck):
+            nodes = self._careful(nodes, int(v))
         return Tracks(nodes, self.ends, self.crossings, self.work)
 
     # --- nodes -----------------------------------------------------------------------------------------------------------
@@ -234,7 +237,7 @@ class Follower:
         bad = ~nodes.sure[right]
         limit = np.full(len(self.paths.end), np.inf)
         np.minimum.at(limit, nodes.track[left[bad]], nodes.place[left[bad]])
-        return nodes.take((nodes.place <= limit[nodes.track]) & np.isfinite(nodes.condition))
+        return nodes.take((nodes.place <= limit[nodes.track]) & (np.isfinite(nodes.condition) | (nodes.place == 0.0)))
 
     # --- the careful march -----------------------------------------------------------------------------------------------
 
@@ -265,7 +268,7 @@ class Follower:
                 good = False
             h = float(_next_step(at - last.place, step.correction, order, np.array([good]))[0])
             if good and middle is not None:
-                self.work.careful_nodes += 1
+                self.work.careful += 1
                 found += [middle, new]
                 before, known = middle, True
                 # where the condition grows as towards a fold, as |s* - s|^-1/2: no further than half of what is left
@@ -329,12 +332,8 @@ class Follower:
             step = self.newton.nodes(x, drive, base.track, base.which, PATH.node)
             new = self._renewed(self._nodes(step, drive, base.track, at, sure=True))
             turn = np.abs((step.Z - base.Z) * direction).max() / max(1.0, float(np.abs(base.Z).max()))
-            if (
-                step.done[0]
-                and step.correction[0] <= 1e-2 * distance
-                and turn <= 0.05
-                and new.condition[0] <= PATH.doubtful
-            ):
+            as_regular = step.condition[0] <= 4.0 * base.condition[0]
+            if step.done[0] and step.correction[0] <= 1e-2 * distance and turn <= PATH.smooth and as_regular:
                 self.crossings.append((track, crossing))
                 self.ends[track] = End.REACHED
                 return new

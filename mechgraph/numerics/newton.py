@@ -77,12 +77,25 @@ class Problem(Protocol):
 
 @dataclass
 class Work:
-    """What was done: points evaluated, calls of the evaluation, matrices factored, nodes of the careful march."""
+    """What was done.
 
+    Attributes
+    ----------
+    positions : positions asked for.
+    nodes : points at which the path was found in between, ``careful`` of them step by step (near a fold or a crossing).
+    evaluations : states at which the equations were evaluated, in ``calls`` batches.
+    factorizations : matrices factored.
+    """
+
+    positions: int = 0
+    nodes: int = 0
+    careful: int = 0
     evaluations: int = 0
     calls: int = 0
     factorizations: int = 0
-    careful_nodes: int = 0
+
+    def __str__(self) -> str:
+        return ", ".join(f"{getattr(self, name)} {name}" for name in self.__dataclass_fields__)
 
 
 @dataclass(frozen=True)

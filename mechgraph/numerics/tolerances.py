@@ -116,6 +116,8 @@ class PathTolerances:
     """Condition number above which another choice of rows and columns is sought."""
     better: float = 0.2
     """Part of the condition number that another choice must undercut to be taken."""
+    independent: float = 1e-8
+    """Part of the closure rates that unit rates of the drivers may leave open before drivers count as dependent on each other."""
     singular: float = 1e9
     """Condition number above which a position counts as a dead point: rates would keep fewer than seven digits."""
     dead_point: float = 1e-10

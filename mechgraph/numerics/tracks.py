@@ -57,6 +57,8 @@ class Paths:
     def _furthest(self, track: int, at: float, limit: float) -> float:
         length, points = self.length[track], self.points[track]
         ahead = np.arange(*np.searchsorted(length, (at, limit), side="right"))
+        if not ahead.size:  # met by rounding of the common key only
+            return limit
         here = self.drive(np.array([track]), np.array([at]))
         chord = np.sqrt(((points[:, ahead] - here) ** 2).sum(axis=0))
         ends = (chord < PATH.straight * (length[ahead] - at)) | np.append(False, self.stops[track][ahead][:-1])

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.equations.state import State
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.numeric import vector_fault
+from mechgraph.numerics.newton import Work
 from mechgraph.result import export
 from mechgraph.units import unit_of
 
@@ -51,6 +52,8 @@ class Values(Protocol):
     batch: tuple[int, ...]
     t: Any
     has_forces: bool
+    engine: Literal["dense", "sparse"]
+    work: Work
 
     def status(self) -> Any:
         """Named outcomes, one a position."""
@@ -312,6 +315,16 @@ class Solution:
     def t(self) -> Any:
         """Times of the motion, where it has some."""
         return self._values.t
+
+    @property
+    def engine(self) -> str:
+        """Which linear algebra ran: ``"dense"`` or ``"sparse"``; the values are the same."""
+        return self._values.engine
+
+    @property
+    def work(self) -> Work:
+        """What was done: positions, nodes of the path, evaluations, factorizations."""
+        return self._values.work
 
     @property
     def checks(self) -> Checks:

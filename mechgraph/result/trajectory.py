@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from mechgraph.force.applied_loads import user_poses, user_twists
 from mechgraph.force.block import BlockForces
 from mechgraph.force.dalembert import given_effort_loads, internal_state
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.numerics.newton import Work
 from mechgraph.result.solution import Checks, MaterialPoint
 from mechgraph.structure.reaction_split import UNIQUE, PairFrames
 
@@ -78,6 +79,8 @@ class Trajectory:
         self._solved = np.zeros(self._count, dtype=bool)
         self._last: BlockMotion | None = None
         self.has_forces = False
+        self.engine: Literal["dense", "sparse"] = "dense"
+        self.work = Work()
 
     # --- filling -------------------------------------------------------------------------------------------------------
 
@@ -293,13 +296,17 @@ class Trajectory:
         driven = np.isin(np.arange(columns.start, columns.stop), self.driven)[:, None]
         own = np.where(driven, total - given - coupled, np.where(np.isnan(given), np.nan, 0.0))
         unit = np.where(self._system.is_length[columns], self._L, self._L**2)[:, None]
-        stress = np.where(driven[:, None], self._of("stress_efforts")[columns] - self._of("coupled_stress")[columns], 0.0)
+        stress = np.where(
+            driven[:, None], self._of("stress_efforts")[columns] - self._of("coupled_stress")[columns], 0.0
+        )
         return self._out(self._masked(unit * (own + given), stress)), self._out(self._masked(unit * own, stress))
 
     def multiplier(self, coupling: int) -> Array:
         """The multiplier of a coupling in the user's units: the effort ``c_i m`` in freedom i."""
         unit = self._L**2 * self._system.row_scale[6 * len(self._system.graph.loops) + coupling]
-        return self._out(self._masked(unit * self._force("multipliers")[coupling], self._of("multiplier_stress")[coupling]))
+        return self._out(
+            self._masked(unit * self._force("multipliers")[coupling], self._of("multiplier_stress")[coupling])
+        )
 
     def shaking(self) -> Array:
         """Wrench on the frame: loads and inertia of all moving links, and what springs do to the frame."""
