@@ -185,7 +185,13 @@ class Outcome:
         self._velocity, self._acceleration = (line.values(kind, batch) for kind in ("velocity", "acceleration"))
         coordinates = continued(path, found)
         self.trajectory = Trajectory(
-            line.system, self._system_at, batch, line.drive.t, line.columns, coordinates, line.options.redundant == "nan"
+            line.system,
+            self._system_at,
+            batch,
+            line.drive.t,
+            line.columns,
+            coordinates,
+            line.options.redundant == "nan",
         )
         work = found.work
         work.positions, work.nodes = len(variant), len(found.tracks.nodes)
