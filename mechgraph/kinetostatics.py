@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.assembly import CLOSED, assembled_at, closed_start, named_columns, state_rows
+from mechgraph.closure.assembly import CLOSED, assembled_at, closed_start, named_columns
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.closure.driver_path import DriverPath, Positions, Request, Status, follow, in_blocks
@@ -104,7 +104,7 @@ class Pipeline:
 
     def _refuse_far(self) -> None:
         """Refuse a path that would be followed for hours."""
-        begin = self.x[state_rows(self.system, self.columns)][:, None]
+        begin = self.x[self.system.single_rows[self.columns]][:, None]
         far = np.abs(self.values("position", self.drive.batch) - begin).max(axis=1)
         faults = [
             f"motion of {name!r}: comes {size * unit:.3g} away from the start; expected at most {FARTHEST * unit:.3g}"
@@ -263,7 +263,7 @@ class Outcome:
     def _disagreement(self, here: Configuration, moved: Rates, places: Index) -> Array:
         """How far given positions and rates of dependent drivers are from those that the leading ones bring, ``(T,)``."""
         line = self.line
-        turns = line.values("position", self.batch)[:, places] - here.x[state_rows(line.system, line.columns)]
+        turns = line.values("position", self.batch)[:, places] - here.x[line.system.single_rows[line.columns]]
         turns -= np.where(line.system.is_length[line.columns], 0.0, 2 * np.pi)[:, None] * np.round(turns / (2 * np.pi))
         out = np.abs(turns).max(axis=0, initial=0.0)
         for given, found in ((self._velocity, moved.dq), (self._acceleration, moved.ddq)):

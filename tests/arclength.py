@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mechgraph.closure.assembly import assembled, named_columns, state_rows
+from mechgraph.closure.assembly import assembled, named_columns
 
 
 class _Path:
@@ -27,7 +27,7 @@ def fold_before_the_end(m, given, step=1e-2, steps=1000):
     """Whether the curve of closed positions over the driver path turns back (or runs off) before the path ends."""
     system, x = assembled(m, {k: float(np.ravel(v.position)[0]) for k, v in given.items()})
     columns, _ = named_columns(m, system, dict.fromkeys(given, 0.0))
-    rows = state_rows(system, columns)
+    rows = system.single_rows[columns]
     unit = np.where(system.is_length[columns], system.par.L, 1.0)
     values = np.array([np.ravel(v.position) for v in given.values()]) / unit[:, None]
     path = _Path(np.concatenate([x[rows][:, None], values], axis=1))

@@ -5,9 +5,9 @@ import pytest
 
 import mechgraph as mg
 from mechgraph.closure.assembly import assembled, named_columns, scaled_system
-from mechgraph.closure.driver_path import Status
+from mechgraph.closure.driver_path import DriverPath, Request, Status, follow
 from mechgraph.closure.indexing import System
-from mechgraph.closure.path import Follower
+from mechgraph.closure.solver import closure_solver
 from mechgraph.topology.linkgraph import link_graph
 
 OPEN = ("rcsr-csr-printed",)
@@ -47,8 +47,9 @@ def followed(m: mg.Mechanism) -> tuple[System, np.ndarray, np.ndarray]:
     columns, _ = named_columns(m, system, dict.fromkeys([d.freedom for d in m.drives], 0.0))
     unit = np.where(system.is_length[columns], system.par.L, 1.0)
     values = np.stack([d.motion.position for d in m.drives if d.motion is not None]) / unit[:, None]
-    found = Follower(system, columns).follow(x, values[:, None])
-    return system, found.x[:, 0], found.status[0]
+    path = DriverPath(system, closure_solver("dense", columns), lambda variants: system)
+    found = follow(path, [Request(x, 0, values, np.arange(values.shape[1]))], values.shape[1])
+    return system, found.x, found.status
 
 
 def test_the_library_is_complete() -> None:

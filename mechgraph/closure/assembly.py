@@ -8,14 +8,20 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array, rotate
 from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.driver_path import DriverPath, Request, Status, follow
 from mechgraph.closure.indexing import Index, System, indexed
+from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
+from mechgraph.closure.solver import closure_solver, engine_for
 from mechgraph.errors import AssemblyError, DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.numeric import is_numeric
-from mechgraph.numerics.newton import closest_zeros, least_norm_step
+from mechgraph.numerics.newton import closest_zeros, least_norm_steps
+from mechgraph.numerics.tolerances import PATH
 
 CLOSED = 1e-10
 """Closure error (angle, or length / L) up to which loops count as closed."""
+SPARSE = 300
+"""Closure rows from which on loops are closed by sparse normal equations."""
 CLOSURE_GOAL = 1e-13
 """Closure error that Newton aims at."""
 ASSEMBLY_RANK = 1e-9
@@ -61,65 +67,35 @@ def close_all(system: System, x: Array, fixed: Index, iterations: int = 60, pati
     """``close`` for states ``(nx, T)``; also the closure errors ``(T,)``."""
     free = np.setdiff1d(np.arange(system.n_freedoms), fixed)
 
-    def evaluate(x: Array) -> tuple[Array, Array]:
-        here = system.at(x)
-        return here.residual, here.J[:, free]
+    def least(here: Configuration) -> Array:
+        if here.T == 1 and system.n_rows >= SPARSE:
+            return ReducedRows(ClosureRows.at(here), fixed).correction(here.residual[:, 0])[:, None]
+        dq = np.zeros((system.n_freedoms, here.T))
+        dq[free] = least_norm_steps(here.J[:, free], here.residual, ASSEMBLY_RANK)
+        return dq
 
-    def advance(x: Array, step: Array) -> Array:
-        dq = np.zeros((system.n_freedoms, x.shape[1]))
-        dq[free] = step
-        return system.advance(x, dq)
-
-    x, _ = closest_zeros(
-        evaluate,
-        advance,
-        x,
-        tolerance=CLOSURE_GOAL,
-        rank_tolerance=ASSEMBLY_RANK,
-        iterations=iterations,
-        patience=patience,
-    )
+    goal = CLOSURE_GOAL
+    x, _ = closest_zeros(system.at, least, system.advance, x, tolerance=goal, iterations=iterations, patience=patience)
     return x, system.at(x).closure
 
 
-def lead(system: System, x: Array, columns: Index, goal: Array, longest: float = 0.15) -> tuple[Array, float]:
-    """Move the coordinates ``columns`` of a closed state to ``goal`` in small steps, loops closed all the way.
+def led(system: System, x: Array, columns: Index, goal: Array) -> tuple[Array, bool]:
+    """A closed state followed until the coordinates ``columns`` have the values ``goal``; whether it came to them.
 
-    Coordinates not named follow with the smallest change. Returns the state reached and the part of the way done.
+    Other freedoms that are free follow as they are held; a goal that is itself a singular position is closed from right before it.
     """
-    rows = state_rows(system, columns)
-    begin = x[rows]
-    free = np.setdiff1d(np.arange(system.n_freedoms), columns)
-    length = float(np.abs(goal - begin).max(initial=0.0))
-    done, h = (0.0, min(1.0, longest / length)) if length > 0 else (1.0, 1.0)
-    while done < 1.0:
-        h = min(h, 1.0 - done)
-        here = system.at(x[:, None])
-        dq = np.zeros((system.n_freedoms, 1))
-        dq[columns, 0] = begin + (done + h) * (goal - begin) - x[rows]
-        dq[free, 0] = least_norm_step(here.J[:, free, 0], here.J[:, columns, 0] @ dq[columns, 0], ASSEMBLY_RANK)
-        ahead = system.advance(x[:, None], dq)[:, 0]
-        closed, error = close(system, ahead, columns, iterations=8)
-        change = np.abs(system.difference(closed[:, None], ahead[:, None])).max()
-        if error <= CLOSED and change < 0.2:
-            x, done = closed, done + h
-            h *= 1.5
-        else:
-            h *= 0.5
-            if h * length < 1e-6:
-                break
-    return x, done
-
-
-def state_rows(system: System, columns: Index) -> Index:
-    """Rows in the state of single freedoms."""
-    row_of = np.full(system.n_freedoms, -1, dtype=np.intp)
-    for g in system.groups:
-        at = 0
-        for factor in g.row.factors:
-            row_of[g.columns[factor[0]]] = g.state_rows[at]
-            at += 1 if len(factor) == 1 else 4
-    return row_of[columns]
+    path = DriverPath(system, closure_solver(engine_for(system.n_rows, 1, "auto"), columns), lambda variants: system)
+    found = follow(path, [Request(x, 0, goal[:, None], np.zeros(1, dtype=np.intp))], 1)
+    if found.status[0] is Status.OK:
+        return found.x[:, 0], True
+    nodes = found.tracks.nodes
+    last = nodes.x[:, int(np.argmax(nodes.place))]
+    if np.abs(last[path.rows] - goal).max() > PATH.dead_zone:
+        return last, False
+    begin = last.copy()
+    begin[path.rows] = goal
+    closed, error = close(system, begin, columns)
+    return closed, error <= CLOSED and bool(np.abs(system.difference(closed[:, None], begin[:, None])).max() < 1e-3)
 
 
 def named_columns(m: Mechanism, system: System, values: Mapping[str, float]) -> tuple[Index, Array]:
@@ -192,7 +168,7 @@ def _settled(system: System, x: Array) -> tuple[System, Array]:
     """The system scaled about the closed position, with the state in its units."""
     q = system.coordinates_of(x[:, None])[:, 0]
     final = scaled_system(system.m, q, system)
-    rows = state_rows(final, np.flatnonzero(final.is_length))
+    rows = final.single_rows[np.flatnonzero(final.is_length)]
     x = x.copy()
     x[rows] *= system.par.L / final.par.L
     return final, x
@@ -202,7 +178,7 @@ def _search(m: Mechanism, system: System, x: Array, preferred: Mapping[str, floa
     drives, _ = named_columns(m, system, {d.freedom: 0.0 for d in m.drives})
     columns, values = named_columns(m, system, preferred)
     at_preferred = x.copy()
-    at_preferred[state_rows(system, columns)] = values
+    at_preferred[system.single_rows[columns]] = values
     attempts = (
         [(x, drives), (at_preferred, columns), (x, np.arange(0))]
         if m.start
@@ -235,11 +211,6 @@ def _search(m: Mechanism, system: System, x: Array, preferred: Mapping[str, floa
     return best, best_error
 
 
-def configuration(system: System, x: Array) -> Configuration:
-    """One state evaluated as a batch of length one."""
-    return system.at(x[:, None])
-
-
 def assembled_at(
     m: Mechanism, values: Mapping[str, float], guess: Mapping[str, float] | None = None
 ) -> tuple[System, Array]:
@@ -257,16 +228,16 @@ def assembled_at(
         raw = scaled_system(m, indexed(m).start_coordinates(m.start))
         columns, goal = named_columns(m, raw, values)
         x = raw.state_of(raw.start_coordinates(m.start)[:, None])[:, 0]
-        x[state_rows(raw, columns)] = goal
+        x[raw.single_rows[columns]] = goal
         x, error = close(raw, x, columns)
         if error > CLOSED:
             raise _not_reached(m, raw, x, error, values)
         return _settled(raw, x)
     system, x = assembled(m, values)
     columns, goal = named_columns(m, system, values)
-    x, done = lead(system, x, columns, goal)
-    if done < 1.0:
-        raise _not_reached(m, system, x, float(np.abs(x[state_rows(system, columns)] - goal).max()), values)
+    x, done = led(system, x, columns, goal)
+    if not done:
+        raise _not_reached(m, system, x, float(np.abs(x[system.single_rows[columns]] - goal).max()), values)
     return _settled(system, x)
 
 

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.assembly import state_rows
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.solver import ClosureSolver, FactoredClosure
@@ -60,7 +59,7 @@ class DriverPath:
     def __init__(self, system: System, solver: ClosureSolver, system_of: SystemOf) -> None:
         self.system, self.solver = system, solver
         self.columns = solver.fixed
-        self.rows = state_rows(system, self.columns)
+        self.rows = system.single_rows[self.columns]
         self.size = (system.n_freedoms, len(self.columns))
         self._system_of = system_of
         self.variant_of: Index = np.zeros(0, dtype=np.intp)
