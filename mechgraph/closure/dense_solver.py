@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -24,6 +25,35 @@ def independent(here: Configuration, Z: Array) -> bool:
     return max(left, default=0.0) <= PATH.independent * max(1.0, float(np.abs(Z).max(initial=0.0)))
 
 
+@dataclass(frozen=True)
+class Form:
+    """Rows turned by the orthogonal ``turn (m, m)`` so that the independent ones come first (None: all are), and a choice of those.
+
+    The rows of a redundant loop are dependent in a way that changes as it moves; among turned rows the first ones stay independent until
+    the column space has turned by a right angle, where rows picked out of them may not.
+    """
+
+    choice: Choice
+    turn: Array | None
+
+    def rows(self, b: Array) -> Array:
+        """``turn^T b`` for ``b (m, k, T)``."""
+        return b if self.turn is None else (self.turn.T @ b.reshape(len(b), -1)).reshape(b.shape)
+
+    def back(self, y: Array) -> Array:
+        """``turn y``."""
+        return y if self.turn is None else (self.turn @ y.reshape(len(y), -1)).reshape(y.shape)
+
+
+def form_at(J: Array, fixed: Index, keep: Index | None) -> Form:
+    """The form chosen at one matrix ``(m, F)``: columns by pivoted QR, rows by the left singular vectors of these."""
+    choice = choose(J, fixed, keep=keep)
+    if len(choice.rows) == len(J):
+        return Form(choice, None)
+    turn = np.linalg.svd(J[:, choice.cols], full_matrices=True)[0]
+    return Form(replace(choice, rows=np.arange(len(choice.cols))), turn)
+
+
 class DenseFactored:
     """Inverses of the independent rows and columns, all positions of a form together."""
 
@@ -31,40 +61,68 @@ class DenseFactored:
 
     def __init__(self, solver: DenseSolver, here: Configuration, which: Index) -> None:
         self.solver, self.here, self.which = solver, here, which
-        self._chosen = ChosenSystem(here.J, solver.choices, which)
+        self._parts = []
+        for i in dict.fromkeys(which.tolist()):
+            at = np.flatnonzero(which == i)
+            J = here.J if len(at) == here.T else here.J[:, :, at]
+            form = solver.forms[i]
+            self._parts.append((form, at, ChosenSystem(form.rows(J), [form.choice], np.zeros(len(at), dtype=np.intp))))
+
+    def _joined(self, values: list[Array], shape: tuple[int, ...]) -> Array:
+        """Values of the forms at all positions."""
+        if len(values) == 1:
+            return values[0]
+        width = max((value.shape[1] for value in values if value.ndim == 3), default=0)
+        out = np.zeros((shape[0], width, self.here.T) if len(shape) > 1 else (self.here.T,))
+        for (_, at, _), value in zip(self._parts, values, strict=True):
+            out[(..., at) if value.ndim < 3 else (slice(None), slice(0, value.shape[1]), at)] = value
+        return out
 
     @property
     def condition(self) -> Array:
         """See the protocol in ``closure.solver``."""
-        return self._chosen.condition
+        return self._joined([system.condition for _, _, system in self._parts], (self.here.T,))
 
     def solve(self, b: Array) -> Array:
         """See the protocol in ``closure.solver``."""
-        return self._chosen.solve(b)
+        found = [system.solve(form.rows(_at(b, at))) for form, at, system in self._parts]
+        return self._joined(found, (self.here.system.n_freedoms, b.shape[1]))
 
     def solve_transposed(self, b: Array) -> Array:
         """See the protocol in ``closure.solver``."""
-        return self._chosen.solve_transposed(b)
+        found = [form.back(system.solve_transposed(_at(b, at))) for form, at, system in self._parts]
+        return self._joined(found, (self.here.system.n_rows, b.shape[1]))
 
     def sensitivity(self) -> Array:
         """See the protocol in ``closure.solver``."""
         fixed = self.solver.fixed
-        Z = self._chosen.solve(-self.here.J[:, fixed])
+        Z = self.solve(-self.here.J[:, fixed])
         Z[fixed, np.arange(len(fixed))] = 1.0
         return Z
 
     def motions(self) -> Array:
         """See the protocol in ``closure.solver``."""
-        return self._chosen.null_of_columns()
+        found = [system.null_of_columns() for _, _, system in self._parts]
+        return self._joined(found, (self.here.system.n_freedoms, 0))
 
     def self_stresses(self) -> Array:
         """See the protocol in ``closure.solver``."""
-        return self._chosen.null_of_transpose()
+        found = [form.back(system.null_of_transpose()) for form, _, system in self._parts]
+        return self._joined(found, (self.here.system.n_rows, 0))
 
     def regular_between(self, a: Configuration, b: Configuration) -> NDArray[np.bool_]:
         """See the protocol in ``closure.solver``."""
         out = np.ones(self.here.T, dtype=bool)
-        for (at, before), (_, behind) in zip(self._chosen.changes(a.J), self._chosen.changes(b.J), strict=True):
+        for form, at, system in self._parts:
+            matrices = [form.rows(_at(other.J, at)) for other in (self.here, a, b)]
+            if form.turn is not None:
+                # turned rows may be singular where the loop is not: the rows independent at these very positions are asked
+                matrices = _independent_rows(matrices, form.choice)
+                whole = np.arange(len(form.choice.cols))
+                system = ChosenSystem(
+                    matrices[0], [Choice(whole, whole, whole[:0], whole[:0])], np.zeros(len(at), dtype=np.intp)
+                )
+            before, behind = (system.change(matrix) for matrix in matrices[1:])
             # on the parabola |change| <= max of both ends; below one it is regular (Banach's lemma)
             regular = scaled_norm(np.maximum(np.abs(before), np.abs(behind))) <= PATH.departure
             rest = np.flatnonzero(~regular)
@@ -89,14 +147,26 @@ class DenseFactored:
 
     def by_held(self) -> list[tuple[Index, Index]]:
         """See the protocol in ``closure.solver``."""
-        forms = np.unique(self.which)
-        held = {tuple(self.solver.choices[i].held.tolist()): self.solver.choices[i].held for i in forms}
-        same = {key: [i for i in forms if tuple(self.solver.choices[i].held.tolist()) == key] for key in held}
-        return [(held[key], np.flatnonzero(np.isin(self.which, same[key]))) for key in held]
+        same: dict[tuple[int, ...], list[Index]] = {}
+        for form, at, _ in self._parts:
+            same.setdefault(tuple(form.choice.held.tolist()), []).append(at)
+        return [(np.array(held, dtype=np.intp), np.sort(np.concatenate(at))) for held, at in same.items()]
+
+
+def _independent_rows(matrices: list[Array], choice: Choice) -> list[Array]:
+    """The chosen columns of matrices ``(m, F, T)`` in an orthonormal basis of those of the first, ``(n, n, T)`` each."""
+    columns = [np.moveaxis(matrix[:, choice.cols], -1, 0) for matrix in matrices]
+    Q = np.linalg.qr(columns[0])[0]
+    return [np.moveaxis(np.swapaxes(Q, 1, 2) @ matrix, 0, -1) for matrix in columns]
+
+
+def _at(values: Array, at: Index) -> Array:
+    """Some of the positions, without a copy where these are all."""
+    return values if len(at) == values.shape[-1] else values[..., at]
 
 
 class DenseSolver:
-    """Independent rows and columns chosen by pivoted QR; positions of poor condition get a choice made among them.
+    """Independent rows and columns; positions of poor condition get a form made at one of them.
 
     Columns in ``keep`` are held rather than others, where that is no worse.
     """
@@ -105,19 +175,19 @@ class DenseSolver:
 
     def __init__(self, fixed: Index, keep: Index | None = None) -> None:
         self.fixed, self.keep = fixed, keep
-        self.choices: list[Choice] = []
+        self.forms: list[Form] = []
 
     def leaves_nothing_free(self, here: Configuration) -> bool:
         """See the protocol in ``closure.solver``."""
         which = self.chosen(here, np.full(here.T, -1))
-        choice = self.choices[int(which[0])]
         f = self.factored(here, which)
-        return not choice.held.size and bool((f.condition < PATH.doubtful).all()) and independent(here, f.sensitivity())
+        free = self.forms[int(which[0])].choice.held.size
+        return not free and bool((f.condition < PATH.doubtful).all()) and independent(here, f.sensitivity())
 
     def corrigible(self, dq: Array, which: Index) -> Array:
         """See the protocol in ``closure.solver``."""
         for i in np.unique(which):
-            held = self.choices[i].held
+            held = self.forms[i].choice.held
             if held.size:
                 dq[np.ix_(held, which == i)] = 0.0
         return dq
@@ -127,40 +197,43 @@ class DenseSolver:
         return DenseFactored(self, here, which)
 
     def chosen(self, here: Configuration, which: Index) -> Index:
-        """See ``ClosureSolver``; a new choice is taken where it is much better than the old one and of the same rank."""
+        """See ``ClosureSolver``; a new form is taken where it is much better than the old one and of the same rank."""
         which = which.copy()
         for t in np.flatnonzero(which < 0):
-            which[t] = self._number(choose(here.J[:, :, t], self.fixed, keep=self.keep))
+            which[t] = self._fitting(here.J[:, :, t])
         for _ in range(TRIES):
             poorness = self._poorness(here, which)
             poor = np.flatnonzero(poorness > 1.0)
             if not poor.size:
                 break
             worst = int(poor[np.argmax(poorness[poor])])
-            new = self._number(choose(here.J[:, :, worst], self.fixed))
-            if new == which[worst]:
-                break
-            same_rank = np.array([len(self.choices[i].cols) == len(self.choices[new].cols) for i in which[poor]])
+            self.forms.append(form_at(here.J[:, :, worst], self.fixed, None))
+            new = len(self.forms) - 1
+            same_rank = np.array(
+                [len(self.forms[i].choice.cols) == len(self.forms[new].choice.cols) for i in which[poor]]
+            )
             trial = self._poorness(here.part(poor), np.full(poor.size, new))
             better = poor[same_rank & (trial < PATH.better * poorness[poor])]
             which[better] = new
             if not better.size:
+                self.forms.pop()
                 break
         return which
 
-    def _number(self, choice: Choice) -> int:
-        """The number of a choice, that of an equal one where there is one."""
-        for i, known in enumerate(self.choices):
-            if known.same(choice):
+    def _fitting(self, J: Array) -> int:
+        """The number of a form for one matrix: the last one where that fits as well, or one made there."""
+        made = form_at(J, self.fixed, self.keep)
+        for i in range(len(self.forms) - 1, -1, -1):
+            if self.forms[i].choice.same(made.choice) and self.forms[i].turn is None:
                 return i
-        self.choices.append(choice)
-        return len(self.choices) - 1
+        self.forms.append(made)
+        return len(self.forms) - 1
 
     def _poorness(self, here: Configuration, which: Index) -> Array:
         """Condition number over what is fair, or where motions are held the largest rate over what is fair."""
-        f = ChosenSystem(here.J, self.choices, which)
+        f = self.factored(here, which)
         out = f.condition / PATH.fair
-        if any(self.choices[i].held.size for i in np.unique(which)):
-            motion = np.nan_to_num(np.abs(f.null_of_columns()).max(axis=(0, 1), initial=0.0), nan=np.inf)
+        if any(self.forms[i].choice.held.size for i in np.unique(which)):
+            motion = np.nan_to_num(np.abs(f.motions()).max(axis=(0, 1), initial=0.0), nan=np.inf)
             out = np.maximum(out, motion / PATH.held)
-        return out
+        return np.asarray(out)

@@ -283,11 +283,9 @@ class ChosenSystem:
             out[np.ix_(choice.held, held, at)] = np.eye(len(held))[:, :, None]
         return out
 
-    def changes(self, other: Array) -> list[tuple[Index, Array]]:
-        """``1 - A^-1 A_other`` of the square parts ``(n, n, T)``, with their places, choice by choice."""
-        out = []
-        for choice, at, factor in self._parts:
-            change = -factor.applied(other[np.ix_(choice.rows, choice.cols, at)])
-            change[np.arange(len(choice.cols)), np.arange(len(choice.cols))] += 1.0
-            out.append((at, change))
+    def change(self, other: Array) -> Array:
+        """``1 - A^-1 A_other`` of the square parts ``(n, n, T)``, of one choice for all positions."""
+        choice, _, factor = self._parts[0]
+        out = -factor.applied(other[np.ix_(choice.rows, choice.cols)])
+        out[np.arange(len(choice.cols)), np.arange(len(choice.cols))] += 1.0
         return out
