@@ -2,7 +2,7 @@
 
 from mechgraph.algebra import inertia
 from mechgraph.equations.build import formulate
-from mechgraph.equations.terms import Formulation
+from mechgraph.equations.formulation import Formulation
 from mechgraph.errors import (
     AssemblyError,
     DeadPointError,

@@ -249,7 +249,7 @@ def test_every_variant_may_have_its_own_motion() -> None:
 
 
 def test_same_seed_same_result_whatever_the_executor(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "CHUNK", 3 * len(ANGLES))
+    monkeypatch.setattr(module, "POSITIONS_TOGETHER", 3 * len(ANGLES))
     ways = {"length[2]": scipy.stats.norm(0.4, 0.004), "link1.mass": scipy.stats.uniform(1, 2)}
     found = []
     calls: list[tuple[int, int]] = []

@@ -37,7 +37,7 @@ WORSE = 1e-2
 """Part of the smallest pivot at the position of choice below which a bordering is chosen anew."""
 RETRY = 1e-3
 """Smallest pivot below which another bordering is tried."""
-SEED = 17
+BORDERS_SEED = 17
 
 
 class LoopSystem(ReducedRows):
@@ -149,7 +149,7 @@ class LoopSystem(ReducedRows):
         neighbours; a random row for every column left over.
         """
         rows, cols, data = self._inner
-        rng = np.random.default_rng(SEED)
+        rng = np.random.default_rng(BORDERS_SEED)
         if beside:
             number, support = _shares(self._touch, self._touch.T.tocsr(), self._left_rows)
         else:

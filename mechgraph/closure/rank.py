@@ -32,7 +32,7 @@ CROSSOVER = 144
 """Rows from which ``auto`` takes the sparse engine: measured on verdicts of ladders and grids, where the two meet at 100 to 240 rows."""
 SHARE = 1e-9
 """Part of a random self-stress below which a row has none."""
-SEED = 23
+SHARES_SEED = 23
 
 
 class Solution(Protocol):
@@ -173,7 +173,7 @@ class ClosureRank:
     def _connected_blocks(self) -> list[list[int]]:
         """Loops (and further rows) with parts of self-stresses that connect loops: those that share freedoms belong together."""
         r = self.reduced
-        probe = np.abs(self._solution.stresses(np.random.default_rng(SEED).normal(size=(self.shared, 1))))[:, 0]
+        probe = np.abs(self._solution.stresses(np.random.default_rng(SHARES_SEED).normal(size=(self.shared, 1))))[:, 0]
         size = np.zeros(r.loops + r.rows.further)
         np.maximum.at(size, r.owners, probe)
         some = np.flatnonzero(size > SHARE * size.max())

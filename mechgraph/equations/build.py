@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
+from mechgraph.equations.formulation import Formulation
 from mechgraph.equations.symbols import LeeNames, factor_text, names_of, screw_letter, subscript
-from mechgraph.equations.terms import AXES, Block, Formulation, ScalarEquation, Screw, Term, Unknown
+from mechgraph.equations.terms import AXES, Block, ScalarEquation, Screw, Term, Unknown
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair

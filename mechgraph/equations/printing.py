@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 from mechgraph.document import Block as Piece
 from mechgraph.document import Bullets, Document, Equation, Heading, Paragraph, Table
 from mechgraph.equations.symbols import names_of, subscript
-from mechgraph.equations.terms import Formulation, ScalarEquation
+from mechgraph.equations.terms import ScalarEquation
+
+if TYPE_CHECKING:
+    from mechgraph.equations.formulation import Formulation
 
 SECTIONS = (
     ("reaction", "Reactions of the pairs"),

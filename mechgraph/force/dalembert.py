@@ -16,11 +16,11 @@ from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.solver import FactoredClosure
 from mechgraph.equations.build import formulate
+from mechgraph.equations.formulation import Formulation
 from mechgraph.equations.state import State
-from mechgraph.equations.terms import Formulation
 from mechgraph.numerics.linear import Choice, ChosenSystem, add_at, choose
 
-CHUNK = 4_000_000
+ENTRIES_TOGETHER = 4_000_000
 """Largest number of matrix entries solved in one batch."""
 BAD_CONDITION = 1e8
 """Condition number above which a choice of independent rows and columns is made anew."""
@@ -126,7 +126,7 @@ def _by_choice(f: Formulation, state: State, T: int) -> tuple[Array, Array]:
     rows, cols, _, _ = f.pattern
     entries, right = f.entries(state), f.right_side(state)
     shape = (len(f.equations), len(f.unknowns))
-    size = max(1, CHUNK // max(1, shape[0] * shape[1]))
+    size = max(1, ENTRIES_TOGETHER // max(1, shape[0] * shape[1]))
     known: list[Choice] = []
     parts = []
     for begin in range(0, T, size):

@@ -28,7 +28,7 @@ SHARED = {
     **_series_of("vector_series", "Three numbers, or an array of such, one a position.", _array(3)),
 }
 """Values that many fields share."""
-WIDTH = 130
+SCHEMA_WIDTH = 130
 """Longest line of the stored schema that is not broken."""
 MARK = re.compile(r"(<!-- fields: ([\w, ]+) -->\n)(?:\|[^\n]*\n)*")
 """Where the Markdown of the library takes a table of fields: a comment, and the table below it."""
@@ -54,7 +54,7 @@ def schema_text() -> str:
 def _laid_out(value: Any, depth: int) -> str:
     """JSON in which what fits in a line stands in one."""
     line = json.dumps(value, ensure_ascii=False)
-    if (depth + len(line) <= WIDTH and depth > 0) or not isinstance(value, dict | list):
+    if (depth + len(line) <= SCHEMA_WIDTH and depth > 0) or not isinstance(value, dict | list):
         return line
     inner, outer = "\n" + "  " * (depth + 1), "\n" + "  " * depth
     if isinstance(value, list):

@@ -25,7 +25,7 @@ STEPS = 24
 """Lanczos steps for the smallest singular value of a larger one."""
 SETTLED = 1e-3
 """Relative change at which these steps end."""
-SEED = 3
+POWER_SEED = 3
 
 
 class LeastNorm:
@@ -59,7 +59,7 @@ def singular_ratio(K: scipy.sparse.csr_array, rank: int, factored: Callable[[], 
         s = singular_values(K.toarray())
         return float(s[rank - 1] / s[0])
     normal = factored()
-    start = np.random.default_rng(SEED).normal(size=K.shape[1])
+    start = np.random.default_rng(POWER_SEED).normal(size=K.shape[1])
     largest = _largest(lambda v: K.T @ (K @ v), start)
 
     def inverse(v: Array) -> Array:

@@ -46,7 +46,7 @@ PATIENCE = 8
 """Corrections without gain after which closing is given up."""
 LONGEST = 0.5
 """Largest component of a correction."""
-SEED = 7
+STEPS_SEED = 7
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,7 @@ def finite_motion(system: System, x: Array, found: ClosureRank, engine: EngineNa
     nullity = found.motions.shape[1]
     if not nullity:
         return FiniteMotion(0, found.rank)
-    rng = np.random.default_rng(SEED)
+    rng = np.random.default_rng(STEPS_SEED)
     v = here.random(rng)
     if found.rank == found.count or here.regular(v):
         return FiniteMotion(nullity, found.rank, (here, v))

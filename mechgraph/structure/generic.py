@@ -16,7 +16,7 @@ from mechgraph.model.pair_type import PairType
 from mechgraph.numerics.tolerances import RANKS
 from mechgraph.topology.linkgraph import LinkGraph
 
-SEED = 11
+GEOMETRY_SEED = 11
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def random_twists(m: Mechanism, rng: np.random.Generator) -> tuple[Array, Array]
 
 def random_rows(m: Mechanism, graph: LinkGraph) -> ClosureRows:
     """The closure equations with random geometry (fixed seed)."""
-    twists, points = random_twists(m, np.random.default_rng(SEED))
+    twists, points = random_twists(m, np.random.default_rng(GEOMETRY_SEED))
     first = np.concatenate([[0], np.cumsum([p.type.f for p in m.pairs])]).astype(np.intp)
     more = coupling_rows(m, int(first[-1]))
     return ClosureRows(graph, first, twists, points, more)
@@ -66,7 +66,7 @@ def coupling_rows(m: Mechanism, width: int) -> scipy.sparse.csr_array | None:
         return None
     out = np.zeros((len(couplings), width))
     place = {name: i for i, name in enumerate(m.freedom_names())}
-    rng = np.random.default_rng(SEED)
+    rng = np.random.default_rng(GEOMETRY_SEED)
     for row, coupling in zip(out, couplings, strict=True):
         row[[place[m.full_name(name)] for name, _ in coupling.terms]] = rng.uniform(0.5, 1.5, len(coupling.terms))
     return scipy.sparse.csr_array(out)

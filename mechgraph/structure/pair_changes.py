@@ -28,13 +28,13 @@ from mechgraph.structure.finite_motion import FiniteMotion
 from mechgraph.structure.mobility import Freedoms, free_motion
 from mechgraph.structure.uniqueness import PROBES, pair_states
 
-SHOWN = 6
+CHANGES_SHOWN = 6
 """Largest number of single changes, and of sets of changes, reported."""
 FREEING = 3
 """Changes reported that let a structure move."""
-SETS = 48
+LARGEST_FOR_SETS = 48
 """Redundancy up to which sets of changes that remove all of it are sought; the work grows as its cube."""
-SEED = 29
+CHANGES_SEED = 29
 
 BEAM = 12
 """Partial sets of changes kept while searching."""
@@ -109,8 +109,8 @@ def changes_of(here: Configuration, freedoms: Freedoms) -> list[Change]:
     On all self-stresses where sets of changes are sought, else on random ones, which give the same rank in one pair.
     """
     system = here.system
-    count = freedoms.redundancy if freedoms.redundancy <= SETS else PROBES
-    rows = freedoms.closure.random_stress(np.random.default_rng(SEED), count)
+    count = freedoms.redundancy if freedoms.redundancy <= LARGEST_FOR_SETS else PROBES
+    rows = freedoms.closure.random_stress(np.random.default_rng(CHANGES_SEED), count)
     stress = np.moveaxis(pair_states(here, np.linalg.qr(rows)[0])[..., 0], 1, 0)
     needed: dict[int, set[str]] = {}
     for k, j in (system.m.freedom(d.freedom) for d in system.m.drives):
@@ -200,7 +200,7 @@ def relieving(changes: list[Change], redundancy: int) -> tuple[list[tuple[Change
     beam: list[tuple[tuple[Change, ...], int]] = [((), 0)]
     complete: list[tuple[Change, ...]] = []
     deepest: list[tuple[tuple[Change, ...], int]] = []
-    for _ in range(redundancy if redundancy <= SETS else 0):
+    for _ in range(redundancy if redundancy <= LARGEST_FOR_SETS else 0):
         grown: dict[frozenset[int], tuple[tuple[Change, ...], int]] = {}
         for parts, removed in beam:
             for c in exact:
@@ -238,7 +238,7 @@ def _spread(singles: list[Change]) -> list[Change]:
     for c in singles:
         (rest if c.pair in seen else first).append(c)
         seen.add(c.pair)
-    return (first + rest)[:SHOWN]
+    return (first + rest)[:CHANGES_SHOWN]
 
 
 def effect(
@@ -304,7 +304,7 @@ def advice(
                 and done not in found
             ):
                 found.append(done)
-    return tuple([*_freeing(system, x, freedoms, changes, motion, engine), *found][: SHOWN + 3])
+    return tuple([*_freeing(system, x, freedoms, changes, motion, engine), *found][: CHANGES_SHOWN + 3])
 
 
 def _freeing(

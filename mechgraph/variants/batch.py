@@ -60,11 +60,11 @@ class NumbersPath(DriverPath):
     def sensitivity(self, point: Configuration, factored: FactoredClosure) -> Array:
         """Rates with the part of the way, by a forward difference: the numbers come from a function or a table of any kind."""
         drive, tracks = self._last
-        ahead = self.system_at(drive[0] + DIFFERENCE, tracks).at(point.x).residual - point.residual
-        return factored.solve(-ahead[:, None] / DIFFERENCE)
+        ahead = self.system_at(drive[0] + NUMBERS_STEP, tracks).at(point.x).residual - point.residual
+        return factored.solve(-ahead[:, None] / NUMBERS_STEP)
 
 
-DIFFERENCE = 1e-7
+NUMBERS_STEP = 1e-7
 """Step of that difference, in parts of the way: half the digits are left, which a prediction does not miss."""
 
 

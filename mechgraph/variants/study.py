@@ -24,7 +24,7 @@ from mechgraph.variants.result import Study
 from mechgraph.variants.sampling import SAMPLINGS, distributions, spread
 from mechgraph.variants.work import Part, Source, Task, as_rows, motion_of_case, solved
 
-CHUNK = 60_000
+POSITIONS_TOGETHER = 60_000
 """Positions of all variants that are solved together: bounds the memory."""
 MOST_TOGETHER = 500
 """Variants that are followed together: their arrays stay in the cache."""
@@ -111,7 +111,7 @@ def study(
         own = {name: motion_of_case(motion, at) for name, motion in paths.items()}
         return Task(source, part, own, kept, method, redundant, engine)
 
-    size = max(1, min(MOST_TOGETHER, CHUNK // max(motion.shape[-1] for motion in paths.values())))
+    size = max(1, min(MOST_TOGETHER, POSITIONS_TOGETHER // max(motion.shape[-1] for motion in paths.values())))
     tasks = [task(near, slice(0, 1))]
     tasks += [task(values[:, i : i + size], slice(i, i + size)) for i in range(0, values.shape[1], size)]
     parts = _all_solved(tasks, executor, progress)

@@ -1,0 +1,191 @@
+"""A formulation: named unknowns and equations whose terms are both printed and assembled."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.document import Document, to_html, to_latex, to_text
+from mechgraph.equations.printing import coefficient_rows, formulation_document
+from mechgraph.equations.state import State
+from mechgraph.equations.symbols import factor_text
+from mechgraph.equations.terms import AXES, Block, Ledger, LedgerRow, ScalarEquation, Screw, Term, Unknown
+from mechgraph.model.mechanism import Mechanism
+
+
+@dataclass(frozen=True)
+class Formulation:
+    """The d'Alembert equations of a mechanism: what is printed is what is solved.
+
+    ``unknowns`` and ``equations`` are scalar; ``blocks`` are the same equations as vectors. Every term names the screw component
+    that is its coefficient; ``assemble`` reads that component from a State, ``text`` prints its symbol.
+    """
+
+    mechanism: Mechanism
+    bookkeeping: str
+    unknowns: tuple[Unknown, ...]
+    equations: tuple[ScalarEquation, ...]
+    blocks: tuple[Block, ...]
+    screws: tuple[Screw, ...]
+
+    # --- counting ------------------------------------------------------------------------------------------------------
+
+    def ledger(self) -> Ledger:
+        """The ledger: unknowns and equations by kind."""
+        groups: dict[str, int] = {}
+        for pair in self.mechanism.pairs:
+            groups[pair.type.symbol] = groups.get(pair.type.symbol, 0) + 1
+        if self.mechanism.couplings:
+            groups["coupling"] = len(self.mechanism.couplings)
+        groups["driver"] = sum(u.group == "driver" for u in self.unknowns)
+        groups["link"] = len(self.mechanism.links) - 1
+        rows = {
+            name: LedgerRow(
+                count,
+                sum(u.group == name for u in self.unknowns),
+                sum(e.group == name for e in self.equations),
+            )
+            for name, count in groups.items()
+        }
+        return Ledger(self.bookkeeping, MappingProxyType(rows))
+
+    # --- numbers -------------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def pattern(self) -> tuple[NDArray[np.intp], NDArray[np.intp], Array, NDArray[np.intp]]:
+        """Rows, columns, signs and value indices of all terms; value 0 is the number one, then six for every screw."""
+        cells = [
+            (i, t.unknown, t.sign, 0 if t.screw is None else 1 + 6 * t.screw + t.part)
+            for i, equation in enumerate(self.equations)
+            for t in equation.terms
+        ]
+        rows, cols, signs, values = zip(*cells, strict=True) if cells else ((), (), (), ())
+        return (
+            np.array(rows, dtype=np.intp),
+            np.array(cols, dtype=np.intp),
+            np.array(signs, dtype=float),
+            np.array(values, dtype=np.intp),
+        )
+
+    def entries(self, state: State) -> Array:
+        """Values of all coefficients ``(terms, T)`` in the order of ``pattern``."""
+        T = state.loads.shape[2]
+        values = np.ones((1 + 6 * len(self.screws), T))
+        for i, screw in enumerate(self.screws):
+            values[1 + 6 * i : 7 + 6 * i] = getattr(state, screw.kind)[screw.pair][:, screw.index]
+        _, _, signs, index = self.pattern
+        out = np.asarray(signs[:, None] * values[index])
+        if self.mechanism.couplings:
+            out *= self._coupled(state)
+        return out
+
+    def _coupled(self, state: State) -> Array:
+        """What the multipliers of couplings are multiplied by in every term, ``(terms, 1 or T)``; 1 in all other terms."""
+        given = state.coefficients or [np.array(c.coefficients)[:, None] for c in self.mechanism.couplings]
+        width = max(c.shape[1] for c in given)
+        terms = [t.coupling for equation in self.equations for t in equation.terms]
+        out = np.ones((len(terms), width))
+        for i, place in enumerate(terms):
+            if place is not None:
+                out[i] = given[place[0]][place[1]]
+        return out
+
+    def right_side(self, state: State) -> Array:
+        """Right sides ``(equations, T)``: minus the inertia and applied wrenches."""
+        out = np.zeros((len(self.equations), state.loads.shape[2]))
+        for i, equation in enumerate(self.equations):
+            if equation.link is not None:
+                out[i] = -state.loads[equation.part, equation.link]
+        return out
+
+    def assemble(self, state: State, position: int = 0) -> tuple[scipy.sparse.csr_array, Array]:
+        """Matrix and right side at one position: ``A u = b``.
+
+        Returns ``A (len(equations), len(unknowns))`` as a scipy sparse array and ``b (len(equations),)``.
+        """
+        rows, cols, _, _ = self.pattern
+        shape = (len(self.equations), len(self.unknowns))
+        A = scipy.sparse.csr_array((self.entries(state)[:, position], (rows, cols)), shape=shape)
+        return A, self.right_side(state)[:, position]
+
+    def assemble_dense(self, state: State) -> tuple[Array, Array]:
+        """Matrices ``(equations, unknowns, T)`` and right sides ``(equations, T)`` of all positions."""
+        rows, cols, _, _ = self.pattern
+        A = np.zeros((len(self.equations), len(self.unknowns), state.loads.shape[2]))
+        np.add.at(A, (rows, cols), self.entries(state))  # a multiplier may act twice on one link
+        return A, self.right_side(state)
+
+    # --- print -------------------------------------------------------------------------------------------------------
+
+    def coefficient_symbol(self, term: Term) -> str:
+        """The symbol of a coefficient, e.g. ``A_1x``, ``A0_1x`` or ``2 A_1x`` of a coupling; empty for the number one."""
+        if term.screw is None:
+            return ""
+        screw = self.screws[term.screw]
+        symbol, axis = screw.symbol if term.part >= 3 else screw.dual, AXES[term.part % 3]
+        symbol = symbol.replace("{}", axis) if "{}" in symbol else symbol + axis
+        return symbol if term.coupling is None else factor_text(abs(self._number(term.coupling))) + symbol
+
+    def sign_of(self, term: Term) -> float:
+        """The sign with which a term is printed: that of its number where a coupling gives one."""
+        return term.sign if term.coupling is None else term.sign * float(np.sign(self._number(term.coupling)))
+
+    def _number(self, place: tuple[int, int]) -> float:
+        return self.mechanism.couplings[place[0]].coefficients[place[1]]
+
+    def document(self, components: bool = True) -> Document:
+        """The printed formulation as a document."""
+        return formulation_document(self, components)
+
+    def text(self, components: bool = True) -> str:
+        """Block-wise and component-wise equations as plain text."""
+        return to_text(self.document(components))
+
+    def latex(self, components: bool = True) -> str:
+        """Block-wise and component-wise equations as LaTeX."""
+        return to_latex(self.document(components))
+
+    def coefficients(self) -> CoefficientTable:
+        """The nonzero coefficients ``Q(row, column)`` and right sides ``C(row)``, as Lee's Table XIV lists them."""
+        return CoefficientTable(tuple(coefficient_rows(self)))
+
+    def __str__(self) -> str:
+        return self.text()
+
+    def __repr__(self) -> str:
+        return (
+            f"Formulation({self.mechanism.name!r}, {self.bookkeeping!r}, {len(self.equations)} equations, "
+            f"{len(self.unknowns)} unknowns)"
+        )
+
+    def _repr_html_(self) -> str:
+        return to_html(self.document())
+
+
+@dataclass(frozen=True)
+class CoefficientTable:
+    """Nonzero coefficients: rows ``(entry, row, column, value)``; right sides have column 0."""
+
+    rows: tuple[tuple[str, int, int, str], ...]
+
+    def text(self) -> str:
+        """One entry a line, ``Q(1, 1) = 1``."""
+        return "\n".join(f"{entry} = {value}" for entry, _, _, value in self.rows) + "\n"
+
+    def csv(self) -> str:
+        """The table as CSV: matrix, row, column, value."""
+        lines = ["matrix,row,column,value"]
+        lines += [f"{entry[0]},{row},{column or ''},{value}" for entry, row, column, value in self.rows]
+        return "\n".join(lines) + "\n"
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __str__(self) -> str:
+        return self.text()
