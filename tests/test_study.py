@@ -478,3 +478,15 @@ def test_bad_questions_to_a_study_are_told() -> None:
         with pytest.raises(mg.DeclarationError):
             ask()
     assert list(study.to_pandas()["A.effort"]) == pytest.approx([5.0, 5.0])
+
+
+def test_coefficients_of_a_coupling_vary() -> None:
+    """Gears ``2 A + c B = 0``: the other wheel turns by ``-2 / c`` of the first."""
+    wheel = {"axis": (0, 0, 1)}
+    pairs = [
+        mg.Pair("A", "R", "f", "a", point=(0, 0, 0), **wheel),
+        mg.Pair("B", "R", "f", "b", point=(1, 0, 0), **wheel),
+    ]
+    m = mg.Mechanism("gears", pairs=pairs, couplings=[mg.Coupling({"A": 2.0, "B": -3.0}, name="g")], drives=["A"])
+    s = mg.study(m, {"g.B": [-3.0, -2.0, -1.0]}, ["B.position"], n=3, motions={"A": [0.0, 1.0]})
+    np.testing.assert_allclose(s.outputs["B.position"][:, 1].ravel(), -2.0 / s.parameters["g.B"], rtol=1e-12)

@@ -89,7 +89,9 @@ def solve_together(numbers_at: NumbersAt, count: int, motions: Mapping[str, Moti
     path = NumbersPath(line, numbers_at)
     valid = variants.valid()
     good = np.flatnonzero(valid)
-    if not good.size:
+    # the rows of couplings have one set of numbers for all tracks
+    coupled = any(np.ptp(np.nan_to_num(rows), axis=1).any() for rows in variants.couplings)
+    if not good.size or coupled:
         return Together(None, np.ones(V, dtype=bool), nothing)
     line_of = Paths([np.array([[0.0, float(ok)]]) for ok in valid])
     tracks = Follower(path).follow(np.repeat(line.x[:, None], V, axis=1), line_of, first=1.0)
