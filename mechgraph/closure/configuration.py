@@ -54,12 +54,6 @@ class Configuration:
         system = self.system if par.batch == 1 else self.system.with_parameters(par.taken(at))
         return Configuration(system, self.x[:, at])
 
-    def forget(self) -> None:
-        """Give back all memory but that of the states; what is asked for again is computed again."""
-        for name, value in vars(type(self)).items():
-            if isinstance(value, kept):
-                self.__dict__.pop(name, None)
-
     # --- poses -------------------------------------------------------------------------------------------------------
 
     @kept
@@ -319,10 +313,6 @@ class Configuration:
             flat = np.asarray(s.graph.sparse_loop_matrix.T @ loops.reshape(n, loops.size // n))
             return np.moveaxis(flat.reshape(len(s.m.pairs), 6, *x.shape[1:]), 1, 0)
         return np.asarray(np.einsum("lp,list->ipst", s.loop_matrix, loops))
-
-    def link_accelerations(self, dq: Array, ddq: Array, V: Array) -> Array:
-        """Accelerations dV/dt of all links ``(6, N, T)``."""
-        return self.accelerations_with(ddq, self.bias(dq, V))
 
     def accelerations_with(self, ddq: Array, bias: Array) -> Array:
         """Accelerations dV/dt of all links ``(6, N, T)``, the velocity part ``bias (6, P, T)`` known."""

@@ -45,11 +45,6 @@ class Group:
     columns: Index
     state_rows: Index
 
-    @cached_property
-    def at_pairs(self) -> Place:
-        """The pairs, as a slice where that can be."""
-        return compact(self.pairs)
-
 
 @dataclass(frozen=True)
 class FactorBatch:

@@ -48,11 +48,6 @@ class Rates(Velocities):
         """Accelerations dV/dt of all links ``(6, N, T)``."""
         return self.here.accelerations_with(self.ddq, self.bias)
 
-    def forget(self) -> None:
-        """Give back the memory of what follows from the rates; what is asked for again is computed again."""
-        for name in ("V", "bias", "A"):
-            self.__dict__.pop(name, None)
-
 
 def rates(
     here: Configuration,

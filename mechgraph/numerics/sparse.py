@@ -72,36 +72,6 @@ class SparseFactor:
         self._pivots = np.zeros(1) if lu is None else np.asarray(lu.U.diagonal())
         self.smallest_pivot = float(np.abs(self._pivots).min(initial=1.0))
 
-    def _signs(self) -> Array:
-        """Signs of the pivots in the places of the first factorization, whatever their size."""
-        lu = self._lu
-        if not np.array_equal(lu.perm_r, lu.perm_c):
-            try:
-                lu = scipy.sparse.linalg.splu(self._A, permc_spec="NATURAL", diag_pivot_thresh=0.0)
-            except RuntimeError:
-                return np.zeros(self._A.shape[0])
-        return np.asarray(np.sign(lu.U.diagonal())[lu.perm_c])
-
-    def same_side(self, other: SparseFactor) -> bool:
-        """Whether nothing says that a singular matrix lies between two of one pattern: every pivot keeps its sign.
-
-        The sign of the determinant alone would miss an even number of zeros passed at once. That a leading block is singular on the
-        way changes signs too, so that a change asks for a closer look, about pivots chosen near by.
-        """
-        if self._lu is None or other._lu is None:
-            return False
-        return np.array_equal(self._signs(), other._signs())
-
-    @property
-    def sign(self) -> float:
-        """Sign of the determinant."""
-        if self._lu is None:
-            return 0.0
-        out = float(np.prod(np.sign(self._pivots)))
-        for perm in (self._lu.perm_r, self._lu.perm_c, self._row_place, self._col_place):
-            out *= _parity(perm)
-        return out
-
     @cached_property
     def distance(self) -> float:
         """Distance to the nearest singular matrix, ``1 / |A^-1|`` in the 1-norm, estimated (Higham and Tisseur 2000); 0 where singular."""
@@ -141,11 +111,3 @@ def _to_places(b: Array, order: Index) -> Array:
     out = np.empty_like(b)
     out[order] = b
     return out
-
-
-def _parity(perm: Index) -> float:
-    """Sign of a permutation: ``(-1)^(n - cycles)``."""
-    n = len(perm)
-    graph = scipy.sparse.coo_array((np.ones(n), (np.arange(n), perm)), shape=(n, n))
-    cycles, _ = scipy.sparse.csgraph.connected_components(graph, directed=False)
-    return -1.0 if (n - cycles) % 2 else 1.0

@@ -14,7 +14,7 @@ from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.passive_rest import Idle
 from mechgraph.closure.rank import ClosureRank, EngineName, closure_rank
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.numerics.linear import RANK_TOLERANCE, independent_rows, singular_values
+from mechgraph.numerics.linear import independent_rows, singular_values
 from mechgraph.numerics.tolerances import MOTIONS
 from mechgraph.structure.passive import PassiveMotion, passive_motions
 
@@ -117,11 +117,6 @@ def free_motion(system: System, x: Array, columns: Index, engine: EngineName = "
         _, pivots = scipy.linalg.qr(np.stack([p.rates for p in passive]), mode="r", pivoting=True)
         hold = np.sort(pivots[: len(passive)]).astype(np.intp)
     return Freedoms(found, at_rest, null, drive < MOTIONS.dependent, tuple(passive), tuple(undriven), hold, drive)
-
-
-def motions_of(J: Array) -> Array:
-    """Orthonormal motions ``(F, M)`` with ``J q' = 0``."""
-    return null_space(J, RANK_TOLERANCE) if J.shape[0] else np.eye(J.shape[1])
 
 
 def _complement(system: System, left: Array, passive: list[PassiveMotion]) -> list[FreeMotion]:

@@ -122,14 +122,6 @@ class PairFrames:
             out.append(values[: 6 - g.row.f])
         return out
 
-    def of_one_pair(self, pair: int, wrenches: Array) -> Array:
-        """Components ``(6 - f, s)`` of reaction wrenches ``(6, s)`` of one pair at a single position."""
-        return self.components_of(*self._place[pair], wrenches[..., None])[..., 0]
-
-    @cached_property
-    def _place(self) -> dict[int, tuple[int, int]]:
-        return {int(k): (n, i) for n, g in enumerate(self.here.system.groups) for i, k in enumerate(g.pairs)}
-
     def components_of(self, number: int, i: int, wrenches: Array) -> Array:
         """Components ``(6 - f, ..., T)`` of the ``i``-th pair of a group from its reaction wrenches ``(6, ..., T)``."""
         here = self.here
