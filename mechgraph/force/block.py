@@ -44,9 +44,10 @@ class BlockForces:
 
     ``reactions (6, P, T)`` and all ``efforts (F, T)`` (of least norm where redundant), ``given (F, T)`` efforts of loads, ``loads
     (6, N, T)`` inertia, applied wrenches and what holds passive bodies (``hold (6, N, T)`` that alone, or None), self-stresses
-    ``stress (6, P, s, T)`` with ``stress_efforts (F, s, T)``, ``coupled (F, T)`` efforts of couplings, ``shaking (6, T)``; ``balance (T,)`` and ``power (T,)`` what is left of
-    equilibrium and power, ``largest`` the largest term of each; ``holds`` by body. ``multipliers (n, T)`` of the closure rows behind
-    those of the loops with ``multiplier_stress (n, s, T)``, of which ``coupled_stress (F, s, T)`` are the efforts in freedoms.
+    ``stress (6, P, s, T)`` with ``stress_efforts (F, s, T)``, ``coupled (F, T)`` efforts of couplings, ``shaking (6, T)``;
+    ``balance (T,)`` and ``power (T,)`` the residuals of equilibrium and power, ``largest`` the largest term of each; ``holds`` by
+    body. ``multipliers (n, T)`` of the closure rows behind those of the loops with ``multiplier_stress (n, s, T)``, of which
+    ``coupled_stress (F, s, T)`` are the efforts in freedoms.
     """
 
     reactions: Array

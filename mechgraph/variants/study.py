@@ -73,10 +73,10 @@ def study(
     -------
     Study
         A variant that cannot be built, assembled or moved has NaN in its outputs and says so in ``status`` and ``messages``; it
-        never stops the others. Every variant starts on the branch to which the mechanism itself is led when its numbers change
-        into those of the variant, also where it is then solved by itself because a position is out of reach or near a dead
-        point; one for which that way is not beyond doubt is solved by itself, as ``solve`` does. A passive body
-        whose centre is off its line stands as it comes to stand on that way.
+        never stops the others. The start of every variant is followed from the mechanism itself while its numbers change into those of
+        the variant, so that it is on the same branch, also where the variant is then solved alone because a position is out of
+        reach or near a dead point. Where that path cannot be followed, the variant is assembled and solved alone, as ``solve``
+        does. The orientation of a passive body whose centre is off its line is the one that it reaches along that path.
 
     Raises
     ------
