@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parents[1]
 README = ROOT / "README.md"
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 ROUNDING = re.compile(r"\b\d(?:\.\d+)?e-1[0-9]\b")
-WORK = re.compile(r"\d+ (?=nodes of the path|evaluations|factorizations)")
+WORK = re.compile(r"\d+ (?=nodes|careful|evaluations|calls|factorizations)")
 
 
 def run_python(code: str, namespace: dict[str, object]) -> str:
