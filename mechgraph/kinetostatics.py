@@ -339,9 +339,12 @@ def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exceptio
     at = ", ".join(f"{name} = {value:.6g}" for name, value in reached.items())
     wanted = ", ".join(f"{name} = {value:.6g}" for name, value in asked.items())
     if status[first] in (Status.DEAD_POINT.value, Status.BEYOND_DEAD_POINT.value):
+        where = (
+            "is a dead point" if status[first] == Status.DEAD_POINT.value else f"is beyond a dead point; reached {at}"
+        )
         return DeadPointError(
-            f"mechanism {line.m.name!r}: dead point at {at} (asked for position {first}: {wanted}). The drivers do not "
-            "determine the motion there; drive another freedom, stop before it, or use on_reach='flag'",
+            f"mechanism {line.m.name!r}: position {first} ({wanted}) {where}. At a dead point the drivers do not determine the "
+            "motion; drive another freedom, leave the position out, or use on_reach='flag'",
             reached,
             solution,
         )

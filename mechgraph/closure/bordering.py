@@ -1,9 +1,9 @@
 """The closure equations of a large mechanism as one square sparse system: reduced loop by loop, bordered, factored.
 
 The six rows of a loop are taken about its own middle, with its own unit of length, and turned so that those without any pivot in that
-loop alone (its local redundancy) fall away. Motions that one loop has by itself (the spin of a coupler between spheres) get a row that
-holds them. A matching of the rows left to the free columns says how many more columns and rows stay over; each brings a random row
-or column beside the loop where it lies. What results,
+loop alone (its local redundancy) fall away. A motion within a single loop (the spin of a coupler between spheres) gets a row that
+holds it. A matching of the remaining rows to the free columns leaves some columns and rows unmatched; each is bordered by a random row
+or column, placed at the loop where it lies. What results,
 
     B = [ U^T J   R ]        B [q; s] = [U^T b; 0],      B^T [x; m] = [tau; c],
         [   G     0 ]
@@ -34,7 +34,7 @@ Mask = NDArray[np.bool_]
 PIVOT = 1e-8
 """Pivot (against unit rows and columns) below which a bordered system counts as singular."""
 WORSE = 1e-2
-"""Part of the smallest pivot at the position of choice below which a bordering is chosen anew."""
+"""Part of the smallest pivot at the position of choice below which another bordering is chosen."""
 RETRY = 1e-3
 """Smallest pivot below which another bordering is tried."""
 SEED = 17

@@ -49,13 +49,13 @@ class Configuration:
         self.T = x.shape[1]
 
     def part(self, at: Index) -> Configuration:
-        """Some of the positions, evaluated by themselves."""
+        """Some of the positions, evaluated separately."""
         par = self.system.par
         system = self.system if par.batch == 1 else self.system.with_parameters(par.taken(at))
         return Configuration(system, self.x[:, at])
 
     def forget(self) -> None:
-        """Give back all memory but that of the states; what is asked for again is computed again."""
+        """Release all memory but that of the states; what is asked for later is computed again."""
         for name, value in vars(type(self)).items():
             if isinstance(value, kept):
                 self.__dict__.pop(name, None)

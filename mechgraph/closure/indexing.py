@@ -315,7 +315,7 @@ class System:
 
     @cached_property
     def rows(self) -> list[Rows]:
-        """Who brings closure rows: the loops, then the couplings."""
+        """The contributors of closure rows: the loops, then the couplings."""
         loops: list[Rows] = [LoopRows(len(self.graph.loops))]
         return loops + ([coupling_rows(self, self.couplings, self.m.start)] if self.couplings else [])
 

@@ -49,7 +49,7 @@ class Rates(Velocities):
         return self.here.accelerations_with(self.ddq, self.bias)
 
     def forget(self) -> None:
-        """Give back the memory of what follows from the rates; what is asked for again is computed again."""
+        """Release the memory of what follows from the rates; what is asked for later is computed again."""
         for name in ("V", "bias", "A"):
             self.__dict__.pop(name, None)
 

@@ -70,7 +70,7 @@ class BlockForces:
 
 @dataclass(frozen=True)
 class ForceTask:
-    """What is asked of every block: force ``method``, ``loads``, ``driven`` freedoms, passive ``bodies``; ``batch`` and times ``t``."""
+    """The task for every block: force ``method``, ``loads``, ``driven`` freedoms, passive ``bodies``; ``batch`` and times ``t``."""
 
     method: str
     loads: tuple[Load, ...]

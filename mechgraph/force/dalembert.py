@@ -23,7 +23,7 @@ from mechgraph.numerics.linear import Choice, ChosenSystem, add_at, choose
 CHUNK = 4_000_000
 """Largest number of matrix entries solved in one batch."""
 BAD_CONDITION = 1e8
-"""Condition number above which a choice of independent rows and columns is made anew."""
+"""Condition number above which other independent rows and columns are chosen."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def newton_euler(problem: Problem) -> Wrenches:
     """All reaction components and driver efforts from the printed equations: six for every moving link.
 
     Assembled from the minimal formulation; redundant systems through independent rows and columns. Positions at which
-    different freedoms are held are solved apart.
+    different freedoms are held are solved separately.
     """
     here = problem.here
     n = here.system.n_rows - 6 * len(here.system.graph.loops)

@@ -3,8 +3,8 @@
 A position is regular where the closed positions near by form a manifold whose dimension is the nullity n of the closure Jacobian.
 That is confirmed by actual motion: after a random step in the null space the rows that are independent here close all loops, so
 that the others depend on them there too and the rank is constant. Where that fails at every step size, the position is a change point
-or shaky; random steps lead to positions near by, where it is asked again. If none of these is regular, each direction v of the null
-space N is tried by itself and what is left of it once the loops are closed by the smallest change is compared with it:
+or shaky; random steps reach nearby positions, where the test is repeated. If none of these is regular, each direction v of the null
+space N is tried alone, and what is left of it once the loops are closed by the smallest change is compared with it:
 
     kept = N^T (x' - x) / h,   x' closed;
 
@@ -27,7 +27,7 @@ from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
 from mechgraph.closure.rank import ClosureRank, EngineName, closure_rank
 
 STEPS = (0.05, 0.0125, 0.003)
-"""Lengths of trial steps (radians, or lengths / L): the first ones tell a motion that returns, the last ones bear curvature."""
+"""Lengths of trial steps (radians, or lengths / L): the first ones tell a motion that returns, the last ones tolerate curvature."""
 FAR_STEPS = 6
 """Further steps of the first length over which the motion is followed."""
 KEPT = 0.5
@@ -117,7 +117,7 @@ class _Position:
 
 @dataclass(frozen=True)
 class FiniteMotion:
-    """What following the motions showed.
+    """Result of following the motions.
 
     Attributes
     ----------

@@ -43,7 +43,7 @@ BEAM = 12
 @dataclass(frozen=True)
 class Change:
     """One pair given another type; ``matrix (f, s)`` is its power on the self-stresses, ``added`` the freedoms added,
-    ``relief`` the self-stresses that it removes by itself.
+    ``relief`` the self-stresses that it removes alone.
 
     ``turn``: angle by which the second direction x is turned about the axis, for types in which it matters.
     """

@@ -52,7 +52,7 @@ def study(
     engine: str = "auto",
     progress: Progress | None = None,
 ) -> Study:
-    """Solve many variants of one mechanism, and what varies with what.
+    """Solve many variants of one mechanism: how outputs vary with its numbers.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def study(
         ``mechgraph.variants.fields``: ``crank.mass``, ``B.on_a.point.x``, ``loads[0].stiffness``, ``length[2]`` of a chain.
     outputs : quantities by name (``"A.effort"``, ``"B.force"``, ``"B:Fx"``, ``"coupler.center"``), or a mapping name -> quantity or
         function of a Solution with the batch ``(variants, positions)``.
-    n : number of variants; on a grid, of levels of every distribution (numbers are taken as they are).
+    n : number of variants; on a grid, of levels of every distribution (a list of numbers is taken as given).
     seed : of the sample. The same seed gives the same result, whatever the executor.
     motions : of the drivers as in ``solve``; a leading axis of length ``n`` gives every variant its own.
     sampling : ``"random"``, ``"latin"`` (Latin hypercube) or ``"grid"``.
