@@ -41,7 +41,7 @@ SEED = 17
 
 
 class LoopSystem(ReducedRows):
-    """The bordered system chosen at one position, columns ``fixed`` left out; serves positions near by.
+    """The bordered system chosen at one position, columns ``fixed`` left out; serves nearby positions.
 
     ``regular`` whether its pivots prove the rank there; ``rank`` of J without the fixed columns; ``smallest`` pivot; ``redundant``
     number of self-stresses; ``held`` number of motions left; ``kept (loops,)`` rows of every loop that are
@@ -106,7 +106,7 @@ class LoopSystem(ReducedRows):
         return rows
 
     def _match(self) -> None:
-        """Match kept rows and the rows of single-loop motions to the free columns; what stays over."""
+        """Match kept rows and the rows of single-loop motions to the free columns; what stays unmatched."""
         e = self.entries
         starts = np.concatenate([[0], np.cumsum(self.kept)])
         self._m, self._n = self.height, int(self._free.sum())

@@ -88,7 +88,7 @@ class ClosureSolver(Protocol):
         """Whether the factors at a position prove that the fixed columns determine all others; False proves nothing."""
 
     def corrigible(self, dq: Array, which: Index) -> Array:
-        """Increments ``(F, T)`` without the motions that are held: no correction would take out what a prediction brings into them."""
+        """Increments ``(F, T)`` without the motions that are held: no correction can remove what a prediction adds to them."""
 
 
 def engine_for(rows: int, positions: int, engine: str) -> Literal["dense", "sparse"]:

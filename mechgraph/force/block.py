@@ -145,7 +145,7 @@ class _Found:
 
 
 def _least(here: Configuration, wrenches: Wrenches, f: FactoredClosure, task: ForceTask) -> _Found:
-    """Reactions and efforts of least norm; where random self-stresses stand for all of them only if that is asked for."""
+    """Reactions and efforts of least norm; where self-stresses are random ones only if that is asked for."""
     totals, multipliers = wrenches.totals, wrenches.multipliers
     acting = np.union1d(task.driven, here.system.coupled_freedoms)
     stress = (orthonormal_stress if f.complete else split_stress)(here, wrenches.stress, acting)

@@ -65,12 +65,12 @@ def loop_wrench(problem: Problem) -> Wrenches:
     tree += here.pair_wrenches(x)[:, :, 0]
     null = problem.solver.self_stresses()
     loops = 6 * len(here.system.graph.loops)
-    # J^T x counts what a row takes out of a freedom; what it brings is the negative
+    # J^T x is minus the effort that a row exerts in a freedom
     return Wrenches(tree, here.pair_wrenches(null), -x[loops:, 0], -null[loops:])
 
 
 def row_efforts(here: Configuration, multipliers: Array) -> Array:
-    """Efforts ``(F, k, T)`` that multipliers ``(n, k, T)`` of the rows behind those of the loops bring into freedoms."""
+    """Efforts ``(F, k, T)`` that multipliers ``(n, k, T)`` of the rows behind those of the loops exert in the freedoms."""
     loops = np.zeros((6 * len(here.system.graph.loops), *multipliers.shape[1:]))
     return here.row_efforts(np.concatenate([loops, multipliers]))
 

@@ -1,4 +1,4 @@
-"""What the fields of a declaration hold, said once, in the annotations of the dataclasses.
+"""What the fields of a declaration hold, stated once, in the annotations of the dataclasses.
 
     mass: Annotated[float, NUMBER("mass", MASS, minimum=0.0)] = 0.0
 

@@ -1,4 +1,4 @@
-"""Numbers as a user types them: read leniently, kept as floats and tuples of floats, faults told in words."""
+"""Numbers as a user types them: read leniently, kept as floats and tuples of floats, faults described in words."""
 
 from __future__ import annotations
 

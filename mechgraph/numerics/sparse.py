@@ -86,7 +86,7 @@ class SparseFactor:
         """Whether nothing says that a singular matrix lies between two of one pattern: every pivot keeps its sign.
 
         The sign of the determinant alone would miss an even number of zeros passed at once. That a leading block is singular on the
-        way changes signs too, so that a change asks for a closer look, about pivots chosen near by.
+        way changes signs too, so that a change asks for a closer look, about pivots chosen nearby.
         """
         if self._lu is None or other._lu is None:
             return False

@@ -125,7 +125,7 @@ class PathTolerances:
     doubtful: float = 1e4
     """Condition number above which the distance to a dead point is computed."""
     dead_zone: float = 1e-7
-    """Distance from the end of a path up to which a position asked for is said to be the dead point itself."""
+    """Distance from the end of a path up to which a requested position counts as the dead point itself."""
     crossing: float = 3e6
     """Condition number at which the careful march stops before a crossing: rounding over it is far below the distance of the branches
     there; at a fold the end of the reach is nearer than ``shortest`` before."""

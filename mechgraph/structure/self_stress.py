@@ -20,7 +20,7 @@ from mechgraph.structure.components import Label
 from mechgraph.topology.components import labels_of_bipartite
 
 COMBINED = 300
-"""Components of one group up to which combinations across pairs are worked out."""
+"""Number of components of a group up to which combinations across pairs are computed."""
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from mechgraph.structure.unique_directions import UniqueDirection, unique_direct
 PROBES = 6
 """Random self-stresses that represent all of them: each is a combination of all, so a component without a part in any is unique."""
 CONNECTING = 200
-"""Self-stresses that connect loops up to which they are worked out; their echelon form is dense, of that width."""
+"""Number of self-stresses that connect loops up to which they are computed; their echelon form is dense, of that width."""
 SEED = 5
 
 
