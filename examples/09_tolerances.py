@@ -4,7 +4,7 @@ Problem: the lengths of the mechanism of ``03_lee_rcsr.py`` are made to 0.002 in
 How far does the input torque scatter over the swing, and what would have to be made better?
 
 Checked two ways: the scatter of 2,000 random mechanisms, each closed and solved, against the sum of squares of first-order
-sensitivities by central differences; and one of these mechanisms solved by itself.
+sensitivities by central differences; and one of these mechanisms solved alone.
 """
 
 import sys

@@ -1,4 +1,4 @@
-"""The command line: declare nothing, just name a mechanism of the library or a TOML file. The only place that prints."""
+"""The command line, for a mechanism of the library or a TOML file. The only module that prints."""
 
 from __future__ import annotations
 
@@ -72,8 +72,16 @@ class Redundant(StrEnum):
     minimum_norm = "minimum_norm"
 
 
+class Engine(StrEnum):
+    """Linear algebra; the values are the same."""
+
+    auto = "auto"
+    dense = "dense"
+    sparse = "sparse"
+
+
 class OnReach(StrEnum):
-    """What happens at positions that cannot be taken."""
+    """What happens at positions that cannot be reached."""
 
     stop = "raise"
     flag = "flag"
@@ -83,12 +91,16 @@ Named = Annotated[
     str, typer.Argument(metavar="NAME_OR_FILE", help="A mechanism of the library (see 'list') or a TOML file.")
 ]
 
+EngineOption = Annotated[
+    Engine, typer.Option(help="Dense or sparse matrices, or the faster ones for the size; the results are the same.")
+]
+
 
 # --- output ------------------------------------------------------------------------------------------------------------
 
 
 def _write(text: str, colour: str = "") -> None:
-    """Text as it is; on a terminal with its headings in bold and the paragraph after the title in ``colour``."""
+    """Write a text; on a terminal its headings in bold and the paragraph after the title in ``colour``."""
     if not sys.stdout.isatty():
         sys.stdout.write(text)
         return
@@ -242,7 +254,7 @@ def parse_drive(m: mg.Mechanism, text: str) -> tuple[str, mg.Motion]:
         return name, mg.Motion(values[0], velocity, acceleration)
     start, stop, step = values
     if step == 0 or (stop - start) / step <= 0:
-        _usage(where, f"the step {parts[2]!r} does not lead from {parts[0]!r} to {parts[1]!r}")
+        _usage(where, f"a step of {parts[2]!r} does not go from {parts[0]!r} to {parts[1]!r}")
     count = (stop - start) / step
     if count > MOST_POSITIONS:
         _usage(where, f"{count:.3g} positions: the command line takes at most {MOST_POSITIONS}")
@@ -260,7 +272,7 @@ def _drives(m: mg.Mechanism, texts: Sequence[str]) -> dict[str, mg.Motion]:
 
 
 def _writable(out: Path) -> None:
-    """Say before a long run that a file cannot be written."""
+    """Refuse a file that cannot be written, before a long run."""
     if out.is_dir():
         raise mg.FileError(out, "is a folder; name a file")
     if not out.absolute().parent.is_dir():
@@ -301,12 +313,13 @@ def check(
         list[str] | None,
         typer.Option("--at", metavar="FREEDOM=VALUE", help="Assemble there first: A=30deg, B.Tz=0.02 (repeat)."),
     ] = None,
+    engine: EngineOption = Engine.auto,
 ) -> None:
     """Print the determinacy report: counts, mobility, redundancy, which reactions are unique, and the verdict.
 
-    Exit status: 0 where the forces can be asked for; 1 where the loops cannot be closed, drivers depend on each other or have
-    nothing to move, or a freedom is left free that is neither driven nor passive. Redundancy is information: a mechanism some of
-    whose reactions are not unique has exit status 0, and so has a topology without geometry. 2 wrong usage or bad input.
+    Exit status: 0 where forces can be solved; 1 where the loops cannot be closed, drivers depend on each other or have nothing
+    to move, or a freedom is neither driven nor passive. Redundancy is information: a mechanism some of whose reactions are not
+    unique has exit status 0, and so has a topology without geometry. 2 wrong usage or bad input.
     """
     with _outcome():
         if json and markdown:
@@ -317,7 +330,7 @@ def check(
             name, value = _named_value(text, "--at")
             values[name] = _values([value], _turns(m, name, f"--at {text!r}"), f"--at {text!r}")[0]
         with _working("checking"):
-            report = mg.check(m, at=values or None)
+            report = mg.check(m, at=values or None, engine=engine.value)
             text = report.to_json() if json else report.to_markdown() if markdown else ""
             document = report.document()
         not_closed = m.has_geometry and report.mobility is None
@@ -381,14 +394,15 @@ def solve(
         Redundant, typer.Option(help="What stands for reactions that are not unique.")
     ] = Redundant.nan,
     on_reach: Annotated[
-        OnReach, typer.Option("--on-reach", help="Stop at a position that cannot be taken, or flag it and go on.")
+        OnReach, typer.Option("--on-reach", help="Stop at a position that cannot be reached, or flag it and go on.")
     ] = OnReach.stop,
+    engine: EngineOption = Engine.auto,
 ) -> None:
     """Solve positions, efforts of the drivers and all reactions, print a summary and write a table.
 
     Exit status: 0 done; 1 the loops cannot be closed, a position is out of reach or a dead point (unless flagged and others were
-    solved), a freedom is left free, or drivers contradict each other; 2 wrong usage or bad input. A file is written whole or not
-    at all.
+    solved), a freedom is neither driven nor passive, or drivers contradict each other; 2 wrong usage or bad input. A file is
+    written whole or not at all.
     """
     with _outcome():
         if out is not None:
@@ -396,7 +410,14 @@ def solve(
         m = _loaded(mechanism)
         motions = _drives(m, drive or ())
         with _working(f"solving {m.name}"):
-            s = mg.solve(m, motions or None, method=method.value, redundant=redundant.value, on_reach=on_reach.value)
+            s = mg.solve(
+                m,
+                motions or None,
+                method=method.value,
+                redundant=redundant.value,
+                on_reach=on_reach.value,
+                engine=engine.value,
+            )
             unique = mg.check(s.mechanism).unique if redundant is Redundant.minimum_norm else None
             document = summary(s, unique)
             if out is not None:

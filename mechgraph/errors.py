@@ -77,7 +77,7 @@ class DeadPointError(PathError):
 
 
 class IndeterminateError(MechgraphError):
-    """A freedom that is neither driven nor passive is left free, or drivers contradict each other.
+    """A freedom is neither driven nor passive, or drivers contradict each other.
 
     ``report`` is the determinacy report of the position at which this was seen.
     """

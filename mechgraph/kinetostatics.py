@@ -1,4 +1,4 @@
-"""Kinetostatics and kinematics in one pipeline: drives, start, positions, rates, forces, for one position, a cycle, cases or variants."""
+"""Kinetostatics and kinematics in one pipeline: drives, start, positions, rates, forces; for a position, a cycle, cases, variants."""
 
 from __future__ import annotations
 
@@ -69,7 +69,8 @@ class Pipeline:
     Attributes
     ----------
     system, x : scaled system and closed state at the start.
-    columns, lead : driven freedoms; which of the drivers lead (independent ones; the others are checked to agree).
+    columns, lead : driven freedoms; places of the leading drivers among them (independent ones, which are followed; the others are
+        checked to agree).
     solver, engine : the closure equations with the leading drivers given, and what solves them.
     bodies : links with passive freedoms.
     """
@@ -115,7 +116,7 @@ class Pipeline:
             raise DeclarationError(f"solve {self.m.name!r}", faults)
 
     def _independent(self) -> Index:
-        """Which of the drivers lead: as many as can move independently, the first ones first."""
+        """The leading drivers: as many as can move independently, taken in the order of the drivers."""
         if not self.freedoms.dependent:
             return np.arange(len(self.columns))
         rank = rank_of(singular_values(self.freedoms.null[self.columns]), 1e-8)
@@ -127,16 +128,19 @@ class Pipeline:
         free = self.freedoms.undriven
         if free:
             names = ", ".join(dict.fromkeys(name for motion in free for name in motion.names))
-            count = f"{len(free)} freedom{'s are' if len(free) > 1 else ' is'}"
+            count, more = (
+                ("1 freedom is", "one driver")
+                if len(free) == 1
+                else (f"{len(free)} freedoms are", f"{len(free)} drivers")
+            )
             raise IndeterminateError(
-                f"mechanism {self.m.name!r}: {count} left free that {'are' if len(free) > 1 else 'is'} neither driven nor passive "
-                f"(moving: {names}). Drive as many more, or change a pair",
+                f"mechanism {self.m.name!r}: {count} neither driven nor passive (moving: {names}); add {more}, or change a pair",
                 check(self.m),
             )
 
     @property
     def leading(self) -> Index:
-        """The driven freedoms that lead."""
+        """The freedoms of the leading drivers."""
         return self.columns[self.lead]
 
     # --- positions -------------------------------------------------------------------------------------------------------
@@ -157,7 +161,7 @@ class Pipeline:
         return Outcome(self, starts, batch, variant, found, path)
 
     def _requests(self, batch: tuple[int, ...], starts: Starts) -> list[Request]:
-        """What is asked of every start: one driver leads all cases along one curve, several lead each case along its own polygon."""
+        """What is asked of every start. With one driver all cases lie on one curve; with several, each case has a polygon of its own."""
         values = self.values("position", batch)[self.lead]
         T, N = values.shape[1], batch[-1] if batch else 1
         if starts.x.shape[1] == 1:
@@ -261,7 +265,7 @@ class Outcome:
         return dead
 
     def _disagreement(self, here: Configuration, moved: Rates, places: Index) -> Array:
-        """How far given positions and rates of dependent drivers are from those that the leading ones bring, ``(T,)``."""
+        """How far given positions and rates of dependent drivers are from those that the leading drivers enforce, ``(T,)``."""
         line = self.line
         turns = line.values("position", self.batch)[:, places] - here.x[line.system.single_rows[line.columns]]
         turns -= np.where(line.system.is_length[line.columns], 0.0, 2 * np.pi)[:, None] * np.round(turns / (2 * np.pi))
@@ -280,7 +284,7 @@ def _system_at(starts: Starts, variant: Index, places: Index) -> System:
 
 
 def _by_position(load: Load) -> bool:
-    """Whether a load is a matter of each position by itself: one of values, not of callables that see the whole batch."""
+    """Whether a load can be evaluated position by position: it holds values, no callables, which see the whole batch."""
     if not dataclasses.is_dataclass(load):
         return False
     return not any(callable(getattr(load, field.name)) for field in dataclasses.fields(load))
@@ -335,9 +339,12 @@ def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exceptio
     at = ", ".join(f"{name} = {value:.6g}" for name, value in reached.items())
     wanted = ", ".join(f"{name} = {value:.6g}" for name, value in asked.items())
     if status[first] in (Status.DEAD_POINT.value, Status.BEYOND_DEAD_POINT.value):
+        where = (
+            "is a dead point" if status[first] == Status.DEAD_POINT.value else f"is beyond a dead point; reached {at}"
+        )
         return DeadPointError(
-            f"mechanism {line.m.name!r}: dead point at {at} (asked for position {first}: {wanted}). The drivers do not "
-            "determine the motion there; drive another freedom, stop before it, or use on_reach='flag'",
+            f"mechanism {line.m.name!r}: position {first} ({wanted}) {where}. At a dead point the drivers do not determine the "
+            "motion; drive another freedom, leave the position out, or use on_reach='flag'",
             reached,
             solution,
         )
@@ -355,11 +362,11 @@ def _check_drivers(line: Pipeline, outcome: Outcome) -> None:
         return
     names, mobility = ", ".join(line.drive.names), line.freedoms.mobility
     why = (
-        f"the drivers {names} contradict each other: their motions cannot be had together (mobility {mobility}, "
-        f"{len(line.columns)} drivers). Take a driver away, or give motions that agree"
+        f"the drivers {names} contradict each other: no position meets all their motions (mobility {mobility}, "
+        f"{len(line.columns)} drivers). Remove a driver, or give motions that agree"
     )
     if not mobility:
-        why = f"it cannot be driven by {names}: it is a structure (mobility 0) where it was assembled. Change a pair, see mg.check"
+        why = f"{names} cannot drive it: it is a structure (mobility 0) where it was assembled. Change a pair, see mg.check"
     raise IndeterminateError(f"mechanism {line.m.name!r}: {why}", check(line.m))
 
 
@@ -423,8 +430,8 @@ def assemble(
 ) -> Mechanism:
     """The same mechanism with ``start`` set to closed coordinates at the given values of some freedoms.
 
-    From ``start`` the freedoms named are led to their values in small steps, so that the branch is kept; from a ``guess`` the
-    loops are closed directly.
+    From ``start`` the named freedoms move to their values in small steps with the loops closed, so that the branch is kept; from a
+    ``guess`` the loops are closed directly.
 
     Raises
     ------

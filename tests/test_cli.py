@@ -45,7 +45,7 @@ def process(*arguments: str, **environment: str) -> "subprocess.CompletedProcess
 
 @pytest.fixture
 def free_chain(tmp_path: Path) -> Path:
-    """A mechanism in which a freedom is left free."""
+    """A mechanism in which a freedom is neither driven nor passive."""
     m = mg.Mechanism("pendulum", [mg.Link("frame"), mg.Link("bob", 1.0, (0, -1, 0))],
                      [mg.Pair("A", "R", "frame", "bob", point=(0, 0, 0), axis=(0, 0, 1))])  # fmt: skip
     mg.save(m, tmp_path / "pendulum.toml")
@@ -95,7 +95,7 @@ def test_check_of_a_redundant_mechanism_is_no_failure() -> None:
     assert run("check", "four-bar").exit_code == 0
 
 
-def test_check_says_what_is_left_free(free_chain: Path) -> None:
+def test_check_says_what_is_not_driven(free_chain: Path) -> None:
     assert run("check", free_chain).exit_code == 1
 
 
@@ -130,6 +130,20 @@ def test_solve_prints_a_summary() -> None:
     assert np.isclose(float(row[1]), force.max(), rtol=1e-4)
     assert float(row[2]) == 5.0 * force.argmax()
     assert re.search(r"^closure error.*e-", result.stdout, re.MULTILINE)
+    work = f"{s.work.nodes} nodes of the path, {s.work.evaluations} evaluations, {s.work.factorizations} factorizations"
+    assert f"Engine dense: 72 positions, {work}." in result.stdout
+
+
+def test_the_engine_is_taken_and_named() -> None:
+    shown = {}
+    for engine in ("dense", "sparse"):
+        result = run("solve", "rssr", "--drive", "A=0:30:10deg@10", "--engine", engine)
+        assert result.exit_code == 0
+        assert f"Engine {engine}: 3 positions, " in result.stdout
+        shown[engine] = result.stdout.partition("Passive freedoms")[0]
+        assert json.loads(run("check", "rssr", "--json", "--engine", engine).stdout)["engine"] == engine
+    assert shown["dense"] == shown["sparse"]
+    assert bad("solve", "rssr", "--engine", "fast")
 
 
 def test_solve_uses_the_stored_motion() -> None:
@@ -183,10 +197,11 @@ def test_loops_that_cannot_be_closed(name: str) -> None:
     assert run("solve", name).exit_code == 1
 
 
-def test_a_freedom_left_free(free_chain: Path) -> None:
+def test_a_freedom_that_nothing_drives(free_chain: Path) -> None:
     result = run("solve", free_chain)
     assert result.exit_code == 1
-    assert "left free" in result.stderr
+    assert "neither driven nor passive" in result.stderr
+    assert "add one driver, or change a pair" in result.stderr
 
 
 def test_out_writes_the_table(tmp_path: Path) -> None:
@@ -255,9 +270,9 @@ def test_several_drives_describe_the_same_positions(tmp_path: Path) -> None:
         ("O1=0:360", "START:STOP:STEP"),
         ("O1=0:1:2:3", "START:STOP:STEP"),
         ("O1=0:360:1deg@1@2@3", "START:STOP:STEP"),
-        ("O1=0:360:0deg", "does not lead"),
-        ("O1=0:360:-1deg", "does not lead"),
-        ("O1=5:5:1deg", "does not lead"),
+        ("O1=0:360:0deg", "does not go"),
+        ("O1=0:360:-1deg", "does not go"),
+        ("O1=5:5:1deg", "does not go"),
         ("O1=a:b:c", "is no number"),
         ("O1=0::1", "is no number"),
         ("O1=nan", "is no number"),

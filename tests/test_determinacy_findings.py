@@ -181,13 +181,13 @@ def test_sliding_plate_between_parallel_planes() -> None:
 
 
 def test_freedoms_that_only_rest_here_are_not_called_locked() -> None:
-    """A slider-crank stretched out: the slider rests, and moves in every position near by."""
+    """A slider-crank stretched out: the slider stands still here, and moves in every nearby position."""
     bars = (("A", "frame", "crank", 0.0), ("B", "crank", "rod", 1.0), ("C", "rod", "slider", 3.0))
     pairs = [mg.Pair(name, "R", a, b, point=(x, 0, 0), axis=(0, 0, 1)) for name, a, b, x in bars]
     slide = mg.Pair("D", "P", "slider", "frame", point=(3, 0, 0), axis=(1, 0, 0))
     found = mg.check(mg.Mechanism("slider-crank", pairs=[*pairs, slide], drives=["A"])).locked
     assert [(f.freedoms, f.text) for f in found] == [
-        (("D.Tz",), "D.Tz rests in this position only: it moves in positions near by")
+        (("D.Tz",), "D.Tz stands still in this position only: it moves in nearby positions")
     ]
 
 

@@ -115,7 +115,7 @@ def test_single_loops(letters: str, excess: int, mobility: int) -> None:
 
 def test_verdicts_of_topologies() -> None:
     assert "determinate for general geometry" in mg.check(mg.chain("RCSR")).verdict
-    assert "over by 2 in the loop O1-O2-O3-O4 whatever the dimensions" in mg.check(mg.chain("RRRR")).verdict
+    assert "2 redundant in the loop O1-O2-O3-O4 whatever the dimensions" in mg.check(mg.chain("RRRR")).verdict
     assert "1 freedom not driven" in mg.check(mg.chain("RSSR")).verdict
     assert "too many" in mg.check(mg.chain("RCSR").replace(drives=["O1", "O4"])).verdict
 

@@ -216,12 +216,12 @@ def assembled_at(
 ) -> tuple[System, Array]:
     """The scaled system and a closed state with some freedoms at given values.
 
-    Without a ``guess`` the closed position near ``start`` is led there in small steps; with one, the loops are closed from it.
+    Without a ``guess`` the closed position near ``start`` is moved there in small steps; with one, the loops are closed from it.
 
     Raises
     ------
     AssemblyError
-        where the values cannot be had.
+        where the values cannot be reached.
     """
     if guess is not None:
         m = m.replace(start={**m.start, **{m.full_name(k): v for k, v in guess.items()}})

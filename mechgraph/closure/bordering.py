@@ -1,9 +1,9 @@
 """The closure equations of a large mechanism as one square sparse system: reduced loop by loop, bordered, factored.
 
 The six rows of a loop are taken about its own middle, with its own unit of length, and turned so that those without any pivot in that
-loop alone (its local redundancy) fall away. Motions that one loop has by itself (the spin of a coupler between spheres) get a row that
-holds them. A matching of the rows left to the free columns says how many more columns and rows stay over; each brings a random row
-or column beside the loop where it lies. What results,
+loop alone (its local redundancy) fall away. A motion within a single loop (the spin of a coupler between spheres) gets a row that
+holds it. A matching of the remaining rows to the free columns leaves some columns and rows unmatched; each is bordered by a random row
+or column, placed at the loop where it lies. What results,
 
     B = [ U^T J   R ]        B [q; s] = [U^T b; 0],      B^T [x; m] = [tau; c],
         [   G     0 ]
@@ -34,14 +34,14 @@ Mask = NDArray[np.bool_]
 PIVOT = 1e-8
 """Pivot (against unit rows and columns) below which a bordered system counts as singular."""
 WORSE = 1e-2
-"""Part of the smallest pivot at the position of choice below which a bordering is chosen anew."""
+"""Part of the smallest pivot at the position of choice below which another bordering is chosen."""
 RETRY = 1e-3
 """Smallest pivot below which another bordering is tried."""
 BORDERS_SEED = 17
 
 
 class LoopSystem(ReducedRows):
-    """The bordered system chosen at one position, columns ``fixed`` left out; serves positions near by.
+    """The bordered system chosen at one position, columns ``fixed`` left out; serves nearby positions.
 
     ``regular`` whether its pivots prove the rank there; ``rank`` of J without the fixed columns; ``smallest`` pivot; ``redundant``
     number of self-stresses; ``held`` number of motions left; ``kept (loops,)`` rows of every loop that are
@@ -106,7 +106,7 @@ class LoopSystem(ReducedRows):
         return rows
 
     def _match(self) -> None:
-        """Match kept rows and the rows of single-loop motions to the free columns; what stays over."""
+        """Match kept rows and the rows of single-loop motions to the free columns; what stays unmatched."""
         e = self.entries
         starts = np.concatenate([[0], np.cumsum(self.kept)])
         self._m, self._n = self.height, int(self._free.sum())

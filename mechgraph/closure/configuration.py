@@ -49,7 +49,7 @@ class Configuration:
         self.T = x.shape[1]
 
     def part(self, at: Index) -> Configuration:
-        """Some of the positions, evaluated by themselves."""
+        """Some of the positions, evaluated separately."""
         par = self.system.par
         system = self.system if par.batch == 1 else self.system.with_parameters(par.taken(at))
         return Configuration(system, self.x[:, at])
@@ -249,7 +249,7 @@ class Configuration:
         return _stacked([part.bias(self, dq, V) for part in self.system.rows])
 
     def row_efforts(self, x: Array) -> Array:
-        """Efforts ``(F, k, T)`` that multipliers ``x (n_rows, k, T)`` of rows other than loops bring into the freedoms."""
+        """Efforts ``(F, k, T)`` that multipliers ``x (n_rows, k, T)`` of rows other than loops exert in the freedoms."""
         s = self.system
         out = np.zeros((s.n_freedoms, *x.shape[1:]), dtype=x.dtype)
         for part, at in zip(s.rows, s.row_places, strict=True):

@@ -1,4 +1,4 @@
-"""What the drivers are asked to do: the motion of every drive by name, and their values for all positions in internal units."""
+"""Prescribed motions of the drivers: the motion of every drive by name, and their values at all positions."""
 
 from __future__ import annotations
 

@@ -258,6 +258,9 @@ class _Legs:
         last[nodes.track] = np.arange(len(nodes))
         ended = np.array([end is not End.REACHED for end in tracks.end])
         reach = np.where(ended, nodes.place[last], np.inf)
+        for track, crossing in tracks.crossings:
+            # up to the crossing the branch is known, also where it is not passed
+            reach[track] = max(reach[track], crossing - PATH.dead_zone)
         out = Positions(
             np.full((path.system.n_state, self.total), np.nan),
             np.full(self.total, Status.OK, dtype=object),
@@ -287,9 +290,11 @@ class _Legs:
         wrong = np.concatenate(bad)
         out.status[wrong] = Status.NOT_CLOSED
         out.x[:, wrong] = np.nan
-        for track, crossing in tracks.crossings:
-            out.status[(self.track == track) & (np.abs(self.place - crossing) < PATH.dead_zone)] = Status.DEAD_POINT
         self._say_why_not(out, tracks, reach)
+        for track, crossing in tracks.crossings:
+            there = self.asked & (self.track == track) & (np.abs(self.place - crossing) < PATH.dead_zone)
+            out.status[there] = Status.DEAD_POINT
+            out.reached[:, there] = follower.paths.drive(np.array([track]), np.array([crossing]))
         return _Found(out, wrong)
 
     def _closed(self, out: Positions, interpolation: Interpolation, at: Index, whole: bool) -> Mask:

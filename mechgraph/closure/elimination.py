@@ -53,7 +53,7 @@ class _Solved:
 
 
 class Elimination:
-    """What eliminating ``K (m, n)`` found, its rows in the blocks ``owners (m,)``; pivots below ``tolerance`` count as zero.
+    """The elimination of ``K (m, n)``, its rows in the blocks ``owners (m,)``; pivots below ``tolerance`` count as zero.
 
     ``rank``, ``dropped`` largest pivot that counted as zero, ``zero_rows`` the rows that became zero: one self-stress each.
     """

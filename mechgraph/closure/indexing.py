@@ -1,6 +1,6 @@
 """A mechanism made ready for evaluation: index arrays from the graph, coefficient arrays from the parameters.
 
-What follows from links, pairs and frame alone is worked out once a mechanism (``indexed``); what follows from its numbers is in
+What follows from links, pairs and frame alone is computed once a mechanism (``indexed``); what follows from its numbers is in
 ``coefficients.Numbers`` and is made when first asked for. All single factors of all pairs are evaluated together, whatever types
 they belong to: their places in the walk, their coordinates and coefficients are arrays, so that no kernel goes through pairs.
 """
@@ -310,7 +310,7 @@ class System:
 
     @cached_property
     def rows(self) -> list[Rows]:
-        """Who brings closure rows: the loops, then the couplings."""
+        """The contributors of closure rows: the loops, then the couplings."""
         loops: list[Rows] = [LoopRows(len(self.graph.loops))]
         return loops + ([coupling_rows(self, self.couplings, self.m.start)] if self.couplings else [])
 
@@ -493,7 +493,7 @@ def _indices(m: Mechanism) -> dict[str, Any]:
 
 
 def indexed(m: Mechanism) -> System:
-    """The system of a mechanism with its declared numbers; what follows from links, pairs and frame is worked out once."""
+    """The system of a mechanism with its declared numbers; what follows from links, pairs and frame is computed once."""
     out = System.__new__(System)
     vars(out).update(m.once(_indices), m=m, couplings=getattr(m, "couplings", ()))
     return out

@@ -5,7 +5,7 @@ decomposition so that those that depend on the others (the redundancy of that lo
 
     U_l^T M_l J_l D = [K_l; 0].
 
-Dense and sparse engine start from these rows, so that they decide the same thing about a single loop.
+Dense and sparse engine start from these rows, so that they reach the same decision on a single loop.
 """
 
 from __future__ import annotations

@@ -201,8 +201,10 @@ class _Carried:
 
 @dataclass(frozen=True)
 class _Body:
-    """One passive body: its ``axis`` and a vector ``across`` it in its own frame, and for every step the reference ``e``, the angle ``turn`` of the
-    carried vector against it where the step begins, and the Legendre ``series`` of its further turning. ``(3, steps)``, ``(steps,)``.
+    """One passive body along all steps, ``(3, steps)`` and ``(steps,)``.
+
+    ``axis`` and a vector ``across`` it in the body's own frame; the reference ``e`` of every step, the angle ``turn`` of the carried
+    vector against it where the step begins, and the Legendre ``series`` of its further turning.
     """
 
     axis: Array

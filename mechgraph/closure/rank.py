@@ -36,7 +36,7 @@ SHARES_SEED = 23
 
 
 class Solution(Protocol):
-    """What an engine finds about ``K``: self-stresses and motions in the kept rows and scaled free columns."""
+    """What an engine determines about ``K``: self-stresses and motions in the kept rows and scaled free columns."""
 
     name: Literal["dense", "sparse"]
     rank: int

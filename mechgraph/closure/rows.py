@@ -1,7 +1,7 @@
-"""The rows of the closure: who has a constraint brings its rows. A loop brings six, a coupling of freedoms one.
+"""The rows of the closure equations: every constraint contributes its own, a loop six, a coupling of freedoms one.
 
-Rows of all contributors stand one below the other, in the order of ``System.rows``: the loops first. What a new contributor has to
-say is the protocol ``Rows``; nothing else in the package knows how many rows there are or where they come from.
+Rows of all contributors stand one below the other, in the order of ``System.rows``: the loops first. A new kind of constraint
+implements the protocol ``Rows``; nothing else in the package knows how many rows there are or where they come from.
 """
 
 from __future__ import annotations

@@ -22,7 +22,9 @@ from mechgraph.closure.sparse_solver import SparseSolver
 EngineName = Literal["auto", "dense", "sparse"]
 ENGINES: tuple[EngineName, ...] = ("auto", "dense", "sparse")
 SPARSE_ROWS = {1: 30, 64: 150}
-"""Closure rows from which on ``auto`` takes the sparse engine, for up to so many positions (and the last for all larger numbers).
+"""Number of positions -> closure rows from which on ``auto`` takes the sparse engine for at most so many positions.
+
+The last entry holds for more positions too.
 
 Measured by ``tests/benchmarks/bench_large.py --crossover`` on ladders of four-bars.
 """
@@ -33,7 +35,7 @@ class FactoredClosure(Protocol):
 
     which: Index
     complete: bool
-    """Whether ``self_stresses`` are all there are (independent ones), or random ones that stand for them."""
+    """Whether ``self_stresses`` is a basis of all self-stresses; otherwise it holds random ones that represent them."""
 
     @property
     def condition(self) -> Array:
@@ -61,7 +63,10 @@ class FactoredClosure(Protocol):
         """Some of the positions, evaluated in ``here``."""
 
     def least(self, R: Sequence[scipy.sparse.csr_array], r0: Array) -> Array:
-        """Multipliers ``x (m, T)`` with ``J^T x = 0`` that make ``|r0 + R x|`` least; ``R[t] (n, m)``, ``r0 (n, T)``; where not complete."""
+        """Multipliers ``x (m, T)`` with ``J^T x = 0`` that make ``|r0 + R x|`` least; ``R[t] (n, m)``, ``r0 (n, T)``.
+
+        Only asked for where ``self_stresses`` are not complete.
+        """
 
     def by_held(self) -> list[tuple[Index, Index]]:
         """Freedoms that are held (beside the fixed ones), and the positions at which they are."""
@@ -80,10 +85,10 @@ class ClosureSolver(Protocol):
         """The equations at positions, each in its form."""
 
     def leaves_nothing_free(self, here: Configuration) -> bool:
-        """Whether the factors at a position prove that the fixed columns determine all others; False where that is to be looked at."""
+        """Whether the factors at a position prove that the fixed columns determine all others; False proves nothing."""
 
     def corrigible(self, dq: Array, which: Index) -> Array:
-        """Increments ``(F, T)`` without the motions that are held: no correction would take out what a prediction brings into them."""
+        """Increments ``(F, T)`` without the motions that are held: no correction can remove what a prediction adds to them."""
 
 
 def engine_for(rows: int, positions: int, engine: str) -> Literal["dense", "sparse"]:

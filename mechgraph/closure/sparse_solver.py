@@ -17,7 +17,7 @@ from mechgraph.numerics.sparse import Pattern, SparseFactor
 from mechgraph.numerics.tolerances import PATH
 
 PROBES = 6
-"""Random self-stresses that stand for all of them at every position: one that has no part in a component would have to miss it by chance."""
+"""Random self-stresses that represent all of them at every position: a component in which none has a part is unique but for chance."""
 SEED = 5
 POWERS = 5
 """Steps of the power iteration that estimates a spectral radius."""

@@ -26,7 +26,7 @@ _MARKDOWN_START = re.compile(r"^()([-+](?= |$|-)|>)|^(\d{1,9})([.)](?= |$))")
 def to_markdown(document: Document) -> str:
     """Return the document as Markdown (CommonMark with GitHub tables, equations between ``$$``), escaped.
 
-    An underscore between letters or digits is left as it is: it means nothing there, and names stay legible.
+    An underscore between letters or digits is left unchanged: it has no meaning there, and names stay legible.
     """
     parts = [f"# {_markdown(document.title)}" if plain(document.title) else ""]
     parts += [_block_markdown(block) for block in document.blocks]

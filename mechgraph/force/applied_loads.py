@@ -57,7 +57,7 @@ class Site:
         self._target = self.external
 
     def collect(self, loads: tuple[Load, ...]) -> None:
-        """Let all loads act."""
+        """Evaluate all loads."""
         for load in loads:
             if load.between_links and not self.internal.flags.writeable:
                 self.internal = np.zeros_like(self.external)
@@ -74,7 +74,7 @@ class Site:
         return all(np.isfinite(part).all() for part in (self.external, self.internal, self.efforts))
 
     def _alone(self, load: Load) -> bool:
-        """Whether a load by itself gives finite values."""
+        """Whether a load alone gives finite values."""
         other = copy(self)
         other.external, other.internal = np.zeros_like(self.external), nothing(self.internal.shape)
         other.efforts = np.zeros_like(self.efforts)
@@ -108,7 +108,7 @@ class Site:
         return self.m.ends_of(name)[1]
 
     def number(self, value: Any) -> Any:
-        """A number or vector as it is; where it varies from case to case, at every position ``(T,)`` or ``(3, T)``."""
+        """A number or vector, unchanged; one that varies from case to case at every position, ``(T,)`` or ``(3, T)``."""
         if not isinstance(value, PerCase):
             return value
         return np.moveaxis(value.values[self.good // self.batch[-1]], 0, -1)

@@ -44,9 +44,10 @@ class BlockForces:
 
     ``reactions (6, P, T)`` and all ``efforts (F, T)`` (of least norm where redundant), ``given (F, T)`` efforts of loads, ``loads
     (6, N, T)`` inertia, applied wrenches and what holds passive bodies (``hold (6, N, T)`` that alone, or None), self-stresses
-    ``stress (6, P, s, T)`` with ``stress_efforts (F, s, T)``, ``coupled (F, T)`` efforts of couplings, ``shaking (6, T)``; ``balance (T,)`` and ``power (T,)`` what is left of
-    equilibrium and power, ``largest`` the largest term of each; ``holds`` by body. ``multipliers (n, T)`` of the closure rows behind
-    those of the loops with ``multiplier_stress (n, s, T)``, of which ``coupled_stress (F, s, T)`` are the efforts in freedoms.
+    ``stress (6, P, s, T)`` with ``stress_efforts (F, s, T)``, ``coupled (F, T)`` efforts of couplings, ``shaking (6, T)``;
+    ``balance (T,)`` and ``power (T,)`` the residuals of equilibrium and power, ``largest`` the largest term of each; ``holds`` by
+    body. ``multipliers (n, T)`` of the closure rows behind those of the loops with ``multiplier_stress (n, s, T)``, of which
+    ``coupled_stress (F, s, T)`` are the efforts in freedoms.
     """
 
     reactions: Array
@@ -69,7 +70,7 @@ class BlockForces:
 
 @dataclass(frozen=True)
 class ForceTask:
-    """What is asked of every block: force ``method``, ``loads``, ``driven`` freedoms, passive ``bodies``; ``batch`` and times ``t``."""
+    """The task for every block: force ``method``, ``loads``, ``driven`` freedoms, passive ``bodies``; ``batch`` and times ``t``."""
 
     method: str
     loads: tuple[Load, ...]
@@ -144,7 +145,7 @@ class _Found:
 
 
 def _least(here: Configuration, wrenches: Wrenches, f: FactoredClosure, task: ForceTask) -> _Found:
-    """Reactions and efforts of least norm; where random self-stresses stand for all of them only if that is asked for."""
+    """Reactions and efforts of least norm; where self-stresses are random ones only if that is asked for."""
     totals, multipliers = wrenches.totals, wrenches.multipliers
     acting = np.union1d(task.driven, here.system.coupled_freedoms)
     stress = (orthonormal_stress if f.complete else split_stress)(here, wrenches.stress, acting)

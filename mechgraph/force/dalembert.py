@@ -23,7 +23,7 @@ from mechgraph.numerics.linear import Choice, ChosenSystem, add_at, choose
 ENTRIES_TOGETHER = 4_000_000
 """Largest number of matrix entries solved in one batch."""
 BAD_CONDITION = 1e8
-"""Condition number above which a choice of independent rows and columns is made anew."""
+"""Condition number above which other independent rows and columns are chosen."""
 
 
 @dataclass(frozen=True)
@@ -65,12 +65,12 @@ def loop_wrench(problem: Problem) -> Wrenches:
     tree += here.pair_wrenches(x)[:, :, 0]
     null = problem.solver.self_stresses()
     loops = 6 * len(here.system.graph.loops)
-    # J^T x counts what a row takes out of a freedom; what it brings is the negative
+    # J^T x is minus the effort that a row exerts in a freedom
     return Wrenches(tree, here.pair_wrenches(null), -x[loops:, 0], -null[loops:])
 
 
 def row_efforts(here: Configuration, multipliers: Array) -> Array:
-    """Efforts ``(F, k, T)`` that multipliers ``(n, k, T)`` of the rows behind those of the loops bring into freedoms."""
+    """Efforts ``(F, k, T)`` that multipliers ``(n, k, T)`` of the rows behind those of the loops exert in the freedoms."""
     loops = np.zeros((6 * len(here.system.graph.loops), *multipliers.shape[1:]))
     return here.row_efforts(np.concatenate([loops, multipliers]))
 
@@ -84,7 +84,7 @@ def newton_euler(problem: Problem) -> Wrenches:
     """All reaction components and driver efforts from the printed equations: six for every moving link.
 
     Assembled from the minimal formulation; redundant systems through independent rows and columns. Positions at which
-    different freedoms are held are solved apart.
+    different freedoms are held are solved separately.
     """
     here = problem.here
     n = here.system.n_rows - 6 * len(here.system.graph.loops)

@@ -66,7 +66,7 @@ def chain(
     twist, length, offset : one number a pair; left out (with another given) they are zero.
     pitch : advance per radian of the helical pairs: one number each in order, or a mapping pair -> pitch.
     drive : the driven pair or freedom; None for none.
-    links : links with mass, each in the link frame said above; those left out are massless.
+    links : links with mass, each in the link frame described above; those left out are massless.
     more : further fields of ``Mechanism`` (loads, start, units, ...).
 
     Raises

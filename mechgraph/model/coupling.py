@@ -89,7 +89,7 @@ class Coupling(Described):
 
 
 def _read_terms(given: Any) -> Any:
-    """Pairs (freedom, coefficient); what is no mapping and no sequence of pairs is kept as it is."""
+    """Pairs (freedom, coefficient); what is no mapping and no sequence of pairs is kept unchanged."""
     items = given.items() if isinstance(given, Mapping) else given
     try:
         return tuple((name, plain(c)) for name, c in items)

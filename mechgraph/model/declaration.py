@@ -82,7 +82,7 @@ def mapping_faults(**given: Any) -> list[str]:
 
 
 def _end_faults(m: Mechanism, names: Sequence[str]) -> list[str]:
-    """Ends of pairs and the frame that are no links; links that hang in the air."""
+    """Ends of pairs and the frame that are no links; links that no pairs connect to the frame."""
     known = set(names)
     faults = []
     strangers = {end for pair in m.pairs for end in (pair.a, pair.b)} - known

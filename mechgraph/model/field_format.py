@@ -1,4 +1,4 @@
-"""What the fields of a declaration hold, said once, in the annotations of the dataclasses.
+"""What the fields of a declaration hold, stated once, in the annotations of the dataclasses.
 
     mass: Annotated[float, NUMBER("mass", MASS, minimum=0.0)] = 0.0
 
@@ -126,7 +126,7 @@ class Described(Formatted):
                 object.__setattr__(self, name, plain(value))
 
     def value_faults(self, where: str) -> list[str]:
-        """What is wrong with the values by themselves; None is none where the field may be left out."""
+        """What is wrong with the values alone; None is no fault where the field may be left out."""
         faults = []
         for name, about in self.formats.items():
             value = getattr(self, name)
@@ -260,7 +260,7 @@ COEFFICIENTS = Kind("table", {"type": "object", "additionalProperties": {"type":
 TABLE = Kind("table", {})
 TABLES = Kind("tables", {})
 OTHER = Kind("", {})
-"""A kind that a field describes by itself, in ``rules``."""
+"""A kind whose schema the field itself gives, in ``rules``."""
 
 POSITION = {"dimension": LENGTH, "turn": PURE, "degrees": True}
 """Of a field that holds a coordinate: an angle or a length, as the freedom is."""

@@ -1,4 +1,4 @@
-"""Where the mechanisms of the library lie: inside an installed package, beside it in a repository."""
+"""Where the mechanisms of the library are: inside an installed package, beside the package in a repository."""
 
 from pathlib import Path
 

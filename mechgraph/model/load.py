@@ -52,7 +52,7 @@ class LoadSite(Protocol):
         """A value at every position, ``(width, T)``; callables are called with the pose and twist of ``link``."""
 
     def number(self, value: Any) -> Any:
-        """A number or vector as it is; where it varies from case to case, at every position ``(T,)`` or ``(3, T)``."""
+        """A number or vector, unchanged; one that varies from case to case at every position, ``(T,)`` or ``(3, T)``."""
 
     def freedom(self, name: str) -> tuple[Array, Array]:
         """Coordinate and rate ``(T,)`` of a freedom."""

@@ -186,7 +186,7 @@ def _checked_samples(samples: Any) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Smooth:
-    """A callable of t: s = f(t), or (s, s', s'') = f(t), taken as they are.
+    """A callable of t: s = f(t), or (s, s', s'') = f(t), taken unchanged.
 
     It is called with arrays, and if it cannot take them (TypeError, ValueError) with one float at a time.
     Where it returns the position alone, the rates are those of Chebyshev interpolants of degree 31 on panels

@@ -1,4 +1,4 @@
-"""Numbers as a user types them: read leniently, kept as floats and tuples of floats, faults told in words."""
+"""Numbers as a user types them: read leniently, kept as floats and tuples of floats, faults described in words."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class PerCase:
 
 
 def plain(value: Any) -> Any:
-    """Numbers, sequences and arrays as floats and nested tuples; what is no number is kept as it is."""
+    """Numbers, sequences and arrays as floats and nested tuples; what is no number is kept unchanged."""
     kind = type(value)
     if value is None or kind is float or kind is str or (kind is tuple and _all_floats(value)) or callable(value):
         return value

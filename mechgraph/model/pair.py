@@ -188,7 +188,7 @@ class Pair(Described):
         return super().in_units(base, turns).replace(type=self.type.scaled(1 / base[0]))
 
     def faults(self) -> list[str]:
-        """What is wrong with this pair by itself, one line each."""
+        """What is wrong with this pair alone, one line each."""
         where = f"pair {self.name!r}: "
         if not isinstance(self.name, str) or not self.name:
             return [f"pair {self.name!r}: the name must be a non-empty text"]

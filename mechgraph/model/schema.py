@@ -108,7 +108,7 @@ def _reference(name: str) -> dict[str, Any]:
 
 
 def with_field_tables(markdown: str) -> str:
-    """A text with the table of fields written anew below every ``<!-- fields: link -->`` (several names: one table of all)."""
+    """A text with the table of fields replaced below every ``<!-- fields: link -->`` (several names: one table of all)."""
     return MARK.sub(lambda found: found[1] + "".join(f"| {' | '.join(r)} |\n" for r in _rows(found[2])), markdown)
 
 

@@ -121,7 +121,7 @@ class _Reader:
         }
 
     def parts(self, kind: str, items: Any, where: str) -> Any:
-        """Freedoms or components: names as they are, tables as objects."""
+        """Freedoms or components: names unchanged, tables as objects."""
         if not isinstance(items, list):
             self.faults.append(f"{where}: expected a list, got {items!r}")
             return ()
@@ -306,7 +306,7 @@ def _item_data(key: str, item: Any, path: str) -> dict[str, Any]:
 
 
 def _type_data(row: PairType, path: str) -> dict[str, Any]:
-    """The table of a pair type; what the constructor fills in by itself is left out."""
+    """The table of a pair type; what the constructor would fill in is left out."""
 
     def parts(kind: str, items: Any) -> list[Any]:
         names = TABLES_OF_FILE[kind].fields

@@ -39,7 +39,7 @@ class End(Enum):
 
 @dataclass(frozen=True)
 class Tracks:
-    """Nodes of all tracks, how each ended ``(V,)`` and the crossings passed as (track, place)."""
+    """Nodes of all tracks, how each ended ``(V,)`` and the crossings met as (track, place)."""
 
     nodes: Nodes
     end: list[End]
@@ -280,10 +280,13 @@ class Follower:
                     found.append(last)
                     known = False
             elif h < PATH.shortest:
-                beyond = self._passed(Nodes.join(found), track)
+                whole = Nodes.join(found)
+                beyond = self._passed(whole, track)
                 if beyond is None:
                     break
-                found.append(beyond)
+                # the branch is smooth there: it is interpolated from where its nodes are not noise
+                clear = 2.0 * self.crossings[-1][1] - beyond.place[0]
+                found = [whole.take(whole.place <= clear), beyond]
                 last, known, h = beyond, False, 0.5 * PATH.shortest_quick
         return Nodes.join([others, *found])
 
@@ -309,13 +312,15 @@ class Follower:
         # the inverse of the condition falls to zero in proportion to the distance
         ratio = nodes.condition[reference] / last.condition[0]
         left = (last.place[0] - nodes.place[reference]) * ratio / (1.0 - ratio)
-        return self._behind(nodes, track, float(last.place[0] + left))
+        crossing = float(last.place[0] + left)
+        self.crossings.append((track, crossing))
+        return self._behind(nodes, track, crossing)
 
     def _behind(self, nodes: Nodes, track: int, crossing: float) -> Nodes | None:
         for distance in (4e-3, 1e-3, 2.5e-4):
-            at = np.array([crossing + distance])
-            if at[0] > self.paths.end[track]:
-                continue
+            at = np.array(
+                [crossing + distance]
+            )  # also behind the end: whether a crossing is passed does not hang on where a path ends
             smooth = nodes.take((nodes.place <= crossing - 0.5 * distance) & (nodes.which == nodes.which[-1]))
             smooth = smooth.take(np.unique(smooth.place, return_index=True)[1])
             if len(smooth) < 3:
@@ -334,7 +339,6 @@ class Follower:
             turn = np.abs((step.Z - base.Z) * direction).max() / max(1.0, float(np.abs(base.Z).max()))
             as_regular = step.condition[0] <= 4.0 * base.condition[0]
             if step.done[0] and step.correction[0] <= 1e-2 * distance and turn <= PATH.smooth and as_regular:
-                self.crossings.append((track, crossing))
                 self.ends[track] = End.REACHED
                 return new
         return None

@@ -38,7 +38,7 @@ class Point(Protocol):
 
     @property
     def residual(self) -> Array:
-        """What is left of the equations, ``(m, n)``."""
+        """Residual of the equations, ``(m, n)``."""
 
     def part(self, at: Index) -> Any:
         """Some of the points."""
@@ -54,7 +54,7 @@ class Problem(Protocol):
         """The equations at states, the path values put in."""
 
     def chosen(self, point: Any, which: Index) -> Index:
-        """Numbers of the forms of the linear equations that serve the points: other ones than ``which`` where these are poor."""
+        """Forms (by number) of the linear equations at the points: ``which``, or others where these are ill-conditioned."""
 
     def factored(self, point: Any, which: Index) -> Any:
         """The linear equations at points, each in its form."""
@@ -72,12 +72,12 @@ class Problem(Protocol):
         """Rates of increments from the rates at the states to which they lead."""
 
     def corrigible(self, dq: Array, which: Index) -> Array:
-        """Increments without what no correction would reach (freedoms that are held)."""
+        """Increments without the part that no correction can change (freedoms that are held)."""
 
 
 @dataclass
 class Work:
-    """What was done.
+    """How much was computed.
 
     Attributes
     ----------

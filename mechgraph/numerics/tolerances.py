@@ -18,15 +18,15 @@ class RankTolerances:
     nearby: float = 1e-6
     """The same at positions reached by a motion: closing a double root to 1e-13 leaves 3e-7 of the way that returns."""
     proved: float = 1e-3
-    """Pivot of a bordered system from which on it proves the rank by itself."""
+    """Pivot of a bordered system above which it proves the rank without another test."""
     distance: float = 1e-8
-    """Distance to a singular matrix from which on the bordered system decides whatever its pivots."""
+    """Distance to a singular matrix above which the bordered system decides the rank, whatever its pivots."""
     near: float = 1e-3
     """Margin of one loop below which a position is called nearly singular: forces are a thousand times the loads."""
     doubt: float = 1e-11
     """Largest dropped value above which it may be more than rounding."""
     damping: float = 1e-13
-    """Square of the singular value (3e-7) below which the normal equations leave a direction alone; rounding of a square is 1e-16."""
+    """Square of the singular value (3e-7) below which the normal equations ignore a direction; rounding of a square is 1e-16."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class MotionTolerances:
     rounding: float = 1e-11
     """Part of a unit rate that counts as zero."""
     nearby: float = 1e-5
-    """Part of a motion above which a freedom that stands still here moves near by, a trial step of 0.05 away."""
+    """Part of a motion above which a freedom that stands still here moves at a nearby position, a trial step of 0.05 away."""
     common: float = 1e-9
     """Singular value against the largest below which twists of a border are common to its pairs; as for a rank."""
     in_place: float = 1e-5
@@ -81,9 +81,9 @@ class PathTolerances:
     accepted: float = 1e-11
     """Residual with which a position counts as closed where rounding lets it come no nearer (poor condition)."""
     iterations: int = 10
-    """Most Newton steps at a position; from a good prediction two suffice, so more says that there is none."""
+    """Most Newton steps at a position; from a good prediction two suffice, so that more mean a poor one."""
     lost: float = 0.3
-    """Sum of corrections from which on Newton is given up: it has left the neighbourhood of the prediction."""
+    """Sum of corrections above which Newton stops: the correction exceeds the trust radius of the prediction."""
     correction: float = 0.06
     """Largest correction that a prediction may need; the certificate of the step asks for more than that."""
     aim: float = 0.005
@@ -95,7 +95,7 @@ class PathTolerances:
     exact: float = 1e-12
     """The same where many positions are interpolated between the nodes, so that their sensitivities must be exact as well."""
     first: float = 0.05
-    """First step of a path: there is no past yet to predict from."""
+    """First step of a path, where there are no earlier nodes to predict from."""
     longest: float = 0.35
     """Longest step between nodes; longer ones would be refused by the certificate more often than not."""
     shortest_quick: float = 2e-3
@@ -111,7 +111,7 @@ class PathTolerances:
     """Part of the change of rates over a step by which the rates in its middle may miss those of the Hermite cubic of its ends (and of
     the sagitta that it makes, by which the state may)."""
     tiny: float = 1e-9
-    """Distance between states below which that is not asked: differences of rounding and of numerical derivatives."""
+    """Distance between states below which ``smooth`` is not tested: differences of rounding and of numerical derivatives."""
     fair: float = 1e3
     """Condition number above which another choice of rows and columns is sought."""
     better: float = 0.2
@@ -123,9 +123,9 @@ class PathTolerances:
     dead_point: float = 1e-10
     """Distance to a dead point (in driver coordinates) below which a position counts as one."""
     doubtful: float = 1e4
-    """Condition number from which on that distance is looked at."""
+    """Condition number above which the distance to a dead point is computed."""
     dead_zone: float = 1e-7
-    """Distance from the end of a path up to which a position asked for is said to be the dead point itself."""
+    """Distance from the end of a path up to which a requested position counts as the dead point itself."""
     crossing: float = 3e6
     """Condition number at which the careful march stops before a crossing: rounding over it is far below the distance of the branches
     there; at a fold the end of the reach is nearer than ``shortest`` before."""
@@ -141,7 +141,7 @@ class PathTolerances:
     window: int = 6
     """Most nodes through which one interpolation goes, each with value and rate."""
     worth: int = 20
-    """Positions for every new node from which on it is worth its time."""
+    """Positions for every new node above which new nodes save time (fewer corrections of positions)."""
     halvings: int = 4
     """Most halvings of a gap between nodes at a time."""
     refinements: int = 5

@@ -35,7 +35,7 @@ class Paths:
         self._key = self._places + np.repeat(self._offset, count)
 
     def drive(self, tracks: Index, at: Array) -> Array:
-        """Path values ``(d, n)`` at places of tracks."""
+        """Path values ``(d, n)`` at places of tracks; behind the end straight on."""
         right = np.searchsorted(self._key, at + self._offset[tracks], side="left")
         right = np.clip(right, np.minimum(self._first[tracks] + 1, self._last[tracks]), self._last[tracks])
         left = np.maximum(right - 1, self._first[tracks])
@@ -43,7 +43,7 @@ class Paths:
         u = np.where(width > 0, (at - self._places[left]) / np.where(width > 0, width, 1.0), 1.0)
         # the ends themselves are met exactly
         return np.where(
-            u >= 1.0, self._all[:, right], self._all[:, left] + u * (self._all[:, right] - self._all[:, left])
+            u == 1.0, self._all[:, right], self._all[:, left] + u * (self._all[:, right] - self._all[:, left])
         )
 
     def step(self, tracks: Index, at: Array, h: Array) -> Array:

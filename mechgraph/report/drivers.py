@@ -12,9 +12,9 @@ from mechgraph.report.findings import Finding, moves_nearby
 from mechgraph.structure.mobility import Freedoms, drive_order, single_freedoms
 
 SHOWN = 8
-"""Freedoms named for one motion."""
+"""Most freedoms named for one motion."""
 MOST_INPUTS = 200
-"""Input freedoms above which freedoms that move in proportion are not looked for."""
+"""Number of input freedoms above which freedoms that move in proportion are not sought."""
 
 
 def left_free(m: Mechanism, freedoms: Freedoms) -> tuple[Finding, ...]:
@@ -49,7 +49,7 @@ def not_drivable(
         why = "moves only in a passive motion"
         if still[i]:
             dead = nearby[i] and freedoms.mobility
-            why = "dead point here (moves in positions near by)" if dead else "stands still"
+            why = "dead point here (moves in nearby positions)" if dead else "stands still"
         out.append(Finding(f"{name} cannot drive: {why}", (name,)))
     return tuple(out)
 
@@ -57,7 +57,7 @@ def not_drivable(
 def suggested(m: Mechanism, freedoms: Freedoms, able: tuple[Finding, ...]) -> tuple[str, ...]:
     """Freedoms that complete the drivers: free of passive motions and at the frame first, in order, independent of each other.
 
-    A driver on a freedom that also moves in a passive motion would hold that motion, and leave another free.
+    A driver on a freedom that also moves in a passive motion would stop that motion and leave another one undriven.
     """
     if not freedoms.undriven:
         return ()

@@ -16,7 +16,7 @@ FINDINGS = ("undriven", "passive", "locked", "drivable", "not_drivable", "advice
 
 
 def ledger(m: Mechanism, bookkeeping: str) -> Ledger:
-    """The ledger of a mechanism: counted from the pair table where that is all there is, else read off its formulation."""
+    """The ledger of a mechanism: counted from the pair table where that suffices, otherwise from its formulation."""
     countable = bookkeeping in ("lee", "minimal") and not getattr(m, "couplings", ())
     return counted_ledger(m, bookkeeping) if countable else formulate(m, bookkeeping).ledger()
 

@@ -18,7 +18,7 @@ from mechgraph.structure.passive import PassiveMotion
 
 @dataclass(frozen=True)
 class Finding:
-    """Something found, in words and by name; ``axis`` is (point, direction) in the global frame where there is one."""
+    """One finding, in words and by name; ``axis`` is (point, direction) in the global frame where there is one."""
 
     text: str
     freedoms: tuple[str, ...] = ()
@@ -31,7 +31,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class LoopFact:
-    """One loop: its chain of links and pairs, freedoms, rank and excess of its own six equations, mobility by itself."""
+    """One loop: its chain of links and pairs, freedoms, rank and excess of its own six equations."""
 
     chain: str
     pairs: tuple[str, ...]
@@ -43,7 +43,7 @@ class LoopFact:
 def loop_facts(
     m: Mechanism, loops: tuple[tuple[tuple[str, int], ...], ...], system: System | None, x: Array | None
 ) -> tuple[LoopFact, ...]:
-    """Every loop by itself; ranks where there is geometry."""
+    """The facts of every loop taken alone; ranks where there is geometry."""
     ends = {p.name: (p.a, p.b) for p in m.pairs}
     freedom_count = {p.name: p.type.f for p in m.pairs}
     S = system.at(x[:, None]).S[:, :, 0] if system is not None and x is not None else None
@@ -85,7 +85,7 @@ def screw_axis(system: System, twist: Array) -> tuple[tuple[float, ...], tuple[f
 
 
 def passive_finding(system: System, motion: PassiveMotion) -> Finding:
-    """A passive freedom: who moves, how, between which pairs."""
+    """A passive freedom: which links move, how, between which pairs."""
     m = system.m
     names = m.link_names()
     links = tuple(names[i] for i in motion.links)
@@ -106,7 +106,7 @@ def passive_finding(system: System, motion: PassiveMotion) -> Finding:
 
 
 def locked_findings(system: System, x: Array, freedoms: Freedoms, null_nearby: Array | None) -> tuple[Finding, ...]:
-    """Freedoms that cannot move here, grouped by the reason; those that move in the motions ``null_nearby`` only rest here."""
+    """Freedoms that cannot move here, grouped by the reason; those that move in the motions ``null_nearby`` stand still only here."""
     m = system.m
     still = np.abs(freedoms.null).max(axis=1, initial=0.0) < MOTIONS.still
     names = m.freedom_names()
@@ -141,19 +141,19 @@ def locked_findings(system: System, x: Array, freedoms: Freedoms, null_nearby: A
     rest = tuple(left)
     if rest:
         verb = "stands" if len(rest) == 1 else "stand"
-        why = "the closure of the loops leaves no rate" if mobile else "the mechanism is a structure here"
+        why = "the closure equations leave it no rate" if mobile else "the mechanism is a structure here"
         out.append(Finding(f"{', '.join(rest)} {verb} still: {why}", rest))
     resting = tuple(names[i] for i in np.flatnonzero(rests))
     if resting:
-        verb, pronoun = ("rests", "it moves") if len(resting) == 1 else ("rest", "they move")
+        verb, pronoun = ("stands", "it moves") if len(resting) == 1 else ("stand", "they move")
         out.append(
-            Finding(f"{', '.join(resting)} {verb} in this position only: {pronoun} in positions near by", resting)
+            Finding(f"{', '.join(resting)} {verb} still in this position only: {pronoun} in nearby positions", resting)
         )
     return tuple(out)
 
 
 def moves_nearby(null_nearby: Array | None, count: int) -> NDArray[np.bool_]:
-    """Which of ``count`` freedoms move in the motions ``(F, M)`` of a position near by; none where that is not known."""
+    """Which of ``count`` freedoms move in the motions ``(F, M)`` of a nearby position; none where that is not known."""
     if null_nearby is None:
         return np.zeros(count, dtype=bool)
     return np.asarray(np.abs(null_nearby).max(axis=1, initial=0.0) > MOTIONS.nearby)

@@ -48,7 +48,7 @@ class DeterminacyReport:
     """What the graph alone and the graph with its geometry say about a mechanism; prints as a report.
 
     Facts that need geometry are None (or empty) for a topology, and where the loops cannot be closed (see ``note``).
-    What is expensive is worked out when first asked for, at any size; ``engine`` says which one decided the rank.
+    What is expensive is computed when first asked for, whatever the size; ``engine`` says which one decided the rank.
     """
 
     mechanism: Mechanism
@@ -110,7 +110,7 @@ class DeterminacyReport:
 
     @cached_property
     def loop_facts(self) -> tuple[LoopFact, ...]:
-        """Every loop by itself: its chain, freedoms, rank and excess."""
+        """Every loop taken alone: its chain, freedoms, rank and excess."""
         g = self.geometry
         return loop_facts(self.mechanism, self.loops, g.system if g else None, g.x if g else None)
 
@@ -123,13 +123,13 @@ class DeterminacyReport:
 
     @cached_property
     def motion(self) -> FiniteMotion | None:
-        """What following the motions over finite strokes showed."""
+        """What was seen when the motions were followed over finite strokes."""
         g = self.geometry
         return finite_motion(g.system, g.x, g.freedoms.closure, self.asked) if g else None
 
     @property
     def finite_mobility(self) -> int | None:
-        """Dimension of the set of closed positions: what really moves."""
+        """Mobility over finite strokes: the dimension of the set of closed positions."""
         return self.motion.mobility if self.motion else None
 
     @property
@@ -158,7 +158,7 @@ class DeterminacyReport:
 
     @property
     def near(self) -> bool:
-        """Whether the verdict is near to another one: a small singular value was kept, or one above rounding dropped."""
+        """Whether a small change may change the verdict: a small singular value was kept, or one above rounding dropped."""
         if self.margin is None or self.dropped is None:
             return False
         return self.margin < self.near_below or self.dropped > RANKS.doubt or self.dead_point
@@ -195,13 +195,13 @@ class DeterminacyReport:
     def self_stresses(self) -> tuple[SelfStress, ...]:
         """Reaction states without load, with the declared drivers: a canonical sparse basis.
 
-        Those that connect loops only where they are not more than ``structure.uniqueness.CONNECTING``.
+        Those that connect loops are left out where they are more than ``structure.uniqueness.CONNECTING``.
         """
         return self.reactions.states if self.reactions else ()
 
     @cached_property
     def undriven(self) -> tuple[Finding, ...]:
-        """Freedoms left free that are neither driven nor passive."""
+        """Freedoms that are neither driven nor passive."""
         if not self.geometry:
             return ()
         return drivers.left_free(self.mechanism, self.geometry.freedoms)
@@ -254,7 +254,7 @@ class DeterminacyReport:
         kept = set(independent_rows(g.freedoms.null, asked, len(asked)))
         names = tuple(n for n, i in place.items() if i in kept and i in asked[len(g.driven) :])
         while names:
-            # a driver may hold a motion that was passive, and so leave another free
+            # a driver may stop a motion that was passive, and so leave another one undriven
             columns, _ = named_columns(m, g.system, dict.fromkeys([*(d.freedom for d in m.drives), *names], 0.0))
             after = free_motion(g.system, g.x, columns, self.asked)
             free = [f.rates for f in after.undriven]
@@ -273,7 +273,7 @@ class DeterminacyReport:
 
     @property
     def determinate(self) -> bool:
-        """Nothing left free that is neither driven nor passive, and every reaction and effort unique."""
+        """Whether every freedom is driven or passive, and every reaction and effort unique."""
         if not self.geometry or self.contradicting_drives:
             return False
         return not self.geometry.freedoms.undriven and bool(self.reactions and self.reactions.is_unique.all())
@@ -292,7 +292,7 @@ class DeterminacyReport:
             what = "drive" if not self.mechanism.drives else "drive also"
             out.append(
                 Finding(
-                    f"{what} {', '.join(self.suggested_drives)}: nothing but passive freedoms is left free then",
+                    f"{what} {', '.join(self.suggested_drives)}: then every freedom is driven or passive",
                     self.suggested_drives,
                 )
             )
@@ -340,7 +340,7 @@ def check(m: Mechanism, at: Mapping[str, float] | None = None, *, engine: Engine
     Raises
     ------
     AssemblyError
-        where ``at`` is given and cannot be reached. Without it, loops that cannot be closed are said in ``note``.
+        where ``at`` is given and cannot be reached. Without it, loops that cannot be closed are reported in ``note``.
     """
     if engine not in get_args(EngineName):
         raise DeclarationError("check", [f"engine = {engine!r}: expected one of {', '.join(get_args(EngineName))}"])
@@ -352,7 +352,7 @@ def check(m: Mechanism, at: Mapping[str, float] | None = None, *, engine: Engine
     except AssemblyError as error:
         if at:
             raise
-        return DeterminacyReport(m, graph, f"No facts of geometry: {error}", asked=engine)
+        return DeterminacyReport(m, graph, f"No facts that need geometry: {error}", asked=engine)
     columns, _ = named_columns(m, system, {d.freedom: 0.0 for d in m.drives})
     return DeterminacyReport(
         m, graph, "", Geometry(system, x, columns, free_motion(system, x, columns, engine)), engine

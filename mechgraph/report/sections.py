@@ -14,16 +14,16 @@ if TYPE_CHECKING:
     from mechgraph.report.report import DeterminacyReport
 
 TERMS = 4
-"""Terms of a sum that is printed."""
+"""Most terms of a sum that is printed."""
 LISTED = 20
-"""Items of one kind that are printed; the rest stand in the JSON."""
+"""Most items of one kind that are printed; all are in the JSON."""
 NOT_UNIQUE = (
     "Unique: equilibrium alone gives it. Not unique: it also depends on fits, stiffness and temperature; a rigid-body program can only "
     "assume it."
 )
 MEANINGS = (
-    "A self-stress is a set of reactions that balance each other without any load: any multiple of it may be locked in. Components "
-    "that stand in none are proved unique. Moments are divided by L = {L:.4g} so that they compare with forces."
+    "A self-stress is a set of reactions that balance each other without any load: any multiple of it may be built in. Components "
+    "in which no self-stress has a part are proved unique. Moments are divided by L = {L:.4g} so that they compare with forces."
 )
 
 
@@ -33,7 +33,11 @@ def document(r: DeterminacyReport) -> Document:
     if r.note:
         blocks.append(Paragraph(r.note))
     blocks += [*_facts(r), *_cure(r)]
-    for key, title in (("undriven", "Left free"), ("passive", "Passive freedoms"), ("locked", "Locked freedoms")):
+    for key, title in (
+        ("undriven", "Neither driven nor passive"),
+        ("passive", "Passive freedoms"),
+        ("locked", "Locked freedoms"),
+    ):
         found = getattr(r, key)
         if found:
             blocks += [Heading(title, 2), _listed(f.text for f in found)]
@@ -48,7 +52,7 @@ def _listed(items: Iterable[str]) -> Bullets:
 
 
 def _facts(r: DeterminacyReport) -> list[Any]:
-    """What there is, count against rank side by side, and why they differ."""
+    """Numbers of links, pairs and loops; count and rank side by side, and why they differ."""
     there = (
         f"{plural(len(r.links), 'link')} with the frame, {plural(len(r.pairs), 'pair')}, {plural(len(r.loops), 'loop')}, "
         f"{plural(len(r.mechanism.drives), 'driver')}."
@@ -123,7 +127,7 @@ def _stresses(r: DeterminacyReport) -> list[Any]:
     if found.listed > len(lines):
         lines.append(f"... and {found.listed - len(lines)} more (report.self_stresses)")
     if found.count > found.listed:
-        lines.append(f"{found.count - found.listed} that connect loops are too many to be written down")
+        lines.append(f"{found.count - found.listed} more that connect loops are not listed: too many")
     blocks: list[Any] = [
         Heading("Self-stresses", 2),
         Paragraph(MEANINGS.format(L=r.geometry.system.par.L)),
@@ -143,7 +147,7 @@ def _stresses(r: DeterminacyReport) -> list[Any]:
 
 
 def _sums(combinations: tuple[tuple[int, str], ...]) -> list[Any]:
-    """Sums across pairs that are unique; those of many terms are left to the JSON."""
+    """Sums across pairs that are unique; those of many terms are only in the JSON."""
     lines = [f"group {group + 1}: {text}" for group, text in combinations if text.count(":") <= TERMS]
     more = len(combinations) - len(lines)
     if more:
@@ -152,7 +156,7 @@ def _sums(combinations: tuple[tuple[int, str], ...]) -> list[Any]:
 
 
 def _cure(r: DeterminacyReport) -> list[Any]:
-    """The change that makes most unique, in one line for the first screen."""
+    """The change that removes most redundancy, in one line near the top."""
     better = [e for e in r.effects if e.redundancy[1] < e.redundancy[0]]
     if not better:
         return []
@@ -162,7 +166,7 @@ def _cure(r: DeterminacyReport) -> list[Any]:
 
 
 def _types(r: DeterminacyReport) -> list[Any]:
-    """What the new pair types of the advice are."""
+    """Names of the pair types that the advice proposes."""
     new = sorted({kind for e in r.effects for _, _, kind in e.changes})
     return [Paragraph(f"Pair types: {'; '.join(f'{kind} {TABLE[kind].name}' for kind in new)}.")] if new else []
 
@@ -197,12 +201,12 @@ def _structure(r: DeterminacyReport) -> list[Any]:
     lines = []
     if parts.redundant_pairs:
         many = plural(parts.spare_unknowns, "reaction unknown")
-        lines.append(f"{many} too many, in the pairs {short(parts.redundant_pairs, LISTED)}")
+        lines.append(f"{many} more than equations, in the pairs {short(parts.redundant_pairs, LISTED)}")
     if parts.free_links:
         many = plural(parts.spare_equations, "equation")
-        lines.append(f"{many} too many, in the links {short(parts.free_links, LISTED)}")
+        lines.append(f"{many} more than unknowns, in the links {short(parts.free_links, LISTED)}")
     if not lines:
-        lines.append("every equation has an unknown of its own, and every unknown an equation")
+        lines.append("every equation is matched to an unknown, and every unknown to an equation")
     lines += [
         f"{n} redundant whatever the dimensions, in the {loop_names(r, loops)}"
         for n, loops in r.generic.places[:LISTED]
@@ -220,7 +224,7 @@ def _checks(r: DeterminacyReport) -> list[Any]:
 
 
 def _size(value: float) -> str:
-    """A rounding error by its power of ten only where it is one."""
+    """A dropped value; one that is no more than rounding without its size, which differs from machine to machine."""
     return "rounding" if value < RANKS.doubt else f"{value:.2g} of the largest"
 
 

@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from mechgraph.structure.uniqueness import Uniqueness
 
 NAMED = 8
-"""Names in a row that a sentence holds."""
+"""Most names that a sentence lists."""
 DROPPED = 1e-9
-"""Part of the margin above which a dropped singular value is spoken of first."""
+"""Part of the margin above which a dropped singular value is reported rather than the margin."""
 SETS = 3
-"""Sets of components that the verdict names."""
+"""Most sets of components that the verdict names."""
 
 
 def plural(count: int, one: str, many: str = "") -> str:
@@ -34,7 +34,7 @@ def short(names: tuple[str, ...] | list[str], most: int = NAMED, count: int | No
 
 
 def verdict(r: DeterminacyReport) -> str:
-    """The verdict in one sentence, and a second where the position is near another verdict."""
+    """The verdict in one sentence, and a second one where a small change of the dimensions may change the verdict."""
     if r.mobility is None:
         return _of_topology(r)
     return _here(r) + _near(r)
@@ -51,7 +51,7 @@ def _near(r: DeterminacyReport) -> str:
 
 
 def _over_driven(r: DeterminacyReport) -> bool:
-    """More drivers than motions: that some of them depend on others is no dead point."""
+    """Whether there are more drivers than motions; then some depend on others without a dead point."""
     return bool(r.mobility) and len(r.mechanism.drives) > (r.mobility or 0)
 
 
@@ -84,9 +84,9 @@ def _here(r: DeterminacyReport) -> str:
         )
     if r.undriven:
         verb = "is" if len(r.undriven) == 1 else "are"
-        free = f"{plural(len(r.undriven), 'freedom')} left free that {verb} neither driven nor passive"
+        free = f"{plural(len(r.undriven), 'freedom')} {verb} neither driven nor passive"
         shaky = " The mobility is infinitesimal only: a shaky structure." if _shaky(r) else ""
-        return f"Under-driven: mobility {r.mobility}, {plural(drivers, 'driver')}, {free}.{shaky}"
+        return f"Under-driven: mobility {r.mobility}, {plural(drivers, 'driver')}; {free}.{shaky}"
     if not r.mobility and drivers:
         return _driven_structure(r)
     if r.reactions is None or r.reactions.is_unique.all():
@@ -179,9 +179,9 @@ def _of_topology(r: DeterminacyReport) -> str:
     drivers = len(r.mechanism.drives)
     if generic.excess:
         places = generic.places[:SETS]
-        where = "; ".join(f"over by {n} in the {loop_names(r, loops)} whatever the dimensions" for n, loops in places)
+        where = "; ".join(f"{n} redundant in the {loop_names(r, loops)} whatever the dimensions" for n, loops in places)
         more = len(generic.places) - len(places)
-        rest = f"; and in {plural(more, 'further place')}" if more else ""
+        rest = f"; others in {plural(more, 'further set')} of loops" if more else ""
         return f"{count}: {where}{rest}; mobility {generic.mobility} for general geometry."
     if generic.mobility > drivers:
         free = plural(generic.mobility - drivers, "freedom")
@@ -218,7 +218,7 @@ def assumed(r: DeterminacyReport) -> list[str]:
     """Second directions that were left out where the pair type needs one."""
     return [
         f"{p.name} ({p.type.symbol}): no second direction was given; x = ({', '.join(f'{v:.4g}' for v in p.second)}) was taken. Give "
-        "second=... if the marker lies otherwise."
+        "second=... if the marker has another direction."
         for p in r.mechanism.pairs
         if p.type.square_second and p.point is not None and p.second == second_direction(p.axis)
     ]
@@ -237,16 +237,18 @@ def _excess(r: DeterminacyReport) -> list[str]:
             "agree all along the motion; with other dimensions they would not."
         )
     elif excess.get("dimensions"):
-        out.append(f"By its special dimensions it is over by {excess['dimensions']} more than with general ones.")
+        out.append(
+            f"Its special dimensions make {excess['dimensions']} more constraints redundant than general ones would."
+        )
     if excess.get("here"):
-        out.append(f"Singular here, by {excess['here']}: positions near by have a higher rank.")
+        out.append(f"Singular here, by {excess['here']}: nearby positions have a higher rank.")
     return out
 
 
 def _finite(r: DeterminacyReport) -> list[str]:
     out = []
     if _shaky(r):
-        out.append("Shaky: the mobility is infinitesimal only; no motion closes over a finite stroke.")
+        out.append("Shaky: the mobility is infinitesimal only; the loops stay closed over no finite stroke.")
     elif r.mobility and r.finite_mobility is not None and r.finite_mobility < r.mobility:
         out.append(f"Of mobility {r.mobility} here, {r.finite_mobility} is finite; the rest is instantaneous.")
     if r.motion and r.motion.stroke:

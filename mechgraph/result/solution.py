@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 class Checks:
     """Every solution's own checks, arrays over positions.
 
-    closure : closure error, the largest of angle and length / L over the loops.
+    closure : closure error, the largest of angle [rad] and length / L over the loops.
     equilibrium : residual of the equilibrium of all links and of ``S^T w = effort`` in all undriven freedoms, relative to the
         largest wrench in the batch (NaN without forces).
     power : driver power + load power - rate of kinetic energy, relative to the largest term in the batch.
@@ -46,7 +46,7 @@ class MaterialPoint(NamedTuple):
 
 
 class Values(Protocol):
-    """Where a Solution takes its values from (see ``force.analysis``); every method returns batch-first arrays."""
+    """Where a Solution takes its values from (see ``result.trajectory``); every method returns batch-first arrays."""
 
     mechanism: Mechanism
     batch: tuple[int, ...]
@@ -187,7 +187,10 @@ class CouplingResult:
 
     @property
     def effort(self) -> Array:
-        """The multiplier m ``(...)``: the coupling exerts the effort ``c_i m`` in freedom i, + on link b; its power ``m sum c_i q'_i`` is 0."""
+        """The multiplier m ``(...)``: the coupling exerts the effort ``c_i m`` in freedom i, + on link b.
+
+        Its power ``m sum_i c_i q'_i`` is zero.
+        """
         return self._values.multiplier(self._index)
 
 
@@ -313,17 +316,17 @@ class Solution:
 
     @property
     def t(self) -> Any:
-        """Times of the motion, where it has some."""
+        """Times of the motion, where it has any."""
         return self._values.t
 
     @property
     def engine(self) -> str:
-        """Which linear algebra ran: ``"dense"`` or ``"sparse"``; the values are the same."""
+        """Which engine ran, ``"dense"`` or ``"sparse"`` matrices; the values are the same."""
         return self._values.engine
 
     @property
     def work(self) -> Work:
-        """What was done: positions, nodes of the path, evaluations, factorizations."""
+        """How much was computed: positions, nodes of the path, evaluations and factorizations of the equations."""
         return self._values.work
 
     @property
@@ -340,7 +343,8 @@ class Solution:
     def passive_effort(self) -> dict[str, Array]:
         """What keeps passive bodies from spinning (or sliding) in space, by body: a couple about the axis, or a force.
 
-        Zero where nothing turns them. How such a body stands depends on the path: it does not spin from the start on.
+        Zero where nothing turns them. The orientation of such a body depends on the path: from the start on it does not spin about its
+        axis.
         """
         return self._values.passive_efforts()
 
@@ -351,7 +355,7 @@ class Solution:
     # --- tables --------------------------------------------------------------------------------------------------------
 
     def columns(self) -> Mapping[str, Array]:
-        """All numbers a table shows, by column name with unit, ``(...)`` each."""
+        """All numbers of the table by column name with unit, ``(...)`` each."""
         return export.columns(self)
 
     def to_pandas(self) -> pandas.DataFrame:

@@ -1,4 +1,4 @@
-"""The summary of a solution for people: what was solved, ranges of efforts, greatest reactions, checks."""
+"""The summary of a solution for people: what was solved, ranges of efforts, greatest reactions, checks, engine and work."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ TIE = 1e-9
 
 
 def summary(s: Solution, not_unique: Mapping[str, Mapping[str, bool]] | None = None) -> Document:
-    """Positions solved and not solved, ranges of the drivers' efforts, greatest reactions and where, and the checks.
+    """Positions solved and not solved, ranges of the drivers' efforts, greatest reactions and where, checks, and the work.
 
     Angles of drivers are shown in degrees. Forces and moments are those of ``s[pair].force`` and ``s[pair].moment``: of the
     reaction, the moment about the origin of marker B.
@@ -47,6 +47,7 @@ def summary(s: Solution, not_unique: Mapping[str, Mapping[str, bool]] | None = N
         blocks += [*view.redundant(not_unique), *view.passive()]
     if view.solved.any():
         blocks += view.checks()
+    blocks.append(view.work())
     return Document(f"Solution of {s.mechanism.name}", tuple(blocks))
 
 
@@ -141,7 +142,7 @@ class _View:
             yield Bullets(tuple(items))
 
     def _beside(self, first: int, last: int) -> str:
-        """The solved positions next to a range that is not."""
+        """The solved positions on both sides of a range that is not solved."""
         near = [
             (word, i)
             for word, i in (("after", first - 1), ("before", last + 1))
@@ -239,10 +240,10 @@ class _View:
             return
         yield Heading("Not unique", 2)
         yield Paragraph(
-            "Self-stress may be added to these components; shown are those of least norm."
+            "Any self-stress can be added to these components; the values shown are those of least norm."
             if least_norm
-            else "Self-stress may be added to these components, so they have no value (NaN). The table above is made of "
-            "what is unique: the components in brackets, where some are missing."
+            else "Any self-stress can be added to these components, so they have no value (NaN). The table above shows "
+            "what is unique; where components are missing, those that it contains are named in brackets."
         )
         yield Bullets(items)
 
@@ -257,19 +258,17 @@ class _View:
         }
 
     def passive(self) -> Iterator[Block]:
-        """The efforts that hold passive freedoms at rest."""
-        held = {name: self.flat(value) for name, value in self.s.passive_effort.items()}
-        if not held:
+        """The efforts that keep passive freedoms at rest."""
+        found = {name: self.flat(value) for name, value in self.s.passive_effort.items()}
+        if not found:
             return
         scale = max(_largest(self.moments), _largest(self.efforts))
         items = []
-        for name, value in held.items():
+        for name, value in found.items():
             size = float(np.nanmax(np.abs(value), initial=0.0))
             none = size <= 1e-9 * scale
-            loose = f"would be turned or moved: {_number(size)} at most keeps it so"
-            items.append(
-                f"{name} does not spin or slide in its passive freedom; {'nothing moves it' if none else loose}"
-            )
+            held = f"an effort of at most {_number(size)} holds it"
+            items.append(f"{name} is kept at rest in its passive freedom; {'no effort is needed' if none else held}")
         yield Heading("Passive freedoms", 2)
         yield Bullets(tuple(items))
 
@@ -283,6 +282,18 @@ class _View:
         yield Table(
             ("check", "worst"), tuple((name, f"{np.nanmax(np.abs(value)):.0e}") for name, value in rows), align="lr"
         )
+
+    def work(self) -> Paragraph:
+        """Which engine ran, and how much it did, in one line."""
+        work = self.s.work
+        counts = (
+            (work.positions, "position"),
+            (work.nodes, "node", " of the path"),
+            (work.evaluations, "evaluation"),
+            (work.factorizations, "factorization"),
+        )
+        shown = [f"{n} {name}{'' if n == 1 else 's'}{''.join(more)}" for n, name, *more in counts]
+        return Paragraph(f"Engine {self.s.engine}: {', '.join(shown)}.")
 
 
 def _runs(status: Any) -> list[tuple[int, int]]:

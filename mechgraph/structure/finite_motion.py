@@ -1,10 +1,10 @@
 """Finite mobility: the nullity at regular positions reached by a motion, confirmed by moving on in all its directions.
 
-A position is regular where the closed positions near by form a manifold whose dimension is the nullity n of the closure Jacobian.
+A position is regular where the nearby closed positions form a manifold whose dimension is the nullity n of the closure Jacobian.
 That is confirmed by actual motion: after a random step in the null space the rows that are independent here close all loops, so
 that the others depend on them there too and the rank is constant. Where that fails at every step size, the position is a change point
-or shaky; random steps lead to positions near by, where it is asked again. If none of these is regular, each direction v of the null
-space N is tried by itself and what is left of it once the loops are closed by the smallest change is compared with it:
+or shaky; random steps reach nearby positions, where the test is repeated. If none of these is regular, each direction v of the null
+space N is tried alone, and what is left of it once the loops are closed by the smallest change is compared with it:
 
     kept = N^T (x' - x) / h,   x' closed;
 
@@ -27,7 +27,7 @@ from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
 from mechgraph.closure.rank import ClosureRank, EngineName, closure_rank
 
 STEPS = (0.05, 0.0125, 0.003)
-"""Lengths of trial steps (radians, or lengths / L): the first ones tell a motion that returns, the last ones bear curvature."""
+"""Lengths of trial steps (radians, or lengths / L): the first ones tell a motion that returns, the last ones tolerate curvature."""
 FAR_STEPS = 6
 """Further steps of the first length over which the motion is followed."""
 KEPT = 0.5
@@ -41,7 +41,7 @@ FROZEN = 12
 SLOW = 0.2
 """Part of the closure error that such a correction may leave."""
 CORRECTIONS = 60
-"""Corrections with equations made anew; a double root halves its error with each."""
+"""Corrections with equations of the new position; a double root halves its error with each."""
 PATIENCE = 8
 """Corrections without gain after which closing is given up."""
 LONGEST = 0.5
@@ -96,7 +96,7 @@ class _Position:
     def regular(self, v: Array) -> bool:
         """Whether the rows that are independent here close all loops after a random step.
 
-        Then the rank is constant near by: the other rows depend on them not only here. Where it is not, they stay open by the square
+        Then the rank is constant nearby: the other rows depend on them not only here. Where it is not, they stay open by the square
         of the step (a change point) or a higher power (shaky), far above the closure error.
         """
         rows = self.found.reduced
@@ -117,12 +117,12 @@ class _Position:
 
 @dataclass(frozen=True)
 class FiniteMotion:
-    """What following the motions showed.
+    """Result of following the motions.
 
     Attributes
     ----------
-    mobility : dimension of the set of closed positions near by.
-    rank_nearby : largest rank of the closure Jacobian at closed positions near by.
+    mobility : dimension of the set of nearby closed positions.
+    rank_nearby : largest rank of the closure Jacobian at nearby closed positions.
     begin : a position and a direction in which it moves on; None where nothing moves.
     """
 
@@ -200,7 +200,7 @@ def _followed(begin: _Position, v: Array) -> float:
 
 
 def _corrected(system: System, x: Array, rows: ReducedRows) -> Array | None:
-    """The loops closed from ``x`` in the kept rows of a position near by alone; None where that does not converge quickly."""
+    """The loops closed from ``x`` in the kept rows of a nearby position alone; None where that does not converge quickly."""
     before, goal = np.inf, max(CLOSURE_GOAL, rows.rounding)
     for _ in range(FROZEN):
         residual = system.at(x[:, None]).residual[:, 0]
@@ -215,7 +215,7 @@ def _corrected(system: System, x: Array, rows: ReducedRows) -> Array | None:
 
 
 def _closed(system: System, x: Array, rows: ReducedRows) -> Array | None:
-    """The loops closed from ``x``: with the rows of a position near by where they do, otherwise by Newton; None where not."""
+    """The loops closed from ``x``: with the rows of a nearby position where they converge, otherwise by Newton; None where not."""
     quick = _corrected(system, x, rows)
     if quick is not None and float(system.at(quick[:, None]).closure[0]) <= CLOSED:
         return quick

@@ -1,4 +1,4 @@
-"""What the topology alone decides: rank of the closure Jacobian for random geometry, and which loops are over whatever the dimensions."""
+"""What the topology alone decides: the rank for random geometry, and which loops are redundant whatever the dimensions."""
 
 from __future__ import annotations
 

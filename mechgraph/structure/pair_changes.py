@@ -1,7 +1,8 @@
 """Advice with computed effect: pair changes that remove redundancy, changes that free a structure, drivers that complete.
 
 A change of pair ``k`` to a type with more freedoms adds twists ``S``; with the self-stresses ``n_k`` that pass the pair (drivers free)
-the redundancy falls by ``rank(S^T n_k)``, so all changes are weighed without a new analysis; those reported are then computed anew.
+the redundancy falls by ``rank(S^T n_k)``, so all changes are ranked without a new analysis; the effect of those reported
+is then computed on the changed mechanism.
 Source of the idea: Reshetov, Self-Aligning Mechanisms, 1982.
 """
 
@@ -43,7 +44,7 @@ BEAM = 12
 @dataclass(frozen=True)
 class Change:
     """One pair given another type; ``matrix (f, s)`` is its power on the self-stresses, ``added`` the freedoms added,
-    ``relief`` the self-stresses that it removes by itself.
+    ``relief`` the self-stresses that it removes alone.
 
     ``turn``: angle by which the second direction x is turned about the axis, for types in which it matters.
     """

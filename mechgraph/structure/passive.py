@@ -1,6 +1,6 @@
 """Passive freedoms: motions that move some links as one, leave their pair elements in place and move no other link.
 
-Candidates are found where they must lie. A set of links that turns or slides as one has a border of pairs all of which allow its twist.
+Candidates follow from the graph. A set of links that turns or slides as one has a border of pairs all of which allow its twist.
 Either the set is one link (or links that no motion moves against each other), or its border are two pairs that lie in the same loops:
 cutting them parts the graph. So the twists common to the freedoms of a border are all there is to look at, and no null space of
 the mechanism is needed. Where a passive motion of several links is a sum of smaller ones, the smaller ones are named.
@@ -40,7 +40,7 @@ class PassiveMotion:
 
 
 class _Search:
-    """What the search needs at hand: column spans, driven columns, group and place of every pair."""
+    """Data of the search: column spans, driven columns, group and place of every pair."""
 
     def __init__(self, here: Configuration, driven: Index) -> None:
         self.here, self.system = here, here.system

@@ -48,7 +48,7 @@ def pair_power(here: Configuration, totals: Array) -> Array:
 
 
 def split_stress(here: Configuration, states: Array, acting: Index) -> Stress:
-    """Reaction parts and efforts of total wrench states ``(6, P, s, T)`` with efforts in the freedoms ``acting`` (driven, coupled) alone."""
+    """Reaction parts and efforts of total wrench states ``(6, P, s, T)``; only the freedoms ``acting`` (driven, coupled) have efforts."""
     s = states.shape[2]
     efforts = np.zeros((here.system.n_freedoms, s, here.T))
     parts = np.empty_like(states)

@@ -20,7 +20,7 @@ from mechgraph.structure.components import Label
 from mechgraph.topology.components import labels_of_bipartite
 
 COMBINED = 300
-"""Components of one group up to which combinations across pairs are worked out."""
+"""Number of components of a group up to which combinations across pairs are computed."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ def basis_of(count: int, parts: list[tuple[Index, Index, Array]], connected: lis
 def combinations(basis: Basis, labels: list[Label], known: set[int]) -> tuple[tuple[tuple[int, str], ...], int]:
     """Per group the sums of components that are unique though their terms are not; ``known`` components are left out.
 
-    A component that a combination found before ties to others of its pair brings nothing new, so it is among ``known``.
+    A component that a combination found before ties to others of its pair is determined by it, so it is among ``known``.
     Also returned: the number of groups that have too many components for it.
     """
     out, unsought = [], 0

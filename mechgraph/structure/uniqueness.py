@@ -18,15 +18,15 @@ from mechgraph.structure.self_stress import Basis, SelfStress, basis_of, combina
 from mechgraph.structure.unique_directions import UniqueDirection, unique_directions
 
 PROBES = 6
-"""Random self-stresses that stand for all of them: each has a part of every one, so a component without a part in any is unique."""
+"""Random self-stresses that represent all of them: each is a combination of all, so a component without a part in any is unique."""
 CONNECTING = 200
-"""Self-stresses that connect loops up to which they are worked out; their echelon form is dense, of that width."""
+"""Number of self-stresses that connect loops up to which they are computed; their echelon form is dense, of that width."""
 SEED = 5
 
 
 @dataclass(frozen=True)
 class Uniqueness:
-    """The verdict on reactions at one position; what is expensive is worked out when first asked for.
+    """The verdict on reactions at one position; what is expensive is computed when first asked for.
 
     ``parts`` the components, ``found`` the closure equations with the drivers at rest, ``table (components, probes)`` their parts in
     random self-stresses of size one in the measure of every loop, so that the verdict does not depend on how many loops there are.

@@ -27,7 +27,7 @@ def labels_of_bipartite(touch: scipy.sparse.csr_array | scipy.sparse.coo_array) 
 
 
 def component_numbers(labels: NDArray[np.signedinteger]) -> Index:
-    """Labels numbered anew in the order in which they appear."""
+    """Labels renumbered in the order in which they appear."""
     _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
     number = np.empty(len(first), dtype=np.intp)
     number[np.argsort(first)] = np.arange(len(first))

@@ -1,1 +1,1 @@
-"""Many variants of one mechanism: declared numbers that vary, samples of them, and what comes of it."""
+"""Many variants of one mechanism: declared numbers that vary, samples of them, and the results."""

@@ -1,7 +1,7 @@
 """Kinetostatics of many variants of one mechanism as one batch ``(variants, positions)``.
 
-Every variant begins where the closed start of the mechanism itself is led when its numbers change into those of the variant: a
-path like any other, with the part of the way in place of a driver.
+The start of every variant is followed from the mechanism itself: from its closed start, while its numbers change into those of the
+variant. This is a path like any other, with the part of the way in place of a driver.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from mechgraph.variants.fields import Variants
 
 Mask = NDArray[np.bool_]
 NumbersAt = Callable[[Array, Index], Variants]
-"""Some of the variants ``(n,)`` (one may stand several times), each at its part ``(n,)`` of the way from the mechanism itself (0) to it (1)."""
+"""Gives variants ``(n,)``, each with its numbers at a part ``(n,)`` of the way from those of the mechanism itself (0) to its own (1)."""
 
 
 class NumbersPath(DriverPath):
@@ -70,7 +70,7 @@ NUMBERS_STEP = 1e-7
 
 @dataclasses.dataclass(frozen=True)
 class Together:
-    """The solution of all variants that could be led from the mechanism itself, and which could not (``alone``).
+    """The solution of all variants that could be followed from the mechanism itself, and which could not (``alone``).
 
     ``starts (F, V)``: user coordinates where each variant begins, NaN where it is not known.
     """
@@ -81,7 +81,7 @@ class Together:
 
 
 def solve_together(numbers_at: NumbersAt, count: int, motions: Mapping[str, Motion], options: Options) -> Together:
-    """All variants as one batch; NaN for those that are to be solved alone, as they cannot be built or led from the mechanism itself."""
+    """All variants as one batch; NaN for those to be solved alone: they cannot be built, or not followed from the mechanism itself."""
     every = np.arange(count)
     variants, V = numbers_at(np.ones(count), every), count
     nothing = np.full((sum(p.type.f for p in variants.mechanism.pairs), V), np.nan)

@@ -95,7 +95,7 @@ class Variants:
 
 
 def _placed(pair: Pair, n: Declared, k: int) -> Pair:
-    """A pair with the numbers of one variant; a second direction that must be square is made so again."""
+    """A pair with the numbers of one variant; a second direction that must be perpendicular is made so again."""
     markers = []
     for side in (0, 1):
         axis, second = n.axis[side, :, k], n.second[side, :, k]
@@ -177,7 +177,7 @@ def varied(m: Mechanism, fields: Mapping[str, AnyField], values: Array) -> Varia
 def _chain_markers(
     m: Mechanism, arrays: Mapping[str, Array], chained: Sequence[tuple[ChainField, Array]], count: int
 ) -> dict[str, Array]:
-    """Point, axis and second directions of a chain some of whose numbers vary; other markers stay as they are."""
+    """Point, axis and second directions of a chain some of whose numbers vary; other markers stay unchanged."""
     start = chain_numbers(m)
     assert start is not None
     numbers = np.repeat(start[:, :, None], count, axis=2)

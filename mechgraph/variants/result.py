@@ -1,4 +1,4 @@
-"""What a study found: labelled arrays, quantiles, sensitivities, and every variant as a mechanism to check by itself."""
+"""What a study found: labelled arrays, quantiles, sensitivities, and every variant as a mechanism that can be checked alone."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class Study:
         return np.asarray(self._outcomes.any(axis=1))
 
     def variant(self, i: int) -> Mechanism:
-        """The ``i``-th variant as a mechanism, to be solved and checked by itself.
+        """The ``i``-th variant as a mechanism, to be solved and checked alone.
 
         Raises
         ------

@@ -13,7 +13,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
 
 TAIL = 0.00135
-"""Part of a distribution without end beyond which nothing is looked at: three standard deviations of a normal one."""
+"""Part of a distribution without end that is ignored at either end: three standard deviations of a normal one."""
 SPREAD = (0.15866, 0.84134)
 """Quantiles whose half distance is called the spread: the standard deviation of a normal distribution."""
 

@@ -52,7 +52,7 @@ def study(
     engine: str = "auto",
     progress: Progress | None = None,
 ) -> Study:
-    """Solve many variants of one mechanism, and what varies with what.
+    """Solve many variants of one mechanism: how outputs vary with its numbers.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def study(
         ``mechgraph.variants.fields``: ``crank.mass``, ``B.on_a.point.x``, ``loads[0].stiffness``, ``length[2]`` of a chain.
     outputs : quantities by name (``"A.effort"``, ``"B.force"``, ``"B:Fx"``, ``"coupler.center"``), or a mapping name -> quantity or
         function of a Solution with the batch ``(variants, positions)``.
-    n : number of variants; on a grid, of levels of every distribution (numbers are taken as they are).
+    n : number of variants; on a grid, of levels of every distribution (a list of numbers is taken as given).
     seed : of the sample. The same seed gives the same result, whatever the executor.
     motions : of the drivers as in ``solve``; a leading axis of length ``n`` gives every variant its own.
     sampling : ``"random"``, ``"latin"`` (Latin hypercube) or ``"grid"``.
@@ -73,10 +73,10 @@ def study(
     -------
     Study
         A variant that cannot be built, assembled or moved has NaN in its outputs and says so in ``status`` and ``messages``; it
-        never stops the others. Every variant starts on the branch to which the mechanism itself is led when its numbers change
-        into those of the variant, also where it is then solved by itself because a position is out of reach or near a dead
-        point; one for which that way is not beyond doubt is solved by itself, as ``solve`` does. A passive body
-        whose centre is off its line stands as it comes to stand on that way.
+        never stops the others. The start of every variant is followed from the mechanism itself while its numbers change into those of
+        the variant, so that it is on the same branch, also where the variant is then solved alone because a position is out of
+        reach or near a dead point. Where that path cannot be followed, the variant is assembled and solved alone, as ``solve``
+        does. The orientation of a passive body whose centre is off its line is the one that it reaches along that path.
 
     Raises
     ------

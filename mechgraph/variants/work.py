@@ -60,7 +60,7 @@ class Source:
         return varied(self.mechanism, self.fields, values)
 
     def variants(self, values: Array, part: Array) -> Variants:
-        """Variants at a ``part (count,)`` of the way from the mechanism itself (0) to ``values (parameters, count)`` (1), and a bit beyond."""
+        """Variants at a ``part (count,)`` of the way from the mechanism itself (0) to ``values (parameters, count)`` (1, or a bit more)."""
         on_the_way = self.start[:, None] + part * (values - self.start[:, None])
         if self.build is None:
             return self._varied(on_the_way)
@@ -71,7 +71,7 @@ class Source:
                 continue
             try:
                 made.append(self.one(column))
-            except Exception:  # told where this variant is solved alone
+            except Exception:  # the message is given where this variant is solved alone
                 made.append(None)
         return stacked(self.mechanism, made)
 
@@ -148,7 +148,7 @@ def _writable(values: Array) -> Array:
 
 
 def _solved_alone(task: Task, i: int, start: Array) -> Solution:
-    """One variant by itself, from coordinates ``start (F,)`` if known; positions out of reach flagged; as a batch ``(1, N)``."""
+    """One variant alone, from coordinates ``start (F,)`` if known; positions out of reach flagged; as a batch ``(1, N)``."""
     try:
         m = task.source.one(task.values[:, i])
     except MechgraphError:
