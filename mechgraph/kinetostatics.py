@@ -144,13 +144,13 @@ class Pipeline:
     def run(self, starts: Starts | None = None, batch: tuple[int, ...] | None = None) -> Outcome:
         """All positions, rates and forces as a trajectory."""
         batch = self.drive.batch if batch is None else batch
-        system = self.system
+        system, start = self.system, None if starts else self.start
         starts = starts or Starts(self.x[:, None], lambda variants: system, self.m.loads)
         one = starts.x.shape[1] == 1
         T = int(np.prod(batch))
         variant = np.zeros(T, dtype=np.intp) if one else np.arange(T) // batch[-1]
         requests = self._requests(batch, starts)
-        path = DriverPath(self.system, self.solver, starts.system_of)
+        path = DriverPath(self.system, self.solver, starts.system_of, start)
         found = follow(path, requests, T)
         if self.bodies:
             found = unspun(path, found, self.bodies)

@@ -12,6 +12,7 @@ from mechgraph.closure.indexing import Index, System, indexed
 from mechgraph.errors import AssemblyError, DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.numeric import is_numeric
+from mechgraph.numerics.linear import complement
 from mechgraph.numerics.newton import closest_zeros, least_norm_step
 
 CLOSED = 1e-10
@@ -59,7 +60,7 @@ def close(system: System, x: Array, fixed: Index, iterations: int = 60, patience
 
 def close_all(system: System, x: Array, fixed: Index, iterations: int = 60, patience: int = 8) -> tuple[Array, Array]:
     """``close`` for states ``(nx, T)``; also the closure errors ``(T,)``."""
-    free = np.setdiff1d(np.arange(system.n_freedoms), fixed)
+    free = complement(fixed, system.n_freedoms)
 
     def evaluate(x: Array) -> tuple[Array, Array]:
         here = system.at(x)
@@ -89,7 +90,7 @@ def lead(system: System, x: Array, columns: Index, goal: Array, longest: float =
     """
     rows = state_rows(system, columns)
     begin = x[rows]
-    free = np.setdiff1d(np.arange(system.n_freedoms), columns)
+    free = complement(columns, system.n_freedoms)
     length = float(np.abs(goal - begin).max(initial=0.0))
     done, h = (0.0, min(1.0, longest / length)) if length > 0 else (1.0, 1.0)
     while done < 1.0:
@@ -219,7 +220,7 @@ def _search(m: Mechanism, system: System, x: Array, preferred: Mapping[str, floa
     guesses = []
     for i in range(RESTARTS):
         guess, fixed = attempts[i % 2]
-        free = np.setdiff1d(np.arange(system.n_freedoms), fixed)
+        free = complement(fixed, system.n_freedoms)
         dq = np.zeros((system.n_freedoms, 1))
         dq[free, 0] = rng.normal(0.0, 0.2 + 1.3 * i / RESTARTS, len(free))
         guesses.append(system.advance(guess[:, None], dq)[:, 0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Sequence
 
 import numpy as np
@@ -29,9 +30,8 @@ class DenseFactored:
 
     complete = True
 
-    def __init__(self, solver: DenseSolver, here: Configuration, which: Index) -> None:
-        self.solver, self.here, self.which = solver, here, which
-        self._chosen = ChosenSystem(here.J, solver.choices, which)
+    def __init__(self, solver: DenseSolver, here: Configuration, which: Index, chosen: ChosenSystem) -> None:
+        self.solver, self.here, self.which, self._chosen = solver, here, which, chosen
 
     @property
     def condition(self) -> Array:
@@ -76,7 +76,7 @@ class DenseFactored:
 
     def part(self, at: Index, here: Configuration) -> DenseFactored:
         """See the protocol in ``closure.solver``."""
-        return DenseFactored(self.solver, here, self.which[at])
+        return self.solver.factored(here, self.which[at])
 
     def least(self, R: Sequence[scipy.sparse.csr_array], r0: Array) -> Array:
         """See the protocol in ``closure.solver``."""
@@ -106,6 +106,7 @@ class DenseSolver:
     def __init__(self, fixed: Index, keep: Index | None = None) -> None:
         self.fixed, self.keep = fixed, keep
         self.choices: list[Choice] = []
+        self._last: tuple[weakref.ref[Configuration], ChosenSystem] | None = None
 
     def leaves_nothing_free(self, here: Configuration) -> bool:
         """See the protocol in ``closure.solver``."""
@@ -116,6 +117,8 @@ class DenseSolver:
 
     def corrigible(self, dq: Array, which: Index) -> Array:
         """See the protocol in ``closure.solver``."""
+        if not any(choice.held.size for choice in self.choices):
+            return dq
         for i in np.unique(which):
             held = self.choices[i].held
             if held.size:
@@ -123,11 +126,22 @@ class DenseSolver:
         return dq
 
     def factored(self, here: Configuration, which: Index) -> DenseFactored:
-        """See the protocol in ``closure.solver``."""
-        return DenseFactored(self, here, which)
+        """See the protocol in ``closure.solver``; those of the last positions are kept for who asks next."""
+        last = self._last_at(here)
+        if last is None or not np.array_equal(last.which, which):
+            last = ChosenSystem(here.J, self.choices, which.copy())
+            self._last = weakref.ref(here), last
+        return DenseFactored(self, here, last.which, last)
+
+    def _last_at(self, here: Configuration) -> ChosenSystem | None:
+        """The last factors, if they are of these positions."""
+        return self._last[1] if self._last is not None and self._last[0]() is here else None
 
     def chosen(self, here: Configuration, which: Index) -> Index:
         """See ``ClosureSolver``; a new choice is taken where it is much better than the old one and of the same rank."""
+        last = self._last_at(here)
+        if last is not None and (which < 0).all():
+            return last.which.copy()
         which = which.copy()
         for t in np.flatnonzero(which < 0):
             which[t] = self._number(choose(here.J[:, :, t], self.fixed, keep=self.keep))
@@ -143,10 +157,19 @@ class DenseSolver:
             same_rank = np.array([len(self.choices[i].cols) == len(self.choices[new].cols) for i in which[poor]])
             trial = self._poorness(here.part(poor), np.full(poor.size, new))
             better = poor[same_rank & (trial < PATH.better * poorness[poor])]
+            which = which.copy()
             which[better] = new
             if not better.size:
                 break
         return which
+
+    def alternative(self, here: Configuration, which: Index) -> Index:
+        """See ``ClosureSolver``."""
+        made = [choose(here.J[:, :, t], self.fixed, keep=self.keep) for t in range(here.T)]
+        same = [len(new.cols) == len(self.choices[i].cols) for new, i in zip(made, which.tolist(), strict=True)]
+        return np.array(
+            [self._number(n) if ok else i for n, ok, i in zip(made, same, which, strict=True)], dtype=np.intp
+        )
 
     def _number(self, choice: Choice) -> int:
         """The number of a choice, that of an equal one where there is one."""
@@ -158,9 +181,9 @@ class DenseSolver:
 
     def _poorness(self, here: Configuration, which: Index) -> Array:
         """Condition number over what is fair, or where motions are held the largest rate over what is fair."""
-        f = ChosenSystem(here.J, self.choices, which)
+        f = self.factored(here, which)
         out = f.condition / PATH.fair
-        if any(self.choices[i].held.size for i in np.unique(which)):
-            motion = np.nan_to_num(np.abs(f.null_of_columns()).max(axis=(0, 1), initial=0.0), nan=np.inf)
+        if any(self.choices[i].held.size for i in set(which.tolist())):
+            motion = np.nan_to_num(np.abs(f.motions()).max(axis=(0, 1), initial=0.0), nan=np.inf)
             out = np.maximum(out, motion / PATH.held)
         return out

@@ -21,10 +21,11 @@ from mechgraph.closure.sparse_solver import SparseSolver
 
 EngineName = Literal["auto", "dense", "sparse"]
 ENGINES: tuple[EngineName, ...] = ("auto", "dense", "sparse")
-SPARSE_ROWS = {1: 30, 64: 150}
-"""Closure rows from which on ``auto`` takes the sparse engine, for up to so many positions (and the last for all larger numbers).
+SPARSE_ROWS = {1.0: 120, 200.0: 90, np.inf: 60}
+"""Closure rows from which on ``auto`` takes the sparse engine, for up to so many positions.
 
-Measured by ``tests/benchmarks/bench_large.py --crossover`` on ladders of four-bars.
+Measured by ``tests/benchmarks/bench_large.py --crossover`` on ladders of four-bars: both engines take the same time at 120 rows (one
+position), 96 (64 positions) and 60 (1000).
 """
 
 
@@ -76,6 +77,9 @@ class ClosureSolver(Protocol):
     def chosen(self, here: Configuration, which: Index) -> Index:
         """Forms ``(T,)`` for positions: ``which`` where these are good enough, new ones where they are not (or are -1)."""
 
+    def alternative(self, here: Configuration, which: Index) -> Index:
+        """Forms ``(T,)`` chosen at the positions by themselves, of the same rank as ``which``; ``which`` where there is no other one."""
+
     def factored(self, here: Configuration, which: Index) -> FactoredClosure:
         """The equations at positions, each in its form."""
 
@@ -90,7 +94,7 @@ def engine_for(rows: int, positions: int, engine: str) -> Literal["dense", "spar
     """The engine that runs: the one asked for, or the one that is faster for the size."""
     if engine != "auto":
         return "dense" if engine == "dense" else "sparse"
-    limit = next((limit for most, limit in SPARSE_ROWS.items() if positions <= most), max(SPARSE_ROWS.values()))
+    limit = next(limit for most, limit in SPARSE_ROWS.items() if positions <= most)
     return "sparse" if rows >= limit else "dense"
 
 

@@ -163,6 +163,10 @@ class SparseSolver:
         """See ``ClosureSolver``."""
         return SparseFactored(self, here, which)
 
+    def alternative(self, here: Configuration, which: Index) -> Index:
+        """See ``ClosureSolver``; borders are exchanged where they are poor, so that there is no other form."""
+        return which
+
     def chosen(self, here: Configuration, which: Index) -> Index:
         """See ``ClosureSolver``."""
         which = which.copy()

@@ -212,7 +212,16 @@ class Follower:
             self.work.evaluations += 3 * test.size
             self.work.factorizations += test.size
             ends = [self.problem.at(end.x, end.drive, end.track) for end in (a.take(test), b.take(test))]
-            ok[test] &= f.regular_between(*ends)
+            ok[test] = f.regular_between(*ends)
+            # a form that is singular in between proves nothing about the equations: those steps are asked again in forms of their middles
+            poor = np.flatnonzero(~ok[test])
+            which = a.which[test[poor]]
+            other = self.problem.alternative(here.part(poor), which) if poor.size else which
+            poor, other = poor[other != which], other[other != which]
+            if poor.size:
+                f = self.problem.factored(here.part(poor), other)
+                self.work.factorizations += poor.size
+                ok[test[poor]] = f.regular_between(*(end.part(poor) for end in ends))
         return ok, middle
 
     def _certified_all(self, nodes: Nodes) -> Nodes:
@@ -404,6 +413,8 @@ def refined(follower: Follower, nodes: Nodes, count: int) -> Nodes:
     """
     left, _ = nodes.steps
     parts = np.full(len(left), 2)
+    if not len(left) or int(parts.sum()) * PATH.worth > count:
+        return nodes
     exact = follower.newton.nodes(nodes.x, nodes.drive, nodes.track, nodes.which, PATH.exact)
     nodes = replace(nodes, x=exact.x, Z=np.where(exact.done, exact.Z, nodes.Z))
     for _ in range(PATH.refinements):
