@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -28,9 +29,32 @@ FIRST = 8
 
 
 def scaled_system(m: Mechanism, q: Array, system: System | None = None) -> System:
-    """The system about the centroid of the pair points at coordinates ``q``, with lengths over their RMS distance L."""
-    raw = system or indexed(m)
-    centroid, L = _measure(raw, q) if system or q.any() else m.once(_measure_as_declared)
+    """The system about the centroid of the pair points at coordinates ``q``, with lengths over their RMS distance L.
+
+    The last one of the mechanism itself is kept with it, so that another call with the same start begins with all numbers ready.
+    """
+    if system is not None:
+        return _rescaled(system, *_measure(system, q))
+    kept, key = m.once(_kept_systems), q.tobytes()
+    found = kept.get(key)
+    if found is None:
+        raw = indexed(m)
+        made = _rescaled(raw, *(_measure(raw, q) if q.any() else m.once(_measure_as_declared)))
+        for name in ("numbers", "effort_numbers"):
+            getattr(made, name)
+        kept.clear()
+        kept[key] = found = {name: value for name, value in vars(made).items() if name not in ("m", "couplings")}
+    out = System.__new__(System)
+    vars(out).update(found, m=m, couplings=m.couplings)
+    return out
+
+
+def _kept_systems(m: Mechanism) -> dict[bytes, dict[str, Any]]:
+    """What scaled systems know beside the mechanism, by the coordinates about which they are scaled."""
+    return {}
+
+
+def _rescaled(raw: System, centroid: Array, L: float) -> System:
     return raw.with_parameters(raw.par.rescaled(raw.par.origin + raw.par.L * centroid, L * raw.par.L))
 
 

@@ -88,7 +88,8 @@ class Nodes:
 
     def take(self, at: Index | Mask) -> Nodes:
         """Some of the nodes."""
-        return Nodes(*(getattr(self, f.name)[..., at] for f in fields(self)))
+        x, Z, drive = (values[..., at] for values in (self.x, self.Z, self.drive))
+        return Nodes(x, Z, drive, *(v[at] for v in (self.track, self.place, self.which, self.condition, self.sure)))
 
     @staticmethod
     def join(parts: list[Nodes]) -> Nodes:
