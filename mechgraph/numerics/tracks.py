@@ -88,8 +88,7 @@ class Nodes:
 
     def take(self, at: Index | Mask) -> Nodes:
         """Some of the nodes."""
-        x, Z, drive = (values[..., at] for values in (self.x, self.Z, self.drive))
-        return Nodes(x, Z, drive, *(v[at] for v in (self.track, self.place, self.which, self.condition, self.sure)))
+        return Nodes(*[getattr(self, name)[..., at] for name in self.__dataclass_fields__])
 
     @staticmethod
     def join(parts: list[Nodes]) -> Nodes:
