@@ -15,7 +15,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import CLOSED, assembled_at, closed_start, named_columns
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
-from mechgraph.closure.driver_path import DriverPath, Positions, Request, Status, follow, in_blocks
+from mechgraph.closure.driver_path import BLOCK, DriverPath, Positions, Request, Status, follow, in_blocks
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.passive_rest import Idle, unspun
 from mechgraph.closure.rates import Rates, distance_to_dead_point, rates
@@ -55,12 +55,14 @@ class Options:
 class Starts:
     """Where the paths begin: a closed state ``x (nx, V)`` for every variant, and the systems with the numbers of variants.
 
-    ``system_of(variants)`` for variants ``(T,)``; ``loads`` act with the numbers of every variant.
+    ``system_of(variants)`` for variants ``(T,)``; ``loads`` act with the numbers of every variant. ``sharing`` is the number of variants
+    that differ in masses and loads alone and move alike, from the only state: their motion is found once.
     """
 
     x: Array
     system_of: Callable[[Index], System]
     loads: tuple[Load, ...]
+    sharing: int = 1
 
 
 class Pipeline:
@@ -148,14 +150,15 @@ class Pipeline:
     def run(self, starts: Starts | None = None, batch: tuple[int, ...] | None = None) -> Outcome:
         """All positions, rates and forces as a trajectory."""
         batch = self.drive.batch if batch is None else batch
-        system = self.system
+        system, start = self.system, None if starts else self.start
         starts = starts or Starts(self.x[:, None], lambda variants: system, self.m.loads)
         one = starts.x.shape[1] == 1
         T = int(np.prod(batch))
-        variant = np.zeros(T, dtype=np.intp) if one else np.arange(T) // batch[-1]
-        requests = self._requests(batch, starts)
-        path = DriverPath(self.system, self.solver, starts.system_of)
-        found = follow(path, requests, T)
+        shared = starts.sharing > 1
+        variant = np.zeros(T, dtype=np.intp) if one and not shared else np.arange(T) // batch[-1]
+        followed = (1, batch[-1]) if shared else batch
+        path = DriverPath(self.system, self.solver, starts.system_of, start)
+        found = follow(path, self._requests(followed, starts), int(np.prod(followed)))
         if self.bodies:
             found = unspun(path, found, self.bodies)
         return Outcome(self, starts, batch, variant, found, path)
@@ -187,7 +190,7 @@ class Outcome:
         self.contradicting = np.zeros(len(variant), dtype=bool)
         self._system_at = partial(_system_at, starts, variant)
         self._velocity, self._acceleration = (line.values(kind, batch) for kind in ("velocity", "acceleration"))
-        coordinates = continued(path, found)
+        coordinates = np.tile(continued(path, found), starts.sharing) if starts.sharing > 1 else continued(path, found)
         self.trajectory = Trajectory(
             line.system,
             self._system_at,
@@ -206,12 +209,37 @@ class Outcome:
         found = self.found
         good = np.flatnonzero(found.status == Status.OK)
         bad = np.flatnonzero(found.status != Status.OK)
-        self.trajectory.mark(bad, [status.value for status in found.status[bad]])
         whole = bool(self.line.bodies) or not all(_by_position(load) for load in self.starts.loads)
+        if self.starts.sharing > 1:
+            self._fill_shared(good, whole)
+            return
+        self.trajectory.mark(bad, [status.value for status in found.status[bad]])
         for places in [good] if whole else in_blocks(good):
-            self._block(places)
+            moved = self._moved(places)
+            if moved is not None:
+                self._put(*moved)
 
-    def _block(self, places: Index) -> None:
+    def _fill_shared(self, good: Index, whole: bool) -> None:
+        """The motion of the first variant serves all; forces in blocks of whole variants."""
+        every, N = np.arange(self.starts.sharing)[:, None], self.batch[-1]
+        moved = self._moved(good)
+        status = np.where(
+            self.found.status == Status.OK, self.trajectory.first(N), [s.value for s in self.found.status]
+        )
+        self.trajectory.mark(np.arange(len(self.variant)), np.tile(status, len(every)))
+        if moved is None:
+            return
+        motion, f = moved
+        self.contradicting[:] = np.tile(self.contradicting[:N], len(every))
+        blocks = 1 if whole else len(every) // max(1, BLOCK // N)
+        for variants in np.array_split(every, max(1, blocks)):
+            places, count = (variants * N + motion.places).ravel(), len(variants)
+            here = motion.here.repeated(self._system_at(places), count)
+            factors = self.solver.factored(here, np.tile(f.which, count))
+            self._put(BlockMotion(places, motion.rates.repeated(here, count)), factors)
+
+    def _moved(self, places: Index) -> tuple[BlockMotion, FactoredClosure] | None:
+        """Rates of a block, and the factors with which they were found; None where it has no position that is closed and regular."""
         found, line = self.found, self.line
         here = found.here if found.here is not None and len(places) == found.x.shape[1] else None
         here = here or self._system_at(places).at(found.x[:, places])
@@ -227,14 +255,16 @@ class Outcome:
             places, here = places[keep], self._system_at(places[keep]).at(here.x[:, keep])
             f = f.part(keep, here)
         if not places.size:
-            return
+            return None
         velocity, acceleration = self._velocity[:, places], self._acceleration[:, places]
         moved = rates(here, f, line.leading, velocity[line.lead], acceleration[line.lead], line.bodies)
         if len(line.lead) < len(line.columns):
             moved.contradiction = self._disagreement(here, moved, places)
         self.contradicting[places] = moved.contradiction > CONTRADICTION
-        motion = BlockMotion(places, moved)
-        self.trajectory.put(motion, self._forces(motion, f) if line.options.method else None)
+        return BlockMotion(places, moved), f
+
+    def _put(self, motion: BlockMotion, f: FactoredClosure) -> None:
+        self.trajectory.put(motion, self._forces(motion, f) if self.line.options.method else None)
 
     def _forces(self, motion: BlockMotion, f: FactoredClosure) -> BlockForces:
         line = self.line

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from mechgraph.closure.solver import closure_solver, engine_for
 from mechgraph.errors import AssemblyError, DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.numeric import is_numeric
+from mechgraph.numerics.linear import complement
 from mechgraph.numerics.newton import closest_zeros, least_norm_steps
 from mechgraph.numerics.tolerances import PATH
 
@@ -33,9 +35,32 @@ FIRST = 8
 
 
 def scaled_system(m: Mechanism, q: Array, system: System | None = None) -> System:
-    """The system about the centroid of the pair points at coordinates ``q``, with lengths over their RMS distance L."""
-    raw = system or indexed(m)
-    centroid, L = _measure(raw, q) if system or q.any() else m.once(_measure_as_declared)
+    """The system about the centroid of the pair points at coordinates ``q``, with lengths over their RMS distance L.
+
+    The last one of the mechanism itself is kept with it, so that another call with the same start begins with all numbers ready.
+    """
+    if system is not None:
+        return _rescaled(system, *_measure(system, q))
+    kept, key = m.once(_kept_systems), q.tobytes()
+    found = kept.get(key)
+    if found is None:
+        raw = indexed(m)
+        made = _rescaled(raw, *(_measure(raw, q) if q.any() else m.once(_measure_as_declared)))
+        for name in ("numbers", "effort_numbers"):
+            getattr(made, name)
+        kept.clear()
+        kept[key] = found = {name: value for name, value in vars(made).items() if name not in ("m", "couplings")}
+    out = System.__new__(System)
+    vars(out).update(found, m=m, couplings=m.couplings)
+    return out
+
+
+def _kept_systems(m: Mechanism) -> dict[bytes, dict[str, Any]]:
+    """What scaled systems know beside the mechanism, by the coordinates about which they are scaled."""
+    return {}
+
+
+def _rescaled(raw: System, centroid: Array, L: float) -> System:
     return raw.with_parameters(raw.par.rescaled(raw.par.origin + raw.par.L * centroid, L * raw.par.L))
 
 
@@ -65,7 +90,7 @@ def close(system: System, x: Array, fixed: Index, iterations: int = 60, patience
 
 def close_all(system: System, x: Array, fixed: Index, iterations: int = 60, patience: int = 8) -> tuple[Array, Array]:
     """``close`` for states ``(nx, T)``; also the closure errors ``(T,)``."""
-    free = np.setdiff1d(np.arange(system.n_freedoms), fixed)
+    free = complement(fixed, system.n_freedoms)
 
     def least(here: Configuration) -> Array:
         if here.T == 1 and system.n_rows >= SPARSE:
@@ -195,7 +220,7 @@ def _search(m: Mechanism, system: System, x: Array, preferred: Mapping[str, floa
     guesses = []
     for i in range(RESTARTS):
         guess, fixed = attempts[i % 2]
-        free = np.setdiff1d(np.arange(system.n_freedoms), fixed)
+        free = complement(fixed, system.n_freedoms)
         dq = np.zeros((system.n_freedoms, 1))
         dq[free, 0] = rng.normal(0.0, 0.2 + 1.3 * i / RESTARTS, len(free))
         guesses.append(system.advance(guess[:, None], dq)[:, 0])

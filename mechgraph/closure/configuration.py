@@ -54,6 +54,15 @@ class Configuration:
         system = self.system if par.batch == 1 else self.system.with_parameters(par.taken(at))
         return Configuration(system, self.x[:, at])
 
+    def repeated(self, system: System, count: int) -> Configuration:
+        """The states ``count`` times, one after the other, for a system of which masses alone differ; what is evaluated is taken over."""
+        out = Configuration(system, np.tile(self.x, count))
+        for name, value in vars(type(self)).items():
+            known = self.__dict__.get(name)
+            if isinstance(value, kept) and isinstance(known, np.ndarray):
+                out.__dict__[name] = np.tile(known, count)
+        return out
+
     # --- poses -------------------------------------------------------------------------------------------------------
 
     @kept

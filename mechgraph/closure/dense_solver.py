@@ -59,13 +59,14 @@ class DenseFactored:
 
     complete = True
 
-    def __init__(self, solver: DenseSolver, here: Configuration, which: Index) -> None:
-        self.solver, self.here, self.which = solver, here, which
+    def __init__(self, forms: list[Form], fixed: Index, here: Configuration, which: Index) -> None:
+        self.here, self.which = here, which
+        self._forms, self._fixed = forms, fixed
         self._parts = []
         for i in dict.fromkeys(which.tolist()):
             at = np.flatnonzero(which == i)
             J = here.J if len(at) == here.T else here.J[:, :, at]
-            form = solver.forms[i]
+            form = forms[i]
             self._parts.append((form, at, ChosenSystem(form.rows(J), [form.choice], np.zeros(len(at), dtype=np.intp))))
 
     def _joined(self, values: list[Array], shape: tuple[int, ...]) -> Array:
@@ -95,7 +96,7 @@ class DenseFactored:
 
     def sensitivity(self) -> Array:
         """See the protocol in ``closure.solver``."""
-        fixed = self.solver.fixed
+        fixed = self._fixed
         Z = self.solve(-self.here.J[:, fixed])
         Z[fixed, np.arange(len(fixed))] = 1.0
         return Z
@@ -134,7 +135,7 @@ class DenseFactored:
 
     def part(self, at: Index, here: Configuration) -> DenseFactored:
         """See the protocol in ``closure.solver``."""
-        return DenseFactored(self.solver, here, self.which[at])
+        return self.solver.factored(here, self.which[at])
 
     def least(self, R: Sequence[scipy.sparse.csr_array], r0: Array) -> Array:
         """See the protocol in ``closure.solver``."""
@@ -176,6 +177,7 @@ class DenseSolver:
     def __init__(self, fixed: Index, keep: Index | None = None) -> None:
         self.fixed, self.keep = fixed, keep
         self.forms: list[Form] = []
+        self._last: DenseFactored | None = None
 
     def leaves_nothing_free(self, here: Configuration) -> bool:
         """See the protocol in ``closure.solver``."""
@@ -186,6 +188,8 @@ class DenseSolver:
 
     def corrigible(self, dq: Array, which: Index) -> Array:
         """See the protocol in ``closure.solver``."""
+        if not any(form.choice.held.size for form in self.forms):
+            return dq
         for i in np.unique(which):
             held = self.forms[i].choice.held
             if held.size:
@@ -193,11 +197,15 @@ class DenseSolver:
         return dq
 
     def factored(self, here: Configuration, which: Index) -> DenseFactored:
-        """See the protocol in ``closure.solver``."""
-        return DenseFactored(self, here, which)
+        """See the protocol in ``closure.solver``; those of the last positions are kept for who asks next."""
+        if self._last is None or self._last.here is not here or not np.array_equal(self._last.which, which):
+            self._last = DenseFactored(self.forms, self.fixed, here, which.copy())
+        return self._last
 
     def chosen(self, here: Configuration, which: Index) -> Index:
         """See ``ClosureSolver``; a new form is taken where it is much better than the old one and of the same rank."""
+        if self._last is not None and self._last.here is here and (which < 0).all():
+            return self._last.which.copy()
         which = which.copy()
         for t in np.flatnonzero(which < 0):
             which[t] = self._fitting(here.J[:, :, t])
@@ -214,6 +222,7 @@ class DenseSolver:
             )
             trial = self._poorness(here.part(poor), np.full(poor.size, new))
             better = poor[same_rank & (trial < PATH.better * poorness[poor])]
+            which = which.copy()
             which[better] = new
             if not better.size:
                 self.forms.pop()

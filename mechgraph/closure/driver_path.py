@@ -53,21 +53,26 @@ SystemOf = Callable[[Index], System]
 class DriverPath:
     """The closure equations with the coordinates ``columns`` given along a path (implements ``numerics.newton.Problem``).
 
-    ``system_of(variants)`` is the system with the numbers of variants; ``variant_of`` says which variant each track follows.
+    ``system_of(variants)`` is the system with the numbers of variants; ``variant_of`` says which variant each track follows. ``start`` is
+    a state that is evaluated already, where there is one variant alone.
     """
 
-    def __init__(self, system: System, solver: ClosureSolver, system_of: SystemOf) -> None:
+    def __init__(
+        self, system: System, solver: ClosureSolver, system_of: SystemOf, start: Configuration | None = None
+    ) -> None:
         self.system, self.solver = system, solver
         self.columns = solver.fixed
         self.rows = system.single_rows[self.columns]
         self.size = (system.n_freedoms, len(self.columns))
-        self._system_of = system_of
+        self._system_of, self._start = system_of, start
         self.variant_of: Index = np.zeros(0, dtype=np.intp)
 
     def at(self, x: Array, drive: Array, tracks: Index) -> Configuration:
         """See ``numerics.newton.Problem``."""
         x = x.copy()
         x[self.rows] = drive
+        if self._start is not None and np.array_equal(x, self._start.x):
+            return self._start
         return self._system_of(self.variant_of[tracks]).at(x)
 
     def chosen(self, point: Configuration, which: Index) -> Index:

@@ -48,6 +48,14 @@ class Rates(Velocities):
         """Accelerations dV/dt of all links ``(6, N, T)``."""
         return self.here.accelerations_with(self.ddq, self.bias)
 
+    def repeated(self, here: Configuration, count: int) -> Rates:
+        """The same ``count`` times, at the states ``here``."""
+        velocities = Velocities(here, np.tile(self.dq, count))
+        velocities.V, velocities.bias = np.tile(self.V, count), np.tile(self.bias, count)
+        out = Rates(velocities, np.tile(self.ddq, count), np.tile(self.contradiction, count))
+        out.A = np.tile(self.A, count)
+        return out
+
 
 def rates(
     here: Configuration,

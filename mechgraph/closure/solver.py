@@ -21,12 +21,11 @@ from mechgraph.closure.sparse_solver import SparseSolver
 
 EngineName = Literal["auto", "dense", "sparse"]
 ENGINES: tuple[EngineName, ...] = ("auto", "dense", "sparse")
-SPARSE_ROWS = {1: 30, 64: 150}
-"""Number of positions -> closure rows from which on ``auto`` takes the sparse engine for at most so many positions.
+SPARSE_ROWS = {1.0: 120, 200.0: 90, np.inf: 60}
+"""Closure rows from which on ``auto`` takes the sparse engine, for up to so many positions.
 
-The last entry holds for more positions too.
-
-Measured by ``tests/benchmarks/bench_large.py --crossover`` on ladders of four-bars.
+Measured by ``tests/benchmarks/bench_large.py --crossover`` on ladders of four-bars: both engines take the same time at 120 rows (one
+position), 96 (64 positions) and 60 (1000).
 """
 
 
@@ -95,7 +94,7 @@ def engine_for(rows: int, positions: int, engine: str) -> Literal["dense", "spar
     """The engine that runs: the one asked for, or the one that is faster for the size."""
     if engine != "auto":
         return "dense" if engine == "dense" else "sparse"
-    limit = next((limit for most, limit in SPARSE_ROWS.items() if positions <= most), max(SPARSE_ROWS.values()))
+    limit = next(limit for most, limit in SPARSE_ROWS.items() if positions <= most)
     return "sparse" if rows >= limit else "dense"
 
 

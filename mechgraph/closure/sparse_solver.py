@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Sequence
 
 import numpy as np
@@ -31,7 +32,7 @@ class SparseFactored:
     def __init__(self, solver: SparseSolver, here: Configuration, which: Index) -> None:
         self.solver, self.here, self.which = solver, here, which
         self._forms = [solver.forms[i] for i in which.tolist()]
-        self._factors = [form.factor(here.S[:, :, t]) for t, form in enumerate(self._forms)]
+        self._factors = [solver.factor(here, t, number) for t, number in enumerate(which.tolist())]
 
     @classmethod
     def of(cls, solver: SparseSolver, here: Configuration, which: Index, factors: list[SparseFactor]) -> SparseFactored:
@@ -112,19 +113,29 @@ class SparseFactored:
         return out
 
     def regular_between(self, a: Configuration, b: Configuration) -> NDArray[np.bool_]:
-        """Whether the changes ``1 - A^-1 A_a`` and ``1 - A^-1 A_b`` have spectral radii below ``departure``, by power iteration."""
+        """Whether the changes ``1 - A^-1 A_a`` and ``1 - A^-1 A_b`` have spectral radii below ``departure``, by power iteration.
+
+        Borders may be singular where the loops are not: those that fail are asked again with borders of the very position.
+        """
+        out = self._departures(a, b) <= PATH.departure
+        for t in np.flatnonzero(~out):
+            one = np.array([t])
+            here, ends = self.here.part(one), (a.part(one), b.part(one))
+            alone = SparseSolver(self.solver.fixed, self.solver.keep)
+            out[t] = alone.factored(here, alone.chosen(here, np.full(1, -1)))._departures(*ends)[0] <= PATH.departure
+        return np.asarray(out)
+
+    def _departures(self, a: Configuration, b: Configuration) -> Array:
         rng = np.random.default_rng(SEED)
-        out = np.ones(self.here.T, dtype=bool)
+        out = np.zeros(self.here.T)
         for other in (a, b):
             v = rng.normal(size=(self.here.system.n_freedoms, self.here.T))
             v[self.solver.fixed] = 0.0
-            ratio = np.zeros(self.here.T)
             for _ in range(POWERS):
                 size = np.sqrt((v * v).sum(axis=0))
                 v = v / np.where(size > 0, size, 1.0)
                 v = self.solve((self.here.closure_rates(v) - other.closure_rates(v))[:, None])[:, 0]
-                ratio = np.sqrt((v * v).sum(axis=0))
-            out &= ratio <= PATH.departure
+            out = np.maximum(out, np.sqrt((v * v).sum(axis=0)))
         return out
 
     def part(self, at: Index, here: Configuration) -> SparseFactored:
@@ -144,6 +155,19 @@ class SparseSolver:
     def __init__(self, fixed: Index, keep: Index | None = None) -> None:
         self.fixed, self.keep = fixed, np.zeros(0, dtype=np.intp) if keep is None else keep
         self.forms: list[LoopSystem] = []
+        self._last: tuple[weakref.ref[Configuration], dict[tuple[int, int], SparseFactor]] | None = None
+
+    def factor(self, here: Configuration, t: int, number: int) -> SparseFactor:
+        """A position factored in a form; what is known of the last positions is kept for who asks next."""
+        known = self._known(here)
+        if (t, number) not in known:
+            known[t, number] = self.forms[number].factor(here.S[:, :, t])
+        return known[t, number]
+
+    def _known(self, here: Configuration) -> dict[tuple[int, int], SparseFactor]:
+        if self._last is None or self._last[0]() is not here:
+            self._last = weakref.ref(here), {}
+        return self._last[1]
 
     def leaves_nothing_free(self, here: Configuration) -> bool:
         """See the protocol in ``closure.solver``."""
@@ -167,13 +191,15 @@ class SparseSolver:
         """See ``ClosureSolver``."""
         which = which.copy()
         for t in range(here.T):
-            S = here.S[:, :, t]
             known = [which[t]] if which[t] >= 0 else range(len(self.forms) - 1, -1, -1)
-            fits = [i for i in known if self.forms[i].factor(S).smallest_pivot > self.forms[i].pivot_limit]
+            fits = [int(i) for i in known if self.factor(here, t, int(i)).smallest_pivot > self.forms[i].pivot_limit][
+                :1
+            ]
             if not fits:
                 form = LoopSystem.at(here if here.T == 1 else here.part(np.array([t])), self.fixed)
-                if which[t] < 0 or form.smallest > 5.0 * self.forms[which[t]].factor(S).smallest_pivot:
+                if which[t] < 0 or form.smallest > 5.0 * self.factor(here, t, int(which[t])).smallest_pivot:
                     self.forms.append(form)
                     fits = [len(self.forms) - 1]
+                    self._known(here)[t, fits[0]] = form.first
             which[t] = fits[0] if fits else which[t]
         return which

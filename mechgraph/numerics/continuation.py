@@ -64,6 +64,8 @@ class Follower:
         stuck = ~(start.condition <= PATH.singular) & (paths.end > 0)
         self.ends = [End.CROSSING if here else End.REACHED for here in stuck]
         open_ = np.flatnonzero(~stuck & (paths.end > 0))
+        if not open_.size:
+            return Tracks(start, self.ends, self.crossings, self.work)
         nodes = self._quick(start.take(open_), first)
         nodes = Nodes.join([start, self._settled(nodes)])
         nodes = self._cut(self._certified_all(nodes))
@@ -123,14 +125,16 @@ class Follower:
         straight = known & (along > (1 - 1e-9) * size) & (ratio > 0.25)
         two = np.flatnonzero(straight)
         if two.size:
-            a, b = before.take(two), last.take(two)
-            direction = change[:, two] / h[two]
+            every = two.size == len(h)
+            mine = slice(None) if every else two
+            a, b = (before, last) if every else (before.take(two), last.take(two))
+            direction = change[:, mine] / h[mine]
             y = self.problem.difference(a.x, b.x)
             rates = np.stack([(b.Z * direction).sum(axis=1), self.problem.tangent(y, (a.Z * direction).sum(axis=1))])
             values = np.stack([np.zeros_like(y), y])
             places = np.stack([np.zeros(two.size), a.place - b.place])
-            dq[:, two] = newton_form(*divided_differences(places, values, rates), h[two])
-            order[two] = 4
+            dq[:, mine] = newton_form(*divided_differences(places, values, rates), h[mine])
+            order[mine] = 4
         bent = np.flatnonzero(known & ~straight & (ratio < 4.0))
         if bent.size:
             dq[:, bent] += 0.5 * ratio[bent] * ((last.Z - before.Z)[:, :, bent] * change[:, bent]).sum(axis=1)
@@ -212,7 +216,7 @@ class Follower:
             self.work.evaluations += 3 * test.size
             self.work.factorizations += test.size
             ends = [self.problem.at(end.x, end.drive, end.track) for end in (a.take(test), b.take(test))]
-            ok[test] &= f.regular_between(*ends)
+            ok[test] = f.regular_between(*ends)
         return ok, middle
 
     def _certified_all(self, nodes: Nodes) -> Nodes:
@@ -408,6 +412,8 @@ def refined(follower: Follower, nodes: Nodes, count: int) -> Nodes:
     """
     left, _ = nodes.steps
     parts = np.full(len(left), 2)
+    if not len(left) or int(parts.sum()) * PATH.worth > count:
+        return nodes
     exact = follower.newton.nodes(nodes.x, nodes.drive, nodes.track, nodes.which, PATH.exact)
     nodes = replace(nodes, x=exact.x, Z=np.where(exact.done, exact.Z, nodes.Z))
     for _ in range(PATH.refinements):

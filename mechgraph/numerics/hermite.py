@@ -24,21 +24,20 @@ def divided_differences(places: Array, values: Array, rates: Array) -> tuple[Arr
 
     ``places (w, n)``, ``values (w, F, n)``, ``rates (w, F, n)``; every one of the ``n`` polynomials has its own nodes.
     """
-    z = np.repeat(places, 2, axis=0)
-    column = np.repeat(values, 2, axis=0)
-    coefficients = [column[0]]
-    between = np.diff(places, axis=0)
+    z = places.repeat(2, axis=0)
+    coefficients = [values[0]]
+    between = places[1:] - places[:-1]
     # of first order: the rate at a double node, the slope of the chord between two
     first = np.empty((len(z) - 1, *values.shape[1:]), dtype=values.dtype)
     first[::2] = rates
     if len(between):
-        first[1::2] = np.diff(values, axis=0) / between[:, None]
+        first[1::2] = (values[1:] - values[:-1]) / between[:, None]
     column = first
     coefficients.append(column[0])
     for order in range(2, len(z)):
-        column = np.diff(column, axis=0) / (z[order:] - z[:-order])[:, None]
+        column = (column[1:] - column[:-1]) / (z[order:] - z[:-order])[:, None]
         coefficients.append(column[0])
-    return np.stack(coefficients), z
+    return np.array(coefficients), z
 
 
 def newton_form(coefficients: Array, nodes: Array, at: Array) -> Array:

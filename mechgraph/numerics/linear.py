@@ -65,6 +65,13 @@ def independent_rows(rows: Array, candidates: list[int], count: int) -> list[int
     return chosen
 
 
+def complement(index: Index, count: int) -> Index:
+    """The places below ``count`` that are not in ``index``."""
+    rest = np.ones(count, dtype=bool)
+    rest[index] = False
+    return np.flatnonzero(rest)
+
+
 def compact(index: Index) -> Place:
     """An evenly spaced rising index as a slice, any other as it is."""
     n = len(index)
@@ -149,7 +156,7 @@ def choose(A: Array, fixed: Index, tolerance: float = RANK_TOLERANCE, keep: Inde
 
     Columns in ``keep`` are held over if the others have the same rank and are not much worse conditioned.
     """
-    free = np.setdiff1d(np.arange(A.shape[1]), fixed)
+    free = complement(fixed, A.shape[1])
     if keep is not None and keep.size:
         others = np.setdiff1d(free, keep)
         with_keep, without = singular_values(A[:, free]), singular_values(A[:, others])
@@ -166,7 +173,16 @@ def choose(A: Array, fixed: Index, tolerance: float = RANK_TOLERANCE, keep: Inde
     _, pivots = scipy.linalg.qr(sub, mode="r", pivoting=True)
     cols = np.sort(free[pivots[:rank]])
     _, pivots = scipy.linalg.qr(A[:, cols].T, mode="r", pivoting=True)
-    return Choice(np.sort(pivots[:rank]), cols, np.setdiff1d(free, cols), np.asarray(fixed, dtype=np.intp))
+    return Choice(
+        np.sort(pivots[:rank]),
+        cols,
+        complement(np.concatenate([fixed, cols]), A.shape[1]),
+        np.asarray(fixed, dtype=np.intp),
+    )
+
+
+SMALL_BATCH = 32
+"""Number of matrices up to which ``matmul`` multiplies them faster than ``einsum`` (measured)."""
 
 
 class Factor:
@@ -177,14 +193,19 @@ class Factor:
 
     def __init__(self, A: Array) -> None:
         self._A = A
-        stacked = np.ascontiguousarray(np.moveaxis(A, -1, 0))
+        stacked = np.ascontiguousarray(A.transpose(2, 0, 1))
         try:
-            inverse = np.linalg.inv(stacked)
+            inverse: Array = np.asarray(np.linalg.inv(stacked), dtype=float)
         except np.linalg.LinAlgError:
             singular = np.linalg.slogdet(stacked)[0] == 0
-            inverse = np.linalg.inv(np.where(singular[:, None, None], np.eye(A.shape[0]), stacked))
+            inverse = np.asarray(
+                np.linalg.inv(np.where(singular[:, None, None], np.eye(A.shape[0]), stacked)), dtype=float
+            )
             inverse[singular] = np.nan
-        self._inverse = np.ascontiguousarray(np.moveaxis(inverse, 0, -1))
+        few = A.shape[2] <= SMALL_BATCH
+        self._inverse = inverse.transpose(1, 2, 0)
+        if not few:
+            self._inverse = np.ascontiguousarray(self._inverse)
 
     @cached_property
     def condition(self) -> Array:
@@ -196,8 +217,7 @@ class Factor:
 
     def applied(self, B: Array) -> Array:
         """``A^-1 B`` for square ``B (n, n, T)``, without refinement."""
-        product = np.moveaxis(self._inverse, -1, 0) @ np.moveaxis(B, -1, 0)
-        return np.moveaxis(product, 0, -1)
+        return (self._inverse.transpose(2, 0, 1) @ B.transpose(2, 0, 1)).transpose(1, 2, 0)
 
     def solve(self, b: Array, transposed: bool = False) -> Array:
         """Solution of ``A x = b`` (or ``A^T x = b``) for ``b (n, k, T)``."""
@@ -211,10 +231,15 @@ class Factor:
 
 def _times(A: Array, b: Array) -> Array:
     """``A b`` for ``(m, n, T)`` and ``(n, k, T)``."""
+    if b.shape[2] <= SMALL_BATCH:
+        return np.asarray((A.transpose(2, 0, 1) @ b.transpose(2, 0, 1)).transpose(1, 2, 0))
     out = np.empty((A.shape[0], *b.shape[1:]))
     for j in range(b.shape[1]):
         np.einsum("int,nt->it", A, b[:, j], out=out[:, j])
     return out
+
+
+EVERY = slice(None)
 
 
 class ChosenSystem:
@@ -227,17 +252,20 @@ class ChosenSystem:
         self.A = A
         self.choices = choices
         self.which = which
-        self._parts: list[tuple[Choice, Index, Factor]] = []
-        for i, choice in enumerate(choices):
-            at = np.flatnonzero(which == i)
-            if at.size:
-                square = A[np.ix_(choice.rows, choice.cols)]
-                factor = Factor(square if at.size == A.shape[2] else square[:, :, at])
-                self._parts.append((choice, at, factor))
+        self._parts: list[tuple[Choice, Place, Factor]] = []
+        for i in sorted(set(which.tolist())):
+            choice, at = choices[i], np.flatnonzero(which == i)
+            square = A[choice.rows[:, None], choice.cols]
+            if at.size == len(which):
+                self._parts.append((choice, EVERY, Factor(square)))
+            else:
+                self._parts.append((choice, at, Factor(square[:, :, at])))
 
     @cached_property
     def condition(self) -> Array:
         """Condition numbers of the square parts ``(T,)``."""
+        if self._parts and self._parts[0][1] is EVERY:
+            return self._parts[0][2].condition
         out = np.ones(self.A.shape[2])
         for _, at, factor in self._parts:
             out[at] = factor.condition
@@ -247,16 +275,14 @@ class ChosenSystem:
         """``x (n, k, T)`` with ``A x = b`` in the chosen rows; zero in held and fixed columns."""
         out = np.zeros((self.A.shape[1], *b.shape[1:]))
         for choice, at, factor in self._parts:
-            out[np.ix_(choice.cols, np.arange(b.shape[1]), at)] = factor.solve(b[choice.rows][:, :, at])
+            _put(out, choice.cols, at, factor.solve(b[choice.rows][:, :, at]))
         return out
 
     def solve_transposed(self, b: Array) -> Array:
         """``y (m, k, T)`` with ``A^T y = b`` in the chosen columns; zero in the rows that were not chosen."""
         out = np.zeros((self.A.shape[0], *b.shape[1:]))
         for choice, at, factor in self._parts:
-            out[np.ix_(choice.rows, np.arange(b.shape[1]), at)] = factor.solve(
-                b[choice.cols][:, :, at], transposed=True
-            )
+            _put(out, choice.rows, at, factor.solve(b[choice.cols][:, :, at], transposed=True))
         return out
 
     def null_of_transpose(self) -> Array:
@@ -264,11 +290,11 @@ class ChosenSystem:
         m, _, T = self.A.shape
         rank = max((len(c.rows) for c in self.choices), default=0)
         out = np.zeros((m, m - rank, T))
-        for choice, at, factor in self._parts:
-            dropped = np.setdiff1d(np.arange(m), choice.rows)
-            part = -factor.solve(np.swapaxes(self.A[np.ix_(dropped, choice.cols)][:, :, at], 0, 1), transposed=True)
-            out[np.ix_(choice.rows, np.arange(m - rank), at)] = part
-            out[np.ix_(dropped, np.arange(m - rank), at)] = np.eye(m - rank)[:, :, None]
+        for choice, at, factor in self._parts if rank < m else ():
+            dropped = complement(choice.rows, m)
+            left = self.A[dropped[:, None], choice.cols][:, :, at]
+            _put(out, choice.rows, at, -factor.solve(left.swapaxes(0, 1), transposed=True))
+            _put(out, dropped, at, np.eye(m - rank)[:, :, None])
         return out
 
     def null_of_columns(self) -> Array:
@@ -277,10 +303,10 @@ class ChosenSystem:
         count = max((len(c.held) for c in self.choices), default=0)
         out = np.zeros((n, count, T))
         for choice, at, factor in self._parts:
-            held = np.arange(len(choice.held))
-            part = -factor.solve(self.A[np.ix_(choice.rows, choice.held)][:, :, at])
-            out[np.ix_(choice.cols, held, at)] = part
-            out[np.ix_(choice.held, held, at)] = np.eye(len(held))[:, :, None]
+            held = len(choice.held)
+            part = -factor.solve(self.A[choice.rows[:, None], choice.held][:, :, at])
+            _put(out[:, :held], choice.cols, at, part)
+            _put(out[:, :held], choice.held, at, np.eye(held)[:, :, None])
         return out
 
     def change(self, other: Array) -> Array:
@@ -289,3 +315,11 @@ class ChosenSystem:
         out = -factor.applied(other[np.ix_(choice.rows, choice.cols)])
         out[np.arange(len(choice.cols)), np.arange(len(choice.cols))] += 1.0
         return out
+
+
+def _put(out: Array, rows: Index, at: Place, values: Array) -> None:
+    """``out[rows][:, :, at] = values``."""
+    if isinstance(at, slice):
+        out[rows, :, at] = values
+    else:
+        out[rows[:, None, None], np.arange(out.shape[1])[:, None], at] = values

@@ -144,41 +144,50 @@ class Newton:
         fresh = np.ones(n, dtype=bool)
         active, point = np.arange(n), None
         for _ in range(PATH.iterations):
-            point = self.problem.at(x[:, active], drive[:, active], tracks[active])
+            mine = slice(None) if active.size == n else active
+            point = self.problem.at(x[:, mine].copy(), drive[:, mine], tracks[mine])
             self._count(active.size, 1, 0)
             left = np.abs(point.residual).max(axis=0, initial=0.0)
-            near = (goal > 0) & ((left <= goal) | ((left <= PATH.accepted) & (left > 0.5 * before[active])))
-            x[:, active[near]] = point.x[:, near]
-            done[active[near]] = True
-            if near.all():
-                break
-            if near.any():
-                keep = np.flatnonzero(~near)
-                active, point, left = active[keep], point.part(keep), left[keep]
-            f = self.problem.factored(point, which[active])
+            if goal > 0:
+                near = (left <= goal) | ((left <= PATH.accepted) & (left > 0.5 * before[mine]))
+                x[:, active[near]] = point.x[:, near]
+                done[active[near]] = True
+                if near.all():
+                    break
+                if near.any():
+                    keep = np.flatnonzero(~near)
+                    active, point, left = active[keep], point.part(keep), left[keep]
+                    mine = active
+            f = self.problem.factored(point, which[mine])
             self._count(0, 0, active.size)
             step = f.solve(-point.residual[:, None])[:, 0]
             size = np.abs(step).max(axis=0, initial=0.0)
             finite = np.isfinite(size)
-            step = np.where(finite, step, 0.0) * np.minimum(1.0, 0.5 / np.maximum(size, 0.5))
-            x[:, active] = self.problem.advance(point.x, step, tracks[active])
-            total[:, active] += step
-            before[active] = left
-            small = finite & (size <= step_goal[active])
+            if not finite.all() or (size > 0.5).any():
+                step = np.where(finite, step, 0.0) * np.minimum(1.0, 0.5 / np.maximum(size, 0.5))
+            x[:, mine] = self.problem.advance(point.x, step, tracks[mine])
+            total[:, mine] += step
+            before[mine] = left
+            small = finite & (size <= step_goal[mine])
             # rows that were left out as dependent must be met as well: where they are not, another form is tried once
-            unmet = small & (left > np.maximum(1e3 * step_goal[active], 1e-9))
-            retry = np.flatnonzero(unmet & fresh[active])
-            if retry.size:
-                which[active[retry]] = self.problem.chosen(point.part(retry), np.full(retry.size, -1))
-                fresh[active[retry]] = False
-            finite &= ~unmet
-            finite[retry] = True
-            small &= ~unmet
+            unmet = small & (left > np.maximum(1e3 * step_goal[mine], 1e-9))
+            if unmet.any():
+                retry = np.flatnonzero(unmet & fresh[mine])
+                if retry.size:
+                    which[active[retry]] = self.problem.chosen(point.part(retry), np.full(retry.size, -1))
+                    fresh[active[retry]] = False
+                finite &= ~unmet
+                finite[retry] = True
+                small &= ~unmet
+            if small.all():
+                Z[:, :, mine], condition[mine], done[mine] = self.problem.sensitivity(point, f), f.condition, True
+                active, point = active[:0], None
+                break
             if small.any():
                 Z[:, :, active[small]] = self.problem.sensitivity(point, f)[:, :, small]
                 condition[active[small]] = f.condition[small]
                 done[active[small]] = True
-            lost = np.abs(total[:, active]).max(axis=0, initial=0.0) > PATH.lost
+            lost = np.abs(total[:, mine]).max(axis=0, initial=0.0) > PATH.lost
             active, point = active[finite & ~small & ~lost], None
             if not active.size:
                 break

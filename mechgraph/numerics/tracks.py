@@ -88,7 +88,7 @@ class Nodes:
 
     def take(self, at: Index | Mask) -> Nodes:
         """Some of the nodes."""
-        return Nodes(*(getattr(self, f.name)[..., at] for f in fields(self)))
+        return Nodes(*[getattr(self, name)[..., at] for name in self.__dataclass_fields__])
 
     @staticmethod
     def join(parts: list[Nodes]) -> Nodes:

@@ -125,6 +125,10 @@ class Trajectory:
         """Say why positions are not solved."""
         self._status[places] = status
 
+    def first(self, count: int) -> Any:
+        """The outcomes of the first positions."""
+        return self._status[:count]
+
     # --- shapes and units ----------------------------------------------------------------------------------------------
 
     def _out(self, values: Array) -> Array:

@@ -21,6 +21,7 @@ from mechgraph.closure.solver import FactoredClosure, closure_solver
 from mechgraph.errors import DeclarationError
 from mechgraph.kinetostatics import Options, Pipeline, Starts
 from mechgraph.model.motion import Motion
+from mechgraph.model.parameters import Parameters
 from mechgraph.numerics.continuation import End, Follower
 from mechgraph.numerics.tracks import Paths
 from mechgraph.result.solution import Solution
@@ -93,22 +94,34 @@ def solve_together(numbers_at: NumbersAt, count: int, motions: Mapping[str, Moti
     coupled = any(np.ptp(np.nan_to_num(rows), axis=1).any() for rows in variants.couplings)
     if not good.size or coupled:
         return Together(None, np.ones(V, dtype=bool), nothing)
-    line_of = Paths([np.array([[0.0, float(ok)]]) for ok in valid])
-    tracks = Follower(path).follow(np.repeat(line.x[:, None], V, axis=1), line_of, first=1.0)
-    last = np.zeros(V, dtype=np.intp)
-    last[tracks.nodes.track] = np.arange(len(tracks.nodes))
-    begun = np.zeros(V, dtype=bool)
-    begun[good] = [tracks.end[v] is End.REACHED for v in good]
-    systems = path.system_at(np.ones(V), every)
-    starts = Starts(
-        np.where(begun, tracks.nodes.x[:, last], np.nan),
-        lambda which: systems.with_parameters(systems.par.taken(which)),
-        variants.loads,
-    )
+    itself, systems = (path.system_at(np.full(V, part), every) for part in (0.0, 1.0))
+    one_motion = int(np.prod(line.drive.batch[:-1])) == 1
+    if V > 1 and one_motion and valid.all() and _move_alike(itself.par, systems.par):
+        begun, x, sharing = valid, line.x[:, None], V
+    else:
+        begun, x, sharing = *_led(line, path, valid), 1
+    starts = Starts(x, lambda which: systems.with_parameters(systems.par.taken(which)), variants.loads, sharing)
     q = systems.coordinates_of(starts.x[..., None], line.system.start_coordinates(line.m.start))[..., 0]
     try:
         outcome = line.run(starts, np.broadcast_shapes((V, 1), line.drive.batch))
     except DeclarationError:
         return Together(None, np.ones(V, dtype=bool), q)
     alone = ~begun | outcome.contradicting.reshape(V, -1).any(axis=1)
-    return Together(Solution(outcome.trajectory), alone, q)
+    return Together(Solution(outcome.trajectory), alone, np.broadcast_to(q, nothing.shape))
+
+
+def _move_alike(itself: Parameters, varied: Parameters) -> bool:
+    """Whether variants differ from the mechanism itself in masses alone."""
+    names = ("marker_a", "marker_b", "pitch")
+    return all(bool((getattr(itself, name) == getattr(varied, name)).all()) for name in names)
+
+
+def _led(line: Pipeline, path: NumbersPath, valid: Mask) -> tuple[Mask, Array]:
+    """Which variants could be led from the mechanism itself, and where they begin ``(nx, V)``, NaN for the others."""
+    V = len(valid)
+    line_of = Paths([np.array([[0.0, float(ok)]]) for ok in valid])
+    tracks = Follower(path).follow(np.repeat(line.x[:, None], V, axis=1), line_of, first=1.0)
+    last = np.zeros(V, dtype=np.intp)
+    last[tracks.nodes.track] = np.arange(len(tracks.nodes))
+    begun = valid & np.array([end is End.REACHED for end in tracks.end])
+    return begun, np.where(begun, tracks.nodes.x[:, last], np.nan)

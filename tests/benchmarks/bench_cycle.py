@@ -19,26 +19,32 @@ import numpy as np
 from bench_core import best, seven_r
 
 import mechgraph as mg
-from mechgraph.closure.march import Marcher
-from mechgraph.closure.path import Follower
-from mechgraph.force import analysis, blocks, found, kinetostatics
-from mechgraph.force.kinetostatics import METHODS
-from mechgraph.force.run import Run
+from mechgraph import kinetostatics
+from mechgraph.closure import driver_path
+from mechgraph.force import block
+from mechgraph.force.dalembert import METHODS
+from mechgraph.numerics.continuation import Follower
+from mechgraph.result.trajectory import Trajectory
 
 TURN = (0.0, 360.0)
 STAGES = (
-    ("assembly, freedoms", Run, "__init__"),
-    ("march", Marcher, "track"),
-    ("nodes between", Follower, "_finer"),
-    ("interpolation, Newton", Follower, "_between"),
-    ("rates", Run, "_rates"),
-    ("loads", kinetostatics, "_site"),
-    ("inertia", found, "inertia_wrenches"),
+    ("assembly, freedoms", kinetostatics.Pipeline, "__init__"),
+    ("march", Follower, "_quick"),
+    ("nodes closed", Follower, "_settled"),
+    ("certificate", Follower, "_certified_all"),
+    ("careful march", Follower, "_careful"),
+    ("nodes between", driver_path, "refined"),
+    ("interpolation, Newton", driver_path._Legs, "_closed"),
+    ("rates", kinetostatics, "rates"),
+    ("loads", block.Site, "collect"),
+    ("inertia", block, "inertia_wrenches"),
     ("wrenches", METHODS, "loop_wrench"),
-    ("reactions, checks", analysis.Analysis, "settle"),
-    ("output", blocks.Blocks, "reaction"),
-    ("driver efforts", blocks.Blocks, "efforts"),
-    ("output of checks", blocks.Blocks, "checks"),
+    ("reactions, stress", block, "_least"),
+    ("checks", block, "_balance"),
+    ("power", block, "_power"),
+    ("output", Trajectory, "reaction"),
+    ("driver efforts", Trajectory, "efforts"),
+    ("output of checks", Trajectory, "checks"),
 )
 
 

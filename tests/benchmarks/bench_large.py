@@ -14,7 +14,7 @@ import subprocess
 import sys
 from math import log
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -25,11 +25,10 @@ import scipy
 from lattices import LATTICES
 
 import mechgraph as mg
-from mechgraph.force import large
+from mechgraph.closure.indexing import indexed
 from mechgraph.topology.linkgraph import link_graph
 
 SIZES = [10, 100, 1_000, 10_000, 100_000]
-NEVER, ALWAYS = 10**9, 0
 
 
 def regular_matrix(m: mg.Mechanism) -> scipy.sparse.csc_array:
@@ -122,22 +121,21 @@ def table(kinds: list[str], sizes: list[int]) -> None:
 
 
 def crossover() -> None:
-    """Dense against sparse by rows of the closure Jacobian: ratio of the times, one position and 100 positions."""
-    print(f"{'links':>6} {'rows':>6} {'dense/sparse, 1 position':>26} {'100 positions':>14}")
-    for links in (10, 16, 24, 32, 48, 64, 100):
+    """Dense against sparse by closure rows: ratio of the shortest times, for some numbers of positions."""
+    counts = (1, 64, 1000)
+    print(f"{'links':>6} {'rows':>6}  dense/sparse for {', '.join(map(str, counts))} positions")
+    for links in (10, 13, 16, 20, 24, 32, 48, 64, 100):
         m = LATTICES["four-bars"](links)
         ratios = []
-        for values in (0.0, np.linspace(0.0, 0.3, 100)):
-            times = []
-            for large.SPARSE_ROWS in (NEVER, ALWAYS):
-                runs = []
-                for _ in range(3):
-                    begin = perf_counter()
-                    mg.solve(m, {"J0": values})
-                    runs.append(perf_counter() - begin)
-                times.append(min(runs))
-            ratios.append(times[0] / times[1])
-        print(f"{len(m.links):6} {6 * len(link_graph(m).loops):6} {ratios[0]:26.2f} {ratios[1]:14.2f}")
+        for count in counts:
+            runs: dict[str, list[float]] = {"dense": [], "sparse": []}
+            for _ in range(3 if count < 1000 else 1):
+                for engine, times in runs.items():
+                    begin = process_time()
+                    mg.solve(m, {"J0": mg.Motion(np.linspace(0.0, 0.3, count), 1.0)}, engine=engine)
+                    times.append(process_time() - begin)
+            ratios.append(min(runs["dense"]) / min(runs["sparse"]))
+        print(f"{len(m.links):6} {indexed(m).n_rows:6}  {'  '.join(f'{r:6.2f}' for r in ratios)}", flush=True)
 
 
 def main() -> None:
