@@ -135,7 +135,7 @@ class DenseFactored:
 
     def part(self, at: Index, here: Configuration) -> DenseFactored:
         """See the protocol in ``closure.solver``."""
-        return self.solver.factored(here, self.which[at])
+        return DenseFactored(self._forms, self._fixed, here, self.which[at])
 
     def least(self, R: Sequence[scipy.sparse.csr_array], r0: Array) -> Array:
         """See the protocol in ``closure.solver``."""
