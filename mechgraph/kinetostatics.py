@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.closure import passive_rest
 from mechgraph.closure.assembly import CLOSED, assembled_at, closed_start, named_columns
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
@@ -128,6 +129,17 @@ class Pipeline:
 
     def _check_determinate(self) -> None:
         free = self.freedoms.undriven
+        still = np.sqrt((self.freedoms.null[self.columns] ** 2).sum(axis=1)) < PATH.independent
+        if free and still.any() and len(self.columns) <= self.freedoms.mobility:
+            value = dict(
+                zip(self.drive.names, (self.x[self.system.single_rows[self.columns]] * self.unit).tolist(), strict=True)
+            )
+            names = ", ".join(name for name, rests in zip(self.drive.names, still, strict=True) if rests)
+            raise DeadPointError(
+                f"mechanism {self.m.name!r}: dead point where it was assembled: {names} stands still there while the mechanism moves, so "
+                "that it does not determine the motion; drive another freedom, or start at another position",
+                value,
+            )
         if free:
             names = ", ".join(dict.fromkeys(name for motion in free for name in motion.names))
             count, more = (
@@ -214,10 +226,20 @@ class Outcome:
             self._fill_shared(good, whole)
             return
         self.trajectory.mark(bad, [status.value for status in found.status[bad]])
+        if not good.size:
+            self._name_holds()
         for places in [good] if whole else in_blocks(good):
             moved = self._moved(places)
             if moved is not None:
                 self._put(*moved)
+
+    def _name_holds(self) -> None:
+        """What would be held, by name, where no position was reached."""
+        line = self.line
+        if not line.bodies or not line.options.method:
+            return
+        f = line.solver.factored(line.start, line.solver.chosen(line.start, np.full(1, -1)))
+        self.trajectory.name_holds(passive_rest.hold_names(line.start, line.bodies, f.motions()))
 
     def _fill_shared(self, good: Index, whole: bool) -> None:
         """The motion of the first variant serves all; forces in blocks of whole variants."""

@@ -17,6 +17,7 @@ Methods for Bifurcations of Dynamical Equilibria, 2000, chapter 3 (bordered syst
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy
@@ -176,11 +177,15 @@ class LoopSystem(ReducedRows):
         mine = (at >= self._m) & (to < self._n)
         return scipy.sparse.csr_array((values[mine], (at[mine] - self._m, to[mine])), shape=(self.held, self._n))
 
+    @cached_property
+    def _normal(self) -> Any:
+        return scipy.sparse.linalg.splu(scipy.sparse.csc_array(self._holding @ self._holding.T))
+
     def unheld(self, dq: Array) -> Array:
         """Increments ``(F, k)`` with the least change that takes the held motions out of them, ``G (dq / scale) = 0``."""
         G = self._holding
         y = dq[self._free] / self._scale[self._free][:, None]
-        y = y - G.T @ scipy.sparse.linalg.spsolve(scipy.sparse.csc_array(G @ G.T), G @ y).reshape(self.held, -1)
+        y = y - G.T @ self._normal.solve(G @ y)
         out = dq.copy()
         out[self._free] = y * self._scale[self._free][:, None]
         return out

@@ -8,7 +8,7 @@ start -> first -> second ...
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
@@ -112,6 +112,13 @@ class Request:
     variant: int
     values: Array
     places: Index
+    via: Array | None = None
+    """Driver values ``(d, k)`` to be passed before the first position."""
+
+    def polygon(self, rows: Index) -> Array:
+        """The driver values of the start, of what is to be passed and of the positions, one after the other."""
+        start = self.x[rows][:, None]
+        return np.concatenate([start, self.values] if self.via is None else [start, self.via, self.values], axis=1)
 
 
 @dataclass
@@ -131,7 +138,6 @@ class Positions:
     tracks: Tracks
     follower: Follower
     here: Configuration | None = None
-    tried: set[tuple[int, int]] = field(default_factory=set)
 
     def put(self, other: Positions, places: Index) -> None:
         """Take some places from positions that were followed afterwards."""
@@ -154,14 +160,14 @@ def follow(path: DriverPath, requests: list[Request], total: int) -> Positions:
     """States at all positions asked for; ``total`` positions in all."""
     if path.size[1] == 1:
         return _one_curve(path, requests, total).followed().positions
-    found = _along_polygons(path, requests, total)
+    found = last = _along_polygons(path, requests, total)
     for _ in range(GAPS):
-        again = _behind_gaps(path, found, requests)
-        if not again:
+        requests = [again for request in requests if (again := _taken_up_again(path, last, request)) is not None]
+        if not requests:
             break
-        more = _along_polygons(path, again, total)
-        for request in again:
-            found.put(more, request.places)
+        last = _along_polygons(path, requests, total)
+        for request in requests:
+            found.put(last, request.places)
     return found
 
 
@@ -175,29 +181,30 @@ def _along_polygons(path: DriverPath, requests: list[Request], total: int) -> Po
     return found.positions
 
 
-def _behind_gaps(path: DriverPath, found: Positions, requests: list[Request]) -> list[Request]:
-    """Where paths can be taken up again behind what could not be passed: at the next position on this side of it, from the last one solved.
+def _taken_up_again(path: DriverPath, found: Positions, request: Request) -> Request | None:
+    """What is left of a polygon behind what could not be passed: from the last node straight to where the polygon comes back to this side.
 
-    A path of which no position was reached is entered at its position nearest to the start.
+    The other side is what lies ahead of the last node in the direction in which the polygon left it. The rule is one of the polygon, not
+    of the positions asked for on it.
     """
-    out = []
-    for request in requests:
-        status = found.status[request.places]
-        solved = np.flatnonzero(status == Status.OK)
-        if solved.size in (0, len(status)):
-            continue
-        last = int(solved[-1])
-        beyond = request.values[:, last + 1 :] - found.reached[:, request.places[last]][:, None]
-        back = (
-            np.flatnonzero((beyond * beyond[:, :1]).sum(axis=0) < 0) if beyond.shape[1] else np.zeros(0, dtype=np.intp)
-        )
-        if not back.size or (last, request.places[0]) in found.tried:
-            continue
-        found.tried.add((last, int(request.places[0])))
-        rest = slice(last + 1 + int(back[0]), None)
-        begin = found.x[:, request.places[last]]
-        out.append(Request(begin, request.variant, request.values[:, rest], request.places[rest]))
-    return out
+    track = int(found.track[request.places[0]])
+    if found.tracks.end[track] is End.REACHED:
+        return None
+    nodes = found.nodes_of(track)
+    last = int(np.argmax(nodes.place))
+    reached, points = nodes.drive[:, last], request.polygon(path.rows)
+    length = np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(points) ** 2).sum(axis=0)))])
+    ahead = np.flatnonzero(length > nodes.place[last])
+    beyond = (points[:, ahead] - reached[:, None]).T @ (points[:, ahead[0]] - reached)
+    back = np.flatnonzero(beyond < 0)
+    if not back.size:
+        return None
+    k = int(back[0])
+    u = beyond[k - 1] / (beyond[k - 1] - beyond[k])
+    left, right = ahead[k - 1], ahead[k]
+    entry = points[:, left] + u * (points[:, right] - points[:, left])
+    rest = length[-request.values.shape[1] :] > length[left] + u * (length[right] - length[left])
+    return Request(nodes.x[:, last], request.variant, request.values[:, rest], request.places[rest], entry[:, None])
 
 
 REPEATS = 12
@@ -376,7 +383,7 @@ def _polygons(path: DriverPath, requests: list[Request], total: int) -> _Legs:
     """Several drivers: from every start the polygon through its positions in their order."""
     legs = _Legs(path, total)
     for request in requests:
-        points = np.concatenate([request.x[path.rows][:, None], request.values], axis=1)
-        at = np.cumsum(np.sqrt((np.diff(points, axis=1) ** 2).sum(axis=0)))
+        points = request.polygon(path.rows)
+        at = np.cumsum(np.sqrt((np.diff(points, axis=1) ** 2).sum(axis=0)))[-request.values.shape[1] :]
         legs.add(request, points, request.values, request.places, at)
     return legs

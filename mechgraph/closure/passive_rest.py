@@ -89,6 +89,10 @@ def body_accelerations(idle: tuple[Idle, ...], points: list[Array], V: Array, A:
 
 GAUSS = 8
 """Points of Gauss and Legendre a step between nodes: what is integrated over it is exact to rounding."""
+TURNS = 8
+"""Most repetitions of the turn that takes the spin out."""
+TURNED = 1e-13
+"""Angle that is rounding."""
 TURNING = 1e-6
 """Part of a unit motion from which on a body takes part in it."""
 
@@ -175,17 +179,26 @@ class _Carried:
 
     def turned(self, x: Array, which: Index, track: Index, place: Array) -> Array:
         """States with every body turned to where it stands when it does not spin."""
+        for _ in range(TURNS):
+            angles, dq = self._turn(x, which, track, place)
+            if np.abs(angles).max(initial=0.0) < TURNED:
+                break
+            # exact where the rates of the turn are constant (ball joints, hinges); over a plane it comes nearer with every repetition
+            x = self.follower.newton.close(self.path.advance(x, dq, track), x[self.path.rows], track, which).x
+        return x
+
+    def _turn(self, x: Array, which: Index, track: Index, place: Array) -> tuple[Array, Array]:
+        """Angles ``(bodies, n)`` that are missing, and the increments ``(F, n)`` that turn by them."""
         nodes = self.interpolation.nodes
         tracks = nodes.track[self.interpolation.left]
         moved = np.isin(track, tracks)
         step = self.interpolation.find(np.where(moved, track, tracks[0]), place)
-        drive = x[self.path.rows]
-        here = self.path.at(x, drive, track)
+        here = self.path.at(x, x[self.path.rows], track)
         Z = self.path.factored(here, which).motions()
         axes, unit = _axes(here, self.bodies, Z)
         integrals = _integrals(2.0 * (place - nodes.place[self.interpolation.left[step]]) / self._h[step] - 1.0)
-        dq = np.zeros((Z.shape[0], x.shape[1]))
-        for body, known, axis, rates in zip(self.bodies, self._bodies, axes, unit, strict=True):
+        angles, dq = np.zeros((len(self.bodies), x.shape[1])), np.zeros((Z.shape[0], x.shape[1]))
+        for i, (body, known, axis) in enumerate(zip(self.bodies, self._bodies, axes, strict=True)):
             if known is None or axis is None:
                 continue
             R = here.poses[:, :3, body.link]
@@ -193,10 +206,9 @@ class _Carried:
             n, _ = _across(known.e[:, step], u)
             angle = known.turn[step] + (known.series[step] * integrals).sum(axis=1)
             angle = angle - _angle(n, rotate(R, known.across[:, step]), u)
-            angle = np.remainder(angle + np.pi, 2 * np.pi) - np.pi
-            dq += rates * np.where(moved, np.sign((axis * u).sum(axis=0)) * angle, 0.0)
-        turned = self.path.advance(x, dq, track)
-        return self.follower.newton.close(turned, drive, track, which).x
+            angles[i] = np.where(moved, np.remainder(angle + np.pi, 2 * np.pi) - np.pi, 0.0)
+            dq += unit[i] * np.sign((axis * u).sum(axis=0)) * angles[i]
+        return angles, dq
 
 
 @dataclass(frozen=True)
@@ -276,20 +288,26 @@ def hold(here: Configuration, idle: tuple[Idle, ...], Z: Array, loads: Array, ef
         wrenches[3:, body.link] += force
         wrenches[:3, body.link] += moment + cross(P, force)
     for p in range(Z.shape[1]):
-        axis, length = _leading_part(G[:, p])
-        flips = np.where((axis[:, 1:] * axis[:, :-1]).sum(axis=0) < 0, -1.0, 1.0)
-        sizes[p] *= np.cumprod(np.concatenate([np.ones(here.T)[:1], flips])) / length
+        axis, length, i = _leading_part(G[:, p])
+        sizes[p] *= _sense(rotate_back(here.poses[:, :3, idle[i].link], axis)) / length
     return wrenches, sizes
 
 
-def _leading_part(twists: Array) -> tuple[Array, Array]:
-    """Of the stacked twists ``(6 bodies, T)`` of one passive motion a turn, or where there is none a slide; with its length."""
+def _sense(axis: Array) -> Array:
+    """Signs ``(T,)`` that make the first component of note of body-fixed axes ``(3, T)`` positive: the same wherever the body stands."""
+    size = np.abs(axis)
+    first = np.argmax(size > 0.1 * size.max(axis=0), axis=0)
+    return np.where(np.take_along_axis(axis, first[None], axis=0)[0] < 0, -1.0, 1.0)
+
+
+def _leading_part(twists: Array) -> tuple[Array, Array, int]:
+    """Of the stacked twists ``(6 bodies, T)`` of one passive motion a turn, or where there is none a slide; its length and body."""
     parts = twists.reshape(-1, 3, twists.shape[1])
     lengths = np.sqrt((parts * parts).sum(axis=1))
     turns = [i for i in range(0, len(parts), 2) if (lengths[i] > 1e-6).all()]
     slides = [i for i in range(1, len(parts), 2) if (lengths[i] > 1e-6).all()]
     i = (turns or slides or [0])[0]
-    return parts[i], np.maximum(lengths[i], 1e-300)
+    return parts[i], np.maximum(lengths[i], 1e-300), i // 2
 
 
 def hold_names(here: Configuration, idle: tuple[Idle, ...], Z: Array) -> list[tuple[str, bool]]:

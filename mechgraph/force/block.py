@@ -114,8 +114,8 @@ def forces_of_block(
         found.stress.efforts,
         found.coupled,
         found.multipliers,
-        found.multiplier_stress,
-        row_efforts(here, found.multiplier_stress),
+        found.stress.multipliers,
+        row_efforts(here, found.stress.multipliers),
         shaking,
         balance,
         power,
@@ -140,7 +140,6 @@ class _Found:
     efforts: Array
     stress: Stress
     multipliers: Array
-    multiplier_stress: Array
     coupled: Array
 
 
@@ -148,7 +147,9 @@ def _least(here: Configuration, wrenches: Wrenches, f: FactoredClosure, task: Fo
     """Reactions and efforts of least norm; where self-stresses are random ones only if that is asked for."""
     totals, multipliers = wrenches.totals, wrenches.multipliers
     acting = np.union1d(task.driven, here.system.coupled_freedoms)
-    stress = (orthonormal_stress if f.complete else split_stress)(here, wrenches.stress, acting)
+    stress = (orthonormal_stress if f.complete else split_stress)(
+        here, wrenches.stress, wrenches.multiplier_stress, acting
+    )
     s = stress.wrenches.shape[2]
     if s and not f.complete and task.redundant == "minimum_norm":
         points = at_pair_points(here, reaction_part(here, totals, pair_power(here, totals)))
@@ -157,15 +158,12 @@ def _least(here: Configuration, wrenches: Wrenches, f: FactoredClosure, task: Fo
         multipliers = multipliers - x[6 * len(here.system.graph.loops) :]
     efforts = pair_power(here, totals)
     reactions = reaction_part(here, totals, efforts)
-    multiplier_stress = np.einsum("nit,tij->njt", wrenches.multiplier_stress, stress.mix)
     if s and f.complete:
-        y = least_multiples(here, reactions, efforts, stress)
+        y = least_multiples(here, reactions, efforts, multipliers, stress)
         reactions = reactions + np.einsum("cpit,it->cpt", stress.wrenches, y)
         efforts = efforts + np.einsum("fit,it->ft", stress.efforts, y)
-        multipliers = multipliers + np.einsum("nit,it->nt", multiplier_stress, y)
-    return _Found(
-        reactions, efforts, stress, multipliers, multiplier_stress, row_efforts(here, multipliers[:, None])[:, 0]
-    )
+        multipliers = multipliers + np.einsum("nit,it->nt", stress.multipliers, y)
+    return _Found(reactions, efforts, stress, multipliers, row_efforts(here, multipliers[:, None])[:, 0])
 
 
 def _balance(

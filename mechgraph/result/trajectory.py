@@ -121,6 +121,11 @@ class Trajectory:
         """User coordinates ``(F, n)`` at flat places."""
         return self._coordinates[:, places]
 
+    def name_holds(self, names: list[tuple[str, bool]]) -> None:
+        """Say what is held at rest where no position is solved."""
+        for name in names:
+            self._holds.setdefault(name, np.full(self._count, np.nan))
+
     def mark(self, places: Index, status: Any) -> None:
         """Say why positions are not solved."""
         self._status[places] = status

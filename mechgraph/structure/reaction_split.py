@@ -22,12 +22,12 @@ class Stress:
     """Self-stresses: reaction states without load, orthonormal in the measure ``sum |F|^2 + |M / L|^2`` at the pair points.
 
     ``wrenches (6, P, s, T)`` are the reaction parts about the internal origin, ``efforts (F, s, T)`` what they bring to driven and
-    coupled freedoms; ``mix (T, s, s)`` makes them from the states that they were found from.
+    coupled freedoms, ``multipliers (n, s, T)`` those of the closure rows behind those of the loops.
     """
 
     wrenches: Array
     efforts: Array
-    mix: Array
+    multipliers: Array
 
 
 def at_pair_points(here: Configuration, wrenches: Array) -> Array:
@@ -47,7 +47,7 @@ def pair_power(here: Configuration, totals: Array) -> Array:
     return np.asarray((here.S * totals[:, here.system.owners]).sum(axis=0))
 
 
-def split_stress(here: Configuration, states: Array, acting: Index) -> Stress:
+def split_stress(here: Configuration, states: Array, multipliers: Array, acting: Index) -> Stress:
     """Reaction parts and efforts of total wrench states ``(6, P, s, T)``; only the freedoms ``acting`` (driven, coupled) have efforts."""
     s = states.shape[2]
     efforts = np.zeros((here.system.n_freedoms, s, here.T))
@@ -56,18 +56,19 @@ def split_stress(here: Configuration, states: Array, acting: Index) -> Stress:
         tau = pair_power(here, states[:, :, i])
         efforts[acting, i] = tau[acting]
         parts[:, :, i] = reaction_part(here, states[:, :, i], efforts[:, i])
-    return Stress(parts, efforts, np.broadcast_to(np.eye(s), (here.T, s, s)))
+    return Stress(parts, efforts, multipliers)
 
 
-def orthonormal_stress(here: Configuration, states: Array, acting: Index) -> Stress:
+def orthonormal_stress(here: Configuration, states: Array, multipliers: Array, acting: Index) -> Stress:
     """Self-stresses from independent total wrench states ``(6, P, s, T)``, orthonormal at every position."""
-    found, s = split_stress(here, states, acting), states.shape[2]
+    found, s = split_stress(here, states, multipliers, acting), states.shape[2]
     if not s:
         return found
     parts, efforts = found.wrenches, found.efforts
     flat = at_pair_points(here, parts).transpose(3, 0, 1, 2).reshape(here.T, 6 * states.shape[1], s)
-    mix = _orthonormal(flat, efforts.transpose(2, 0, 1))
-    return Stress(np.einsum("cpit,tij->cpjt", parts, mix), np.einsum("fit,tij->fjt", efforts, mix), mix)
+    mix = _orthonormal(flat, np.concatenate([efforts, multipliers]).transpose(2, 0, 1))
+    mixed = (np.einsum("fit,tij->fjt", values, mix) for values in (efforts, multipliers))
+    return Stress(np.einsum("cpit,tij->cpjt", parts, mix), *mixed)
 
 
 def _orthonormal(reactions: Array, efforts: Array) -> Array:
@@ -85,12 +86,13 @@ def _orthonormal(reactions: Array, efforts: Array) -> Array:
     return out
 
 
-def least_multiples(here: Configuration, reactions: Array, efforts: Array, stress: Stress) -> Array:
+def least_multiples(here: Configuration, reactions: Array, efforts: Array, multipliers: Array, stress: Stress) -> Array:
     """Multiples ``(s, T)`` of the self-stresses with which reactions ``(6, P, T)`` have minimum norm: no part along any of them."""
     states = at_pair_points(here, stress.wrenches)
     y = -np.einsum("cpit,cpt->it", states, at_pair_points(here, reactions))
-    alone = (states**2).sum(axis=(0, 1)) < 0.5  # drivers that strain each other without any reaction
-    y -= np.where(alone, np.einsum("fit,ft->it", stress.efforts, efforts), 0.0)
+    alone = (states**2).sum(axis=(0, 1)) < 0.5  # drivers or couplings that strain each other without any reaction
+    acting = np.einsum("fit,ft->it", stress.efforts, efforts) + np.einsum("nit,nt->it", stress.multipliers, multipliers)
+    y -= np.where(alone, acting, 0.0)
     return np.asarray(y)
 
 
