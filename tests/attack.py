@@ -219,7 +219,7 @@ def differences(a, b, forces=True, pick=None):
     kinds = {}
     for key, x in first.items():
         kind = key[1] if key[1] in (*PAIR[:3], *LINK) else "force"
-        kinds[kind] = max(kinds.get(kind, 1e-12), float(np.nanmax(np.abs(x), initial=0.0)))
+        kinds[kind] = max(kinds.get(kind, 1e-12), float(np.nan_to_num(np.abs(x)).max(initial=0.0)))
     for key in first.keys() & second.keys():
         x = first[key] if pick is None else np.take(first[key], pick, axis=np.ndim(a.status) - 1)
         x, y = x[both], second[key][both]
@@ -228,13 +228,13 @@ def differences(a, b, forces=True, pick=None):
             continue
         kind = key[1] if key[1] in (*PAIR[:3], *LINK) else "force"
         size = max(kinds[kind], 1.0) if kind in MOTION else kinds[kind]
-        gap = float(np.nanmax(np.abs(x - y), initial=0.0)) / size
+        gap = float(np.nan_to_num(np.abs(x - y)).max(initial=0.0)) / size
         if gap > worst:
             worst, where = gap, key
     return worst, where, faults
 
 
-def conditions(s, engine="dense"):
+def conditions(s):
     """Largest rate of any freedom for the drivers' unit rates: what multiplies rounding near a singular position, ``(T,)``."""
     size = [np.abs(s[p.name].velocity).max(axis=-1, initial=0.0) for p in s.mechanism.pairs]
     return np.nan_to_num(np.max(size, axis=0), nan=np.inf)

@@ -50,7 +50,7 @@ def drawn(seed):
     return m, motions(m, seed, t, size=float(rng.choice([0.08, 0.5]))), how
 
 
-@pytest.mark.seeds(45)
+@pytest.mark.seeds(24)
 def test_random_mechanisms(seed):
     m, given, how = drawn(seed)
     assert_engines_agree(m, given, **how)
@@ -65,19 +65,19 @@ def test_library(name):
 @pytest.mark.parametrize("method", ["loop_wrench", "newton_euler"])
 @pytest.mark.parametrize("kind", LATTICES)
 def test_lattices_around_the_crossover(kind, method):
-    m = LATTICES[kind](12)
+    m = LATTICES[kind](8)
     given = {m.drives[0].freedom: mg.Motion(np.linspace(0.0, 0.2, 3), 1.0, 0.5)}
     for redundant in ("nan", "minimum_norm"):
         assert_engines_agree(m, given, 1e-8, redundant=redundant, method=method)
 
 
-@pytest.mark.seeds(10)
+@pytest.mark.seeds(5)
 def test_chains_open_at_the_start(seed):
     m = open_chain(seed)
-    m = m.replace(drives=["O1"]) if m.pairs[0].type.f == 1 else m.replace(drives=[m.pairs[0].freedom_names[0]])
-    if not m.pairs[0].type.drivable[0]:
-        pytest.skip("the first freedom takes no drive")
-    assert_engines_agree(m, {m.drives[0].freedom: np.linspace(0.0, 0.2, 4)})
+    able = [n for p in m.pairs for n, d in zip(p.freedom_names, p.type.drivable, strict=True) if d]
+    if not able:
+        pytest.skip("no freedom takes a drive")
+    assert_engines_agree(m.replace(drives=[able[0]]), {able[0]: np.linspace(0.0, 0.2, 4)})
 
 
 # --- what random mechanisms found, one by one -------------------------------------------------------------------------------
@@ -104,9 +104,7 @@ def test_where_a_passive_body_stands_does_not_hang_on_the_engine(seed):
 
 
 def wheels(*couplings, drives=("A",)):
-    pairs = [
-        mg.Pair(name, "R", "frame", f"wheel{name}", point=(i, 0, 0), axis=Z) for i, name in enumerate("ABC")
-    ]
+    pairs = [mg.Pair(name, "R", "frame", f"wheel{name}", point=(i, 0, 0), axis=Z) for i, name in enumerate("ABC")]
     return mg.Mechanism("wheels", None, pairs, list(drives), [mg.Effort("C", 2.0)], couplings=couplings)
 
 

@@ -53,10 +53,10 @@ def test_library(name):
     m = mg.load(name)
     freedom, begin, size = first_drive(m)
     rng = np.random.default_rng(40)
-    assert_subsets_agree(m, freedom, begin + size * np.linspace(0, 2 * np.pi, 37), rng)
+    assert_subsets_agree(m, freedom, begin + size * np.linspace(0, 2 * np.pi, 19), rng)
 
 
-@pytest.mark.seeds(30)
+@pytest.mark.seeds(14)
 def test_random_mechanisms(seed):
     rng = np.random.default_rng((seed, 41))
     m = with_drives(closed_mechanism(seed, mobility=1, loops=int(rng.integers(1, 4))), seed)
@@ -98,7 +98,7 @@ def on_polygon(seed, rng, size=None):
     return with_loads(m, seed), np.array(points), np.array(corner)
 
 
-@pytest.mark.seeds(30)
+@pytest.mark.seeds(10)
 def test_several_drivers(seed):
     rng = np.random.default_rng(seed)
     m, points, corner = on_polygon(seed, rng)
@@ -107,7 +107,7 @@ def test_several_drivers(seed):
         return {d.freedom: mg.Motion(values[:, i], 1.0 + 0.1 * i, 0.3) for i, d in enumerate(m.drives)}
 
     whole = solved(m, motion(points))
-    for _ in range(3):
+    for _ in range(2):
         pick = np.flatnonzero(corner | (rng.random(len(points)) < 0.3))
         part = solved(m, motion(points[pick]))
         if isinstance(whole, Exception) or isinstance(part, Exception):
@@ -148,13 +148,13 @@ def two_rods():
 @pytest.mark.parametrize("m", [rssr(), two_rods(), mg.load("rssr")], ids=["rssr", "two rods", "library"])
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 def test_passive_bodies(m, engine):
-    n = 41 if engine == "dense" else 21
+    n = 41 if engine == "dense" else 11
     rng = np.random.default_rng(43)
     assert_subsets_agree(m, "A", np.linspace(-1.0, 6.0, n), rng, engine=engine)
 
 
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
-@pytest.mark.parametrize("end", [0.7, -2.0, 2 * np.pi])
+@pytest.mark.parametrize("end", [0.7, 2 * np.pi])
 def test_spin_is_that_of_parallel_transport(engine, end):
     """No spin at any position, and the pose of an independent integration, for any number of positions on the way."""
     m = rssr()
@@ -203,7 +203,8 @@ def from_change_point(bars, crank):
 def assert_parallel(s, bars, q, start):
     """Every position but the change points themselves is solved, as a parallelogram, with the torque 10."""
     off, ok = from_change_point(bars, q + start), s.status == "ok"
-    assert ok[off > 1e-7].all(), f"{set(s.status[~ok & (off > 1e-7)])} {off[~ok & (off > 1e-7)][:3]} from the change point"
+    lost = ~ok & (off > 1e-7)
+    assert not lost.any(), f"{set(s.status[lost])} {off[lost][:3]} from the change point"
     assert not ok[off < 1e-9].any()
     for i in range(len(bars)):
         # rounding over the distance for a position, over its square for a force
@@ -214,7 +215,7 @@ def assert_parallel(s, bars, q, start):
 ONE = [Bars(1.0, 2.0, 1.0, 2.0)]
 
 
-@pytest.mark.parametrize("step", [1, 2, 6, 7, 10, -7, 0.37])
+@pytest.mark.parametrize("step", [1, 2, 6, 7, 10, -7, 0.74])
 def test_parallelogram_over_a_turn(step):
     q = np.radians(np.arange(0, 360 + 1e-9, abs(step))) * np.sign(step)
     for start in (np.pi / 2, np.radians(137.3)):
@@ -222,11 +223,12 @@ def test_parallelogram_over_a_turn(step):
 
 
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
-@pytest.mark.parametrize("off", [1e-5, 1e-4, 1e-3, 3e-3, 5e-3])
+@pytest.mark.parametrize("off", [1e-5, 1e-3, 3e-3, 5e-3])
 def test_beside_a_change_point_wherever_the_path_ends(engine, off):
     """Behind a change point a position is solved alone, with one before it, and with others behind it."""
     start = np.pi / 2
-    for q in ([np.pi / 2 + off], [0.3, np.pi / 2 + off], [np.pi / 2 + off, 3.0], [np.pi / 2 - off, np.pi / 2 + off, 5.0]):
+    at = np.pi / 2
+    for q in ([at + off], [0.3, at + off], [at + off, 3.0], [at - off, at + off, 5.0]):
         q = np.array(q)
         assert_parallel(solved(parallelograms(ONE, start), {"A": q}, engine=engine), ONE, q, start)
 
@@ -244,7 +246,7 @@ def drawn_parallelograms(rng):
             return bars, start
 
 
-@pytest.mark.seeds(10)
+@pytest.mark.seeds(6)
 def test_several_parallelograms_on_one_crank(seed):
     """Change points of their own, or all at one crank angle; and any subset of the positions."""
     rng = np.random.default_rng((seed, 44))
