@@ -71,13 +71,13 @@ def test_lattices_around_the_crossover(kind, method):
         assert_engines_agree(m, given, 1e-8, redundant=redundant, method=method)
 
 
-@pytest.mark.seeds(5)
+@pytest.mark.seeds(1)
 def test_chains_open_at_the_start(seed):
     m = open_chain(seed)
     able = [n for p in m.pairs for n, d in zip(p.freedom_names, p.type.drivable, strict=True) if d]
     if not able:
         pytest.skip("no freedom takes a drive")
-    assert_engines_agree(m.replace(drives=[able[0]]), {able[0]: np.linspace(0.0, 0.2, 4)})
+    assert_engines_agree(m.replace(drives=[able[0]]), {able[0]: np.linspace(0.0, 0.2, 2)})
 
 
 # --- what random mechanisms found, one by one -------------------------------------------------------------------------------
