@@ -17,6 +17,22 @@ GOLDEN = Path(__file__).parent / "golden"
 def pytest_addoption(parser: pytest.Parser) -> None:
     """``--update-golden`` writes the golden files anew; look at the difference before you keep it."""
     parser.addoption("--update-golden", action="store_true", help="write the files of tests/golden anew")
+    parser.addoption(
+        "--attack", type=int, default=0, metavar="N", help="so many seeds more for every test of random mechanisms"
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Markers of these tests."""
+    config.addinivalue_line("markers", "seeds(n): a test for each of n seeds, and for as many more as --attack says")
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Seeds of tests that are marked so: always the same ones, then the further ones of ``--attack``."""
+    marker = metafunc.definition.get_closest_marker("seeds")
+    if marker is not None:
+        more = metafunc.config.getoption("--attack")
+        metafunc.parametrize("seed", [*range(marker.args[0]), *range(10_000, 10_000 + more)])
 
 
 @pytest.fixture

@@ -1,0 +1,136 @@
+"""Identities of engines: the dense and the sparse engine say the same, to rounding: values, NaN, statuses, warnings, errors."""
+
+import numpy as np
+import pytest
+from attack import conditions, differences, solved, warned, without_numbers
+from lattices import LATTICES
+from mechanisms import Z
+from strategies import closed_mechanism, motions, open_chain, with_drives, with_loads
+
+import mechgraph as mg
+
+SAME = 1e-9
+"""Difference of engines over the condition (largest rate for unit rates of the drivers): factors of other pivots round otherwise."""
+
+
+def assert_engines_agree(m, given, tolerance=SAME, **how):
+    dense, sparse = (solved(m, given, engine=e, **how) for e in ("dense", "sparse"))
+    if isinstance(dense, Exception) or isinstance(sparse, Exception):
+        assert type(dense) is type(sparse), f"{type(dense).__name__}: {dense}\n{type(sparse).__name__}: {sparse}"
+        assert without_numbers(dense) == without_numbers(sparse)
+        return
+    assert (dense.engine, sparse.engine) == ("dense", "sparse")
+    worst, where, faults = differences(dense, sparse)
+    worse = conditions(dense)[dense.status == "ok"].max(initial=1.0)
+    assert not faults
+    assert worst <= tolerance * max(1.0, worse), f"{where}: {worst:.1e} at condition {worse:.1e}"
+    assert warned(m, given, engine="dense", **how) == warned(m, given, engine="sparse", **how)
+
+
+def drawn(seed):
+    """A random mechanism with drives and loads, some with a driver too many or too few, a motion, and how to solve."""
+    rng = np.random.default_rng((seed, 30))
+    m = with_drives(closed_mechanism(seed), seed)
+    if m is None:
+        pytest.skip("no drives make it determinate")
+    m = with_loads(m, seed)
+    if rng.random() < 0.15:
+        m = m.replace(drives=m.drives[:-1])
+    if rng.random() < 0.25:
+        has = {m.full_name(d.freedom) for d in m.drives}
+        free = [f for p in m.pairs for f, able in zip(p.freedom_names, p.type.drivable, strict=True) if able]
+        more = [f for f in free if f not in has]
+        if more:
+            m = m.replace(drives=[*m.drives, mg.Drive(str(rng.choice(more)))])
+    t = np.linspace(0, rng.choice([0.1, 1.0, 3.0]), int(rng.choice([1, 6, 15])))
+    how = {
+        "redundant": str(rng.choice(["nan", "minimum_norm"])),
+        "method": str(rng.choice(["loop_wrench", "newton_euler"])),
+    }
+    return m, motions(m, seed, t, size=float(rng.choice([0.08, 0.5]))), how
+
+
+@pytest.mark.seeds(24)
+def test_random_mechanisms(seed):
+    m, given, how = drawn(seed)
+    assert_engines_agree(m, given, **how)
+
+
+@pytest.mark.parametrize("name", [n for n in mg.library() if n != "rcsr-csr-printed"])
+def test_library(name):
+    m = mg.load(name)
+    assert_engines_agree(m, {d.freedom: d.motion.position[:5] for d in m.drives if d.motion is not None})
+
+
+@pytest.mark.parametrize("method", ["loop_wrench", "newton_euler"])
+@pytest.mark.parametrize("kind", LATTICES)
+def test_lattices_around_the_crossover(kind, method):
+    m = LATTICES[kind](8)
+    given = {m.drives[0].freedom: mg.Motion(np.linspace(0.0, 0.2, 3), 1.0, 0.5)}
+    for redundant in ("nan", "minimum_norm"):
+        assert_engines_agree(m, given, 1e-8, redundant=redundant, method=method)
+
+
+@pytest.mark.seeds(1)
+def test_chains_open_at_the_start(seed):
+    m = open_chain(seed)
+    able = [n for p in m.pairs for n, d in zip(p.freedom_names, p.type.drivable, strict=True) if d]
+    if not able:
+        pytest.skip("no freedom takes a drive")
+    assert_engines_agree(m.replace(drives=[able[0]]), {able[0]: np.linspace(0.0, 0.2, 2)})
+
+
+# --- what random mechanisms found, one by one -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", [40, 139, 213])
+def test_the_sign_of_what_holds_a_passive_body(seed):
+    """A turn in E-S, a slide in E-E, a turn in Sp-S: the couple or force that holds the body has one sign."""
+    m = with_loads(with_drives(closed_mechanism(seed), seed), seed)
+    given = {d.freedom: 0.01 for d in m.drives}
+    one, other = (solved(m, given, engine=e).passive_effort for e in ("dense", "sparse"))
+    assert one.keys() == other.keys()
+    for name, value in one.items():
+        np.testing.assert_allclose(value, other[name], rtol=1e-9)
+
+
+@pytest.mark.parametrize("seed", [40, 204, 218])
+def test_where_a_passive_body_stands_does_not_hang_on_the_engine(seed):
+    """A body between a sphere and a plane: the turn that takes its spin out is not linear in the coordinates of the plane."""
+    m = with_loads(with_drives(closed_mechanism(seed), seed), seed)
+    given = {d.freedom: mg.Motion(np.linspace(0.0, 0.3, 4), 1.0) for d in m.drives}
+    one, other = (solved(m, given, engine=e, forces=False) for e in ("dense", "sparse"))
+    assert differences(one, other, forces=False)[0] < 1e-9
+
+
+def wheels(*couplings, drives=("A",)):
+    pairs = [mg.Pair(name, "R", "frame", f"wheel{name}", point=(i, 0, 0), axis=Z) for i, name in enumerate("ABC")]
+    return mg.Mechanism("wheels", None, pairs, list(drives), [mg.Effort("C", 2.0)], couplings=couplings)
+
+
+AB, BC = mg.Coupling({"A": 1, "B": 2}), mg.Coupling({"B": 1, "C": 3})
+Q = np.array([0.0, 1.0, 2.0])
+COUPLED = {
+    "determinate": (wheels(AB, BC), {"A": Q}),
+    "one twice": (wheels(AB, BC, mg.Coupling({"A": 2, "B": 4}, name="again")), {"A": Q}),
+    "contradicting": (wheels(AB, BC, mg.Coupling({"A": 2, "B": 5}, name="other")), {"A": Q}),
+    "contradicting constants": (wheels(AB, BC, mg.Coupling({"A": 1, "B": 2}, constant=0.5, name="other")), {"A": Q}),
+    "locked driver": (wheels(AB, BC, mg.Coupling({"A": 1}, name="lock")), {"A": Q}),
+    "one too few": (wheels(AB), {"A": Q}),
+    "drivers that agree": (wheels(AB, BC, drives=("A", "B")), {"A": Q, "B": -0.5 * Q}),
+    "drivers that contradict": (wheels(AB, BC, drives=("A", "B")), {"A": Q, "B": 0.5 * Q}),
+    "two freedoms of a four-bar": (
+        mg.load("four-bar").replace(drives=[], couplings=[mg.Coupling({"A": 1, "D": -1})]),
+        {},
+    ),
+    "no drive, no loop": (wheels(drives=()), {}),
+}
+
+
+@pytest.mark.parametrize("name", COUPLED)
+@pytest.mark.parametrize("method", ["loop_wrench", "newton_euler"])
+def test_couplings(name, method):
+    """Redundant and contradicting ones too: a result or one of our errors, and the same from both engines."""
+    m, given = COUPLED[name]
+    for redundant in ("nan", "minimum_norm"):
+        assert_engines_agree(m, given, method=method, redundant=redundant)

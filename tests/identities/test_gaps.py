@@ -1,0 +1,153 @@
+"""Identities of reach: no position behind a gap is reached, however the positions lie, and no branch is left where loops nearly fold."""
+
+import mechanisms
+import numpy as np
+import pytest
+from attack import Bars, anywhere, four_bars, just_out_of_reach, nearly_folded, solved, wrapped
+from mechanisms import Z
+
+import mechgraph as mg
+
+COUNTS = (4, 5, 7, 10, 20, 36, 41, 100, 181)
+LIMIT = 1e-6
+"""Distance to the closed form of a limit within which a position may count as beyond it."""
+
+
+def inside_reach(rng, bar):
+    """A start well inside the reach, and its limits."""
+    while True:
+        start = rng.uniform(-np.pi, np.pi)
+        low, high = bar.interval(start)
+        if np.isfinite(bar.rocker(start)) and low + 0.02 < start < high - 0.02:
+            return start, low, high
+
+
+def positions_around(rng, bar, start):
+    """Crank angles of a turn or two, none where the closed form has no position."""
+    n = int(rng.choice(COUNTS))
+    begin = start + (rng.uniform(-0.3, 0.3) if rng.random() < 0.5 else 0.0)
+    crank = {
+        0: begin + np.linspace(0, 2 * np.pi, n),
+        1: begin - np.linspace(0, 2 * np.pi, n),
+        2: begin + np.linspace(-np.pi, np.pi, n),
+        3: begin + rng.uniform(-2 * np.pi, 2 * np.pi, n),
+    }[int(rng.integers(4))]
+    return crank[np.isfinite(bar.rocker(crank))]
+
+
+def assert_reached(s, bar, crank, start, low, high):
+    ok, inside = s.status == "ok", (crank > low) & (crank < high)
+    margin = np.minimum(crank - low, high - crank)
+    assert not (ok & ~inside).any(), f"led across a gap at {crank[ok & ~inside][:3]}"
+    assert not (~ok & inside & (margin > LIMIT)).any()
+    assert set(s.status[~ok]) <= {"out of reach"}
+    good = ok & inside
+    error = np.abs(wrapped(s["D0"].position[..., 0] - bar.rocker(crank) + bar.rocker(start)))
+    # rates, and rounding with them, grow as the inverse square root of the distance to the limit
+    assert (error[good] * np.sqrt(np.minimum(1.0, margin[good]))).max(initial=0.0) < 1e-11
+
+
+@pytest.mark.seeds(16)
+@pytest.mark.parametrize("folded", [False, True])
+def test_no_gap_of_the_reach_is_leapt_over(seed, folded):
+    rng = np.random.default_rng((seed, 20))
+    bar = just_out_of_reach(rng, folded=folded)
+    start, low, high = inside_reach(rng, bar)
+    crank = positions_around(rng, bar, start)
+    if not len(crank):
+        pytest.skip("no position has a closed form")
+    m = four_bars([bar], start, anywhere(rng))
+    engine = "sparse" if seed % 8 == 7 else "dense"
+    s = mg.kinematics(m, {"A": crank - start}, on_reach="flag", engine=engine)
+    assert_reached(s, bar, crank, start, low, high)
+
+
+@pytest.mark.seeds(12)
+def test_loops_nearly_folded_together_keep_their_branches(seed):
+    rng = np.random.default_rng((seed, 21))
+    margin = 10 ** rng.uniform(-6, -3)
+    bars, lean = [], rng.random() < 0.5
+    for _ in range(int(rng.choice([1, 2, 2, 3, 4]))):
+        off = rng.uniform(-1, 1) * np.sqrt(margin) if lean else 0.0
+        bars.append(nearly_folded(rng, margin, offset=rng.uniform(-np.pi, np.pi), lean=off))
+    if not lean and seed % 2:  # the same four-bar several times, turned
+        one = bars[0]
+        bars = [Bars(one.a, one.b, one.c, one.g, float(rng.choice([-1, 1])), bar.offset) for bar in bars]
+    start = rng.uniform(-np.pi, np.pi)
+    low, high = np.array([bar.interval(start) for bar in bars]).T
+    crank = start + rng.choice([-1, 1]) * np.linspace(0, 2 * np.pi, int(rng.choice(COUNTS)))
+    m = four_bars(bars, start, anywhere(rng))
+    s = mg.kinematics(m, {"A": crank - start}, on_reach="flag", engine="sparse" if seed % 8 == 7 else "dense")
+    inside = (crank > low.max()) & (crank < high.min())
+    np.testing.assert_array_equal(s.status == "ok", inside)
+    for i, bar in enumerate(bars):
+        error = np.abs(wrapped(s[f"D{i}"].position[..., 0] - bar.rocker(crank) + bar.rocker(start)))
+        assert error[inside].max() < 1e-9
+
+
+@pytest.mark.parametrize("exponent", range(3, 10, 2))
+@pytest.mark.parametrize("longer", [True, False])
+def test_slider_crank_with_rod_about_as_long_as_the_crank(exponent, longer):
+    rod = 1.0 + (1 if longer else -1) * 10.0**-exponent
+    for start, n in ((0.3, 5), (-0.7, 36)):
+        along = np.cos(start) + np.sqrt((rod - np.sin(start)) * (rod + np.sin(start)))
+        pairs = [
+            mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=Z),
+            mg.Pair("B", "R", "crank", "rod", point=(np.cos(start), np.sin(start), 0), axis=Z),
+            mg.Pair("C", "R", "rod", "slider", point=(along, 0, 0), axis=Z),
+            mg.Pair("D", "P", "frame", "slider", point=(along, 0, 0), axis=(1, 0, 0)),
+        ]
+        q = np.linspace(0, 2 * np.pi, n)
+        s = solved(mg.Mechanism("slider-crank", None, pairs, ["A"]), {"A": q})
+        crank, ok = q + start, s.status == "ok"
+        if longer:
+            assert ok.all()
+        else:
+            inside = crank < np.arcsin(rod)
+            assert not (ok & ~inside).any()
+            assert not (~ok & inside & (np.arcsin(rod) - crank > LIMIT)).any()
+        root = np.sqrt(np.maximum((rod - np.sin(crank)) * (rod + np.sin(crank)), 0.0))
+        error = np.abs(s["D"].position[..., 0] - np.cos(crank) - root + along)[ok]
+        assert (error * np.maximum(root[ok], 1e-9)).max() < 1e-11
+
+
+def test_first_position_out_of_reach_and_later_ones_within():
+    """B3 of issue 11: positions behind one that is out of reach, back inside, are solved."""
+    bar = Bars(1.0, 0.6, 0.6, 1.3)
+    _, high = bar.interval(0.3)
+    q = np.array([high - 0.1, high - 0.4, 0.0, -0.2])
+    for engine in ("dense", "sparse"):
+        s = mg.kinematics(four_bars([bar], 0.3), {"A": q}, on_reach="flag", engine=engine)
+        assert s.status.tolist() == ["out of reach", "ok", "ok", "ok"]
+        with pytest.raises(mg.ReachError) as caught:
+            mg.kinematics(four_bars([bar], 0.3), {"A": q}, engine=engine)
+        assert "out of reach" in str(caught.value)
+
+
+def at_dead_point():
+    """A four-bar driven by its rocker, declared where crank and coupler are in line."""
+    a, b, c, g = 0.5, 1.2, 1.1, 1.3
+    foot = np.array([g, 0.0])
+    x = ((a + b) ** 2 + g * g - c * c) / (2 * g)
+    head = np.array([x, np.sqrt((a + b) ** 2 - x * x)])
+    tip = head * a / (a + b)
+    points = {"A": (0, 0), "B": tip, "C": head, "D": foot}
+    ends = {"A": ("frame", "crank"), "B": ("crank", "coupler"), "C": ("coupler", "rocker"), "D": ("frame", "rocker")}
+    pairs = [mg.Pair(k, "R", *ends[k], point=(*points[k], 0), axis=Z) for k in ends]
+    return mg.Mechanism("at a dead point", None, pairs, ["D"])
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.parametrize("positions", [0.0, [0.0], [0.0, 0.01, -0.01]])
+def test_a_driver_declared_at_its_dead_point_is_a_dead_point(engine, positions):
+    """B1 of issue 11: not "drive as many more", not "contradict each other", and never solved."""
+    with pytest.raises(mg.DeadPointError):
+        mg.solve(at_dead_point(), {"D": positions}, engine=engine)
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+def test_a_structure_is_refused_for_any_subset_of_positions(engine):
+    """A triangle: what is refused with a further position is refused for the first alone, as on its own it cannot be driven either."""
+    m = mechanisms.ring("RRR", [(0, 0, 0), (1, 0, 0), (0.3, 1, 0)], [Z] * 3)
+    found = [type(solved(m, {"O1": q}, engine=engine)) for q in ([0.0, 0.1], [0.1], [0.0], 0.0)]
+    assert len(set(found)) == 1, found

@@ -1,0 +1,260 @@
+"""Identities of paths: a position has the same values, or the same status, whichever other positions of the path were asked for."""
+
+import mechanisms
+import numpy as np
+import pytest
+from attack import Bars, anywhere, carried, conditions, differences, everything, solved, wrapped
+from mechanisms import Z
+from strategies import closed_mechanism, with_drives, with_loads
+
+import mechgraph as mg
+
+SAME = 1e-10
+"""Difference over the condition (largest rate of a freedom for unit rates of the drivers; what multiplies rounding near a change point)."""
+
+
+def subsets(rng, n):
+    """Positions backwards, shuffled, some, every seventh, alone."""
+    some = rng.choice(n, int(rng.integers(2, max(3, n // 2))), replace=False)
+    return [np.arange(n)[::-1], rng.permutation(n), some, np.arange(0, n, 7), *rng.choice(n, (2, 1), replace=False)]
+
+
+def assert_same(whole, part, pick):
+    worst, where, faults = differences(whole, part, pick=pick)
+    worse = conditions(whole)[pick][whole.status[pick] == "ok"].max(initial=1.0)
+    assert not faults
+    assert worst <= SAME * max(1.0, worse), f"{where}: {worst:.1e} at condition {worse:.1e}"
+
+
+def assert_subsets_agree(m, freedom, q, rng, **how):
+    """All subsets of the positions ``q`` of one driver against all positions together."""
+
+    def motion(values):
+        return {freedom: mg.Motion(values, 1.3, 0.7)}
+
+    whole = solved(m, motion(q), **how)
+    for pick in subsets(rng, len(q)):
+        part = solved(m, motion(q[pick]), **how)
+        if isinstance(whole, Exception) or isinstance(part, Exception):
+            assert type(whole) is type(part), f"{whole} / {part}"
+        else:
+            assert_same(whole, part, pick)
+
+
+def first_drive(m):
+    freedom = m.drives[0].freedom
+    begin = m.start.get(m.full_name(freedom), 0.0)
+    k, j = m.freedom(freedom)
+    return freedom, begin, 1.0 if m.pairs[k].type.freedoms[j].turns else 0.02
+
+
+@pytest.mark.parametrize("name", [n for n in mg.library() if n != "rcsr-csr-printed"])
+def test_library(name):
+    m = mg.load(name)
+    freedom, begin, size = first_drive(m)
+    rng = np.random.default_rng(40)
+    assert_subsets_agree(m, freedom, begin + size * np.linspace(0, 2 * np.pi, 19), rng)
+
+
+@pytest.mark.seeds(14)
+def test_random_mechanisms(seed):
+    rng = np.random.default_rng((seed, 41))
+    m = with_drives(closed_mechanism(seed, mobility=1, loops=int(rng.integers(1, 4))), seed)
+    if m is None or len(m.drives) != 1:
+        pytest.skip("not of one driver")
+    q = rng.choice([0.3, 1.0, 3.0]) * np.linspace(-1, 1, int(rng.choice([9, 20, 47]))) + rng.choice([0.0, 0.05])
+    how = {
+        "redundant": str(rng.choice(["nan", "minimum_norm"])),
+        "method": str(rng.choice(["loop_wrench", "newton_euler"])),
+        "engine": "sparse" if seed % 8 == 7 else "dense",
+    }
+    assert_subsets_agree(with_loads(m, seed), m.drives[0].freedom, q, rng, **how)
+
+
+def test_names_of_a_result_do_not_hang_on_what_was_reached():
+    """Where no position is reached, what holds a passive body is NaN; its name is there as otherwise."""
+    m = with_loads(with_drives(closed_mechanism(40), 40), 40)
+    freedom = m.drives[0].freedom
+    near, far = (solved(m, {freedom: q}) for q in ([0.0, 50.0], [50.0]))
+    assert far.status[0] == near.status[1] != "ok"
+    assert everything(near).keys() == everything(far).keys()
+
+
+# --- several drivers ------------------------------------------------------------------------------------------------------
+
+
+def on_polygon(seed, rng, size=None):
+    """A mechanism of several drivers, positions on a polygon, and which of them are its corners."""
+    m = with_drives(closed_mechanism(seed, mobility=int(rng.integers(2, 4)), loops=int(rng.integers(1, 3))), seed)
+    if m is None or len(m.drives) < 2:
+        pytest.skip("not of several drivers")
+    size = float(rng.choice([0.1, 0.4, 1.0]) if size is None else size)
+    corners = np.vstack([np.zeros(len(m.drives)), size * rng.normal(size=(4, len(m.drives)))])
+    points, corner = [], []
+    for a, b in zip(corners[:-1], corners[1:], strict=True):
+        parts = [*np.sort(rng.uniform(0, 1, int(rng.integers(0, 6)))), 1.0]
+        points += [a + u * (b - a) for u in parts]
+        corner += [False] * (len(parts) - 1) + [True]
+    return with_loads(m, seed), np.array(points), np.array(corner)
+
+
+@pytest.mark.seeds(10)
+def test_several_drivers(seed):
+    rng = np.random.default_rng(seed)
+    m, points, corner = on_polygon(seed, rng)
+
+    def motion(values):
+        return {d.freedom: mg.Motion(values[:, i], 1.0 + 0.1 * i, 0.3) for i, d in enumerate(m.drives)}
+
+    whole = solved(m, motion(points))
+    for _ in range(2):
+        pick = np.flatnonzero(corner | (rng.random(len(points)) < 0.3))
+        part = solved(m, motion(points[pick]))
+        if isinstance(whole, Exception) or isinstance(part, Exception):
+            assert type(whole) is type(part)
+        else:
+            assert_same(whole, part, pick)
+
+
+# --- passive bodies ---------------------------------------------------------------------------------------------------------
+
+
+def rssr(mass=True, follower="S"):
+    """RSSR, the coupler's mass centre off its line; ``follower`` in place of the second sphere: E, Sp take spins as well."""
+    body = {"mass": 2.0, "center": (0.2, 0.15, 0.1), "inertia": 0.01 * np.eye(3)} if mass else {}
+    links = [mg.Link("frame"), mg.Link("crank"), mg.Link("coupler", **body), mg.Link("rocker")]
+    pairs = [
+        mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=Z),
+        mg.Pair("B", "S", "crank", "coupler", point=(0.06, 0, 0.02)),
+        mg.Pair("C", follower, "coupler", "rocker", point=(0.33, 0.1, 0.08), axis=(0.2, 1.0, 0.3)),
+        mg.Pair("D", "R", "rocker", "frame", point=(0.26, -0.03, 0.11), axis=(-1, 2, 1)),
+    ]
+    return mg.Mechanism("RSSR", links, pairs, ["A"], [mg.Gravity((0, 0, -9.81))])
+
+
+def two_rods():
+    """A crank and two rockers on two S-S rods, one of them from rocker to rocker."""
+    pairs = [
+        *rssr(False).pairs,
+        mg.Pair("E", "S", "rocker", "rod", point=(0.4, 0.05, 0.05)),
+        mg.Pair("F", "S", "rod", "second", point=(0.6, 0.3, 0.1)),
+        mg.Pair("G", "R", "second", "frame", point=(0.7, 0.1, 0.05), axis=(0.3, 0.2, 1)),
+    ]
+    bodies = [mg.Link(n, mass=1.0, center=(0.3, 0.2, 0.1), inertia=0.01 * np.eye(3)) for n in ("coupler", "rod")]
+    links = [mg.Link("frame"), mg.Link("crank"), mg.Link("rocker"), mg.Link("second"), *bodies]
+    return mg.Mechanism("two rods", links, pairs, ["A"], [mg.Gravity((0, 0, -9.81))])
+
+
+@pytest.mark.parametrize(
+    ("m", "engine", "end"),
+    [(rssr(), "dense", 6.0), (two_rods(), "dense", 6.0), (mg.load("rssr"), "dense", 6.0), (rssr(), "sparse", 1.0)],
+    ids=["rssr", "two rods", "library", "sparse"],
+)
+def test_passive_bodies(m, engine, end):
+    assert_subsets_agree(m, "A", np.linspace(-1.0, end, 15), np.random.default_rng(43), engine=engine)
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.parametrize("end", [0.7, -1.5])
+def test_spin_is_that_of_parallel_transport(engine, end):
+    """No spin at any position, and the pose of an independent integration, for any number of positions on the way."""
+    m = rssr()
+    axis = np.array([0.27, 0.1, 0.06]) / np.linalg.norm([0.27, 0.1, 0.06])
+    goal, tail = carried(m, "A", "coupler", axis, 0.0, end)
+    for q in ([end], np.linspace(0.0, end, 5), np.linspace(0.0, end, 41)):
+        link = mg.kinematics(m, {"A": mg.Motion(q, 1.0)}, engine=engine).link("coupler")
+        np.testing.assert_allclose(link.pose[-1, :3, :3], goal, atol=1e-11 + 100 * tail)
+        spin = np.einsum("ti,tij,j->t", link.twist[:, :3], link.pose[:, :3, :3], axis)
+        assert np.abs(spin).max() < 1e-13
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.parametrize(("seed", "pair", "link"), [(40, "J3", "b3"), (204, "J5", "b3"), (218, "J12", "b10")])
+def test_spin_of_a_body_between_sphere_and_plane(engine, seed, pair, link):
+    m = with_drives(closed_mechanism(seed), seed)
+    axis = next(np.array(p.axis) / np.linalg.norm(p.axis) for p in m.pairs if p.name == pair)
+    drive = m.drives[0].freedom
+    goal, tail = carried(m, drive, link, axis, 0.0, 0.1, nodes=40)
+    for q in ([0.1], np.linspace(0.0, 0.1, 5)):
+        R = mg.kinematics(m, {drive: q}, engine=engine).link(link).pose[-1, :3, :3]
+        np.testing.assert_allclose(R, goal, atol=1e-11 + 100 * tail)
+
+
+# --- change points ----------------------------------------------------------------------------------------------------------
+
+
+def parallelograms(bars, start, moved=None):
+    """Parallelograms on one crank, declared at the crank angle ``start``, an output effort -10 in all."""
+    pairs = [mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=Z)]
+    for i, bar in enumerate(bars):
+        tip, foot = bar.tip(start), bar.foot
+        at = {"B": tip, "C": foot + tip, "D": foot}
+        ends = {"B": ("crank", f"coupler{i}"), "C": (f"coupler{i}", f"rocker{i}"), "D": ("frame", f"rocker{i}")}
+        pairs += [mg.Pair(f"{k}{i}", "R", *ends[k], point=(*at[k], 0), axis=Z) for k in ends]
+    loads = [mg.Effort(f"D{i}", -10.0 / len(bars)) for i in range(len(bars))]
+    m = mg.Mechanism("parallelograms", None, pairs, ["A"], loads)
+    return m if moved is None else m.moved(moved)
+
+
+def from_change_point(bars, crank):
+    """Angle from the nearest position in line of any parallelogram."""
+    return np.min([np.abs(wrapped(2 * (crank - bar.lean))) / 2 for bar in bars], axis=0)
+
+
+def assert_parallel(s, bars, q, start):
+    """Every position but the change points themselves is solved, as a parallelogram, with the torque 10."""
+    off, ok = from_change_point(bars, q + start), s.status == "ok"
+    lost = ~ok & (off > 1e-7)
+    assert not lost.any(), f"{set(s.status[lost])} {off[lost][:3]} from the change point"
+    assert not ok[off < 1e-9].any()
+    for i in range(len(bars)):
+        # rounding over the distance for a position, over its square for a force
+        assert (np.abs(s[f"D{i}"].position[..., 0] - q)[ok] * off[ok]).max(initial=0.0) < 1e-12
+    assert (np.abs(s["A"].effort[..., 0] - 10.0)[ok] * np.minimum(off[ok], 1.0) ** 2).max(initial=0.0) < 1e-10
+
+
+ONE = [Bars(1.0, 2.0, 1.0, 2.0)]
+
+
+@pytest.mark.parametrize("step", [1, 2, 6, 7, 10, -7, 0.74])
+def test_parallelogram_over_a_turn(step):
+    q = np.radians(np.arange(0, 360 + 1e-9, abs(step))) * np.sign(step)
+    for start in (np.pi / 2, np.radians(137.3)):
+        assert_parallel(solved(parallelograms(ONE, start), {"A": q}), ONE, q, start)
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.parametrize("off", [1e-5, 1e-3, 3e-3, 5e-3])
+def test_beside_a_change_point_wherever_the_path_ends(engine, off):
+    """Behind a change point a position is solved alone, with one before it, and with others behind it."""
+    start = np.pi / 2
+    at = np.pi / 2
+    for q in ([at + off], [0.3, at + off], [at + off, 3.0], [at - off, at + off, 5.0]):
+        q = np.array(q)
+        assert_parallel(solved(parallelograms(ONE, start), {"A": q}, engine=engine), ONE, q, start)
+
+
+def drawn_parallelograms(rng):
+    k, together = int(rng.choice([1, 1, 2, 3])), rng.random() < 0.5
+    bars = []
+    for _ in range(k):
+        a, g = rng.uniform(0.3, 1.0), rng.uniform(1.1, 2.0)
+        lean = 0.0 if together else rng.uniform(-np.pi, np.pi)
+        bars.append(Bars(a, g, a, g, 0.0, rng.uniform(-3, 3), lean))
+    while True:
+        start = rng.uniform(-np.pi, np.pi)
+        if from_change_point(bars, np.array([start]))[0] > 0.05:
+            return bars, start
+
+
+@pytest.mark.seeds(6)
+def test_several_parallelograms_on_one_crank(seed):
+    """Change points of their own, or all at one crank angle; and any subset of the positions."""
+    rng = np.random.default_rng((seed, 44))
+    bars, start = drawn_parallelograms(rng)
+    m = parallelograms(bars, start, anywhere(rng))
+    q = rng.choice([-1, 1]) * np.linspace(0, rng.choice([3.0, 2 * np.pi]), int(rng.choice([10, 37])))
+    whole = solved(m, {"A": q})
+    assert_parallel(whole, bars, q, start)
+    pick = rng.choice(len(q), len(q) // 3, replace=False)
+    assert not differences(whole, solved(m, {"A": q[pick]}), pick=pick)[2]
