@@ -129,6 +129,12 @@ class Pipeline:
 
     def _check_determinate(self) -> None:
         free = self.freedoms.undriven
+        if len(self.columns) and not self.freedoms.mobility:
+            raise IndeterminateError(
+                f"mechanism {self.m.name!r}: {', '.join(self.drive.names)} cannot drive it: it is a structure (mobility 0) where it was "
+                "assembled. Change a pair, see mg.check",
+                check(self.m),
+            )
         still = np.sqrt((self.freedoms.null[self.columns] ** 2).sum(axis=1)) < PATH.independent
         if free and still.any() and len(self.columns) <= self.freedoms.mobility:
             value = dict(
@@ -417,8 +423,6 @@ def _check_drivers(line: Pipeline, outcome: Outcome) -> None:
         f"the drivers {names} contradict each other: no position meets all their motions (mobility {mobility}, "
         f"{len(line.columns)} drivers). Remove a driver, or give motions that agree"
     )
-    if not mobility:
-        why = f"{names} cannot drive it: it is a structure (mobility 0) where it was assembled. Change a pair, see mg.check"
     raise IndeterminateError(f"mechanism {line.m.name!r}: {why}", check(line.m))
 
 

@@ -92,6 +92,10 @@ class PathTolerances:
     """Correction up to which one Newton step makes a node of the first march; all nodes are closed together afterwards."""
     node: float = 1e-8
     """Last Newton step of a node that counts as closed: its square is rounding."""
+    rates: float = 1e-6
+    """Product of the last step and the condition number up to which a node is closed: its rates err by about as much."""
+    rounding: float = 1e-14
+    """Part of the condition number below which a Newton step is rounding."""
     exact: float = 1e-12
     """The same where many positions are interpolated between the nodes, so that their sensitivities must be exact as well."""
     first: float = 0.05

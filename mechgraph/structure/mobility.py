@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.passive_rest import Idle
@@ -16,7 +15,7 @@ from mechgraph.closure.rank import ClosureRank, EngineName, closure_rank
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.linear import independent_rows, singular_values
 from mechgraph.numerics.tolerances import MOTIONS
-from mechgraph.structure.passive import PassiveMotion, passive_motions
+from mechgraph.structure.passive import PassiveMotion, passive_motions, small_combinations
 
 
 @dataclass(frozen=True)
@@ -85,7 +84,8 @@ def _left_free(found: ClosureRank, at_rest: ClosureRank, columns: Index) -> Arra
         return null
     if found.engine == "dense":
         return at_rest.motions
-    return np.asarray(null @ null_space(null[columns], MOTIONS.dependent))
+    # the motions are of size one: a driver whose part in all of them is below the threshold stands still
+    return np.asarray(null @ small_combinations(null[columns], MOTIONS.dependent))
 
 
 def _drive(null: Array, columns: Index) -> float:

@@ -1,6 +1,5 @@
 """Identities of paths: a position has the same values, or the same status, whichever other positions of the path were asked for."""
 
-import mechanisms
 import numpy as np
 import pytest
 from attack import Bars, anywhere, carried, conditions, differences, everything, solved, wrapped
