@@ -1,5 +1,7 @@
 """Identities of paths: a position has the same values, or the same status, whichever other positions of the path were asked for."""
 
+import itertools
+
 import numpy as np
 import pytest
 from attack import Bars, anywhere, carried, conditions, differences, everything, solved, wrapped
@@ -90,7 +92,7 @@ def on_polygon(seed, rng, size=None):
     size = float(rng.choice([0.1, 0.4, 1.0]) if size is None else size)
     corners = np.vstack([np.zeros(len(m.drives)), size * rng.normal(size=(4, len(m.drives)))])
     points, corner = [], []
-    for a, b in zip(corners[:-1], corners[1:], strict=True):
+    for a, b in itertools.pairwise(corners):
         parts = [*np.sort(rng.uniform(0, 1, int(rng.integers(0, 6)))), 1.0]
         points += [a + u * (b - a) for u in parts]
         corner += [False] * (len(parts) - 1) + [True]
