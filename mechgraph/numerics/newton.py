@@ -171,8 +171,8 @@ class Newton:
             small = finite & (size <= step_goal[mine])
             if small.any() and step_goal[0] <= PATH.node:
                 # the rates of a node err by the last step times the condition: poor ones are closed further, down to rounding
-                condition_now = f.condition
-                small &= size <= np.maximum(PATH.rates / condition_now, PATH.rounding * condition_now)
+                condition_here = np.maximum(f.condition, 1.0)
+                small &= size <= np.maximum(PATH.rates / condition_here, PATH.rounding * condition_here)
             # rows that were left out as dependent must be met as well: where they are not, another form is tried once
             unmet = small & (left > np.maximum(1e3 * step_goal[mine], 1e-9))
             if unmet.any():
