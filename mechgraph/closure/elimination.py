@@ -69,6 +69,7 @@ class Elimination:
         self.zero_rows = np.concatenate(self._zero)
 
     def _sweep(self, K: scipy.sparse.csr_array, owners: Index) -> None:
+        K.sum_duplicates()
         starts = np.flatnonzero(np.diff(owners, prepend=-1))
         blocks = list(zip(starts.tolist(), [*starts[1:].tolist(), K.shape[0]], strict=True))
         columns = [np.unique(K.indices[K.indptr[i] : K.indptr[j]]).astype(np.intp) for i, j in blocks]
@@ -77,10 +78,17 @@ class Elimination:
         for step, i in enumerate(order):
             last[columns[i]] = step
         front, rows, active = np.zeros((0, 0)), np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
+        place = np.full(K.shape[1], -1)  # of the columns in the front
         for step, i in enumerate(order):
             first, end = blocks[i]
-            wide = np.concatenate([active, np.setdiff1d(columns[i], active, assume_unique=True)]).astype(np.intp)
-            below = K[first:end][:, wide].toarray()
+            place[active] = np.arange(len(active))
+            wide = np.concatenate([active, columns[i][place[columns[i]] < 0]])
+            place[wide] = np.arange(len(wide))
+            entries = slice(K.indptr[first], K.indptr[end])
+            below = np.zeros((end - first, len(wide)))
+            number = np.repeat(np.arange(end - first), np.diff(K.indptr[first : end + 1]))
+            below[number, place[K.indices[entries]]] = K.data[entries]
+            place[wide] = -1
             kept = np.pad(front, ((0, 0), (0, len(wide) - front.shape[1])))
             front, rows, active = np.concatenate([kept, below]), np.concatenate([rows, np.arange(first, end)]), wide
             front, rows, active = self._eliminate(front, rows, active, last[active] == step)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy
@@ -33,7 +34,7 @@ class Freedoms:
     ``closure`` the rank of the closure equations with its margin, ``driven_closure`` the same with the drivers at rest;
     ``null (F, M)`` orthonormal motions;
     ``dependent`` whether drivers cannot move independently, ``drive`` how strongly the weakest of them moves (against the freedom that
-    moves most; small near a dead point); ``passive`` and ``undriven`` motions with the drivers at rest;
+    moves most; small near a dead point); ``left (F, n)`` orthonormal motions with the drivers at rest, ``passive`` motions among them;
     ``hold`` freedoms whose rest stops the passive motions.
     """
 
@@ -42,9 +43,15 @@ class Freedoms:
     null: Array
     dependent: bool
     passive: tuple[PassiveMotion, ...]
-    undriven: tuple[FreeMotion, ...]
+    system: System
+    left: Array
     hold: Index
     drive: float = 1.0
+
+    @cached_property
+    def undriven(self) -> tuple[FreeMotion, ...]:
+        """Motions with the drivers at rest that are not passive."""
+        return tuple(_complement(self.system, self.left, self.passive))
 
     @property
     def rank(self) -> int:
@@ -111,15 +118,14 @@ def free_motion(system: System, x: Array, columns: Index, engine: EngineName = "
         # nothing else can move: what could be driven is an input, not a passive freedom
         drivable = [c for c, _ in single_freedoms(system.m)]
         passive = [p for p in passive if not (np.abs(p.rates[drivable]) > MOTIONS.still).any()]
-    undriven = _complement(system, left, passive)
     hold = np.zeros(0, dtype=np.intp)
     if passive:
         _, pivots = scipy.linalg.qr(np.stack([p.rates for p in passive]), mode="r", pivoting=True)
         hold = np.sort(pivots[: len(passive)]).astype(np.intp)
-    return Freedoms(found, at_rest, null, drive < MOTIONS.dependent, tuple(passive), tuple(undriven), hold, drive)
+    return Freedoms(found, at_rest, null, drive < MOTIONS.dependent, tuple(passive), system, left, hold, drive)
 
 
-def _complement(system: System, left: Array, passive: list[PassiveMotion]) -> list[FreeMotion]:
+def _complement(system: System, left: Array, passive: Sequence[PassiveMotion]) -> list[FreeMotion]:
     """Motions of ``left`` that are not passive: in each one freedom moves while those of the other motions rest.
 
     These freedoms are the first independent ones in the order in which drivers are wanted, so a motion is what one more driver does.
@@ -135,7 +141,8 @@ def _complement(system: System, left: Array, passive: list[PassiveMotion]) -> li
     m = system.m
     Q, _ = np.linalg.qr(rest)
     order = drive_order(m, passive)
-    order += [c for c in range(system.n_freedoms) if c not in set(order)]
+    wanted = set(order)
+    order += [c for c in range(system.n_freedoms) if c not in wanted]
     chosen = independent_rows(Q, order, Q.shape[1])
     basis = np.linalg.solve(Q[chosen].T, Q.T)
     basis /= np.abs(basis).max(axis=1, keepdims=True)
