@@ -18,9 +18,10 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.solver import ClosureSolver, FactoredClosure
-from mechgraph.numerics.continuation import End, Follower, Tracks, refined
+from mechgraph.numerics.continuation import End, Follower, Tracks
 from mechgraph.numerics.hermite import Interpolation
 from mechgraph.numerics.newton import Work
+from mechgraph.numerics.refinement import refined
 from mechgraph.numerics.tolerances import PATH
 from mechgraph.numerics.tracks import Nodes, Paths
 
@@ -348,7 +349,7 @@ class _Legs:
         found = follower.newton.nodes(
             interpolation(step, place, drive), drive, nodes.track[a], nodes.which[a], PATH.node
         )
-        return follower._nodes(found, drive, nodes.track[a], place, sure=True).take(found.done)
+        return Nodes.closed(found, drive, nodes.track[a], place, sure=True).take(found.done)
 
     def _say_why_not(self, out: Positions, tracks: Tracks, reach: Array) -> None:
         """Statuses of the positions behind the end of their track."""

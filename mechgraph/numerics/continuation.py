@@ -19,8 +19,9 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.numerics.hermite import Interpolation, divided_differences, newton_form
-from mechgraph.numerics.newton import Closed, Newton, Problem, Work
+from mechgraph.numerics.certificate import middles, smooth
+from mechgraph.numerics.hermite import divided_differences, newton_form
+from mechgraph.numerics.newton import Newton, Problem, Work
 from mechgraph.numerics.tolerances import PATH
 from mechgraph.numerics.tracks import Nodes, Paths
 
@@ -85,10 +86,6 @@ class Follower:
         f = self.problem.factored(point, which)
         Z = self.problem.sensitivity(point, f)
         return Nodes(point.x, Z, drive, tracks, np.zeros(len(tracks)), which, f.condition, np.ones(len(tracks), bool))
-
-    def _nodes(self, found: Closed, drive: Array, track: Index, place: Array, sure: bool) -> Nodes:
-        n = len(place)
-        return Nodes(found.x, found.Z, drive, track, place, found.which, found.condition, np.full(n, sure))
 
     def _renewed(self, nodes: Nodes) -> Nodes:
         """The same nodes in better forms where theirs are poor."""
@@ -156,7 +153,7 @@ class Follower:
             x = self.problem.advance(last.x, dq, last.track)
             found = self.newton.nodes(x, drive, last.track, last.which, PATH.quick)
             good = found.done & (found.correction <= PATH.correction) & (found.condition <= PATH.singular)
-            new = self._nodes(found, drive, last.track, at, sure=False)
+            new = Nodes.closed(found, drive, last.track, at, sure=False)
             h = _next_step(at - last.place, found.correction, order, good)
             if good.all():
                 out.append(new)
@@ -196,19 +193,19 @@ class Follower:
 
         The middle is predicted by Hermite interpolation of both ends and closed. The matrix along the track is, up to third order, the
         parabola through those at both ends and in the middle; no matrix on it, nor near it for complex places, may be singular (see
-        ``Factored.regular_between``). At a crossing or a fold between the ends the parabola has a singular point however short the step.
-        That the middle closes with a small correction and moves on as its neighbours do (see ``_smooth``) excludes that the ends lie on
-        different branches.
+        ``Factored.regular_between``). At a crossing or a fold between the ends the parabola has a singular point however short the
+        step. That the middle closes with a small correction and moves on as its neighbours do (see ``certificate.smooth``) excludes
+        that the ends lie on different branches. What is left out is the third order: a test, not interval arithmetic.
         """
         a, b = nodes.take(left), nodes.take(right)
         place = 0.5 * (a.place + b.place)
         drive = self.paths.drive(a.track, place)
-        x = _middles(self.problem, a, b, drive)
+        x = middles(self.problem, a, b, drive)
         found = self.newton.nodes(x, drive, a.track, a.which, PATH.node)
-        middle = self._nodes(found, drive, a.track, place, sure=True)
+        middle = Nodes.closed(found, drive, a.track, place, sure=True)
         ok = found.done & (found.which == a.which) & (found.correction <= PATH.correction)
         ok &= np.isfinite(a.condition) & np.isfinite(b.condition)
-        ok &= _smooth(self.problem, a, middle, b, found.correction)
+        ok &= smooth(self.problem, a, middle, b, found.correction)
         test = np.flatnonzero(ok)
         if test.size:
             here = self.problem.at(found.x[:, test], drive[:, test], a.track[test])
@@ -261,7 +258,7 @@ class Follower:
             dq, order = self._ahead(last, before, np.array([known]), at, drive)
             x = self.problem.advance(last.x, dq, last.track)
             step = self.newton.nodes(x, drive, last.track, last.which, PATH.node)
-            new = self._nodes(step, drive, last.track, at, sure=True)
+            new = Nodes.closed(step, drive, last.track, at, sure=True)
             good = bool(step.done[0]) and step.correction[0] <= PATH.correction and step.condition[0] <= worst
             middle = None
             if good and step.which[0] == last.which[0]:
@@ -339,7 +336,7 @@ class Follower:
             ahead = self.problem.corrigible(newton_form(*form, at - base.place), base.which)
             x = self.problem.advance(base.x, ahead, base.track)
             step = self.newton.nodes(x, drive, base.track, base.which, PATH.node)
-            new = self._renewed(self._nodes(step, drive, base.track, at, sure=True))
+            new = self._renewed(Nodes.closed(step, drive, base.track, at, sure=True))
             turn = np.abs((step.Z - base.Z) * direction).max() / max(1.0, float(np.abs(base.Z).max()))
             as_regular = step.condition[0] <= 4.0 * base.condition[0]
             if step.done[0] and step.correction[0] <= 1e-2 * distance and turn <= PATH.smooth and as_regular:
@@ -368,83 +365,3 @@ def _replaced(old: Nodes, new: Nodes, at: Index) -> Nodes:
         column[..., at] = getattr(new, name)[..., at]
         values[name] = column
     return Nodes(**values)
-
-
-def _middles(problem: Problem, a: Nodes, b: Nodes, drive: Array) -> Array:
-    """States in the middle between neighbours, by Hermite interpolation of both ends."""
-    h = b.place - a.place
-    direction = (b.drive - a.drive) / h
-    y = problem.difference(b.x, a.x)
-    rates = np.stack([(a.Z * direction).sum(axis=1), problem.tangent(y, (b.Z * direction).sum(axis=1))])
-    values, places = np.stack([np.zeros_like(y), y]), np.stack([np.zeros_like(h), h])
-    dq = newton_form(*divided_differences(places, values, rates), 0.5 * h)
-    off = drive - 0.5 * (a.drive + b.drive)
-    dq += 0.5 * ((a.Z + b.Z) * off).sum(axis=1)
-    return problem.advance(a.x, dq, a.track)
-
-
-def _smooth(problem: Problem, a: Nodes, m: Nodes, b: Nodes, correction: Array) -> Mask:
-    """Whether states and rates in the middles ``m`` are those of the Hermite cubic of both ends, against the change of rates over the step.
-
-    On a smooth track ``r_m = 3/2 (x_b - x_a) / h - (r_a + r_b) / 4`` and the correction of ``x_m`` vanishes, both to higher order than
-    the change of rates; where a step leads from one branch onto another by a jump of the rates, the one holds for a jump at a sixth
-    of the step, the other at a quarter, so never both.
-    """
-    h = b.place - a.place
-    direction = (b.drive - a.drive) / h
-    y = problem.difference(b.x, a.x)
-    rates = [(a.Z * direction).sum(axis=1)]
-    for node in (m, b):
-        rates.append(problem.tangent(problem.difference(node.x, a.x), (node.Z * direction).sum(axis=1)))
-    r_a, r_m, r_b = rates
-    gap = np.abs(r_m - 1.5 * y / h + 0.25 * (r_a + r_b)).max(axis=0, initial=0.0)
-    change = np.max([np.abs(p - q).max(axis=0, initial=0.0) for p, q in ((r_a, r_m), (r_m, r_b), (r_a, r_b))], axis=0)
-    off = np.abs(m.drive - 0.5 * (a.drive + b.drive)).max(axis=0, initial=0.0) / h
-    noise = (4.0 * off + 1e-6) * np.abs(r_m).max(axis=0, initial=0.0) + 1e-14 * m.condition / h
-    noise += PATH.tiny / h  # branches that are no further apart are one
-    return np.asarray((gap <= PATH.smooth * change + noise) & (correction <= h * (PATH.smooth * change / 8 + noise)))
-
-
-def refined(follower: Follower, nodes: Nodes, count: int) -> Nodes:
-    """Nodes with further ones between them until interpolation is exact, or until they are too many for ``count`` positions.
-
-    First one in the middle of every step, which tells the error there; then as many as that error asks for.
-    """
-    left, _ = nodes.steps
-    parts = np.full(len(left), 2)
-    if not len(left) or len(nodes) > count:
-        return nodes
-    exact = follower.newton.nodes(nodes.x, nodes.drive, nodes.track, nodes.which, PATH.exact)
-    nodes = replace(nodes, x=exact.x, Z=np.where(exact.done, exact.Z, nodes.Z))
-    for _ in range(PATH.refinements):
-        if not (parts > 1).any() or int(parts.sum()) * PATH.worth > count:
-            break
-        interpolation = Interpolation(follower.problem, nodes)
-        step = np.repeat(np.arange(len(parts)), parts - 1)
-        share = np.concatenate([np.arange(1, n) / n for n in parts])
-        a, b = interpolation.left[step], interpolation.right[step]
-        place = nodes.place[a] + share * (nodes.place[b] - nodes.place[a])
-        drive, track, which = follower.paths.drive(nodes.track[a], place), nodes.track[a], nodes.which[a]
-        found = follower.newton.nodes(interpolation(step, place, drive), drive, track, which, PATH.exact)
-        good = found.done & (found.correction <= PATH.correction)
-        new = follower._nodes(found, drive, track, place, sure=True).take(good)
-        error = np.zeros(len(parts))
-        np.maximum.at(error, step, np.where(good, found.correction, 0.0))
-        parts = _divisions(error, parts, np.bincount(step[good], minlength=len(parts)))
-        nodes = Nodes.join([nodes, new])
-    return nodes
-
-
-def _divisions(error: Array, parts: Index, added: Index) -> Index:
-    """Into how many parts every step is to be cut next, from the error of interpolation in the step that it lies in."""
-    halvings = np.zeros(len(error), dtype=np.intp)
-    for _ in range(PATH.halvings):
-        above = error > PATH.interpolation / PATH.gain
-        halvings[above] += 1
-        error = np.where(above, error * PATH.gain, error)
-    out = np.repeat(2**halvings, added + 1)
-    for _ in range(PATH.halvings):
-        # neighbours at most twice as dense: interpolation reaches over both
-        out[1:] = np.maximum(out[1:], out[:-1] // 2)
-        out[:-1] = np.maximum(out[:-1], out[1:] // 2)
-    return out

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from mechgraph.numerics.newton import Closed
 from mechgraph.numerics.tolerances import PATH
 
 Array = NDArray[np.float64]
@@ -85,6 +86,11 @@ class Nodes:
 
     def __len__(self) -> int:
         return len(self.place)
+
+    @classmethod
+    def closed(cls, found: Closed, drive: Array, track: Index, place: Array, sure: bool) -> Nodes:
+        """Nodes from what Newton's method found at path values ``drive (d, n)``."""
+        return cls(found.x, found.Z, drive, track, place, found.which, found.condition, np.full(len(place), sure))
 
     def take(self, at: Index | Mask) -> Nodes:
         """Some of the nodes."""

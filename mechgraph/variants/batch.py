@@ -19,11 +19,11 @@ from mechgraph.closure.driver_path import DriverPath
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.solver import FactoredClosure, closure_solver
 from mechgraph.errors import DeclarationError
-from mechgraph.kinetostatics import Options, Pipeline, Starts
 from mechgraph.model.motion import Motion
 from mechgraph.model.parameters import Parameters
 from mechgraph.numerics.continuation import End, Follower
 from mechgraph.numerics.tracks import Paths
+from mechgraph.pipeline import Options, Pipeline, Starts
 from mechgraph.result.solution import Solution
 from mechgraph.variants.fields import Variants
 

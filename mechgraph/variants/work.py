@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.driver_path import Status
 from mechgraph.errors import DeclarationError, MechgraphError
-from mechgraph.kinetostatics import Options, solve
+from mechgraph.kinetostatics import solve
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
+from mechgraph.pipeline import Options
 from mechgraph.result.solution import Solution
 from mechgraph.variants.batch import solve_together
 from mechgraph.variants.fields import AnyField, Variants, stacked, topology_of, varied

@@ -1,0 +1,49 @@
+"""Parts of the certificate of a step: its middle, and whether it lies on a smooth track (see ``continuation.Follower._certified``)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechgraph.numerics.hermite import divided_differences, newton_form
+from mechgraph.numerics.newton import Problem
+from mechgraph.numerics.tolerances import PATH
+from mechgraph.numerics.tracks import Nodes
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+def middles(problem: Problem, a: Nodes, b: Nodes, drive: Array) -> Array:
+    """States in the middle between neighbours, by Hermite interpolation of both ends."""
+    h = b.place - a.place
+    direction = (b.drive - a.drive) / h
+    y = problem.difference(b.x, a.x)
+    rates = np.stack([(a.Z * direction).sum(axis=1), problem.tangent(y, (b.Z * direction).sum(axis=1))])
+    values, places = np.stack([np.zeros_like(y), y]), np.stack([np.zeros_like(h), h])
+    dq = newton_form(*divided_differences(places, values, rates), 0.5 * h)
+    off = drive - 0.5 * (a.drive + b.drive)
+    dq += 0.5 * ((a.Z + b.Z) * off).sum(axis=1)
+    return problem.advance(a.x, dq, a.track)
+
+
+def smooth(problem: Problem, a: Nodes, m: Nodes, b: Nodes, correction: Array) -> Mask:
+    """Whether states and rates in the middles ``m`` are those of the Hermite cubic of both ends, against the change of rates over the step.
+
+    On a smooth track ``r_m = 3/2 (x_b - x_a) / h - (r_a + r_b) / 4`` and the correction of ``x_m`` vanishes, both to higher order than
+    the change of rates; where a step leads from one branch onto another by a jump of the rates, the one holds for a jump at a sixth
+    of the step, the other at a quarter, so never both.
+    """
+    h = b.place - a.place
+    direction = (b.drive - a.drive) / h
+    y = problem.difference(b.x, a.x)
+    rates = [(a.Z * direction).sum(axis=1)]
+    for node in (m, b):
+        rates.append(problem.tangent(problem.difference(node.x, a.x), (node.Z * direction).sum(axis=1)))
+    r_a, r_m, r_b = rates
+    gap = np.abs(r_m - 1.5 * y / h + 0.25 * (r_a + r_b)).max(axis=0, initial=0.0)
+    change = np.max([np.abs(p - q).max(axis=0, initial=0.0) for p, q in ((r_a, r_m), (r_m, r_b), (r_a, r_b))], axis=0)
+    off = np.abs(m.drive - 0.5 * (a.drive + b.drive)).max(axis=0, initial=0.0) / h
+    noise = (4.0 * off + 1e-6) * np.abs(r_m).max(axis=0, initial=0.0) + 1e-14 * m.condition / h
+    noise += PATH.tiny / h  # branches that are no further apart are one
+    return np.asarray((gap <= PATH.smooth * change + noise) & (correction <= h * (PATH.smooth * change / 8 + noise)))
