@@ -76,8 +76,8 @@ STRESSES = StressTolerances()
 class PathTolerances:
     """Following a path of closed positions (see ``numerics.continuation``)."""
 
-    closed: float = 1e-13
-    """Closure residual that Newton aims at: some ten roundings of numbers of size one."""
+    closed: float = 1e-14
+    """Closure residual that Newton aims at: some roundings of numbers of size one; where it cannot be had, the smallest one there is."""
     accepted: float = 1e-11
     """Residual with which a position counts as closed where rounding lets it come no nearer (poor condition)."""
     iterations: int = 10
