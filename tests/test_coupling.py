@@ -238,3 +238,23 @@ def test_couplings_are_printed() -> None:
     cells = [row for row in f.coefficients().rows if row[2] == column]
     assert len({entry for entry, *_ in cells}) == len(cells)
     assert any(value == "0.5 A_2x - A_3x + 2.5 A'0_3x" for *_, value in cells)
+
+
+def test_couplings_that_say_the_same_twice_have_no_unique_effort() -> None:
+    # B = 2/3 A, written twice: any part of the effort may run over either, so that only their sum is known
+    pairs = [mg.Pair(n, "R", "f", n.lower(), point=(x, 0, 0), axis=(0, 0, 1)) for n, x in [("A", 0.0), ("B", 1.0)]]
+    twice = [mg.Coupling({"A": 2.0, "B": -3.0}, name="g1"), mg.Coupling({"A": 4e4, "B": -6e4}, name="g2")]
+    m = mg.Mechanism("gears", pairs=pairs, couplings=twice, drives=["A"], loads=[mg.Effort("B", 3.0)])
+    report = mg.check(m)
+    assert (report.redundancy, report.determinate) == (1, False)
+    assert report.unique["g1"] == report.unique["g2"] == {"effort": False}
+    assert all(report.unique["A"].values())
+    assert "efforts of the couplings g1, g2 are not unique" in report.verdict
+    assert "in the efforts of the couplings alone" in str(report)
+    for engine in ("dense", "sparse"):
+        s = mg.solve(m, {"A": [0.0, 0.5]}, engine=engine)
+        assert np.isnan([s.coupling("g1").effort, s.coupling("g2").effort]).all()
+        np.testing.assert_allclose(s["A"].effort, -2.0, rtol=1e-12)
+    once = mg.check(m.replace(couplings=twice[:1]))
+    assert once.determinate
+    assert once.unique["g1"] == {"effort": True}

@@ -276,7 +276,7 @@ class DeterminacyReport:
         """Whether every freedom is driven or passive, and every reaction and effort unique."""
         if not self.geometry or self.contradicting_drives:
             return False
-        return not self.geometry.freedoms.undriven and bool(self.reactions and self.reactions.is_unique.all())
+        return not self.geometry.freedoms.undriven and bool(self.reactions and self.reactions.all_unique)
 
     @cached_property
     def effects(self) -> tuple[Effect, ...]:

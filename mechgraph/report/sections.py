@@ -106,12 +106,12 @@ def _reactions(r: DeterminacyReport) -> list[Any]:
     if not r.unique:
         return []
     rows: list[tuple[str, str, str, str]] = []
+    kinds = {p.name: p.type.symbol for p in r.mechanism.pairs}
     for pair, row in r.unique.items():
         yes = " ".join(n for n, ok in row.items() if ok)
         no = " ".join(n for n, ok in row.items() if not ok)
-        rows.append(
-            (pair, r.mechanism.pair(pair).type.symbol if len(rows) < LISTED else "", yes or "none", no or "none")
-        )
+        kind = kinds.get(pair, "coupling") if len(rows) < LISTED else ""
+        rows.append((pair, kind, yes or "none", no or "none"))
     if len(rows) > LISTED:
         rows = [*rows[:LISTED], ("...", "", f"and {len(rows) - LISTED} pairs more (see report.to_dict())", "")]
     loose = [NOT_UNIQUE] if any(not ok for row in r.unique.values() for ok in row.values()) else []
@@ -123,7 +123,9 @@ def _stresses(r: DeterminacyReport) -> list[Any]:
     found = r.reactions
     if not found or not found.count or not r.geometry:
         return []
-    lines = [f"group {s.group + 1}: {s.text}" for s in found.first_states(LISTED)]
+    lines = [
+        f"group {s.group + 1}: {s.text or 'in the efforts of the couplings alone'}" for s in found.first_states(LISTED)
+    ]
     if found.listed > len(lines):
         lines.append(f"... and {found.listed - len(lines)} more (report.self_stresses)")
     if found.count > found.listed:

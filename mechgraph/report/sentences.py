@@ -89,7 +89,7 @@ def _here(r: DeterminacyReport) -> str:
         return f"Under-driven: mobility {r.mobility}, {plural(drivers, 'driver')}; {free}.{shaky}"
     if not r.mobility and drivers:
         return _driven_structure(r)
-    if r.reactions is None or r.reactions.is_unique.all():
+    if r.reactions is None or r.reactions.all_unique:
         more = plural(len(r.passive), "unknown")
         held = f" ({plural(len(r.passive), 'passive freedom')} held: {more} more)" if r.passive else ""
         state = "Determinate" if r.mobility else "Determinate structure"
@@ -135,9 +135,15 @@ def _tied(r: DeterminacyReport) -> str:
     ]
     if len(sets) > SETS:
         shown.append(f"others of {plural(sum(len(p) for _, p in sets[SETS:]), 'further pair')}")
+    loose = [c.name for c, ok in zip(m.couplings, found.coupling_is_unique.tolist(), strict=True) if not ok]
+    who = "effort of the coupling {} is" if len(loose) == 1 else "efforts of the couplings {} are"
+    tied = f"the {who.format(short(loose, NAMED))} not unique"
+    if not total:
+        return f"but {tied} (redundancy {r.redundancy})"
+    more = f"; {tied}" if loose else ""
     form = "form one self-stress group" if found.groups == 1 else f"form {plural(found.groups, 'self-stress group')}"
     components = "reaction component is" if total == 1 else "reaction components are"
-    return f"but {total} {components} not unique: {'; '.join(shown)} {form} (redundancy {r.redundancy})"
+    return f"but {total} {components} not unique: {'; '.join(shown)} {form}{more} (redundancy {r.redundancy})"
 
 
 def _patterns(found: Uniqueness) -> list[tuple[list[str], Index]]:

@@ -29,12 +29,14 @@ class Uniqueness:
     """The verdict on reactions at one position; what is expensive is computed when first asked for.
 
     ``parts`` the components, ``found`` the closure equations with the drivers at rest, ``table (components, probes)`` their parts in
-    random self-stresses of size one in the measure of every loop, so that the verdict does not depend on how many loops there are.
+    random self-stresses of size one in the measure of every loop, so that the verdict does not depend on how many loops there are;
+    ``coupled (couplings, probes)`` the greatest effort of every coupling in them.
     """
 
     parts: Components
     found: ClosureRank
     table: Array
+    coupled: Array
 
     @property
     def count(self) -> int:
@@ -52,6 +54,16 @@ class Uniqueness:
         return self.sizes <= UNIQUE
 
     @property
+    def coupling_is_unique(self) -> NDArray[np.bool_]:
+        """Whether the multiplier of each coupling is unique, in order of declaration."""
+        return np.asarray(np.sqrt((self.coupled**2).sum(axis=1)) <= UNIQUE)
+
+    @property
+    def all_unique(self) -> bool:
+        """Whether every reaction component, effort and multiplier is unique."""
+        return bool(self.is_unique.all() and self.coupling_is_unique.all())
+
+    @property
     def weakest(self) -> float:
         """Largest part of a self-stress in a component called unique."""
         return float(self.sizes[self.is_unique].max(initial=0.0))
@@ -63,10 +75,12 @@ class Uniqueness:
 
     @cached_property
     def unique(self) -> dict[str, dict[str, bool]]:
-        """Pair -> component -> whether it is unique; ``effort`` (or ``effort Tz``) for driven freedoms."""
+        """Pair -> component -> whether it is unique; ``effort`` (or ``effort Tz``) for driven freedoms and for couplings."""
         out: dict[str, dict[str, bool]] = {pair.name: {} for pair in self.parts.system.m.pairs}
         for (pair, name), ok in zip(self.parts.labels, self.is_unique.tolist(), strict=True):
             out[pair][name] = ok
+        for coupling, ok in zip(self.parts.system.couplings, self.coupling_is_unique.tolist(), strict=True):
+            out[coupling.name] = {"effort": ok}
         return out
 
     @cached_property
@@ -149,7 +163,9 @@ def uniqueness(
     found = found or closure_rank(here, driven, engine)
     count = min(PROBES, found.count - found.rank)
     probes = found.random_stress(np.random.default_rng(SEED), count)
-    return Uniqueness(parts, found, parts.table(pair_states(here, probes)))
+    coefficients = np.abs(here.system.coupling_matrix).max(axis=1, initial=0.0)
+    multipliers = probes[6 * len(here.system.graph.loops) :]
+    return Uniqueness(parts, found, parts.table(pair_states(here, probes)), coefficients[:, None] * multipliers)
 
 
 def pair_states(here: Configuration, rows: Array) -> Array:
