@@ -6,7 +6,7 @@ Component axes first, the flat batch of positions last, NaN where a position was
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -47,6 +47,8 @@ KEPT = (
     "coupled_stress", "shaking", "balance", "power",
 )  # fmt: skip
 """Fields of ``BlockForces`` that are kept for every position."""
+RETAINED = 40_000
+"""Links times positions up to which motions evaluated again are retained (some 20 MB), as readers ask for one pair after another."""
 
 
 class Trajectory:
@@ -77,7 +79,7 @@ class Trajectory:
         self._holds: dict[tuple[str, bool], Array] = {}
         self._largest = np.zeros(2)
         self._solved = np.zeros(self._count, dtype=bool)
-        self._last: BlockMotion | None = None
+        self._motions: list[BlockMotion] = []
         self.has_forces = False
         self.engine: Literal["dense", "sparse"] = "dense"
         self.work = Work()
@@ -95,7 +97,7 @@ class Trajectory:
             ("closure", motion.here.closure),
         ):
             self._keep(name, places, values)
-        self._last = motion if len(places) == self._count else None
+        self._motions = [motion] if len(places) == self._count else []
         if forces is None:
             return
         self.has_forces = True
@@ -145,14 +147,17 @@ class Trajectory:
 
     def _evaluated(self, value: Callable[[BlockMotion], Array]) -> Array:
         """What a function gives of the motion at all solved positions, block by block, ``(..., T)``."""
-        if self._last is not None:
-            return value(self._last)
+        if len(self._motions) == 1 and len(self._motions[0].places) == self._count:
+            return value(self._motions[0])
+        motions: Iterable[BlockMotion] = self._motions or map(self._motion, in_blocks(np.flatnonzero(self._solved)))
+        if len(self.mechanism.links) * self._count <= RETAINED:
+            motions = self._motions = list(motions)
         out: Array | None = None
-        for places in in_blocks(np.flatnonzero(self._solved)):
-            found = value(self._motion(places))
+        for motion in motions:
+            found = value(motion)
             if out is None:
                 out = np.full((*found.shape[:-1], self._count), np.nan)
-            out[..., places] = found
+            out[..., motion.places] = found
         assert out is not None
         return out
 
