@@ -48,7 +48,7 @@ KEPT = (
 )  # fmt: skip
 """Fields of ``BlockForces`` that are kept for every position."""
 RETAINED = 40_000
-"""Links times positions up to which motions evaluated again are retained (some 20 MB), as readers ask for one pair after another."""
+"""Links times positions up to which motions evaluated again are retained (some 30 MB), as readers ask for one pair after another."""
 
 
 class Trajectory:
