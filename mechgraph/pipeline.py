@@ -116,7 +116,7 @@ class Pipeline:
         """The leading drivers: as many as can move independently, taken in the order of the drivers."""
         if not self.freedoms.dependent:
             return np.arange(len(self.columns))
-        rank = rank_of(singular_values(self.freedoms.null[self.columns]), 1e-8)
+        rank = rank_of(singular_values(self.freedoms.null[self.columns]), PATH.independent)
         order = [int(c) for c in self.columns]
         chosen = independent_rows(self.freedoms.null, order, rank)
         return np.array([order.index(c) for c in sorted(chosen, key=order.index)], dtype=np.intp)

@@ -298,7 +298,7 @@ class _Legs:
             more = self._halved(follower, interpolation, wrong)
             if not len(more):
                 break
-            nodes, inside = Nodes.join([nodes, more]), inside
+            nodes = Nodes.join([nodes, more])
         out.tracks = replace(tracks, nodes=nodes)
         wrong = np.concatenate(bad)
         out.status[wrong] = Status.NOT_CLOSED

@@ -319,9 +319,8 @@ class Follower:
 
     def _behind(self, nodes: Nodes, track: int, crossing: float) -> Nodes | None:
         for distance in (4e-3, 1e-3, 2.5e-4):
-            at = np.array(
-                [crossing + distance]
-            )  # also behind the end: whether a crossing is passed does not hang on where a path ends
+            # also where that is behind the end: whether a crossing is passed does not hang on where a path ends
+            at = np.array([crossing + distance])
             smooth = nodes.take((nodes.place <= crossing - 0.5 * distance) & (nodes.which == nodes.which[-1]))
             smooth = smooth.take(np.unique(smooth.place, return_index=True)[1])
             if len(smooth) < 3:

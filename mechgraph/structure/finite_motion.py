@@ -22,9 +22,11 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import CLOSED, CLOSURE_GOAL
+from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import System
 from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
 from mechgraph.closure.rank import ClosureRank, EngineName, closure_rank
+from mechgraph.numerics.newton import closest_zeros
 
 STEPS = (0.05, 0.0125, 0.003)
 """Lengths of trial steps (radians, or lengths / L): the first ones tell a motion that returns, the last ones tolerate curvature."""
@@ -40,12 +42,6 @@ FROZEN = 12
 """Corrections with the equations of the position left."""
 SLOW = 0.2
 """Part of the closure error that such a correction may leave."""
-CORRECTIONS = 60
-"""Corrections with equations of the new position; a double root halves its error with each."""
-PATIENCE = 8
-"""Corrections without gain after which closing is given up."""
-LONGEST = 0.5
-"""Largest component of a correction."""
 STEPS_SEED = 7
 
 
@@ -219,16 +215,10 @@ def _closed(system: System, x: Array, rows: ReducedRows) -> Array | None:
     quick = _corrected(system, x, rows)
     if quick is not None and float(system.at(quick[:, None]).closure[0]) <= CLOSED:
         return quick
-    best, least, since = x, np.inf, 0
-    for _ in range(CORRECTIONS):
-        here = system.at(x[:, None])
-        residual = here.residual[:, 0]
-        error = float(np.abs(residual).max(initial=0.0))
-        since = since + 1 if error > 0.999 * least else 0
-        best, least = (x, error) if error < least else (best, least)
-        if error <= CLOSURE_GOAL or since > PATIENCE:
-            break
-        dq = ReducedRows(ClosureRows.at(here), np.zeros(0, dtype=np.intp), rows.dense).correction(residual)
-        dq = dq * min(1.0, LONGEST / max(float(np.abs(dq).max()), 1e-300))
-        x = system.advance(x[:, None], dq[:, None])[:, 0]
-    return best if float(system.at(best[:, None]).closure[0]) <= CLOSED else None
+
+    def least(here: Configuration) -> Array:
+        new = ReducedRows(ClosureRows.at(here), np.zeros(0, dtype=np.intp), rows.dense)
+        return new.correction(here.residual[:, 0])[:, None]
+
+    best, _ = closest_zeros(system.at, least, system.advance, x[:, None], tolerance=CLOSURE_GOAL)
+    return best[:, 0] if float(system.at(best).closure[0]) <= CLOSED else None

@@ -68,11 +68,6 @@ class Uniqueness:
         """Largest part of a self-stress in a component called unique."""
         return float(self.sizes[self.is_unique].max(initial=0.0))
 
-    @property
-    def strongest(self) -> float:
-        """Smallest part of a self-stress in a component called not unique."""
-        return float(self.sizes[~self.is_unique].min(initial=np.inf))
-
     @cached_property
     def unique(self) -> dict[str, dict[str, bool]]:
         """Pair -> component -> whether it is unique; ``effort`` (or ``effort Tz``) for driven freedoms and for couplings."""
