@@ -19,6 +19,9 @@ from mechgraph.closure.indexing import Index
 from mechgraph.numerics.continuation import Follower
 from mechgraph.numerics.hermite import Interpolation
 
+TURNING = 1e-6
+"""Part of a unit motion from which on a body takes part in it."""
+
 
 @dataclass(frozen=True)
 class Idle:
@@ -37,9 +40,9 @@ def rest_points(here: Configuration, idle: tuple[Idle, ...], Z: Array) -> list[A
     out = []
     for body in idle:
         origin = here.poses[:, 3, body.link]
-        mine = [V[:, body.link] for V in twists if np.abs(V[:, body.link]).max() > 1e-6]
+        mine = [V[:, body.link] for V in twists if np.abs(V[:, body.link]).max() > TURNING]
         point = origin
-        if len(mine) == 1 and (np.abs(mine[0][:3]).max(axis=0) > 1e-6).all():
+        if len(mine) == 1 and (np.abs(mine[0][:3]).max(axis=0) > TURNING).all():
             w, v = mine[0][:3], mine[0][3:] + cross(mine[0][:3], origin)
             point = origin + cross(w, v) / (w * w).sum(axis=0)
         out.append(point)
@@ -93,8 +96,6 @@ TURNS = 8
 """Most repetitions of the turn that takes the spin out."""
 TURNED = 1e-13
 """Angle that is rounding."""
-TURNING = 1e-6
-"""Part of a unit motion from which on a body takes part in it."""
 
 
 def unspun(path: DriverPath, found: Positions, bodies: tuple[Idle, ...]) -> Positions:
@@ -304,8 +305,8 @@ def _leading_part(twists: Array) -> tuple[Array, Array, int]:
     """Of the stacked twists ``(6 bodies, T)`` of one passive motion a turn, or where there is none a slide; its length and body."""
     parts = twists.reshape(-1, 3, twists.shape[1])
     lengths = np.sqrt((parts * parts).sum(axis=1))
-    turns = [i for i in range(0, len(parts), 2) if (lengths[i] > 1e-6).all()]
-    slides = [i for i in range(1, len(parts), 2) if (lengths[i] > 1e-6).all()]
+    turns = [i for i in range(0, len(parts), 2) if (lengths[i] > TURNING).all()]
+    slides = [i for i in range(1, len(parts), 2) if (lengths[i] > TURNING).all()]
     i = (turns or slides or [0])[0]
     return parts[i], np.maximum(lengths[i], 1e-300), i // 2
 
@@ -316,8 +317,8 @@ def hold_names(here: Configuration, idle: tuple[Idle, ...], Z: Array) -> list[tu
     twists = [here.link_twists(Z[:, p]) for p in range(Z.shape[1])]
     out: list[tuple[str, bool]] = []
     for V in twists:
-        moving = next((b for b in idle if np.abs(V[:, b.link]).max(initial=0.0) > 1e-6), idle[0])
-        turns = bool((np.abs(V[:3, moving.link]).max(axis=0) > 1e-6).all())
+        moving = next((b for b in idle if np.abs(V[:, b.link]).max(initial=0.0) > TURNING), idle[0])
+        turns = bool((np.abs(V[:3, moving.link]).max(axis=0) > TURNING).all())
         name = links[moving.link]
         count = sum(n.split(" (")[0] == name for n, _ in out)
         out.append((f"{name} ({count + 1})" if count else name, turns))

@@ -18,6 +18,7 @@ from mechgraph.closure.assembly import named_columns, scaled_system
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.rank import EngineName
+from mechgraph.closure.sparse_solver import PROBES
 from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker, Pair
@@ -27,7 +28,7 @@ from mechgraph.numerics.linear import singular_values
 from mechgraph.numerics.tolerances import STRESSES
 from mechgraph.structure.finite_motion import FiniteMotion
 from mechgraph.structure.mobility import Freedoms, free_motion
-from mechgraph.structure.uniqueness import PROBES, pair_states
+from mechgraph.structure.uniqueness import pair_states
 
 CHANGES_SHOWN = 6
 """Largest number of single changes, and of sets of changes, reported."""

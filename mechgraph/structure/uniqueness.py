@@ -12,16 +12,14 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.rank import ClosureRank, EngineName, closure_rank
+from mechgraph.closure.sparse_solver import PROBES, SEED
 from mechgraph.structure.components import Components
 from mechgraph.structure.reaction_split import UNIQUE
 from mechgraph.structure.self_stress import Basis, SelfStress, basis_of, combinations
 from mechgraph.structure.unique_directions import UniqueDirection, unique_directions
 
-PROBES = 6
-"""Random self-stresses that represent all of them: each is a combination of all, so a component without a part in any is unique."""
 CONNECTING = 200
 """Number of self-stresses that connect loops up to which they are computed; their echelon form is dense, of that width."""
-SEED = 5
 
 
 @dataclass(frozen=True)
