@@ -152,7 +152,7 @@ def anywhere(rng):
 
 # --- comparing solutions ----------------------------------------------------------------------------------------------------
 
-PAIR = ("position", "velocity", "acceleration", "reaction", "total", "effort", "drive_effort", "force", "moment")
+PAIR = ("position", "velocity", "acceleration", "reaction", "total", "effort", "applied_effort", "force", "moment")
 LINK = ("pose", "twist", "acceleration")
 MOTION = ("position", "velocity", "acceleration", "pose", "twist")
 

@@ -405,3 +405,17 @@ def test_interrupted(tmp_path: Path) -> None:
     assert running.returncode == 130
     assert "Traceback" not in error
     assert not list(tmp_path.iterdir())
+
+
+def test_the_summary_and_the_table_tell_motor_from_spring(tmp_path: Path) -> None:
+    """A massless arm on a spring k = 7 about its hinge: the spring pulls with -7 q, the motor supplies 7 q."""
+    m = mg.Mechanism("arm", pairs=[mg.Pair("A", "R", "frame", "arm", point=(0, 0, 0), axis=(0, 0, 1))], drives=["A"],
+                     loads=[mg.TorsionSpring("A", stiffness=7.0)])  # fmt: skip
+    mg.save(m, tmp_path / "arm.toml")
+    out = tmp_path / "arm.csv"
+    text = run("solve", str(tmp_path / "arm.toml"), "--drive", "A=0:1.5:0.5", "--out", str(out)).stdout
+    motor, spring = re.findall(r"^A\.Rz +(\S+) +\S+ deg +(\S+) +\S+ deg$", text, re.MULTILINE)
+    assert (motor, spring) == (("0", "7"), ("-7", "0"))
+    assert "Applied efforts (springs, dampers, given efforts)" in text
+    rows = list(csv.DictReader(out.read_text().splitlines()))
+    assert [(float(r["A.Rz effort"]), float(r["A.Rz applied effort"])) for r in rows] == [(0, 0), (3.5, -3.5), (7, -7)]

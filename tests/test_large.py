@@ -24,7 +24,7 @@ from mechgraph.model.parameters import parameters
 from mechgraph.topology.linkgraph import link_graph
 
 AGREE = 1e-9
-VALUES = ("position", "velocity", "acceleration", "reaction", "total", "effort", "force", "moment")
+VALUES = ("position", "velocity", "acceleration", "reaction", "total", "effort", "applied_effort", "force", "moment")
 
 
 def is_sparse(s: mg.Solution) -> bool:
@@ -44,7 +44,7 @@ def assert_same(one: mg.Solution, other: mg.Solution) -> None:
         a, b = (np.concatenate([getattr(s[p.name], what).ravel() for p in s.mechanism.pairs]) for s in (one, other))
         size = np.nanmax(np.abs(a), initial=0.0)
         largest = max(largest, size) if what in ("reaction", "total", "force") else largest
-        scale = largest if what in ("effort", "moment") else max(1.0, size)
+        scale = largest if what in ("effort", "applied_effort", "moment") else max(1.0, size)
         assert_allclose(a, b, rtol=0, atol=AGREE * scale, err_msg=what)
     for p in one.mechanism.pairs:
         a, b = one[p.name].components, other[p.name].components

@@ -89,6 +89,16 @@ def test_single_position_and_effort_curve() -> None:
     assert np.allclose(line.get_ydata(), s["A"].effort[:, 0])
 
 
+def test_an_effort_curve_shows_motor_and_loads_apart() -> None:
+    """A spring in the driver's freedom: two curves, the motor's of which falls by what the spring brings."""
+    ax = effort_curve(s := mg.solve(four_bar(), {"A": THETA}, loads=[mg.TorsionSpring("A", 2.0)]))
+    motor, spring = ax.lines[:2]
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["driver", "applied"]
+    assert np.allclose(spring.get_ydata(), -2.0 * THETA)
+    assert np.allclose(motor.get_ydata(), 2.0 * THETA)
+    assert np.allclose(s["A"].applied_effort[:, 0], -2.0 * THETA)
+
+
 def test_faults_are_named() -> None:
     s = mg.solve(four_bar(), {"A": THETA})
     with pytest.raises(mg.DeclarationError, match="position 99"):

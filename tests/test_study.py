@@ -405,8 +405,8 @@ def test_builders_may_close_over_what_they_vary() -> None:
     def build(pull: float = 1.0) -> mg.Mechanism:
         return pendulum().replace(loads=[mg.Effort("A", lambda pose, twist, t: np.full(np.shape(pose)[:-2], pull))])
 
-    study = mg.study(build, {"pull": [1.0, 2.0]}, "A.drive_effort", motions={"A": [0.0, 0.1]}, sampling="grid")
-    assert study.outputs["A.drive_effort"] == pytest.approx(np.array([[-1.0, -1.0], [-2.0, -2.0]]))
+    study = mg.study(build, {"pull": [1.0, 2.0]}, "A.effort", motions={"A": [0.0, 0.1]}, sampling="grid")
+    assert study.outputs["A.effort"] == pytest.approx(np.array([[-1.0, -1.0], [-2.0, -2.0]]))
 
 
 def test_numbers_of_a_chain_and_of_a_marker_together() -> None:

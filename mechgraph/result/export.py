@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 def columns(s: Solution) -> dict[str, Array]:
     """Columns by name: coordinates, rates, efforts, reaction components, status and checks.
 
-    Names are ``B.Tz``, ``B.Tz velocity``, ``B.Tz effort``, ``B:Fx`` (component of the reaction), with the unit in brackets where
-    the mechanism declares units.
+    Names are ``B.Tz``, ``B.Tz velocity``, ``B.Tz effort`` (of the drive), ``B.Tz applied effort`` (of springs, dampers, given efforts),
+    ``B:Fx`` (component of the reaction), with the unit in brackets where the mechanism declares units.
     """
     m = s.mechanism
     out: dict[str, Array] = {}
@@ -47,9 +47,10 @@ def columns(s: Solution) -> dict[str, Array]:
     if s.has_forces:
         for pair in m.pairs:
             r = s[pair.name]
-            efforts = r.effort
+            efforts = {"effort": r.effort, "applied effort": r.applied_effort}
             for j, (name, part) in enumerate(zip(pair.freedom_names, pair.type.efforts, strict=True)):
-                put(f"{name} effort", efforts[..., j], 2 if part.is_couple else 1, 1, -2)
+                for label, effort in efforts.items():
+                    put(f"{name} {label}", effort[..., j], 2 if part.is_couple else 1, 1, -2)
             for name, value in r.components.items():
                 couple = name.startswith("M")
                 put(f"{pair.name}:{name}", value, 2 if couple else 1, 1, -2)

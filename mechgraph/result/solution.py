@@ -77,7 +77,7 @@ class Values(Protocol):
         """Reaction components by name, ``(...)``."""
 
     def efforts(self, pair: int) -> tuple[Array, Array]:
-        """Efforts of all kinds, and those of the driver alone, ``(..., f)``."""
+        """What the drive supplies, and what springs, dampers and given efforts do, ``(..., f)`` each."""
 
     def multiplier(self, coupling: int) -> Array:
         """Multiplier of a coupling, ``(...)``."""
@@ -129,17 +129,17 @@ class PairResult:
 
     @property
     def total(self) -> Array:
-        """Reaction and efforts, all that the pair transmits, ``(..., 6)``."""
+        """Reaction and all efforts (of couplings too), all that the pair transmits, ``(..., 6)``."""
         return self._values.total(self._index)
 
     @property
     def effort(self) -> Array:
-        """Efforts ``(..., f)`` of driver, springs and given efforts together; 0 where nothing acts."""
+        """What the drive supplies ``(..., f)``, the motor's torque or force: + on link b, - on link a; 0 in freedoms not driven."""
         return self._values.efforts(self._index)[0]
 
     @property
-    def drive_effort(self) -> Array:
-        """The driver's own part of ``effort``."""
+    def applied_effort(self) -> Array:
+        """What loads do in the freedoms ``(..., f)``: springs, dampers, given efforts; 0 where nothing acts."""
         return self._values.efforts(self._index)[1]
 
     @property
@@ -170,7 +170,7 @@ class PairResult:
             "velocity": tuple(unit_of(m.units, (n, 0, -1)) for n in lengths),
             "acceleration": tuple(unit_of(m.units, (n, 0, -2)) for n in lengths),
             "effort": efforts,
-            "drive_effort": efforts,
+            "applied_effort": efforts,
             "force": force,
             "moment": moment,
             "reaction": (moment,) * 3 + (force,) * 3,

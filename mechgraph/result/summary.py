@@ -39,7 +39,7 @@ def summary(s: Solution, not_unique: Mapping[str, Mapping[str, bool]] | None = N
     blocks: list[Block] = [*view.positions(), *view.driver_table()]
     if s.has_forces and view.solved.any():
         if view.loaded:
-            blocks += [*view.effort_table(), *view.reaction_table()]
+            blocks += [*view.effort_tables(), *view.reaction_table()]
         else:
             blocks.append(
                 Paragraph("All efforts and reactions are zero: no link has a mass that moves and no load acts.")
@@ -76,9 +76,12 @@ class _View:
         self.force_unit = unit_of(self.m.units, (1, 1, -2))
         self.moment_unit = unit_of(self.m.units, (2, 1, -2))
         self.forces, self.moments = self._magnitudes() if s.has_forces else ([], [])
-        self.efforts = [self.of_freedom(name, "drive_effort") for name in self.drivers] if s.has_forces else []
+        self.efforts = {name: self.of_freedom(name, "effort") for name in self.drivers} if s.has_forces else {}
+        self.applied = self._applied() if s.has_forces else {}
         self.extent = self._extent()
-        self.loaded = any(_largest(rows) > 0 for rows in (self.forces, self.moments, self.efforts))
+        self.loaded = any(
+            _largest(rows) > 0 for rows in (self.forces, self.moments, [*self.efforts.values(), *self.applied.values()])
+        )
 
     def flat(self, values: Any) -> Array:
         """One value a position."""
@@ -88,6 +91,11 @@ class _View:
         """A quantity of one freedom over the positions."""
         k, j = self.m.freedom(name)
         return self.flat(getattr(self.s[self.m.pairs[k].name], what)[..., j])
+
+    def _applied(self) -> dict[str, Array]:
+        """What loads do in freedoms, of those in which they do something."""
+        found = {name: self.of_freedom(name, "applied_effort") for name in self.m.freedom_names()}
+        return {name: values for name, values in found.items() if _largest([values]) > 0}
 
     def _magnitudes(self) -> tuple[list[Array], list[Array]]:
         rows = [self.s[p.name] for p in self.m.pairs]
@@ -172,11 +180,15 @@ class _View:
         if rows:
             yield Table(("driver", "from", "to", "rate"), tuple(rows), align="lrrr")
 
-    def effort_table(self) -> Iterator[Block]:
-        """Range of every driver's effort, and where."""
-        largest = _largest(self.efforts)
+    def effort_tables(self) -> Iterator[Block]:
+        """Range of every driver's effort, and where; the same of what springs, dampers and given efforts do."""
+        largest = _largest([*self.efforts.values(), *self.applied.values()])
+        yield from self._ranges("Efforts of the drivers", "driver", self.efforts, largest)
+        yield from self._ranges("Applied efforts (springs, dampers, given efforts)", "freedom", self.applied, largest)
+
+    def _ranges(self, title: str, what: str, efforts: Mapping[str, Array], largest: float) -> Iterator[Block]:
         rows = []
-        for name, effort in zip(self.drivers, self.efforts, strict=True):
+        for name, effort in efforts.items():
             head = _with_unit(name, f"[{self.effort_unit(name)}]" if self.effort_unit(name) else "")
             if np.isnan(effort[self.solved]).any():
                 rows.append((head, "not unique", "", "", ""))
@@ -186,8 +198,8 @@ class _View:
                 (head, _number(effort[low], largest), self.place(low), _number(effort[high], largest), self.place(high))
             )
         if rows:
-            yield Heading("Efforts of the drivers", 2)
-            yield Table(("driver", "least", "at", "greatest", "at"), tuple(rows), align="lrrrr")
+            yield Heading(title, 2)
+            yield Table((what, "least", "at", "greatest", "at"), tuple(rows), align="lrrrr")
 
     def reaction_table(self) -> Iterator[Block]:
         """Greatest force and moment of every pair's reaction, and where; of what is unique of it."""
@@ -262,7 +274,7 @@ class _View:
         found = {name: self.flat(value) for name, value in self.s.passive_effort.items()}
         if not found:
             return
-        scale = max(_largest(self.moments), _largest(self.efforts))
+        scale = max(_largest(self.moments), _largest([*self.efforts.values()]))
         items = []
         for name, value in found.items():
             size = float(np.nanmax(np.abs(value), initial=0.0))

@@ -304,7 +304,7 @@ class Trajectory:
         return {name: self._out(part) for name, part in zip(row.component_names, masked, strict=True)}
 
     def efforts(self, pair: int) -> tuple[Array, Array]:
-        """Efforts of all kinds and of the driver alone."""
+        """What the drive supplies, and what loads do in the freedoms."""
         columns = self._columns(pair)
         total, given, coupled = (self._force(name)[columns] for name in ("efforts", "given", "coupled"))
         driven = np.isin(np.arange(columns.start, columns.stop), self.driven)[:, None]
@@ -313,7 +313,7 @@ class Trajectory:
         stress = np.where(
             driven[:, None], self._of("stress_efforts")[columns] - self._of("coupled_stress")[columns], 0.0
         )
-        return self._out(self._masked(unit * (own + given), stress)), self._out(self._masked(unit * own, stress))
+        return self._out(self._masked(unit * own, stress)), self._out(unit * given)
 
     def multiplier(self, coupling: int) -> Array:
         """The multiplier of a coupling in the user's units: the effort ``c_i m`` in freedom i."""

@@ -13,7 +13,7 @@ from mechgraph.units import unit_of
 
 
 def effort_curve(s: Solution, freedom: str | None = None, *, ax: Any = None, marked: int | None = None) -> Any:
-    """Draw the effort of a driver over its position; a turn in degrees. Returns the axes.
+    """Draw what a driver supplies over its position (a turn in degrees), and where loads act in its freedom what they do. Returns the axes.
 
     Parameters
     ----------
@@ -40,16 +40,23 @@ def effort_curve(s: Solution, freedom: str | None = None, *, ax: Any = None, mar
     turns, couple = pair.type.freedoms[j].turns, pair.type.efforts[j].is_couple
     result = s[pair.name]
     order = np.atleast_1d(np.rad2deg(result.position[..., j]) if turns else result.position[..., j])
-    effort = np.atleast_1d(result.drive_effort[..., j])
+    efforts = {"driver": np.atleast_1d(result.effort[..., j]), "applied": np.atleast_1d(result.applied_effort[..., j])}
+    if not np.nan_to_num(efforts["applied"]).any():
+        efforts.pop("applied")
 
     ax = pyplot().subplots(layout="constrained")[1] if ax is None else ax
     unit = unit_of(m.units, (2, 1, -2) if couple else (1, 1, -2))
     length = unit_of(m.units, (1, 0, 0))
-    for row_x, row_y in zip(order.reshape(-1, order.shape[-1]), effort.reshape(-1, effort.shape[-1]), strict=True):
-        ax.plot(row_x, row_y, color=PALETTE[0], lw=2.0, solid_capstyle="round", marker="o" if row_x.size == 1 else "")
+    marker, rows = "o" if order.shape[-1] == 1 else "", order.reshape(-1, order.shape[-1])
+    for (label, effort), colour in zip(efforts.items(), (PALETTE[0], MUTED), strict=False):
+        for i, (x, y) in enumerate(zip(rows, effort.reshape(rows.shape), strict=True)):
+            ax.plot(x, y, color=colour, lw=2.0, solid_capstyle="round", marker=marker, label="_" * bool(i) + label)
+    if len(efforts) > 1:
+        ax.legend(frameon=False)
     ax.axhline(0.0, color=MUTED, lw=0.8, zorder=0)
     ax.set_xlabel(f"{name} [deg]" if turns else f"{name} [{length}]" if length else name, color=INK)
-    ax.set_ylabel(f"{'torque' if couple else 'force'} of the driver {name}" + (f" [{unit}]" if unit else ""), color=INK)
+    who = f"of the driver {name}" if len(efforts) == 1 else f"in {name}"
+    ax.set_ylabel(f"{'torque' if couple else 'force'} {who}" + (f" [{unit}]" if unit else ""), color=INK)
     if turns and np.nanmax(order) - np.nanmin(order) > 90:
         step = next(d for d in (30, 45, 60, 90, 180, 360, 1e9) if (np.nanmax(order) - np.nanmin(order)) / d <= 8)
         ax.xaxis.set_major_locator(pyplot().MultipleLocator(step))
@@ -60,7 +67,7 @@ def effort_curve(s: Solution, freedom: str | None = None, *, ax: Any = None, mar
     if marked is not None:
         ax.plot(
             order.reshape(-1)[marked],
-            effort.reshape(-1)[marked],
+            efforts["driver"].reshape(-1)[marked],
             "o",
             ms=8,
             mfc="white",

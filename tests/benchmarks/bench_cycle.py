@@ -77,7 +77,7 @@ def cycle(m, span, n):
         for pair in m.pairs:
             assert s[pair.name].reaction.shape[-1] == 6
         checks = s.checks
-        assert np.isfinite(s[name.split(".")[0]].drive_effort).all()
+        assert np.isfinite(s[name.split(".")[0]].effort).all()
         assert checks.closure.max() < 1e-12
         assert checks.equilibrium.max() < 1e-12
         return s

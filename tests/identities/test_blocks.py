@@ -38,7 +38,7 @@ def values(s):
             "reaction",
             "total",
             "effort",
-            "drive_effort",
+            "applied_effort",
             "force",
             "moment",
         ):

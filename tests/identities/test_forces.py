@@ -54,7 +54,7 @@ def largest(s, m):
 def assert_same_forces(a, b, m, tolerance=1e-9):
     big = largest(a, m)
     for p in m.pairs:
-        for what in ("reaction", "total", "effort"):
+        for what in ("reaction", "total", "effort", "applied_effort"):
             x, y = getattr(a[p.name], what), getattr(b[p.name], what)
             np.testing.assert_array_equal(np.isnan(x), np.isnan(y), err_msg=f"{p.name} {what}")
             np.testing.assert_allclose(x, y, rtol=0, atol=tolerance * big, err_msg=f"{p.name} {what}")
@@ -172,11 +172,13 @@ def test_undriven_freedoms_transmit_the_efforts_that_are_given_and_reactions_do_
         relative = s.link(p.b).twist - s.link(p.a).twist
         size = big * max(1.0, np.abs(relative).max())
         np.testing.assert_allclose((r.reaction * relative).sum(-1), 0, atol=1e-9 * size)
-        np.testing.assert_allclose((r.total * relative).sum(-1), (r.effort * r.velocity).sum(-1), atol=1e-9 * size)
+        efforts = r.effort + r.applied_effort
+        np.testing.assert_allclose((r.total * relative).sum(-1), (efforts * r.velocity).sum(-1), atol=1e-9 * size)
         np.testing.assert_allclose(r.force, r.reaction[..., 3:], atol=1e-9 * big)
         for j, name in enumerate(p.freedom_names):
+            np.testing.assert_allclose(r.applied_effort[..., j], given_effort(m, s, k, j), atol=1e-9 * big)
             if name not in driven:
-                np.testing.assert_allclose(r.effort[..., j], given_effort(m, s, k, j), atol=1e-9 * big)
+                assert not r.effort[..., j].any()
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -220,7 +222,7 @@ def test_what_is_printed_is_what_is_solved(seed, bookkeeping):
         name = m.full_name(drive.freedom)
         k, j = m.freedom(name)
         mine = next(v for x, v in zip(f.unknowns, u, strict=True) if x.freedom == name)
-        np.testing.assert_allclose(mine, s[m.pairs[k].name].drive_effort[i, j], atol=1e-9 * big)
+        np.testing.assert_allclose(mine, s[m.pairs[k].name].effort[i, j], atol=1e-9 * big)
     at = 0
     for k, p in enumerate(m.pairs):
         mine = [n for n, x in enumerate(f.unknowns) if x.owner == p.name and not x.freedom]
@@ -255,6 +257,7 @@ def test_a_moved_mechanism_has_the_moved_forces(seed):
         if not loose:
             np.testing.assert_allclose(y.reaction, expected, atol=1e-8 * big)
         np.testing.assert_allclose(y.effort, x.effort, atol=1e-8 * big)
+        np.testing.assert_allclose(y.applied_effort, x.applied_effort, atol=1e-8 * big)
         for name, value in x.components.items():
             np.testing.assert_allclose(y.components[name], value, atol=1e-7 * big)
     np.testing.assert_allclose(
@@ -335,7 +338,7 @@ def test_power_supplied_is_the_rate_of_kinetic_energy(seed):
     rate, tail = chebyshev_rate(t, kinetic_energy(m, s))
     applied = applied_wrenches(m, s)
     terms = [(applied[k.name] * s.link(k.name).twist).sum(-1) for k in m.links]
-    terms += [(s[p.name].effort * s[p.name].velocity).sum(-1) for p in m.pairs]
+    terms += [((s[p.name].effort + s[p.name].applied_effort) * s[p.name].velocity).sum(-1) for p in m.pairs]
     size = max(np.abs(x).max() for x in terms)
     np.testing.assert_allclose(sum(terms), rate, atol=1e-6 * size + 10 * tail)
 
@@ -392,7 +395,7 @@ def test_values_over_positions_are_the_values_at_each():
             {"A": mg.Motion(ANGLE[i], 1.5, -0.5)},
         )
         np.testing.assert_allclose(whole["A"].total[i], one["A"].total, atol=1e-13)
-        np.testing.assert_allclose(whole["A"].drive_effort[i], one["A"].drive_effort, atol=1e-13)
+        np.testing.assert_allclose(whole["A"].effort[i], one["A"].effort, atol=1e-13)
 
 
 def test_callable_values_are_called_with_pose_twist_and_time():
@@ -411,7 +414,7 @@ def test_callable_values_are_called_with_pose_twist_and_time():
     np.testing.assert_allclose(by_call["A"].total, by_array["A"].total, atol=1e-13)
     effort = mg.solve(pendulum(loads=[mg.Effort("A", lambda pose, twist, t: -0.7 * twist[..., 2])]), MOTION)
     np.testing.assert_allclose(
-        effort["A"].drive_effort[:, 0] - mg.solve(pendulum(), MOTION)["A"].effort[:, 0], 0.7 * 1.5, atol=1e-13
+        effort["A"].effort[:, 0] - mg.solve(pendulum(), MOTION)["A"].effort[:, 0], 0.7 * 1.5, atol=1e-13
     )
 
 
@@ -434,7 +437,7 @@ def test_a_callable_load_works_for_one_position():
         ]
     )
     s = mg.solve(m, {"A": 0.5})
-    np.testing.assert_allclose(s["A"].drive_effort, [3 * np.cos(0.5) - 2.0], atol=1e-13)
+    np.testing.assert_allclose(s["A"].effort, [3 * np.cos(0.5) - 2.0], atol=1e-13)
 
 
 def test_a_load_of_the_wrong_length_is_refused():
@@ -443,11 +446,12 @@ def test_a_load_of_the_wrong_length_is_refused():
 
 
 def test_an_effort_acts_with_plus_on_b_and_minus_on_a():
-    """The driver needs as much less as the given effort brings; reversed links reverse its sense."""
+    """The motor supplies as much less as the given effort brings; reversed links reverse its sense."""
     plain = mg.solve(pendulum(), MOTION)["A"].effort[:, 0]
     s = mg.solve(pendulum(loads=[mg.Effort("A", 10.0)]), MOTION)
-    np.testing.assert_allclose(s["A"].effort[:, 0], plain, atol=1e-13)
-    np.testing.assert_allclose(s["A"].drive_effort[:, 0], plain - 10.0, atol=1e-13)
+    np.testing.assert_allclose(s["A"].effort[:, 0], plain - 10.0, atol=1e-13)
+    np.testing.assert_array_equal(s["A"].applied_effort[:, 0], np.full(7, 10.0))
+    np.testing.assert_allclose(s["A"].total, mg.solve(pendulum(), MOTION)["A"].total, atol=1e-13)
     flipped = pendulum(pairs=[mg.Pair("A", "R", "bar", "frame", point=(0, 0, 0), axis=(0, 0, 1))], frame="frame")
     r = mg.solve(flipped, {"A": mg.Motion(-ANGLE, -1.5, 0.5)})
     np.testing.assert_allclose(r["A"].effort[:, 0], -plain, atol=1e-13)
@@ -474,7 +478,7 @@ def test_a_torsion_spring_is_an_effort_proportional_to_the_angle():
     m = pendulum(loads=[mg.TorsionSpring("A", stiffness=7.0, free=0.2, damping=0.4)])
     s, plain = mg.solve(m, MOTION), mg.solve(pendulum(), MOTION)
     np.testing.assert_allclose(
-        s["A"].drive_effort[:, 0], plain["A"].effort[:, 0] + 7.0 * (ANGLE - 0.2) + 0.4 * 1.5, atol=1e-12
+        s["A"].effort[:, 0], plain["A"].effort[:, 0] + 7.0 * (ANGLE - 0.2) + 0.4 * 1.5, atol=1e-12
     )
     np.testing.assert_allclose(s["A"].total, plain["A"].total, atol=1e-12)
 
