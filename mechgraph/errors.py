@@ -10,7 +10,11 @@ if TYPE_CHECKING:
 
 
 class MechgraphError(Exception):
-    """The base of every error that mechgraph raises on purpose."""
+    """The base of every error that mechgraph raises on purpose; it pickles and copies with the data that it carries."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """By message and data: an exception's own way calls the constructor with the message alone."""
+        return _restored, (type(self), self.args, self.__dict__)
 
 
 class DeclarationError(MechgraphError):
@@ -94,3 +98,10 @@ class MissingExtraError(MechgraphError, ImportError):
         self.package = package
         self.extra = extra
         super().__init__(f"this needs {package}: pip install 'mechgraph[{extra}]'")
+
+
+def _restored(kind: type[MechgraphError], message: tuple[Any, ...], data: dict[str, Any]) -> MechgraphError:
+    error = kind.__new__(kind, *message)
+    super(MechgraphError, error).__init__(*message)
+    error.__dict__.update(data)
+    return error

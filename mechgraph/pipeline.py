@@ -162,8 +162,8 @@ class Pipeline:
     def run(self, starts: Starts | None = None, batch: tuple[int, ...] | None = None) -> Outcome:
         """All positions, rates and forces as a trajectory."""
         batch = self.drive.batch if batch is None else batch
-        system, start = self.system, None if starts else self.start
-        starts = starts or Starts(self.x[:, None], lambda variants: system, self.m.loads)
+        start = None if starts else self.start
+        starts = starts or Starts(self.x[:, None], self.system.cases, self.m.loads)
         one = starts.x.shape[1] == 1
         T = int(np.prod(batch))
         shared = starts.sharing > 1

@@ -186,6 +186,27 @@ def test_positions_out_of_reach() -> None:
     assert "positions 56 to 69: out of reach (after O1.Rz = 205 deg)" in result.stdout
 
 
+def test_nothing_solved_of_a_mechanism_with_a_passive_freedom(tmp_path: Path) -> None:
+    mg.save(mg.load("rssr").replace(drives=["D"]), tmp_path / "m.toml")
+    result = run("solve", tmp_path / "m.toml", "--drive", "D=2")
+    assert result.exit_code == 1
+    assert "out of reach" in result.stderr
+    flagged = (
+        "solve",
+        tmp_path / "m.toml",
+        "--drive",
+        "D=2:2.2:0.1",
+        "--on-reach",
+        "flag",
+        "--out",
+        tmp_path / "x.csv",
+    )
+    result = run(*flagged)
+    assert result.exit_code == 1
+    assert "Solved 0 of 2 positions." in result.stdout
+    assert (tmp_path / "x.csv").read_text().count(",out of reach\n") == 2
+
+
 def test_nothing_solved_is_no_success() -> None:
     result = run("solve", "rcsr", "--drive", "O1=0deg", "--on-reach", "flag")
     assert result.exit_code == 1

@@ -490,3 +490,12 @@ def test_coefficients_of_a_coupling_vary() -> None:
     m = mg.Mechanism("gears", pairs=pairs, couplings=[mg.Coupling({"A": 2.0, "B": -3.0}, name="g")], drives=["A"])
     s = mg.study(m, {"g.B": [-3.0, -2.0, -1.0]}, ["B.position"], n=3, motions={"A": [0.0, 1.0]})
     np.testing.assert_allclose(s.outputs["B.position"][:, 1].ravel(), -2.0 / s.parameters["g.B"], rtol=1e-12)
+
+
+@pytest.mark.parametrize("number", ["coupler.mass", "B.point.x"])
+@pytest.mark.parametrize("positions", [[2.0], [0.0339174, 2.0]])
+def test_no_position_solved_of_a_mechanism_with_passive_freedoms(number: str, positions: list[float]) -> None:
+    m = mg.load("rssr").replace(drives=["D"])  # its dead point lies at 0.033917
+    s = mg.study(m, {number: [0.06, 0.061]}, ["D.effort", "A.position"], n=2, motions={"D": positions})
+    assert s.status[:, -1].tolist() == ["out of reach"] * 2
+    assert np.isnan(s.outputs["D.effort"][:, -1]).all()

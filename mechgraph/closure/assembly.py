@@ -109,7 +109,7 @@ def led(system: System, x: Array, columns: Index, goal: Array) -> tuple[Array, b
 
     Other freedoms that are free follow as they are held; a goal that is itself a singular position is closed from right before it.
     """
-    path = DriverPath(system, closure_solver(engine_for(system.n_rows, 1, "auto"), columns), lambda variants: system)
+    path = DriverPath(system, closure_solver(engine_for(system.n_rows, 1, "auto"), columns), system.cases)
     found = follow(path, [Request(x, 0, goal[:, None], np.zeros(1, dtype=np.intp))], 1)
     if found.status[0] is Status.OK:
         return found.x[:, 0], True

@@ -17,7 +17,6 @@ Methods for Bifurcations of Dynamical Equilibria, 2000, chapter 3 (bordered syst
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import scipy
@@ -27,7 +26,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
-from mechgraph.numerics.sparse import Pattern, SparseFactor
+from mechgraph.numerics.sparse import Factors, Pattern, SparseFactor
 from mechgraph.numerics.tolerances import RANKS
 
 Mask = NDArray[np.bool_]
@@ -178,8 +177,8 @@ class LoopSystem(ReducedRows):
         return scipy.sparse.csr_array((values[mine], (at[mine] - self._m, to[mine])), shape=(self.held, self._n))
 
     @cached_property
-    def _normal(self) -> Any:
-        return scipy.sparse.linalg.splu(scipy.sparse.csc_array(self._holding @ self._holding.T))
+    def _normal(self) -> Factors:
+        return Factors(scipy.sparse.csc_array(self._holding @ self._holding.T))
 
     def unheld(self, dq: Array) -> Array:
         """Increments ``(F, k)`` with the least change that takes the held motions out of them, ``G (dq / scale) = 0``."""

@@ -358,6 +358,10 @@ class System:
         """The constant reaction components in their nodes, moment and force ``(3, 2, K, B)``."""
         return self.numbers.components(self.reaction_table)
 
+    def cases(self, which: Index) -> System:
+        """The system with the numbers of some variants of its batch, in that order; of a batch of one, itself."""
+        return self if self.par.batch == 1 else self.with_parameters(self.par.taken(which))
+
     def with_parameters(self, par: Parameters) -> System:
         """The same graph with other numbers."""
         out = copy(self)

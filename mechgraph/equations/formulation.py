@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from types import MappingProxyType
 
 import numpy as np
 import scipy
@@ -53,7 +52,7 @@ class Formulation:
             )
             for name, count in groups.items()
         }
-        return Ledger(self.bookkeeping, MappingProxyType(rows))
+        return Ledger(self.bookkeeping, rows)
 
     # --- numbers -------------------------------------------------------------------------------------------------------
 

@@ -9,12 +9,14 @@ matrix definite where rows of K depend on each other. Source: Bjorck, Numerical 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 from mechgraph.numerics.linear import singular_values
+from mechgraph.numerics.sparse import Factors
 from mechgraph.numerics.tolerances import RANKS
 
 Array = NDArray[np.float64]
@@ -36,12 +38,11 @@ class LeastNorm:
         m = K.shape[0]
         if isinstance(K, np.ndarray):
             factor = scipy.linalg.lu_factor(K @ K.T + RANKS.damping * np.eye(m))
-            self._solve: Callable[[Array], Array] = lambda r: scipy.linalg.lu_solve(factor, r)
+            self._solve: Callable[[Array], Array] = partial(scipy.linalg.lu_solve, factor)
         elif m:
             A = (K @ K.T + RANKS.damping * scipy.sparse.eye_array(m)).tocsc()
             symmetric = {"SymmetricMode": True}
-            lu = scipy.sparse.linalg.splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=symmetric)
-            self._solve = lu.solve
+            self._solve = Factors(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=symmetric).solve
 
     def multipliers(self, r: Array) -> Array:
         """``(K K^T + d I)^-1 r`` for ``r (m, k)``."""

@@ -5,7 +5,7 @@ Source: Davis, Direct Methods for Sparse Linear Systems, 2006, chapters 6 and 7;
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Literal
 
 import numpy as np
@@ -49,27 +49,42 @@ class Pattern:
             if first is None:
                 return SparseFactor(self._matrix(values), None, self._row_place, self._col_place)
             self._known = True
-            self._arrange(first.perm_r.astype(np.intp), first.perm_c.astype(np.intp))
+            self._arrange(first.lu.perm_r.astype(np.intp), first.lu.perm_c.astype(np.intp))
         lu = self._factored(values, "NATURAL", KEEP_PIVOT)
         return SparseFactor(self._matrix(values), lu, self._row_place, self._col_place)
 
     def _matrix(self, values: Array) -> scipy.sparse.csc_array:
         return scipy.sparse.csc_array((values[self._values], self._indices, self._starts), shape=(self.size,) * 2)
 
-    def _factored(self, values: Array, order: Literal["COLAMD", "NATURAL"], threshold: float) -> Any:
-        """SuperLU of the matrix as it is arranged, None where it is exactly singular."""
+    def _factored(self, values: Array, order: Literal["COLAMD", "NATURAL"], threshold: float) -> Factors | None:
+        """Factors of the matrix as it is arranged, None where it is exactly singular."""
         try:
-            return scipy.sparse.linalg.splu(self._matrix(values), permc_spec=order, diag_pivot_thresh=threshold)
+            return Factors(self._matrix(values), permc_spec=order, diag_pivot_thresh=threshold)
         except RuntimeError:
             return None
+
+
+class Factors:
+    """SuperLU of a matrix. It is copied and pickled by the matrix, which is factored again: SuperLU itself cannot be."""
+
+    def __init__(self, A: scipy.sparse.csc_array, **options: Any) -> None:
+        self._A, self._options = A, options
+        self.lu: Any = scipy.sparse.linalg.splu(A, **options)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return partial(type(self), **self._options), (self._A,)
+
+    def solve(self, b: Array, trans: Literal["N", "T"] = "N") -> Array:
+        """Solution of ``A x = b``, or ``A^T x = b``, for ``b (n, k)``."""
+        return np.asarray(self.lu.solve(b, trans))
 
 
 class SparseFactor:
     """One factored matrix; solves with one step of refinement. ``lu`` is None for a matrix that is exactly singular."""
 
-    def __init__(self, A: scipy.sparse.csc_array, lu: Any, row_place: Index, col_place: Index) -> None:
+    def __init__(self, A: scipy.sparse.csc_array, lu: Factors | None, row_place: Index, col_place: Index) -> None:
         self._A, self._lu, self._row_place, self._col_place = A, lu, row_place, col_place
-        self._pivots = np.zeros(1) if lu is None else np.asarray(lu.U.diagonal())
+        self._pivots = np.zeros(1) if lu is None else np.asarray(lu.lu.U.diagonal())
         self.smallest_pivot = float(np.abs(self._pivots).min(initial=1.0))
 
     @cached_property
@@ -102,6 +117,7 @@ class SparseFactor:
         return self._refined(_to_places(b, self._row_place), "N", self._A)[self._col_place]
 
     def _refined(self, b: Array, trans: Literal["N", "T"], A: Any) -> Array:
+        assert self._lu is not None
         solve = self._lu.solve
         x = solve(b, trans)
         return np.asarray(x + solve(b - A @ x, trans))

@@ -277,7 +277,10 @@ class LinkResult:
 
 
 class Solution:
-    """Motion and forces at a batch of positions, by name: ``s["D"].reaction``, ``s.link("coupler").pose``."""
+    """Motion and forces at a batch of positions, by name: ``s["D"].reaction``, ``s.link("coupler").pose``.
+
+    It can be pickled where its loads can: those that hold numbers, or a function of a module.
+    """
 
     def __init__(self, values: Values) -> None:
         self._values = values

@@ -84,6 +84,10 @@ class Trajectory:
         self.engine: Literal["dense", "sparse"] = "dense"
         self.work = Work()
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the retained motions, which are most of its size and are evaluated again."""
+        return vars(self) | {"_motions": []}
+
     # --- filling -------------------------------------------------------------------------------------------------------
 
     def put(self, motion: BlockMotion, forces: BlockForces | None) -> None:

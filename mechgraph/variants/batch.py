@@ -37,7 +37,7 @@ class NumbersPath(DriverPath):
 
     def __init__(self, line: Pipeline, numbers_at: NumbersAt) -> None:
         solver = closure_solver(line.engine, line.leading, line.freedoms.hold if line.bodies else None)
-        super().__init__(line.system, solver, lambda variants: line.system)
+        super().__init__(line.system, solver, line.system.cases)
         self.size = (self.system.n_freedoms, 1)
         self._line, self._numbers_at = line, numbers_at
         self._known: tuple[bytes, System] | None = None
@@ -100,7 +100,7 @@ def solve_together(numbers_at: NumbersAt, count: int, motions: Mapping[str, Moti
         begun, x, sharing = valid, line.x[:, None], V
     else:
         begun, x, sharing = *_led(line, path, valid), 1
-    starts = Starts(x, lambda which: systems.with_parameters(systems.par.taken(which)), variants.loads, sharing)
+    starts = Starts(x, systems.cases, variants.loads, sharing)
     q = systems.coordinates_of(starts.x[..., None], line.system.start_coordinates(line.m.start))[..., 0]
     try:
         outcome = line.run(starts, np.broadcast_shapes((V, 1), line.drive.batch))

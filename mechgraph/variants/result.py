@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -46,24 +45,20 @@ class Study:
         parts: Sequence[Part],
     ) -> None:
         self._source, self._ways, self._values, self._steps, self._near = source, ways, values, steps, near
-        self.motions = MappingProxyType(dict(motions))
-        self.parameters: Mapping[str, Array] = MappingProxyType(dict(zip(ways, values, strict=True)))
+        self.motions: Mapping[str, Motion] = dict(motions)
+        self.parameters: Mapping[str, Array] = dict(zip(ways, values, strict=True))
         self._outcomes: NDArray[np.int8] = np.concatenate([part.status for part in parts])
         shape = next((part.outputs for part in [near, *parts] if part.outputs is not None), None)
         shapes = {name: self._outcomes.shape[1:] if shape is None else shape[name].shape[1:] for name in names}
-        self.outputs: Mapping[str, Array] = MappingProxyType(
-            {
-                name: np.concatenate(
-                    [
-                        np.full((len(part.status), *shapes[name]), np.nan)
-                        if part.outputs is None
-                        else part.outputs[name]
-                        for part in parts
-                    ]
-                )
-                for name in names
-            }
-        )
+        self.outputs: Mapping[str, Array] = {
+            name: np.concatenate(
+                [
+                    np.full((len(part.status), *shapes[name]), np.nan) if part.outputs is None else part.outputs[name]
+                    for part in parts
+                ]
+            )
+            for name in names
+        }
         self.messages: dict[int, str] = {}
         first = 0
         for part in parts:
