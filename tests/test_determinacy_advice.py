@@ -9,7 +9,8 @@ import pytest
 import mechgraph as mg
 from mechgraph.algebra.se3 import rotation_exp
 from mechgraph.report.report import DeterminacyReport
-from mechgraph.structure.pair_changes import Effect
+from mechgraph.structure import pair_changes
+from mechgraph.structure.pair_changes import Effect, changes_of
 
 BUILDERS = {
     "planar": known.planar,
@@ -26,6 +27,10 @@ BUILDERS = {
 
 def changed(m: mg.Mechanism, effect: Effect) -> DeterminacyReport:
     for (pair, old, new), turn in zip(effect.changes, effect.turns, strict=True):
+        if new == "left out":
+            assert old == "coupling"
+            m = m.replace(couplings=[c for c in m.couplings if c.name != pair])
+            continue
         assert m.pair(pair).type.symbol == old
         m = m.with_pair_type(pair, new)
         if turn:
@@ -88,3 +93,60 @@ def test_under_driven_mechanisms_get_the_drivers_that_complete_them() -> None:
         assert not whole.undriven
         assert not whole.contradicting_drives
         assert report.advice[0].freedoms == report.suggested_drives
+
+
+# --- couplings -----------------------------------------------------------------------------------------------------------
+
+
+def gears(*ratios: float) -> mg.Mechanism:
+    """Wheels on the frame, each after the first tied to the one before."""
+    names = [chr(ord("A") + i) for i in range(len(ratios) + 1)]
+    pairs = [mg.Pair(n, "R", "frame", f"wheel{n}", point=(i, 0, 0), axis=known.Z) for i, n in enumerate(names)]
+    couplings = [mg.Coupling({a: r, b: -1.0}) for a, b, r in zip(names, names[1:], ratios, strict=False)]
+    return mg.Mechanism("gears", None, pairs, ["A"], couplings=couplings)
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+def test_redundant_couplings_are_advised_to_be_left_out(engine: str) -> None:
+    """A second coupling of A and C says what g1 and g2 say together: any one of the three may go, no other change helps."""
+    m = gears(2.0, 3.0, 0.5)
+    m = m.replace(couplings=[*m.couplings, mg.Coupling({"A": -6.0, "C": 1.0}, name="again")])
+    report = mg.check(m, engine=engine)  # type: ignore[arg-type]
+    assert (report.redundancy, report.mobility) == (1, 1)
+    assert {e.changes for e in report.effects} == {((g, "coupling", "left out"),) for g in ("g1", "g2", "again")}
+    for e in report.effects:
+        after = changed(m, e)
+        assert (e.redundancy, e.mobility, e.passive) == ((1, after.redundancy), (1, after.mobility), (0, 0))
+        assert after.redundancy == 0
+    assert "coupling g1 left out: redundancy 1 -> 0, mobility 1 -> 1, passive 0 -> 0" in str(report)
+
+
+def test_advice_keeps_freedoms_that_couplings_tie() -> None:
+    """A planar four-bar with two of its turns coupled is a structure; a pair whose turn is coupled keeps it as a single freedom."""
+    m = known.planar().replace(couplings=[mg.Coupling({"O2": 1.0, "O3": -1.0})])
+    report = mg.check(m)
+    assert report.mobility == 0
+    kinds = {new for e in report.effects for pair, _, new in e.changes if pair in ("O2", "O3")}
+    assert not kinds & {"S", "Sg", "Sp"}
+    for e in report.effects:
+        after = changed(m, e)
+        assert (e.redundancy[1], e.mobility[1]) == (after.redundancy, after.mobility), e.text
+    assert any(e.changes == (("g1", "coupling", "left out"),) and e.mobility == (0, 1) for e in report.effects)
+    assert str(report)
+
+
+def test_effects_hold_where_pairs_have_moved() -> None:
+    """A universal joint away from its zero: made a sphere it adds one passive freedom or mobility, here as where it was declared."""
+    declared, moved = mg.check(known.rsur()), mg.check(known.rsur(), at={"A": 0.3})
+    for report in (declared, moved):
+        g = report.geometry
+        assert g is not None
+        k = next(i for i, p in enumerate(report.mechanism.pairs) if p.type.symbol == "U")
+        (wider,) = [c for c in changes_of(g.freedoms) if c.item == k and c.pair and c.pair.type.symbol == "S"]
+        done = pair_changes.effect(g.freedoms, g.driven, (wider,))
+        after = mg.check(known.rsur().with_pair_type(report.mechanism.pairs[k].name, "S"))
+        assert (done.redundancy[1], done.mobility[1], done.passive[1]) == (
+            after.redundancy,
+            after.mobility,
+            len(after.passive),
+        )

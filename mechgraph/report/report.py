@@ -282,7 +282,7 @@ class DeterminacyReport:
     def effects(self) -> tuple[Effect, ...]:
         """Pair changes with their computed effect: they remove redundancy, or free a structure."""
         g = self.geometry
-        return advice(g.system, g.x, g.freedoms, self.motion, self.asked) if g and self.motion else ()
+        return advice(g.freedoms, g.driven, self.finite_mobility or 0, self.asked) if g else ()
 
     @cached_property
     def advice(self) -> tuple[Finding, ...]:

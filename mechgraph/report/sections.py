@@ -169,7 +169,7 @@ def _cure(r: DeterminacyReport) -> list[Any]:
 
 def _types(r: DeterminacyReport) -> list[Any]:
     """Names of the pair types that the advice proposes."""
-    new = sorted({kind for e in r.effects for _, _, kind in e.changes})
+    new = sorted({kind for e in r.effects for _, _, kind in e.changes if kind in TABLE})
     return [Paragraph(f"Pair types: {'; '.join(f'{kind} {TABLE[kind].name}' for kind in new)}.")] if new else []
 
 

@@ -12,11 +12,12 @@ import scipy
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.passive_rest import Idle
-from mechgraph.closure.rank import ClosureRank, EngineName, closure_rank
+from mechgraph.closure.rank import ClosureRank, EngineName, rank_of_rows
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.linear import independent_rows, singular_values
 from mechgraph.numerics.tolerances import MOTIONS
 from mechgraph.structure.passive import PassiveMotion, passive_motions, small_combinations
+from mechgraph.structure.position import Position
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class Freedoms:
     null: Array
     dependent: bool
     passive: tuple[PassiveMotion, ...]
-    system: System
+    position: Position
     left: Array
     hold: Index
     drive: float = 1.0
@@ -51,7 +52,7 @@ class Freedoms:
     @cached_property
     def undriven(self) -> tuple[FreeMotion, ...]:
         """Motions with the drivers at rest that are not passive."""
-        return tuple(_complement(self.system, self.left, self.passive))
+        return tuple(_complement(self.position.m, self.left, self.passive))
 
     @property
     def rank(self) -> int:
@@ -84,12 +85,12 @@ class Freedoms:
         return tuple(Idle(link) for link in sorted({link for p in self.passive for link in p.links}))
 
 
-def _left_free(found: ClosureRank, at_rest: ClosureRank, columns: Index) -> Array:
+def _left_free(closure: ClosureRank, at_rest: ClosureRank, columns: Index) -> Array:
     """Orthonormal motions with the freedoms ``columns`` at rest."""
-    null = found.motions
+    null = closure.motions
     if not len(columns) or not null.shape[1]:
         return null
-    if found.engine == "dense":
+    if closure.engine == "dense":
         return at_rest.motions
     # the motions are of size one: a driver whose part in all of them is below the threshold stands still
     return np.asarray(null @ small_combinations(null[columns], MOTIONS.dependent))
@@ -107,25 +108,28 @@ def _drive(null: Array, columns: Index) -> float:
 
 def free_motion(system: System, x: Array, columns: Index, engine: EngineName = "auto") -> Freedoms:
     """Mobility at a closed state ``x (nx,)`` and what drivers in ``columns`` leave free."""
-    here = system.at(x[:, None])
-    found = closure_rank(here, engine=engine)
-    null = found.motions
+    return freedoms_at(Position.at(system.at(x[:, None])), columns, engine)
+
+
+def freedoms_at(position: Position, columns: Index, engine: EngineName = "auto") -> Freedoms:
+    """The same at a position, which may have changed pairs."""
+    closure = rank_of_rows(position.rows, None, engine)
+    null = closure.motions
     drive = _drive(null, columns)
-    at_rest = closure_rank(here, columns, engine) if len(columns) else found
-    left = _left_free(found, at_rest, columns)
-    passive = passive_motions(here, left, columns)
+    at_rest = rank_of_rows(position.rows, columns, engine) if len(columns) else closure
+    left = _left_free(closure, at_rest, columns)
+    passive = passive_motions(position, left, columns)
     if not len(columns) and passive and len(passive) == null.shape[1]:
         # nothing else can move: what could be driven is an input, not a passive freedom
-        drivable = [c for c, _ in single_freedoms(system.m)]
-        passive = [p for p in passive if not (np.abs(p.rates[drivable]) > MOTIONS.still).any()]
+        passive = [p for p in passive if not (np.abs(p.rates[position.drivable]) > MOTIONS.still).any()]
     hold = np.zeros(0, dtype=np.intp)
     if passive:
         _, pivots = scipy.linalg.qr(np.stack([p.rates for p in passive]), mode="r", pivoting=True)
         hold = np.sort(pivots[: len(passive)]).astype(np.intp)
-    return Freedoms(found, at_rest, null, drive < MOTIONS.dependent, tuple(passive), system, left, hold, drive)
+    return Freedoms(closure, at_rest, null, drive < MOTIONS.dependent, tuple(passive), position, left, hold, drive)
 
 
-def _complement(system: System, left: Array, passive: Sequence[PassiveMotion]) -> list[FreeMotion]:
+def _complement(m: Mechanism, left: Array, passive: Sequence[PassiveMotion]) -> list[FreeMotion]:
     """Motions of ``left`` that are not passive: in each one freedom moves while those of the other motions rest.
 
     These freedoms are the first independent ones in the order in which drivers are wanted, so a motion is what one more driver does.
@@ -138,11 +142,10 @@ def _complement(system: System, left: Array, passive: Sequence[PassiveMotion]) -
         rest = left - P @ (P.T @ left)
         U, s, _ = np.linalg.svd(rest, full_matrices=False)
         rest = U[:, : left.shape[1] - len(passive)]
-    m = system.m
     Q, _ = np.linalg.qr(rest)
     order = drive_order(m, passive)
     wanted = set(order)
-    order += [c for c in range(system.n_freedoms) if c not in wanted]
+    order += [c for c in range(len(Q)) if c not in wanted]
     chosen = independent_rows(Q, order, Q.shape[1])
     basis = np.linalg.solve(Q[chosen].T, Q.T)
     basis /= np.abs(basis).max(axis=1, keepdims=True)

@@ -1,8 +1,8 @@
-"""Advice with computed effect: pair changes that remove redundancy, changes that free a structure, drivers that complete.
+"""Advice with computed effect: wider pairs in place of others and couplings left out, to remove redundancy or to free a structure.
 
 A change of pair ``k`` to a type with more freedoms adds twists ``S``; with the self-stresses ``n_k`` that pass the pair (drivers free)
-the redundancy falls by ``rank(S^T n_k)``, so all changes are ranked without a new analysis; the effect of those reported
-is then computed on the changed mechanism.
+the redundancy falls by ``rank(S^T n_k)``. A coupling left out adds one freedom in the same way, with its multiplier in place of
+``S^T n_k``. So all changes are ranked without a new analysis; the effect of those reported is then computed from the changed rows.
 Source of the idea: Reshetov, Self-Aligning Mechanisms, 1982.
 """
 
@@ -14,20 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.assembly import named_columns, scaled_system
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.indexing import Index, System
+from mechgraph.closure.indexing import Index
 from mechgraph.closure.rank import EngineName
 from mechgraph.closure.sparse_solver import PROBES
 from mechgraph.model import pair_kinematics as evaluation
-from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.pair_table import TABLE
 from mechgraph.model.pair_type import PairType
-from mechgraph.numerics.linear import singular_values
 from mechgraph.numerics.tolerances import STRESSES
-from mechgraph.structure.finite_motion import FiniteMotion
-from mechgraph.structure.mobility import Freedoms, free_motion
+from mechgraph.structure.mobility import Freedoms, freedoms_at
+from mechgraph.structure.position import PlacedPair
 from mechgraph.structure.uniqueness import pair_states
 
 CHANGES_SHOWN = 6
@@ -42,17 +37,22 @@ BEAM = 12
 """Partial sets of changes kept while searching."""
 
 
+COUPLING, LEFT_OUT = "coupling", "left out"
+"""What a coupling is changed from and to."""
+
+
 @dataclass(frozen=True)
 class Change:
-    """One pair given another type; ``matrix (f, s)`` is its power on the self-stresses, ``added`` the freedoms added,
-    ``relief`` the self-stresses that it removes alone.
+    """One pair given another type, or one coupling left out; ``added`` the freedoms that it adds, ``power (n, s)`` of these on the
+    self-stresses, ``relief`` the number of self-stresses that it removes alone.
 
-    ``turn``: angle by which the second direction x is turned about the axis, for types in which it matters.
+    ``item`` counts the pairs, then the couplings. ``pair`` is the new pair where it stands (None for a coupling), ``turn`` the angle by
+    which its second direction x is turned about the axis, for types in which it matters.
     """
 
-    pair: int
-    type: PairType
-    matrix: Array
+    item: int
+    pair: PlacedPair | None
+    power: Array
     added: int
     relief: int
     turn: float = 0.0
@@ -60,9 +60,10 @@ class Change:
 
 @dataclass(frozen=True)
 class Effect:
-    """Changes and what they do, computed on the changed mechanism: before -> after.
+    """Changes and what they do: before -> after.
 
-    ``changes`` are (pair, old type, new type), ``turns`` the angles in degrees by which their second direction x is turned.
+    ``changes`` are (pair, old type, new type), or (coupling, "coupling", "left out"); ``turns`` the angles in degrees by which the second
+    direction x of the new pair is turned.
     """
 
     changes: tuple[tuple[str, str, str], ...]
@@ -72,21 +73,21 @@ class Effect:
     turns: tuple[float, ...] = ()
 
     @property
+    def inputs(self) -> tuple[int, int]:
+        """Mobility without the passive freedoms."""
+        return self.mobility[0] - self.passive[0], self.mobility[1] - self.passive[1]
+
+    @property
     def text(self) -> str:
         """E.g. ``R at D -> S: redundancy 3 -> 1, mobility 1 -> 1, passive 0 -> 0``."""
-        turns = [f" (its x turned by {turn:.3g} degrees)" if turn else "" for turn in self.turns]
-        what = ", ".join(
-            f"{old} at {pair} -> {new}{turn}" for (pair, old, new), turn in zip(self.changes, turns, strict=True)
-        )
-        effect = ", ".join(
-            f"{name} {a} -> {b}"
-            for name, (a, b) in (
-                ("redundancy", self.redundancy),
-                ("mobility", self.mobility),
-                ("passive", self.passive),
-            )
-        )
-        return f"{what}: {effect}"
+        what = [
+            f"coupling {name} left out" if new == LEFT_OUT else f"{old} at {name} -> {new}"
+            for name, old, new in self.changes
+        ]
+        turned = [f" (its x turned by {turn:.3g} degrees)" if turn else "" for turn in self.turns]
+        values = {"redundancy": self.redundancy, "mobility": self.mobility, "passive": self.passive}
+        done = ", ".join(f"{name} {before} -> {after}" for name, (before, after) in values.items())
+        return f"{', '.join(a + b for a, b in zip(what, turned, strict=True))}: {done}"
 
 
 def wider_types(row: PairType) -> Iterator[PairType]:
@@ -105,51 +106,60 @@ def wider_types(row: PairType) -> Iterator[PairType]:
                 yield other
 
 
-def changes_of(here: Configuration, freedoms: Freedoms) -> list[Change]:
-    """All single changes to wider types that leave the drivers in place, with their power on the self-stresses (drivers free).
+def changes_of(freedoms: Freedoms) -> list[Change]:
+    """All single changes that leave the drivers in place, with their power on the self-stresses (drivers free).
 
-    On all self-stresses where sets of changes are sought, else on random ones, which give the same rank in one pair.
+    On all self-stresses where sets of changes are sought, else on random ones, which give the same rank at one pair.
     """
+    here, rows = freedoms.position.declared, freedoms.position.rows
     system = here.system
     count = freedoms.redundancy if freedoms.redundancy <= LARGEST_FOR_SETS else PROBES
-    rows = freedoms.closure.random_stress(np.random.default_rng(CHANGES_SEED), count)
-    stress = np.moveaxis(pair_states(here, np.linalg.qr(rows)[0])[..., 0], 1, 0)
+    states = np.linalg.qr(freedoms.closure.random_stress(np.random.default_rng(CHANGES_SEED), count))[0]
+    stress = np.moveaxis(pair_states(here, states)[..., 0], 1, 0)
+    tied = [d.freedom for d in system.m.drives] + [name for c in system.couplings for name, _ in c.terms]
     needed: dict[int, set[str]] = {}
-    for k, j in (system.m.freedom(d.freedom) for d in system.m.drives):
+    for k, j in map(system.m.freedom, tied):
         needed.setdefault(k, set()).add(system.m.pairs[k].type.freedoms[j].name)
     out: list[tuple[int, int, Change]] = []
     for g, group in enumerate(system.groups):
-        base = here.frames[g][-1]
-        for number, row in enumerate(wider_types(system.m.pairs[int(group.pairs[0])].type)):
-            single = {f.name for f, ok in zip(row.freedoms, row.drivable, strict=True) if ok}
-            some = np.array(
-                [i for i, k in enumerate(group.pairs.tolist()) if needed.get(k, set()) <= single], dtype=np.intp
-            )
-            made = _changes_to(row, base[:, :, some], stress[group.pairs[some]], group.pairs[some], row.f - group.row.f)
-            out += [(c.pair, 2 * number + turned, c) for turned, c in made]
+        frames = here.frames[g][-1][..., 0]
+        for number, new in enumerate(wider_types(system.m.pairs[int(group.pairs[0])].type)):
+            single = {f.name for f, ok in zip(new.freedoms, new.drivable, strict=True) if ok}
+            keeps = [needed.get(k, set()) <= single for k in group.pairs.tolist()]
+            some = np.flatnonzero(keeps).astype(np.intp)
+            pairs = group.pairs[some]
+            made = _changes_to(new, frames[:, :, some], stress[pairs], pairs, new.f - group.row.f)
+            out += [(c.item, 2 * number + turned, c) for turned, c in made]
+    for i, power in enumerate(states[rows.count - rows.further :, None]):
+        relief = int(_ranks(power[None])[0])
+        out.append((len(rows.graph.ends) + i, 0, Change(len(rows.graph.ends) + i, None, power, 1, relief)))
     return [c for _, _, c in sorted(out, key=lambda item: item[:2])]
 
 
-def _changes_to(row: PairType, base: Array, stress: Array, pairs: Index, added: int) -> list[tuple[int, Change]]:
+def _changes_to(new: PairType, frames: Array, stress: Array, pairs: Index, added: int) -> list[tuple[int, Change]]:
     """Changes of pairs to one type: as they stand (0), and turned about z (1) where that relieves more; all pairs at once."""
-    plain = _power(row, base, stress)
-    relief = _ranks(plain)
-    out = [(0, Change(int(k), row, plain[i], added, int(relief[i]))) for i, k in enumerate(pairs)]
-    if row.square_second and len(pairs):
-        turns = best_turns(base[..., 0], stress)
-        power = _power(row, turned(base, turns[:, None]), stress)
+
+    def change(i: int, power: Array, relief: Array, frames: Array, turn: float = 0.0) -> Change:
+        return Change(int(pairs[i]), PlacedPair.at_zero(new, frames[:, :, i]), power[i], added, int(relief[i]), turn)
+
+    power = _power(new, frames, stress)
+    relief = _ranks(power)
+    out = [(0, change(i, power, relief, frames)) for i in range(len(pairs))]
+    if new.square_second and len(pairs):
+        turns = best_turns(frames, stress)
+        frames = turned(frames, turns)
+        power = _power(new, frames, stress)
         better = _ranks(power)
-        more = np.flatnonzero(better > relief)
-        out += [(1, Change(int(pairs[i]), row, power[i], added, int(better[i]), float(turns[i]))) for i in more]
+        more = np.flatnonzero(better > relief).tolist()
+        out += [(1, change(i, power, better, frames, float(turns[i]))) for i in more]
     return out
 
 
-def _power(row: PairType, base: Array, stress: Array) -> Array:
-    """Power ``(n, f, s)`` of a pair type at coordinates zero in frames ``base (3, 4, n, 1)`` on self-stresses ``(n, 6, s)``."""
-    n = base.shape[2]
-    pitch = np.zeros((n, 1))
-    x = evaluation.coordinates_to_state(row, np.zeros((row.f, n, 1)))
-    twists = evaluation.twists_of(row, pitch, evaluation.frames_of(row, pitch, x, base))[..., 0]
+def _power(new: PairType, frames: Array, stress: Array) -> Array:
+    """Power ``(n, f, s)`` of a pair type at coordinates zero in ``frames (3, 4, n)`` on self-stresses ``(n, 6, s)``."""
+    n = frames.shape[2]
+    pitch, x = np.zeros((n, 1)), evaluation.coordinates_to_state(new, np.zeros((new.f, n, 1)))
+    twists = evaluation.twists_of(new, pitch, evaluation.frames_of(new, pitch, x, frames[..., None]))[..., 0]
     return np.asarray(np.einsum("ifn,nis->nfs", twists, stress))
 
 
@@ -162,11 +172,11 @@ def _ranks(A: Array) -> Array:
     )
 
 
-def turned(base: Array, angle: Array | float) -> Array:
-    """Frames turned about their own z."""
-    c, s = np.cos(angle), np.sin(angle)
-    out = base.copy()
-    out[:, 0], out[:, 1] = c * base[:, 0] + s * base[:, 1], c * base[:, 1] - s * base[:, 0]
+def turned(frames: Array, angles: Array) -> Array:
+    """Frames ``(3, 4, n)`` turned about their own z by angles ``(n,)``."""
+    c, s = np.cos(angles), np.sin(angles)
+    out = frames.copy()
+    out[:, 0], out[:, 1] = c * frames[:, 0] + s * frames[:, 1], c * frames[:, 1] - s * frames[:, 0]
     return out
 
 
@@ -182,45 +192,54 @@ def best_turns(frames: Array, wrenches: Array) -> Array:
     return np.where(s[:, 0] < STRESSES.relieved, 0.0, angle)
 
 
-def _relief(parts: tuple[Change, ...]) -> int:
-    return rank_of_absolute(np.concatenate([c.matrix for c in parts]))
-
-
-def rank_of_absolute(A: Array) -> int:
-    """Rank with an absolute tolerance (self-stresses and twists are of size one)."""
-    return int((singular_values(A) > STRESSES.relieved).sum()) if A.size else 0
-
-
 def relieving(changes: list[Change], redundancy: int) -> tuple[list[tuple[Change, ...]], list[tuple[Change, ...]]]:
     """Single changes that lower the redundancy, and smallest sets that remove it, without more freedoms than self-stresses removed.
 
     Ranked by how little they change: freedoms added beyond need, then number of changes, then the order of declaration.
     """
-    useful = [c for c in changes if c.relief]
-    singles = sorted(useful, key=lambda c: (c.added - c.relief, -c.relief, c.pair))
+    singles = sorted((c for c in changes if c.relief), key=lambda c: (c.added - c.relief, -c.relief, c.item))
     exact = [c for c in singles if c.added == c.relief]
-    beam: list[tuple[tuple[Change, ...], int]] = [((), 0)]
-    complete: list[tuple[Change, ...]] = []
-    deepest: list[tuple[tuple[Change, ...], int]] = []
-    for _ in range(redundancy if redundancy <= LARGEST_FOR_SETS else 0):
-        grown: dict[frozenset[int], tuple[tuple[Change, ...], int]] = {}
-        for parts, removed in beam:
-            for c in exact:
-                if parts and c.pair <= parts[-1].pair:
-                    continue
-                now = _relief((*parts, c))
-                if now == removed + c.added:
-                    grown[frozenset(id(p) for p in (*parts, c))] = ((*parts, c), now)
-        found = sorted(grown.values(), key=lambda item: (-item[1], [c.pair for c in item[0]]))
-        complete += [parts for parts, removed in found if removed == redundancy]
-        deepest = [*found[:2], *deepest]
-        beam = [item for item in found if item[1] < redundancy][:BEAM]
-        if not beam:
-            break
-    if not complete and deepest:
-        most = max(removed for _, removed in deepest)
-        complete = [parts for parts, removed in deepest if removed == most and len(parts) > 1]
-    return [(c,) for c in _spread(singles)], complete
+    complete, largest = _complete_sets(exact, redundancy) if exact and redundancy <= LARGEST_FOR_SETS else ([], [])
+    return [(c,) for c in _spread(singles)], complete or [chosen for chosen in largest if len(chosen) > 1]
+
+
+def _complete_sets(exact: list[Change], redundancy: int) -> tuple[list[tuple[Change, ...]], list[tuple[Change, ...]]]:
+    """Sets of changes that together remove all self-stresses, each as many as it adds freedoms; else those that remove most.
+
+    A set grows by changes of later pairs, a beam of sets at a time. A change removes as many as before where its directions among the
+    self-stresses are independent of those of the set, so each set carries an orthonormal basis of its directions.
+    """
+    items, added = np.array([c.item for c in exact]), np.array([c.added for c in exact])
+    directions = np.zeros((len(exact), int(added.max()), exact[0].power.shape[1]))
+    for mine, c in zip(directions, exact, strict=True):
+        mine[: c.added] = np.linalg.svd(c.power, full_matrices=False)[2][: c.added]
+    beam: list[tuple[tuple[int, ...], Array]] = [((), np.zeros((0, redundancy)))]
+    complete: list[tuple[int, ...]] = []
+    deepest: list[tuple[int, ...]] = []
+    most = 0
+    while beam:
+        grown = []
+        for chosen, basis in beam:
+            later = np.flatnonzero(items > (items[chosen[-1]] if chosen else -1))
+            rest = directions[later] - (directions[later] @ basis.T) @ basis
+            gram = rest @ np.swapaxes(rest, 1, 2)
+            free = np.flatnonzero((np.linalg.eigvalsh(gram) > STRESSES.relieved**2).sum(axis=1) == added[later])
+            grown += [
+                (len(basis) + int(added[i]), (*chosen, int(i)), basis, rest[n])
+                for n, i in zip(free, later[free], strict=True)
+            ]
+        grown.sort(key=lambda item: (-item[0], [items[i] for i in item[1]]))
+        complete += [chosen for removed, chosen, _, _ in grown if removed == redundancy]
+        if grown and grown[0][0] > most:
+            most, deepest = grown[0][0], []
+        deepest = [chosen for removed, chosen, _, _ in grown[:2] if removed == most] + deepest
+        going = [item for item in grown if item[0] < redundancy][:BEAM]
+        beam = [
+            (chosen, np.concatenate([basis, np.linalg.svd(rest, full_matrices=False)[2][: removed - len(basis)]]))
+            for removed, chosen, basis, rest in going
+        ]
+    sets = ([tuple(exact[i] for i in chosen) for chosen in some] for some in (complete, deepest))
+    return next(sets), next(sets)
 
 
 def _mixed(complete: list[tuple[Change, ...]]) -> list[tuple[Change, ...]]:
@@ -238,86 +257,44 @@ def _spread(singles: list[Change]) -> list[Change]:
     rest: list[Change] = []
     seen: set[int] = set()
     for c in singles:
-        (rest if c.pair in seen else first).append(c)
-        seen.add(c.pair)
+        (rest if c.item in seen else first).append(c)
+        seen.add(c.item)
     return (first + rest)[:CHANGES_SHOWN]
 
 
-def effect(
-    system: System, x: Array, before: Freedoms, parts: tuple[Change, ...], engine: EngineName = "auto"
-) -> Effect | None:
-    """The effect of changes, computed on the changed mechanism at the same position; None where it cannot be built."""
-    m = system.m
-    q = system.coordinates_of(x[:, None], system.start_coordinates(m.start))[:, 0]
-    changed: Mechanism = m.replace(start=dict(zip(m.freedom_names(), q.tolist(), strict=True)), loads=())
-    for c in parts:
-        changed = changed.with_pair_type(m.pairs[c.pair].name, c.type)
-        if c.turn:
-            changed = with_turned_pair(changed, m.pairs[c.pair].name, c.turn)
-    raw = System(changed, system.graph)
-    start = raw.start_coordinates(changed.start)
-    after_system = scaled_system(changed, start, raw)
-    state = after_system.state_of(start[:, None])[:, 0]
-    if float(after_system.at(state[:, None]).closure[0]) > 1e-8:
-        return None
-    columns, _ = named_columns(changed, after_system, {d.freedom: 0.0 for d in changed.drives})
-    after = free_motion(after_system, state, columns, engine)
+def effect(before: Freedoms, driven: Index, changes: tuple[Change, ...], engine: EngineName = "auto") -> Effect:
+    """The effect of changes, computed from the changed rows at the same position."""
+    position = before.position
+    pairs, couplings = position.m.pairs, position.declared.system.couplings
+    dropped = np.array([c.item - len(pairs) for c in changes if c.pair is None], dtype=np.intp)
+    after_changes, column = position.with_changes({c.item: c.pair for c in changes if c.pair is not None}, dropped)
+    after = freedoms_at(after_changes, column[driven], engine)
     return Effect(
-        tuple((m.pairs[c.pair].name, m.pairs[c.pair].type.symbol, c.type.symbol) for c in parts),
+        tuple(
+            (pairs[c.item].name, pairs[c.item].type.symbol, c.pair.type.symbol)
+            if c.pair is not None
+            else (couplings[c.item - len(pairs)].name, COUPLING, LEFT_OUT)
+            for c in changes
+        ),
         (before.redundancy, after.redundancy),
         (before.mobility, after.mobility),
         (len(before.passive), len(after.passive)),
-        tuple(float(np.degrees(c.turn)) for c in parts),
+        tuple(float(np.degrees(c.turn)) for c in changes),
     )
 
 
-def with_turned_pair(m: Mechanism, name: str, angle: float) -> Mechanism:
-    """A copy in which the second direction x of one pair is turned about its axis, on both links."""
-
-    def marker(old: Marker) -> Marker:
-        pose = turned(old.pose()[..., None], angle)[..., 0]
-        return Marker(old.point, old.axis, pose[:, 0].tolist())
-
-    def replaced(pair: Pair) -> Pair:
-        if pair.on_a is not None and pair.on_b is not None:
-            return pair.replace(on_a=marker(pair.on_a), on_b=marker(pair.on_b))
-        return pair.replace(second=marker(pair.markers[0]).second)
-
-    return m.replace(pairs=[replaced(p) if p.name == name else p for p in m.pairs])
-
-
-def advice(
-    system: System, x: Array, freedoms: Freedoms, motion: FiniteMotion, engine: EngineName = "auto"
-) -> tuple[Effect, ...]:
-    """Pair changes worth making: those that remove redundancy without adding input freedoms; for a structure, those that free it."""
-    here = system.at(x[:, None])
-    redundancy = freedoms.redundancy
-    changes = changes_of(here, freedoms)
+def advice(freedoms: Freedoms, driven: Index, finite_mobility: int, engine: EngineName = "auto") -> tuple[Effect, ...]:
+    """Changes worth making: those that remove redundancy without adding input freedoms; for a structure, those that free it."""
+    changes = changes_of(freedoms)
     found: list[Effect] = []
-    inputs = freedoms.mobility - len(freedoms.passive)
-    if redundancy:
-        singles, complete = relieving(changes, redundancy)
-        for parts in (*_mixed(complete), *singles):
-            done = effect(system, x, freedoms, parts, engine)
-            if (
-                done
-                and done.mobility[1] - done.passive[1] == inputs
-                and done.redundancy[1] < redundancy
-                and done not in found
-            ):
+    if not (freedoms.mobility - len(freedoms.passive) and finite_mobility):
+        wider = sorted((c for c in changes if c.added > c.relief), key=lambda c: (c.added, c.item))
+        freeing = [effect(freedoms, driven, (c,), engine) for c in _spread(wider)[:FREEING]]
+        found += [e for e in freeing if e.inputs[1] > e.inputs[0]]
+    if freedoms.redundancy:
+        singles, complete = relieving(changes, freedoms.redundancy)
+        for chosen in (*_mixed(complete), *singles):
+            done = effect(freedoms, driven, chosen, engine)
+            if done.inputs[1] == done.inputs[0] and done.redundancy[1] < done.redundancy[0] and done not in found:
                 found.append(done)
-    return tuple([*_freeing(system, x, freedoms, changes, motion, engine), *found][: CHANGES_SHOWN + 3])
-
-
-def _freeing(
-    system: System, x: Array, freedoms: Freedoms, changes: list[Change], motion: FiniteMotion, engine: EngineName
-) -> list[Effect]:
-    """For a structure the changes that let it move, those that add fewest freedoms first; nothing for what moves."""
-    if freedoms.mobility - len(freedoms.passive) and motion.mobility:
-        return []
-    found: list[Effect] = []
-    for c in _spread(sorted((c for c in changes if c.added > c.relief), key=lambda c: (c.added, c.pair)))[:FREEING]:
-        done = effect(system, x, freedoms, (c,), engine)
-        if done and done.mobility[1] - done.passive[1] > freedoms.mobility - len(freedoms.passive):
-            found.append(done)
-    return found
+    return tuple(found[: CHANGES_SHOWN + FREEING])

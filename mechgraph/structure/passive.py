@@ -17,10 +17,10 @@ import scipy
 
 from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array, compose, pose_exp
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.indexing import Index, System
+from mechgraph.closure.indexing import Index
 from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.numerics.tolerances import MOTIONS
+from mechgraph.structure.position import Position
 from mechgraph.topology.components import components_of_edges, cut_off, labels_of_bipartite, members
 from mechgraph.topology.linkgraph import LinkGraph
 
@@ -39,32 +39,32 @@ class PassiveMotion:
     twist: Array
 
 
+@dataclass(frozen=True)
 class _Search:
-    """Data of the search: column spans, driven columns, group and place of every pair."""
+    """A position and the freedoms of every pair that are not ``driven``."""
 
-    def __init__(self, here: Configuration, driven: Index) -> None:
-        self.here, self.system = here, here.system
-        first = self.system.first_column
-        self.spans = [(int(i), int(j)) for i, j in pairwise(first)]
-        self.driven = {int(c) for c in driven}
-        self.place = {int(k): (n, i) for n, g in enumerate(self.system.groups) for i, k in enumerate(g.pairs)}
-        self.columns = [[c for c in range(*span) if c not in self.driven] for span in self.spans]
+    position: Position
+    driven: frozenset[int]
+
+    def columns(self, k: int) -> list[int]:
+        """The columns of a pair that are not driven."""
+        return [c for c in self.position.columns(k) if c not in self.driven]
 
     def common_twist(self, one: int, two: int) -> bool:
         """Whether two pairs have a twist in common."""
-        S = self.here.S[:, self.columns[one] + self.columns[two], 0]
-        if not self.columns[one] or not self.columns[two]:
+        mine, others = self.columns(one), self.columns(two)
+        if not mine or not others:
             return False
-        s = np.linalg.svd(S, compute_uv=False)
-        return S.shape[1] > 6 or bool(s[-1] <= MOTIONS.common * s[0])
+        s = np.linalg.svd(self.position.rows.S[:, mine + others], compute_uv=False)
+        return len(mine) + len(others) > 6 or bool(s[-1] <= MOTIONS.common * s[0])
 
 
-def passive_motions(here: Configuration, left: Array, driven: Index) -> list[PassiveMotion]:
+def passive_motions(position: Position, left: Array, driven: Index) -> list[PassiveMotion]:
     """Independent passive motions with the freedoms ``driven`` at rest; ``left (F, p)`` are all motions that leave free."""
     if not left.shape[1]:
         return []
     found: list[PassiveMotion] = []
-    search = _Search(here, driven)
+    search = _Search(position, frozenset(driven.tolist()))
     for links, border in sorted(_borders(search, left), key=lambda item: (len(item[0]), item[0])):
         for motion in _of_border(search, links, border):
             if _independent(motion, found):
@@ -72,13 +72,13 @@ def passive_motions(here: Configuration, left: Array, driven: Index) -> list[Pas
     return sorted(found, key=lambda p: p.links)
 
 
-def still_sets(system: System, rates: Array) -> list[list[int]]:
+def links_at_rest_together(position: Position, rates: Array) -> list[list[int]]:
     """Links that no motion ``rates (F, p)`` moves against each other, joined through pairs that stand still in all of them."""
     moves = np.concatenate([np.abs(rates).max(axis=1, initial=0.0) >= MOTIONS.still, [False]])
-    first = system.first_column
+    first = position.rows.first_column
     moving = np.add.reduceat(moves, first[:-1]) * (np.diff(first) > 0) > 0
-    ends = [e for e, moved in zip(system.graph.ends, moving.tolist(), strict=True) if not moved]
-    return members(components_of_edges(system.graph.n_links, ends))
+    ends = [e for e, moved in zip(position.graph.ends, moving.tolist(), strict=True) if not moved]
+    return members(components_of_edges(position.graph.n_links, ends))
 
 
 def series(graph: LinkGraph) -> list[list[int]]:
@@ -97,9 +97,9 @@ def series(graph: LinkGraph) -> list[list[int]]:
 
 def _borders(search: _Search, left: Array) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
     """(links, border pairs) of all sets that a passive motion could move."""
-    graph = search.system.graph
+    graph = search.position.graph
     set_of: dict[int, int] = {}
-    sets = still_sets(search.system, left)
+    sets = links_at_rest_together(search.position, left)
     for number, links in enumerate(sets):
         set_of |= dict.fromkeys(links, number)
     border: list[list[int]] = [[] for _ in sets]
@@ -124,25 +124,25 @@ def _borders(search: _Search, left: Array) -> Iterator[tuple[tuple[int, ...], tu
 
 def _of_border(search: _Search, links: tuple[int, ...], border: tuple[int, ...]) -> list[PassiveMotion]:
     """Passive motions of one set of links: twists that every border pair allows and that leave all pair elements in place."""
-    here, system = search.here, search.system
-    columns = [search.columns[k] for k in border]
-    sides = [1.0 if system.graph.ends[k][1] in links else -1.0 for k in border]
+    position, S = search.position, search.position.rows.S
+    columns = [search.columns(k) for k in border]
+    sides = [1.0 if position.graph.ends[k][1] in links else -1.0 for k in border]
     if not links or any(not c for c in columns):
         return []
     every = [c for part in columns for c in part]
-    first = sides[0] * here.S[:, columns[0], 0]
+    first = sides[0] * S[:, columns[0]]
     rows, at = np.zeros((6 * (len(border) - 1), len(every))), len(columns[0])
     for i, (part, side) in enumerate(zip(columns[1:], sides[1:], strict=True)):
         rows[6 * i : 6 * i + 6, : len(columns[0])] = first
-        rows[6 * i : 6 * i + 6, at : at + len(part)] = -side * here.S[:, part, 0]
+        rows[6 * i : 6 * i + 6, at : at + len(part)] = -side * S[:, part]
         at += len(part)
     common = null_space(rows, MOTIONS.common)
     if not common.shape[1]:
         return []
-    moves = np.zeros((system.n_freedoms, common.shape[1]))
+    moves = np.zeros((position.n_freedoms, common.shape[1]))
     moves[every] = common
     twists = first @ common[: len(columns[0])]
-    leaving = np.concatenate([_leaving(search, k, links, moves, twists) for k in border])
+    leaving = np.concatenate([_leaving(position, k, links, moves, twists) for k in border])
     out = []
     for mix in small_combinations(leaving, MOTIONS.in_place).T:
         rates, twist = moves @ mix, twists @ mix
@@ -159,26 +159,19 @@ def small_combinations(rows: Array, tolerance: float) -> Array:
     return np.asarray(Vt[small].T)
 
 
-def _leaving(search: _Search, k: int, links: tuple[int, ...], moves: Array, twists: Array) -> Array:
+def _leaving(position: Position, k: int, links: tuple[int, ...], moves: Array, twists: Array) -> Array:
     """Rate at which the reaction wrenches of pair ``k`` leave their span, one column a motion."""
-    here, system = search.here, search.system
-    number, i = search.place[k]
-    g = system.groups[number]
-    row, pitch = g.row, system.par.pitch[k : k + 1]
-    base = here.frames[number][0][:, :, i, 0]
-    carried = system.graph.ends[k][0] in links
+    pair = position.pair(k)
+    carried = position.graph.ends[k][0] in links
+    steps = np.array([STEP, -STEP, 0.0])
     columns = []
-    for move, twist in zip(moves.T, twists.T, strict=True):
-        steps = np.array([STEP, -STEP, 0.0])
-        bases = np.repeat(base[:, :, None], 3, axis=2)
+    for move, twist in zip(moves[position.columns(k)].T, twists.T, strict=True):
+        frame = np.repeat(pair.frame, 3, axis=2)
         if carried:
-            bases = compose(pose_exp(twist[:, None] * steps), bases)
-        x = evaluation.advance(
-            row,
-            np.repeat(here.x[g.state_rows[:, i]][:, None, :1], 3, axis=2),
-            (move[g.columns[:, i]][:, None, None] * steps),
-        )
-        W = evaluation.reactions_of(row, pitch, evaluation.frames_of(row, pitch, x, bases[:, :, None]))[:, :, 0]
+            frame = compose(pose_exp(twist[:, None] * steps), frame)
+        x = evaluation.advance(pair.type, np.repeat(pair.x, 3, axis=1)[:, None], move[:, None, None] * steps)
+        frames = evaluation.frames_of(pair.type, pair.pitch, x, frame[:, :, None])
+        W = evaluation.reactions_of(pair.type, pair.pitch, frames)[:, :, 0]
         Q, _ = np.linalg.qr(W[:, :, 2])
         change = (W[:, :, 0] - W[:, :, 1]) / (2 * STEP)
         columns.append((change - Q @ (Q.T @ change)).ravel())
