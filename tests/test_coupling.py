@@ -233,7 +233,7 @@ def test_couplings_are_printed() -> None:
     assert "F_C(g1,B.Rz) = -3 e M_C(g1) A_2" in text
     assert "F_C(slides,E.Tz) = 2 F_C(slides) A_5" in text
     assert "- 3 A_2x M_C(g1)" in text
-    assert r"\hat{F}_{C(g1,A.Rz)} = 2 \epsilon M_{C(g1)} \hat{A}_{1}" in f.latex()
+    assert r"\hat{F}_{C(\text{g1,A.Rz})} = 2 \epsilon M_{C(\text{g1})} \hat{A}_{1}" in f.latex()
     column = 1 + next(i for i, u in enumerate(f.unknowns) if u.name == "M_C(screw)")
     cells = [row for row in f.coefficients().rows if row[2] == column]
     assert len({entry for entry, *_ in cells}) == len(cells)

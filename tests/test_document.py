@@ -12,6 +12,7 @@ from mechgraph.document import (
     Document,
     Equation,
     Heading,
+    Legend,
     Paragraph,
     Table,
     to_html,
@@ -339,3 +340,12 @@ def test_latex_equations_have_no_blank_lines_and_verbatim_cannot_be_left():
     assert to_latex(body(Equation("", "a\n\n b"))) == "\\[\na\n b\n\\]\n"
     assert to_latex(body(Equation("a = b"))) == "\\begin{verbatim}\na = b\n\\end{verbatim}\n"
     assert r"\end{verbatim}" not in to_latex(body(Code("x\n\\end{verbatim}")))
+
+
+def test_a_legend_has_its_symbols_as_text_or_as_mathematics() -> None:
+    legend = Legend([(Equation("rho_k", r"\rho_{k}"), "pitch of a_b"), (Equation("P_k", "P_{k}"), "point")])
+    assert to_text(body(legend)) == "- rho_k: pitch of a_b\n- P_k: point\n"
+    assert to_markdown(body(legend)) == "- $\\rho_{k}$: pitch of a_b\n- $P_{k}$: point\n"
+    assert "<li>rho_k: pitch of a_b</li>" in to_html(body(legend))
+    assert to_latex(body(legend)).splitlines()[1:3] == [r"\item $\rho_{k}$: pitch of a\_b", r"\item $P_{k}$: point"]
+    assert [render(body(Legend([]))) for render in RENDERERS] == ["\n"] * 4

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import mechgraph as mg
+from mechgraph.equations.symbols import Symbol, Words, moment_of
 from mechgraph.equations.terms import Term
 
 SECTIONS = {
@@ -53,14 +54,11 @@ def as_printed(f: mg.Formulation, pair: str) -> mg.Formulation:
     axial = {t.unknown for e in f.equations for t in e.terms if t.screw in wrong}
     (unknown,) = axial
     couple = f.mechanism.pairs[k].type.efforts[0].is_couple
-    axis = f"A_{k + 1}"
-    screw = replace(
-        f.screws[wrong[0]],
-        kind="efforts",
-        symbol="" if couple else axis,
-        dual=axis if couple else f"A0_{k + 1}",
-        meaning=f"{axis}: what equation of the thesis prints",
+    axis = Symbol("A", str(k + 1), "dual")
+    printed: dict[str, Words] = (
+        {"real": (), "dual": (axis,)} if couple else {"real": (axis,), "dual": (moment_of(axis),)}
     )
+    screw = replace(f.screws[wrong[0]], kind="efforts", **printed)
     screws = (*f.screws, screw)
     parts = (0, 1, 2) if couple else (0, 1, 2, 3, 4, 5)
     equations = []

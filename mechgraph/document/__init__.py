@@ -10,10 +10,10 @@ only `Code` and the text form of an `Equation` keep theirs.
 """
 
 from mechgraph.document.html import to_html
-from mechgraph.document.latex import to_latex
+from mechgraph.document.latex import latex_words, to_latex
 from mechgraph.document.markdown import to_markdown
 from mechgraph.document.text import to_text
-from mechgraph.document.tree import Block, Bullets, Code, Document, Equation, Heading, Paragraph, Table
+from mechgraph.document.tree import Block, Bullets, Code, Document, Equation, Heading, Legend, Paragraph, Table
 
 __all__ = [
     "Block",
@@ -22,8 +22,10 @@ __all__ = [
     "Document",
     "Equation",
     "Heading",
+    "Legend",
     "Paragraph",
     "Table",
+    "latex_words",
     "to_html",
     "to_latex",
     "to_markdown",

@@ -14,6 +14,7 @@ from mechgraph.document.tree import (
     Document,
     Equation,
     Heading,
+    Legend,
     Paragraph,
     Table,
     joined,
@@ -54,6 +55,8 @@ def _block_html(block: Block) -> str:
             return _bullets_html(block)
         case Table():
             return _table_html(block)
+        case Legend():
+            return _bullets_html(block.bullets())
         case Equation(text, latex):
             source = html.escape(plain(latex))
             return _preformatted(kept_lines(text) or kept_lines(latex), f' data-latex="{source}"' if source else "")

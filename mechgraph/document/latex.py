@@ -14,6 +14,7 @@ from mechgraph.document.tree import (
     Document,
     Equation,
     Heading,
+    Legend,
     Paragraph,
     Table,
     joined,
@@ -55,14 +56,14 @@ def to_latex(document: Document) -> str:
     return joined(parts, "\n\n")
 
 
-def _latex(text: str) -> str:
-    """Escape running text for LaTeX; double hyphens stay two hyphens."""
+def latex_words(text: str) -> str:
+    """Running text escaped for LaTeX; double hyphens stay two hyphens."""
     return re.sub("-(?=-)", "-{}", plain(text).translate(_LATEX_TABLE))
 
 
 def _section(text: str, level: int) -> str:
     """Return the sectioning command of a level; nothing for an empty text."""
-    return rf"\{_LATEX_SECTIONS[level]}{{{_latex(text)}}}" if plain(text) else ""
+    return rf"\{_LATEX_SECTIONS[level]}{{{latex_words(text)}}}" if plain(text) else ""
 
 
 def _verbatim(lines: list[str]) -> str:
@@ -79,11 +80,14 @@ def _block_latex(block: Block) -> str:
         case Heading(text, level):
             return _section(text, level)
         case Paragraph(text):
-            return _latex(text)
+            return latex_words(text)
         case Bullets():
             return _bullets_latex(block)
         case Table():
             return _table_latex(block)
+        case Legend(entries):
+            items = [rf"\item ${plain(e.latex)}$: {latex_words(meaning)}" for e, meaning in entries]
+            return "\n".join(_itemize(items))
         case Equation(text, latex):
             lines = [line for line in kept_lines(latex) if line]
             return "\n".join([r"\[", *lines, r"\]"]) if lines else _verbatim(kept_lines(text))
@@ -102,7 +106,7 @@ def _bullets_latex(block: Bullets) -> str:
     """Render bullets as nested itemize."""
     lines: list[str] = []
     for text, nested in block.grouped():
-        lines += [rf"\item {_latex(text)}", *_itemize([rf"\item {_latex(inner)}" for inner in nested])]
+        lines += [rf"\item {latex_words(text)}", *_itemize([rf"\item {latex_words(inner)}" for inner in nested])]
     return "\n".join(_itemize(lines))
 
 
@@ -119,7 +123,7 @@ def _table_latex(table: Table) -> str:
     )
 
     def row(line: Sequence[str]) -> str:
-        cells = " & ".join(_latex(cell) for cell in line)
+        cells = " & ".join(latex_words(cell) for cell in line)
         return rf"{'{}' if cells.startswith('*') else ''}{cells} \\"
 
     rows = [row(line) for line in lines]
@@ -131,7 +135,7 @@ def _table_latex(table: Table) -> str:
             [
                 r"\begin{table}[htbp]",
                 r"\centering",
-                rf"\caption{{{_latex(table.caption)}}}",
+                rf"\caption{{{latex_words(table.caption)}}}",
                 *grid,
                 r"\end{table}",
             ]

@@ -12,6 +12,7 @@ from mechgraph.document.tree import (
     Document,
     Equation,
     Heading,
+    Legend,
     Paragraph,
     Table,
     joined,
@@ -60,6 +61,8 @@ def _block_markdown(block: Block) -> str:
             return "\n".join(lines)
         case Table():
             return _table_markdown(block)
+        case Legend(entries):
+            return "\n".join(f"- ${plain(e.latex)}$: {_markdown(meaning)}" for e, meaning in entries)
         case Equation(text, latex):
             lines = [line for line in kept_lines(latex) if line]
             return "\n".join(["$$", *lines, "$$"]) if lines else _fenced(kept_lines(text))

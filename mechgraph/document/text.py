@@ -13,6 +13,7 @@ from mechgraph.document.tree import (
     Document,
     Equation,
     Heading,
+    Legend,
     Paragraph,
     Table,
     joined,
@@ -56,6 +57,8 @@ def _block_text(block: Block, width: int) -> str:
                 for inner in nested:
                     lines += _wrapped(inner, width, "  - ")
             return "\n".join(lines)
+        case Legend():
+            return _block_text(block.bullets(), width)
         case Table():
             return _table_text(block, width)
         case Equation(text, latex):

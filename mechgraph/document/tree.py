@@ -131,13 +131,28 @@ class Equation:
 
 
 @dataclass(frozen=True, slots=True)
+class Legend:
+    """What symbols mean: entries ``(equation, meaning)``, a bullet each, ``A0_k = P_k x A_k: the moment of ...``."""
+
+    entries: Sequence[tuple[Equation, str]]
+
+    def __post_init__(self) -> None:
+        """Copy the entries into a tuple."""
+        object.__setattr__(self, "entries", tuple(self.entries))
+
+    def bullets(self) -> Bullets:
+        """The entries in words, symbols as plain text."""
+        return Bullets([f"{equation.text}: {meaning}" for equation, meaning in self.entries])
+
+
+@dataclass(frozen=True, slots=True)
 class Code:
     """Preformatted text, kept line by line and never wrapped; blank lines at its ends are dropped."""
 
     text: str
 
 
-Block = Heading | Paragraph | Bullets | Table | Equation | Code
+Block = Heading | Paragraph | Bullets | Table | Equation | Legend | Code
 """What a document is made of."""
 
 

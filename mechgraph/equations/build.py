@@ -3,10 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from mechgraph.equations.formulation import Formulation
-from mechgraph.equations.symbols import LeeNames, factor_text, names_of, screw_letter, subscript
+from mechgraph.equations.symbols import (
+    LeeNames,
+    Symbol,
+    Words,
+    direction,
+    dual_unit,
+    factor,
+    moment_of,
+    names_of,
+    summed,
+    written,
+)
 from mechgraph.equations.terms import AXES, Block, ScalarEquation, Screw, Term, Unknown
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
@@ -29,56 +40,40 @@ class _Draft:
     acts: list[list[Term]] = field(default_factory=list)
     duals: dict[int, list[int]] = field(default_factory=dict)
     blocks: list[Block] = field(default_factory=list)
-    driven: list[tuple[int, str]] = field(default_factory=list)
+    driven: list[tuple[int, Symbol]] = field(default_factory=list)
 
-    def unknown(self, name: str, owner: str, group: str, couple: bool, meaning: str, freedom: str = "") -> int:
-        self.unknowns.append(Unknown(name, owner, group, couple, meaning, freedom))
+    def unknown(self, symbol: Symbol, owner: str, group: str, couple: bool, meaning: str, freedom: str = "") -> int:
+        self.unknowns.append(Unknown(symbol, owner, group, couple, meaning, freedom))
         return len(self.unknowns) - 1
 
-    def screw(self, kind: str, k: int, index: int, part: Component, letter: str) -> int:
-        number = f"_{k + 1}"
-        point = f"P{chr(39) * part.frame}_{k + 1}"
-        direction = letter + number
-        if part.is_couple:
-            made = Screw(
-                kind, k, index, "", direction, f"{direction}: unit couple {part.name} of pair {self.m.pairs[k].name}"
-            )
-        else:
-            dual = f"{letter}0{number}"
-            meaning = f"{dual} = {point} x {direction}"
-            if any(part.per_pitch):
-                meaning += f", rho_{k + 1} the pitch of pair {self.m.pairs[k].name} (advance per radian)"
-                dual = f"({dual}{{}} - rho_{k + 1} {direction}{{}})"
-            made = Screw(kind, k, index, direction, dual, meaning)
-        self.screws.append(made)
+    def block(self, words: Words, kind: str, owner: str) -> None:
+        self.blocks.append(Block(written(words), written(words, latex=True), kind, owner))
+
+    def screw(self, kind: str, k: int, index: int, part: Component, line: Symbol) -> int:
+        """A wrench of pair ``k``: a couple has the direction as its dual part, a force its moment (less pitch times it)."""
+        real: Words = () if part.is_couple else (line,)
+        dual: Words = (line,) if part.is_couple else (moment_of(line),)
+        if any(part.per_pitch):
+            dual = ("(", *dual, "-", Symbol("rho", line.place), line, ")")
+        self.screws.append(Screw(kind, k, index, real, dual))
         return len(self.screws) - 1
 
     def carry(self, act: list[Term], unknown: int, screw: int, coupling: tuple[int, int] | None = None) -> None:
-        made = self.screws[screw]
-        parts = [part for part in range(6) if (made.symbol if part >= 3 else made.dual)]
-        act += [Term(unknown, 1.0, screw, part, coupling) for part in parts]
-
-    def effort(self, k: int, j: int, unknown: int, coupling: tuple[int, int] | None = None) -> str:
-        """The unknown acts as effort in freedom ``j`` of pair ``k``; returns the letter of its direction."""
-        part = self.m.pairs[k].type.efforts[j]
-        letter = screw_letter(part)
-        self.carry(self.acts[k], unknown, self.screw("efforts", k, j, part, letter), coupling)
-        return letter
+        act += [Term(unknown, 1.0, screw, part, coupling) for part in range(6) if self.screws[screw].coefficient(part)]
 
 
-def _along(draft: _Draft, k: int, kind: str, parts: Iterable[Component], act: list[Term]) -> list[str]:
-    """Unknown multiples of the screws of a pair; returns how each is printed, ``FA_1 A_1``."""
+def _along(draft: _Draft, k: int, kind: str, parts: Iterable[Component], act: list[Term]) -> list[tuple[str, Words]]:
+    """Unknown multiples of the screws of a pair; returns how each is printed, ``+ FA_1 A_1``."""
     pair = draft.m.pairs[k]
-    printed = []
+    printed: list[tuple[str, Words]] = []
     for i, part in enumerate(parts):
-        letter = screw_letter(part)
-        name = f"{part.name[0]}{letter}_{k + 1}"
+        line = direction(k, part)
+        symbol = Symbol("M" if part.is_couple else "F", line.place, along=line.letter)
         where = f"{part.name} in frame {part.frame} of pair {pair.name}"
-        unknown = draft.unknown(name, pair.name, pair.type.symbol, part.is_couple, where)
-        screw = draft.screw(kind, k, i, part, letter)
-        draft.carry(act, unknown, screw)
-        turned = f"(1 - e rho_{k + 1}) " if any(part.per_pitch) else ""
-        printed.append(f"{turned}{'e ' if part.is_couple else ''}{name} {letter}_{k + 1}")
+        unknown = draft.unknown(symbol, pair.name, pair.type.symbol, part.is_couple, where)
+        draft.carry(act, unknown, draft.screw(kind, k, i, part, line))
+        turned: Words = ("(", "1", "-", "e", Symbol("rho", line.place), ")") if any(part.per_pitch) else ()
+        printed.append(("+", (*turned, *dual_unit(part), symbol, line)))
     return printed
 
 
@@ -102,14 +97,14 @@ def _lee(draft: _Draft, k: int) -> None:
     if book is None:
         _minimal(draft, k)
         return
-    symbol = draft.names.reaction[k]
+    free = replace(draft.names.reaction[k], letter="F")
     act: list[Term] = []
     dual = []
     for letter, offset, couple in (("F", 3, False), ("M", 0, True)):
         for i, axis in enumerate(AXES):
             what = "moment about the origin" if couple else "force"
             unknown = draft.unknown(
-                f"{letter}_{symbol}{axis}",
+                replace(free, letter=letter, axis=axis),
                 pair.name,
                 pair.type.symbol,
                 couple,
@@ -120,54 +115,28 @@ def _lee(draft: _Draft, k: int) -> None:
     draft.duals[k] = dual
     printed = _along(draft, k, "along", book.along, act)
     draft.acts.append(act)
-    _define(draft, k, [f"F_{symbol}", *printed])
+    _define(draft, k, [("+", (free,)), *printed])
 
 
 BOOKKEEPINGS: dict[str, Callable[[_Draft, int], None]] = {"lee": _lee, "minimal": _minimal}
 """How a pair's reaction is written, by the name of the bookkeeping."""
 
 
-def _define(draft: _Draft, k: int, printed: list[str]) -> None:
-    left = f"R_{draft.names.reaction[k]}"
-    if printed:
-        text = f"{left} = {' + '.join(printed)}"
-        latex = f"{_hat(left)} = {' + '.join(_hat(p) for p in printed)}"
-    else:
-        text = latex = f"{left} = 0"
-    draft.blocks.append(Block(text, latex, "reaction", draft.m.pairs[k].name))
-
-
-def _hat(symbol: str) -> str:
-    r"""A printed term as LaTeX with hats on dual vectors: ``FA_1 A_1`` -> ``F^{A_{1}} \hat{A}_{1}``."""
-    front = ""
-    if symbol.startswith("("):
-        front, _, symbol = symbol.partition(") ")
-        front = subscript(front + ")").replace("e rho", r"\epsilon \rho") + " "
-    words = symbol.split()
-    out = []
-    for i, word in enumerate(words):
-        head, _, tail = word.partition("_")
-        if word == "e":
-            out.append(r"\epsilon")
-        elif i == len(words) - 1:
-            out.append(rf"\hat{{{head}}}_{{{tail}}}")
-        else:
-            out.append(f"{head[0]}^{{{head[1:]}_{{{tail}}}}}" if len(head) > 1 else subscript(word))
-    return front + " ".join(out)
+def _define(draft: _Draft, k: int, printed: list[tuple[str, Words]]) -> None:
+    draft.block((draft.names.reaction[k], "=", *summed(printed)), "reaction", draft.m.pairs[k].name)
 
 
 def _driver_efforts(draft: _Draft, efforts: tuple[str, ...]) -> None:
     """One unknown for every driven (or held) freedom; + on link b, - on link a."""
-    for name in efforts:
-        k, j = draft.m.freedom(name)
+    for full in efforts:
+        k, j = draft.m.freedom(full)
         pair = draft.m.pairs[k]
-        couple = pair.type.efforts[j].is_couple
-        label = "IN" if len(efforts) == 1 else f"IN({name})"
         freedom = pair.freedom_names[j]
-        size = f"{'M' if couple else 'F'}_{label}"
+        part = pair.type.efforts[j]
+        couple, along = part.is_couple, direction(k, part).letter
+        size = Symbol("M" if couple else "F", "IN", along=along, name="" if len(efforts) == 1 else full)
         unknown = draft.unknown(size, pair.name, "driver", couple, f"effort in {freedom}", freedom)
-        letter = draft.effort(k, j, unknown)
-        _define_effort(draft, k, "effort", pair.name, label, "", couple, size, letter)
+        _exert(draft, (k, j), unknown, replace(size, letter="F", along="", kind="dual"), "effort", pair.name)
 
 
 def _multipliers(draft: _Draft) -> None:
@@ -176,25 +145,31 @@ def _multipliers(draft: _Draft) -> None:
     for g, coupling in enumerate(m.couplings):
         places = [m.freedom(freedom) for freedom in coupling.freedoms]
         couple = any(m.pairs[k].type.freedoms[j].turns for k, j in places)
-        size = f"{'M' if couple else 'F'}_C({coupling.name})"
+        size = Symbol("M" if couple else "F", "C", name=coupling.name)
         unknown = draft.unknown(size, coupling.name, "coupling", couple, f"multiplier of the coupling {coupling.name}")
-        for i, ((k, j), (freedom, c)) in enumerate(zip(places, coupling.terms, strict=True)):
-            letter = draft.effort(k, j, unknown, (g, i))
-            label, factor = f"C({coupling.name},{freedom})", ("-" if c < 0 else "") + factor_text(abs(c))
-            turns = m.pairs[k].type.efforts[j].is_couple
-            _define_effort(draft, k, "coupling", coupling.name, label, factor, turns, size, letter)
+        for i, (place, (freedom, _)) in enumerate(zip(places, coupling.terms, strict=True)):
+            exerted = Symbol("F", "C", "dual", name=f"{coupling.name},{freedom}")
+            _exert(draft, place, unknown, exerted, "coupling", coupling.name, (g, i))
 
 
-def _define_effort(
-    draft: _Draft, k: int, kind: str, owner: str, label: str, factor: str, couple: bool, size: str, letter: str
+def _exert(
+    draft: _Draft,
+    place: tuple[int, int],
+    unknown: int,
+    exerted: Symbol,
+    kind: str,
+    owner: str,
+    coupling: tuple[int, int] | None = None,
 ) -> None:
-    """The printed definition of what a driver or coupling exerts in pair ``k``: ``F_IN = e M_IN A_1``, ``F_C(g,A.Rz) = 2 e M_C(g) A_1``."""
-    draft.driven.append((k, f"F_{label}"))
-    text = f"F_{label} = {factor}{'e ' if couple else ''}{size} {letter}_{k + 1}"
-    left = rf"\hat{{F}}^{{{label}}}" if kind == "effort" else _hat(f"F_{label}")
-    dual = r"\epsilon " if couple else ""
-    latex = rf"{left} = {factor}{dual}{subscript(size)} \hat{{{letter}}}_{{{k + 1}}}"
-    draft.blocks.append(Block(text, latex, kind, owner))
+    """The unknown acts as effort in a freedom: ``F_IN = e MA_IN A_1``, ``F_C(g,A.Rz) = 2 e M_C(g) A_1`` with the number of a coupling."""
+    k, j = place
+    part = draft.m.pairs[k].type.efforts[j]
+    line = direction(k, part)
+    draft.carry(draft.acts[k], unknown, draft.screw("efforts", k, j, part, line), coupling)
+    draft.driven.append((k, exerted))
+    number = 1.0 if coupling is None else draft.m.couplings[coupling[0]].coefficients[coupling[1]]
+    words = (exerted, "=", *factor(number), *dual_unit(part), draft.unknowns[unknown].symbol, line)
+    draft.block(words, kind, owner)
 
 
 def _equilibrium(draft: _Draft) -> list[ScalarEquation]:
@@ -210,20 +185,18 @@ def _equilibrium(draft: _Draft) -> list[ScalarEquation]:
         if link.name == m.frame:
             continue
         number = names.link_number[link.name]
-        printed: list[tuple[str, str]] = []
+        printed: list[tuple[str, Words]] = []
         terms: list[list[Term]] = [[] for _ in range(6)]
         for k, sign in at_link[link.name]:
-            printed.append(("+", f"R_{names.reaction[k] if sign > 0 else names.opposite[k]}"))
+            printed.append(("+", (names.reaction[k] if sign > 0 else names.opposite[k],)))
             for t in draft.acts[k]:
                 terms[t.part].append(Term(t.unknown, sign, t.screw, t.part, t.coupling))
-        known = [f"I{number}"] + ([f"A{number}"] if link.name in touched else [])
-        printed += [("+", f"F_{name}") for name in known]
-        for k, label in draft.driven:
+        known = [Symbol("F", f"{kind}{number}", "dual") for kind in ("I", "L") if kind == "I" or link.name in touched]
+        printed += [("+", (symbol,)) for symbol in known]
+        for k, exerted in draft.driven:
             if link.name in (m.pairs[k].a, m.pairs[k].b):
-                printed.append(("+" if m.pairs[k].b == link.name else "-", label))
-        text = "".join(f" {sign} {symbol}" for sign, symbol in printed).removeprefix(" + ") + " = 0"
-        latex = "".join(f" {sign} {_hat(symbol)}" for sign, symbol in printed).removeprefix(" + ") + " = 0"
-        draft.blocks.append(Block(text, latex, "link", link.name))
+                printed.append(("+" if m.pairs[k].b == link.name else "-", (exerted,)))
+        draft.block((*summed(printed), "=", "0"), "link", link.name)
         for what, letter, offset in (("force", "F", 3), ("moment", "M", 0)):
             for i, axis in enumerate(AXES):
                 equations.append(
@@ -234,7 +207,7 @@ def _equilibrium(draft: _Draft) -> list[ScalarEquation]:
                         tuple(terms[offset + i]),
                         index,
                         offset + i,
-                        tuple(f"{letter}_{name}{axis}" for name in known),
+                        tuple(replace(symbol, letter=letter, axis=axis) for symbol in known),
                     )
                 )
     return equations
@@ -248,10 +221,8 @@ def _conditions(draft: _Draft) -> list[ScalarEquation]:
         if book is None:
             continue
         equations += [_condition(draft, k, i, twist, dual) for i, twist in enumerate(book.conditions)]
-        symbol, axis = draft.names.reaction[k], screw_letter(book.conditions[0])
-        text = f"F_{symbol} . {axis}_{k + 1} = 0"
-        latex = rf"\hat{{F}}_{{{symbol}}} \cdot \hat{{{axis}}}_{{{k + 1}}} = 0"
-        draft.blocks.append(Block(text, latex, "condition", draft.m.pairs[k].name))
+        free, line = replace(draft.names.reaction[k], letter="F"), direction(k, book.conditions[0])
+        draft.block((free, ".", line, "=", "0"), "condition", draft.m.pairs[k].name)
     return equations
 
 
@@ -260,10 +231,9 @@ def _condition(draft: _Draft, k: int, i: int, twist: Freedom, dual: list[int]) -
 
     The real (angular) part of the twist multiplies the moment, its dual part the force.
     """
-    pair, letter = draft.m.pairs[k], screw_letter(twist)
-    direction, moment = f"{letter}_{k + 1}", f"{letter}0_{k + 1}"
-    symbols = (moment, direction) if twist.turns else (direction, "")
-    draft.screws.append(Screw("conditions", k, i, *symbols, f"{moment} = P_{k + 1} x {direction}"))
+    pair, line = draft.m.pairs[k], direction(k, twist)
+    parts: tuple[Words, Words] = ((moment_of(line),), (line,)) if twist.turns else ((line,), ())
+    draft.screws.append(Screw("conditions", k, i, *parts))
     at = len(draft.screws) - 1
     terms = [Term(dual[j], 1.0, at, 3 + j) for j in range(3)]
     if twist.turns:

@@ -13,8 +13,8 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.document import Document, to_html, to_latex, to_text
 from mechgraph.equations.printing import coefficient_rows, formulation_document
 from mechgraph.equations.state import State
-from mechgraph.equations.symbols import factor_text
-from mechgraph.equations.terms import AXES, Block, Ledger, LedgerRow, ScalarEquation, Screw, Term, Unknown
+from mechgraph.equations.symbols import Words, factor
+from mechgraph.equations.terms import Block, Ledger, LedgerRow, ScalarEquation, Screw, Term, Unknown
 from mechgraph.model.mechanism import Mechanism
 
 
@@ -122,18 +122,15 @@ class Formulation:
 
     # --- print -------------------------------------------------------------------------------------------------------
 
-    def coefficient_symbol(self, term: Term) -> str:
-        """The symbol of a coefficient, e.g. ``A_1x``, ``A0_1x`` or ``2 A_1x`` of a coupling; empty for the number one."""
-        if term.screw is None:
-            return ""
-        screw = self.screws[term.screw]
-        symbol, axis = screw.symbol if term.part >= 3 else screw.dual, AXES[term.part % 3]
-        symbol = symbol.replace("{}", axis) if "{}" in symbol else symbol + axis
-        return symbol if term.coupling is None else factor_text(abs(self._number(term.coupling))) + symbol
+    def coefficient(self, term: Term) -> Words:
+        """The coefficient of a term without its sign, e.g. ``A_1x``, ``A0_1x`` or ``2 A_1x`` of a coupling; nothing for one."""
+        words = () if term.screw is None else self.screws[term.screw].coefficient(term.part)
+        return words if term.coupling is None else (*factor(abs(self._number(term.coupling))), *words)
 
-    def sign_of(self, term: Term) -> float:
+    def sign_of(self, term: Term) -> str:
         """The sign with which a term is printed: that of its number where a coupling gives one."""
-        return term.sign if term.coupling is None else term.sign * float(np.sign(self._number(term.coupling)))
+        number = 1.0 if term.coupling is None else self._number(term.coupling)
+        return "+" if term.sign * number > 0 else "-"
 
     def _number(self, place: tuple[int, int]) -> float:
         return self.mechanism.couplings[place[0]].coefficients[place[1]]

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from mechgraph.document import Block as Piece
-from mechgraph.document import Bullets, Document, Equation, Heading, Paragraph, Table
-from mechgraph.equations.symbols import names_of, subscript
+from mechgraph.document import Bullets, Document, Equation, Heading, Legend, Paragraph, Table
+from mechgraph.equations.symbols import Symbol, Words, moment_of, names_of, summed, written
 from mechgraph.equations.terms import ScalarEquation
 
 if TYPE_CHECKING:
@@ -20,8 +20,70 @@ SECTIONS = (
     ("link", "Equations of motion"),
     ("condition", "Conditions at the pairs"),
 )
-COUPLINGS = "F_C(g, q): what the multiplier M_C(g) or F_C(g) of the coupling g exerts on link b in the freedom q"
-"""What the symbols of couplings mean."""
+
+
+def _dual(letter: str, place: str, name: str = "") -> Symbol:
+    return Symbol(letter, place, "dual", name=name)
+
+
+def _entry(*words: str | Symbol) -> Equation:
+    return Equation(written(words), written(words, latex=True))
+
+
+A = Symbol("A", "k", "vector")
+A0 = moment_of(A)
+SYMBOLS = (
+    (
+        _entry(_dual("R", "ab"), "=", "F", "+", "e", "M"),
+        "force and moment about the global origin that link a exerts on link b, one dual vector; e times e is zero",
+    ),
+    (_entry(_dual("R", "ba"), "=", "-", _dual("R", "ab")), "action and reaction"),
+    (
+        _entry(A),
+        "unit vector along the axis of pair k, z of its marker; X and Y along x and y; a prime for every freedom before",
+    ),
+    (
+        _entry(A0, "=", Symbol("P", "k", "vector"), "x", A),
+        "its moment about the global origin, P the origin of its frame, for an effort that of the marker on the second link",
+    ),
+    (
+        Equation("A_k + e A0_k", _entry(_dual("A", "k"), "=", A, "+", "e", A0).latex),
+        "the axis as a line, what A stands for among dual vectors",
+    ),
+    (
+        _entry(Symbol("F", "k", along="A")),
+        "unknown force of pair k along A; likewise along X and Y, and couples M about them",
+    ),
+    (_entry(_dual("F", "Ib")), "inertia of link b: minus mass times acceleration of its mass centre, and the moment"),
+)
+"""What the symbols of every formulation mean."""
+LEE = (_entry(_dual("F", "ab")), "part of the reaction with no force along and no moment about the axis of the pair")
+PITCH = (_entry(Symbol("rho", "k")), "pitch of pair k, advance per radian")
+LOADS = (_entry(_dual("F", "Lb")), "loads applied to link b")
+DRIVERS = (
+    _entry(_dual("F", "IN"), "=", "e", Symbol("M", "IN", along="A"), _dual("A", "k")),
+    "what a driver exerts on the second link of its pair k, minus on the first; F in place of e M for a slide",
+)
+COUPLINGS = (
+    _entry(_dual("F", "C", "g,q")),
+    "what coupling g exerts in freedom q: its number there times its multiplier, M or F with C(g)",
+)
+
+
+def _symbols(f: Formulation) -> Iterator[tuple[Equation, str]]:
+    """The symbols that occur."""
+    m = f.mechanism
+    yield from SYMBOLS
+    if any(u.meaning.startswith("free dual") for u in f.unknowns):
+        yield LEE
+    if any(pair.pitch is not None for pair in m.pairs):
+        yield PITCH
+    if m.loads:
+        yield LOADS
+    if any(u.group == "driver" for u in f.unknowns):
+        yield DRIVERS
+    if m.couplings:
+        yield COUPLINGS
 
 
 def formulation_document(f: Formulation, components: bool) -> Document:
@@ -41,14 +103,9 @@ def formulation_document(f: Formulation, components: bool) -> Document:
             (
                 "links: " + ", ".join(f"{number} = {name}" for name, number in numbers.items()),
                 "pairs: " + ", ".join(f"{k + 1} = {p.name} ({p.type.symbol})" for k, p in enumerate(m.pairs)),
-                "R_ab: dual force F + e M that link a exerts on link b, M about the global origin; R_ba = -R_ab",
-                "F_I: inertia of a link, -(m a) and its moment; F_A: applied loads; F_IN: what a driver exerts on link b",
-                "A: pair axis, X and Y: the other directions of the marker (primes: frame after so many freedoms); "
-                "A0 = P x A its moment about the origin, P the origin of its frame",
-                *([COUPLINGS] if m.couplings else []),
-                *(s.meaning for s in f.screws if "{}" in s.dual),
             )
         ),
+        Legend(tuple(_symbols(f))),
     ]
     for kind, title in SECTIONS:
         mine = [b for b in f.blocks if b.kind == kind]
@@ -57,35 +114,27 @@ def formulation_document(f: Formulation, components: bool) -> Document:
             blocks += [Equation(b.text, b.latex) for b in mine]
     if components:
         blocks.append(Heading("Components", 2))
-        blocks += [
-            Equation(f"({i + 1})  {_scalar(f, e, False)}", _scalar(f, e, True)) for i, e in enumerate(f.equations)
-        ]
+        blocks += [_numbered(i, _scalar(f, e)) for i, e in enumerate(f.equations, 1)]
     return Document(f"Equations of {m.name}", tuple(blocks))
 
 
-def _scalar(f: Formulation, equation: ScalarEquation, latex: bool) -> str:
-    parts = []
-    for term in equation.terms:
-        symbols = [s for s in (f.coefficient_symbol(term), f.unknowns[term.unknown].name) if s]
-        parts.append(("+" if f.sign_of(term) > 0 else "-", " ".join(subscript(s) if latex else s for s in symbols)))
-    parts += [("+", subscript(name) if latex else name) for name in equation.known]
-    if not parts:
-        return "0 = 0"
-    text = "".join(f" {sign} {symbol}" for sign, symbol in parts)
-    return (text[3:] if text.startswith(" + ") else text.strip()) + " = 0"
+def _numbered(number: int, words: Words) -> Equation:
+    return Equation(f"({number})  {written(words)}", rf"{written(words, latex=True)} \tag{{{number}}}")
+
+
+def _scalar(f: Formulation, equation: ScalarEquation) -> Words:
+    terms = [(f.sign_of(term), (*f.coefficient(term), f.unknowns[term.unknown].symbol)) for term in equation.terms]
+    return (*summed([*terms, *(("+", (symbol,)) for symbol in equation.known)]), "=", "0")
 
 
 def coefficient_rows(f: Formulation) -> Iterator[tuple[str, int, int, str]]:
     """Right sides ``C(row)`` and coefficients ``Q(row, column)`` that are not zero by structure."""
     for i, equation in enumerate(f.equations, 1):
         if equation.known:
-            yield f"C({i})", i, 0, "-" + " - ".join(equation.known)
+            yield f"C({i})", i, 0, written(summed(("-", (symbol,)) for symbol in equation.known))
     for i, equation in enumerate(f.equations, 1):
-        cells: dict[int, str] = {}
-        for term in sorted(equation.terms, key=lambda t: t.unknown):
-            value, minus = f.coefficient_symbol(term) or "1", f.sign_of(term) < 0
-            before = cells.get(term.unknown)  # a multiplier may act twice on one link
-            joined = f"{before} {'-' if minus else '+'} {value}"
-            cells[term.unknown] = ("-" if minus else "") + value if before is None else joined
-        for unknown, value in cells.items():
-            yield f"Q({i}, {unknown + 1})", i, unknown + 1, value
+        cells: dict[int, list[tuple[str, Words]]] = {}
+        for term in sorted(equation.terms, key=lambda t: t.unknown):  # a multiplier may act twice on one link
+            cells.setdefault(term.unknown, []).append((f.sign_of(term), f.coefficient(term) or ("1",)))
+        for unknown, terms in cells.items():
+            yield f"Q({i}, {unknown + 1})", i, unknown + 1, written(summed(terms))

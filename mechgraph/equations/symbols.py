@@ -1,11 +1,13 @@
-"""How links, pairs and screws are called in equations: Lee's numbers and letters."""
+"""How links, pairs and screws are called in equations: Lee's numbers and letters, as text and as LaTeX."""
 
 from __future__ import annotations
 
-import re
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from itertools import chain
 
+from mechgraph.document import latex_words
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair_type import Component, Freedom
 
@@ -14,12 +16,84 @@ LETTERS = {"x": "X", "y": "Y", "z": "A"}
 
 
 @dataclass(frozen=True)
+class Symbol:
+    r"""One symbol of the equations, the same thing in text and in LaTeX.
+
+    ``FA'_2`` and ``F^{A'}_{2}``: a force of pair 2 along A'; ``A'0_2x`` and ``A'^{0}_{2x}``: x of the moment of A' about the
+    origin; ``R_12(B)`` and ``\hat{R}_{12(\text{B})}``: a dual vector, with the name of a pair or freedom in the user's words.
+
+    Attributes
+    ----------
+    letter, along : what it is, with primes for the frame of a direction, and the direction along which it is counted.
+    place, name : what it belongs to, numbers of links or of a pair, and a name where numbers do not tell.
+    kind : ``"scalar"``, ``"vector"`` or ``"dual"`` (a vector with a moment part).
+    moment : the moment of that direction about the origin.
+    axis : ``x``, ``y`` or ``z`` of a component.
+    """
+
+    letter: str
+    place: str
+    kind: str = "scalar"
+    along: str = ""
+    name: str = ""
+    moment: bool = False
+    axis: str = ""
+
+    @property
+    def text(self) -> str:
+        """In plain text."""
+        name = f"({self.name})" if self.name else ""
+        return f"{self.letter}{self.along}{'0' if self.moment else ''}_{self.place}{name}{self.axis}"
+
+    @property
+    def latex(self) -> str:
+        """In LaTeX, with a hat on a whole dual vector."""
+        letter = self.letter.rstrip("'")
+        primes = self.letter[len(letter) :]
+        shown = r"\rho" if letter == "rho" else letter if len(letter) == 1 else rf"\text{{{latex_words(letter)}}}"
+        if self.kind == "dual" and not self.axis:
+            shown = rf"\hat{{{shown}}}"
+        above = "0" if self.moment else self.along
+        name = rf"(\text{{{latex_words(self.name)}}})" if self.name else ""
+        return f"{shown}{primes}{f'^{{{above}}}' if above else ''}_{{{self.place}{name}{self.axis}}}"
+
+    def component(self, axis: str) -> Symbol:
+        """One component of a vector; a scalar stays what it is."""
+        return self if self.kind == "scalar" else replace(self, axis=axis)
+
+
+Words = tuple["str | Symbol", ...]
+"""A product or an equation: symbols, numbers, signs, brackets, ``e`` for epsilon and ``.`` for the product of dual vectors."""
+
+LATEX = {"e": r"\epsilon", ".": r"\cdot", "x": r"\times"}
+
+
+def written(words: Iterable[str | Symbol], latex: bool = False) -> str:
+    """Words as text or as LaTeX, a blank between them but inside brackets and behind a minus in front."""
+    out = ""
+    for word in words:
+        if isinstance(word, Symbol):
+            piece = word.latex if latex else word.text
+        else:
+            piece = LATEX.get(word, word) if latex else word
+        close = not out or piece == ")" or out == "-" or out.endswith(("(", "= -"))
+        out += piece if close else f" {piece}"
+    return out
+
+
+def summed(terms: Iterable[tuple[str, Words]]) -> Words:
+    """A sum from signs and products; a plus in front is left out, and a sum of nothing is 0."""
+    words = tuple(chain.from_iterable((sign, *product) for sign, product in terms))
+    return words[1:] if words[:1] == ("+",) else words or ("0",)
+
+
+@dataclass(frozen=True)
 class LeeNames:
-    """Numbers of links (moving ones first, then the frame) and names of the reactions of pairs."""
+    """Numbers of links (moving ones first, then the frame) and names of the reactions of pairs, both ways round."""
 
     link_number: dict[str, int]
-    reaction: tuple[str, ...]
-    opposite: tuple[str, ...]
+    reaction: tuple[Symbol, ...]
+    opposite: tuple[Symbol, ...]
 
 
 def names_of(m: Mechanism) -> LeeNames:
@@ -28,10 +102,10 @@ def names_of(m: Mechanism) -> LeeNames:
     number = {name: i + 1 for i, name in enumerate([*moving, m.frame])}
     between = Counter(frozenset((p.a, p.b)) for p in m.pairs)
 
-    def ends(first: str, second: str, pair: str) -> str:
+    def ends(first: str, second: str, pair: str) -> Symbol:
         i, j = number[first], number[second]
-        joined = f"{i}{j}" if max(i, j) < 10 else f"{i},{j}"
-        return joined if between[frozenset((first, second))] == 1 else f"{joined}({pair})"
+        place = f"{i}{j}" if max(i, j) < 10 else f"{i},{j}"
+        return Symbol("R", place, "dual", name="" if between[frozenset((first, second))] == 1 else pair)
 
     return LeeNames(
         number,
@@ -40,23 +114,25 @@ def names_of(m: Mechanism) -> LeeNames:
     )
 
 
-def screw_letter(part: Component | Freedom) -> str:
-    """Letter of the direction of a component or freedom: A, X, Y with a prime for every frame, else its own name."""
+def direction(k: int, part: Component | Freedom) -> Symbol:
+    """Direction of a component or freedom of pair ``k``, a line: A, X, Y with a prime for every frame, else by its own name."""
     values = part.wrench if isinstance(part, Component) else part.twist
     frame = part.frame if isinstance(part, Component) else 0
     nonzero = [i for i, v in enumerate(values) if v]
-    if len(nonzero) == 1 and values[nonzero[0]] == 1.0:
-        return LETTERS["xyz"[nonzero[0] % 3]] + "'" * frame
-    return part.name
+    plain = len(nonzero) == 1 and values[nonzero[0]] == 1.0
+    return Symbol(LETTERS["xyz"[nonzero[0] % 3]] + "'" * frame if plain else part.name, str(k + 1), "dual")
 
 
-def factor_text(number: float) -> str:
-    """A factor before a symbol: ``"2.5 "``, nothing for one."""
-    return "" if number == 1 else f"{number:.12g} "
+def moment_of(line: Symbol) -> Symbol:
+    """The moment of a line about the origin: ``A0_1``."""
+    return replace(line, kind="vector", moment=True)
 
 
-def subscript(symbol: str) -> str:
-    """Symbols as LaTeX: ``F_12x`` -> ``F_{12x}``, ``A0_1x`` -> ``A^{0}_{1x}``; primes stay on the letter, rho is Greek."""
-    text = re.sub(r"([A-Za-z])0_", r"\1^{0}_", symbol)
-    text = re.sub(r"_([\w,]+(?:\([^)]*\)[xyz]?)?)", r"_{\1}", text)
-    return re.sub(r"\brho_", r"\\rho_", text)
+def dual_unit(part: Component) -> Words:
+    """Epsilon in front of a couple."""
+    return ("e",) if part.is_couple else ()
+
+
+def factor(number: float) -> Words:
+    """A factor in front of a symbol, nothing for one."""
+    return () if number == 1 else (f"{number:.12g}",)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from mechgraph.equations.symbols import Symbol, Words
+
 AXES = ("x", "y", "z")
 
 
@@ -12,16 +14,20 @@ AXES = ("x", "y", "z")
 class Screw:
     """A unit wrench or twist of a pair that appears in coefficients: ``kind`` and ``index`` place it in a State.
 
-    ``symbol`` is printed for the real part (direction), ``dual`` for the dual part (moment about the origin), the axis letter
-    behind it or in the place of ``{}``; empty where that part is zero. ``meaning`` explains them.
+    ``real`` and ``dual`` are printed for its real part (force of a wrench, velocity of a twist) and its dual part (moment, rotation),
+    a component of each vector in them; empty where that part is zero.
     """
 
     kind: str
     pair: int
     index: int
-    symbol: str
-    dual: str
-    meaning: str
+    real: Words
+    dual: Words
+
+    def coefficient(self, part: int) -> Words:
+        """Component ``part`` of the screw, 0 to 2 of the dual part and 3 to 5 of the real one; nothing where it is zero."""
+        words = self.real if part >= 3 else self.dual
+        return tuple(w.component(AXES[part % 3]) if isinstance(w, Symbol) else w for w in words)
 
 
 @dataclass(frozen=True)
@@ -32,12 +38,17 @@ class Unknown:
     force; ``freedom`` the freedom of an effort.
     """
 
-    name: str
+    symbol: Symbol
     owner: str
     group: str
     couple: bool
     meaning: str
     freedom: str = ""
+
+    @property
+    def name(self) -> str:
+        """Its symbol in plain text, ``FA_1``."""
+        return self.symbol.text
 
 
 @dataclass(frozen=True)
@@ -65,7 +76,7 @@ class ScalarEquation:
     terms: tuple[Term, ...]
     link: int | None = None
     part: int = 0
-    known: tuple[str, ...] = ()
+    known: tuple[Symbol, ...] = ()
 
 
 @dataclass(frozen=True)

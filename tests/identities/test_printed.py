@@ -1,0 +1,344 @@
+"""The printed equations hold: text and LaTeX are read back and evaluated with numbers that owe nothing to the formulation.
+
+Directions and points come from the poses of the links and the markers, inertia from the accelerations of the mass centres, loads
+from their declaration, unknowns from the reactions of a solution, taken apart by Lee's definitions.
+"""
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+import mechgraph as mg
+
+MOVING = tuple(name for name in mg.library() if mg.load(name).expected.get("mobility", 0) > 0)
+BOOKKEEPINGS = ("lee", "minimal")
+LETTERS = dict(zip("XYA", np.eye(3), strict=True))
+PART = r"[A-Za-z]\w*?'*0?_[\w,]+?(?:\([^()]*\))?"
+SYMBOL = re.compile(rf"(?P<name>{PART})(?P<axis>[xyz]?)")
+TOKEN = re.compile(rf"{PART}[xyz]?(?![\w(])|e(?!\w)|\d+(?:\.\d+)?|[-+().=]")
+TEX = re.compile(
+    r"(?:\\hat\{(?P<hat>\w|\\text\{\w+\})\}|(?P<plain>\\rho|\\text\{\w+\}|[A-Z]))(?P<primes>'*)"
+    r"(?:\^\{(?P<above>[^{}]*)\})?_\{(?P<below>(?:[^{}]|\{[^{}]*\})*)\}"
+)
+
+
+def untexed(latex: str) -> str:
+    """The LaTeX of an equation as the text of the same equation."""
+
+    def symbol(m: re.Match[str]) -> str:
+        letter = (m["hat"] or m["plain"]).removeprefix("\\")
+        return re.sub(r"\\?text\{([^{}]*)\}", r"\1", f"{letter}{m['primes']}{m['above'] or ''}_{m['below']}")
+
+    words = TEX.sub(symbol, latex).replace(r"\epsilon", "e").replace(r"\cdot", ".")
+    assert "\\" not in words.replace(r"\_", "_"), latex
+    return words.replace(r"\_", "_")
+
+
+@dataclass(frozen=True)
+class Dual:
+    """``real + e dual``: scalars or vectors, with e e = 0."""
+
+    real: np.ndarray
+    dual: np.ndarray
+
+    @staticmethod
+    def of(real: object, dual: object = 0.0) -> "Dual":
+        return Dual(np.asarray(real, dtype=float), np.asarray(dual, dtype=float))
+
+    @property
+    def size(self) -> float:
+        return float(max(np.abs(self.real).max(), np.abs(self.dual).max()))
+
+    def __add__(self, other: "Dual") -> "Dual":
+        return Dual(self.real + other.real, self.dual + other.dual)
+
+    def __neg__(self) -> "Dual":
+        return Dual(-self.real, -self.dual)
+
+    def __mul__(self, other: "Dual") -> "Dual":
+        return Dual(self.real * other.real, self.real * other.dual + self.dual * other.real)
+
+    def dot(self, other: "Dual") -> "Dual":
+        return Dual(np.asarray(self.real @ other.real), self.real @ other.dual + self.dual @ other.real)
+
+
+class Numbers(dict[str, Dual]):
+    """Values of the symbols at one position of a solution."""
+
+    def __init__(self, m: mg.Mechanism, s: mg.Solution, i: int) -> None:
+        super().__init__(e=Dual.of(0.0, 1.0))
+        self.m, self.s, self.i = m, s, i
+        self.held = max((float(np.abs(effort[i])) for effort in s.passive_effort.values()), default=0.0)
+        moving = [link.name for link in m.links if link.name != m.frame]
+        self.number = {name: str(n) for n, name in enumerate([*moving, m.frame], 1)}
+        for k, pair in enumerate(m.pairs):
+            self.put_pair(str(k + 1), pair)
+        for link in m.links:
+            if link.name != m.frame:
+                self.put_link(link)
+
+    def pose(self, link: str) -> np.ndarray:
+        return self.s.link(link).pose[self.i]
+
+    def frames(self, pair: mg.Pair) -> list[np.ndarray]:
+        """Poses of the frames of a pair, one more after every single freedom."""
+        out = [self.pose(pair.a) @ full(pair.markers[0].pose())]
+        for label, q in zip((f.name for f in pair.type.freedoms), self.s[pair.name].position[self.i], strict=True):
+            step = np.eye(4)
+            axis = "xyz".index(label[1])
+            if label[0] == "T":
+                step[axis, 3] = q
+            else:
+                j, k = (axis + 1) % 3, (axis + 2) % 3
+                step[[j, k], [j, k]], step[j, k], step[k, j] = np.cos(q), -np.sin(q), np.sin(q)
+            out.append(out[-1] @ step)
+        return out
+
+    def put_pair(self, k: str, pair: mg.Pair) -> None:
+        at_b = (self.pose(pair.b) @ full(pair.markers[1].pose()))[:3, 3]
+        frames = self.frames(pair)
+        slides = {
+            f"{'XYA'['xyz'.index(f.name[1])]}{p * chr(39)}"
+            for p, f in enumerate(pair.type.freedoms)
+            if f.name[0] == "T"
+        }
+        for p, frame in enumerate(frames):
+            for letter, unit in LETTERS.items():
+                name, point = letter + p * "'", frame[:3, 3]
+                line, moment = frame[:3, :3] @ unit, np.cross(at_b if name in slides else point, frame[:3, :3] @ unit)
+                self[f"{name}_{k}"], self[f"{name}0_{k}"] = Dual.of(line, moment), Dual.of(moment)
+        if pair.pitch is not None:
+            self[f"rho_{k}"] = Dual.of(pair.pitch)
+        joint = self.s[pair.name]
+        moment, force = joint.reaction[self.i, :3], joint.reaction[self.i, 3:]
+        a, b = self.number[pair.a], self.number[pair.b]
+        alone = sum({p.a, p.b} == {pair.a, pair.b} for p in self.m.pairs) == 1
+        name = "" if alone else f"({pair.name})"
+        self[f"R_{a}{b}{name}"], self[f"R_{b}{a}{name}"] = Dual.of(force, moment), -Dual.of(force, moment)
+        for part, value in joint.components.items():
+            for p in range(4):
+                self[f"{part[0]}{'XYA'['xyz'.index(part[1])]}{p * chr(39)}_{k}"] = Dual.of(value[self.i])
+        axis, origin = frames[0][:3, 2], frames[0][:3, 3]
+        if pair.type.symbol in ("R", "H"):  # Lee: what remains has no force along the axis, and no moment about it
+            along = float(axis @ force)
+            rho = pair.pitch or 0.0
+            moment = moment - along * (np.cross(origin, axis) - rho * axis)
+            force = force - along * axis
+            self[f"FA_{k}"] = Dual.of(along)
+        elif pair.type.symbol == "P":
+            along = float(axis @ (moment - np.cross(origin, force)))
+            moment = moment - along * axis
+            self[f"MA_{k}"] = Dual.of(along)
+        self[f"F_{a}{b}{name}"], self[f"M_{a}{b}{name}"] = Dual.of(force, moment), Dual.of(moment)
+
+    def put_link(self, link: mg.Link) -> None:
+        here, n = self.s.link(link.name), self.number[link.name]
+        pose, w, alpha = here.pose[self.i], here.angular_velocity[self.i], here.angular_acceleration[self.i]
+        turned = np.zeros((3, 3)) if link.inertia is None else pose[:3, :3] @ link.inertia @ pose[:3, :3].T
+        place = here.center[self.i] if link.mass else np.zeros(3)
+        force = -link.mass * (here.center_acceleration[self.i] if link.mass else np.zeros(3))
+        moment = np.cross(place, force) - turned @ alpha - np.cross(w, turned @ w)
+        self.put_load(f"I{n}", force, moment)
+        force, moment = np.zeros(3), np.zeros(3)
+        for load in self.m.loads:
+            if isinstance(load, mg.Gravity):
+                weight = link.mass * np.asarray(load.acceleration)
+                force, moment = force + weight, moment + np.cross(place, weight)
+            else:
+                assert isinstance(load, mg.Effort)
+                k, j = self.m.freedom(load.freedom)
+                pair = self.m.pairs[k]
+                sign = (pair.b == link.name) - (pair.a == link.name)
+                letter = "XYA"["xyz".index(pair.type.freedoms[j].name[1])] + j * "'"
+                line = self[f"{letter}_{k + 1}"]
+                turns = pair.type.freedoms[j].turns
+                moment = moment + sign * load.value * (line.real if turns else line.dual)
+                force = force + sign * load.value * line.real * (not turns)
+        self.put_load(f"L{n}", force, moment)
+
+    def put_load(self, place: str, force: np.ndarray, moment: np.ndarray) -> None:
+        self[f"F_{place}"], self[f"M_{place}"] = Dual.of(force, moment), Dual.of(moment)
+
+    def value(self, word: str) -> Dual:
+        if word in self:
+            return self[word]
+        if word[0].isdigit():
+            return Dual.of(float(word))
+        name, axis = SYMBOL.fullmatch(word).group("name", "axis")
+        return Dual.of(self[name].real["xyz".index(axis)])
+
+
+def full(pose: np.ndarray) -> np.ndarray:
+    return np.vstack([pose, [0, 0, 0, 1]])
+
+
+def evaluated(text: str, numbers: Numbers) -> Dual:
+    """A sum of products; ``.`` is the product of dual vectors."""
+    words = TOKEN.findall(text)
+    assert "".join(words) == text.replace(" ", ""), text
+
+    def summed(end: str) -> Dual:
+        total = Dual.of(0.0)
+        sign = "+"
+        while words and words[0] != end:
+            if words[0] in "+-":
+                sign = words.pop(0)
+            product = Dual.of(1.0)
+            while words and words[0] not in ("+", "-", end):
+                word = words.pop(0)
+                if word == ".":
+                    product = product.dot(numbers.value(words.pop(0)))
+                else:
+                    product = product * (summed(")") if word == "(" else numbers.value(word))
+            total = total + (product if sign == "+" else -product)
+        if end:
+            words.pop(0)
+        return total
+
+    return summed("")
+
+
+def assert_holds(text: str, numbers: Numbers) -> None:
+    """To rounding, and to the effort that holds a passive freedom, which is no unknown of the printed equations."""
+    left, right = (evaluated(side, numbers) for side in text.split(" = "))
+    gap, scale = left + -right, max(number.size for number in numbers.values())
+    assert max(np.abs(gap.real).max(), np.abs(gap.dual).max()) <= 1e-11 * scale + numbers.held, text
+
+
+def numbered(text: str, latex: str) -> list[tuple[str, str]]:
+    """Text and LaTeX of the component equations, each by its number."""
+    flat = " ".join(text.partition("Components\n~~~~~~~~~~\n")[2].split())
+    pieces = re.split(r"(?:^| )\((\d+)\) ", flat)[1:]
+    tagged = {n: line for line, n in re.findall(r"^(.*) \\tag\{(\d+)\}$", latex, re.MULTILINE)}
+    assert list(tagged) == pieces[::2] == [str(n + 1) for n in range(len(tagged))]
+    return [(words, tagged[n]) for n, words in zip(pieces[::2], pieces[1::2], strict=True)]
+
+
+def check_all(m: mg.Mechanism, s: mg.Solution, bookkeeping: str, positions: tuple[int, ...]) -> None:
+    """Every printed equation, block by block and component by component, as text and as LaTeX."""
+    f = mg.formulate(m, bookkeeping)
+    names = [u.name for u in f.unknowns]
+    assert len(set(names)) == len(names)
+    components = numbered(f.text(), f.latex())
+    assert len(components) == len(f.equations)
+    for text, latex in [*components, *((b.text, b.latex) for b in f.blocks)]:
+        assert untexed(latex) == text
+    for i in positions:
+        numbers = Numbers(m, s, i)
+        for u in f.unknowns:
+            if u.group == "driver":
+                k, j = m.freedom(u.freedom)
+                numbers[u.name] = Dual.of(s[m.pairs[k].name].effort[i, j])
+            elif u.group == "coupling":
+                numbers[u.name] = Dual.of(s.coupling(u.owner).effort[i])
+        for block in f.blocks:
+            if block.kind in ("effort", "coupling"):
+                left, _, right = block.text.partition(" = ")
+                numbers[left] = evaluated(right, numbers)
+            else:
+                assert_holds(block.text, numbers)
+        for text, _ in components:
+            assert_holds(text, numbers)
+
+
+@pytest.mark.parametrize("bookkeeping", BOOKKEEPINGS)
+@pytest.mark.parametrize("name", MOVING)
+def test_printed_equations_of_the_library_hold(name: str, bookkeeping: str) -> None:
+    m = mg.load(name)
+    (drive,) = m.drives
+    if drive.motion is None:
+        s = mg.solve(m, {drive.freedom: mg.Motion([0.0, 0.1], 2.0, 3.0)}, redundant="minimum_norm")
+        check_all(m, s, bookkeeping, (0, 1))
+        return
+    s = mg.solve(m, redundant="minimum_norm")
+    check_all(m, s, bookkeeping, (0, len(s.status) // 3))
+
+
+Z = (0.0, 0.0, 1.0)
+
+
+def planar() -> mg.Mechanism:
+    """Two drivers on one link of a planar pair whose frames turn: efforts along slides that act at the marker of link b."""
+    links = [mg.Link("frame"), mg.Link("plate", 2.0, (0.3, 0.2, 0.1), np.diag([0.1, 0.2, 0.3]))]
+    pair = mg.Pair("E", "E", "frame", "plate", point=(0.1, -0.2, 0.4), axis=(0.2, 0.3, 1.0))
+    return mg.Mechanism("plate", links, [pair], drives=["E.Tx", "E.Ty", "E.Rz"], loads=[mg.Gravity((1.0, 2.0, -9.81))])
+
+
+def door() -> mg.Mechanism:
+    """Two hinges between the same links, with names that mean something in LaTeX, and a wheel geared to them."""
+    links = [mg.Link("frame"), mg.Link("door", 20.0, (0.4, 0, 0.9)), mg.Link("wheel", 1.0, (1.1, 0, 0), np.eye(3))]
+    pairs = [
+        mg.Pair("hinge_low", "R", "frame", "door", point=(0, 0, 0), axis=Z),
+        mg.Pair("hinge_high", "R", "door", "frame", point=(0, 0, 2), axis=Z),
+        mg.Pair("axle", "R", "frame", "wheel", point=(1, 0, 0), axis=Z),
+    ]
+    gears = mg.Coupling({"hinge_low": 1.0, "axle": -2.5}, name="belt")
+    return mg.Mechanism(
+        "door", links, pairs, couplings=[gears], drives=["hinge_low"], loads=[mg.Gravity((0, 1, -9.81))]
+    )
+
+
+@pytest.mark.parametrize("bookkeeping", BOOKKEEPINGS)
+@pytest.mark.parametrize(
+    ("m", "motion"),
+    [
+        (planar(), {"E.Tx": [0.1, 0.2], "E.Ty": [0.3, 0.4], "E.Rz": mg.Motion([0.7, 0.9], 2.0, 3.0)}),
+        (door(), {"hinge_low": mg.Motion([0.7, 0.9], 2.0, 3.0)}),
+    ],
+    ids=["several drivers", "two pairs between two links, coupling"],
+)
+def test_printed_equations_hold_beyond_the_library(m: mg.Mechanism, motion: dict, bookkeeping: str) -> None:
+    check_all(m, mg.solve(m, motion, redundant="minimum_norm"), bookkeeping, (0, 1))
+
+
+@pytest.mark.parametrize("bookkeeping", BOOKKEEPINGS)
+def test_a_wrong_sign_would_be_seen(bookkeeping: str) -> None:
+    """Every term of every equation counts: with its sign turned about, no equation holds (axes in general directions)."""
+    pose = np.eye(4)
+    pose[:3, :3] = np.linalg.qr(np.random.default_rng(7).normal(size=(3, 3)))[0]
+    pose[:3, :3] *= np.linalg.det(pose[:3, :3])
+    pose[:3, 3] = 0.3, -0.2, 0.4
+    m = mg.load("rprrhc").moved(pose)
+    s = mg.solve(m)
+    numbers = Numbers(m, s, 3)
+    numbers["MA_IN"] = Dual.of(s["O1"].effort[3, 0])
+    numbers["F_IN"] = evaluated("e MA_IN A_1", numbers)
+    f = mg.formulate(m, bookkeeping)
+    texts = [text for text, _ in numbered(f.text(), f.latex())] + [b.text for b in f.blocks if b.kind == "link"]
+    for text in texts:
+        assert_holds(text, numbers)
+        for sign in re.finditer(r"(?:^-| [-+] )(?=[A-Z(])", text):
+            turned = text[: sign.start()] + (" - " if "+" in sign[0] else " + ") + text[sign.end() :]
+            with pytest.raises(AssertionError):
+                assert_holds(turned, numbers)
+
+
+def test_names_are_escaped_in_latex() -> None:
+    r"""A pair called ``\input{x}`` is text, not a command; a pair type's own component likewise."""
+    slot = mg.PairType("Q", "crossed slots", freedoms=["Tx", "Ty"], reactions=None)
+    pairs = [
+        mg.Pair(r"\input{x}", "R", "frame", "a"),
+        mg.Pair("B_1%", "R", "frame", "a"),
+        mg.Pair("C", slot, "frame", "a"),
+    ]
+    for bookkeeping in BOOKKEEPINGS:
+        latex = mg.formulate(mg.Mechanism("names", pairs=pairs), bookkeeping, efforts=["B_1%", "C.Tx"]).latex()
+        assert r"\input" not in latex
+        assert r"\text{\textbackslash{}input\{x\}}" in latex
+        assert r"M^{A}_{IN(\text{B\_1\%})}" in latex
+        assert r"\hat{\text{n1}}_{3}" in latex
+
+
+def test_symbols_are_explained_in_mathematics() -> None:
+    latex = mg.formulate(mg.load("rchch")).latex()
+    assert r"\item $\hat{R}_{ab} = F + \epsilon M$: force" in latex
+    assert r"\item $\hat{A}_{k} = A_{k} + \epsilon A^{0}_{k}$: " in latex
+    assert r"\item $\rho_{k}$: pitch" in latex
+    assert r"\hat{R}_{23} = \hat{F}_{23} + (1 - \epsilon \rho_{3}) F^{A}_{3} \hat{A}_{3}" in latex
+    assert r"\rho" not in mg.formulate(mg.load("7r")).latex()
+    text = mg.formulate(mg.load("rchch")).text()
+    assert "- rho_k: pitch of pair k, advance per radian" in text
+    assert "F_Lb: loads applied to link b" in text
+    assert "F_Lb" not in mg.formulate(mg.load("rchch").replace(loads=[])).text()
