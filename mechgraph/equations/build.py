@@ -16,7 +16,6 @@ from mechgraph.equations.symbols import (
     moment_of,
     names_of,
     summed,
-    written,
 )
 from mechgraph.equations.terms import AXES, Block, ScalarEquation, Screw, Term, Unknown
 from mechgraph.errors import DeclarationError
@@ -47,7 +46,7 @@ class _Draft:
         return len(self.unknowns) - 1
 
     def block(self, words: Words, kind: str, owner: str) -> None:
-        self.blocks.append(Block(written(words), written(words, latex=True), kind, owner))
+        self.blocks.append(Block(words, kind, owner))
 
     def screw(self, kind: str, k: int, index: int, part: Component, line: Symbol) -> int:
         """A wrench of pair ``k``: a couple has the direction as its dual part, a force its moment (less pitch times it)."""
@@ -59,7 +58,9 @@ class _Draft:
         return len(self.screws) - 1
 
     def carry(self, act: list[Term], unknown: int, screw: int, coupling: tuple[int, int] | None = None) -> None:
-        act += [Term(unknown, 1.0, screw, part, coupling) for part in range(6) if self.screws[screw].coefficient(part)]
+        made = self.screws[screw]
+        parts = (*range(3 * bool(made.dual)), *range(3, 3 + 3 * bool(made.real)))
+        act += [Term(unknown, 1.0, screw, part, coupling) for part in parts]
 
 
 def _along(draft: _Draft, k: int, kind: str, parts: Iterable[Component], act: list[Term]) -> list[tuple[str, Words]]:
@@ -191,8 +192,8 @@ def _equilibrium(draft: _Draft) -> list[ScalarEquation]:
             printed.append(("+", (names.reaction[k] if sign > 0 else names.opposite[k],)))
             for t in draft.acts[k]:
                 terms[t.part].append(Term(t.unknown, sign, t.screw, t.part, t.coupling))
-        known = [Symbol("F", f"{kind}{number}", "dual") for kind in ("I", "L") if kind == "I" or link.name in touched]
-        printed += [("+", (symbol,)) for symbol in known]
+        known = [f"I{number}"] + [f"L{number}"] * (link.name in touched)
+        printed += [("+", (Symbol("F", place, "dual"),)) for place in known]
         for k, exerted in draft.driven:
             if link.name in (m.pairs[k].a, m.pairs[k].b):
                 printed.append(("+" if m.pairs[k].b == link.name else "-", (exerted,)))
@@ -207,7 +208,7 @@ def _equilibrium(draft: _Draft) -> list[ScalarEquation]:
                         tuple(terms[offset + i]),
                         index,
                         offset + i,
-                        tuple(replace(symbol, letter=letter, axis=axis) for symbol in known),
+                        tuple(Symbol(letter, place, "vector", axis=axis) for place in known),
                     )
                 )
     return equations

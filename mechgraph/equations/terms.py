@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from mechgraph.equations.symbols import Symbol, Words
+from mechgraph.equations.symbols import Symbol, Words, written
 
 AXES = ("x", "y", "z")
 
@@ -86,10 +86,19 @@ class Block:
     ``kind`` is ``"link"``, ``"condition"``, ``"reaction"``, ``"effort"`` or ``"coupling"``.
     """
 
-    text: str
-    latex: str
+    words: Words
     kind: str
     owner: str
+
+    @property
+    def text(self) -> str:
+        """In plain text."""
+        return written(self.words)
+
+    @property
+    def latex(self) -> str:
+        """In LaTeX."""
+        return written(self.words, latex=True)
 
 
 @dataclass(frozen=True)
