@@ -77,7 +77,12 @@ class ReachError(PathError):
 
 
 class DeadPointError(PathError):
-    """At this position the drivers do not determine the motion (dead point or change point)."""
+    """At this position the drivers do not determine the motion (dead point or change point).
+
+    ``branches``: of a change point the branches that meet there, each as a mapping freedom -> rate for a unit rate of the first driver.
+    """
+
+    branches: tuple[dict[str, float], ...] = ()
 
 
 class IndeterminateError(MechgraphError):

@@ -18,6 +18,7 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.pipeline import Options, Outcome, Pipeline
 from mechgraph.report.report import check
 from mechgraph.result.solution import Solution
+from mechgraph.structure.branching import branches, branches_text
 
 ON_REACH = ("raise", "flag")
 REDUNDANT = ("nan", "minimum_norm")
@@ -30,7 +31,7 @@ def _option(what: str, value: Any, allowed: Iterable[str]) -> list[str]:
 def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exception | None:
     """The named error for the first position that was not solved, with the solution so far."""
     status = solution.status.reshape(-1)
-    bad = np.flatnonzero(status != Status.OK.value)
+    bad = np.flatnonzero((status != Status.OK.value) & (status != Status.CHANGE_POINT.value))
     if not bad.size:
         return None
     first = int(bad[0])
@@ -45,12 +46,17 @@ def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exceptio
         where = (
             "is a dead point" if status[first] == Status.DEAD_POINT.value else f"is beyond a dead point; reached {at}"
         )
-        return DeadPointError(
-            f"mechanism {line.m.name!r}: position {first} ({wanted}) {where}. At a dead point the drivers do not determine the "
+        nodes = outcome.found.nodes_of(int(outcome.found.track[first]))
+        ways = branches(line.system, nodes.x[:, np.argmax(nodes.place)], line.leading) if len(nodes) else ()
+        meet = f" ({branches_text(ways, line.drive.names[line.lead[0]])})" if ways else ""
+        error = DeadPointError(
+            f"mechanism {line.m.name!r}: position {first} ({wanted}) {where}{meet}. At a dead point the drivers do not determine the "
             "motion; drive another freedom, leave the position out, or use on_reach='flag'",
             reached,
             solution,
         )
+        error.branches = ways
+        return error
     return ReachError(
         f"mechanism {line.m.name!r}: position {first} ({wanted}) is out of reach; reached {at}. Use on_reach='flag' for the "
         "positions that can be reached",
@@ -60,7 +66,7 @@ def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exceptio
 
 
 def _check_drivers(line: Pipeline, outcome: Outcome) -> None:
-    unsolved = not (outcome.found.status == Status.OK).any()
+    unsolved = not outcome.found.moved.any()
     if not outcome.contradicting.any() and not (unsolved and line.freedoms.dependent):
         return
     names, mobility = ", ".join(line.drive.names), line.freedoms.mobility

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -18,7 +18,7 @@ from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.closure.driver_path import BLOCK, DriverPath, Positions, Request, Status, follow, in_blocks
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.passive_rest import Idle, unspun
-from mechgraph.closure.rates import Rates, distance_to_dead_point, rates
+from mechgraph.closure.rates import Rates, Velocities, distance_to_dead_point, rates
 from mechgraph.closure.solver import ClosureSolver, FactoredClosure, closure_solver, engine_for
 from mechgraph.errors import DeadPointError, DeclarationError, IndeterminateError
 from mechgraph.force.block import BlockForces, ForceTask, forces_of_block
@@ -27,10 +27,13 @@ from mechgraph.numerics.linear import independent_rows, rank_of, singular_values
 from mechgraph.numerics.tolerances import PATH
 from mechgraph.report.report import check
 from mechgraph.result.trajectory import BlockMotion, Trajectory
+from mechgraph.structure.branching import branches, branches_text
 from mechgraph.structure.mobility import Freedoms, free_motion
 
 CONTRADICTION = 1e-6
 """Relative part of the closure rates that drivers may leave open before they count as contradicting each other."""
+NOISE = 1e-13
+"""Part of the condition number within which a start is not told from a dead point: some hundred roundings of its closing."""
 FARTHEST = 1e6
 """Longest way of a driver from its start (radians, or lengths / L)."""
 
@@ -140,6 +143,7 @@ class Pipeline:
                 "that it does not determine the motion; drive another freedom, or start at another position",
                 value,
             )
+        self._refuse_change_point()
         if free:
             names = ", ".join(dict.fromkeys(name for motion in free for name in motion.names))
             count, more = (
@@ -151,6 +155,26 @@ class Pipeline:
                 f"mechanism {self.m.name!r}: {count} neither driven nor passive (moving: {names}); add {more}, or change a pair",
                 check(self.m),
             )
+
+    def _refuse_change_point(self) -> None:
+        """A path that starts where branches cross has no velocity that it could continue."""
+        here, columns = self.start, self.leading
+        f = self.solver.factored(here, self.solver.chosen(here, np.full(1, -1)))
+        if f.condition[0] <= PATH.singular and not self.freedoms.undriven:
+            near = distance_to_dead_point(here, f, columns)[0]
+            if f.condition[0] < PATH.doubtful or near > NOISE * f.condition[0]:
+                return
+        ways = branches(self.system, self.x, columns, self.freedoms.passive)
+        if not ways:
+            return
+        values = self.x[self.system.single_rows[self.columns]] * self.unit
+        error = DeadPointError(
+            f"mechanism {self.m.name!r}: change point where it was assembled: {branches_text(ways, self.drive.names[0])}. A path that "
+            "starts there has no velocity to continue: start beside it, on the branch that is meant, or drive another freedom",
+            dict(zip(self.drive.names, values.tolist(), strict=True)),
+        )
+        error.branches = ways
+        raise error
 
     @property
     def leading(self) -> Index:
@@ -173,6 +197,7 @@ class Pipeline:
         found = follow(path, self._requests(followed, starts), int(np.prod(followed)))
         if self.bodies:
             found = unspun(path, found, self.bodies)
+            found.interpolate()
         return Outcome(self, starts, batch, variant, found, path)
 
     def _requests(self, batch: tuple[int, ...], starts: Starts) -> list[Request]:
@@ -219,7 +244,7 @@ class Outcome:
 
     def _fill(self) -> None:
         found = self.found
-        good = np.flatnonzero(found.status == Status.OK)
+        good = np.flatnonzero((found.status == Status.OK) & (found.near < 0))
         bad = np.flatnonzero(found.status != Status.OK)
         whole = bool(self.line.bodies) or not all(_by_position(load) for load in self.starts.loads)
         if self.starts.sharing > 1:
@@ -232,6 +257,8 @@ class Outcome:
             moved = self._moved(places)
             if moved is not None:
                 self._put(*moved)
+        for motion, f in self._beside_change_points():
+            self._put(motion, f)
 
     def _name_holds(self) -> None:
         """What would be held, by name, where no position was reached."""
@@ -249,16 +276,14 @@ class Outcome:
             self.found.status == Status.OK, self.trajectory.first(N), [s.value for s in self.found.status]
         )
         self.trajectory.mark(np.arange(len(self.variant)), np.tile(status, len(every)))
-        if moved is None:
-            return
-        motion, f = moved
         self.contradicting[:] = np.tile(self.contradicting[:N], len(every))
         blocks = 1 if whole else len(every) // max(1, BLOCK // N)
-        for variants in np.array_split(every, max(1, blocks)):
-            places, count = (variants * N + motion.places).ravel(), len(variants)
-            here = motion.here.repeated(self._system_at(places), count)
-            factors = self.solver.factored(here, np.tile(f.which, count))
-            self._put(BlockMotion(places, motion.rates.repeated(here, count)), factors)
+        for motion, f in [*([] if moved is None else [moved]), *self._beside_change_points()]:
+            for variants in np.array_split(every, max(1, blocks)):
+                places, count = (variants * N + motion.places).ravel(), len(variants)
+                here = motion.here.repeated(self._system_at(places), count)
+                factors = None if f is None else self.solver.factored(here, np.tile(f.which, count))
+                self._put(BlockMotion(places, motion.rates.repeated(here, count)), factors)
 
     def _moved(self, places: Index) -> tuple[BlockMotion, FactoredClosure] | None:
         """Rates of a block, and the factors with which they were found; None where it has no position that is closed and regular."""
@@ -278,15 +303,44 @@ class Outcome:
             f = f.part(keep, here)
         if not places.size:
             return None
-        velocity, acceleration = self._velocity[:, places], self._acceleration[:, places]
-        moved = rates(here, f, line.leading, velocity[line.lead], acceleration[line.lead], line.bodies)
+        moved = self._rates(here, f, places)
         if len(line.lead) < len(line.columns):
             moved.contradiction = self._disagreement(here, moved, places)
         self.contradicting[places] = moved.contradiction > CONTRADICTION
         return BlockMotion(places, moved), f
 
-    def _put(self, motion: BlockMotion, f: FactoredClosure) -> None:
-        self.trajectory.put(motion, self._forces(motion, f) if self.line.options.method else None)
+    def _rates(self, here: Configuration, f: FactoredClosure, places: Index) -> Rates:
+        """Rates at states for the motions of the drivers at places."""
+        line = self.line
+        velocity, acceleration = self._velocity[line.lead][:, places], self._acceleration[line.lead][:, places]
+        return rates(here, f, line.leading, velocity, acceleration, line.bodies)
+
+    def _beside_change_points(self) -> Iterator[tuple[BlockMotion, FactoredClosure | None]]:
+        """Motion at and beside the change points passed, interpolated between both sides; without factors where these are singular."""
+        found, path = self.found, self.path
+        for number, crossing in enumerate(found.crossings):
+            places, sides = np.flatnonzero(found.near == number), crossing.sides
+            n, k = len(places), len(sides)
+            many = np.tile(np.arange(k), n)
+            beside = path.at(sides.x[:, many], sides.drive[:, many], sides.track[many])
+            f = path.factored(beside, sides.which[many])
+            moved = self._rates(beside, f, np.repeat(places, k))
+            weights = crossing.weights(found.place[places])
+            dq, ddq = (np.einsum("fnk,kn->fn", values.reshape(-1, n, k), weights) for values in (moved.dq, moved.ddq))
+            for regular in (True, False):
+                mine = np.flatnonzero((found.status[places] == Status.OK) == regular)
+                if not mine.size:
+                    continue
+                at = places[mine]
+                here = self._system_at(at).at(found.x[:, at])
+                motion = Rates(Velocities(here, dq[:, mine]), ddq[:, mine], np.zeros(len(mine)))
+                factors = self.solver.factored(here, self.solver.chosen(here, found.which[at])) if regular else None
+                yield BlockMotion(at, motion), factors
+
+    def _put(self, motion: BlockMotion, f: FactoredClosure | None) -> None:
+        forces = self._forces(motion, f) if self.line.options.method and f is not None else None
+        self.trajectory.put(motion, forces)
+        self.trajectory.has_forces |= self.line.options.method is not None
 
     def _forces(self, motion: BlockMotion, f: FactoredClosure) -> BlockForces:
         line = self.line
@@ -349,7 +403,7 @@ def continued(path: DriverPath, found: Positions) -> Array:
     if all(len(factor) == 1 for g in s.groups for factor in g.row.factors):
         return s.coordinates_of(found.x)
     out = np.full((s.n_freedoms, found.x.shape[1]), np.nan)
-    good = np.flatnonzero(found.status == Status.OK)
+    good = np.flatnonzero(found.moved)
     for track, mine in _by_track(found.track[good]):
         at, nodes = good[mine], found.nodes_of(track)
         place = np.concatenate([nodes.place, found.place[at]])

@@ -19,6 +19,7 @@ from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.solver import ClosureSolver, FactoredClosure
 from mechgraph.numerics.continuation import End, Follower, Tracks
+from mechgraph.numerics.crossings import WINDOW, Crossing, passed
 from mechgraph.numerics.hermite import Interpolation
 from mechgraph.numerics.newton import Work
 from mechgraph.numerics.refinement import refined
@@ -40,6 +41,7 @@ class Status(Enum):
     DEAD_POINT = "dead point"
     OUT_OF_REACH = "out of reach"
     BEYOND_DEAD_POINT = "beyond a dead point"
+    CHANGE_POINT = "change point"
     NOT_CLOSED = "loops not closed"
 
 
@@ -127,7 +129,8 @@ class Positions:
     """States ``(nx, T)``, statuses ``(T,)`` and forms ``(T,)`` of all positions; ``reached (d, T)`` the last driver values before what was
     not reached; ``here`` the evaluation where all positions were closed in one block.
 
-    ``place (T,)`` and ``track (T,)`` say where on the followed tracks they lie.
+    ``place (T,)`` and ``track (T,)`` say where on the followed tracks they lie; ``near (T,)`` is the number of the crossing beside which
+    a position lies, or -1.
     """
 
     x: Array
@@ -138,7 +141,20 @@ class Positions:
     place: Array
     tracks: Tracks
     follower: Follower
+    near: Index
+    crossings: list[Crossing]
     here: Configuration | None = None
+
+    @property
+    def moved(self) -> Mask:
+        """Which positions have a state and rates: those that are solved, and change points."""
+        return np.asarray((self.status == Status.OK) | (self.status == Status.CHANGE_POINT))
+
+    def interpolate(self) -> None:
+        """Take the states beside change points from the branch that passes them."""
+        for i, crossing in enumerate(self.crossings):
+            at = np.flatnonzero(self.near == i)
+            self.x[:, at] = crossing.states(self.place[at])
 
     def put(self, other: Positions, places: Index) -> None:
         """Take some places from positions that were followed afterwards."""
@@ -283,9 +299,12 @@ class _Legs:
             self.place,
             tracks,
             follower,
+            np.full(self.total, -1),
+            [],
         )
         out.status[~self.asked] = Status.NOT_CLOSED
-        inside = np.flatnonzero(self.asked & (self.place <= reach[self.track]))
+        self._beside_crossings(out)
+        inside = np.flatnonzero(self.asked & (self.place <= reach[self.track]) & (out.near < 0))
         bad = []
         for _ in range(FINER):
             interpolation = Interpolation(path, nodes)
@@ -306,9 +325,23 @@ class _Legs:
         self._say_why_not(out, tracks, reach)
         for track, crossing in tracks.crossings:
             there = self.asked & (self.track == track) & (np.abs(self.place - crossing) < PATH.dead_zone)
-            out.status[there] = Status.DEAD_POINT
+            out.status[there & (out.near < 0)] = Status.DEAD_POINT
+            out.status[there & (out.near >= 0)] = Status.CHANGE_POINT
             out.reached[:, there] = follower.paths.drive(np.array([track]), np.array([crossing]))
         return _Found(out, wrong)
+
+    def _beside_crossings(self, out: Positions) -> None:
+        """Positions beside change points that were passed are taken from the branch itself."""
+        tracks = out.tracks
+        for track, place in tracks.crossings:
+            beside = np.flatnonzero(self.asked & (self.track == track) & (np.abs(self.place - place) < WINDOW))
+            crossing = passed(out.follower, tracks.nodes, track, place) if beside.size else None
+            if crossing is None:
+                continue
+            straight = np.abs(self.values[:, beside] - crossing.drives(self.place[beside])).max(axis=0) < 1e-12
+            out.near[beside[straight]] = len(out.crossings)
+            out.crossings.append(crossing)
+        out.interpolate()
 
     def _closed(self, out: Positions, interpolation: Interpolation, at: Index, whole: bool) -> Mask:
         """Positions ``at`` closed from their prediction; which of them are not beyond doubt."""

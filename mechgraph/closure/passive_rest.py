@@ -18,6 +18,7 @@ from mechgraph.closure.driver_path import DriverPath, Positions, Status
 from mechgraph.closure.indexing import Index
 from mechgraph.numerics.continuation import Follower
 from mechgraph.numerics.hermite import Interpolation
+from mechgraph.numerics.tracks import Nodes
 
 TURNING = 1e-6
 """Part of a unit motion from which on a body takes part in it."""
@@ -107,16 +108,17 @@ def unspun(path: DriverPath, found: Positions, bodies: tuple[Idle, ...]) -> Posi
     Legendre's rule in every step between nodes, so that it does not hang on which positions were asked for. Bodies with more than one
     passive motion are left as they are. Source: Bishop, There is more than one way to frame a curve, Amer. Math. Monthly 82, 1975.
     """
-    nodes, good = found.tracks.nodes, np.flatnonzero(found.status == Status.OK)
+    nodes, good = found.tracks.nodes, np.flatnonzero((found.status == Status.OK) & (found.near < 0))
     interpolation = Interpolation(path, nodes)
     if not len(interpolation.left) or not good.size:
         return found
     carried = _Carried(path, interpolation, found.follower, bodies)
     x = found.x.copy()
     x[:, good] = carried.turned(found.x[:, good], found.which[good], found.track[good], found.place[good])
-    turned = carried.turned(nodes.x, nodes.which, nodes.track, nodes.place)
+    turned = carried.turned_nodes(nodes)
     tracks = replace(found.tracks, nodes=replace(nodes, x=turned))
-    return replace(found, x=x, here=None, tracks=tracks)
+    crossings = [replace(c, sides=replace(c.sides, x=carried.turned_nodes(c.sides))) for c in found.crossings]
+    return replace(found, x=x, here=None, tracks=tracks, crossings=crossings)
 
 
 class _Carried:
@@ -187,6 +189,10 @@ class _Carried:
             # exact where the rates of the turn are constant (ball joints, hinges); over a plane it comes nearer with every repetition
             x = self.follower.newton.close(self.path.advance(x, dq, track), x[self.path.rows], track, which).x
         return x
+
+    def turned_nodes(self, nodes: Nodes) -> Array:
+        """States of nodes on the tracks."""
+        return self.turned(nodes.x, nodes.which, nodes.track, nodes.place)
 
     def _turn(self, x: Array, which: Index, track: Index, place: Array) -> tuple[Array, Array]:
         """Angles ``(bodies, n)`` that are missing, and the increments ``(F, n)`` that turn by them."""

@@ -1,0 +1,102 @@
+"""Crossings that a track has passed: states at and beside them, on the branch that is followed.
+
+Where branches cross the matrix of the equations is singular, but the branch of continuous rates is smooth. Beside the crossing, rounding
+times the condition number, which grows as the inverse of the distance, moves what Newton's method closes off the branch, and once more
+the rates solved there. Nearer than ``WINDOW`` states are therefore interpolated between states on the branch on both sides.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechgraph.numerics.continuation import Follower
+from mechgraph.numerics.hermite import divided_differences, newton_form
+from mechgraph.numerics.newton import Problem
+from mechgraph.numerics.tolerances import PATH
+from mechgraph.numerics.tracks import Nodes
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+WINDOW = 2e-3
+"""Distance from a crossing below which states and rates are interpolated: accelerations lose rounding over its cube."""
+NOISE = 1e-3
+"""Distance from a crossing below which a node is not used: its sensitivities lose rounding over the square."""
+SIDES = np.array([-6, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 6]) / 6
+"""Places of the states on both sides, in parts of a span."""
+SPANS = (0.08, 0.02, 0.005)
+"""Spans tried. With the first, polynomials through the sides are exact to rounding where the branch is analytic within a distance of
+0.5; the others serve where another singular position is near."""
+SCATTER = 3.0
+"""Factor within which condition times distance is constant where there is no other singular position near."""
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """A crossing at ``place`` of a ``track``, at values ``drive (d,)`` that go on in ``direction (d,)``; ``sides``: nodes beside it."""
+
+    problem: Problem
+    track: int
+    place: float
+    drive: Array
+    direction: Array
+    sides: Nodes
+
+    def drives(self, places: Array) -> Array:
+        """Path values ``(d, n)`` at places beside the crossing."""
+        return self.drive[:, None] + self.direction[:, None] * (places - self.place)
+
+    def weights(self, places: Array) -> Array:
+        """Lagrange's weights ``(sides, n)`` for values at places between the sides."""
+        at = self.sides.place
+        gaps = at[:, None] - at + np.eye(len(at))
+        distance = places - at[:, None]
+        others = ~np.eye(len(at), dtype=bool)
+        return np.stack([distance[mine].prod(axis=0) for mine in others]) / gaps.prod(axis=1)[:, None]
+
+    def states(self, places: Array) -> Array:
+        """States ``(nx, n)`` at places, interpolated between the sides."""
+        base = self.sides.take(np.full(len(places), len(self.sides) // 2))
+        dq = self.problem.difference(self.sides.x, base.x[:, :1]) @ self.weights(places)
+        return self.problem.advance(base.x, dq, base.track)
+
+
+def passed(follower: Follower, nodes: Nodes, track: int, place: float) -> Crossing | None:
+    """The crossing at a place of a track, with states beside it; None where none are found on one smooth branch."""
+    problem, paths = follower.problem, follower.paths
+    here = np.array([track])
+    drive = paths.drive(here, np.array([place]))[:, 0]
+    direction = (paths.drive(here, np.array([place + PATH.first])) - drive[:, None])[:, 0] / PATH.first
+    mine = nodes.take((nodes.track == track) & (np.abs(nodes.place - place) > NOISE))
+    off = mine.drive - drive[:, None] - direction[:, None] * (mine.place - place)
+    mine = mine.take(np.abs(off).max(axis=0, initial=0.0) < 1e-12)
+    if not (mine.place > place).any() or not (mine.place < place).any():
+        return None
+    wanted = place + np.concatenate([-_DISTANCES[::-1], _DISTANCES])
+    picked = mine.take(np.unique([int(np.argmin(np.abs(mine.place - at))) for at in wanted]))
+    picked = picked.take(np.unique(picked.place, return_index=True)[1])
+    base = picked.take(np.full(len(SIDES), np.searchsorted(picked.place, place) - 1))
+    dq = problem.difference(picked.x, base.x[:, :1])
+    rates = problem.tangent(dq, (picked.Z * direction[:, None]).sum(axis=1))
+    form = divided_differences((picked.place - base.place[0])[:, None], dq.T[:, :, None], rates.T[:, :, None])
+    coefficients, places = (np.repeat(values, len(SIDES), axis=-1) for values in form)
+    for span in SPANS:
+        at = place + span * SIDES
+        drives = drive[:, None] + direction[:, None] * (at - place)
+        ahead = problem.corrigible(newton_form(coefficients, places, at - base.place), base.which)
+        x = problem.advance(base.x, ahead, base.track)
+        found = follower.newton.nodes(x, drives, base.track, base.which, PATH.exact)
+        nearness = found.condition * np.abs(at - place)
+        regular = nearness.max() <= SCATTER * nearness.min()
+        if found.done.all() and (found.correction <= 1e-2 * span).all() and regular:
+            return Crossing(
+                problem, track, place, drive, direction, Nodes.closed(found, drives, base.track, at, sure=True)
+            )
+    return None
+
+
+_DISTANCES = 4e-3 * 3.0 ** np.arange(4)
+"""Distances of the nodes from which the sides are predicted."""

@@ -1,0 +1,155 @@
+"""Change points passed: pose, velocity and acceleration there, what is next to them, and paths that start there."""
+
+import numpy as np
+import pytest
+
+import mechgraph as mg
+
+X, Y, Z = np.eye(3)
+TURNS = [np.eye(3), np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])]
+
+
+def four_bar(a, b, c, g, crank, side=1, rod="RR", moved=TURNS[0]):
+    """Crank a, coupler b, rocker c, frame g in a plane, declared at a crank angle with the coupler on one side; effort -10 at D."""
+    tip, foot = a * np.array([np.cos(crank), np.sin(crank)]), np.array([g, 0.0])
+    d = np.linalg.norm(foot - tip)
+    u = (foot - tip) / d if d else X[:2]
+    along = (b * b - c * c + d * d) / (2 * d) if d else b
+    joint = tip + along * u + side * np.sqrt(max(b * b - along * along, 0.0)) * np.array([-u[1], u[0]])
+    at = {"A": (0, 0), "B": tip, "C": joint, "D": foot}
+    ends = {"A": ("frame", "crank"), "B": ("crank", "rod"), "C": ("rod", "rocker"), "D": ("frame", "rocker")}
+    types = dict(zip("ABCD", f"R{rod}R", strict=True))
+    return mg.Mechanism(
+        "four-bar",
+        pairs=[mg.Pair(k, types[k], *ends[k], point=moved @ [*at[k], 0], axis=moved @ Z) for k in "ABCD"],
+        drives=["A"],
+        loads=[mg.Effort("D", -10.0)],
+    )
+
+
+def kite_output(crank, side):
+    """Angle of the long rocker of a kite (crank and frame 1, coupler and rocker 2), signed over its change point: an isosceles triangle.
+
+    The base is 2 sin(crank / 2), in the direction 90 deg + crank / 2 seen from the foot; its sign goes on through zero.
+    """
+    return np.pi / 2 + crank / 2 - side * np.arccos(np.sin(crank / 2) / 2)
+
+
+def kite_rates(crank, side, h=1e-4):
+    """First and second derivative of ``kite_output``, by central differences of fourth order."""
+    f = [kite_output(crank + i * h, side) for i in (-2, -1, 0, 1, 2)]
+    first = (f[0] - 8 * f[1] + 8 * f[3] - f[4]) / (12 * h)
+    return first, (-f[0] + 16 * f[1] - 30 * f[2] + 16 * f[3] - f[4]) / (12 * h * h)
+
+
+BESIDE = np.array([0.0, 1e-7, 3e-7, 1e-6, 1e-5, 1e-4, 5e-4, 1e-3, 5e-3])
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.parametrize("method", ["loop_wrench", "newton_euler"])
+@pytest.mark.parametrize("moved", TURNS)
+def test_parallelogram_at_and_beside_its_change_point(engine, method, moved):
+    """D follows A; the torque 10 to 1e-10 times the condition, which is the inverse of the distance; at the point it does not exist."""
+    m = four_bar(1, 2, 1, 2, np.pi / 2, moved=moved)
+    for side in (-1, 1):
+        q = np.pi / 2 + side * BESIDE
+        s = mg.solve(m, {"A": mg.Motion(q, velocity=2.0, acceleration=3.0)}, engine=engine, method=method)
+        assert list(s.status) == ["change point"] + (["change point"] if s.status[1] != "ok" else ["ok"]) + ["ok"] * 7
+        np.testing.assert_allclose(s["D"].position[:, 0], q, atol=1e-12)
+        np.testing.assert_allclose(s["D"].velocity[:, 0], 2.0, atol=1e-9)
+        np.testing.assert_allclose(s["D"].acceleration[:, 0], 3.0, atol=1e-6)
+        np.testing.assert_allclose(s.link("rod").angular_velocity, 0.0, atol=1e-9)
+        assert np.isnan(s["A"].effort[0, 0])
+        assert np.isnan(s["C"].reaction[0]).all()
+        far = np.maximum(BESIDE[2:], 1e-9)
+        assert (np.abs(s["A"].effort[2:, 0] - 10.0) < 1e-10 / far).all()
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.parametrize("side", [1, -1])
+def test_kite_at_and_beside_its_change_point(engine, side):
+    """Where the crank lies on the frame the rocker could turn alone; the branch of the driven crank goes on."""
+    start = -1.0
+    m = four_bar(1, 2, 2, 1, start, side)
+    angles = np.concatenate([-BESIDE[:0:-1], BESIDE])
+    s = mg.solve(m, {"A": mg.Motion(angles - start, velocity=1.0)}, engine=engine)
+    assert (s.status[np.abs(angles) > 2e-7] == "ok").all()
+    assert s.status[len(BESIDE) - 1] == "change point"
+    velocity, acceleration = kite_rates(angles, -side)
+    turned = kite_output(angles, -side) - kite_output(start, -side)
+    np.testing.assert_allclose(s["D"].position[:, 0], turned, atol=1e-11)
+    np.testing.assert_allclose(s["D"].velocity[:, 0], velocity, atol=1e-9)
+    np.testing.assert_allclose(s["D"].acceleration[:, 0], acceleration, atol=1e-6)
+    ok = s.status == "ok"
+    power = s["A"].effort[ok, 0] - 10.0 * velocity[ok]
+    assert (np.abs(power * angles[ok]) < 1e-10).all()
+
+
+def test_alone_and_in_any_company():
+    """The change point asked for alone, last, or among others has the same motion."""
+    m = four_bar(1, 2, 1, 2, np.pi / 2)
+    at = np.pi / 2
+    for q in ([at], [0.3, at], [at, 3.0], [5.0, at, -1.0], np.linspace(0, 2 * np.pi, 361)):
+        q = np.asarray(q)
+        s = mg.kinematics(m, {"A": mg.Motion(q, velocity=1.0)})
+        i = int(np.argmin(np.abs(q - at)))
+        assert s.status[i] == "change point"
+        assert s["D"].velocity[i, 0] == pytest.approx(1.0, abs=1e-9)
+        assert s["D"].acceleration[i, 0] == pytest.approx(0.0, abs=1e-6)
+        np.testing.assert_allclose(s.link("rod").pose[i, :3, :3], np.eye(3), atol=1e-9)
+
+
+@pytest.mark.parametrize("dims", [(1, 1, 2, 2), (1, 1, 1, 1), (1, 2, 2, 1), (1, 2, 1, 2), (2, 1, 2, 1), (2, 2, 1, 1)])
+@pytest.mark.parametrize("side", [1, -1])
+def test_velocity_is_continuous_over_whole_turns(dims, side):
+    """Kites, a square and parallelograms over a turn: no jump of the velocity where branches cross."""
+    a, b, c, g = dims
+    m = four_bar(*dims, crank=-0.9, side=side)
+    s = mg.kinematics(m, {"A": mg.Motion(np.linspace(0, 2 * np.pi, 1441), velocity=1.0)}, on_reach="flag")
+    reached = np.isfinite(s["D"].velocity[:, 0])
+    assert reached.all() or a > g or a > b  # a long crank does not turn
+    jumps = np.abs(np.diff(s["D"].velocity[:, 0][reached]))
+    assert jumps[: max(1, int(reached.sum()) - 40)].max() < 0.1
+
+
+def test_coupler_between_ball_joints():
+    """The rod of the parallelogram between two spheres spins idly: held at rest across the change point too."""
+    m = four_bar(1, 2, 1, 2, np.pi / 2, rod="SS")
+    q = np.pi / 2 + np.array([-0.1, -1e-3, 0.0, 1e-3, 0.1])
+    s = mg.kinematics(m, {"A": mg.Motion(q, velocity=1.0)})
+    assert list(s.status) == ["ok", "ok", "change point", "ok", "ok"]
+    np.testing.assert_allclose(s["D"].velocity[:, 0], 1.0, atol=1e-9)
+    np.testing.assert_allclose(s.link("rod").pose[:, :3, :3], np.broadcast_to(np.eye(3), (5, 3, 3)), atol=1e-9)
+    np.testing.assert_allclose(s.link("rod").angular_velocity, 0.0, atol=1e-8)
+
+
+def test_study_over_a_change_point():
+    """Variants of loads share one motion, change point included."""
+    m = four_bar(1, 2, 1, 2, np.pi / 2)
+    q = np.array([0.3, np.pi / 2, 2.0])
+    study = mg.study(m, {"loads[0].value": [-10.0, -5.0]}, ["A.effort", "D.velocity"], n=2, motions={"A": q})
+    wanted = -study.parameters["loads[0].value"][:, None]
+    np.testing.assert_allclose(study.outputs["A.effort"][:, [0, 2]], np.broadcast_to(wanted, (2, 2)), atol=1e-9)
+    assert (np.asarray(study.status)[:, 1] == "change point").all()
+    assert np.isnan(study.outputs["A.effort"][:, 1]).all()
+    assert np.isfinite(study.outputs["D.velocity"][:, 1]).all()
+
+
+@pytest.mark.parametrize(("dims", "slopes"), [((1, 2, 1, 2), {1.0, -3.0}), ((1, 3, 2, 2), None)])
+def test_a_path_cannot_start_at_a_change_point(dims, slopes):
+    """All links in line: both branches by their rates, from the quadratic of the loop to second order."""
+    a, b, c, g = dims
+    with pytest.raises(mg.DeadPointError, match="2 branches meet there") as caught:
+        mg.solve(four_bar(*dims, crank=0.0), {"A": np.array([0.0, 0.1])})
+    found = {round(way["D.Rz"], 6) for way in caught.value.branches}
+    # in line: a w1 + b w2 = c w3 (across) and a w1^2 + b w2^2 = c w3^2 (along)
+    roots = np.roots([c * c - b * c, -2 * a * c, a * a + a * b])
+    assert found == {round(float(r), 6) for r in roots}
+    assert slopes is None or found == slopes
+
+
+def test_a_path_cannot_be_assembled_at_a_change_point():
+    """Closed from elsewhere, with the accuracy that a double root allows."""
+    m = four_bar(1, 2, 1, 2, np.pi / 2).replace(start={"A": np.pi / 2})
+    with pytest.raises(mg.DeadPointError, match="2 branches meet there"):
+        mg.solve(m, {"A": np.array([np.pi / 2, 1.7])})
