@@ -145,7 +145,7 @@ def assemble(
     AssemblyError, ReachError
     """
     system, x = assembled_at(m, {} if values is None else values, guess)
-    wanted = {m.full_name(name): float(value) for name, value in (values or {}).items()}
+    wanted = {m.full_name(name): float(m.in_own_units(name, value)) for name, value in (values or {}).items()}
     q = system.coordinates_of(x[:, None], system.start_coordinates(m.start))[:, 0]
     start = dict(zip(m.freedom_names(), q.tolist(), strict=True)) | wanted
     return m.replace(start=start)

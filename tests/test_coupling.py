@@ -84,7 +84,7 @@ def test_several_couplings_share_a_freedom_and_changed_copies_keep_them() -> Non
         (mg.Coupling({"A": 1.0, "A.Rz": 2.0}), "A.Rz twice"),
         (mg.Coupling({"A": 1.0}, constant=float("inf")), "constant"),
         (mg.Coupling({"A": 1.0}, name="B"), "a pair has that name"),
-        (mg.Coupling({"A": 1.0}, name=3), "must be a text"),
+        (mg.Coupling({"A": 1.0}, name=3), "expected a text"),
         (mg.Coupling(5), "expected a mapping"),
         (("A", 1.0), "mg.Coupling"),
     ],

@@ -5,6 +5,7 @@ import pytest
 import scipy
 
 from mechgraph.algebra import inertia
+from mechgraph.errors import DeclarationError
 
 EDGE, WEIGHT = np.polynomial.legendre.leggauss(4)
 
@@ -173,5 +174,5 @@ def test_tolerance_is_relative():
     ],
 )
 def test_invalid_arguments_are_named(call, says):
-    with pytest.raises(ValueError, match=says):
+    with pytest.raises(DeclarationError, match=says):
         call()

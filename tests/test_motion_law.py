@@ -87,10 +87,10 @@ def test_repr_is_short():
     [
         ({"position": np.nan}, "position must be finite, got nan"),
         ({"position": [0.0, np.inf]}, "position must be finite, got inf at index (1,)"),
-        ({"position": "fast"}, "position must be a real number"),
-        ({"position": None}, "position must be a real number"),
-        ({"position": 1j}, "position must be a real number"),
-        ({"position": [[1.0], [1.0, 2.0]]}, "rows differ in length"),
+        ({"position": "fast"}, "expected a real number"),
+        ({"position": None}, "expected a real number"),
+        ({"position": 1j}, "expected a real number"),
+        ({"position": [[1.0], [1.0, 2.0]]}, "rows of one length"),
         ({"position": np.zeros(3), "velocity": np.zeros(2)}, "position (3,), velocity (2,)"),
     ],
 )

@@ -11,6 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mechgraph.errors import DeclarationError
+from mechgraph.quantities import real_array, shown, wrong
+
 __all__ = ["box", "cylinder", "from_components", "physical_faults", "rod", "shifted", "sphere"]
 
 Array = NDArray[np.float64]
@@ -19,36 +22,35 @@ AXES_TOLERANCE = 1e-9
 """Largest deviation from 1 of axes^T axes that `box` takes for orthonormal axes."""
 
 
-def _vector(value: ArrayLike, what: str) -> Array:
-    """Return three finite numbers as an array; anything else is a ValueError."""
-    try:
-        vector = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{what} must be three numbers, got {value!r}") from error
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise ValueError(f"{what} must be three finite numbers, got {value!r}")
-    return vector
+def _numbers(value: ArrayLike, what: str, shape: tuple[int, ...] = (), sign: str = "") -> Array:
+    """Return finite numbers of a shape, where ``sign`` says so "positive" or "not negative"; DeclarationError for all else."""
+    found = real_array(value)
+    if (
+        found is None
+        or found.shape != shape
+        or not np.isfinite(found).all()
+        or (sign and not (found > 0 if sign == "positive" else found >= 0).all())
+    ):
+        count = {(): "a finite number", (3,): "three finite numbers", (3, 3): "3 x 3 finite numbers"}[shape]
+        raise DeclarationError("inertia", [wrong(value, what, f"{count}{sign and ', '}{sign}")])
+    return found
 
 
 def _mass(mass: float) -> float:
-    """Return the mass; ValueError where it is negative or not finite."""
-    if not (np.isfinite(mass) and mass >= 0):
-        raise ValueError(f"mass must be finite and not negative, got {mass!r}")
-    return float(mass)
+    """Return the mass; DeclarationError where it is negative or no number."""
+    return float(_numbers(mass, "mass", sign="not negative"))
 
 
 def _length(length: float, what: str) -> float:
-    """Return a length; ValueError where it is not positive or not finite."""
-    if not (np.isfinite(length) and length > 0):
-        raise ValueError(f"{what} must be finite and positive, got {length!r}")
-    return float(length)
+    """Return a length; DeclarationError where it is not positive or no number."""
+    return float(_numbers(length, what, sign="positive"))
 
 
 def _direction(vector: Array, what: str) -> Array:
-    """Return the unit vector along a vector; ValueError where that is zero."""
+    """Return the unit vector along a vector; DeclarationError where that is zero."""
     largest = float(np.abs(vector).max())
     if largest == 0.0:
-        raise ValueError(f"{what}, got {vector.tolist()}")
+        raise DeclarationError("inertia", [f"{what}, got {vector.tolist()}"])
     scaled = vector / largest
     unit: Array = scaled / np.linalg.norm(scaled)
     return unit
@@ -74,11 +76,11 @@ def rod(mass: float, start: ArrayLike, end: ArrayLike) -> Array:
 
     Raises
     ------
-    ValueError
+    DeclarationError
         Negative mass, points that coincide or are no points.
     """
     mass = _mass(mass)
-    along = _vector(end, "rod: end") - _vector(start, "rod: start")
+    along = _numbers(end, "rod: end", (3,)) - _numbers(start, "rod: start", (3,))
     unit = _direction(along, "rod: start and end must differ; their difference must not be zero")
     return np.asarray(mass * (along @ along) / 12.0 * (np.eye(3) - np.outer(unit, unit)))
 
@@ -104,20 +106,18 @@ def box(mass: float, size: ArrayLike, axes: ArrayLike | None = None) -> Array:
 
     Raises
     ------
-    ValueError
+    DeclarationError
         Negative mass, an edge that is not positive, axes that are not orthonormal within `AXES_TOLERANCE`.
     """
     mass = _mass(mass)
-    edges = _vector(size, "box: size")
-    if (edges <= 0).any():
-        raise ValueError(f"box: size must be positive, got {edges.tolist()}")
+    edges = _numbers(size, "box: size", (3,), "positive")
     squares = edges**2
     principal = mass / 12.0 * (squares.sum() - squares)
     if axes is None:
         return np.asarray(np.diag(principal))
-    frame = np.array(axes, dtype=np.float64)
-    if frame.shape != (3, 3) or not np.allclose(frame.T @ frame, np.eye(3), rtol=0, atol=AXES_TOLERANCE):
-        raise ValueError(f"box: axes must be three orthonormal columns, got {frame.tolist()}")
+    frame = _numbers(axes, "box: axes", (3, 3))
+    if not np.allclose(frame.T @ frame, np.eye(3), rtol=0, atol=AXES_TOLERANCE):
+        raise DeclarationError("inertia", [f"box: axes must be three orthonormal columns, got {frame.tolist()}"])
     return _symmetric((frame * principal) @ frame.T)
 
 
@@ -142,7 +142,7 @@ def cylinder(mass: float, radius: float, length: float, axis: ArrayLike = (0.0, 
 
     Raises
     ------
-    ValueError
+    DeclarationError
         Negative mass, a radius or length that is not positive, a zero axis.
     """
     mass, radius, length = (
@@ -150,7 +150,7 @@ def cylinder(mass: float, radius: float, length: float, axis: ArrayLike = (0.0, 
         _length(radius, "cylinder: radius"),
         _length(length, "cylinder: length"),
     )
-    unit = _direction(_vector(axis, "cylinder: axis"), "cylinder: axis must not be zero")
+    unit = _direction(_numbers(axis, "cylinder: axis", (3,)), "cylinder: axis must not be zero")
     along = np.outer(unit, unit)
     polar = mass * radius**2 / 2.0
     transverse = mass * (3.0 * radius**2 + length**2) / 12.0
@@ -174,7 +174,7 @@ def sphere(mass: float, radius: float) -> Array:
 
     Raises
     ------
-    ValueError
+    DeclarationError
         Negative mass, a radius that is not positive.
     """
     return np.asarray(0.4 * _mass(mass) * _length(radius, "sphere: radius") ** 2 * np.eye(3))
@@ -200,13 +200,11 @@ def from_components(xx: float, yy: float, zz: float, xy: float = 0.0, xz: float 
 
     Raises
     ------
-    ValueError
+    DeclarationError
         A component that is not a finite number.
     """
-    components = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "xz": xz, "yz": yz}
-    for name, value in components.items():
-        if not np.isfinite(value):
-            raise ValueError(f"inertia component {name} must be finite, got {value!r}")
+    given = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "xz": xz, "yz": yz}
+    xx, yy, zz, xy, xz, yz = (float(_numbers(value, f"component {name}")) for name, value in given.items())
     return np.array([[xx, -xy, -xz], [-xy, yy, -yz], [-xz, -yz, zz]], dtype=np.float64)
 
 
@@ -231,19 +229,19 @@ def shifted(inertia: ArrayLike, mass: ArrayLike, offset: ArrayLike) -> Array:
 
     Raises
     ------
-    ValueError
+    DeclarationError
         Wrong shapes, numbers that are not finite, negative mass.
     """
-    tensor = np.asarray(inertia, dtype=np.float64)
-    masses = np.asarray(mass, dtype=np.float64)
-    away = np.asarray(offset, dtype=np.float64)
-    if tensor.shape[-2:] != (3, 3) or away.shape[-1:] != (3,):
-        shapes = f"{tensor.shape} and {away.shape}"
-        raise ValueError(f"shifted: inertia must be (..., 3, 3) and offset (..., 3), got {shapes}")
+    tensor, masses, away = (real_array(value) for value in (inertia, mass, offset))
+    if tensor is None or masses is None or away is None or tensor.shape[-2:] != (3, 3) or away.shape[-1:] != (3,):
+        wanted = "inertia (..., 3, 3), mass (...) and offset (..., 3), all numbers"
+        raise DeclarationError(
+            "inertia", [f"shifted: expected {wanted}, got {', '.join(map(shown, (inertia, mass, offset)))}"]
+        )
     if not (np.isfinite(tensor).all() and np.isfinite(away).all()):
-        raise ValueError("shifted: inertia and offset must be finite")
+        raise DeclarationError("inertia", ["shifted: inertia and offset must be finite"])
     if not (np.isfinite(masses) & (masses >= 0)).all():
-        raise ValueError(f"mass must be finite and not negative, got {mass!r}")
+        raise DeclarationError("inertia", [f"shifted: mass must be finite and not negative, got {shown(mass)}"])
     square = np.einsum("...i,...i->...", away, away)[..., None, None] * np.eye(3)
     outer = away[..., :, None] * away[..., None, :]
     return np.asarray(tensor + masses[..., None, None] * (square - outer))
@@ -269,10 +267,9 @@ def physical_faults(inertia: ArrayLike, tol: float = 1e-9) -> list[str]:
         One sentence a fault, with the values. The first fault that makes the further questions meaningless
         ends the list.
     """
-    try:
-        tensor = np.asarray(inertia, dtype=np.float64)
-    except (TypeError, ValueError):
-        return [f"inertia must be a 3 x 3 array of numbers, got {inertia!r}"]
+    tensor = real_array(inertia)
+    if tensor is None:
+        return [f"inertia must be a 3 x 3 array of numbers, got {shown(inertia)}"]
     if tensor.shape != (3, 3):
         return [f"inertia must be 3 x 3, got shape {tensor.shape}"]
     if not np.isfinite(tensor).all():

@@ -15,10 +15,10 @@ from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
 from mechgraph.closure.solver import closure_solver, engine_for
 from mechgraph.errors import AssemblyError, DeclarationError
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.numeric import is_numeric
 from mechgraph.numerics.linear import complement
 from mechgraph.numerics.newton import closest_zeros, least_norm_steps
 from mechgraph.numerics.tolerances import PATH
+from mechgraph.quantities import is_numeric, wrong
 
 CLOSED = 1e-10
 """Closure error (angle, or length / L) up to which loops count as closed."""
@@ -126,19 +126,20 @@ def led(system: System, x: Array, columns: Index, goal: Array) -> tuple[Array, b
 def named_columns(m: Mechanism, system: System, values: Mapping[str, float]) -> tuple[Index, Array]:
     """Columns and internal values of single freedoms given by name."""
     if not isinstance(values, Mapping):
-        raise DeclarationError(f"mechanism {m.name!r}", [f"values = {values!r}: expected a mapping freedom -> number"])
+        raise DeclarationError(f"mechanism {m.name!r}", [wrong(values, "values", "a mapping freedom -> number")])
     faults, columns, numbers = [], [], []
     for name, value in values.items():
         fault = m.freedom_fault(name, single=True)
-        if fault or not is_numeric(value, ()):
-            faults.append(fault or f"{name} = {value!r}: expected a finite number")
+        number = value if fault else m.in_own_units(name, value)
+        if fault or not is_numeric(number, ()):
+            faults.append(fault or wrong(number, name, "a finite number"))
             continue
         k, j = m.freedom(name)
         column = int(system.first_column[k]) + j
         if column in columns:
             faults.append(f"{name}: {m.full_name(name)} is given twice")
         columns.append(column)
-        numbers.append(float(value) / (system.par.L if system.is_length[column] else 1.0))
+        numbers.append(float(number) / (system.par.L if system.is_length[column] else 1.0))
     if faults:
         raise DeclarationError(f"mechanism {m.name!r}", faults)
     return np.array(columns, dtype=np.intp), np.array(numbers)

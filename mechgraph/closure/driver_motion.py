@@ -14,11 +14,12 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 
 
-def _as_motion(value: Any, name: str, faults: list[str]) -> Motion | None:
-    if isinstance(value, Motion):
-        return value
+def _as_motion(m: Mechanism, value: Any, name: str, faults: list[str]) -> Motion | None:
+    """A motion in the units of the mechanism; positions alone are at rest."""
     try:
-        return Motion(value)
+        motion = (value if isinstance(value, Motion) else Motion(value)).without_quantities(m.units, m.turns(name))
+        faults += motion.faults(f"motion of {name!r}: ")
+        return motion
     except DeclarationError as error:
         faults += [f"drive {name!r}: {fault}" for fault in error.faults]
         return None
@@ -51,7 +52,7 @@ def driven(m: Mechanism, motions: Mapping[str, Any] | None) -> tuple[Mechanism, 
         if m.full_name(name) in out:
             faults.append(f"motion of {name!r}: {m.full_name(name)} is given twice")
             continue
-        motion = _as_motion(value, name, faults)
+        motion = _as_motion(m, value, name, faults)
         if motion is not None:
             out[m.full_name(name)] = motion
     for name, drive in known.items():

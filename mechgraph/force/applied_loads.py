@@ -13,6 +13,7 @@ from mechgraph.closure.rates import Rates
 from mechgraph.errors import DeclarationError
 from mechgraph.model.load import Load, Value
 from mechgraph.model.numeric import PerCase
+from mechgraph.quantities import real_array, wrong
 
 
 def inertia_wrenches(here: Configuration, rates: Rates) -> Array:
@@ -122,11 +123,14 @@ class Site:
             pose = self._spread(user_poses(self.here)[i])
             twist = self._spread(np.moveaxis(user_twists(self.here, self.rates.V)[:, i], 0, -1))
             try:
-                value = np.asarray(value(pose, twist, self.t), dtype=float)
-            except (TypeError, ValueError) as error:
+                given = value(pose, twist, self.t)
+            except Exception as error:
                 raise DeclarationError(
-                    f"load on {link!r}", [f"its callable (pose, twist, t) failed: {error}"]
+                    f"load on {link!r}", [f"its callable (pose, twist, t) failed: {type(error).__name__}: {error}"]
                 ) from error
+            value = real_array(given)
+            if value is None:
+                raise DeclarationError(f"load on {link!r}", [wrong(given, "value of its callable", "numbers")])
         array = np.asarray(value, dtype=float)
         if width == 1 and (array.ndim == 0 or array.shape[-1:] != (1,) or len(array.shape) <= len(self.batch)):
             array = array[..., None]

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mechgraph.algebra.se3 import Array, identity, inverse
+from mechgraph.arguments import items_of
 from mechgraph.errors import DeclarationError
 from mechgraph.model.link import Link
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.numeric import is_numeric, plain
+from mechgraph.model.numeric import plain
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.pair_table import TABLE
+from mechgraph.quantities import is_numeric, real_array, shown, without_units, wrong
+from mechgraph.units import LENGTH, PURE
 
 NUMBERS_OF_CHAIN = ("twist", "length", "offset")
 """What places the link after every pair of a chain, in the order of the rows of its numbers."""
@@ -24,6 +28,8 @@ def chain_symbols(letters: str) -> tuple[list[str], list[str]]:
     known = sorted(TABLE, key=len, reverse=True)
     symbols: list[str] = []
     at = 0
+    if not isinstance(letters, str):
+        return symbols, [wrong(letters, "pairs", "letters of pair types in one text, e.g. 'RSSR'")]
     while at < len(letters):
         symbol = next((s for s in known if letters.startswith(s, at)), None)
         if symbol is None and letters[at] in "-_ ":
@@ -45,10 +51,10 @@ def _marker(X: Array) -> Marker:
 def chain(
     letters: str,
     *,
-    twist: Sequence[float] | None = None,
-    length: Sequence[float] | None = None,
-    offset: Sequence[float] | None = None,
-    pitch: Sequence[float] | Mapping[str, float] | None = None,
+    twist: ArrayLike | None = None,
+    length: ArrayLike | None = None,
+    offset: ArrayLike | None = None,
+    pitch: ArrayLike | Mapping[str, float] | None = None,
     name: str | None = None,
     drive: str | None = "O1",
     links: Iterable[Link] | None = None,
@@ -74,23 +80,31 @@ def chain(
     DeclarationError
         with all faults at once.
     """
-    title = name or letters
+    title = letters if name is None else name
     symbols, faults = chain_symbols(letters)
     n = len(symbols)
     if not faults and n < 2:
         faults.append(f"pairs {letters!r}: a loop needs at least two pairs")
     numbers = {}
-    for what, values in zip(NUMBERS_OF_CHAIN, (twist, length, offset), strict=True):
-        numbers[what] = (0.0,) * n if values is None else plain(values)
-        if values is not None and not is_numeric(values, (n,)):
-            faults.append(f"{what} = {values!r}: expected {n} finite numbers, one a pair")
-    pitches, pitch_faults = _pitches(symbols, pitch)
+    units = more["units"] if isinstance(more.get("units"), Mapping) else {}
+    for what, given in zip(NUMBERS_OF_CHAIN, (twist, length, offset), strict=True):
+        values = (0.0,) * n if given is None else without_units(given, PURE if what == "twist" else LENGTH, units)
+        numbers[what] = plain(values)
+        if not is_numeric(values, (n,)):
+            faults.append(wrong(values, what, f"{n} finite numbers, one a pair"))
+    pitches, pitch_faults = _pitches(symbols, without_units(pitch, LENGTH, units))
     faults += pitch_faults
-    given = {link.name: link for link in links or ()}
     names = ["frame", *(f"link{k}" for k in range(1, n))]
-    faults += [f"link {k!r}: is not in this chain (links: {', '.join(names)})" for k in given if k not in names]
+    massive: dict[str, Link] = {}
+    for link in items_of(() if links is None else links, "links", faults):
+        if isinstance(link, Link) and isinstance(link.name, str) and link.name in names:
+            massive[link.name] = link
+        else:
+            faults.append(
+                f"link {shown(getattr(link, 'name', link))}: is not in this chain (links: {', '.join(names)})"
+            )
     if faults:
-        raise DeclarationError(f"chain {title!r}", faults)
+        raise DeclarationError(f"chain {shown(title)}", faults)
     placed = any(v is not None for v in (twist, length, offset))
     poses = markers_of_chain(np.array(list(numbers.values()))[:, :, None])
     pairs = []
@@ -101,7 +115,7 @@ def chain(
         pairs.append(Pair(f"O{k + 1}", symbol, names[k], names[(k + 1) % n], pitch=pitches.get(k), **markers))
     if drive is not None:
         more.setdefault("drives", [_first_freedom(pairs, drive)])
-    return Mechanism(title, [given.get(link, Link(link)) for link in names], pairs, **more)
+    return Mechanism(title, [massive.get(link, Link(link)) for link in names], pairs, **more)
 
 
 def _first_freedom(pairs: list[Pair], drive: str) -> str:
@@ -116,17 +130,17 @@ def _pitches(symbols: list[str], pitch: Any) -> tuple[dict[int, float], list[str
         return {}, []
     if isinstance(pitch, Mapping):
         names = {f"O{k + 1}": k for k in takers}
-        wrong = [f"pitch: {key!r} is no helical pair of this chain" for key in pitch if key not in names]
-        return {names[key]: value for key, value in pitch.items() if key in names}, wrong
-    try:
-        values = list(np.asarray(pitch, dtype=float).reshape(-1))
-    except (TypeError, ValueError, OverflowError):
-        return {}, [f"pitch = {pitch!r}: expected numbers, or a mapping pair -> pitch"]
+        strange = [f"pitch: {shown(key)} is no helical pair of this chain" for key in pitch if key not in names]
+        return {names[key]: value for key, value in pitch.items() if key in names}, strange
+    array = real_array(pitch)
+    if array is None:
+        return {}, [wrong(pitch, "pitch", "numbers, or a mapping pair -> pitch")]
+    values = array.reshape(-1).tolist()
     if len(values) == len(symbols) and len(takers) < len(symbols):
         values = [values[k] for k in takers]
     if len(values) != len(takers):
         return {}, [f"pitch: {len(values)} given for {len(takers)} helical pairs"]
-    return dict(zip(takers, map(float, values), strict=True)), []
+    return dict(zip(takers, values, strict=True)), []
 
 
 def markers_of_chain(numbers: Array) -> tuple[Array, Array]:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from mechgraph.model.field_format import COEFFICIENTS, NUMBER, TEXT, Described
-from mechgraph.model.numeric import is_numeric, number_fault, plain
+from mechgraph.model.numeric import number_fault, plain
+from mechgraph.quantities import is_numeric, without_units, wrong
 from mechgraph.units import LENGTH, PURE
 
 if TYPE_CHECKING:
@@ -63,22 +64,32 @@ class Coupling(Described):
         """What is wrong with this coupling in a mechanism, one line each."""
         where = f"coupling {self.name!r}: "
         if not isinstance(self.name, str):
-            return [f"{where}the name must be a text"]
+            return [wrong(self.name, "coupling: name", "a text")]
         if not _is_terms(self.terms):
-            return [f"{where}terms = {self.terms!r}: expected a mapping freedom -> coefficient"]
+            return [wrong(self.terms, f"{where}terms", "a mapping freedom -> coefficient")]
         found: list[str | None] = [] if self.terms else [f"{where}has no terms; name at least one freedom"]
         seen: dict[str, str] = {}
         for freedom, c in self.terms:
             fault = m.freedom_fault(freedom, single=True)
             found.append(fault and where + fault)
             if not is_numeric(c, ()) or c == 0:
-                found.append(f"{where}coefficient of {freedom!r} = {c!r}: expected a finite number other than 0")
-            other = freedom if fault else seen.setdefault(m.full_name(freedom), freedom)
-            if other != freedom or self.freedoms.count(freedom) > 1:
-                found.append(f"{where}names the freedom {m.full_name(freedom) if not fault else freedom} twice")
+                found.append(wrong(c, f"{where}coefficient of {freedom!r}", "a finite number other than 0"))
+            if not fault and (
+                seen.setdefault(m.full_name(freedom), freedom) != freedom or self.freedoms.count(freedom) > 1
+            ):
+                found.append(f"{where}names the freedom {m.full_name(freedom)} twice")
         if self.constant is not None:
             found.append(number_fault(self.constant, where + "constant"))
         return list(dict.fromkeys(fault for fault in found if fault))
+
+    def in_own_units(self, units: Mapping[str, str], turns: Sequence[bool]) -> Coupling:
+        """The same with quantities of pint as plain numbers in these units; ``turns`` says which freedoms are angles."""
+        slides = not any(turns)
+        terms = [
+            (name, plain(without_units(c, PURE if slides or turn else (-1, 0, 0), units)))
+            for (name, c), turn in zip(self.terms, turns, strict=True)
+        ]
+        return self.replace(terms=terms, constant=without_units(self.constant, LENGTH if slides else PURE, units))
 
     def converted(self, length: float, turns: Sequence[bool]) -> Coupling:
         """The same relation with lengths times ``length``; ``turns`` says which freedoms are angles (the rule stands above)."""

@@ -18,9 +18,9 @@ from mechgraph.model.coupling import Coupling
 from mechgraph.model.drive import Drive
 from mechgraph.model.link import Link
 from mechgraph.model.load import LOADS
-from mechgraph.model.numeric import column, is_numeric
 from mechgraph.model.pair import PERPENDICULAR, Pair
 from mechgraph.model.pair_type import PairType
+from mechgraph.quantities import column, is_numeric, shown, wrong
 from mechgraph.units import BASE_UNITS
 
 if TYPE_CHECKING:
@@ -46,36 +46,50 @@ def _kind_faults(m: Mechanism) -> list[str]:
         if set(map(type, items)) <= set(kind):
             continue
         wrong = [item for item in items if not isinstance(item, kind)]
-        faults += [f"{what} {item!r}: is no {what}; use mg.{what.capitalize()}(...)" for item in wrong]
+        faults += [f"{what} {shown(item)}: is no {what}; use {_maker(what)}" for item in wrong]
     return faults
+
+
+def _maker(what: str) -> str:
+    """How one makes an item of that kind."""
+    return (
+        " or ".join(f"mg.{kind.__name__}(...)" for kind in LOADS.values())
+        if what == "load"
+        else f"mg.{what.capitalize()}(...)"
+    )
 
 
 def declaration_faults(m: Mechanism) -> list[str]:
     """All that is wrong with a mechanism, one line each."""
     faults = _kind_faults(m)
     if not isinstance(m.name, str) or not m.name:
-        faults.append(f"name {m.name!r}: expected a text")
+        faults.append(wrong(m.name, "name", "a text"))
     if not m.pairs:
         faults.append("no pairs; a mechanism needs at least one pair")
     if faults:
         return faults
-    names = m.link_names()
+    names = [name for name in m.link_names() if isinstance(name, str)]
     if not _links_are_sound(m.links):
         faults += [fault for link in m.links for fault in link.faults()]
-    faults += _repeated(names, "link") + _repeated([p.name for p in m.pairs], "pair")
+    faults += _repeated(names, "link") + _repeated([p.name for p in m.pairs if isinstance(p.name, str)], "pair")
     if not _pairs_are_sound(m.pairs):
         faults += [fault for pair in m.pairs for fault in pair.faults()]
     faults += _end_faults(m, names)
     for key, value in m.units.items():
         if key not in BASE_UNITS or not isinstance(value, str) or not value:
-            faults.append(f"units: {key} = {value!r}: expected names for {', '.join(BASE_UNITS)}")
+            faults.append(wrong(value, f"units: {key}", f"names for {', '.join(BASE_UNITS)}"))
+    faults += [
+        wrong(value, what, "a text")
+        for what, value in (("source", m.source), ("description", m.description))
+        if not isinstance(value, str)
+    ]
     return faults + _symbol_faults(m) + _reference_faults(m) + _coupling_faults(m)
 
 
 def mapping_faults(**given: Any) -> list[str]:
     """Arguments that should be mappings and are not."""
     return [
-        f"{what} = {value!r}: expected a mapping"
+        wrong(value, what, "a mapping")
         for what, value in given.items()
         if value is not None and not isinstance(value, Mapping)
     ]
@@ -85,18 +99,18 @@ def _end_faults(m: Mechanism, names: Sequence[str]) -> list[str]:
     """Ends of pairs and the frame that are no links; links that no pairs connect to the frame."""
     known = set(names)
     faults = []
-    strangers = {end for pair in m.pairs for end in (pair.a, pair.b)} - known
-    if strangers:
-        for pair in m.pairs:
-            for end in (pair.a, pair.b):
-                if end is None:
-                    faults.append(f"pair {pair.name!r}: is on one link only; name both links")
-                elif end in strangers:
-                    declared = ", ".join(map(str, names))
-                    faults.append(f"pair {pair.name!r}: link {end!r} is not declared (links: {declared})")
-    if m.frame not in known:
-        faults.append(f"frame {m.frame!r}: is no link (links: {', '.join(map(str, names))})")
-    elif not strangers:
+    ends = [end for pair in m.pairs for end in (pair.a, pair.b)]
+    all_known = set(map(type, ends)) == {str} and set(ends) <= known
+    declared = ", ".join(names)
+    for pair in () if all_known else m.pairs:
+        for end in (pair.a, pair.b):
+            if end is None:
+                faults.append(f"pair {pair.name!r}: is on one link only; name both links")
+            elif isinstance(end, str) and end not in known:
+                faults.append(f"pair {pair.name!r}: link {end!r} is not declared (links: {declared})")
+    if not isinstance(m.frame, str) or m.frame not in known:
+        faults.append(f"frame {shown(m.frame)}: is no link (links: {declared})")
+    elif all_known:
         faults += _connection_faults(m)
     return faults
 
@@ -197,9 +211,10 @@ def _reference_faults(m: Mechanism) -> list[str]:
     for drive in m.drives:
         fault = m.freedom_fault(drive.freedom, single=True)
         if fault:
-            faults.append(f"drive {drive.freedom!r}: {fault}")
+            faults.append(f"drive {shown(drive.freedom)}: {fault}")
         else:
             drives.append(m.full_name(drive.freedom))
+            faults += drive.faults()
     faults += _repeated(drives, "drive")
     for load in m.loads:
         faults += load.faults(m)
@@ -218,15 +233,21 @@ def flat_start(m: Mechanism, start: Mapping[str, Any]) -> tuple[dict[str, float]
     """Start values by full freedom name; a pair's name may carry one value for each of its freedoms."""
     flat: dict[str, float] = {}
     faults = []
-    for key, value in start.items():
-        pair = m.pairs[m.pair_index[key]] if key in m.pair_index else None
-        many = len(pair.freedom_names) if pair is not None else 0
-        if pair is not None and many > 1 and is_numeric(value, (many,)):
-            flat.update(zip(pair.freedom_names, map(float, value), strict=True))
-            continue
-        fault = m.freedom_fault(key, single=False)
-        if fault or not is_numeric(value, ()):
-            faults.append(f"start {key!r} = {value!r}: {fault or 'expected a finite number'}")
-        else:
-            flat[m.full_name(key)] = float(value)
+    for key, given in start.items():
+        pair = m.pairs[m.pair_index[key]] if isinstance(key, str) and key in m.pair_index else None
+        names: Sequence[str] = pair.freedom_names if pair is not None else ()
+        several = isinstance(given, list | tuple) or (isinstance(given, np.ndarray) and given.ndim == 1)
+        values: Sequence[Any] = given
+        if not several or len(names) < 2 or len(given) != len(names):
+            fault = m.freedom_fault(key, single=False)
+            if fault:
+                faults.append(f"start {shown(key)} = {shown(given)}: {fault}")
+                continue
+            names, values = (m.full_name(key),), (given,)
+        for name, value in zip(names, values, strict=True):
+            number = m.in_own_units(name, value)
+            if is_numeric(number, ()):
+                flat[name] = float(number)
+            else:
+                faults.append(wrong(number, f"start {name!r}", "a finite number"))
     return flat, faults

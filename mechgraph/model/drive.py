@@ -7,6 +7,7 @@ from typing import Annotated
 
 from mechgraph.model.field_format import FREEDOM_NAME, TABLE, Described
 from mechgraph.model.motion import Motion
+from mechgraph.quantities import wrong
 
 
 @dataclass(frozen=True)
@@ -15,3 +16,10 @@ class Drive(Described):
 
     freedom: Annotated[str, FREEDOM_NAME("the driven freedom; not one of a rotation of S, Sg, Sp")]
     motion: Annotated[Motion | None, TABLE("used where `solve` is given none", table="motion", default="none")] = None
+
+    def faults(self) -> list[str]:
+        """What is wrong with the motion, one line each."""
+        where = f"drive {self.freedom!r}: motion"
+        if isinstance(self.motion, Motion):
+            return self.motion.faults(f"{where}.")
+        return [] if self.motion is None else [wrong(self.motion, where, "a Motion, mg.Motion(position, ...)")]

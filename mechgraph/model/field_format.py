@@ -17,10 +17,13 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
 from mechgraph.model.numeric import number_fault, plain, vector_fault
+from mechgraph.quantities import has_quantity, is_numeric, real_array, without_units, wrong
 from mechgraph.units import LENGTH, PURE, Dimension, factor_of, symbol_of
 
 XYZ = "xyz"
 Schema = Mapping[str, Any]
+STANDS_AS = {str: "a text", bool: "true or false", dict: "a table"}
+"""How the types of values are called in messages."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +97,11 @@ class FieldFormat:
 
     def fault(self, value: Any, what: str) -> str | None:
         """What is wrong with a value, or None."""
-        if self.choices and value not in self.choices:
-            return f"{what} = {value!r}: expected {' or '.join(map(repr, self.choices))}"
+        if self.choices and not (isinstance(value, str) and value in self.choices):
+            return wrong(value, what, " or ".join(map(repr, self.choices)))
+        stands_as = self.kind.stands_as
+        if stands_as in STANDS_AS and not isinstance(value, stands_as):
+            return wrong(value, what, STANDS_AS[stands_as])
         return None if self.kind.fault is None else self.kind.fault(value, what, self.minimum)
 
 
@@ -147,6 +153,20 @@ class Described(Formatted):
                 changes[name] = value.moved(pose)
             elif value is not None and about.kind.moved is not None:
                 changes[name] = about.kind.moved(value, pose)
+        return self.replace(**changes) if changes else self
+
+    def without_quantities(self, units: Mapping[str, str], turns: bool = False) -> Self:
+        """The same with quantities of pint as plain numbers in these units; those that do not fit stay, and are faults.
+
+        ``turns``: whether the freedom that it names is a turn.
+        """
+        changes = {}
+        for name, about in self.formats.items():
+            value = getattr(self, name)
+            if isinstance(value, Described):
+                changes[name] = value.without_quantities(units, turns)
+            elif about.kind.numeric and has_quantity(value):
+                changes[name] = without_units(value, about.turn if turns else about.slide, units)
         return self.replace(**changes) if changes else self
 
     def in_units(self, base: tuple[float, float, float], turns: bool = False) -> Self:
@@ -212,15 +232,16 @@ def _series_fault(width: int) -> Callable[[Any, str, float | None], str | None]:
     def fault(value: Any, what: str, minimum: float | None) -> str | None:
         if callable(value):
             return None
-        try:
-            array = np.asarray(value, dtype=float)
-        except (TypeError, ValueError, OverflowError):
-            array = np.array(np.nan)
-        if np.isfinite(array).all() and (width == 1 or (array.ndim >= 1 and array.shape[-1] == width)):
+        array = real_array(value)
+        if array is not None and np.isfinite(array).all() and (width == 1 or array.shape[-1:] == (width,)):
             return None
-        return f"{what} = {value!r}: expected {wanted}, an array of them over positions, or a callable (pose, twist, t)"
+        return wrong(value, what, f"{wanted}, an array of them over positions, or a callable (pose, twist, t)")
 
     return fault
+
+
+def _tensor_fault(value: Any, what: str, minimum: float | None) -> str | None:
+    return None if is_numeric(value, (3, 3)) else wrong(value, what, "a 3 x 3 tensor of finite numbers")
 
 
 def _vector_fault(value: Any, what: str, minimum: float | None) -> str | None:
@@ -247,7 +268,8 @@ TENSOR = Kind(
     None,
     (3, 3),
     True,
-    moved=_turned_tensor,
+    _tensor_fault,
+    _turned_tensor,
 )
 SIX = Kind("6 numbers", {"$ref": "#/$defs/six"})
 SERIES = Kind("number(s)", {"$ref": "#/$defs/series"}, None, (), True, _series_fault(1))

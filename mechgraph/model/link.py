@@ -9,7 +9,7 @@ import numpy as np
 
 from mechgraph.algebra.inertia import physical_faults
 from mechgraph.model.field_format import FLAG, NUMBER, POINT, TENSOR, TEXT, Described
-from mechgraph.model.numeric import is_numeric
+from mechgraph.quantities import is_numeric
 from mechgraph.units import INERTIA, LENGTH, MASS
 
 
@@ -58,9 +58,7 @@ class Link(Described):
         found = self.value_faults(where)
         if self.center is None and is_numeric(self.mass, ()) and self.mass > 0:
             found.append(f"{where}mass = {self.mass:g} without a center; give center=(x, y, z)")
-        if self.inertia is not None and not is_numeric(self.inertia, (3, 3)):
-            found.append(f"{where}inertia: expected a 3 x 3 tensor of finite numbers, got {self.inertia!r}")
-        elif self.inertia is not None:
+        if is_numeric(self.inertia, (3, 3)):
             if self.center is None:
                 found.append(f"{where}inertia without a center; give center=(x, y, z)")
             if self.mass == 0 and np.any(self.inertia):

@@ -24,6 +24,7 @@ from mechgraph.model.field_format import (
     VECTOR_SERIES,
     Described,
 )
+from mechgraph.model.link import Link
 from mechgraph.model.numeric import same_fields
 from mechgraph.units import ACCELERATION, FORCE, LENGTH, MOMENT
 
@@ -83,6 +84,9 @@ class Nameable(Protocol):
     def massive_links(self) -> tuple[str, ...]:
         """Links that have mass."""
 
+    def link(self, name: str) -> Link:
+        """The link of that name."""
+
     def ends_of(self, freedom: str) -> tuple[str, str]:
         """Links a and b of the pair of a freedom."""
 
@@ -117,6 +121,8 @@ class _Load(Described):
         found: list[str | None] = []
         for name, about in self.formats.items():
             value = getattr(self, name)
+            if not isinstance(value, str):
+                continue
             if about.kind is LINK_NAME and value not in names.link_index:
                 found.append(f"unknown link {value!r} (links: {', '.join(names.link_index)})")
             elif about.kind is FREEDOM_NAME:
@@ -164,8 +170,9 @@ class Wrench(_Load):
     """A force at a material point and a moment on one link.
 
     ``point`` is in the coordinates of the declared configuration, in which link frames stand on the global one (for a link
-    placed by markers: its own frame); the mass centre where it is left out. ``frame`` says whether force and moment have global
-    directions or turn with the link. Values may be arrays over positions or a callable ``(pose, twist, t)`` of the link.
+    placed by markers: its own frame); the mass centre where it is left out (a force on a link without one
+    needs it). ``frame`` says whether force and moment have global directions or turn with the link. Values may be arrays over
+    positions or a callable ``(pose, twist, t)`` of the link.
     """
 
     kind: ClassVar[str] = "wrench"
@@ -184,8 +191,12 @@ class Wrench(_Load):
 
     def faults(self, names: Nameable) -> list[str]:
         """What is wrong with this load."""
-        nothing = self.force is None and self.moment is None
-        return super().faults(names) + ([f"{self.where}has neither force nor moment"] if nothing else [])
+        found = super().faults(names)
+        if self.force is None and self.moment is None:
+            found.append(f"{self.where}has neither force nor moment")
+        if self.force is not None and self.point is None and not found and names.link(self.link).center is None:
+            found.append(f"{self.where}has a force but no point, and the link no mass centre; give point=(x, y, z)")
+        return found
 
     def act(self, site: LoadSite) -> None:
         """Add force and moment."""
@@ -193,7 +204,7 @@ class Wrench(_Load):
         if self.force is not None:
             force = site.values(self.force, self.link, 3)
             point = site.number(self.point) if self.point is not None else site.center(self.link)
-            at, _ = site.point(self.link, (0.0, 0.0, 0.0) if point is None else point)
+            at, _ = site.point(self.link, point)
             site.add_force(self.link, force if R is None else rotate(R, force), at)
         if self.moment is not None:
             moment = site.values(self.moment, self.link, 3)

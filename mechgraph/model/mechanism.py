@@ -12,6 +12,7 @@ from typing import Annotated, Any, TypeVar
 
 import numpy as np
 
+from mechgraph.arguments import items_of
 from mechgraph.errors import DeclarationError
 from mechgraph.model.coupling import Coupling
 from mechgraph.model.declaration import declaration_faults, flat_start, item_faults, mapping_faults
@@ -19,10 +20,11 @@ from mechgraph.model.drive import Drive
 from mechgraph.model.field_format import FACTS, OTHER, TABLE, TABLES, TEXT, Formatted
 from mechgraph.model.link import Link
 from mechgraph.model.load import Load
-from mechgraph.model.numeric import is_numeric, same_fields
+from mechgraph.model.numeric import same_fields
 from mechgraph.model.pair import Pair
 from mechgraph.model.pair_type import PairType
-from mechgraph.units import base_factors
+from mechgraph.quantities import is_numeric, shown, without_units, wrong
+from mechgraph.units import LENGTH, PURE, base_factors
 
 Made = TypeVar("Made")
 START = {
@@ -94,28 +96,58 @@ class Mechanism(Formatted):
         description: str = "",
         expected: Mapping[str, Any] | None = None,
     ) -> None:
-        pair_tuple = tuple(pairs)
-        link_tuple = tuple(links) if links is not None else tuple(map(Link, _ends(pair_tuple)))
+        faults: list[str] = []
+        pair_tuple = items_of(pairs, "pairs", faults)
+        link_tuple = tuple(map(Link, _ends(pair_tuple))) if links is None else items_of(links, "links", faults)
         first = next((link.name for link in link_tuple if isinstance(link, Link)), "")
         self._set(
             name=name,
             links=link_tuple,
             pairs=pair_tuple,
-            couplings=_named(couplings, pair_tuple),
-            drives=_as_drives(drives),
-            loads=tuple(loads),
+            couplings=_named(items_of(couplings, "couplings", faults), pair_tuple),
+            drives=_as_drives(items_of(drives, "drives", faults)),
+            loads=items_of(loads, "loads", faults),
             frame=first if frame is None else frame,
             units=MappingProxyType(dict(units) if isinstance(units, Mapping) else {}),
             source=source,
             description=description,
             expected=MappingProxyType(dict(expected) if isinstance(expected, Mapping) else {}),
         )
-        faults = declaration_faults(self) + mapping_faults(units=units, start=start, expected=expected)
-        self._finish(start, faults)
+        if not faults:
+            faults = declaration_faults(self)
+            if faults and self._take_quantities():
+                faults = declaration_faults(self)
+        self._finish(start, faults + mapping_faults(units=units, start=start, expected=expected))
 
     def _set(self, **fields: Any) -> None:
         for key, value in fields.items():
             object.__setattr__(self, key, value)
+
+    def _take_quantities(self) -> bool:
+        """Turn quantities of pint into plain numbers, where units are declared; whether there may have been any."""
+        if not self.units:
+            return False
+        new: dict[str, list[Any]] = {
+            "links": [item.without_quantities(self.units) for item in self.links if isinstance(item, Link)],
+            "pairs": [item.without_quantities(self.units) for item in self.pairs if isinstance(item, Pair)],
+            "drives": [
+                item.without_quantities(self.units, self.turns(item.freedom))
+                for item in self.drives
+                if isinstance(item, Drive)
+            ],
+            "loads": [
+                item.without_quantities(self.units, self.turns(item.in_freedom))
+                for item in self.loads
+                if isinstance(item, Load)
+            ],
+            "couplings": [
+                item.in_own_units(self.units, [self.turns(name) for name in item.freedoms])
+                for item in self.couplings
+                if isinstance(item, Coupling)
+            ],
+        }
+        self._set(**{key: tuple(items) for key, items in new.items() if len(items) == len(getattr(self, key))})
+        return True
 
     def _finish(self, start: Any, faults: list[str]) -> None:
         """Raise all faults at once, those of ``start`` too; keep start values and couplings by full freedom names."""
@@ -124,7 +156,7 @@ class Mechanism(Formatted):
             flat, start_faults = flat_start(self, start if isinstance(start, Mapping) else {})
             faults += start_faults
         if faults:
-            raise DeclarationError(f"mechanism {self.name!r}", faults)
+            raise DeclarationError(f"mechanism {shown(self.name)}", faults)
         self._set(start=MappingProxyType(flat))
         in_full = ([(self.full_name(q), value) for q, value in c.terms] for c in self.couplings)
         self._set(couplings=tuple(c.replace(terms=t) for c, t in zip(self.couplings, in_full, strict=True)))
@@ -200,9 +232,9 @@ class Mechanism(Formatted):
         return self._index(name, self.pair_index, "pair")
 
     def _index(self, name: str, places: Mapping[str, int], what: str) -> int:
-        if name not in places:
+        if not isinstance(name, str) or name not in places:
             raise DeclarationError(
-                f"mechanism {self.name!r}", [f"unknown {what} {name!r} ({what}s: {', '.join(places)})"]
+                f"mechanism {self.name!r}", [f"unknown {what} {shown(name)} ({what}s: {', '.join(places)})"]
             )
         return places[name]
 
@@ -227,6 +259,15 @@ class Mechanism(Formatted):
             raise DeclarationError(f"mechanism {self.name!r}", [found])
         return found
 
+    def turns(self, freedom: Any) -> bool:
+        """Whether the coordinate of a freedom is an angle; False for what is no freedom."""
+        found = self._find_freedom(freedom)
+        return not isinstance(found, str) and self.pairs[found[0]].type.freedoms[found[1]].turns
+
+    def in_own_units(self, freedom: str, value: Any) -> Any:
+        """A coordinate given as a quantity of pint as a plain number in the declared units; unchanged where it does not fit."""
+        return without_units(value, PURE if self.turns(freedom) else LENGTH, self.units)
+
     def full_name(self, name: str) -> str:
         """The full spelling ``"B.Tz"`` of a freedom."""
         k, j = self.freedom(name)
@@ -235,7 +276,7 @@ class Mechanism(Formatted):
     def _find_freedom(self, name: Any) -> tuple[int, int] | str:
         """Index of the pair and of the freedom within it, or why there is none."""
         if not isinstance(name, str):
-            return f"freedom {name!r}: expected a name such as 'B' or 'B.Tz'"
+            return f"freedom {shown(name)}: expected a name such as 'B' or 'B.Tz'"
         k = self._place_of_named(name)
         if k is None:
             return f"unknown freedom {name!r} (freedoms: {', '.join(self.freedom_names())})"
@@ -288,11 +329,15 @@ class Mechanism(Formatted):
         # links, pairs and couplings stay, and with them what is kept of the graph: only what refers to them is checked again
         out = object.__new__(Mechanism)
         fields = {k: getattr(self, k) for k in self.formats}
-        fields["drives"] = _as_drives(changes.get("drives", self.drives))
-        fields["loads"] = tuple(changes.get("loads", self.loads))
+        wrong_kinds: list[str] = []
+        fields["drives"] = _as_drives(items_of(changes.get("drives", self.drives), "drives", wrong_kinds))
+        fields["loads"] = items_of(changes.get("loads", self.loads), "loads", wrong_kinds)
         out._set(**fields, _kept=self._kept)
         start = changes.get("start", self.start)
-        out._finish(start, item_faults(out) + mapping_faults(start=start))
+        faults = item_faults(out)
+        if faults and out._take_quantities():
+            faults = item_faults(out)
+        out._finish(start, wrong_kinds + faults + mapping_faults(start=start))
         return out
 
     def with_pair_type(self, pair: str, type: str | PairType, *, pitch: float | None = None) -> Mechanism:
@@ -330,12 +375,7 @@ class Mechanism(Formatted):
 
         Needs the present units declared.
         """
-        base = base_factors(self.units, units)
-
-        def turns(freedom: str | None) -> bool:
-            k, j = self.freedom(freedom) if freedom is not None else (0, 0)
-            return freedom is not None and self.pairs[k].type.freedoms[j].turns
-
+        base, turns = base_factors(self.units, units), self.turns
         return self.replace(
             links=[link.in_units(base) for link in self.links],
             pairs=[pair.in_units(base) for pair in self.pairs],
@@ -360,6 +400,12 @@ class Mechanism(Formatted):
         )
 
 
+def check_mechanism(m: Any, call: str) -> None:
+    """Raise DeclarationError where ``m`` is no Mechanism."""
+    if not isinstance(m, Mechanism):
+        raise DeclarationError(call, [wrong(m, "mechanism", "a Mechanism; mg.load(name) reads one")])
+
+
 def _ends(pairs: Iterable[Any]) -> list[str]:
     """Names of the links of pairs, each once, in order."""
     ends = (end for p in pairs if isinstance(p, Pair) for end in (p.a, p.b))
@@ -370,9 +416,8 @@ def _as_drives(drives: Iterable[Any]) -> tuple[Any, ...]:
     return tuple(Drive(d) if isinstance(d, str) else d for d in drives)
 
 
-def _named(couplings: Iterable[Any], pairs: Iterable[Any]) -> tuple[Any, ...]:
+def _named(items: tuple[Any, ...], pairs: Iterable[Any]) -> tuple[Any, ...]:
     """The couplings; those without a name are called g1, g2, ... as far as these are free."""
-    items = tuple(couplings)
     if not items:
         return ()
     taken = {getattr(item, "name", None) for item in (*items, *pairs) if isinstance(getattr(item, "name", None), str)}
@@ -381,10 +426,11 @@ def _named(couplings: Iterable[Any], pairs: Iterable[Any]) -> tuple[Any, ...]:
 
 
 def _places(names: Iterable[Any]) -> dict[Any, int]:
-    """Name -> its first place."""
+    """Name -> its first place; what is no name has none."""
     out: dict[Any, int] = {}
     for i, name in enumerate(names):
-        out.setdefault(name, i)
+        if isinstance(name, str):
+            out.setdefault(name, i)
     return out
 
 

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from mechgraph.errors import DeclarationError
 from mechgraph.model.field_format import SERIES, Described
 from mechgraph.model.motion_law import LAWS, Array, Law, LawFault, Smooth, read_series
+from mechgraph.quantities import has_quantity, shown, wrong
 from mechgraph.units import LENGTH, PURE, TIME
 
 __all__ = ["LAWS", "Motion"]
@@ -31,7 +32,7 @@ class Motion(Described):
     Parameters
     ----------
     position : (...) array_like
-        Radians or lengths.
+        Radians or lengths. Quantities of pint are converted by the mechanism that they are used for, if it declares units.
     velocity, acceleration : (...) array_like, optional
         First and second time derivative; 0 where left out.
     t : (...) array_like, optional
@@ -61,6 +62,10 @@ class Motion(Described):
             "acceleration": acceleration,
             "t": t,
         }
+        if any(map(has_quantity, given.values())):  # kept as given: only a mechanism knows its units
+            for name, value in given.items():
+                object.__setattr__(self, name, value)
+            return
         faults: list[str] = []
         arrays = {
             name: read_series(0.0 if value is None and name in ("velocity", "acceleration") else value, name, faults)
@@ -81,6 +86,11 @@ class Motion(Described):
                 array.setflags(write=False)
             object.__setattr__(self, name, array)
 
+    def faults(self, where: str = "") -> list[str]:
+        """Quantities that are not converted to plain numbers yet, one line each."""
+        left = {name: value for name in self.formats if has_quantity(value := getattr(self, name))}
+        return [wrong(value, where + name, "plain numbers") for name, value in left.items()]
+
     @property
     def shape(self) -> tuple[int, ...]:
         """The common shape of the arrays; empty for one position."""
@@ -95,6 +105,8 @@ class Motion(Described):
         """Compare all arrays exactly; a motion without times differs from one with."""
         if not isinstance(other, Motion):
             return NotImplemented
+        if self.faults() or other.faults():
+            return self is other
         return all(
             (mine is None) == (theirs is None) and (mine is None or theirs is None or np.array_equal(mine, theirs))
             for mine, theirs in zip(self._arrays, other._arrays, strict=True)
@@ -102,10 +114,14 @@ class Motion(Described):
 
     def __hash__(self) -> int:
         """Return a hash of shapes and values; 0.0 and -0.0 hash alike since they compare equal."""
+        if self.faults():
+            return id(self)
         return hash((self.shape, *((array + 0.0).tobytes() for array in self._arrays if array is not None)))
 
     def __repr__(self) -> str:
         """Return the shape and the range of every quantity."""
+        if self.faults():
+            return f"Motion({', '.join(f'{name}={shown(getattr(self, name))}' for name in self.formats)})"
         parts = [f"shape={self.shape}"] if self.shape else []
         for name, array in zip(self.formats, self._arrays, strict=True):
             if array is not None and array.size:

@@ -16,6 +16,8 @@ import scipy
 from numpy.polynomial import Polynomial, chebyshev
 from numpy.typing import NDArray
 
+from mechgraph.quantities import real_array, wrong
+
 Array = NDArray[np.float64]
 Rates = tuple[Array, Array, Array]
 """Position, velocity, acceleration."""
@@ -44,15 +46,11 @@ DEEPEST_PANEL = 16
 
 def read_series(value: Any, what: str, faults: list[str]) -> Array:
     """Return `value` as a new float64 array; what keeps it from being finite goes to `faults`."""
-    try:
-        array = np.asarray(value)
-    except ValueError:
-        faults.append(f"{what} must be an array of numbers, but its rows differ in length: {value!r}")
+    array = real_array(value)
+    if array is None:
+        faults.append(wrong(value, what, "a real number, or an array of them with rows of one length"))
         return np.zeros(())
-    if array.dtype.kind not in "iuf":
-        faults.append(f"{what} must be a real number or an array of them, got {value!r}")
-        return np.zeros(())
-    numbers = np.array(array, dtype=np.float64)
+    numbers = np.array(array)
     if not np.isfinite(numbers).all():
         where = tuple(int(i) for i in np.argwhere(~np.isfinite(numbers))[0])
         faults.append(f"{what} must be finite, got {numbers[where]}{f' at index {where}' if where else ''}")
@@ -168,7 +166,7 @@ def _checked_samples(samples: Any) -> tuple[Array, Array]:
     try:
         first, second = samples
     except (TypeError, ValueError):
-        raise LawFault(f"samples must be a pair (times, values), got {samples!r}") from None
+        raise LawFault(wrong(samples, "samples", "a pair (times, values)")) from None
     faults: list[str] = []
     times = read_series(first, "times of the samples", faults)
     values = read_series(second, "values of the samples", faults)

@@ -1,19 +1,15 @@
-"""Numbers as a user types them: read leniently, kept as floats and tuples of floats, faults described in words."""
+"""Numbers of a declaration: kept as floats and tuples of floats, faults described in words."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-LARGEST = 1e100
-"""Numbers from here on are refused: their squares would overflow."""
-
-_FLOAT_ONLY = {float}
+from mechgraph.quantities import all_floats, is_numeric, real_array, wrong
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,43 +22,22 @@ class PerCase:
 def plain(value: Any) -> Any:
     """Numbers, sequences and arrays as floats and nested tuples; what is no number is kept unchanged."""
     kind = type(value)
-    if value is None or kind is float or kind is str or (kind is tuple and _all_floats(value)) or callable(value):
+    if value is None or kind is float or kind is str or (kind is tuple and all_floats(value)) or callable(value):
         return value
-    try:
-        array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError, OverflowError):
-        return value
-    if array.ndim == 1:
-        return tuple(array.tolist())
-    return tuple(map(tuple, array.tolist())) if array.ndim == 2 else _as_tuples(array.tolist())
+    array = real_array(value)
+    return value if array is None else _as_tuples(array.tolist())
 
 
 def _as_tuples(value: Any) -> Any:
-    return tuple([_as_tuples(v) for v in value]) if isinstance(value, list) else value
+    if not isinstance(value, list):
+        return value
+    return tuple(value) if all_floats(value) else tuple([_as_tuples(v) for v in value])
 
 
-def _all_floats(value: tuple[Any, ...]) -> bool:
-    """Whether a tuple holds floats only, so that it needs no reading."""
-    return set(map(type, value)) == _FLOAT_ONLY
-
-
-def is_numeric(value: Any, shape: tuple[int, ...]) -> bool:
-    """Whether ``value`` is an array of finite numbers of the given shape."""
-    if type(value) is float:
-        return shape == () and abs(value) < LARGEST
-    if type(value) is tuple and _all_floats(value):
-        return shape == (len(value),) and all(abs(v) < LARGEST for v in value)
-    try:
-        array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError, OverflowError):
-        return False
-    return array.shape == shape and bool((np.abs(array) < LARGEST).all())
-
-
-def vector_fault(value: Any, what: str, *, direction: bool = False, hint: str = "") -> str | None:
+def vector_fault(value: Any, what: str, *, direction: bool = False) -> str | None:
     """The fault of a vector of three numbers, or None; a direction must not be zero."""
     if not is_numeric(value, (3,)):
-        return f"{what} = {value!r}: expected three finite numbers{hint}"
+        return wrong(value, what, "three finite numbers")
     if direction and not math.hypot(*value) > 1e-12:
         return f"{what} = {value!r}: has length 0; give a direction, e.g. (0, 0, 1)"
     return None
@@ -71,7 +46,7 @@ def vector_fault(value: Any, what: str, *, direction: bool = False, hint: str = 
 def number_fault(value: Any, what: str, *, minimum: float | None = None) -> str | None:
     """The fault of one number, or None."""
     if not is_numeric(value, ()):
-        return f"{what} = {value!r}: expected a finite number"
+        return wrong(value, what, "a finite number")
     if minimum is not None and float(value) < minimum:
         return f"{what} = {value!r}: expected a number not below {minimum:g}"
     return None
@@ -87,12 +62,3 @@ def same(a: Any, b: Any) -> bool:
 def same_fields(a: Any, b: Any) -> bool:
     """Field by field equality of two dataclasses of one type, arrays included."""
     return type(a) is type(b) and all(same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a) if f.compare)
-
-
-def column(values: Sequence[Any], shape: tuple[int, ...]) -> NDArray[np.float64] | None:
-    """A whole column of values ``(len(values), *shape)``; None where one of them is no array of finite numbers of that shape."""
-    try:
-        made = np.array(values, dtype=float) if values else np.zeros((0, *shape))
-    except (TypeError, ValueError, OverflowError):
-        return None
-    return made if made.shape == (len(values), *shape) and bool((np.abs(made) < LARGEST).all()) else None

@@ -21,9 +21,10 @@ from mechgraph.model.field_format import (
 from mechgraph.model.field_format import (
     TABLE as NESTED,
 )
-from mechgraph.model.numeric import is_numeric, number_fault, plain
+from mechgraph.model.numeric import plain
 from mechgraph.model.pair_table import TABLE
 from mechgraph.model.pair_type import PairType
+from mechgraph.quantities import is_numeric, shown, wrong
 from mechgraph.units import LENGTH
 
 PERPENDICULAR = 1e-6
@@ -193,8 +194,12 @@ class Pair(Described):
         if not isinstance(self.name, str) or not self.name:
             return [f"pair {self.name!r}: the name must be a non-empty text"]
         if not isinstance(self.type, PairType):
-            return [f"{where}unknown type {self.type!r}; known: {', '.join(TABLE)}, or pass a PairType"]
-        found: list[str | None] = []
+            return [f"{where}unknown type {shown(self.type)}; known: {', '.join(TABLE)}, or pass a PairType"]
+        found: list[str | None] = [
+            wrong(end, where + side, "the name of a link")
+            for side, end in (("a", self.a), ("b", self.b))
+            if not isinstance(end, str | None)
+        ]
         if self.a == self.b:
             found.append(f"{where}joins link {self.a!r} to itself; a pair joins two links")
         found += list(self._pitch_faults(where))
@@ -204,8 +209,11 @@ class Pair(Described):
         elif self.on_a is not None and self.on_b is not None:
             if self.point is not None or self.axis is not None:
                 found.append(f"{where}has both point/axis and markers on_a/on_b; give one form")
-            for side, marker in (("on_a.", self.on_a), ("on_b.", self.on_b)):
-                found += marker.faults(where + side, self.type.square_second)
+            for side, marker in (("on_a", self.on_a), ("on_b", self.on_b)):
+                if isinstance(marker, Marker):
+                    found += marker.faults(f"{where}{side}.", self.type.square_second)
+                else:
+                    found.append(wrong(marker, where + side, "a Marker, mg.Marker(point, axis)"))
         elif self.has_geometry:
             if self.point is None:
                 found.append(f"{where}has an axis but no point; give point=(x, y, z)")
@@ -223,4 +231,4 @@ class Pair(Described):
             yield f"{where}has both pitch and lead; give exactly one (lead = 2 pi pitch)"
         elif not given and self.has_geometry:
             yield f"{where}type {self.type.symbol} needs a pitch (advance per radian) or a lead (advance per turn)"
-        yield from (number_fault(v, where + n) for n, v in given)
+        yield from (self.formats[n].fault(v, where + n) for n, v in given)

@@ -12,13 +12,14 @@ from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import accumulate
+from typing import TypeVar
 
 import numpy as np
 
 from mechgraph.errors import DeclarationError
 from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.model.factors import ConstantScrew, Factor, Rotation
-from mechgraph.model.numeric import is_numeric
+from mechgraph.quantities import is_numeric
 
 Six = tuple[float, float, float, float, float, float]
 
@@ -88,6 +89,12 @@ class Component:
         """Whether the component is a couple (unit of a moment) rather than a force."""
         return not any(self.wrench[3:])
 
+    def scaled(self, L: float) -> Component:
+        """The component with its lengths divided by ``L``: the moment (an arm) of a force; itself where it has none."""
+        if self.is_couple or not any(self.wrench[:3]):
+            return self
+        return replace(self, wrench=_six((*(v / L for v in self.wrench[:3]), *self.wrench[3:])))
+
 
 @dataclass(frozen=True)
 class Bookkeeping:
@@ -109,6 +116,17 @@ class Bookkeeping:
     def equations(self) -> int:
         """Number of constraint equations, ``len(conditions)``."""
         return len(self.conditions)
+
+    def scaled(self, L: float) -> Bookkeeping:
+        """The bookkeeping with its lengths divided by ``L``."""
+        return Bookkeeping(_all_scaled(self.conditions, L), _all_scaled(self.along, L))
+
+
+Scaled = TypeVar("Scaled", Freedom, Component)
+
+
+def _all_scaled(parts: Sequence[Scaled], L: float) -> tuple[Scaled, ...]:
+    return tuple(part.scaled(L) for part in parts)
 
 
 def _factors(given: Sequence[object], faults: list[str]) -> tuple[Factor, ...]:
@@ -239,8 +257,9 @@ class PairType:
         scaled = {
             "steps": steps,
             "freedoms": tuple(freedom for step in steps for freedom in step.freedoms),
-            "reactions": None if self.reactions is None else tuple(_scaled_arm(c, L) for c in self.reactions),
-            "efforts": tuple(_scaled_arm(c, L) for c in self.efforts),
+            "reactions": None if self.reactions is None else _all_scaled(self.reactions, L),
+            "efforts": _all_scaled(self.efforts, L),
+            "bookkeeping": self.bookkeeping and self.bookkeeping.scaled(L),
         }
         out = copy(self)
         for key, value in scaled.items():
@@ -250,10 +269,15 @@ class PairType:
     @cached_property
     def has_lengths(self) -> bool:
         """Whether numbers of the row are lengths."""
-        components = (*(self.reactions or ()), *self.efforts)
-        return any(step.scaled(2.0) is not step for step in self.steps) or any(
-            _scaled_arm(c, 2.0) is not c for c in components
+        book = self.bookkeeping or Bookkeeping((), ())
+        parts: tuple[Factor | Freedom | Component, ...] = (
+            *self.steps,
+            *(self.reactions or ()),
+            *self.efforts,
+            *book.conditions,
+            *book.along,
         )
+        return any(part.scaled(2.0) is not part for part in parts)
 
     @property
     def f(self) -> int:
@@ -341,13 +365,6 @@ def fill_row(
     for key, value in fields.items():
         object.__setattr__(row, key, value)
     return faults
-
-
-def _scaled_arm(c: Component, L: float) -> Component:
-    """A force component with its moment (an arm) divided by ``L``; couples have none."""
-    if c.is_couple or not any(c.wrench[:3]):
-        return c
-    return replace(c, wrench=_six((*(v / L for v in c.wrench[:3]), *c.wrench[3:])))
 
 
 def _dual_effort(freedom: Freedom, frame: int) -> Component:

@@ -23,9 +23,9 @@ from mechgraph.model.file_format import DEGREES, SCHEMA, TABLES_OF_FILE
 from mechgraph.model.library import library_names, library_path
 from mechgraph.model.load import LOADS
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.numeric import is_numeric
 from mechgraph.model.pair_table import TABLE as PAIR_TABLE
 from mechgraph.model.pair_type import PairType
+from mechgraph.quantities import is_numeric
 
 SWEEP_ROUNDING = 1e-12
 """Part of a sweep by which its end may come early and still be excluded (degrees turned into radians are rounded)."""

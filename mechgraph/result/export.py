@@ -32,8 +32,8 @@ def columns(s: Solution) -> dict[str, Array]:
     m = s.mechanism
     out: dict[str, Array] = {}
 
-    def put(name: str, values: Any, *dimension: float) -> None:
-        unit = unit_of(m.units, dimension)
+    def put(name: str, values: Any, *dimension: float, unit: str = "") -> None:
+        unit = unit or unit_of(m.units, dimension)
         out[f"{name} [{unit}]" if unit else name] = np.asarray(values)
 
     if s.t is not None:
@@ -52,8 +52,7 @@ def columns(s: Solution) -> dict[str, Array]:
                 for label, effort in efforts.items():
                     put(f"{name} {label}", effort[..., j], 2 if part.is_couple else 1, 1, -2)
             for name, value in r.components.items():
-                couple = name.startswith("M")
-                put(f"{pair.name}:{name}", value, 2 if couple else 1, 1, -2)
+                put(f"{pair.name}:{name}", value, unit=r.units["components"][name])
     for name in ("closure", "equilibrium", "power"):
         out[name] = getattr(s.checks, name)
     out["status"] = s.status

@@ -154,7 +154,11 @@ class PairResult:
 
     @property
     def components(self) -> dict[str, Array]:
-        """Reaction components of the pair table by name, in frame k about its origin; NaN where not unique."""
+        """Reaction components of the pair table by name, in frame k about its origin; NaN where not unique.
+
+        Components n1, n2, ... (of a null space) mix force and moment: they count wrenches with ``|F|^2 + |M / L|^2 = 1`` about marker B, L
+        the mean radius of the mechanism, and have the unit of a force.
+        """
         return self._values.components(self._index)
 
     @property
@@ -175,7 +179,9 @@ class PairResult:
             "moment": moment,
             "reaction": (moment,) * 3 + (force,) * 3,
             "total": (moment,) * 3 + (force,) * 3,
-            "components": {name: moment if name.startswith("M") else force for name in row.component_names},
+            "components": {c.name: moment if c.is_couple else force for c in row.reactions}
+            if row.reactions is not None
+            else dict.fromkeys(row.component_names, force and f"{force}, M/L"),
         }
 
 

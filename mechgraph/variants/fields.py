@@ -16,9 +16,10 @@ from mechgraph.model.chain import chain_numbers, markers_of_chain
 from mechgraph.model.coupling import Coupling
 from mechgraph.model.load import Load
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.numeric import PerCase, is_numeric
+from mechgraph.model.numeric import PerCase
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.parameters import Declared, declared
+from mechgraph.quantities import is_numeric
 from mechgraph.variants.number_names import MARKER, AnyField, ChainField, CouplingField, Field, LoadField, find_field
 
 __all__ = ["AnyField", "Variants", "clashes", "field_values", "find_field", "stacked", "topology_of", "varied"]

@@ -18,9 +18,9 @@ from mechgraph.model.coupling import Coupling
 from mechgraph.model.field_format import Described, FieldFormat
 from mechgraph.model.link import Link
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.numeric import is_numeric
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.parameters import Declared
+from mechgraph.quantities import is_numeric
 
 MARKER = tuple(Marker.formats)
 """Numbers of a marker."""

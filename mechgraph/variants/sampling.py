@@ -11,6 +11,7 @@ import scipy
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
+from mechgraph.quantities import is_numeric, real_array, shown, wrong
 
 TAIL = 0.00135
 """Part of a distribution without end that is ignored at either end: three standard deviations of a normal one."""
@@ -68,13 +69,13 @@ def distributions(parameters: Mapping[str, Any]) -> dict[str, Any]:
     """
     if not isinstance(parameters, Mapping):
         raise DeclarationError(
-            "study: parameters", [f"{parameters!r}: expected a mapping name -> distribution or numbers"]
+            "study: parameters", [wrong(parameters, "parameters", "a mapping name -> distribution or numbers")]
         )
     out, faults = {}, []
     for name, given in parameters.items():
         distribution = _with_quantiles(given)
         if isinstance(distribution, str):
-            faults.append(f"{name!r} = {given!r}: {distribution}")
+            faults.append(f"{name!r} = {shown(given)}: {distribution}")
         else:
             out[name] = distribution
     if faults:
@@ -86,14 +87,18 @@ def _with_quantiles(given: Any) -> Any:
     """Something with quantiles, or what is wrong with it."""
     found = InverseDistribution(given) if hasattr(given, "icdf") else given
     if hasattr(found, "ppf") and not hasattr(found, "freeze"):
-        return found if np.isfinite(found.ppf(0.5)) else "has no median; check the arguments of the distribution"
-    try:
-        levels = np.asarray(given, dtype=float)
-    except (TypeError, ValueError):
-        levels = np.array(np.nan)
-    if levels.ndim != 1 or not levels.size or not np.isfinite(levels).all():
+        return found if _has_median(found) else "has no median; check the arguments of the distribution"
+    levels = real_array(given)
+    if levels is None or levels.ndim != 1 or not levels.size or not np.isfinite(levels).all():
         return "expected a distribution of scipy.stats with its numbers, e.g. scipy.stats.norm(10, 0.1), or a sequence of numbers"
     return Levels(np.sort(levels))
+
+
+def _has_median(distribution: Any) -> bool:
+    try:
+        return is_numeric(distribution.ppf(0.5), ())
+    except Exception:  # whatever the numbers that it was given do in the methods of a distribution
+        return False
 
 
 def deviation(distribution: Any) -> float:
