@@ -310,13 +310,13 @@ class Configuration:
         s = self.system
         if s.many_loops:
             flat = per_pair.transpose(1, 0, 2).reshape(per_pair.shape[1], 6 * per_pair.shape[2])
-            return np.asarray(s.graph.sparse_loop_matrix @ flat).reshape(6 * len(s.graph.loops), per_pair.shape[2])
+            return np.asarray(s.graph.sparse_loop_matrix @ flat).reshape(6 * s.graph.n_loops, per_pair.shape[2])
         return _combined(s.loop_matrix, per_pair)
 
     def pair_wrenches(self, x: Array) -> Array:
         """Pair wrenches ``(6, P, k, T)`` of the loop rows of ``x (n_rows, k, T)``: ``w = C^T x``."""
         s = self.system
-        n = len(s.graph.loops)
+        n = s.graph.n_loops
         loops = x[: 6 * n].reshape(n, 6, *x.shape[1:])
         if s.many_loops:
             flat = np.asarray(s.graph.sparse_loop_matrix.T @ loops.reshape(n, loops.size // n))

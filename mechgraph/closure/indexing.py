@@ -101,9 +101,7 @@ class System:
         self.first_column = np.concatenate([[0], np.cumsum([p.type.f for p in m.pairs])]).astype(np.intp)
         self.first_row = np.concatenate([[0], np.cumsum([p.type.nx for p in m.pairs])]).astype(np.intp)
         self.n_freedoms, self.n_state = int(self.first_column[-1]), int(self.first_row[-1])
-        self.a = np.array([a for a, _ in self.graph.ends], dtype=np.intp)
-        self.b = np.array([b for _, b in self.graph.ends], dtype=np.intp)
-        self.chords = np.array(self.graph.chords, dtype=np.intp)
+        self.a, self.b, self.chords = self.graph.a, self.graph.b, self.graph.chords
         self.groups = self._group_pairs()
         self.n_factors = np.array([len(p.type.steps) for p in m.pairs], dtype=np.intp)
         self.tree = Tree(self.graph)
@@ -283,7 +281,7 @@ class System:
     @cached_property
     def many_loops(self) -> bool:
         """Whether sums along loops are taken with the sparse loop matrix."""
-        return len(self.graph.loops) > MANY_LOOPS
+        return self.graph.n_loops > MANY_LOOPS
 
     @cached_property
     def loop_matrix(self) -> Array:
@@ -311,7 +309,7 @@ class System:
     @cached_property
     def rows(self) -> list[Rows]:
         """The contributors of closure rows: the loops, then the couplings."""
-        loops: list[Rows] = [LoopRows(len(self.graph.loops))]
+        loops: list[Rows] = [LoopRows(self.graph.n_loops)]
         return loops + ([coupling_rows(self, self.couplings, self.m.start)] if self.couplings else [])
 
     @cached_property

@@ -43,7 +43,7 @@ def entries_of(graph: LinkGraph, first_column: Index) -> Entries:
     width = np.diff(first_column)[pair]
     step = np.repeat(np.arange(len(loop)), width)
     within = np.arange(len(step)) - np.repeat(np.cumsum(width) - width, width)
-    first = np.searchsorted(loop[step], np.arange(len(graph.loops) + 1))
+    first = np.searchsorted(loop[step], np.arange(graph.n_loops + 1))
     return Entries(loop[step], first_column[pair[step]] + within, sign[step], first.astype(np.intp))
 
 
@@ -68,7 +68,7 @@ class Measure:
 def measure_of(graph: LinkGraph, pair_points: Array) -> Measure:
     """Middle and size of the pair points ``(3, P)`` of every loop."""
     loop, pair, _ = graph.loop_steps
-    n = len(graph.loops)
+    n = graph.n_loops
     points = pair_points[:, pair]
     count = np.maximum(np.bincount(loop, minlength=n), 1)
     middle = np.stack([np.bincount(loop, row, minlength=n) for row in points]) / count
@@ -105,7 +105,7 @@ class ClosureRows:
     @property
     def count(self) -> int:
         """Number of rows."""
-        return 6 * len(self.graph.loops) + self.further
+        return 6 * self.graph.n_loops + self.further
 
 
 class ReducedRows:

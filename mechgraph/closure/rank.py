@@ -202,7 +202,7 @@ def rank_of_rows(
 ) -> ClosureRank:
     """The same for rows given as such; pivots of a bordered system above ``proved`` decide by themselves."""
     fixed = np.zeros(0, dtype=np.intp) if fixed is None else fixed
-    if engine == "dense" or not rows.graph.loops or (engine == "auto" and rows.count < CROSSOVER):
+    if engine == "dense" or not rows.graph.n_loops or (engine == "auto" and rows.count < CROSSOVER):
         reduced = ReducedRows(rows, fixed, dense=True)
         return ClosureRank(reduced, _Dense(reduced, tolerance), tolerance)
     bordered = LoopSystem(rows, fixed)

@@ -32,9 +32,8 @@ class Tree:
 
     def __init__(self, graph: LinkGraph) -> None:
         self.n_links, self.frame = graph.n_links, graph.frame
-        steps = np.array(graph.tree, dtype=np.intp).reshape(len(graph.tree), 4)
-        self.pairs, self.parents, self.children = steps[:, 0], steps[:, 2], steps[:, 3]
-        self.forward = steps[:, 1] > 0
+        self.pairs, sign, self.parents, self.children = graph.steps.T
+        self.forward = sign > 0
         depth = np.zeros(self.n_links, dtype=np.intp)
         for parent, child in zip(self.parents.tolist(), self.children.tolist(), strict=True):
             depth[child] = depth[parent] + 1

@@ -155,7 +155,7 @@ def _least(here: Configuration, wrenches: Wrenches, f: FactoredClosure, task: Fo
         points = at_pair_points(here, reaction_part(here, totals, pair_power(here, totals)))
         x = f.least([reaction_map(here, t) for t in range(here.T)], points.swapaxes(0, 1).reshape(-1, here.T))
         totals = totals + here.pair_wrenches(x[:, None])[:, :, 0]
-        multipliers = multipliers - x[6 * len(here.system.graph.loops) :]
+        multipliers = multipliers - x[6 * here.system.graph.n_loops :]
     efforts = pair_power(here, totals)
     reactions = reaction_part(here, totals, efforts)
     if s and f.complete:

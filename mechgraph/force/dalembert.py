@@ -64,14 +64,14 @@ def loop_wrench(problem: Problem) -> Wrenches:
     x = problem.solver.solve_transposed(rhs[:, None])
     tree += here.pair_wrenches(x)[:, :, 0]
     null = problem.solver.self_stresses()
-    loops = 6 * len(here.system.graph.loops)
+    loops = 6 * here.system.graph.n_loops
     # J^T x is minus the effort that a row exerts in a freedom
     return Wrenches(tree, here.pair_wrenches(null), -x[loops:, 0], -null[loops:])
 
 
 def row_efforts(here: Configuration, multipliers: Array) -> Array:
     """Efforts ``(F, k, T)`` that multipliers ``(n, k, T)`` of the rows behind those of the loops exert in the freedoms."""
-    loops = np.zeros((6 * len(here.system.graph.loops), *multipliers.shape[1:]))
+    loops = np.zeros((6 * here.system.graph.n_loops, *multipliers.shape[1:]))
     return here.row_efforts(np.concatenate([loops, multipliers]))
 
 
@@ -87,7 +87,7 @@ def newton_euler(problem: Problem) -> Wrenches:
     different freedoms are held are solved separately.
     """
     here = problem.here
-    n = here.system.n_rows - 6 * len(here.system.graph.loops)
+    n = here.system.n_rows - 6 * here.system.graph.n_loops
     parts = []
     for held, at in problem.solver.by_held():
         mine = here if at.size == here.T else here.part(at)
@@ -115,7 +115,7 @@ def _components_and_efforts(problem: Problem, held: Index) -> Wrenches:
     totals = totals + here.pair_sums(here.E * problem.efforts)
     if null is None:
         loops = problem.solver.self_stresses()
-        stress, multiplier_stress = here.pair_wrenches(loops), -loops[6 * len(here.system.graph.loops) :]
+        stress, multiplier_stress = here.pair_wrenches(loops), -loops[6 * here.system.graph.n_loops :]
     else:
         stress, multiplier_stress = _pair_totals(here, f, state, null)
     return Wrenches(totals, stress, multipliers, multiplier_stress)

@@ -7,9 +7,10 @@ stands and whatever its units: internal position = (R_b offset_b + p_b - center)
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import chain
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -94,7 +95,7 @@ class Declared:
 
     def offset(self, m: Mechanism) -> Array:
         """Middle of the markers of every link in its frame, ``(3, N)``: of the first variant."""
-        ends = np.concatenate(m.once(_ends))
+        ends = np.concatenate(m.once(pair_ends))
         points = np.concatenate([self.point[0, :, :, 0], self.point[1, :, :, 0]], axis=1)
         count = np.bincount(ends, minlength=len(m.links))
         return np.stack([np.bincount(ends, row, minlength=len(m.links)) for row in points]) / count
@@ -107,7 +108,7 @@ class Declared:
         frame[:, 3, 0] = (offset[:, frame_link] - origin) / L
         placed = np.array([link.center is not None for link in m.links])
         center = np.where(placed[:, None], self.center - offset[:, :, None], 0.0)
-        a, b = m.once(_ends)
+        a, b = m.once(pair_ends)
         return Parameters(
             marker_a=self._markers(0, offset[:, a], L),
             marker_b=self._markers(1, offset[:, b], L),
@@ -131,43 +132,47 @@ class Declared:
         return np.stack([np.broadcast_to(v, (*v.shape[:2], B)) for v in (x, cross(z, x), z, at)], axis=1)
 
 
-def _ends(m: Mechanism) -> tuple[Index, Index]:
-    index = m.link_index
-    a, b = (np.array([index[getattr(p, end)] for p in m.pairs], dtype=np.intp) for end in ("a", "b"))
-    return a, b
+def pair_ends(m: Mechanism) -> tuple[Index, Index]:
+    """Indices of the links a and b of every pair, ``(P,)`` each."""
+    place, n = m.link_index, len(m.pairs)
+    return np.fromiter((place[p.a] for p in m.pairs), np.intp, n), np.fromiter((place[p.b] for p in m.pairs), np.intp, n)
 
 
-def _rows(vectors: Sequence[Any]) -> Array:
-    """Vectors of three numbers as rows ``(n, 3)``."""
-    return np.fromiter(chain.from_iterable(vectors), float, 3 * len(vectors)).reshape(-1, 3)
+def _rows(vectors: Iterable[Any], count: int) -> Array:
+    """``count`` vectors of three numbers as rows ``(count, 3)``."""
+    return np.fromiter(chain.from_iterable(vectors), float, 3 * count).reshape(-1, 3)
 
 
 def _of_sides(m: Mechanism, field: str) -> Array:
     """A field of the markers on both sides of all pairs, ``(2, 3, P)``."""
+    value = attrgetter(field)
     marked = [k for k, pair in enumerate(m.pairs) if pair.on_a is not None]
-    first = _rows([getattr(pair if pair.on_a is None else pair.on_a, field) for pair in m.pairs])
+    first = _rows((value(pair.on_a or pair) for pair in m.pairs), len(m.pairs))
     out = np.stack([first, first])
-    out[1, marked] = _rows([getattr(m.pairs[k].on_b, field) for k in marked])
+    out[1, marked] = _rows((value(m.pairs[k].on_b) for k in marked), len(marked))
     return out.transpose(0, 2, 1)
+
+
+NOWHERE = (0.0, 0.0, 0.0)
+WEIGHTLESS = (NOWHERE,) * 3
+"""What stands for a center and an inertia that are not declared."""
 
 
 def declared(m: Mechanism) -> Declared:
     """The declared numbers of one mechanism with geometry, a batch of one."""
     point, axis, second = (_of_sides(m, field) for field in ("point", "axis", "second"))
-    center, inertia = np.zeros((3, len(m.links))), np.zeros((3, 3, len(m.links)))
-    at = [i for i, link in enumerate(m.links) if link.center is not None]
-    center[:, at] = _rows([m.links[i].center for i in at]).T
-    turning = [i for i, link in enumerate(m.links) if link.inertia is not None]
-    tensors = _rows([row for i in turning for row in m.links[i].inertia]).reshape(-1, 3, 3)
-    inertia[:, :, turning] = np.moveaxis(tensors, 0, -1)
+    n = len(m.links)
+    center = _rows((NOWHERE if link.center is None else link.center for link in m.links), n).T
+    tensors = (WEIGHTLESS if link.inertia is None else link.inertia for link in m.links)
+    inertia = _rows(chain.from_iterable(tensors), 3 * n).reshape(n, 3, 3).transpose(1, 2, 0)
     return Declared(
         point[..., None],
         axis[..., None],
         second[..., None],
-        np.array([[p.pitch_per_radian] for p in m.pairs]),
-        np.array([[link.mass] for link in m.links]),
-        center[..., None],
-        inertia[..., None],
+        np.fromiter((p.pitch_per_radian for p in m.pairs), float, len(m.pairs))[:, None],
+        np.fromiter((link.mass for link in m.links), float, n)[:, None],
+        np.ascontiguousarray(center)[..., None],
+        np.ascontiguousarray(inertia)[..., None],
     )
 
 

@@ -87,7 +87,7 @@ class DeterminacyReport:
     @property
     def equation_count(self) -> int:
         """Number of closure equations: six a loop, one a coupling."""
-        return 6 * len(self.graph.loops) + len(getattr(self.mechanism, "couplings", ()))
+        return 6 * self.graph.n_loops + len(getattr(self.mechanism, "couplings", ()))
 
     @property
     def engine(self) -> str:
@@ -166,7 +166,7 @@ class DeterminacyReport:
     @property
     def near_below(self) -> float:
         """Margin below which a position is called nearly singular; of a regular chain of n loops it goes as 1 / (n + 1)."""
-        return 2.0 * RANKS.near / (1 + max(len(self.graph.loops), 1))
+        return 2.0 * RANKS.near / (1 + max(self.graph.n_loops, 1))
 
     @property
     def dead_point(self) -> bool:

@@ -90,7 +90,7 @@ class Components:
         if not some.size:
             return []
         loop, pair, sign = self.system.graph.loop_steps
-        number = np.full(len(self.system.graph.loops), -1)
+        number = np.full(self.system.graph.n_loops, -1)
         number[some] = np.arange(some.size)
         mine = np.flatnonzero(number[loop] >= 0)
         order = np.lexsort((pair[mine], number[loop[mine]]))

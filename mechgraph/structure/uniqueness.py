@@ -87,13 +87,13 @@ class Uniqueness:
             return basis_of(self.parts.count, local, self._places_of_sets())
         states = self.parts.table(pair_states(self.parts.here, self.found.connecting(np.eye(shared))))
         touched = np.flatnonzero(np.abs(states).max(axis=1) > UNIQUE * np.abs(states).max())
-        number = np.array([len(self.parts.system.graph.loops)])
+        number = np.array([self.parts.system.graph.n_loops])
         return basis_of(self.parts.count, [*local, (number, touched[None], states[touched][None])], [])
 
     def _places_of_sets(self) -> list[Index]:
         """For every set of connected loops the components there that are not unique."""
         loop, pair, _ = self.parts.system.graph.loop_steps
-        home = np.full(len(self.parts.system.graph.loops), -1)
+        home = np.full(self.parts.system.graph.n_loops, -1)
         sets = [loops for _, loops in self.found.sets if len(loops) > 1]
         for number, loops in enumerate(sets):
             home[list(loops)] = number
@@ -157,10 +157,10 @@ def uniqueness(
     count = min(PROBES, found.count - found.rank)
     probes = found.random_stress(np.random.default_rng(SEED), count)
     coefficients = np.abs(here.system.coupling_matrix).max(axis=1, initial=0.0)
-    multipliers = probes[6 * len(here.system.graph.loops) :]
+    multipliers = probes[6 * here.system.graph.n_loops :]
     return Uniqueness(parts, found, parts.table(pair_states(here, probes)), coefficients[:, None] * multipliers)
 
 
 def pair_states(here: Configuration, rows: Array) -> Array:
     """Total pair wrenches ``(6, P, s, 1)`` of loop wrenches, the first of ``rows (rows, s)``: ``w = C^T x``."""
-    return here.pair_wrenches(rows[: 6 * len(here.system.graph.loops), :, None])
+    return here.pair_wrenches(rows[: 6 * here.system.graph.n_loops, :, None])

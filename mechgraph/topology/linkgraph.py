@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain, pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,64 +13,83 @@ import scipy
 from numpy.typing import NDArray
 
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.parameters import pair_ends
 
 if TYPE_CHECKING:
     import networkx as nx
+
+Index = NDArray[np.intp]
 
 Loop = tuple[tuple[int, int], ...]
 """A loop as (pair index, sign) in the order in which it is run through."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LinkGraph:
     """The graph of a mechanism: links are nodes, pairs are edges; several pairs may join the same two links.
 
     Attributes
     ----------
-    ends : (a, b) link indices of every pair.
+    a, b : link indices ``(P,)`` of every pair.
     frame : index of the frame link.
-    tree : (pair, sign, parent, child) of the spanning tree, breadth first from the frame; sign +1 where the pair leads
+    steps : rows (pair, sign, parent, child) of the spanning tree, breadth first from the frame; sign +1 where the pair leads
         from parent to child.
     chords : the pairs outside the tree, one a loop.
-    loops : a short cycle basis.
+    loop_steps : a short cycle basis; loop, pair and sign of all steps of all loops, one after the other.
     """
 
     n_links: int
-    ends: tuple[tuple[int, int], ...]
+    a: Index
+    b: Index
     frame: int
-    tree: tuple[tuple[int, int, int, int], ...]
-    chords: tuple[int, ...]
-    loops: tuple[Loop, ...]
+    steps: Index
+    chords: Index
+    loop_steps: tuple[Index, Index, NDArray[np.float64]]
+
+    @property
+    def n_loops(self) -> int:
+        """Number of loops."""
+        return len(self.chords)
+
+    @cached_property
+    def ends(self) -> tuple[tuple[int, int], ...]:
+        """(a, b) link indices of every pair, to go through one by one."""
+        return tuple(zip(self.a.tolist(), self.b.tolist(), strict=True))
+
+    @cached_property
+    def tree(self) -> tuple[tuple[int, int, int, int], ...]:
+        """The rows of ``steps``, to go through one by one."""
+        return tuple((k, sign, parent, child) for k, sign, parent, child in self.steps.tolist())
+
+    @cached_property
+    def loops(self) -> tuple[Loop, ...]:
+        """The loops, to go through one by one."""
+        loop, pair, sign = self.loop_steps
+        steps = list(zip(pair.tolist(), sign.astype(int).tolist(), strict=True))
+        cuts = np.searchsorted(loop, np.arange(self.n_loops + 1)).tolist()
+        return tuple(tuple(steps[i:j]) for i, j in pairwise(cuts))
 
     @property
     def incidence(self) -> NDArray[np.float64]:
         """Incidence matrix, moving links x pairs: +1 where the pair acts on the link as its second, -1 as its first."""
-        A = np.zeros((self.n_links, len(self.ends)))
-        for k, (a, b) in enumerate(self.ends):
-            A[b, k] += 1.0
-            A[a, k] -= 1.0
+        A = np.zeros((self.n_links, len(self.a)))
+        every = np.arange(len(self.a))
+        A[self.b, every] = 1.0
+        A[self.a, every] = -1.0
         return np.delete(A, self.frame, axis=0)
-
-    @cached_property
-    def loop_steps(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]:
-        """All steps of all loops, one after the other: loop, pair and sign of each."""
-        loop = np.repeat(np.arange(len(self.loops)), [len(steps) for steps in self.loops])
-        flat = np.array([step for steps in self.loops for step in steps], dtype=np.intp).reshape(len(loop), 2)
-        return loop.astype(np.intp), flat[:, 0], flat[:, 1].astype(float)
 
     @cached_property
     def sparse_loop_matrix(self) -> scipy.sparse.csr_array:
         """The loop matrix, loops x pairs, stored sparsely."""
         loop, pair, sign = self.loop_steps
-        return scipy.sparse.csr_array((sign, (loop, pair)), shape=(len(self.loops), len(self.ends)))
+        return scipy.sparse.csr_array((sign, (loop, pair)), shape=(self.n_loops, len(self.a)))
 
     @property
     def loop_matrix(self) -> NDArray[np.float64]:
         """Loop matrix, loops x pairs: sign with which a loop runs through a pair, 0 elsewhere. A C^T = 0."""
-        C = np.zeros((len(self.loops), len(self.ends)))
-        for row, loop in zip(C, self.loops, strict=True):
-            for k, sign in loop:
-                row[k] = sign
+        loop, pair, sign = self.loop_steps
+        C = np.zeros((self.n_loops, len(self.a)))
+        C[loop, pair] = sign
         return C
 
 
@@ -87,94 +107,114 @@ def network(m: Mechanism) -> nx.MultiGraph[str]:
 
 def link_graph(m: Mechanism) -> LinkGraph:
     """Tree, chords and loops of a mechanism."""
-    index = m.link_index
-    ends = tuple([(index[p.a], index[p.b]) for p in m.pairs])
-    return graph_of_ends(len(m.links), ends, index[m.frame])
+    return _graph(len(m.links), *m.once(pair_ends), m.link_index[m.frame])
 
 
-def graph_of_ends(n_links: int, ends: tuple[tuple[int, int], ...], frame: int) -> LinkGraph:
+def graph_of_ends(n_links: int, ends: Sequence[tuple[int, int]], frame: int) -> LinkGraph:
     """Tree, chords and loops of a connected graph given by the ends of its edges."""
-    edges_at: list[list[tuple[int, int, int]]] = [[] for _ in range(n_links)]
-    for k, (a, b) in enumerate(ends):
-        edges_at[a].append((k, 1, b))
-        edges_at[b].append((k, -1, a))
-    tree: list[tuple[int, int, int, int]] = []
-    depth = {frame: 0}
-    queue = deque([frame])
-    while queue:
-        parent = queue.popleft()
-        for k, sign, child in edges_at[parent]:
-            if child not in depth:
+    a, b = np.array(ends, dtype=np.intp).reshape(-1, 2).T
+    return _graph(n_links, a, b, frame)
+
+
+def _graph(n_links: int, a: Index, b: Index, frame: int) -> LinkGraph:
+    edges = _Edges(n_links, a, b)
+    depth = [-1] * n_links
+    depth[frame] = 0
+    reached, through = [frame], []
+    for parent in reached:  # the list grows while it is run through
+        for k in edges.at(parent):
+            child = edges.both[k] - parent
+            if depth[child] < 0:
                 depth[child] = depth[parent] + 1
-                tree.append((k, sign, parent, child))
-                queue.append(child)
-    in_tree = {k for k, *_ in tree}
-    chords = tuple(k for k in range(len(ends)) if k not in in_tree)
-    return LinkGraph(n_links, ends, frame, tuple(tree), chords, _short_loops(n_links, ends, tree, chords, depth))
+                reached.append(child)
+                through.append(k)
+    tree, child = np.array(through, dtype=np.intp), np.array(reached[1:], dtype=np.intp)
+    steps = np.stack([tree, np.where(b[tree] == child, 1, -1), a[tree] + b[tree] - child, child], axis=1)
+    chords = np.delete(np.arange(len(a)), tree)
+    height = np.array(depth)
+    closing = chords[np.argsort(height[a[chords]] + height[b[chords]], kind="stable")]
+    return LinkGraph(n_links, a, b, frame, steps, chords, _short_loops(n_links, a, b, tree, closing))
+
+
+class _Edges:
+    """Edges ``(a, b)`` in an order, and at every node the numbers of its edges in that order."""
+
+    def __init__(self, n_nodes: int, a: Index, b: Index) -> None:
+        ends = np.stack([a, b], axis=1).ravel()
+        self.both: list[int] = (a + b).tolist()
+        self._numbers: list[int] = (np.argsort(ends, kind="stable") // 2).tolist()
+        self._begin: list[int] = np.concatenate([[0], np.cumsum(np.bincount(ends, minlength=n_nodes))]).tolist()
+
+    def at(self, node: int) -> list[int]:
+        """Edges at a node."""
+        return self._numbers[self._begin[node] : self._begin[node + 1]]
 
 
 def _short_loops(
-    n_links: int,
-    ends: tuple[tuple[int, int], ...],
-    tree: list[tuple[int, int, int, int]],
-    chords: tuple[int, ...],
-    depth: dict[int, int],
-) -> tuple[Loop, ...]:
-    """One loop a chord: the chord and a shortest path in the tree with the chords before it.
+    n_links: int, a: Index, b: Index, tree: Index, closing: Index
+) -> tuple[Index, Index, NDArray[np.float64]]:
+    """One loop a chord: the chord and a shortest path in the tree with the chords before it; as ``LinkGraph.loop_steps``.
 
-    Chords come by the depth of their ends, so that the cells of a lattice close one after the other and stay small.
-    Every loop has a chord that no earlier loop has, so they are independent.
+    Chords come by the depth of their ends (``closing``), so that the cells of a lattice close one after the other and stay small.
+    Every loop has a chord that no earlier loop has, so they are independent. A step is held as ``2 pair + forward``.
     """
-    present: list[list[tuple[int, int, int]]] = [[] for _ in range(n_links)]
-
-    def add(k: int) -> None:
-        a, b = ends[k]
-        present[a].append((k, 1, b))
-        present[b].append((k, -1, a))
-
-    for k, *_ in tree:
-        add(k)
+    order = np.concatenate([tree, closing])
+    edges = _Edges(n_links, a[order], b[order])
+    pairs, tails, heads = order.tolist(), a[order].tolist(), b[order].tolist()
     loops = []
-    for chord in sorted(chords, key=lambda k: (sum(depth[e] for e in ends[k]), k)):
-        a, b = ends[chord]
-        loops.append(_oriented([(chord, 1), *_shortest_path(present, b, a)], ends))
-        add(chord)
-    return tuple(sorted(loops, key=lambda loop: (loop[0][0], len(loop), loop)))
+    for chord in range(len(tree), len(order)):
+        path = _shortest_path(edges, heads[chord], tails[chord], chord)
+        loops.append(_oriented([2 * pairs[k] + (tails[k] == node) for k, node in [(chord, tails[chord]), *path]]))
+    loops.sort(key=lambda loop: (loop[0], len(loop), loop))
+    steps = np.fromiter(chain.from_iterable(loops), np.intp)
+    loop = np.repeat(np.arange(len(loops)), np.array([len(steps) for steps in loops], dtype=np.intp))
+    return loop, steps >> 1, 2.0 * (steps & 1) - 1.0
 
 
-def _shortest_path(present: list[list[tuple[int, int, int]]], start: int, goal: int) -> list[tuple[int, int]]:
-    """Edges (pair, sign) of a shortest path, searched from both ends; ties go to the earlier declaration."""
-    back: tuple[dict[int, tuple[int, int, int] | None], ...] = ({start: None}, {goal: None})
+def _shortest_path(edges: _Edges, start: int, goal: int, limit: int) -> list[tuple[int, int]]:
+    """Edges, each with the node from which it is run through, of a shortest path along edges before ``limit``.
+
+    Searched from both ends; ties go to the earlier edge.
+    """
+    back: tuple[dict[int, int], dict[int, int]] = ({start: -1}, {goal: -1})
     fronts = [[start], [goal]]
-    meet = start if start == goal else None
-    while meet is None:
+    meet = -1
+    while meet < 0:
         side = 0 if len(fronts[0]) <= len(fronts[1]) else 1
-        following: list[int] = []
-        for node in fronts[side]:
-            for k, sign, other in present[node]:
-                if other not in back[side]:
-                    back[side][other] = (k, sign, node)
-                    following.append(other)
-                    if other in back[1 - side] and meet is None:
-                        meet = other
-        fronts[side] = following
+        fronts[side], meet = _next_front(edges, fronts[side], back[side], back[1 - side], limit)
     path: list[tuple[int, int]] = []
     node = meet
-    while (step := back[0][node]) is not None:
-        path.append((step[0], step[1]))
-        node = step[2]
+    while (k := back[0][node]) >= 0:
+        node = edges.both[k] - node
+        path.append((k, node))
     path.reverse()
     node = meet
-    while (step := back[1][node]) is not None:
-        path.append((step[0], -step[1]))
-        node = step[2]
+    while (k := back[1][node]) >= 0:
+        path.append((k, node))
+        node = edges.both[k] - node
     return path
 
 
-def _oriented(loop: list[tuple[int, int]], ends: tuple[tuple[int, int], ...]) -> Loop:
+def _next_front(
+    edges: _Edges, front: list[int], mine: dict[int, int], theirs: dict[int, int], limit: int
+) -> tuple[list[int], int]:
+    """Nodes next to a front that are new to ``mine`` (node -> edge that led there), up to the first in ``theirs``; that one or -1."""
+    following = []
+    for node in front:
+        for k in edges.at(node):
+            if k >= limit:
+                break
+            other = edges.both[k] - node
+            if other not in mine:
+                mine[other] = k
+                if other in theirs:
+                    return following, other
+                following.append(other)
+    return following, -1
+
+
+def _oriented(loop: list[int]) -> list[int]:
     """The loop begun at its first declared pair, run through from that pair's a to its b."""
-    at = min(range(len(loop)), key=lambda i: loop[i][0])
+    at = loop.index(min(loop))
     turned = loop[at:] + loop[:at]
-    if turned[0][1] < 0:
-        turned = [(k, -sign) for k, sign in [turned[0], *reversed(turned[1:])]]
-    return tuple(turned)
+    return turned if turned[0] & 1 else [step ^ 1 for step in (turned[0], *reversed(turned[1:]))]

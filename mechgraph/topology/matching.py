@@ -44,7 +44,7 @@ def parts_of(m: Mechanism, graph: LinkGraph) -> Parts:
     supply = np.array([6 - p.type.f for p in m.pairs], dtype=np.intp)
     np.add.at(supply, [m.freedom(drive.freedom)[0] for drive in m.drives], 1)
     pair = np.repeat(np.arange(P), 2)
-    link = np.array(graph.ends, dtype=np.intp).reshape(-1)
+    link = np.stack([graph.a, graph.b], axis=1).ravel()
     moving = link != graph.frame
     pair, link = pair[moving], link[moving]
     links = np.delete(np.arange(N), graph.frame)
