@@ -289,7 +289,7 @@ class Outcome:
         """Rates of a block, and the factors with which they were found; None where it has no position that is closed and regular."""
         found, line = self.found, self.line
         here = found.here if found.here is not None and len(places) == found.x.shape[1] else None
-        here = here or self._system_at(places).at(found.x[:, places])
+        here = here or Configuration(self._system_at(places), found.x[:, places])
         which = self.solver.chosen(here, found.which[places])
         f = self.solver.factored(here, which)
         found.work.factorizations += here.T
@@ -299,7 +299,7 @@ class Outcome:
             self.trajectory.mark(places[open_], Status.NOT_CLOSED.value)
             self.trajectory.mark(places[dead], Status.DEAD_POINT.value)
             keep = np.flatnonzero(~(open_ | dead))
-            places, here = places[keep], self._system_at(places[keep]).at(here.x[:, keep])
+            places, here = places[keep], Configuration(self._system_at(places[keep]), here.x[:, keep])
             f = f.part(keep, here)
         if not places.size:
             return None
@@ -332,7 +332,7 @@ class Outcome:
                 if not mine.size:
                     continue
                 at = places[mine]
-                here = self._system_at(at).at(found.x[:, at])
+                here = Configuration(self._system_at(at), found.x[:, at])
                 motion = Rates(Velocities(here, dq[:, mine]), ddq[:, mine], np.zeros(len(mine)))
                 factors = self.solver.factored(here, self.solver.chosen(here, found.which[at])) if regular else None
                 yield BlockMotion(at, motion), factors

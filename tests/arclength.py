@@ -3,6 +3,7 @@
 import numpy as np
 
 from mechgraph.closure.assembly import assembled, named_columns
+from mechgraph.closure.configuration import Configuration
 
 
 class _Path:
@@ -42,7 +43,7 @@ def fold_before_the_end(m, given, step=1e-2, steps=1000):
 
     s, tangent = 0.0, np.eye(F + 1)[F]
     for _ in range(steps):
-        A = matrix(system.at(x[:, None]).J[:, :, 0], s)
+        A = matrix(Configuration(system, x[:, None]).J[:, :, 0], s)
         _, sigma, Vt = np.linalg.svd(A)
         null = Vt[(sigma > 1e-9 * sigma[0]).sum() :]
         tangent = null.T @ (null @ tangent)
@@ -52,7 +53,7 @@ def fold_before_the_end(m, given, step=1e-2, steps=1000):
         x = system.advance(x[:, None], (step * tangent[:F])[:, None])[:, 0]
         s += step * tangent[F] * path.end
         for _ in range(12):
-            here = system.at(x[:, None])
+            here = Configuration(system, x[:, None])
             r = np.concatenate([here.residual[:, 0], x[rows] - path.at(s)])
             if np.abs(r).max() < 1e-11:
                 break

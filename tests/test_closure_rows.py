@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 
 import mechgraph as mg
 from mechgraph.closure.assembly import scaled_system
+from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import System
 from mechgraph.model.library import library_path
 
@@ -54,7 +55,7 @@ def state(system: System, T: int, seed: int = 0) -> np.ndarray:
 def test_loops_come_first_and_couplings_in_order(ring):
     _, system, _ = ring
     x = state(system, 5)
-    here, alone = system.at(x), System(system.m, par=system.par, couplings=()).at(x)
+    here, alone = Configuration(system, x), Configuration(System(system.m, par=system.par, couplings=()), x)
     assert system.n_rows == 8
     assert here.residual.shape == (8, 5)
     assert here.J.shape == (8, 4, 5)
@@ -70,7 +71,7 @@ def test_loops_come_first_and_couplings_in_order(ring):
 def test_the_closure_error_contains_the_couplings(ring):
     _, system, _ = ring
     x = state(system, 5)
-    here, alone = system.at(x), System(system.m, par=system.par, couplings=()).at(x)
+    here, alone = Configuration(system, x), Configuration(System(system.m, par=system.par, couplings=()), x)
     expected = np.maximum(alone.closure, np.abs(here.residual[6:]).max(axis=0))
     assert_allclose(here.closure, expected, atol=1e-15)
 
@@ -79,7 +80,7 @@ def test_rates_bias_and_efforts_belong_to_the_same_rows(ring):
     """``closure_rates = J q'``; efforts are the transpose of the rows: ``x^T J q' = q'^T efforts`` and the loops' wrenches' power."""
     _, system, _ = ring
     x, rng = state(system, 3), np.random.default_rng(5)
-    here, dq = system.at(x), rng.normal(size=(4, 3))
+    here, dq = Configuration(system, x), rng.normal(size=(4, 3))
     assert_allclose(here.closure_rates(dq), np.einsum("rft,ft->rt", here.J, dq), atol=1e-13)
     bias = here.closure_bias(dq, here.link_twists(dq))
     assert bias.shape == (8, 3)
@@ -94,8 +95,8 @@ def test_rows_hold_over_complex_numbers(ring):
     _, system, _ = ring
     x = state(system, 1)
     dq = np.random.default_rng(1).normal(size=(4, 1))
-    there = system.at(system.advance(x, 1e-30j * dq))
-    assert_allclose(there.residual.imag[6:] / 1e-30, system.at(x).closure_rates(dq)[6:], rtol=1e-14)
+    there = Configuration(system, system.advance(x, 1e-30j * dq))
+    assert_allclose(there.residual.imag[6:] / 1e-30, Configuration(system, x).closure_rates(dq)[6:], rtol=1e-14)
 
 
 def test_lengths_are_in_the_users_units():
@@ -107,7 +108,7 @@ def test_lengths_are_in_the_users_units():
     turn = next(name for name, pair in zip(names, pairs, strict=True) if pair.type.freedoms[0].turns)
     system = system_with(m, Relation("rack", ((turn, 3.0), (slide, -40.0)), 0.2))
     q = np.random.default_rng(0).uniform(-0.3, 0.3, (system.n_freedoms, 4))
-    here = system.at(system.state_of(q))
+    here = Configuration(system, system.state_of(q))
     columns = [system.first_column[k] + j for k, j in (m.freedom(turn), m.freedom(slide))]
     user = 3.0 * q[columns[0]] - 40.0 * q[columns[1]] - 0.2
     assert_allclose(here.residual[-1] / system.row_scale[-1], user, atol=1e-12)
@@ -120,7 +121,7 @@ def test_a_constant_that_is_not_given_holds_at_the_start():
     m = m.replace(start={names[0]: 0.4, names[1]: -0.1})
     system = system_with(m, Relation("one", ((names[0], 2.0), (names[1], -3.0))))
     q = system.start_coordinates(m.start)[:, None]
-    assert_allclose(system.at(system.state_of(q)).residual[6], 0, atol=1e-15)
+    assert_allclose(Configuration(system, system.state_of(q)).residual[6], 0, atol=1e-15)
 
 
 def test_turns_count_on():
@@ -129,13 +130,13 @@ def test_turns_count_on():
     names = names_of(m)
     system = system_with(m, Relation("equal", ((names[0], 1.0), (names[1], -1.0))))
     x = np.array([[2 * np.pi], [0.0], [0.0], [0.0]])
-    assert_allclose(system.at(x).residual[6], 2 * np.pi)
-    assert_allclose(system.at(x).closure, 2 * np.pi)
+    assert_allclose(Configuration(system, x).residual[6], 2 * np.pi)
+    assert_allclose(Configuration(system, x).closure, 2 * np.pi)
 
 
 def test_without_couplings_rows_are_the_loops():
     system = System(mechanisms.bennett())
-    here = system.at(state(system, 2))
+    here = Configuration(system, state(system, 2))
     assert system.n_rows == 6
     assert not here.row_efforts(np.ones((6, 1, 2))).any()
 
@@ -152,7 +153,7 @@ def test_a_mechanism_without_loops_has_no_rows_but_its_couplings():
     )
     names = names_of(m)
     system = System(m, couplings=(Relation("belt", ((names[0], 1.0), (names[1], 1.0))),))
-    here = system.at(np.array([[0.3], [0.2]]))
+    here = Configuration(system, np.array([[0.3], [0.2]]))
     assert here.residual.shape == (1, 1)
     assert_allclose(here.residual, 0.5)
     assert_allclose(here.closure, 0.5)

@@ -17,6 +17,7 @@ from strategies import closed_mechanism, with_drives
 
 import mechgraph as mg
 from mechgraph.closure.assembly import assembled
+from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.elimination import Elimination
 from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
 from mechgraph.closure.rank import ClosureRank, closure_rank, rank_of_rows
@@ -57,7 +58,7 @@ CASES: dict[str, Callable[[], mg.Mechanism]] = {
 
 def here_and_driven(m: mg.Mechanism) -> tuple[Any, np.ndarray]:
     system, x = assembled(m)
-    return system.at(x[:, None]), np.array([0]) if m.drives else np.zeros(0, dtype=np.intp)
+    return Configuration(system, x[:, None]), np.array([0]) if m.drives else np.zeros(0, dtype=np.intp)
 
 
 def engines(m: mg.Mechanism) -> list[ClosureRank]:

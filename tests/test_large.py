@@ -19,6 +19,7 @@ import mechgraph as mg
 from mechgraph.closure import tree
 from mechgraph.closure.assembly import assembled
 from mechgraph.closure.bordering import LoopSystem
+from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.tree import Tree
 from mechgraph.model.parameters import parameters
 from mechgraph.topology.linkgraph import link_graph
@@ -207,7 +208,7 @@ def test_passive_freedoms_are_the_same_on_both_engines() -> None:
 @pytest.mark.parametrize("name", FEW)
 def test_a_bordered_system_proves_the_rank(name: str) -> None:
     system, x = assembled(FEW[name]())
-    here = system.at(x[:, None])
+    here = Configuration(system, x[:, None])
     driven = np.array([0])
     loops = LoopSystem.at(here, driven)
     J = np.delete(here.J[:, :, 0], driven, axis=1)
@@ -222,17 +223,17 @@ def test_a_bordered_system_proves_the_rank(name: str) -> None:
 def test_dependent_rows_and_columns_are_no_proof() -> None:
     """Concurrent cranks move instantaneously though their count forbids it: the pivots say that nothing is proved."""
     system, x = assembled(known.concurrent_cranks())
-    loops = LoopSystem.at(system.at(x[:, None]), np.zeros(0, dtype=np.intp))
+    loops = LoopSystem.at(Configuration(system, x[:, None]), np.zeros(0, dtype=np.intp))
     assert not loops.regular
 
 
 def test_factors_of_one_pattern_are_renewed() -> None:
     """The second factorization takes the column order of the first; solutions are the same."""
     system, x = assembled(ladder(40))
-    here = system.at(x[:, None])
+    here = Configuration(system, x[:, None])
     loops = LoopSystem.at(here, np.array([0]))
     again = loops.factor(here.S[:, :, 0])
-    b = np.random.default_rng(2).normal(size=(6 * len(system.graph.loops), 2))
+    b = np.random.default_rng(2).normal(size=(6 * system.graph.n_loops, 2))
     assert_allclose(loops.solve(again, b), loops.solve(loops.first, b), atol=1e-11)
     tau = np.random.default_rng(3).normal(size=(system.n_freedoms, 2))
     assert_allclose(loops.solve_transposed(again, tau), loops.solve_transposed(loops.first, tau), atol=1e-10)
@@ -245,12 +246,12 @@ def test_deep_trees_by_pointer_doubling(monkeypatch: pytest.MonkeyPatch) -> None
     n, P = len(m.links), len(m.pairs)
     x = system.state_of(rng.uniform(-1, 1, (system.n_freedoms, 2)))
     terms, loads = rng.normal(size=(6, P, 2)), rng.normal(size=(6, n, 2))
-    shallow, poses = Tree(link_graph(m)), system.at(x).poses
+    shallow, poses = Tree(link_graph(m)), Configuration(system, x).poses
     monkeypatch.setattr(tree, "DEEP", 0)
     deep = Tree(link_graph(m))
     assert deep.deep
     assert not shallow.deep
-    assert_allclose(system.at(x).poses, poses, atol=1e-11)
+    assert_allclose(Configuration(system, x).poses, poses, atol=1e-11)
     assert_allclose(deep.sums(terms), shallow.sums(terms), atol=1e-11)
     assert_allclose(deep.carried(loads), shallow.carried(loads), atol=1e-11)
 
@@ -268,7 +269,7 @@ def test_five_thousand_links(name: str) -> None:
     assert np.isfinite([s["J7"].components[k] for k in ("Fx", "Fy")]).all()
     report = mg.check(m)
     assert report.mobility == 1
-    assert report.redundancy == (3 * len(report.graph.loops) if planar else 0)
+    assert report.redundancy == (3 * report.graph.n_loops if planar else 0)
 
 
 def test_a_thousand_links_along_a_path() -> None:

@@ -5,6 +5,7 @@ import pytest
 
 import mechgraph as mg
 from mechgraph.closure.assembly import assembled, named_columns, scaled_system
+from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_path import DriverPath, Request, Status, follow
 from mechgraph.closure.indexing import System
 from mechgraph.closure.solver import closure_solver
@@ -38,7 +39,7 @@ def start_state(m: mg.Mechanism) -> tuple[System, np.ndarray]:
 
 def jacobian(m: mg.Mechanism) -> np.ndarray:
     system, x = start_state(m)
-    return np.asarray(system.at(x).J[:, :, 0])
+    return np.asarray(Configuration(system, x).J[:, :, 0])
 
 
 def followed(m: mg.Mechanism) -> tuple[System, np.ndarray, np.ndarray]:
@@ -91,7 +92,7 @@ def test_ledger(name: str) -> None:
 @pytest.mark.parametrize("name", CLOSED)
 def test_start_is_closed(name: str) -> None:
     system, x = start_state(mg.load(name))
-    assert system.at(x).closure[0] < 1e-12
+    assert Configuration(system, x).closure[0] < 1e-12
 
 
 @pytest.mark.parametrize("name", OPEN)
@@ -129,7 +130,7 @@ def test_the_stored_sweep_can_be_followed(name: str) -> None:
     m = mg.load(name)
     system, x, status = followed(m)
     assert (status == Status.OK).all()
-    here = system.at(x)
+    here = Configuration(system, x)
     assert here.closure.max() < 1e-10
     sigma = np.linalg.svd(np.moveaxis(here.J, 2, 0), compute_uv=False)
     rank = sigma.shape[1] - m.expected["redundancy"]
@@ -146,7 +147,7 @@ def test_a_full_cycle_ends_where_it_began(name: str) -> None:
     once_round = mg.Motion(np.append(motion.position, turn))
     system, x, status = followed(m.replace(drives=[mg.Drive(m.drives[0].freedom, once_round)]))
     assert (status == Status.OK).all()
-    poses = system.at(x).poses
+    poses = Configuration(system, x).poses
     passive = m.expected["passive"]  # the links that a passive freedom moves need not come back
     away = np.abs(poses[..., -1] - poses[..., 0]).max(axis=(0, 1))
     assert (np.sort(away)[: len(away) - passive] < 1e-9).all()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -49,10 +50,8 @@ def scaled_system(m: Mechanism, q: Array, system: System | None = None) -> Syste
         for name in ("numbers", "effort_numbers"):
             getattr(made, name)
         kept.clear()
-        kept[key] = found = {name: value for name, value in vars(made).items() if name not in ("m", "couplings")}
-    out = System.__new__(System)
-    vars(out).update(found, m=m, couplings=m.couplings)
-    return out
+        kept[key] = found = made.known()
+    return System.remembered(m, found)
 
 
 def _kept_systems(m: Mechanism) -> dict[bytes, dict[str, Any]]:
@@ -66,7 +65,7 @@ def _rescaled(raw: System, centroid: Array, L: float) -> System:
 
 def _measure(raw: System, q: Array) -> tuple[Array, float]:
     """Centroid ``(3,)`` of the pair points at coordinates ``q``, and their RMS distance from it (with that of the mass centres)."""
-    here = raw.at(raw.state_of(q[:, None]))
+    here = Configuration(raw, raw.state_of(q[:, None]))
     points = here.pair_points[:, :, 0]
     centroid = points.mean(axis=1)
     massive = [i for i, link in enumerate(raw.m.links) if link.center is not None]
@@ -100,8 +99,16 @@ def close_all(system: System, x: Array, fixed: Index, iterations: int = 60, pati
         return dq
 
     goal = CLOSURE_GOAL
-    x, _ = closest_zeros(system.at, least, system.advance, x, tolerance=goal, iterations=iterations, patience=patience)
-    return x, system.at(x).closure
+    x, _ = closest_zeros(
+        partial(Configuration, system),
+        least,
+        system.advance,
+        x,
+        tolerance=goal,
+        iterations=iterations,
+        patience=patience,
+    )
+    return x, Configuration(system, x).closure
 
 
 def led(system: System, x: Array, columns: Index, goal: Array) -> tuple[Array, bool]:
@@ -170,13 +177,13 @@ def closed_start(m: Mechanism, preferred: Mapping[str, float] | None = None) -> 
         )
     q = indexed(m).start_coordinates(m.start)
     system = scaled_system(m, q)
-    here = system.at(system.state_of(q[:, None]))
+    here = Configuration(system, system.state_of(q[:, None]))
     x, error = here.x[:, 0], float(here.closure[0])
     if error <= 10 * CLOSURE_GOAL or (error <= CLOSED and system.many_loops):
         return here
     if error <= CLOSED:
         system, x = _settled(system, close(system, x, np.arange(0))[0])
-        return system.at(x[:, None])
+        return Configuration(system, x[:, None])
     x, error = _search(m, system, x, preferred or {})
     if error > CLOSED:
         best = dict(zip(m.freedom_names(), system.coordinates_of(x[:, None])[:, 0].tolist(), strict=True))
@@ -187,7 +194,7 @@ def closed_start(m: Mechanism, preferred: Mapping[str, float] | None = None) -> 
             best,
         )
     system, x = _settled(system, x)
-    return system.at(x[:, None])
+    return Configuration(system, x[:, None])
 
 
 def _settled(system: System, x: Array) -> tuple[System, Array]:

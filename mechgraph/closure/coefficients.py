@@ -4,19 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array, cross, homogeneous, identity, inverse
-
-if TYPE_CHECKING:
-    from mechgraph.closure.indexing import FactorBatch, ScrewTable
-    from mechgraph.closure.tree import Walk
-    from mechgraph.model.parameters import Parameters
-
-Index = NDArray[np.intp]
+from mechgraph.closure.batches import FactorBatch, Index, ScrewTable
+from mechgraph.closure.tree import Walk
+from mechgraph.model.parameters import Parameters
 
 MARKER_A, MARKER_B, MARKER_A_INVERSE, MARKER_B_INVERSE = range(4)
 """Order of the constant poses in ``Numbers.constants``, after the identity."""

@@ -8,20 +8,16 @@ type of the numbers that come in, real or complex.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechgraph.algebra.screw import cross_twist, move_twist
 from mechgraph.algebra.se3 import Array, compose, cross, finite_twist, multiplied
+from mechgraph.closure.batches import Index, ScrewTable
+from mechgraph.closure.indexing import System
 from mechgraph.closure.tree import run_sums
 from mechgraph.model import pair_kinematics as evaluation
-
-if TYPE_CHECKING:
-    from mechgraph.closure.indexing import ScrewTable, System
-
-Index = NDArray[np.intp]
 
 Value = TypeVar("Value")
 

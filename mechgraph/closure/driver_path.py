@@ -76,7 +76,7 @@ class DriverPath:
         x[self.rows] = drive
         if self._start is not None and np.array_equal(x, self._start.x):
             return self._start
-        return self._system_of(self.variant_of[tracks]).at(x)
+        return Configuration(self._system_of(self.variant_of[tracks]), x)
 
     def chosen(self, point: Configuration, which: Index) -> Index:
         """See ``numerics.newton.Problem``."""

@@ -40,7 +40,7 @@ class Tree:
         ends = np.searchsorted(depth[self.children], np.arange(1, depth.max(initial=0) + 2))
         spans = [slice(int(i), int(j)) for i, j in pairwise(ends)]
         parts = (self.pairs, self.forward, self.parents, self.children)
-        self.levels: list[Level] = [tuple(part[span] for part in parts) for span in spans]  # type: ignore[misc]
+        self.levels: list[Level] = [tuple(part[span] for part in parts) for span in spans]
         self.deep = len(self.levels) > DEEP
 
     @cached_property

@@ -135,7 +135,9 @@ class Declared:
 def pair_ends(m: Mechanism) -> tuple[Index, Index]:
     """Indices of the links a and b of every pair, ``(P,)`` each."""
     place, n = m.link_index, len(m.pairs)
-    return np.fromiter((place[p.a] for p in m.pairs), np.intp, n), np.fromiter((place[p.b] for p in m.pairs), np.intp, n)
+    return np.fromiter((place[p.a] for p in m.pairs), np.intp, n), np.fromiter(
+        (place[p.b] for p in m.pairs), np.intp, n
+    )
 
 
 def _rows(vectors: Iterable[Any], count: int) -> Array:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import System
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.linear import rank_of, singular_values
@@ -46,7 +47,7 @@ def loop_facts(
     """The facts of every loop taken alone; ranks where there is geometry."""
     ends = {p.name: (p.a, p.b) for p in m.pairs}
     freedom_count = {p.name: p.type.f for p in m.pairs}
-    S = system.at(x[:, None]).S[:, :, 0] if system is not None and x is not None else None
+    S = Configuration(system, x[:, None]).S[:, :, 0] if system is not None and x is not None else None
     out = []
     for i, loop in enumerate(loops):
         chain = ends[loop[0][0]][0 if loop[0][1] > 0 else 1]
@@ -112,7 +113,7 @@ def locked_findings(system: System, x: Array, freedoms: Freedoms, null_nearby: A
     names = m.freedom_names()
     rests = still & moves_nearby(null_nearby, len(names))
     left = {names[i]: i for i in np.flatnonzero(still & ~rests)}
-    S = system.at(x[:, None]).S[:, :, 0]
+    S = Configuration(system, x[:, None]).S[:, :, 0]
     turns = np.array([f.turns for p in m.pairs for f in p.type.freedoms], dtype=bool)
     out = []
     for columns, _ in system.loop_columns:

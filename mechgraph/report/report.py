@@ -12,6 +12,7 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import assembled, assembled_at, named_columns
+from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.rank import EngineName
 from mechgraph.document import Document, to_html, to_markdown, to_text
@@ -184,7 +185,7 @@ class DeterminacyReport:
         g = self.geometry
         if not g:
             return None
-        return uniqueness(g.system.at(g.x[:, None]), g.driven, self.asked, g.freedoms.driven_closure)
+        return uniqueness(Configuration(g.system, g.x[:, None]), g.driven, self.asked, g.freedoms.driven_closure)
 
     @property
     def unique(self) -> dict[str, dict[str, bool]]:

@@ -10,7 +10,7 @@ from mechgraph.model.pair import second_direction
 from mechgraph.numerics.tolerances import RANKS
 
 if TYPE_CHECKING:
-    from mechgraph.closure.configuration import Index
+    from mechgraph.closure.indexing import Index
     from mechgraph.report.report import DeterminacyReport
     from mechgraph.structure.uniqueness import Uniqueness
 

@@ -167,7 +167,7 @@ class Trajectory:
 
     def _motion(self, places: Index) -> BlockMotion:
         """The motion at some places, evaluated again."""
-        here = self._system_at(places).at(self._of("x")[:, places])
+        here = Configuration(self._system_at(places), self._of("x")[:, places])
         rates = Rates(Velocities(here, self._of("dq")[:, places]), self._of("ddq")[:, places], np.zeros(len(places)))
         return BlockMotion(places, rates)
 
@@ -321,7 +321,7 @@ class Trajectory:
 
     def multiplier(self, coupling: int) -> Array:
         """The multiplier of a coupling in the user's units: the effort ``c_i m`` in freedom i."""
-        unit = self._L**2 * self._system.row_scale[6 * len(self._system.graph.loops) + coupling]
+        unit = self._L**2 * self._system.row_scale[6 * self._system.graph.n_loops + coupling]
         return self._out(
             self._masked(unit * self._force("multipliers")[coupling], self._of("multiplier_stress")[coupling])
         )

@@ -10,6 +10,7 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import assembled
+from mechgraph.closure.configuration import Configuration
 from mechgraph.errors import DeclarationError
 from mechgraph.force.applied_loads import user_poses
 from mechgraph.model.mechanism import Mechanism
@@ -50,7 +51,7 @@ def _poses(drawn: Solution | Mechanism) -> tuple[Mechanism, dict[str, Array], An
     """Poses ``(T, 3, 4)`` of every link at the positions that can be drawn, which these are, and of how many."""
     if isinstance(drawn, Mechanism):
         system, x = assembled(drawn)
-        found = user_poses(system.at(x[:, None]))
+        found = user_poses(Configuration(system, x[:, None]))
         poses = {name: found[i, :, :3] for i, name in enumerate(drawn.link_names())}
         return drawn, poses, np.zeros(1, dtype=np.intp), 1
     m = drawn.mechanism

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.loop_rows import ClosureRows
 from mechgraph.closure.rank import rank_of_rows
@@ -44,7 +45,7 @@ class _Curvature:
 
     def residual(self, a: Array) -> Array:
         """Residuals ``(self-stresses + drivers, T)``."""
-        here = self.system.at(np.repeat(self.x[:, None], a.shape[1], axis=1))
+        here = Configuration(self.system, np.repeat(self.x[:, None], a.shape[1], axis=1))
         dq = self.N @ a
         bias = here.closure_bias(dq, here.link_twists(dq))
         return np.concatenate([self.stress.T @ bias, dq[self.columns] - 1.0])
@@ -76,7 +77,7 @@ def branches(
     Empty where there is one alone, or where more than ``MOST`` directions meet the conditions: then a freedom is left free. The rank is
     decided to the accuracy with which closing meets a singular position (``RANKS.nearby``). Passive motions are at rest.
     """
-    found = rank_of_rows(ClosureRows.at(system.at(x[:, None])), tolerance=RANKS.nearby)
+    found = rank_of_rows(ClosureRows.at(Configuration(system, x[:, None])), tolerance=RANKS.nearby)
     N = found.motions
     if passive:
         idle, _ = np.linalg.qr(np.stack([p.rates for p in passive], axis=1))

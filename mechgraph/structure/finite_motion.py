@@ -56,7 +56,7 @@ class _Position:
 
     @classmethod
     def at(cls, system: System, x: Array, engine: EngineName) -> _Position:
-        return cls(system, x, closure_rank(system.at(x[:, None]), engine=engine), engine)
+        return cls(system, x, closure_rank(Configuration(system, x[:, None]), engine=engine), engine)
 
     @cached_property
     def N(self) -> Array:
@@ -96,11 +96,14 @@ class _Position:
         of the step (a change point) or a higher power (shaky), far above the closure error.
         """
         rows = self.found.reduced
-        already = rows.open_part(self.system.at(self.x[:, None]).residual[:, 0])
+        already = rows.open_part(Configuration(self.system, self.x[:, None]).residual[:, 0])
         limit = 10 * max(CLOSURE_GOAL, rows.rounding, already)
         for h in STEPS:
             closed = _corrected(self.system, self._stepped(v, h)[0], rows)
-            if closed is not None and rows.open_part(self.system.at(closed[:, None]).residual[:, 0]) <= limit:
+            if (
+                closed is not None
+                and rows.open_part(Configuration(self.system, closed[:, None]).residual[:, 0]) <= limit
+            ):
                 return True
         return False
 
@@ -199,7 +202,7 @@ def _corrected(system: System, x: Array, rows: ReducedRows) -> Array | None:
     """The loops closed from ``x`` in the kept rows of a nearby position alone; None where that does not converge quickly."""
     before, goal = np.inf, max(CLOSURE_GOAL, rows.rounding)
     for _ in range(FROZEN):
-        residual = system.at(x[:, None]).residual[:, 0]
+        residual = Configuration(system, x[:, None]).residual[:, 0]
         error = float(np.abs(rows.kept_part(residual[:, None])).max(initial=0.0))
         if error <= goal or (error < 10 * goal and error > SLOW * before):
             return x
@@ -213,12 +216,14 @@ def _corrected(system: System, x: Array, rows: ReducedRows) -> Array | None:
 def _closed(system: System, x: Array, rows: ReducedRows) -> Array | None:
     """The loops closed from ``x``: with the rows of a nearby position where they converge, otherwise by Newton; None where not."""
     quick = _corrected(system, x, rows)
-    if quick is not None and float(system.at(quick[:, None]).closure[0]) <= CLOSED:
+    if quick is not None and float(Configuration(system, quick[:, None]).closure[0]) <= CLOSED:
         return quick
 
     def least(here: Configuration) -> Array:
         new = ReducedRows(ClosureRows.at(here), np.zeros(0, dtype=np.intp), rows.dense)
         return new.correction(here.residual[:, 0])[:, None]
 
-    best, _ = closest_zeros(system.at, least, system.advance, x[:, None], tolerance=CLOSURE_GOAL)
-    return best[:, 0] if float(system.at(best).closure[0]) <= CLOSED else None
+    best, _ = closest_zeros(
+        lambda x: Configuration(system, x), least, system.advance, x[:, None], tolerance=CLOSURE_GOAL
+    )
+    return best[:, 0] if float(Configuration(system, best).closure[0]) <= CLOSED else None

@@ -10,6 +10,7 @@ import numpy as np
 import scipy
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.passive_rest import Idle
 from mechgraph.closure.rank import ClosureRank, EngineName, rank_of_rows
@@ -108,7 +109,7 @@ def _drive(null: Array, columns: Index) -> float:
 
 def free_motion(system: System, x: Array, columns: Index, engine: EngineName = "auto") -> Freedoms:
     """Mobility at a closed state ``x (nx,)`` and what drivers in ``columns`` leave free."""
-    return freedoms_at(Position.at(system.at(x[:, None])), columns, engine)
+    return freedoms_at(Position.at(Configuration(system, x[:, None])), columns, engine)
 
 
 def freedoms_at(position: Position, columns: Index, engine: EngineName = "auto") -> Freedoms:

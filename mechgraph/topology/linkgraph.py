@@ -120,7 +120,8 @@ def _graph(n_links: int, a: Index, b: Index, frame: int) -> LinkGraph:
     edges = _Edges(n_links, a, b)
     depth = [-1] * n_links
     depth[frame] = 0
-    reached, through = [frame], []
+    reached: list[int] = [frame]
+    through: list[int] = []
     for parent in reached:  # the list grows while it is run through
         for k in edges.at(parent):
             child = edges.both[k] - parent
@@ -128,8 +129,8 @@ def _graph(n_links: int, a: Index, b: Index, frame: int) -> LinkGraph:
                 depth[child] = depth[parent] + 1
                 reached.append(child)
                 through.append(k)
-    tree, child = np.array(through, dtype=np.intp), np.array(reached[1:], dtype=np.intp)
-    steps = np.stack([tree, np.where(b[tree] == child, 1, -1), a[tree] + b[tree] - child, child], axis=1)
+    tree, below = np.array(through, dtype=np.intp), np.array(reached[1:], dtype=np.intp)
+    steps = np.stack([tree, np.where(b[tree] == below, 1, -1), a[tree] + b[tree] - below, below], axis=1)
     chords = np.delete(np.arange(len(a)), tree)
     height = np.array(depth)
     closing = chords[np.argsort(height[a[chords]] + height[b[chords]], kind="stable")]
@@ -168,7 +169,7 @@ def _short_loops(
     loops.sort(key=lambda loop: (loop[0], len(loop), loop))
     steps = np.fromiter(chain.from_iterable(loops), np.intp)
     loop = np.repeat(np.arange(len(loops)), np.array([len(steps) for steps in loops], dtype=np.intp))
-    return loop, steps >> 1, 2.0 * (steps & 1) - 1.0
+    return loop.astype(np.intp), (steps >> 1).astype(np.intp), np.where(steps & 1, 1.0, -1.0)
 
 
 def _shortest_path(edges: _Edges, start: int, goal: int, limit: int) -> list[tuple[int, int]]:
@@ -199,7 +200,7 @@ def _next_front(
     edges: _Edges, front: list[int], mine: dict[int, int], theirs: dict[int, int], limit: int
 ) -> tuple[list[int], int]:
     """Nodes next to a front that are new to ``mine`` (node -> edge that led there), up to the first in ``theirs``; that one or -1."""
-    following = []
+    following: list[int] = []
     for node in front:
         for k in edges.at(node):
             if k >= limit:

@@ -56,12 +56,12 @@ class NumbersPath(DriverPath):
     def at(self, x: Array, drive: Array, tracks: Index) -> Configuration:
         """The equations with the numbers at a part of the way."""
         self._last = drive, tracks
-        return self.system_at(drive[0], tracks).at(x)
+        return Configuration(self.system_at(drive[0], tracks), x)
 
     def sensitivity(self, point: Configuration, factored: FactoredClosure) -> Array:
         """Rates with the part of the way, by a forward difference: the numbers come from a function or a table of any kind."""
         drive, tracks = self._last
-        ahead = self.system_at(drive[0] + NUMBERS_STEP, tracks).at(point.x).residual - point.residual
+        ahead = Configuration(self.system_at(drive[0] + NUMBERS_STEP, tracks), point.x).residual - point.residual
         return factored.solve(-ahead[:, None] / NUMBERS_STEP)
 
 

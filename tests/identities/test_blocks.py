@@ -8,6 +8,7 @@ from strategies import closed_mechanism, motions, with_drives, with_loads
 import mechgraph as mg
 from mechgraph.closure import driver_path
 from mechgraph.closure.assembly import assembled
+from mechgraph.closure.configuration import Configuration
 from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.numerics.continuation import Follower
 
@@ -177,7 +178,7 @@ def test_frames_by_columns_are_those_of_the_pair_table(seed):
     system, x = assembled(m)
     rng = np.random.default_rng(seed)
     x = system.advance(x[:, None], 0.5 * rng.normal(size=(system.n_freedoms, 3)))
-    here = system.at(x)
+    here = Configuration(system, x)
     for g, frames in zip(system.groups, here.frames, strict=True):
         local = evaluation.frames_of(g.row, system.par.pitch[g.pairs], x[g.state_rows])
         for one, other in zip(frames, local, strict=True):

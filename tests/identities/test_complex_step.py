@@ -16,6 +16,7 @@ import mechgraph as mg
 from mechgraph.algebra import se3
 from mechgraph.closure import tree
 from mechgraph.closure.assembly import close, scaled_system
+from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import System, indexed
 from mechgraph.model.factors import Factor
 from mechgraph.model.library import library_names, library_path
@@ -39,7 +40,7 @@ def closed(m: mg.Mechanism, seed: int = 0, size: float = 0.1) -> tuple[System, n
 
 def stepped(system: System, x: np.ndarray, dq: np.ndarray):
     """The configurations an imaginary step away in the directions ``dq (F, k)``."""
-    return system.at(system.advance(x, STEP * 1j * dq))
+    return Configuration(system, system.advance(x, STEP * 1j * dq))
 
 
 def rate(values: np.ndarray) -> np.ndarray:
@@ -60,7 +61,7 @@ def bias_by_complex_step(system: System, x: np.ndarray, dq: np.ndarray) -> np.nd
 
 
 def holds(system: System, x: np.ndarray, seed: int = 1) -> None:
-    here = system.at(x)
+    here = Configuration(system, x)
     left_open = float(here.closure[0])  # J is the derivative of the logarithm where the closure is exactly the identity
     assert relative(jacobian_by_complex_step(system, x), here.J[:, :, 0]) < 1e-14 + 2 * left_open
     dq = np.random.default_rng(seed).normal(size=(system.n_freedoms, 1))
@@ -120,11 +121,11 @@ def test_everything_keeps_the_type_of_its_numbers(seed):
     system, x = closed(strategies.closed_mechanism(seed), seed, 0.02)
     dq = np.random.default_rng(seed).normal(size=(system.n_freedoms, 1))
     for kind, state in ((float, x), (complex, x.astype(complex))):
-        here = system.at(state)
+        here = Configuration(system, state)
         V = here.link_twists(dq)
         found = (here.residual, here.J, here.S, here.E, *here.W, here.poses, here.pair_points, V, here.bias(dq, V))
         assert {np.asarray(part).dtype for part in found} == {np.dtype(kind)}
-        again = system.at(x)
+        again = Configuration(system, x)
         for part, same in zip((here.J, here.S, here.E, *here.W), (again.J, again.S, again.E, *again.W), strict=True):
             assert_allclose(part, same, atol=1e-13)
 
@@ -152,7 +153,7 @@ def test_parameters_may_be_complex():
         point = par.marker_a.astype(type(step) if isinstance(step, complex) else float)
         point[0, 3, 2] += step
         pitch = par.pitch + step * (par.pitch != 0)
-        return system.with_parameters(replace(par, marker_a=point, pitch=pitch)).at(x).residual
+        return Configuration(system.with_parameters(replace(par, marker_a=point, pitch=pitch)), x).residual
 
     h = 1e-4
     quotient = (8 * (residual(h) - residual(-h)) - (residual(2 * h) - residual(-2 * h))) / (12 * h)
@@ -273,7 +274,7 @@ def test_a_frame_along_a_circle_is_a_revolute_at_its_centre():
     special = np.isin(np.arange(7), (2, 5))[:, None]
     q = np.where(special, u + bend * u**2, u)
     slope, bent = np.where(special, 1 + 2 * bend * u, 1.0), np.where(special, 2 * bend, 0.0)
-    a, b = curve.at(u), hinge.at(q)
+    a, b = Configuration(curve, u), Configuration(hinge, q)
     assert_allclose(a.S, b.S * slope, atol=1e-13)
     assert_allclose(a.J, b.J * slope, atol=1e-13)
     V = a.link_twists(du)
@@ -299,7 +300,7 @@ def test_a_factor_with_a_moving_twist(factor, after):
     row = mg.PairType("Along", freedoms=["Tz", factor, *after], reactions=None)
     system, x = closed(with_type(row, 5), 5)
     holds(system, x)
-    here = system.at(x)
+    here = Configuration(system, x)
     g, W = next((g, W) for g, W in zip(system.groups, here.W, strict=True) if g.row.symbol == "Along")
     S, E = here.S[:, g.columns], here.E[:, g.columns]
     assert_allclose(np.einsum("ifnt,icnt->fcnt", S, W), 0, atol=1e-12)
@@ -322,12 +323,12 @@ def test_a_batch_is_the_evaluation_of_each(seed, monkeypatch):
         parts = (here.residual, here.S, here.E, here.poses, here.pair_points, here.bias(rates, V), *here.W)
         return [np.array(part) for part in (*parts, *(X for frames in here.frames for X in frames))]
 
-    whole = everything(system.at(states), dq)
+    whole = everything(Configuration(system, states), dq)
     monkeypatch.setattr(tree, "DEEP", 0)
-    doubled = everything(system.at(states), dq)
+    doubled = everything(Configuration(system, states), dq)
     monkeypatch.undo()
     for t in (0, 17, 69):
-        alone = everything(system.at(states[:, t : t + 1]), dq[:, t : t + 1])
+        alone = everything(Configuration(system, states[:, t : t + 1]), dq[:, t : t + 1])
         for a, b, c in zip(whole, alone, doubled, strict=True):
             assert_allclose(a[..., t], b[..., 0], atol=1e-12)
             assert_allclose(a[..., t], c[..., t], atol=1e-12)

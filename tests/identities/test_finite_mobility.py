@@ -66,12 +66,12 @@ def nullity(here: Configuration) -> int:
 
 def along_the_path(system: System, x: np.ndarray, steps: int = 4) -> tuple[list[int], float]:
     """Nullities at closed positions along a motion; and the least part of a random step that closing left."""
-    out = [nullity(system.at(x[:, None]))]
+    out = [nullity(Configuration(system, x[:, None]))]
     least = 1.0
     rng = np.random.default_rng(0)
     v = rng.normal(size=system.n_freedoms)
     for _ in range(steps):
-        J = system.at(x[:, None]).J[:, :, 0]
+        J = Configuration(system, x[:, None]).J[:, :, 0]
         _, s, Vt = np.linalg.svd(J)
         N = Vt[int((s > 1e-9 * s[0]).sum()) :].T
         v = N @ (N.T @ v)
@@ -84,7 +84,7 @@ def along_the_path(system: System, x: np.ndarray, steps: int = 4) -> tuple[list[
         change = system.difference(closed[:, None], x[:, None])[:, 0]
         least = min(least, 1.0 - float(np.linalg.norm(N.T @ (change / STEP - v))))
         x = closed
-        out.append(nullity(system.at(x[:, None])))
+        out.append(nullity(Configuration(system, x[:, None])))
     return out, least
 
 

@@ -1,0 +1,103 @@
+"""What is evaluated together, as arrays: pairs of one type, factors of one kind, screws of components."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.closure.tree import Walk
+from mechgraph.model import pair_kinematics as evaluation
+from mechgraph.model.factors import Factor, FixedStack, Stack
+from mechgraph.model.pair_type import PairType
+from mechgraph.numerics.linear import Place, compact
+
+Index = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Group:
+    """The pairs of one type: their indices, the columns of their freedoms ``(f, n)`` and rows of their state ``(nx, n)``."""
+
+    row: PairType
+    pairs: Index
+    columns: Index
+    state_rows: Index
+
+
+@dataclass(frozen=True)
+class FactorBatch:
+    """All factors of one kind: their steps in the walk, columns of their freedoms ``(f, n)`` and rows of their state ``(nx, n)``."""
+
+    stack: Stack
+    pairs: Index
+    ranks: Index
+    steps: Index
+    columns: Index
+    state_rows: Index
+
+    @cached_property
+    def at_steps(self) -> Place:
+        """The steps, as a slice where that can be."""
+        return compact(self.steps)
+
+
+@dataclass(frozen=True)
+class ScrewTable:
+    """Constant screws, each in a frame of a pair: parts ``(3, K)``, the node of the frame and the constant pose behind it.
+
+    The line of a screw goes through the origin of its frame, or that of marker B of its pair where ``at_b``.
+    """
+
+    bound: Array
+    free: Array
+    per_pitch: Array
+    pairs: Index
+    nodes: Index
+    const: Index
+    at_b: NDArray[np.bool_]
+
+    @cached_property
+    def b_places(self) -> Index:
+        """The screws through the origin of marker B."""
+        return np.flatnonzero(self.at_b)
+
+    def taken(self, order: Index) -> ScrewTable:
+        """Some of the screws, in that order."""
+        return ScrewTable(*(getattr(self, part.name)[..., order] for part in fields(self)))
+
+
+def factor_batches(groups: Sequence[Group], walk: Walk, n_factors: Index) -> list[FactorBatch]:
+    """The factors of all pairs by kind, each kind in the order of the walk; pairs without a factor are a kind of their own."""
+    kinds: dict[Hashable, list[tuple[Factor, Group, int]]] = {}
+    for g in groups:
+        for rank, factor in enumerate(g.row.steps):
+            kinds.setdefault(factor.kind, []).append((factor, g, rank))
+    batches = [_batch(members, walk) for members in kinds.values()]
+    fixed = np.flatnonzero(n_factors == 0)
+    if fixed.size:
+        nothing = np.zeros((0, len(fixed)), dtype=np.intp)
+        steps = walk.step_of[walk.first[fixed]]
+        ranks = np.zeros(len(fixed), dtype=np.intp)
+        batches.append(FactorBatch(FixedStack(len(fixed)), fixed, ranks, steps, nothing, nothing))
+    return batches
+
+
+def _batch(members: Sequence[tuple[Factor, Group, int]], walk: Walk) -> FactorBatch:
+    parts = []
+    for number, (_, g, rank) in enumerate(members):
+        columns, rows = evaluation.places(g.row)[rank]
+        ranks = np.full(len(g.pairs), rank, dtype=np.intp)
+        steps = walk.step_of[walk.first[g.pairs] + rank]
+        parts.append([g.columns[columns], g.state_rows[rows], g.pairs, ranks, steps, np.full(len(g.pairs), number)])
+    joined: list[Index] = [np.concatenate(part, axis=-1) for part in zip(*parts, strict=True)]
+    order = np.argsort(joined[4], kind="stable")
+    at_columns, at_rows, pairs, of_pair, at_steps, member = (part[..., order] for part in joined)
+    starts = np.flatnonzero(np.concatenate([[True], member[1:] != member[:-1]]))
+    counts = np.diff(np.append(starts, len(member))).tolist()
+    factors = [members[int(member[i])][0] for i in starts]
+    return FactorBatch(factors[0].stack(factors, counts), pairs, of_pair, at_steps, at_columns, at_rows)
