@@ -169,7 +169,7 @@ class LoopSystem(ReducedRows):
         return pattern, constant
 
     @cached_property
-    def _holding(self) -> scipy.sparse.csr_array:
+    def holding(self) -> scipy.sparse.csr_array:
         """The rows ``G (held, free columns)`` that hold the motions left free."""
         at, to = self.pattern.places
         values = np.concatenate([np.zeros(int(self._live.sum())), self._constant])
@@ -178,11 +178,11 @@ class LoopSystem(ReducedRows):
 
     @cached_property
     def _normal(self) -> Factors:
-        return Factors(scipy.sparse.csc_array(self._holding @ self._holding.T))
+        return Factors(scipy.sparse.csc_array(self.holding @ self.holding.T))
 
     def unheld(self, dq: Array) -> Array:
         """Increments ``(F, k)`` with the least change that takes the held motions out of them, ``G (dq / scale) = 0``."""
-        G = self._holding
+        G = self.holding
         y = dq[self._free] / self._scale[self._free][:, None]
         y = y - G.T @ self._normal.solve(G @ y)
         out = dq.copy()

@@ -91,24 +91,25 @@ class SparseFactored:
         return out
 
     def least(self, R: Sequence[scipy.sparse.csr_array], r0: Array) -> Array:
-        """``[R^T R  J; J^T  0] [x; z] = [-R^T r0; 0]`` in the turned rows of the loops (Golub and Van Loan, section 12.1)."""
+        """``[R^T R  J; J^T  0] [x; z] = [-R^T r0; 0]`` in the turned rows of the loops (Golub and Van Loan, section 12.1).
+
+        Rows that hold the motions left free stand below those of J, with unknowns that come out as zero: without them z is not unique.
+        """
         out = np.zeros((self.here.system.n_rows, self.here.T))
         for t, form in enumerate(self._forms):
             turned = form.turned_rows
             part = R[t] @ turned
-            H, J = (
-                scipy.sparse.coo_array(part.T @ part),
-                scipy.sparse.coo_array(form.turned_matrix(self.here.S[:, :, t])),
-            )
-            rows, size = H.shape[0], H.shape[0] + J.shape[1]
+            H = scipy.sparse.coo_array(part.T @ part)
+            J = scipy.sparse.coo_array(scipy.sparse.vstack([form.turned_matrix(self.here.S[:, :, t]), form.holding]))
+            rows, size = J.shape[0], sum(J.shape)
             pattern = Pattern(
                 np.concatenate([H.row, J.row, rows + J.col]).astype(np.intp),
                 np.concatenate([H.col, rows + J.col, J.row]).astype(np.intp),
                 size,
             )
             right = np.zeros((size, 1))
-            right[:rows, 0] = -(part.T @ r0[:, t])
-            found = pattern.factor(np.concatenate([H.data, J.data, J.data])).solve(right)[:rows, 0]
+            right[: H.shape[0], 0] = -(part.T @ r0[:, t])
+            found = pattern.factor(np.concatenate([H.data, J.data, J.data])).solve(right)[: H.shape[0], 0]
             out[:, t] = turned @ found
         return out
 
