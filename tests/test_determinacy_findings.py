@@ -23,9 +23,9 @@ def test_force_across_a_pinned_bar_is_unique() -> None:
     assert not report.unique["O1"]["Fx"]
     assert not report.unique["O1"]["Fy"]
     assert report.reactions is not None
-    texts = [t.text for t in report.reactions.transverse]
+    texts = [t.text for t in report.reactions.unique_directions]
     assert len(texts) == 2
-    for t in report.reactions.transverse:
+    for t in report.reactions.unique_directions:
         assert not t.across
         assert np.allclose(t.direction, (0.8, -0.6, 0))
         assert abs(np.dot(t.in_space, (0.6, 0.8, 0))) < 1e-12
@@ -36,7 +36,7 @@ def test_force_across_a_pinned_bar_is_unique() -> None:
 def test_force_across_a_bar_on_two_spheres() -> None:
     report = mg.check(pinned_bar("SS", (2, 3, 6)))
     assert report.reactions is not None
-    assert [t.text for t in report.reactions.transverse] == [
+    assert [t.text for t in report.reactions.unique_directions] == [
         f"{pair}: force across (0.2857, 0.4286, 0.8571) is unique" for pair in report.pairs
     ]
 
@@ -63,7 +63,7 @@ def test_directions_and_combinations_together_are_all_there_is() -> None:
         found = report.reactions
         assert found is not None
         loose = sum(not ok for row in report.unique.values() for ok in row.values())
-        directions = sum(2 if t.across else 1 for t in found.transverse)
+        directions = sum(2 if t.across else 1 for t in found.unique_directions)
         assert directions + len(found.combinations) == loose - found.count
 
 
@@ -250,3 +250,76 @@ def test_more_drivers_than_motions_are_no_dead_point() -> None:
 def test_a_driven_structure_says_that_it_is_one() -> None:
     with pytest.raises(mg.IndeterminateError, match=r"it is a structure \(mobility 0\)"):
         mg.solve(mg.load("prprrh"), {"O1": [0.0, 0.1]})
+
+
+# --- dead points and change points -----------------------------------------------------------------------------------------
+
+
+def slider_crank(drive: str) -> mg.Mechanism:
+    """Stretched out: the slider is at its dead point."""
+    bars = (("A", "frame", "crank", 0.0), ("B", "crank", "rod", 1.0), ("C", "rod", "slider", 3.0))
+    pairs = [mg.Pair(name, "R", a, b, point=(x, 0, 0), axis=Z) for name, a, b, x in bars]
+    slide = mg.Pair("D", "P", "slider", "frame", point=(3, 0, 0), axis=X)
+    return mg.Mechanism("slider-crank", pairs=[*pairs, slide], drives=[drive])
+
+
+def test_a_driver_at_its_dead_point_is_replaced() -> None:
+    report = mg.check(slider_crank("D"))
+    assert report.verdict.startswith(
+        "Badly driven: mobility 1, but the driver D.Tz cannot move it here (a dead point)."
+    )
+    assert (report.suggested_drives, report.replaced_drives) == (("A.Rz",), ("D.Tz",))
+    assert report.advice[0].text == "drive A.Rz instead of D.Tz: then every freedom is driven or passive"
+    text = str(report)
+    assert "instead of D.Tz: A.Rz" in text
+    assert "drive also" not in text
+    assert "take one away" not in text
+    instead = mg.check(slider_crank("A"))
+    assert not instead.undriven
+    assert not instead.replaced_drives
+
+
+def test_the_driver_that_depends_on_another_is_replaced() -> None:
+    """Two parallel four-bars side by side, both drivers in the first: the second of them is to move to the other one."""
+    pairs = []
+    for side, shift in (("a", 0.0), ("b", 5.0)):
+        points = np.array([(0, 0, 0), (0.2, 1, 0), (2.2, 1.6, 0), (2, 0, 0)]) + np.array((shift, 0, 0))
+        links = ["frame", *(f"{side}{k}" for k in range(1, 4)), "frame"]
+        pairs += [mg.Pair(f"{side}{k}", "R", links[k - 1], links[k], point=points[k - 1], axis=Z) for k in range(1, 5)]
+    report = mg.check(mg.Mechanism("two four-bars", None, pairs, ["a1", "a4"]))
+    assert (report.suggested_drives, report.replaced_drives) == (("b1.Rz",), ("a4.Rz",))
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+def test_a_flat_parallelogram_says_its_finite_mobility_first(engine: str) -> None:
+    corners = [(0, 0, 0), (1.0, 0, 0), (3, 0, 0), (2, 0, 0)]
+    flat = known.ring("RRRR", corners, [Z] * 4, name="flat parallelogram")
+    report = mg.check(flat, engine=engine)  # type: ignore[arg-type]
+    assert (report.mobility, report.finite_mobility, report.change_point) == (2, 1, True)
+    assert report.verdict.startswith("Finite mobility 1, 1 driver, at a change point: mobility 2 here")
+    assert not report.suggested_drives
+    assert not report.determinate
+    undriven = mg.check(flat.replace(drives=[]), engine=engine)  # type: ignore[arg-type]
+    assert undriven.verdict.startswith("Finite mobility 1, 0 drivers, under-driven at a change point")
+    assert undriven.suggested_drives == ("O1.Rz",)
+
+
+def test_a_freedom_that_is_shaky_everywhere_makes_no_change_point() -> None:
+    corners = ((0, 0, 0), (0.3, 1, 0), (1.4, 1.2, 0), (1.1, 0.1, 0))
+    names = ["frame", "a", "b", "c", "frame"]
+    pairs = [mg.Pair(f"J{i}", "R", names[i], names[i + 1], point=corners[i], axis=Z) for i in range(4)]
+    bars = ["b", "p", "q", "b"]
+    pairs += [mg.Pair(f"K{i}", "R", bars[i], bars[i + 1], point=(0.5 + i, 2.0, 0), axis=Z) for i in range(3)]
+    report = mg.check(mg.Mechanism("shaky on a coupler", None, pairs, ["J0"]))
+    assert (report.mobility, report.finite_mobility, report.change_point) == (2, 1, False)
+
+
+def test_drivers_are_suggested_for_a_ring_of_many_links() -> None:
+    """A ring of 200 links has 194 freedoms; drivers that nearly depend on each other do not repeat a declared one."""
+    turns = np.linspace(0, 2 * np.pi, 200, endpoint=False)
+    points = np.stack([5 * np.cos(turns), 5 * np.sin(turns), 0.1 * np.sin(3 * turns)], axis=1)
+    axes = np.stack([0.1 * np.cos(5 * turns), 0.2 * np.sin(7 * turns), np.ones(200)], axis=1)
+    report = mg.check(known.ring("R" * 200, points, axes))
+    assert report.mobility == 194
+    assert len(set(report.suggested_drives)) == len(report.suggested_drives) == 193
+    assert "O1.Rz" not in report.suggested_drives

@@ -155,6 +155,14 @@ class ClosureRank:
         size = np.maximum(np.abs(kept).max(axis=0, initial=0.0), 1.0)
         return r.multipliers(kept / size, dropped / size)
 
+    def orthonormal_stress(self) -> Array:
+        """All self-stresses ``(rows, count - rank)``, orthonormal in the measure of the loops."""
+        r = self.reduced
+        kept = np.linalg.qr(self._solution.stresses(np.eye(self.shared)))[0]
+        own = 6 * r.loops - int(r.kept.sum())
+        dropped = np.concatenate([np.zeros((own, self.shared)), np.eye(own)], axis=1)
+        return r.multipliers(np.concatenate([kept, np.zeros((len(kept), own))], axis=1), dropped)
+
     @cached_property
     def sets(self) -> tuple[tuple[int, tuple[int, ...]], ...]:
         """(number of self-stresses, loops) of every set of loops that self-stresses can connect."""
@@ -206,7 +214,7 @@ def rank_of_rows(
         reduced = ReducedRows(rows, fixed, dense=True)
         return ClosureRank(reduced, _Dense(reduced, tolerance), tolerance)
     bordered = LoopSystem(rows, fixed)
-    if bordered.smallest > proved or bordered.first.distance > RANKS.distance:
+    if bordered.smallest > proved or bordered.first.distance > max(RANKS.distance, tolerance):
         return ClosureRank(bordered, _Bordered(bordered), tolerance)
     reduced = ReducedRows(rows, fixed)
     return ClosureRank(reduced, _Eliminated(reduced, tolerance), tolerance)

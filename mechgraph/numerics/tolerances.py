@@ -59,6 +59,11 @@ class StressTolerances:
 
     unique: float = 1e-7
     """Part in a component above which the component is not unique: far from rounding and from shares that are meant."""
+    doubt: float = 1e-11
+    """Part of a component called unique above which it may be more than rounding: rounding leaves 1e-13 in regular positions."""
+    near: float = 1e-4
+    """Part of a component that is not unique below which a small change of dimensions may make it so: where no dimension is meant to
+    be nearly special, parts are 3e-3 and more (215 library, known and random mechanisms)."""
     shown: float = 1e-6
     """Part (of a largest part of one) below which a component is not shown."""
     drivers_alone: float = 1e-9

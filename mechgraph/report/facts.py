@@ -1,24 +1,354 @@
-"""The facts of a determinacy report as plain data, and its ledgers."""
+"""The facts of a determinacy report: of the graph alone and of a closed position, each computed when first asked for."""
 
 from __future__ import annotations
 
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from functools import cached_property
 
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.closure.indexing import Index, System
+from mechgraph.closure.rank import EngineName
 from mechgraph.equations.build import formulate
 from mechgraph.equations.terms import Ledger, LedgerRow
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.numerics.linear import independent_rows
+from mechgraph.numerics.tolerances import RANKS
+from mechgraph.report import findings
+from mechgraph.report.findings import Finding, LoopFact
+from mechgraph.structure.finite_motion import FiniteMotion, finite_motion
+from mechgraph.structure.generic import Generic, generic
+from mechgraph.structure.mobility import Freedoms, freedoms_at
+from mechgraph.structure.pair_changes import Effect, advice
+from mechgraph.structure.self_stress import SelfStress
+from mechgraph.structure.unique_directions import UniqueDirection
+from mechgraph.structure.uniqueness import Uniqueness, uniqueness
+from mechgraph.topology.linkgraph import LinkGraph
+from mechgraph.topology.matching import Parts, parts_of
 
-if TYPE_CHECKING:
-    from mechgraph.report.report import DeterminacyReport
 
-FINDINGS = ("undriven", "passive", "locked", "drivable", "not_drivable", "advice")
+@dataclass(frozen=True)
+class Geometry:
+    """A closed position: the scaled system, its state, the driven columns and what can move."""
+
+    system: System
+    x: Array
+    driven: Index
+    freedoms: Freedoms
 
 
-def ledger(m: Mechanism, bookkeeping: str) -> Ledger:
-    """The ledger of a mechanism: counted from the pair table where that suffices, otherwise from its formulation."""
-    countable = bookkeeping in ("lee", "minimal") and not getattr(m, "couplings", ())
-    return counted_ledger(m, bookkeeping) if countable else formulate(m, bookkeeping).ledger()
+@dataclass(frozen=True)
+class Facts:
+    """What the graph alone and the graph with its geometry say about a mechanism.
+
+    Facts that need geometry are None (or empty) for a topology, and where the loops cannot be closed (see ``note``).
+    What is expensive is computed when first asked for, whatever the size; ``engine`` says which one decided the rank.
+    """
+
+    mechanism: Mechanism
+    graph: LinkGraph
+    note: str = ""
+    geometry: Geometry | None = field(default=None, repr=False)
+    asked: EngineName = field(default="auto", repr=False)
+
+    # --- the graph alone -----------------------------------------------------------------------------------------------
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        """Names of the links."""
+        return self.mechanism.link_names()
+
+    @cached_property
+    def pairs(self) -> tuple[str, ...]:
+        """Names of the pairs."""
+        return tuple(p.name for p in self.mechanism.pairs)
+
+    @cached_property
+    def loops(self) -> tuple[tuple[tuple[str, int], ...], ...]:
+        """Independent loops, each a chain of (pair name, sign)."""
+        return tuple(tuple((self.pairs[k], sign) for k, sign in loop) for loop in self.graph.loops)
+
+    @property
+    def freedom_count(self) -> int:
+        """Sum of the freedoms of the pairs."""
+        return sum(p.type.f for p in self.mechanism.pairs)
+
+    @property
+    def equation_count(self) -> int:
+        """Number of closure equations: six a loop, one a coupling."""
+        return 6 * self.graph.n_loops + len(self.mechanism.couplings)
+
+    @property
+    def mobility_by_count(self) -> int:
+        """Kutzbach mobility: sum of freedoms - closure equations."""
+        return self.freedom_count - self.equation_count
+
+    def ledger(self, bookkeeping: str = "lee") -> Ledger:
+        """Unknowns against equations in a bookkeeping, ``"lee"`` or ``"minimal"``."""
+        countable = bookkeeping in ("lee", "minimal") and not self.mechanism.couplings
+        if countable:
+            return counted_ledger(self.mechanism, bookkeeping)
+        return formulate(self.mechanism, bookkeeping).ledger()
+
+    @cached_property
+    def generic(self) -> Generic:
+        """Rank and excess for random geometry: what the topology alone decides."""
+        return generic(self.mechanism, self.graph, self.asked)
+
+    @cached_property
+    def parts(self) -> Parts:
+        """Dulmage-Mendelsohn parts: which links and pairs are over-, which underdetermined by count."""
+        return parts_of(self.mechanism, self.graph)
+
+    @cached_property
+    def loop_facts(self) -> tuple[LoopFact, ...]:
+        """Every loop taken alone: its chain, freedoms, rank and excess."""
+        position = self.geometry.freedoms.position if self.geometry else None
+        return findings.loop_facts(self.mechanism, self.loops, position)
+
+    # --- what can move -------------------------------------------------------------------------------------------------
+
+    @property
+    def engine(self) -> str:
+        """Which engine decided the rank here, ``"dense"`` or ``"sparse"``; empty where there is no geometry."""
+        return self.geometry.freedoms.closure.engine if self.geometry else ""
+
+    @property
+    def mobility(self) -> int | None:
+        """Freedoms minus rank of the closure Jacobian here."""
+        return self.geometry.freedoms.mobility if self.geometry else None
+
+    @cached_property
+    def motion(self) -> FiniteMotion | None:
+        """What was seen when the motions were followed over finite strokes."""
+        g = self.geometry
+        return finite_motion(g.system, g.x, g.freedoms.closure, self.asked) if g else None
+
+    @property
+    def finite_mobility(self) -> int | None:
+        """Mobility over finite strokes: the dimension of the set of closed positions."""
+        return self.motion.mobility if self.motion else None
+
+    @property
+    def stroke(self) -> float | None:
+        """Length (radians, or lengths / L) over which a motion was followed with the loops closed."""
+        return self.motion.stroke if self.motion else None
+
+    @property
+    def inputs(self) -> int | None:
+        """Input freedoms: mobility minus passive freedoms."""
+        return self.geometry.freedoms.mobility - len(self.geometry.freedoms.passive) if self.geometry else None
+
+    @property
+    def redundancy(self) -> int | None:
+        """Closure equations minus rank: number of self-stresses with the drivers free."""
+        return self.geometry.freedoms.redundancy if self.geometry else None
+
+    @property
+    def excess(self) -> dict[str, int]:
+        """The redundancy by reason: ``structural`` (whatever the dimensions), ``dimensions`` (all along the motion), ``here``."""
+        if not self.motion or self.redundancy is None:
+            return {}
+        nearby = self.equation_count - self.motion.rank_nearby
+        structural = min(self.generic.excess, nearby)
+        return {"structural": structural, "dimensions": nearby - structural, "here": self.redundancy - nearby}
+
+    # --- how sure that is ----------------------------------------------------------------------------------------------
+
+    @property
+    def margin(self) -> float | None:
+        """Smallest kept singular value over the largest: small means nearly singular."""
+        return self.geometry.freedoms.closure.margin if self.geometry else None
+
+    @property
+    def dropped(self) -> float | None:
+        """Largest dropped singular value over the largest (0 where none is dropped)."""
+        return self.geometry.freedoms.closure.dropped if self.geometry else None
+
+    @property
+    def near(self) -> bool:
+        """Whether a small change may change the verdict."""
+        return self.near_other_rank or self.near_other_uniqueness or self.dead_point
+
+    @property
+    def near_other_rank(self) -> bool:
+        """Whether a small singular value was kept, or one above rounding dropped."""
+        if self.margin is None or self.dropped is None:
+            return False
+        return self.margin < self.near_below or self.dropped > RANKS.doubt
+
+    @property
+    def near_other_uniqueness(self) -> bool:
+        """Whether a component of a small part in the self-stresses is called not unique, or one of a part above rounding unique."""
+        return bool(self.reactions and self.reactions.is_near)
+
+    @property
+    def near_below(self) -> float:
+        """Margin below which a position is called nearly singular; of a regular chain of n loops it goes as 1 / (n + 1)."""
+        return 2.0 * RANKS.near / (1 + max(self.graph.n_loops, 1))
+
+    @property
+    def dead_point(self) -> bool:
+        """Whether a driver is near a dead point: it hardly moves when the mechanism moves."""
+        return bool(self.geometry and self.geometry.freedoms.mobility and self.geometry.freedoms.drive < RANKS.near)
+
+    @property
+    def change_point(self) -> bool:
+        """Whether branches of a finite motion meet here: more mobility than on either of them, and less rank than nearby."""
+        return 0 < (self.finite_mobility or 0) < (self.mobility or 0) and self.excess["here"] > 0
+
+    # --- freedoms and drivers --------------------------------------------------------------------------------------------
+
+    @property
+    def contradicting_drives(self) -> bool:
+        """Whether the declared drivers cannot move independently of each other."""
+        return bool(self.geometry and self.geometry.freedoms.dependent)
+
+    @cached_property
+    def undriven(self) -> tuple[Finding, ...]:
+        """Freedoms that are neither driven nor passive."""
+        return findings.left_free(self.geometry.freedoms) if self.geometry else ()
+
+    @cached_property
+    def passive(self) -> tuple[Finding, ...]:
+        """Passive freedoms by name and line."""
+        g = self.geometry
+        return tuple(findings.passive_finding(g.system, p) for p in g.freedoms.passive) if g else ()
+
+    @property
+    def _null_nearby(self) -> Array | None:
+        return self.motion.null_nearby if self.motion else None
+
+    @cached_property
+    def locked(self) -> tuple[Finding, ...]:
+        """Freedoms that cannot move here, with the reason."""
+        return findings.locked(self.geometry.freedoms, self._null_nearby) if self.geometry else ()
+
+    @cached_property
+    def drivable(self) -> tuple[Finding, ...]:
+        """Freedoms that can serve as a driver here: single freedoms that move in other than passive motions."""
+        return findings.drivable(self.geometry.freedoms) if self.geometry else ()
+
+    @cached_property
+    def not_drivable(self) -> tuple[Finding, ...]:
+        """Single freedoms that cannot drive here, with the reason."""
+        g = self.geometry
+        return findings.not_drivable(g.freedoms, self.drivable, self._null_nearby) if g else ()
+
+    @cached_property
+    def _drivers_that_move(self) -> Index:
+        """Columns of the declared drivers without those that stand still here or depend on the ones before."""
+        g = self.geometry
+        return np.array(independent_rows(g.freedoms.null, g.driven.tolist(), len(g.driven)) if g else [], dtype=np.intp)
+
+    @cached_property
+    def replaced_drives(self) -> tuple[str, ...]:
+        """Drivers that do not move the mechanism here, where others are suggested instead of them."""
+        g, names = self.geometry, self.mechanism.freedom_names()
+        at_rest = set(g.driven.tolist()) - set(self._drivers_that_move.tolist()) if g and self.suggested_drives else ()
+        return tuple(names[c] for c in sorted(at_rest))
+
+    @cached_property
+    def suggested_drives(self) -> tuple[str, ...]:
+        """Freedoms that would complete the drivers (all of them where none is declared): at the frame first, independent.
+
+        A driver may stop a motion that was passive, and so leave another one undriven; then more are sought. At a change point there
+        are no more of them than the finite motion needs, and they move in it.
+        """
+        g = self.geometry
+        if not g:
+            return ()
+        moving = columns = self._drivers_that_move
+        able, wanted = np.ones(self.freedom_count, dtype=bool), self.freedom_count
+        if self.change_point:
+            able = findings.moves_nearby(self._null_nearby, self.freedom_count)
+            wanted = max((self.finite_mobility or 0) - len(g.freedoms.passive), 0)
+        after = g.freedoms if len(moving) == len(g.driven) else freedoms_at(g.freedoms.position, moving, self.asked)
+        while after.undriven and len(columns) < wanted:
+            both = [*columns.tolist(), *findings.completing(after, able)]
+            independent = np.array(independent_rows(g.freedoms.null, both, wanted), dtype=np.intp)
+            if len(independent) == len(columns):
+                break
+            columns = independent
+            after = freedoms_at(g.freedoms.position, columns, self.asked)
+        names = self.mechanism.freedom_names()
+        return tuple(names[c] for c in np.sort(columns[len(moving) :]))
+
+    @cached_property
+    def dependent_drives(self) -> tuple[tuple[str, ...], ...]:
+        """For mobility above one: sets of freedoms of which only one can be driven, as they move in proportion."""
+        g = self.geometry
+        return findings.proportional(g.freedoms, self.drivable) if g and (self.inputs or 0) > 1 else ()
+
+    # --- reactions -------------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def reactions(self) -> Uniqueness | None:
+        """Verdict on every reaction component and effort, with the self-stresses."""
+        g = self.geometry
+        return uniqueness(g.freedoms.position.declared, g.driven, self.asked, g.freedoms.driven_closure) if g else None
+
+    @property
+    def unique(self) -> dict[str, dict[str, bool]]:
+        """For every pair: component -> whether it is unique; ``effort`` for a driven freedom and for a coupling."""
+        return self.reactions.unique if self.reactions else {}
+
+    @property
+    def self_stress_count(self) -> int | None:
+        """Number of self-stresses with the declared drivers."""
+        return self.reactions.count if self.reactions else None
+
+    @cached_property
+    def self_stresses(self) -> tuple[SelfStress, ...]:
+        """Reaction states without load, with the declared drivers: a canonical sparse basis.
+
+        Those that connect loops are left out where they are more than ``structure.uniqueness.CONNECTING``.
+        """
+        return self.reactions.states if self.reactions else ()
+
+    @property
+    def unique_directions(self) -> tuple[UniqueDirection, ...]:
+        """Directions of force and moment that are unique in a pair though its components are not."""
+        return self.reactions.unique_directions if self.reactions else ()
+
+    @property
+    def combinations(self) -> tuple[tuple[int, str], ...]:
+        """(group, sum) of sums of components across pairs that are unique although their terms are not."""
+        return self.reactions.combinations if self.reactions else ()
+
+    @property
+    def groups_without_combinations(self) -> int:
+        """Number of groups in which such sums were not sought, as they have too many components."""
+        return self.reactions.unsought if self.reactions else 0
+
+    @property
+    def determinate(self) -> bool:
+        """Whether every freedom is driven or passive, and every reaction and effort unique."""
+        if not self.geometry or self.contradicting_drives:
+            return False
+        return not self.geometry.freedoms.undriven and bool(self.reactions and self.reactions.all_unique)
+
+    # --- advice ----------------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def effects(self) -> tuple[Effect, ...]:
+        """Changes with their computed effect: they remove redundancy, or free a structure."""
+        g = self.geometry
+        return advice(g.freedoms, g.driven, self.finite_mobility or 0, self.asked) if g else ()
+
+    @cached_property
+    def advice(self) -> tuple[Finding, ...]:
+        """What would make it determinate: drivers to add, changes with their computed effect."""
+        out = []
+        if self.suggested_drives:
+            names, drives = ", ".join(self.suggested_drives), self.mechanism.drives
+            what = f"drive {'also ' if drives and not self.replaced_drives else ''}{names}"
+            instead = f" instead of {', '.join(self.replaced_drives)}" if self.replaced_drives else ""
+            where = " beside the change point" if self.change_point else ""
+            then = f"then every freedom is driven or passive{where}"
+            out.append(Finding(f"{what}{instead}: {then}", self.suggested_drives))
+        return (*out, *(Finding(e.text, tuple(item for item, _, _ in e.changes)) for e in self.effects))
 
 
 def counted_ledger(m: Mechanism, bookkeeping: str) -> Ledger:
@@ -31,75 +361,3 @@ def counted_ledger(m: Mechanism, bookkeeping: str) -> Ledger:
     rows["driver"] = LedgerRow(len(m.drives), len(m.drives), 0)
     rows["link"] = LedgerRow(len(m.links) - 1, 0, 6 * (len(m.links) - 1))
     return Ledger(bookkeeping, rows)
-
-
-def to_dict(r: DeterminacyReport) -> dict[str, Any]:
-    """All facts of a report as plain data."""
-    return {**_of_graph(r), **_of_geometry(r), **_of_reactions(r), **_findings(r)}
-
-
-def _of_graph(r: DeterminacyReport) -> dict[str, Any]:
-    books = {name: r.ledger(name) for name in ("lee", "minimal")}
-    return {
-        "mechanism": r.mechanism.name,
-        "verdict": r.verdict,
-        "note": r.note,
-        "determinate": r.determinate,
-        "engine": r.engine,
-        "links": list(r.links),
-        "pairs": list(r.pairs),
-        "loops": [
-            {"steps": [list(step) for step in loop], **asdict(fact)}
-            for loop, fact in zip(r.loops, r.loop_facts, strict=True)
-        ],
-        "mobility_by_count": r.mobility_by_count,
-        "generic": asdict(r.generic),
-        "parts": asdict(r.parts),
-        "ledger": {
-            name: {
-                "unknowns": b.unknowns,
-                "equations": b.equations,
-                "balance": b.balance,
-                "by_kind": {k: [row.count, row.unknowns, row.equations] for k, row in b.by_kind.items()},
-            }
-            for name, b in books.items()
-        },
-    }
-
-
-def _of_geometry(r: DeterminacyReport) -> dict[str, Any]:
-    return {
-        "mobility": r.mobility,
-        "finite_mobility": r.finite_mobility,
-        "inputs": r.inputs,
-        "stroke": r.motion.stroke if r.motion else None,
-        "redundancy": r.redundancy,
-        "excess": r.excess,
-        "margin": r.margin,
-        "dropped": r.dropped,
-        "near": r.near,
-    }
-
-
-def _of_reactions(r: DeterminacyReport) -> dict[str, Any]:
-    found = r.reactions
-    return {
-        "unique": r.unique,
-        "self_stress_count": found.count if found else None,
-        "self_stresses": [
-            {"group": s.group, "components": dict(s.components), "efforts": dict(s.efforts)} for s in r.self_stresses
-        ],
-        "transverse": [{"text": t.text, **asdict(t)} for t in found.transverse] if found else [],
-        "combinations": [list(c) for c in found.combinations] if found else [],
-        "groups_without_combinations": found.unsought if found else 0,
-    }
-
-
-def _findings(r: DeterminacyReport) -> dict[str, Any]:
-    return {
-        "suggested_drives": list(r.suggested_drives),
-        "dependent_drives": [list(g) for g in r.dependent_drives],
-        "contradicting_drives": r.contradicting_drives,
-        "effects": [asdict(e) for e in r.effects],
-        **{key: [asdict(finding) for finding in getattr(r, key)] for key in FINDINGS},
-    }

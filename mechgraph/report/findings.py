@@ -1,4 +1,4 @@
-"""Findings in words and by name: passive and locked freedoms, drivers, loops, with their geometry."""
+"""Findings in words and by name: passive and locked freedoms, what can drive and what cannot, loops, with their geometry."""
 
 from __future__ import annotations
 
@@ -8,13 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import System
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.numerics.linear import rank_of, singular_values
+from mechgraph.numerics.linear import independent_rows, rank_of, singular_values
 from mechgraph.numerics.tolerances import MOTIONS
-from mechgraph.structure.mobility import Freedoms
+from mechgraph.structure.mobility import Freedoms, drive_order, single_freedoms
 from mechgraph.structure.passive import PassiveMotion
+from mechgraph.structure.position import Position
+
+NAMED = 8
+"""Most freedoms named for one motion."""
+MOST_INPUTS = 200
+"""Number of input freedoms above which freedoms that move in proportion are not sought."""
 
 
 @dataclass(frozen=True)
@@ -42,25 +47,27 @@ class LoopFact:
 
 
 def loop_facts(
-    m: Mechanism, loops: tuple[tuple[tuple[str, int], ...], ...], system: System | None, x: Array | None
+    m: Mechanism, loops: tuple[tuple[tuple[str, int], ...], ...], position: Position | None
 ) -> tuple[LoopFact, ...]:
     """The facts of every loop taken alone; ranks where there is geometry."""
     ends = {p.name: (p.a, p.b) for p in m.pairs}
     freedom_count = {p.name: p.type.f for p in m.pairs}
-    S = Configuration(system, x[:, None]).S[:, :, 0] if system is not None and x is not None else None
     out = []
     for i, loop in enumerate(loops):
         chain = ends[loop[0][0]][0 if loop[0][1] > 0 else 1]
         for name, sign in loop:
             chain += f" -{name}- {ends[name][1 if sign > 0 else 0]}"
         rank = None
-        if system is not None and S is not None:
-            rank = rank_of(singular_values(S[:, system.loop_columns[i][0]]))
+        if position is not None:
+            columns, _ = position.declared.system.loop_columns[i]
+            rank = rank_of(singular_values(position.rows.S[:, columns]))
         pairs = tuple(name for name, _ in loop)
-        out.append(
-            LoopFact(chain, pairs, sum(freedom_count[p] for p in pairs), rank, None if rank is None else 6 - rank)
-        )
+        freedoms = sum(freedom_count[p] for p in pairs)
+        out.append(LoopFact(chain, pairs, freedoms, rank, None if rank is None else 6 - rank))
     return tuple(out)
+
+
+# --- passive and locked freedoms ------------------------------------------------------------------------------------------
 
 
 def number(value: float) -> str:
@@ -106,51 +113,47 @@ def passive_finding(system: System, motion: PassiveMotion) -> Finding:
     )
 
 
-def locked_findings(system: System, x: Array, freedoms: Freedoms, null_nearby: Array | None) -> tuple[Finding, ...]:
+def locked(freedoms: Freedoms, null_nearby: Array | None) -> tuple[Finding, ...]:
     """Freedoms that cannot move here, grouped by the reason; those that move in the motions ``null_nearby`` stand still only here."""
-    m = system.m
+    names = freedoms.position.m.freedom_names()
     still = np.abs(freedoms.null).max(axis=1, initial=0.0) < MOTIONS.still
-    names = m.freedom_names()
-    rests = still & moves_nearby(null_nearby, len(names))
-    left = {names[i]: i for i in np.flatnonzero(still & ~rests)}
-    S = Configuration(system, x[:, None]).S[:, :, 0]
-    turns = np.array([f.turns for p in m.pairs for f in p.type.freedoms], dtype=bool)
+    only_here = still & moves_nearby(null_nearby, len(names))
+    left = {int(i) for i in np.flatnonzero(still & ~only_here)}
     out = []
-    for columns, _ in system.loop_columns:
-        turning = [int(c) for c in columns if turns[c]]
-        if not turning or any(names[c] not in left for c in turning):
-            continue
-        rank = int(np.linalg.matrix_rank(S[:3, turning], tol=1e-9))
-        if rank < len(turning):
-            continue
-        why = {1: "it is the only turn of its loop", 2: "their axes are not parallel"}.get(
-            rank, "their axes form a rigid spherical triangle"
-        )
-        group = tuple(names[c] for c in turning)
-        for name in group:
-            left.pop(name)
-        verb = "stands" if len(group) == 1 else "stand"
-        out.append(
-            Finding(
-                f"{', '.join(group)} {verb} still: no other turn in the loop, and {why}"
-                if rank > 1
-                else f"{group[0]} stands still: {why}",
-                group,
-            )
-        )
-    mobile = freedoms.mobility > 0
-    rest = tuple(left)
-    if rest:
-        verb = "stands" if len(rest) == 1 else "stand"
-        why = "the closure equations leave it no rate" if mobile else "the mechanism is a structure here"
-        out.append(Finding(f"{', '.join(rest)} {verb} still: {why}", rest))
-    resting = tuple(names[i] for i in np.flatnonzero(rests))
+    for turning, why in _locked_turns(freedoms.position, left):
+        out.append(_still(names, turning, f"still: {why}"))
+        left -= set(turning)
+    if left:
+        why = "the closure equations leave it no rate" if freedoms.mobility else "the mechanism is a structure here"
+        out.append(_still(names, sorted(left), f"still: {why}"))
+    resting = np.flatnonzero(only_here).tolist()
     if resting:
-        verb, pronoun = ("stands", "it moves") if len(resting) == 1 else ("stand", "they move")
-        out.append(
-            Finding(f"{', '.join(resting)} {verb} still in this position only: {pronoun} in nearby positions", resting)
-        )
+        why = "it moves in nearby positions" if len(resting) == 1 else "they move in nearby positions"
+        out.append(_still(names, resting, f"still in this position only: {why}"))
     return tuple(out)
+
+
+def _still(names: tuple[str, ...], columns: list[int], how: str) -> Finding:
+    group = tuple(names[c] for c in columns)
+    return Finding(f"{', '.join(group)} {'stands' if len(group) == 1 else 'stand'} {how}", group)
+
+
+def _locked_turns(position: Position, still: set[int]) -> list[tuple[list[int], str]]:
+    """The turns of loops in which none can turn, as their directions are independent; and why."""
+    turns = np.array([f.turns for p in position.m.pairs for f in p.type.freedoms], dtype=bool)
+    reasons = {
+        1: "it is the only turn of its loop",
+        2: "no other turn in the loop, and their axes are not parallel",
+        3: "no other turn in the loop, and their axes form a rigid spherical triangle",
+    }
+    out, taken = [], set[int]()
+    for columns, _ in position.declared.system.loop_columns:
+        turning = columns[turns[columns]].tolist()
+        if 0 < len(turning) <= 3 and set(turning) <= still - taken:
+            if np.linalg.matrix_rank(position.rows.S[:3, turning], tol=1e-9) == len(turning):
+                out.append((turning, reasons[len(turning)]))
+                taken |= set(turning)
+    return out
 
 
 def moves_nearby(null_nearby: Array | None, count: int) -> NDArray[np.bool_]:
@@ -160,9 +163,70 @@ def moves_nearby(null_nearby: Array | None, count: int) -> NDArray[np.bool_]:
     return np.asarray(np.abs(null_nearby).max(axis=1, initial=0.0) > MOTIONS.nearby)
 
 
-def input_motions(freedoms: Freedoms, null: Array) -> Array:
-    """Motions without their passive part."""
-    if not freedoms.passive:
-        return null
-    P, _ = np.linalg.qr(np.stack([p.rates for p in freedoms.passive], axis=1))
-    return np.asarray(null - P @ (P.T @ null))
+# --- drivers ----------------------------------------------------------------------------------------------------------------
+
+
+def left_free(freedoms: Freedoms) -> tuple[Finding, ...]:
+    """Motions that are neither driven nor passive: the freedoms that move in each, those that could be driven first."""
+    single = {name for _, name in single_freedoms(freedoms.position.m)}
+    out = []
+    for motion in freedoms.undriven:
+        names = sorted(motion.names, key=lambda n: n not in single)
+        shown = ", ".join(names[:NAMED]) + (f" and {len(names) - NAMED} more" if len(names) > NAMED else "")
+        out.append(Finding(f"{shown} {'moves' if len(names) == 1 else 'move together'}", motion.names))
+    return tuple(out)
+
+
+def drivable(freedoms: Freedoms) -> tuple[Finding, ...]:
+    """Freedoms that can serve as a driver here: single freedoms that move in other than passive motions."""
+    moves = np.abs(freedoms.inputs).max(axis=1, initial=0.0) > MOTIONS.still
+    return tuple(Finding(f"{n} can drive", (n,)) for i, n in single_freedoms(freedoms.position.m) if moves[i])
+
+
+def not_drivable(freedoms: Freedoms, able: tuple[Finding, ...], null_nearby: Array | None) -> tuple[Finding, ...]:
+    """Single freedoms that cannot drive here, with the reason: a dead point, locked, or moving only passively."""
+    good = {name for finding in able for name in finding.freedoms}
+    still = np.abs(freedoms.null).max(axis=1, initial=0.0) < MOTIONS.still
+    nearby = moves_nearby(null_nearby, len(still))
+    out = []
+    for i, name in single_freedoms(freedoms.position.m):
+        if name in good:
+            continue
+        why = "moves only in a passive motion"
+        if still[i]:
+            dead = nearby[i] and freedoms.mobility
+            why = "dead point here (moves in nearby positions)" if dead else "stands still"
+        out.append(Finding(f"{name} cannot drive: {why}", (name,)))
+    return tuple(out)
+
+
+def completing(freedoms: Freedoms, able: NDArray[np.bool_]) -> list[int]:
+    """Columns among those ``able (F,)`` that complete the drivers: free of passive motions and at the frame first, independent.
+
+    A driver on a freedom that also moves in a passive motion would stop that motion and leave another one undriven.
+    """
+    rest, _ = np.linalg.qr(np.stack([f.rates for f in freedoms.undriven], axis=1))
+    order = [i for i in drive_order(freedoms.position.m, freedoms.passive) if able[i]]
+    return independent_rows(rest, order, rest.shape[1])
+
+
+def proportional(freedoms: Freedoms, able: tuple[Finding, ...]) -> tuple[tuple[str, ...], ...]:
+    """Sets of freedoms of which only one can be driven, as they move in proportion."""
+    column = {name: i for i, name in single_freedoms(freedoms.position.m)}
+    names = [name for finding in able for name in finding.freedoms]
+    if not names or freedoms.inputs.shape[1] > MOST_INPUTS:
+        return ()
+    rows = freedoms.inputs[[column[n] for n in names]]
+    size = np.linalg.norm(rows, axis=1)
+    rows = rows / size[:, None]
+    first: list[int] = []
+    groups: list[list[str]] = []
+    for i, name in enumerate(names):
+        sine = np.sqrt(np.maximum(1.0 - (rows[first] @ rows[i]) ** 2, 0.0))
+        alike = np.flatnonzero(sine < MOTIONS.proportional + MOTIONS.error / np.minimum(size[first], size[i]))
+        if alike.size:
+            groups[int(alike[0])].append(name)
+        else:
+            first.append(i)
+            groups.append([name])
+    return tuple(tuple(g) for g in groups if len(g) > 1)

@@ -1,17 +1,20 @@
-"""The determinacy report as a document: verdict first, then facts, reasons, findings, reactions and advice, then the record."""
+"""The determinacy report as one list of facts: their keys in the data, and where and how they stand on paper.
+
+Text, Markdown and HTML follow from the list through a document, JSON through plain data.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import asdict, dataclass, is_dataclass
+from typing import Any
 
-from mechgraph.document import Bullets, Document, Heading, Paragraph, Table
+from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Table
+from mechgraph.equations.terms import Ledger
 from mechgraph.model.pair_table import TABLE
 from mechgraph.numerics.tolerances import RANKS
-from mechgraph.report.sentences import assumed, loop_names, plural, reasons, short
-
-if TYPE_CHECKING:
-    from mechgraph.report.report import DeterminacyReport
+from mechgraph.report.facts import Facts
+from mechgraph.report.sentences import assumed, listed, loop_names, mobility_line, plural, reasons, verdict
 
 TERMS = 4
 """Most terms of a sum that is printed."""
@@ -27,222 +30,242 @@ MEANINGS = (
 )
 
 
-def document(r: DeterminacyReport) -> Document:
+@dataclass(frozen=True)
+class Section:
+    """A part of the report: its ``title`` ("" goes on in the part before), the ``keys`` of its facts, and what is printed of them."""
+
+    title: str
+    keys: tuple[str, ...]
+    printed: Callable[[Facts], Iterable[Block]]
+
+
+def document(r: Facts) -> Document:
     """The report as a document."""
-    blocks: list[Any] = [Paragraph(r.verdict)]
-    if r.note:
-        blocks.append(Paragraph(r.note))
-    blocks += [*_facts(r), *_cure(r)]
-    for key, title in (
-        ("undriven", "Neither driven nor passive"),
-        ("passive", "Passive freedoms"),
-        ("locked", "Locked freedoms"),
-    ):
-        found = getattr(r, key)
-        if found:
-            blocks += [Heading(title, 2), _listed(f.text for f in found)]
-    blocks += _drivers(r) + _reactions(r) + _advice(r) + _loops(r) + _structure(r) + _ledger(r) + _checks(r)
+    blocks: list[Block] = []
+    for section in SECTIONS:
+        printed = list(section.printed(r))
+        blocks += [Heading(section.title, 2), *printed] if section.title and printed else printed
     return Document(f"Determinacy of {r.mechanism.name}", tuple(blocks))
 
 
-def _listed(items: Iterable[str]) -> Bullets:
+def to_dict(r: Facts) -> dict[str, Any]:
+    """All facts as plain data, by key."""
+    return {key: _VALUES[key](r) if key in _VALUES else _plain(getattr(r, key)) for s in SECTIONS for key in s.keys}
+
+
+def _plain(value: Any) -> Any:
+    """Dataclasses and mappings as dictionaries, sequences as lists."""
+    if isinstance(value, Mapping):
+        return {key: _plain(of) for key, of in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(of) for of in value]
+    return _plain(asdict(value)) if is_dataclass(value) and not isinstance(value, type) else value
+
+
+def _ledger_data(book: Ledger) -> dict[str, Any]:
+    kinds = {kind: [row.count, row.unknowns, row.equations] for kind, row in book.by_kind.items()}
+    return {"unknowns": book.unknowns, "equations": book.equations, "balance": book.balance, "by_kind": kinds}
+
+
+_VALUES: dict[str, Callable[[Facts], Any]] = {
+    "mechanism": lambda r: r.mechanism.name,
+    "verdict": verdict,
+    "loops": lambda r: [
+        {"steps": _plain(loop), **_plain(fact)} for loop, fact in zip(r.loops, r.loop_facts, strict=True)
+    ],
+    "ledger": lambda r: {name: _ledger_data(r.ledger(name)) for name in ("lee", "minimal")},
+    "unique_directions": lambda r: [{"text": d.text, **_plain(d)} for d in r.unique_directions],
+}
+"""Facts whose plain data are not those of the attribute of that name."""
+
+
+def _listed(items: Iterable[str]) -> Iterator[Block]:
     texts = list(items)
     more = len(texts) - LISTED
-    return Bullets(tuple(texts[:LISTED] + ([f"... and {more} more (see report.to_dict())"] if more > 0 else [])))
+    if texts:
+        yield Bullets(tuple(texts[:LISTED] + ([f"... and {more} more (see report.to_dict())"] if more > 0 else [])))
 
 
-def _facts(r: DeterminacyReport) -> list[Any]:
-    """Numbers of links, pairs and loops; count and rank side by side, and why they differ."""
-    there = (
+def _findings(key: str) -> Callable[[Facts], Iterator[Block]]:
+    return lambda r: _listed(f.text for f in getattr(r, key))
+
+
+def _numbers(r: Facts) -> Iterator[Block]:
+    """Numbers of links, pairs and loops; count and rank side by side."""
+    yield Paragraph(
         f"{plural(len(r.links), 'link')} with the frame, {plural(len(r.pairs), 'pair')}, {plural(len(r.loops), 'loop')}, "
         f"{plural(len(r.mechanism.drives), 'driver')}."
     )
     f, rows = r.freedom_count, r.equation_count
-    columns: list[tuple[str, list[int]]] = [
-        ("by count", [f, rows, rows, f - rows, 0]),
-        ("general geometry", [f, rows, r.generic.rank, r.generic.mobility, r.generic.excess]),
+    columns = [
+        ("by count", (f, rows, rows, f - rows, 0)),
+        ("general geometry", (f, rows, r.generic.rank, r.generic.mobility, r.generic.excess)),
     ]
-    if r.geometry and r.mobility is not None and r.redundancy is not None:
-        columns.append(("this geometry", [f, rows, f - r.mobility, r.mobility, r.redundancy]))
+    if r.mobility is not None and r.redundancy is not None:
+        columns.append(("this geometry", (f, rows, f - r.mobility, r.mobility, r.redundancy)))
     names = ("freedoms of the pairs", "closure equations", "of these independent", "mobility", "redundancy")
-    table = Table(
-        ("", *(head for head, _ in columns)),
-        tuple((name, *(str(values[i]) for _, values in columns)) for i, name in enumerate(names)),
-        align="l" + "r" * len(columns),
-    )
-    return [Paragraph(there), table, *_mobility(r), *([Bullets((*reasons(r), *assumed(r)))] if r.geometry else [])]
+    lines = tuple((name, *(str(values[i]) for _, values in columns)) for i, name in enumerate(names))
+    yield Table(("", *(head for head, _ in columns)), lines, align="l" + "r" * len(columns))
 
 
-def _mobility(r: DeterminacyReport) -> list[Any]:
-    if not r.geometry or not r.mobility or r.margin is None:
-        return []
-    return [
-        Paragraph(
-            f"Mobility {r.mobility} = {plural(r.inputs or 0, 'input freedom')} + {plural(len(r.passive), 'passive freedom')}; "
-            f"finite mobility: {r.finite_mobility}. Margin to a singular position: {r.margin:.3g} (near below {r.near_below:.3g})."
-        )
-    ]
+def _why(r: Facts) -> Iterator[Block]:
+    """What the mobility is made of, and why count and rank differ."""
+    if r.mobility:
+        yield Paragraph(mobility_line(r))
+    if r.geometry:
+        yield Bullets((*reasons(r), *assumed(r)))
 
 
-def _drivers(r: DeterminacyReport) -> list[Any]:
-    if not r.geometry:
-        return []
-    able = [name for f in r.drivable for name in f.freedoms]
-    lines = [f"can drive: {short(able, LISTED)}" if able else "no freedom can drive"]
-    if r.contradicting_drives and r.mobility:
-        lines.append("the declared drivers depend on each other: take one away")
-    lines += [f"only one of {short(group, LISTED)} (they move in proportion)" for group in r.dependent_drives]
-    reasons_why: dict[str, list[str]] = {}
-    for f in r.not_drivable:
-        reasons_why.setdefault(f.text.split(": ", 1)[1], []).extend(f.freedoms)
-    lines += [f"cannot drive: {short(names, LISTED)}: {why}" for why, names in reasons_why.items()]
-    if r.suggested_drives:
-        word = "drive also" if r.mechanism.drives else "suggested"
-        lines.append(f"{word}: {short(r.suggested_drives, LISTED)}")
-    return [Heading("Drivers", 2), _listed(lines)]
-
-
-def _reactions(r: DeterminacyReport) -> list[Any]:
-    if not r.unique:
-        return []
-    rows: list[tuple[str, str, str, str]] = []
-    kinds = {p.name: p.type.symbol for p in r.mechanism.pairs}
-    for pair, row in r.unique.items():
-        yes = " ".join(n for n, ok in row.items() if ok)
-        no = " ".join(n for n, ok in row.items() if not ok)
-        kind = kinds.get(pair, "coupling") if len(rows) < LISTED else ""
-        rows.append((pair, kind, yes or "none", no or "none"))
-    if len(rows) > LISTED:
-        rows = [*rows[:LISTED], ("...", "", f"and {len(rows) - LISTED} pairs more (see report.to_dict())", "")]
-    loose = [NOT_UNIQUE] if any(not ok for row in r.unique.values() for ok in row.values()) else []
-    table = Table(("pair", "type", "unique", "not unique"), tuple(rows))
-    return [Heading("Reactions", 2), table, *(Paragraph(text) for text in loose), *_stresses(r)]
-
-
-def _stresses(r: DeterminacyReport) -> list[Any]:
-    found = r.reactions
-    if not found or not found.count or not r.geometry:
-        return []
-    lines = [
-        f"group {s.group + 1}: {s.text or 'in the efforts of the couplings alone'}" for s in found.first_states(LISTED)
-    ]
-    if found.listed > len(lines):
-        lines.append(f"... and {found.listed - len(lines)} more (report.self_stresses)")
-    if found.count > found.listed:
-        lines.append(f"{found.count - found.listed} more that connect loops are not listed: too many")
-    blocks: list[Any] = [
-        Heading("Self-stresses", 2),
-        Paragraph(MEANINGS.format(L=r.geometry.system.par.L)),
-        Bullets(tuple(lines)),
-    ]
-    directions = [t.text for t in found.transverse]
-    if directions or found.combinations or found.unsought:
-        blocks.append(Heading("Unique only in combination", 2))
-        if directions:
-            blocks += [Paragraph("Directions in the axes x, y, z of the pair's marker."), _listed(directions)]
-        if found.combinations:
-            blocks += _sums(found.combinations)
-        if found.unsought:
-            where = f"{plural(found.unsought, 'group')} of many components"
-            blocks.append(Paragraph(f"Sums across pairs were not sought in {where}."))
-    return blocks
-
-
-def _sums(combinations: tuple[tuple[int, str], ...]) -> list[Any]:
-    """Sums across pairs that are unique; those of many terms are only in the JSON."""
-    lines = [f"group {group + 1}: {text}" for group, text in combinations if text.count(":") <= TERMS]
-    more = len(combinations) - len(lines)
-    if more:
-        lines.append(f"{'and ' if lines else ''}{more} of more than {TERMS} terms (see report.to_dict())")
-    return [Paragraph("These sums are unique though their terms are not:"), _listed(lines)]
-
-
-def _cure(r: DeterminacyReport) -> list[Any]:
+def _best_change(r: Facts) -> Iterator[Block]:
     """The change that removes most redundancy, in one line near the top."""
     better = [e for e in r.effects if e.redundancy[1] < e.redundancy[0]]
-    if not better:
-        return []
-    best = min(better, key=lambda e: (e.redundancy[1], len(e.changes)))
-    start = "To remove all redundancy" if not best.redundancy[1] else "To lower the redundancy"
-    return [Paragraph(f"{start}: {best.text} (more under Advice).")]
+    if better:
+        best = min(better, key=lambda e: (e.redundancy[1], len(e.changes)))
+        start = "To remove all redundancy" if not best.redundancy[1] else "To lower the redundancy"
+        yield Paragraph(f"{start}: {best.text} (more under Advice).")
 
 
-def _types(r: DeterminacyReport) -> list[Any]:
-    """Names of the pair types that the advice proposes."""
+def _drivers(r: Facts) -> Iterator[Block]:
+    if not r.geometry:
+        return
+    able = [name for f in r.drivable for name in f.freedoms]
+    lines = [f"can drive: {listed(able, LISTED)}" if able else "no freedom can drive"]
+    if r.contradicting_drives and r.mobility and not r.suggested_drives:
+        lines.append("the declared drivers depend on each other: take one away")
+    lines += [f"only one of {listed(group, LISTED)} (they move in proportion)" for group in r.dependent_drives]
+    names_by_reason: dict[str, list[str]] = {}
+    for f in r.not_drivable:
+        names_by_reason.setdefault(f.text.split(": ", 1)[1], []).extend(f.freedoms)
+    lines += [f"cannot drive: {listed(names, LISTED)}: {why}" for why, names in names_by_reason.items()]
+    if r.suggested_drives:
+        word = "drive also" if r.mechanism.drives else "suggested"
+        word = f"instead of {listed(r.replaced_drives, LISTED)}" if r.replaced_drives else word
+        lines.append(f"{word}: {listed(r.suggested_drives, LISTED)}")
+    yield from _listed(lines)
+
+
+def _reactions(r: Facts) -> Iterator[Block]:
+    if not r.unique:
+        return
+    kinds = {p.name: p.type.symbol for p in r.mechanism.pairs}
+    rows = []
+    for name, components in list(r.unique.items())[:LISTED]:
+        sides = (" ".join(n for n, ok in components.items() if ok is side) or "none" for side in (True, False))
+        rows.append((name, kinds.get(name, "coupling"), *sides))
+    if len(r.unique) > LISTED:
+        rows.append(("...", "", f"and {len(r.unique) - LISTED} pairs more (see report.to_dict())", ""))
+    yield Table(("pair", "type", "unique", "not unique"), tuple(rows))
+    if not all(ok for components in r.unique.values() for ok in components.values()):
+        yield Paragraph(NOT_UNIQUE)
+
+
+def _stresses(r: Facts) -> Iterator[Block]:
+    known = r.reactions
+    if not known or not known.count or not r.geometry:
+        return
+    lines = [
+        f"group {s.group + 1}: {s.text or 'in the efforts of the couplings alone'}" for s in known.first_states(LISTED)
+    ]
+    if known.listed > len(lines):
+        lines.append(f"... and {known.listed - len(lines)} more (report.self_stresses)")
+    if known.count > known.listed:
+        lines.append(f"{known.count - known.listed} more that connect loops are not listed: too many")
+    yield Paragraph(MEANINGS.format(L=r.geometry.system.par.L))
+    yield Bullets(tuple(lines))
+
+
+def _combined(r: Facts) -> Iterator[Block]:
+    """Directions and sums that are unique though components are not; sums of many terms are only in the JSON."""
+    if r.unique_directions:
+        yield Paragraph("Directions in the axes x, y, z of the pair's marker.")
+        yield from _listed(d.text for d in r.unique_directions)
+    if r.combinations:
+        lines = [f"group {group + 1}: {text}" for group, text in r.combinations if text.count(":") <= TERMS]
+        more = len(r.combinations) - len(lines)
+        if more:
+            lines.append(f"{'and ' if lines else ''}{more} of more than {TERMS} terms (see report.to_dict())")
+        yield Paragraph("These sums are unique though their terms are not:")
+        yield from _listed(lines)
+    if r.groups_without_combinations:
+        where = f"{plural(r.groups_without_combinations, 'group')} of many components"
+        yield Paragraph(f"Sums across pairs were not sought in {where}.")
+
+
+def _advice(r: Facts) -> Iterator[Block]:
+    yield from _listed(a.text for a in r.advice)
     new = sorted({kind for e in r.effects for _, _, kind in e.changes if kind in TABLE})
-    return [Paragraph(f"Pair types: {'; '.join(f'{kind} {TABLE[kind].name}' for kind in new)}.")] if new else []
+    if new:
+        yield Paragraph(f"Pair types: {'; '.join(f'{kind} {TABLE[kind].name}' for kind in new)}.")
 
 
-def _advice(r: DeterminacyReport) -> list[Any]:
-    if r.advice:
-        return [Heading("Advice", 2), _listed(a.text for a in r.advice), *_types(r)]
-    return []
-
-
-def _loops(r: DeterminacyReport) -> list[Any]:
-    if not r.loops:
-        return []
+def _loops(r: Facts) -> Iterator[Block]:
     rows = [
-        (
-            str(i + 1),
-            fact.chain,
-            str(fact.freedoms),
-            "-" if fact.rank is None else str(fact.rank),
-            "-" if fact.excess is None else str(fact.excess),
-        )
+        (str(i + 1), fact.chain, str(fact.freedoms), *("-" if n is None else str(n) for n in (fact.rank, fact.excess)))
         for i, fact in enumerate(r.loop_facts[:LISTED])
     ]
     if len(r.loops) > LISTED:
         rows.append(("...", f"and {len(r.loops) - LISTED} more (see report.to_dict())", "", "", ""))
-    table = Table(("loop", "links and pairs", "freedoms", "rank", "excess"), tuple(rows), align="rlrrr")
-    return [Heading("Loops", 2), table]
+    if rows:
+        yield Table(("loop", "links and pairs", "freedoms", "rank", "excess"), tuple(rows), align="rlrrr")
 
 
-def _structure(r: DeterminacyReport) -> list[Any]:
+def _count(r: Facts) -> Iterator[Block]:
     parts = r.parts
     lines = []
     if parts.redundant_pairs:
         many = plural(parts.spare_unknowns, "reaction unknown")
-        lines.append(f"{many} more than equations, in the pairs {short(parts.redundant_pairs, LISTED)}")
+        lines.append(f"{many} more than equations, in the pairs {listed(parts.redundant_pairs, LISTED)}")
     if parts.free_links:
         many = plural(parts.spare_equations, "equation")
-        lines.append(f"{many} more than unknowns, in the links {short(parts.free_links, LISTED)}")
+        lines.append(f"{many} more than unknowns, in the links {listed(parts.free_links, LISTED)}")
     if not lines:
         lines.append("every equation is matched to an unknown, and every unknown to an equation")
-    lines += [
-        f"{n} redundant whatever the dimensions, in the {loop_names(r, loops)}"
-        for n, loops in r.generic.places[:LISTED]
-    ]
-    return [Heading("By count alone (unknowns matched to equations)", 2), Bullets(tuple(lines))]
+    places = r.generic.places[:LISTED]
+    yield Bullets((*lines, *(f"{n} redundant whatever the dimensions, in the {loop_names(r, at)}" for n, at in places)))
 
 
-def _checks(r: DeterminacyReport) -> list[Any]:
-    if not r.geometry:
-        return []
-    return [
-        Heading("Checks", 2),
-        Paragraph(f"Rank decided by the {r.engine} engine; largest value taken for zero: {_size(r.dropped or 0.0)}."),
-    ]
-
-
-def _size(value: float) -> str:
-    """A dropped value; one that is no more than rounding without its size, which differs from machine to machine."""
-    return "rounding" if value < RANKS.doubt else f"{value:.2g} of the largest"
-
-
-def _ledger(r: DeterminacyReport) -> list[Any]:
+def _ledger(r: Facts) -> Iterator[Block]:
     lee, minimal = r.ledger("lee"), r.ledger("minimal")
-    rows = [
-        (
-            kind,
-            str(row.count),
-            f"{row.unknowns} / {row.equations}",
-            f"{minimal.by_kind[kind].unknowns} / {minimal.by_kind[kind].equations}",
-        )
-        for kind, row in lee.by_kind.items()
-    ]
-    rows.append(("sum", "", f"{lee.unknowns} / {lee.equations}", f"{minimal.unknowns} / {minimal.equations}"))
-    return [
-        Heading("Ledger of the force equations (unknowns / equations)", 2),
-        Table(("kind", "count", "as Lee writes them", "minimal"), tuple(rows), align="lrrr"),
-    ]
+
+    def both(a: Any, b: Any) -> tuple[str, str]:
+        return f"{a.unknowns} / {a.equations}", f"{b.unknowns} / {b.equations}"
+
+    rows = [(kind, str(row.count), *both(row, minimal.by_kind[kind])) for kind, row in lee.by_kind.items()]
+    rows.append(("sum", "", *both(lee, minimal)))
+    yield Table(("kind", "count", "as Lee writes them", "minimal"), tuple(rows), align="lrrr")
+
+
+def _checks(r: Facts) -> Iterator[Block]:
+    """How the rank was decided; a dropped value that is no more than rounding differs from machine to machine."""
+    if r.geometry:
+        dropped = r.dropped or 0.0
+        size = "rounding" if dropped < RANKS.doubt else f"{dropped:.2g} of the largest"
+        yield Paragraph(f"Rank decided by the {r.engine} engine; largest value taken for zero: {size}.")
+
+
+SECTIONS = (
+    Section("", ("mechanism", "verdict", "determinate"), lambda r: [Paragraph(verdict(r))]),
+    Section("", ("note",), lambda r: [Paragraph(r.note)] if r.note else []),
+    Section("", ("links", "pairs", "mobility_by_count", "generic", "mobility", "redundancy"), _numbers),
+    Section("", ("inputs", "finite_mobility", "stroke", "excess", "change_point", "margin", "near"), _why),
+    Section("", ("effects",), _best_change),
+    Section("Neither driven nor passive", ("undriven",), _findings("undriven")),
+    Section("Passive freedoms", ("passive",), _findings("passive")),
+    Section("Locked freedoms", ("locked",), _findings("locked")),
+    Section(
+        "Drivers",
+        ("drivable", "contradicting_drives", "dependent_drives", "not_drivable", "suggested_drives", "replaced_drives"),
+        _drivers,
+    ),
+    Section("Reactions", ("unique", "near_other_uniqueness"), _reactions),
+    Section("Self-stresses", ("self_stress_count", "self_stresses"), _stresses),
+    Section(
+        "Unique only in combination", ("unique_directions", "combinations", "groups_without_combinations"), _combined
+    ),
+    Section("Advice", ("advice",), _advice),
+    Section("Loops", ("loops",), _loops),
+    Section("By count alone (unknowns matched to equations)", ("parts",), _count),
+    Section("Ledger of the force equations (unknowns / equations)", ("ledger",), _ledger),
+    Section("Checks", ("engine", "dropped"), _checks),
+)
+"""All facts in the order of the report."""

@@ -1,18 +1,16 @@
-"""The determinacy report in sentences: the verdict and the reasons. Pure functions of a report."""
+"""The determinacy report in sentences: the verdict and the reasons. Pure functions of the facts."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from mechgraph.closure.indexing import Index
 from mechgraph.model.pair import second_direction
 from mechgraph.numerics.tolerances import RANKS
-
-if TYPE_CHECKING:
-    from mechgraph.closure.indexing import Index
-    from mechgraph.report.report import DeterminacyReport
-    from mechgraph.structure.uniqueness import Uniqueness
+from mechgraph.report.facts import Facts
+from mechgraph.structure.uniqueness import Uniqueness
 
 NAMED = 8
 """Most names that a sentence lists."""
@@ -27,45 +25,54 @@ def plural(count: int, one: str, many: str = "") -> str:
     return f"{count} {one if count == 1 else many or one + 's'}"
 
 
-def short(names: tuple[str, ...] | list[str], most: int = NAMED, count: int | None = None) -> str:
+def listed(names: Sequence[str], most: int = NAMED, count: int | None = None) -> str:
     """Names in a row, the first few of many (of ``count``, where only those are given)."""
     more = (len(names) if count is None else count) - most
     return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")
 
 
-def verdict(r: DeterminacyReport) -> str:
+def verdict(r: Facts) -> str:
     """The verdict in one sentence, and a second one where a small change of the dimensions may change the verdict."""
     if r.mobility is None:
         return _of_topology(r)
-    return _here(r) + _near(r)
+    return _of_position(r) + _near(r)
 
 
-def _near(r: DeterminacyReport) -> str:
+def _near(r: Facts) -> str:
     if not r.near or r.margin is None or r.dropped is None or _over_driven(r):
         return ""
     if r.dead_point:
         return f" Near a dead point: {weakest_drive(r)} hardly moves when the mechanism does."
     if r.dropped > r.margin * DROPPED:
         return f" Near another verdict: a singular value of {r.dropped:.2g} of the largest was taken for zero."
+    if not r.near_other_rank and r.reactions:
+        return f" Near another verdict: {_doubtful_part(r.reactions)}."
     return f" Nearly singular: margin {r.margin:.2g}."
 
 
-def _over_driven(r: DeterminacyReport) -> bool:
+def _doubtful_part(known: Uniqueness) -> str:
+    """The component whose part in the self-stresses is nearest to the limit, on either side."""
+    name, size, unique = known.most_doubtful
+    verb = "unique, but has" if unique else "not unique, but has only"
+    return f"{name} is called {verb} a part of {size:.1g} in the self-stresses"
+
+
+def _over_driven(r: Facts) -> bool:
     """Whether there are more drivers than motions; then some depend on others without a dead point."""
     return bool(r.mobility) and len(r.mechanism.drives) > (r.mobility or 0)
 
 
-def weakest_drive(r: DeterminacyReport) -> str:
+def weakest_drive(r: Facts) -> str:
     """The driver that moves least; drivers, where several depend on each other."""
     g, drives = r.geometry, [r.mechanism.full_name(d.freedom) for d in r.mechanism.drives]
     if g is None or len(drives) == 1:
         return f"the driver {drives[0]}" if drives else "no driver"
-    parts = np.sqrt((g.freedoms.null[g.driven] ** 2).sum(axis=1))
-    weak = [name for name, part in zip(drives, parts, strict=True) if part < 2 * g.freedoms.drive * parts.max()]
+    size = np.sqrt((g.freedoms.null[g.driven] ** 2).sum(axis=1))
+    weak = [name for name, mine in zip(drives, size, strict=True) if mine < 2 * g.freedoms.drive * size.max()]
     return f"the driver {weak[0]}" if len(weak) == 1 else "a combination of the drivers"
 
 
-def _counts(r: DeterminacyReport) -> str:
+def _counts(r: Facts) -> str:
     book = r.ledger("lee")
     return (
         f"{plural(len(r.mechanism.drives), 'driver')}, {plural(book.unknowns, 'unknown')}, "
@@ -73,7 +80,7 @@ def _counts(r: DeterminacyReport) -> str:
     )
 
 
-def _here(r: DeterminacyReport) -> str:
+def _of_position(r: Facts) -> str:
     drivers = len(r.mechanism.drives)
     if r.contradicting_drives and r.mobility:
         if drivers <= r.mobility:
@@ -83,10 +90,7 @@ def _here(r: DeterminacyReport) -> str:
             f"Over-driven: mobility {r.mobility}, {plural(drivers, 'driver')} that cannot all be moved independently."
         )
     if r.undriven:
-        verb = "is" if len(r.undriven) == 1 else "are"
-        free = f"{plural(len(r.undriven), 'freedom')} {verb} neither driven nor passive"
-        shaky = " The mobility is infinitesimal only: a shaky structure." if _shaky(r) else ""
-        return f"Under-driven: mobility {r.mobility}, {plural(drivers, 'driver')}; {free}.{shaky}"
+        return _left_free(r)
     if not r.mobility and drivers:
         return _driven_structure(r)
     if r.reactions is None or r.reactions.all_unique:
@@ -94,10 +98,21 @@ def _here(r: DeterminacyReport) -> str:
         held = f" ({plural(len(r.passive), 'passive freedom')} held: {more} more)" if r.passive else ""
         state = "Determinate" if r.mobility else "Determinate structure"
         return f"{state}: {_counts(r)}; every reaction is unique{held}."
-    return f"{_state(r)}, {_tied(r)}{_efforts(r)}."
+    return f"{_state(r)}, {_not_unique(r, r.reactions)}{_efforts(r, r.reactions)}."
 
 
-def _driven_structure(r: DeterminacyReport) -> str:
+def _left_free(r: Facts) -> str:
+    """A freedom is left free; at a change point that may be one of the position alone."""
+    drivers, verb = plural(len(r.mechanism.drives), "driver"), "is" if len(r.undriven) == 1 else "are"
+    free = f"{plural(len(r.undriven), 'freedom')} {verb} neither driven nor passive"
+    if not r.change_point:
+        shaky = " The mobility is infinitesimal only: a shaky structure." if _shaky(r) else ""
+        return f"Under-driven: mobility {r.mobility}, {drivers}; {free}.{shaky}"
+    state = "under-driven at" if r.suggested_drives else "at"
+    return f"Finite mobility {r.finite_mobility}, {drivers}, {state} a change point: mobility {r.mobility} here; {free} here."
+
+
+def _driven_structure(r: Facts) -> str:
     """A structure with drivers on it."""
     one = len(r.mechanism.drives) == 1
     who = f"{weakest_drive(r)} only strains it" if one else "its drivers only strain it"
@@ -109,11 +124,11 @@ def _driven_structure(r: DeterminacyReport) -> str:
     return f"A structure (mobility 0), which cannot be driven: {who}; {rest}."
 
 
-def _shaky(r: DeterminacyReport) -> bool:
+def _shaky(r: Facts) -> bool:
     return bool(r.mobility) and r.finite_mobility == 0
 
 
-def _state(r: DeterminacyReport) -> str:
+def _state(r: Facts) -> str:
     if not r.mobility:
         return "A structure (mobility 0)"
     if _shaky(r):
@@ -121,66 +136,57 @@ def _state(r: DeterminacyReport) -> str:
     return f"Moves with mobility {r.finite_mobility}"
 
 
-def _tied(r: DeterminacyReport) -> str:
+def _not_unique(r: Facts, known: Uniqueness) -> str:
     """Which components are not unique, and in how many groups of self-stresses."""
-    found = r.reactions
-    if found is None:
-        return ""
-    sets = _patterns(found)
+    m, sets = r.mechanism, _patterns(known)
     total = sum(len(names) * len(pairs) for names, pairs in sets)
-    m = r.mechanism
     shown = [
-        f"{_joined(names)} of {short([m.pairs[k].name for k in pairs[:NAMED]], NAMED, len(pairs))}"
+        f"{_joined(names)} of {listed([m.pairs[k].name for k in pairs[:NAMED]], NAMED, len(pairs))}"
         for names, pairs in sets[:SETS]
     ]
     if len(sets) > SETS:
         shown.append(f"others of {plural(sum(len(p) for _, p in sets[SETS:]), 'further pair')}")
-    loose = [c.name for c, ok in zip(m.couplings, found.coupling_is_unique.tolist(), strict=True) if not ok]
+    loose = [c.name for c, ok in zip(m.couplings, known.coupling_is_unique.tolist(), strict=True) if not ok]
     who = "effort of the coupling {} is" if len(loose) == 1 else "efforts of the couplings {} are"
-    tied = f"the {who.format(short(loose, NAMED))} not unique"
+    tied = f"the {who.format(listed(loose, NAMED))} not unique"
     if not total:
         return f"but {tied} (redundancy {r.redundancy})"
     more = f"; {tied}" if loose else ""
-    form = "form one self-stress group" if found.groups == 1 else f"form {plural(found.groups, 'self-stress group')}"
+    form = "form one self-stress group" if known.groups == 1 else f"form {plural(known.groups, 'self-stress group')}"
     components = "reaction component is" if total == 1 else "reaction components are"
     return f"but {total} {components} not unique: {'; '.join(shown)} {form}{more} (redundancy {r.redundancy})"
 
 
-def _patterns(found: Uniqueness) -> list[tuple[list[str], Index]]:
+def _patterns(known: Uniqueness) -> list[tuple[list[str], Index]]:
     """Names of reaction components that are not unique, and the pairs of which they are, in order of declaration."""
-    parts, loose = found.parts, ~found.is_unique
-    pairs = parts.system.m.pairs
+    components, loose = known.components, ~known.is_unique
+    pairs = components.system.m.pairs
     by_names: dict[tuple[str, ...], list[Index]] = {}
-    for g in parts.system.groups:
+    for g in components.system.groups:
         names = pairs[int(g.pairs[0])].type.component_names
-        mine = loose[parts.first[g.pairs][:, None] + np.arange(len(names))]
+        mine = loose[components.first[g.pairs][:, None] + np.arange(len(names))]
         code = mine @ (1 << np.arange(len(names)))
         for value in np.unique(code[code > 0]):
             which = tuple(n for i, n in enumerate(names) if value >> i & 1)
             by_names.setdefault(which, []).append(g.pairs[code == value])
-    out = [
-        (int(both[0]), list(which), both)
-        for which, some in by_names.items()
-        for both in [np.sort(np.concatenate(some))]
-    ]
-    return [(which, mine) for _, which, mine in sorted(out, key=lambda item: item[0])]
+    out = [(list(which), np.sort(np.concatenate(some))) for which, some in by_names.items()]
+    return sorted(out, key=lambda item: int(item[1][0]))
 
 
 def _joined(names: list[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
-def _efforts(r: DeterminacyReport) -> str:
-    if not r.mechanism.drives or r.reactions is None:
+def _efforts(r: Facts, known: Uniqueness) -> str:
+    if not r.mechanism.drives:
         return ""
-    parts = r.reactions.parts
-    one = len(r.mechanism.drives) == 1
-    if not r.reactions.is_unique[parts.efforts].all():
-        return "; the driver effort is not unique" if one else "; driver efforts are not all unique"
-    return "; the driver effort is unique" if one else "; all driver efforts are unique"
+    unique = bool(known.is_unique[known.components.efforts].all())
+    if len(r.mechanism.drives) == 1:
+        return f"; the driver effort is {'' if unique else 'not '}unique"
+    return f"; {'all driver efforts are unique' if unique else 'driver efforts are not all unique'}"
 
 
-def _of_topology(r: DeterminacyReport) -> str:
+def _of_topology(r: Facts) -> str:
     generic, count = r.generic, _counts(r)
     drivers = len(r.mechanism.drives)
     if generic.excess:
@@ -202,7 +208,7 @@ def _of_topology(r: DeterminacyReport) -> str:
     return f"{count}: determinate for general geometry (mobility {generic.mobility})."
 
 
-def loop_names(r: DeterminacyReport, loops: tuple[int, ...]) -> str:
+def loop_names(r: Facts, loops: tuple[int, ...]) -> str:
     """``loop A-B-C-D``: loops by their pairs, the first few of many, long ones by their ends."""
 
     def name(i: int) -> str:
@@ -213,14 +219,14 @@ def loop_names(r: DeterminacyReport, loops: tuple[int, ...]) -> str:
     return ("loop " if len(loops) == 1 else "loops ") + ", ".join(name(i) for i in loops[:SETS]) + more
 
 
-def reasons(r: DeterminacyReport) -> list[str]:
+def reasons(r: Facts) -> list[str]:
     """Why count and rank differ, in the words of the report."""
     if not r.geometry:
         return []
     return _excess(r) + _finite(r) + _margin(r) or ["Count and rank agree: no equation is redundant."]
 
 
-def assumed(r: DeterminacyReport) -> list[str]:
+def assumed(r: Facts) -> list[str]:
     """Second directions that were left out where the pair type needs one."""
     return [
         f"{p.name} ({p.type.symbol}): no second direction was given; x = ({', '.join(f'{v:.4g}' for v in p.second)}) was taken. Give "
@@ -230,7 +236,7 @@ def assumed(r: DeterminacyReport) -> list[str]:
     ]
 
 
-def _excess(r: DeterminacyReport) -> list[str]:
+def _excess(r: Facts) -> list[str]:
     excess, out = r.excess, []
     if excess["structural"]:
         places = "; ".join(f"{n} in the {loop_names(r, loops)}" for n, loops in r.generic.places[:SETS])
@@ -251,29 +257,42 @@ def _excess(r: DeterminacyReport) -> list[str]:
     return out
 
 
-def _finite(r: DeterminacyReport) -> list[str]:
+def _finite(r: Facts) -> list[str]:
     out = []
     if _shaky(r):
         out.append("Shaky: the mobility is infinitesimal only; the loops stay closed over no finite stroke.")
     elif r.mobility and r.finite_mobility is not None and r.finite_mobility < r.mobility:
         out.append(f"Of mobility {r.mobility} here, {r.finite_mobility} is finite; the rest is instantaneous.")
-    if r.motion and r.motion.stroke:
-        out.append(
-            f"Motion checked: followed over a stroke of {r.motion.stroke:.2g} (radians, or lengths / L) with the loops closed."
-        )
+    if r.stroke:
+        length = f"{r.stroke:.2g} (radians, or lengths / L)"
+        out.append(f"Motion checked: followed over a stroke of {length} with the loops closed.")
     return out
 
 
-def _margin(r: DeterminacyReport) -> list[str]:
+def _margin(r: Facts) -> list[str]:
     if r.dead_point and r.geometry and not _over_driven(r):
         return [
             f"Near a dead point of {weakest_drive(r)}: it moves {r.geometry.freedoms.drive:.2g} times as much as the freedom that moves "
             "most, so its effort and the reactions grow without bound."
         ]
-    if not r.near:
-        return []
-    gap = f", largest taken for zero {r.dropped:.1g}" if (r.dropped or 0.0) > RANKS.doubt else ""
-    return [
-        f"Near another verdict: smallest singular value kept {r.margin:.2g} of the largest{gap}. A small change of dimensions or "
-        "position may change mobility and uniqueness; forces may be large."
-    ]
+    out = []
+    if r.near_other_rank:
+        gap = f", largest taken for zero {r.dropped:.1g}" if (r.dropped or 0.0) > RANKS.doubt else ""
+        out.append(
+            f"Near another verdict: smallest singular value kept {r.margin:.2g} of the largest{gap}. A small change of dimensions or "
+            "position may change mobility and uniqueness; forces may be large."
+        )
+    if r.near_other_uniqueness and r.reactions:
+        out.append(
+            f"Near another verdict: {_doubtful_part(r.reactions)}. A small change of dimensions may change what is unique, at the "
+            "same mobility and redundancy."
+        )
+    return out
+
+
+def mobility_line(r: Facts) -> str:
+    """What the mobility is made of, and how far the position is from a singular one."""
+    return (
+        f"Mobility {r.mobility} = {plural(r.inputs or 0, 'input freedom')} + {plural(len(r.passive), 'passive freedom')}; "
+        f"finite mobility: {r.finite_mobility}. Margin to a singular position: {r.margin:.3g} (near below {r.near_below:.3g})."
+    )

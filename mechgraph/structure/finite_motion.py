@@ -11,6 +11,10 @@ space N is tried alone, and what is left of it once the loops are closed by the 
 a direction in which nothing moves on loses its part at any step size and does not count.
 So the mobility is never above a nullity on the way. Chords of a curved motion are never ranked against each other: they differ in
 direction by its curvature. Source for the notion: Connelly and Whiteley, Second-order rigidity and prestress stability, 1996.
+
+From a regular position the motion is then followed as every path is (``numerics.continuation``), n of its freedoms being given. The test
+itself cannot be left to the follower: it presumes a regular start, chooses other rows where those chosen do not close all loops, and
+takes no step on a branch along which the rank is nowhere full (a shaky part carried by a mechanism that moves).
 """
 
 from __future__ import annotations
@@ -21,17 +25,24 @@ from functools import cached_property
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.assembly import CLOSED, CLOSURE_GOAL
+from mechgraph.closure.assembly import CLOSED, CLOSURE_GOAL, close
 from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.driver_path import DriverPath
 from mechgraph.closure.indexing import System
 from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
-from mechgraph.closure.rank import ClosureRank, EngineName, closure_rank
-from mechgraph.numerics.newton import closest_zeros
+from mechgraph.closure.rank import ClosureRank, EngineName, rank_of_rows
+from mechgraph.closure.solver import closure_solver, engine_for
+from mechgraph.numerics.continuation import Follower
+from mechgraph.numerics.linear import independent_rows
+from mechgraph.numerics.tolerances import RANKS
+from mechgraph.numerics.tracks import Paths
 
 STEPS = (0.05, 0.0125, 0.003)
 """Lengths of trial steps (radians, or lengths / L): the first ones tell a motion that returns, the last ones tolerate curvature."""
-FAR_STEPS = 6
-"""Further steps of the first length over which the motion is followed."""
+STROKE = 0.35
+"""Length over which a motion is followed."""
+RESOLUTION = 0.01
+"""Parts in which that length is given: just where it ends is a matter of step control."""
 KEPT = 0.5
 """Part of a step in one direction that must be left for it to count: about 1 on a motion, 0 where it returns."""
 MOVED = 0.05
@@ -46,72 +57,95 @@ STEPS_SEED = 7
 
 
 @dataclass(frozen=True)
-class _Position:
+class _Closed:
     """A closed position and the motions there, ``N`` orthonormal in columns of unit size."""
 
     system: System
     x: Array
-    found: ClosureRank
+    closure: ClosureRank
     engine: EngineName
 
-    @classmethod
-    def at(cls, system: System, x: Array, engine: EngineName) -> _Position:
-        return cls(system, x, closure_rank(Configuration(system, x[:, None]), engine=engine), engine)
+    def reached(self, x: Array) -> _Closed:
+        """A closed position reached from here."""
+        rows = ClosureRows.at(Configuration(self.system, x[:, None]))
+        return _Closed(self.system, x, rank_of_rows(rows, None, self.engine, RANKS.nearby), self.engine)
 
     @cached_property
     def N(self) -> Array:
-        return np.linalg.qr(self.found.motions / self.found.reduced.scale[:, None])[0]
+        return np.linalg.qr(self.closure.motions / self.closure.reduced.scale[:, None])[0]
 
-    def moved(self, v: Array, h: float) -> tuple[Array, float] | None:
-        """State after a step of ``N v`` of length ``h`` with the loops closed again, and the factor of the step; None where not."""
-        x, factor = self._stepped(v, h)
-        closed = _closed(self.system, x, self.found.reduced)
-        return None if closed is None else (closed, factor)
+    def increments(self, v: Array) -> Array:
+        """The motion ``N v`` with its largest increment one."""
+        dq = self.closure.reduced.scale * (self.N @ v)
+        return np.asarray(dq / np.abs(dq).max())
 
-    def _stepped(self, v: Array, h: float) -> tuple[Array, float]:
-        dq = self.found.reduced.scale * (self.N @ v)
-        factor = h / float(np.abs(dq).max())
-        return self.system.advance(self.x[:, None], factor * dq[:, None])[:, 0], factor
+    def moved(self, v: Array, h: float) -> Array | None:
+        """State after a step of ``N v`` of length ``h`` with the loops closed again by the smallest change; None where not."""
+        x, error = close(self.system, self._stepped(v, h), np.zeros(0, dtype=np.intp))
+        return x if error <= CLOSED else None
+
+    def _stepped(self, v: Array, h: float) -> Array:
+        return self.system.advance(self.x[:, None], h * self.increments(v)[:, None])[:, 0]
 
     def change(self, x: Array) -> Array:
         """Increments ``(F,)`` from here to a state."""
         return self.system.difference(x[:, None], self.x[:, None])[:, 0]
 
-    def kept(self, v: Array, h: float) -> Array | None:
-        """What is left of the step ``v`` in the null space, in units of the step."""
-        moved = self.moved(v, h)
-        if moved is None:
-            return None
-        return np.asarray(self.N.T @ (self.change(moved[0]) / self.found.reduced.scale) / moved[1])
+    def kept(self, v: Array, h: float) -> Array:
+        """What is left of the step ``v`` in the null space, in units of the step; nothing where the loops do not close."""
+        x = self.moved(v, h)
+        if x is None:
+            return np.zeros(len(v))
+        factor = h / float(np.abs(self.closure.reduced.scale * (self.N @ v)).max())
+        return np.asarray(self.N.T @ (self.change(x) / self.closure.reduced.scale) / factor)
 
     def random(self, rng: np.random.Generator) -> Array:
         """A random direction of size one: of a random vector of all freedoms, so that no basis of the motions matters."""
         v = self.N.T @ rng.normal(size=self.N.shape[0])
         return np.asarray(v / np.linalg.norm(v))
 
-    def regular(self, v: Array) -> bool:
-        """Whether the rows that are independent here close all loops after a random step.
+    def regular(self, v: Array) -> float:
+        """Length of the first step after which the rows that are independent here close all loops; 0 where there is none.
 
         Then the rank is constant nearby: the other rows depend on them not only here. Where it is not, they stay open by the square
         of the step (a change point) or a higher power (shaky), far above the closure error.
         """
-        rows = self.found.reduced
+        rows = self.closure.reduced
         already = rows.open_part(Configuration(self.system, self.x[:, None]).residual[:, 0])
         limit = 10 * max(CLOSURE_GOAL, rows.rounding, already)
         for h in STEPS:
-            closed = _corrected(self.system, self._stepped(v, h)[0], rows)
+            closed = _corrected(self.system, self._stepped(v, h), rows)
             if (
                 closed is not None
                 and rows.open_part(Configuration(self.system, closed[:, None]).residual[:, 0]) <= limit
             ):
-                return True
-        return False
+                return h
+        return 0.0
 
     def dimension(self) -> int:
         """Number of directions in which a step is kept."""
-        columns = [self.kept(v, STEPS[1]) for v in np.eye(self.N.shape[1])]
-        table = np.stack([c if c is not None else np.zeros(self.N.shape[1]) for c in columns])
+        table = np.stack([self.kept(v, STEPS[1]) for v in np.eye(self.N.shape[1])])
         return int((np.linalg.svd(table, compute_uv=False) > KEPT).sum())
+
+    def followed(self, v: Array) -> float:
+        """Length over which the motion ``N v`` goes on with the loops closed, as many single freedoms given as move independently.
+
+        Only these can be given along a path; what turns in spheres alone (the spin of a coupler) is held, as in every solution.
+        """
+        single = np.flatnonzero(self.system.single_rows >= 0)
+        given = np.array(independent_rows(self.N, single.tolist(), self.N.shape[1]), dtype=np.intp)
+        ahead = STROKE * self.increments(v)[given]
+        if not np.abs(ahead).max(initial=0.0) > MOVED * STEPS[0]:
+            return 0.0
+        solver = closure_solver(engine_for(self.system.n_rows, 1, self.engine), given)
+        path = DriverPath(self.system, solver, lambda variants: self.system)
+        path.variant_of = np.zeros(1, dtype=np.intp)
+        begin = self.x[path.rows]
+        paths = Paths([np.stack([begin, begin + ahead], axis=1)])
+        nodes = Follower(path).follow(self.x[:, None], paths).nodes
+        closed = Configuration(self.system, nodes.x).closure <= CLOSED
+        length = STROKE * float(nodes.place[closed].max(initial=0.0)) / float(paths.end[0])
+        return RESOLUTION * np.floor(length / RESOLUTION + 1e-6)
 
 
 @dataclass(frozen=True)
@@ -123,79 +157,67 @@ class FiniteMotion:
     mobility : dimension of the set of nearby closed positions.
     rank_nearby : largest rank of the closure Jacobian at nearby closed positions.
     begin : a position and a direction in which it moves on; None where nothing moves.
+    step : length of the step by which that was confirmed.
     """
 
     mobility: int
     rank_nearby: int
-    begin: tuple[_Position, Array] | None = field(default=None, repr=False)
+    begin: tuple[_Closed, Array] | None = field(default=None, repr=False)
+    step: float = 0.0
 
     @cached_property
     def stroke(self) -> float:
         """Length over which a motion was followed with the loops closed (0 where nothing moves)."""
-        return _followed(*self.begin) if self.begin and self.mobility else 0.0
+        if not self.begin or not self.mobility:
+            return 0.0
+        start, v = self.begin
+        return start.followed(v) or self.step or start.regular(v)
 
     @cached_property
     def null_nearby(self) -> Array | None:
         """Motions ``(F, M)`` at a position reached by a motion; None where nothing moves."""
-        moved = self.begin and self.begin[0].moved(self.begin[1], STEPS[0])
-        if not self.begin or not moved:
-            return None
-        return _Position.at(self.begin[0].system, moved[0], self.begin[0].engine).found.motions
+        x = self.begin[0].moved(self.begin[1], STEPS[0]) if self.begin else None
+        return self.begin[0].reached(x).closure.motions if self.begin and x is not None else None
 
 
-def finite_motion(system: System, x: Array, found: ClosureRank, engine: EngineName = "auto") -> FiniteMotion:
-    """Follow the motions of a closed state ``x (nx,)`` where ``found`` is the rank of its closure equations.
+def finite_motion(system: System, x: Array, closure: ClosureRank, engine: EngineName = "auto") -> FiniteMotion:
+    """Follow the motions of a closed state ``x (nx,)`` where ``closure`` is the rank of its closure equations.
 
     Where the closure Jacobian has full row rank the dimension is its nullity (implicit function theorem).
     """
-    here = _Position(system, x, found, engine)
-    nullity = found.motions.shape[1]
+    start = _Closed(system, x, closure, engine)
+    nullity = closure.motions.shape[1]
     if not nullity:
-        return FiniteMotion(0, found.rank)
+        return FiniteMotion(0, closure.rank)
     rng = np.random.default_rng(STEPS_SEED)
-    v = here.random(rng)
-    if found.rank == found.count or here.regular(v):
-        return FiniteMotion(nullity, found.rank, (here, v))
-    return _near_by(here, rng)
+    v = start.random(rng)
+    step = 0.0 if closure.rank == closure.count else start.regular(v)
+    if step or closure.rank == closure.count:
+        return FiniteMotion(nullity, closure.rank, (start, v), step)
+    return _near_by(start, rng)
 
 
-def _near_by(here: _Position, rng: np.random.Generator) -> FiniteMotion:
+def _near_by(start: _Closed, rng: np.random.Generator) -> FiniteMotion:
     """The mobility about a position that is not regular: the largest of those at positions reached from it."""
-    mobility, rank, begin = 0, here.found.rank, None
+    best = FiniteMotion(0, start.closure.rank)
+    rank = best.rank_nearby
     for _ in range(TRIALS):
-        moved = here.moved(here.random(rng), STEPS[0])
-        if moved is None:
+        x = start.moved(start.random(rng), STEPS[0])
+        if x is None:
             continue
-        change = here.change(moved[0])
-        if not np.abs(change).max() > MOVED * STEPS[0]:
+        change = start.change(x)
+        length = float(np.abs(change).max())
+        if not length > MOVED * STEPS[0]:
             continue
-        there = _Position.at(here.system, moved[0], here.engine)
-        rank = max(rank, there.found.rank)
+        there = start.reached(x)
+        rank = max(rank, there.closure.rank)
         if not there.N.shape[1]:
             continue
-        regular = there.regular(there.random(rng))
-        dimension = there.N.shape[1] if regular else there.dimension()
-        if dimension > mobility:
-            mobility, begin = dimension, (there, there.N.T @ (change / there.found.reduced.scale))
-    return FiniteMotion(mobility, rank, begin)
-
-
-def _followed(begin: _Position, v: Array) -> float:
-    """Stroke over which a motion can be continued in the same sense."""
-    stroke, at = 0.0, begin
-    for _ in range(FAR_STEPS + 1):
-        moved = at.moved(v, STEPS[0])
-        if moved is None:
-            break
-        change = at.change(moved[0])
-        if not np.abs(change).max() > MOVED * STEPS[0]:
-            break
-        stroke += float(np.abs(change).max())
-        at = _Position.at(at.system, moved[0], at.engine)
-        v = at.N.T @ (change / at.found.reduced.scale)
-        if not np.linalg.norm(v) > MOVED * STEPS[0]:
-            break
-    return stroke
+        dimension = there.N.shape[1] if there.regular(there.random(rng)) else there.dimension()
+        if dimension > best.mobility:
+            v = there.N.T @ (change / there.closure.reduced.scale)
+            best = FiniteMotion(min(dimension, start.N.shape[1]), rank, (there, v), length)
+    return FiniteMotion(best.mobility, rank, best.begin, best.step)
 
 
 def _corrected(system: System, x: Array, rows: ReducedRows) -> Array | None:
@@ -211,19 +233,3 @@ def _corrected(system: System, x: Array, rows: ReducedRows) -> Array | None:
         before = error
         x = system.advance(x[:, None], rows.correction(residual)[:, None])[:, 0]
     return None
-
-
-def _closed(system: System, x: Array, rows: ReducedRows) -> Array | None:
-    """The loops closed from ``x``: with the rows of a nearby position where they converge, otherwise by Newton; None where not."""
-    quick = _corrected(system, x, rows)
-    if quick is not None and float(Configuration(system, quick[:, None]).closure[0]) <= CLOSED:
-        return quick
-
-    def least(here: Configuration) -> Array:
-        new = ReducedRows(ClosureRows.at(here), np.zeros(0, dtype=np.intp), rows.dense)
-        return new.correction(here.residual[:, 0])[:, None]
-
-    best, _ = closest_zeros(
-        lambda x: Configuration(system, x), least, system.advance, x[:, None], tolerance=CLOSURE_GOAL
-    )
-    return best[:, 0] if float(Configuration(system, best).closure[0]) <= CLOSED else None

@@ -55,25 +55,18 @@ class Freedoms:
         """Motions with the drivers at rest that are not passive."""
         return tuple(_complement(self.position.m, self.left, self.passive))
 
-    @property
-    def rank(self) -> int:
-        """Rank of the closure Jacobian."""
-        return self.closure.rank
+    @cached_property
+    def inputs(self) -> Array:
+        """Motions ``(F, M)`` without their passive part."""
+        if not self.passive:
+            return self.null
+        P, _ = np.linalg.qr(np.stack([p.rates for p in self.passive], axis=1))
+        return np.asarray(self.null - P @ (P.T @ self.null))
 
     @property
     def redundancy(self) -> int:
         """Closure equations minus rank."""
         return self.closure.count - self.closure.rank
-
-    @property
-    def margin(self) -> float:
-        """Smallest singular value kept, as part of the largest."""
-        return self.closure.margin
-
-    @property
-    def dropped(self) -> float:
-        """Largest value that counted as zero, as part of the largest."""
-        return self.closure.dropped
 
     @property
     def mobility(self) -> int:

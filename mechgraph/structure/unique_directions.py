@@ -44,25 +44,25 @@ class UniqueDirection:
         return f"{self.pair}: {self.kind} {'across' if self.across else 'along'} ({shown}) is unique"
 
 
-def unique_directions(parts: Components, table: Array) -> tuple[tuple[UniqueDirection, ...], set[int]]:
+def unique_directions(components: Components, table: Array) -> tuple[tuple[UniqueDirection, ...], set[int]]:
     """Directions unique in a pair though its components are not; and components that these make known from others.
 
     ``table (components, s)`` are the parts of the components in the self-stresses.
     """
     not_unique = (table**2).sum(axis=1) > UNIQUE**2
-    found: list[tuple[tuple[int, int], UniqueDirection]] = []
+    named: list[tuple[tuple[int, int], UniqueDirection]] = []
     known: set[int] = set()
-    for g, group in enumerate(parts.system.groups):
+    for g, group in enumerate(components.system.groups):
         for order, ((frame, kind), axes, numbers) in enumerate(_vectors(group.row.reactions or ())):
-            rows = parts.first[group.pairs][:, None] + numbers
+            rows = components.first[group.pairs][:, None] + numbers
             for some, mine in _alike(not_unique[rows]):
                 for i, unique in zip(some, _directions(table[rows[np.ix_(some, mine)]]), strict=True):
                     if unique.shape[1]:
                         pair = int(group.pairs[i])
-                        R = parts.here.frames[g][frame][:, :3, i, 0]
-                        found.append(((pair, order), _named(parts, pair, kind, axes[mine], unique, R)))
+                        R = components.here.frames[g][frame][:, :3, i, 0]
+                        named.append(((pair, order), _named(components, pair, kind, axes[mine], unique, R)))
                         known |= set(_dependent(unique, rows[i, mine].tolist()))
-    return tuple(direction for _, direction in sorted(found, key=lambda item: item[0])), known
+    return tuple(direction for _, direction in sorted(named, key=lambda item: item[0])), known
 
 
 def _vectors(reactions: tuple[Component, ...]) -> Iterator[tuple[tuple[int, str], Index, Index]]:
@@ -98,14 +98,14 @@ def _directions(rows: Array) -> list[Array]:
     return out
 
 
-def _named(parts: Components, pair: int, kind: str, axes: Index, unique: Array, R: Array) -> UniqueDirection:
+def _named(components: Components, pair: int, kind: str, axes: Index, unique: Array, R: Array) -> UniqueDirection:
     across = unique.shape[1] > 1
     inner = null_space(unique.T, 1e-9) if across else unique
     direction = np.zeros(3)
     direction[axes] = inner[:, 0]
     direction = np.where(np.abs(direction) < ROUND, 0.0, direction)
     direction = direction * np.sign(direction[np.flatnonzero(direction)[0]])
-    name = parts.system.m.pairs[pair].name
+    name = components.system.m.pairs[pair].name
     return UniqueDirection(name, kind, tuple(direction.tolist()), across, tuple((R @ direction).tolist()))
 
 

@@ -13,11 +13,14 @@ from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.rank import ClosureRank, EngineName, closure_rank
 from mechgraph.closure.sparse_solver import PROBES, SEED
+from mechgraph.numerics.tolerances import STRESSES
 from mechgraph.structure.components import Components
 from mechgraph.structure.reaction_split import UNIQUE
 from mechgraph.structure.self_stress import Basis, SelfStress, basis_of, combinations
 from mechgraph.structure.unique_directions import UniqueDirection, unique_directions
 
+BASIS = 48
+"""Number of self-stresses up to which all of them tell what is unique; more are represented by random ones."""
 CONNECTING = 200
 """Number of self-stresses that connect loops up to which they are computed; their echelon form is dense, of that width."""
 
@@ -26,80 +29,102 @@ CONNECTING = 200
 class Uniqueness:
     """The verdict on reactions at one position; what is expensive is computed when first asked for.
 
-    ``parts`` the components, ``found`` the closure equations with the drivers at rest, ``table (components, probes)`` their parts in
-    random self-stresses of size one in the measure of every loop, so that the verdict does not depend on how many loops there are;
-    ``coupled (couplings, probes)`` the greatest effort of every coupling in them.
+    ``closure`` are the closure equations with the drivers at rest, ``table (components, probes)`` the parts of the components in
+    self-stresses of size one in the measure of every loop, so that the verdict does not depend on how many loops there are: in an
+    orthonormal basis of them, or in random ones where they are many; ``coupled (couplings, probes)`` the greatest effort of every
+    coupling in them.
     """
 
-    parts: Components
-    found: ClosureRank
+    components: Components
+    closure: ClosureRank
     table: Array
     coupled: Array
 
     @property
     def count(self) -> int:
         """Number of self-stresses with the drivers in place."""
-        return self.found.count - self.found.rank
+        return self.closure.count - self.closure.rank
 
     @cached_property
     def sizes(self) -> Array:
-        """Part of every component in the random self-stresses."""
-        return np.sqrt((self.table**2).sum(axis=1))
+        """Part in the self-stresses of every component, in the order of ``components.labels``, and then of every coupling."""
+        return np.sqrt((np.concatenate([self.table, self.coupled]) ** 2).sum(axis=1))
 
     @property
     def is_unique(self) -> NDArray[np.bool_]:
-        """Whether each component is unique, in the order of ``parts.labels``."""
-        return self.sizes <= UNIQUE
+        """Whether each component is unique, in the order of ``components.labels``."""
+        return self.sizes[: self.components.count] <= UNIQUE
 
     @property
     def coupling_is_unique(self) -> NDArray[np.bool_]:
         """Whether the multiplier of each coupling is unique, in order of declaration."""
-        return np.asarray(np.sqrt((self.coupled**2).sum(axis=1)) <= UNIQUE)
+        return self.sizes[self.components.count :] <= UNIQUE
 
     @property
     def all_unique(self) -> bool:
         """Whether every reaction component, effort and multiplier is unique."""
-        return bool(self.is_unique.all() and self.coupling_is_unique.all())
+        return bool((self.sizes <= UNIQUE).all())
 
     @property
-    def weakest(self) -> float:
-        """Largest part of a self-stress in a component called unique."""
-        return float(self.sizes[self.is_unique].max(initial=0.0))
+    def margin(self) -> float:
+        """Smallest part of a self-stress in what is not unique; 1 where all is."""
+        return float(self.sizes[self.sizes > UNIQUE].min(initial=1.0))
+
+    @property
+    def dropped(self) -> float:
+        """Largest part of a self-stress in what is called unique."""
+        return float(self.sizes[self.sizes <= UNIQUE].max(initial=0.0))
+
+    @property
+    def is_near(self) -> bool:
+        """Whether a small change of dimensions may change what is unique at the same rank: parts come continuously from zero."""
+        return self.margin < STRESSES.near or self.dropped > STRESSES.doubt
+
+    @property
+    def most_doubtful(self) -> tuple[str, float, bool]:
+        """What has the part nearest to the limit (by ratio): its name, this part, and whether it is called unique."""
+        size = np.maximum(self.sizes, np.finfo(float).tiny)
+        i = int(np.argmin(np.abs(np.log(size / UNIQUE))))
+        names = [
+            *map(":".join, self.components.labels),
+            *(f"coupling {c.name}" for c in self.components.system.couplings),
+        ]
+        return names[i], float(self.sizes[i]), bool(self.sizes[i] <= UNIQUE)
 
     @cached_property
     def unique(self) -> dict[str, dict[str, bool]]:
         """Pair -> component -> whether it is unique; ``effort`` (or ``effort Tz``) for driven freedoms and for couplings."""
-        out: dict[str, dict[str, bool]] = {pair.name: {} for pair in self.parts.system.m.pairs}
-        for (pair, name), ok in zip(self.parts.labels, self.is_unique.tolist(), strict=True):
+        out: dict[str, dict[str, bool]] = {pair.name: {} for pair in self.components.system.m.pairs}
+        for (pair, name), ok in zip(self.components.labels, self.is_unique.tolist(), strict=True):
             out[pair][name] = ok
-        for coupling, ok in zip(self.parts.system.couplings, self.coupling_is_unique.tolist(), strict=True):
+        for coupling, ok in zip(self.components.system.couplings, self.coupling_is_unique.tolist(), strict=True):
             out[coupling.name] = {"effort": ok}
         return out
 
     @cached_property
     def basis(self) -> Basis:
         """Canonical sparse self-stresses: of single loops, then (up to ``CONNECTING``) those that connect loops."""
-        local = self.parts.of_loops(self.found)
-        shared = self.found.shared
+        local = self.components.of_loops(self.closure)
+        shared = self.closure.shared
         if not shared:
-            return basis_of(self.parts.count, local, [])
+            return basis_of(self.components.count, local, [])
         if shared > CONNECTING:
-            return basis_of(self.parts.count, local, self._places_of_sets())
-        states = self.parts.table(pair_states(self.parts.here, self.found.connecting(np.eye(shared))))
+            return basis_of(self.components.count, local, self._places_of_sets())
+        states = self.components.table(pair_states(self.components.here, self.closure.connecting(np.eye(shared))))
         touched = np.flatnonzero(np.abs(states).max(axis=1) > UNIQUE * np.abs(states).max())
-        number = np.array([self.parts.system.graph.n_loops])
-        return basis_of(self.parts.count, [*local, (number, touched[None], states[touched][None])], [])
+        number = np.array([self.components.system.graph.n_loops])
+        return basis_of(self.components.count, [*local, (number, touched[None], states[touched][None])], [])
 
     def _places_of_sets(self) -> list[Index]:
         """For every set of connected loops the components there that are not unique."""
-        loop, pair, _ = self.parts.system.graph.loop_steps
-        home = np.full(self.parts.system.graph.n_loops, -1)
-        sets = [loops for _, loops in self.found.sets if len(loops) > 1]
+        loop, pair, _ = self.components.system.graph.loop_steps
+        home = np.full(self.components.system.graph.n_loops, -1)
+        sets = [loops for _, loops in self.closure.sets if len(loops) > 1]
         for number, loops in enumerate(sets):
             home[list(loops)] = number
         loose = ~self.is_unique
         steps = [pair[home[loop] == number] for number in range(len(sets))]
-        return [np.flatnonzero(loose & np.isin(self.parts.owners, pairs)) for pairs in steps]
+        return [np.flatnonzero(loose & np.isin(self.components.owners, pairs)) for pairs in steps]
 
     @property
     def groups(self) -> int:
@@ -113,7 +138,7 @@ class Uniqueness:
 
     def first_states(self, count: int) -> tuple[SelfStress, ...]:
         """The first few self-stresses."""
-        return tuple(self.basis.state(i, self.parts.labels) for i in range(min(count, self.listed)))
+        return tuple(self.basis.state(i, self.components.labels) for i in range(min(count, self.listed)))
 
     @cached_property
     def states(self) -> tuple[SelfStress, ...]:
@@ -122,16 +147,16 @@ class Uniqueness:
 
     @cached_property
     def _directions(self) -> tuple[tuple[UniqueDirection, ...], set[int]]:
-        return unique_directions(self.parts, self.table)
+        return unique_directions(self.components, self.table)
 
     @property
-    def transverse(self) -> tuple[UniqueDirection, ...]:
+    def unique_directions(self) -> tuple[UniqueDirection, ...]:
         """Directions of force and moment that are unique in a pair though its components are not."""
         return self._directions[0]
 
     @cached_property
     def _sums(self) -> tuple[tuple[tuple[int, str], ...], int]:
-        return combinations(self.basis, self.parts.labels, self._directions[1])
+        return combinations(self.basis, self.components.labels, self._directions[1])
 
     @property
     def combinations(self) -> tuple[tuple[int, str], ...]:
@@ -145,20 +170,21 @@ class Uniqueness:
 
 
 def uniqueness(
-    here: Configuration, driven: Index, engine: EngineName = "auto", found: ClosureRank | None = None
+    here: Configuration, driven: Index, engine: EngineName = "auto", closure: ClosureRank | None = None
 ) -> Uniqueness:
     """Which reaction components and efforts are unique: those in which no self-stress has a part, drivers in place.
 
-    ``found``, where it is known, is the rank of the closure equations with the drivers at rest. The self-stresses are the null space
+    ``closure``, where it is known, is the rank of the closure equations with the drivers at rest. The self-stresses are the null space
     of ``[J^T, -E]``: of ``J^T`` in the columns that are not driven.
     """
-    parts = Components(here, driven)
-    found = found or closure_rank(here, driven, engine)
-    count = min(PROBES, found.count - found.rank)
-    probes = found.random_stress(np.random.default_rng(SEED), count)
+    components = Components(here, driven)
+    closure = closure or closure_rank(here, driven, engine)
+    few = closure.count - closure.rank <= BASIS
+    probes = closure.orthonormal_stress() if few else closure.random_stress(np.random.default_rng(SEED), PROBES)
     coefficients = np.abs(here.system.coupling_matrix).max(axis=1, initial=0.0)
     multipliers = probes[6 * here.system.graph.n_loops :]
-    return Uniqueness(parts, found, parts.table(pair_states(here, probes)), coefficients[:, None] * multipliers)
+    table = components.table(pair_states(here, probes))
+    return Uniqueness(components, closure, table, coefficients[:, None] * multipliers)
 
 
 def pair_states(here: Configuration, rows: Array) -> Array:

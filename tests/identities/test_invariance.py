@@ -36,7 +36,7 @@ def said(r: DeterminacyReport) -> tuple[object, ...]:
         r.excess,
         r.unique,
         [s.text for s in r.self_stresses],
-        [t.text for t in r.reactions.transverse],
+        [t.text for t in r.reactions.unique_directions],
         r.reactions.combinations,
         [p.links for p in r.passive],
         [d.freedoms for d in r.drivable],
@@ -124,3 +124,20 @@ def test_at_a_dead_point() -> None:
     assert not report.determinate
     assert report.verdict.startswith(("Badly driven", "Under-driven"))
     assert any("O4.Tz cannot drive: dead point" in found.text for found in report.not_drivable)
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.parametrize("slope", [0.0, 1e-10, 1e-9, 1e-6, 1e-5, 1e-2])
+def test_uniqueness_that_a_small_change_turns_is_near(slope: float, engine: str) -> None:
+    """A bar on two pins is strained along its line: Fy of the pins is unique only where the line is x, at any rank the same."""
+    m = known.ring("RR", [(0, 0, 0), (1, slope, 0)], [known.Z] * 2, drives=[])
+    report = mg.check(m, engine=engine)  # type: ignore[arg-type]
+    assert (report.mobility, report.redundancy) == (0, 4)
+    assert report.unique["O1"]["Fy"] == (slope < 1e-7)
+    nearly = 0.0 < slope < 1e-4
+    assert report.near == report.near_other_uniqueness == nearly
+    assert not report.near_other_rank
+    if nearly:
+        verb = "unique, but has a part" if slope < 1e-7 else "not unique, but has only a part"
+        assert f"Near another verdict: O1:Fy is called {verb} of " in report.verdict
+        assert "A small change of dimensions may change what is unique" in " ".join(str(report).split())

@@ -54,7 +54,7 @@ CASES = {
     "pphchp, 3 and 4 parallel": Case(lambda: known.pphchp(Z, Z, (1, 0.3, 0.2)), 2, 2, 1, (0, 1, 0)),
     "pphchp, 3 and 5 parallel": Case(lambda: known.pphchp(Z, (0.3, 0.2, 1), Z), 2, 2, 1, (0, 1, 0)),
     "pphchp, 4 and 5 parallel": Case(lambda: known.pphchp((1, 0.3, 0.2), Z, Z), 2, 2, 1, (0, 1, 0)),
-    "pphchp, coplanar": Case(lambda: known.pphchp(Z, X + Z, X), 2, 1, 1, (0, 0, 1)),
+    "pphchp, coplanar": Case(lambda: known.pphchp(Z, X + Z, X), 2, 1, 1, (0, 1, 0)),
     "prprrh, in general": Case(lambda: mg.load("prprrh"), 0, 0, 0),
     "prprrh, parallel": Case(known.prprrh_special, 1, 1, 1, (0, 1, 0)),
 }
@@ -170,9 +170,11 @@ def test_pphchp_with_three_parallel_axes_is_under_driven() -> None:
 
 
 def test_coplanar_pphchp_has_an_instantaneous_freedom() -> None:
+    """It only slides, so that the three axes stay coplanar: the rank is the same all along (values of 4e-8 there are a double root's)."""
     text = str(report("pphchp, coplanar"))
     assert "instantaneous" in text
-    assert "Singular here" in text
+    assert "Overconstrained by its dimensions" in text
+    assert "Singular here" not in text
 
 
 LIBRARY = [name for name in mg.library() if name != "rcsr-csr-printed"]
