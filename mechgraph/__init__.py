@@ -5,6 +5,7 @@ from mechgraph.equations.build import formulate
 from mechgraph.equations.formulation import Formulation
 from mechgraph.errors import (
     AssemblyError,
+    ContentError,
     DeadPointError,
     DeclarationError,
     FileError,
@@ -35,6 +36,7 @@ __all__ = [
     "AssemblyError",
     "Bookkeeping",
     "Component",
+    "ContentError",
     "Coupling",
     "DeadPointError",
     "DeclarationError",

@@ -21,6 +21,7 @@ from rich.text import Text
 
 import mechgraph as mg
 from mechgraph.document import Document, Table, to_text
+from mechgraph.model.toml import MOST_POSITIONS
 from mechgraph.result.summary import driver_value, summary
 
 DONE, NO_ANSWER, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -29,7 +30,6 @@ DONE, NO_ANSWER, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 NO_ANSWERS = (mg.AssemblyError, mg.ReachError, mg.DeadPointError, mg.IndeterminateError)
 """Errors that say that the mechanism has no answer; every other error is bad input."""
 
-MOST_POSITIONS = 1_000_000
 """Longest drive the command line takes."""
 
 UNBROKEN = 10_000

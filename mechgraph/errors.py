@@ -42,6 +42,15 @@ class FileError(MechgraphError):
         super().__init__(f"{path}: {reason}")
 
 
+class ContentError(DeclarationError, FileError):
+    """Faults in the content of a file that can be read: those of a declaration, and where they stand."""
+
+    def __init__(self, path: str | PathLike[str], found: DeclarationError) -> None:
+        self.path, self.reason = str(path), "its content is at fault"
+        self.subject, self.faults = found.subject, found.faults
+        MechgraphError.__init__(self, str(found))
+
+
 class AssemblyError(MechgraphError):
     """The loops cannot be closed.
 

@@ -3,29 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
+from mechgraph.arguments import items_of, option_faults
 from mechgraph.closure.assembly import assembled_at
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.closure.driver_path import Status
-from mechgraph.closure.solver import ENGINES
+from mechgraph.closure.solver import ENGINES, EngineName
 from mechgraph.errors import DeadPointError, DeclarationError, IndeterminateError, ReachError
-from mechgraph.force.dalembert import METHODS
+from mechgraph.force.dalembert import METHODS, MethodName
+from mechgraph.model.declaration import mapping_faults
 from mechgraph.model.load import Load
-from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.mechanism import Mechanism, check_mechanism
 from mechgraph.pipeline import Options, Outcome, Pipeline
 from mechgraph.report.report import check
 from mechgraph.result.solution import Solution
 from mechgraph.structure.branching import branches, branches_text
 
-ON_REACH = ("raise", "flag")
-REDUNDANT = ("nan", "minimum_norm")
-
-
-def _option(what: str, value: Any, allowed: Iterable[str]) -> list[str]:
-    return [] if value in allowed else [f"{what} = {value!r}: expected one of {', '.join(map(repr, allowed))}"]
+ReachName = Literal["raise", "flag"]
+RedundantName = Literal["nan", "minimum_norm"]
+ON_REACH: tuple[ReachName, ...] = ("raise", "flag")
+REDUNDANT: tuple[RedundantName, ...] = ("nan", "minimum_norm")
 
 
 def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exception | None:
@@ -78,9 +78,6 @@ def _check_drivers(line: Pipeline, outcome: Outcome) -> None:
 
 
 def _solve(m: Mechanism, motions: Mapping[str, Any] | None, on_reach: str, options: Options) -> Solution:
-    faults = _option("on_reach", on_reach, ON_REACH) + _option("engine", options.engine, ENGINES)
-    if faults:
-        raise DeclarationError(f"solve {m.name!r}", faults)
     line = Pipeline(DriverMotion(m, motions), options)
     outcome = line.run()
     _check_drivers(line, outcome)
@@ -92,9 +89,17 @@ def _solve(m: Mechanism, motions: Mapping[str, Any] | None, on_reach: str, optio
 
 
 def kinematics(
-    m: Mechanism, motions: Mapping[str, Any] | None = None, *, on_reach: str = "raise", engine: str = "auto"
+    m: Mechanism,
+    motions: Mapping[str, Any] | None = None,
+    *,
+    on_reach: ReachName = "raise",
+    engine: EngineName = "auto",
 ) -> Solution:
     """Positions, velocities and accelerations of all pairs and links, without forces; see ``solve``."""
+    check_mechanism(m, "kinematics")
+    faults = option_faults({"on_reach": (on_reach, ON_REACH), "engine": (engine, ENGINES)})
+    if faults:
+        raise DeclarationError(f"kinematics of {m.name!r}", faults)
     return _solve(m, motions, on_reach, Options(None, "nan", engine))
 
 
@@ -102,11 +107,11 @@ def solve(
     m: Mechanism,
     motions: Mapping[str, Any] | None = None,
     *,
-    method: str = "loop_wrench",
+    method: MethodName = "loop_wrench",
     loads: Iterable[Load] | None = None,
-    redundant: str = "nan",
-    on_reach: str = "raise",
-    engine: str = "auto",
+    redundant: RedundantName = "nan",
+    on_reach: ReachName = "raise",
+    engine: EngineName = "auto",
 ) -> Solution:
     """Driver efforts and all reactions for given driver motion (kinetostatics; statics where the rates are zero).
 
@@ -124,11 +129,20 @@ def solve(
     ------
     DeclarationError, AssemblyError, ReachError, DeadPointError, IndeterminateError
     """
-    faults = _option("method", method, METHODS) + _option("redundant", redundant, REDUNDANT)
+    check_mechanism(m, "solve")
+    faults = option_faults(
+        {
+            "method": (method, METHODS),
+            "redundant": (redundant, REDUNDANT),
+            "on_reach": (on_reach, ON_REACH),
+            "engine": (engine, ENGINES),
+        }
+    )
+    given = () if loads is None else items_of(loads, "loads", faults)
     if faults:
         raise DeclarationError(f"solve {m.name!r}", faults)
     if loads is not None:
-        m = m.replace(loads=tuple(loads))
+        m = m.replace(loads=given)
     return _solve(m, motions, on_reach, Options(method, redundant, engine))
 
 
@@ -144,6 +158,10 @@ def assemble(
     ------
     AssemblyError, ReachError
     """
+    check_mechanism(m, "assemble")
+    faults = mapping_faults(values=values, guess=guess)
+    if faults:
+        raise DeclarationError(f"assemble {m.name!r}", faults)
     system, x = assembled_at(m, {} if values is None else values, guess)
     wanted = {m.full_name(name): float(m.in_own_units(name, value)) for name, value in (values or {}).items()}
     q = system.coordinates_of(x[:, None], system.start_coordinates(m.start))[:, 0]

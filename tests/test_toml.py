@@ -3,6 +3,8 @@
 import contextlib
 import inspect
 import json
+import os
+import re
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -234,6 +236,66 @@ def test_no_toml_and_no_file_are_file_errors(tmp_path: Path) -> None:
         mg.load(tmp_path)
     with pytest.raises(mg.FileError, match="no mechanism of that name"):
         mg.load("no-such-mechanism")
+
+
+DEEP = 5000
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (FOUR_BAR.replace("schema = 1", f"schema = {'1' * 5000}", 1), "line 3: an integer of more digits"),
+        (FOUR_BAR + f"\n[extra]\nx = {10**400}\n", "field 'extra': an integer beyond 64 bits"),
+        (f"a = 1\nx = {'[' * DEEP}{']' * DEEP}", "line 2: nested too deeply"),
+        (f"\n\nx = {'{a = ' * DEEP}1{'}' * DEEP}", "line 3: nested too deeply"),
+        (f"{'[' * 100}{']' * 100}", "is no TOML"),
+        (f"x = {'[' * 100}{']' * 100}", "field 'x': nested more than 32 levels deep"),
+        ("a = 1\n" + ".".join(["b"] * 20000) + " = 1", "line 2: nested too deeply"),
+        (b"\xef\xbb\xbf" + FOUR_BAR.encode(), "line 1 begins with a byte-order mark"),
+        (FOUR_BAR.encode("utf-16"), "line 1: not in UTF-8"),
+        (b"a = 1\nb = '\xff'", "line 2: not in UTF-8"),
+    ],
+    ids=range(10),
+)
+def test_what_no_reader_can_hold_is_refused_with_its_place(tmp_path: Path, content: str | bytes, words: str) -> None:
+    path = tmp_path / "m.toml"
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    with pytest.raises(mg.FileError, match=re.escape(words)):
+        mg.load(path)
+
+
+@pytest.mark.parametrize("sweep", ["[0, 1e9, 1]", "[0, 1e99, 1e-99]", "[0.0, -1e12, -0.1]"])
+def test_a_sweep_of_too_many_positions_is_refused(tmp_path: Path, sweep: str) -> None:
+    path = written(tmp_path, FOUR_BAR.replace("[0.0, 360.0, 1.0]", sweep))
+    with pytest.raises(mg.FileError, match=r"drive 1\.motion\.sweep = .*at most 1000000 positions"):
+        mg.load(path)
+
+
+def test_a_file_that_never_ends_is_refused(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.toml")
+    (tmp_path / "null.toml").symlink_to("/dev/zero")
+    for name in ("pipe.toml", "null.toml"):
+        with pytest.raises(mg.FileError, match="no regular file"):
+            mg.load(tmp_path / name)
+    with (tmp_path / "long.toml").open("wb") as file:
+        file.truncate(2**40)
+    with pytest.raises(mg.FileError, match="larger than"):
+        mg.load(tmp_path / "long.toml")
+
+
+def test_faults_of_the_format_and_of_the_mechanism_come_at_once(tmp_path: Path) -> None:
+    text = FOUR_BAR.replace("schema = 1", "schema = 2").replace('kind = "gravity"', 'kind = "gravity"\nbad = 3')
+    text = text.replace('freedom = "A"', 'freedom = "Z"').replace("axis = [0.0, 0.0, 1.0]", "axis = [0.0, 0.0, 0.0]", 1)
+    path = written(tmp_path, re.sub(r'(name = "crank"\nmass = )([\d.]+)', r'\1"\2"', text))
+    with pytest.raises(mg.ContentError) as caught:
+        mg.load(path)
+    assert isinstance(caught.value, mg.FileError)
+    for words in ("schema = 2", "'bad'", "'Z'", "length 0", "mass = '"):
+        assert words in str(caught.value)
+    # where a thing is left out for its faults, what refers to it is not blamed
+    text = text.replace('name = "rocker"', 'nam = "rocker"', 1)
+    assert not any("not declared" in fault for fault in faults_of(tmp_path, text))
+    assert any("length 0" in fault for fault in faults_of(tmp_path, text))
 
 
 # --- writing -------------------------------------------------------------------------------------------------------------

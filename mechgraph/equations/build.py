@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
+from mechgraph.arguments import items_of, option_faults
 from mechgraph.equations.formulation import Formulation
 from mechgraph.equations.symbols import (
     LeeNames,
@@ -19,7 +21,7 @@ from mechgraph.equations.symbols import (
 )
 from mechgraph.equations.terms import AXES, Block, ScalarEquation, Screw, Term, Unknown
 from mechgraph.errors import DeclarationError
-from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.mechanism import Mechanism, check_mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.model.pair_type import Component, Freedom
 
@@ -119,6 +121,7 @@ def _lee(draft: _Draft, k: int) -> None:
     _define(draft, k, [("+", (free,)), *printed])
 
 
+BookkeepingName = Literal["lee", "minimal"]
 BOOKKEEPINGS: dict[str, Callable[[_Draft, int], None]] = {"lee": _lee, "minimal": _minimal}
 """How a pair's reaction is written, by the name of the bookkeeping."""
 
@@ -243,7 +246,7 @@ def _condition(draft: _Draft, k: int, i: int, twist: Freedom, dual: list[int]) -
     return ScalarEquation(f"pair {k + 1} ({pair.name}): {what} the axis", pair.name, pair.type.symbol, tuple(terms))
 
 
-def formulate(m: Mechanism, bookkeeping: str = "lee", efforts: Iterable[str] | None = None) -> Formulation:
+def formulate(m: Mechanism, bookkeeping: BookkeepingName = "lee", efforts: Iterable[str] | None = None) -> Formulation:
     """The d'Alembert equations of a mechanism as named unknowns and equations.
 
     For every moving link ``sum of reactions + inertia + applied + efforts of drivers and couplings = 0`` (six scalar equations about the
@@ -260,12 +263,15 @@ def formulate(m: Mechanism, bookkeeping: str = "lee", efforts: Iterable[str] | N
     DeclarationError
         for an unknown bookkeeping or freedom.
     """
-    if bookkeeping not in BOOKKEEPINGS:
-        raise DeclarationError("formulate", [f"bookkeeping {bookkeeping!r}: expected one of {', '.join(BOOKKEEPINGS)}"])
+    check_mechanism(m, "formulate")
+    faults = option_faults({"bookkeeping": (bookkeeping, BOOKKEEPINGS)})
+    named = () if efforts is None else items_of(efforts, "efforts", faults)
+    if faults:
+        raise DeclarationError(f"formulate {m.name!r}", faults)
     draft = _Draft(m, names_of(m))
     for k in range(len(m.pairs)):
         BOOKKEEPINGS[bookkeeping](draft, k)
-    _driver_efforts(draft, tuple(d.freedom for d in m.drives) if efforts is None else tuple(efforts))
+    _driver_efforts(draft, tuple(d.freedom for d in m.drives) if efforts is None else named)
     _multipliers(draft)
     equations = _equilibrium(draft) + _conditions(draft)
     return Formulation(

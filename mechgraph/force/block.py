@@ -14,7 +14,7 @@ from mechgraph.closure.passive_rest import Idle
 from mechgraph.closure.rates import Rates
 from mechgraph.closure.solver import FactoredClosure
 from mechgraph.force.applied_loads import Site, inertia_wrenches, kinetic_power
-from mechgraph.force.dalembert import METHODS, Problem, Wrenches, row_efforts
+from mechgraph.force.dalembert import METHODS, ForceProblem, Wrenches, row_efforts
 from mechgraph.force.reaction_map import reaction_map
 from mechgraph.model.load import Load
 from mechgraph.numerics.linear import add_at
@@ -95,7 +95,7 @@ def forces_of_block(
     if task.bodies:
         hold, holds = _held(here, task.bodies, f.motions(), loads, given)
         loads = loads + hold
-    wrenches = METHODS[task.method](Problem(here, loads, given, task.driven, f))
+    wrenches = METHODS[task.method](ForceProblem(here, loads, given, task.driven, f))
     found = _least(here, wrenches, f, task)
     own = np.zeros_like(found.efforts)
     own[task.driven] = (found.efforts - given - found.coupled)[task.driven]

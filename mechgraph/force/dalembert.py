@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import scipy
@@ -27,7 +28,7 @@ BAD_CONDITION = 1e8
 
 
 @dataclass(frozen=True)
-class Problem:
+class ForceProblem:
     """What a method solves: closed positions with loads (internal units).
 
     ``loads (6, N, T)`` inertia and applied wrenches, ``efforts (F, T)`` given efforts, ``driven`` the freedoms with a driver,
@@ -53,7 +54,7 @@ class Wrenches:
     multiplier_stress: Array
 
 
-def loop_wrench(problem: Problem) -> Wrenches:
+def loop_wrench(problem: ForceProblem) -> Wrenches:
     """``w = w_tree + C^T x`` with one wrench ``x`` a loop: ``J^T x = tau - S^T w_tree`` in the undriven freedoms.
 
     The transpose of the closure Jacobian, so the factors of the velocity serve again.
@@ -80,7 +81,7 @@ def tree_wrenches(here: Configuration, loads: Array) -> Array:
     return here.system.tree.wrenches(loads, len(here.system.m.pairs))
 
 
-def newton_euler(problem: Problem) -> Wrenches:
+def newton_euler(problem: ForceProblem) -> Wrenches:
     """All reaction components and driver efforts from the printed equations: six for every moving link.
 
     Assembled from the minimal formulation; redundant systems through independent rows and columns. Positions at which
@@ -92,7 +93,7 @@ def newton_euler(problem: Problem) -> Wrenches:
     for held, at in problem.solver.by_held():
         mine = here if at.size == here.T else here.part(at)
         f = problem.solver if at.size == here.T else problem.solver.part(at, mine)
-        mine_alone = Problem(mine, problem.loads[:, :, at], problem.efforts[:, at], problem.driven, f)
+        mine_alone = ForceProblem(mine, problem.loads[:, :, at], problem.efforts[:, at], problem.driven, f)
         parts.append((at, _components_and_efforts(mine_alone, held)))
     s = max((part.stress.shape[2] for _, part in parts), default=0)
     P = len(here.system.m.pairs)
@@ -105,7 +106,7 @@ def newton_euler(problem: Problem) -> Wrenches:
     return Wrenches(**out)
 
 
-def _components_and_efforts(problem: Problem, held: Index) -> Wrenches:
+def _components_and_efforts(problem: ForceProblem, held: Index) -> Wrenches:
     here, m = problem.here, problem.here.system.m
     names = m.freedom_names()
     f = formulate(m, "minimal", efforts=[names[c] for c in sorted({*problem.driven.tolist(), *held.tolist()})])
@@ -252,5 +253,6 @@ def internal_state(here: Configuration, loads: Array) -> State:
     )
 
 
-METHODS: dict[str, Callable[[Problem], Wrenches]] = {"loop_wrench": loop_wrench, "newton_euler": newton_euler}
+MethodName = Literal["loop_wrench", "newton_euler"]
+METHODS: dict[str, Callable[[ForceProblem], Wrenches]] = {"loop_wrench": loop_wrench, "newton_euler": newton_euler}
 """Force methods by name."""

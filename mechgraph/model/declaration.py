@@ -18,7 +18,7 @@ from mechgraph.model.coupling import Coupling
 from mechgraph.model.drive import Drive
 from mechgraph.model.link import Link
 from mechgraph.model.load import LOADS
-from mechgraph.model.pair import PERPENDICULAR, Pair
+from mechgraph.model.pair import PERPENDICULAR, Marker, Pair
 from mechgraph.model.pair_type import PairType
 from mechgraph.quantities import column, is_numeric, shown, wrong
 from mechgraph.units import BASE_UNITS
@@ -136,7 +136,7 @@ def _are_names(names: Sequence[Any]) -> bool:
 def _links_are_sound(links: Sequence[Link]) -> bool:
     """Whether every link passes, checked in columns; False where it takes a closer look."""
     masses = [link.mass for link in links]
-    if not _are_names([link.name for link in links]) or not set(map(type, masses)) <= {float}:
+    if not _are_names([link.name for link in links]) or {type(link.unphysical) for link in links} != {bool}:
         return False
     mass = column(masses, ())
     if (
@@ -161,6 +161,8 @@ def _pairs_are_sound(pairs: Sequence[Pair]) -> bool:
     types = {id(p.type): p.type for p in pairs}.values()
     if not _are_names([p.name for p in pairs]) or not all(isinstance(t, PairType) for t in types):
         return False
+    if not set(map(type, (end for p in pairs for end in (p.a, p.b)))) <= {str}:
+        return False
     if any(p.a == p.b or (p.on_a is None) != (p.on_b is None) for p in pairs):
         return False
     takers = {id(t) for t in types if t.takes_pitch}
@@ -169,6 +171,8 @@ def _pairs_are_sound(pairs: Sequence[Pair]) -> bool:
     by_point = [p for p in pairs if p.point is not None or p.axis is not None]
     by_markers = [p for p in pairs if p.on_a is not None]
     if any(p.on_a is not None for p in by_point):
+        return False
+    if not all(isinstance(side, Marker) for p in by_markers for side in (p.on_a, p.on_b)):
         return False
     markers = [*by_point, *(p.on_a for p in by_markers), *(p.on_b for p in by_markers)]
     return _markers_are_sound(markers, [p.type.square_second for p in (*by_point, *by_markers, *by_markers)])

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Protocol, Self
+from typing import Annotated, Any, ClassVar, Literal, Protocol, Self
 
 import numpy as np
 
@@ -185,7 +185,7 @@ class Wrench(_Load):
         POINT("material point, in the coordinates of the declared configuration", LENGTH, default="mass centre"),
     ] = None
     frame: Annotated[
-        str,
+        Literal["global", "link"],
         TEXT('`"link"`: force and moment turn with the link; `"global"`: they do not', choices=("global", "link")),
     ] = "global"
 

@@ -16,10 +16,11 @@ from typing import TypeVar
 
 import numpy as np
 
+from mechgraph.arguments import items_of
 from mechgraph.errors import DeclarationError
 from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.model.factors import ConstantScrew, Factor, Rotation
-from mechgraph.quantities import is_numeric
+from mechgraph.quantities import is_numeric, shown, wrong
 
 Six = tuple[float, float, float, float, float, float]
 
@@ -135,7 +136,7 @@ def _factors(given: Sequence[object], faults: list[str]) -> tuple[Factor, ...]:
     for item in given:
         if isinstance(item, Factor):
             out.append(item)
-        elif item == "rotation":
+        elif isinstance(item, str) and item == "rotation":
             out.append(Rotation(tuple(Freedom(name, UNIT_TWISTS[name]) for name in ROTATION)))
         else:
             freedom = _named_freedom(item, faults) if isinstance(item, str) else _given_freedom(item, faults)
@@ -148,7 +149,7 @@ def _named_freedom(item: str, faults: list[str]) -> Freedom | None:
     slide = tail.removeprefix("pitch").strip()
     if head not in UNIT_TWISTS or (tail and slide not in UNIT_TWISTS):
         faults.append(
-            f"freedom {item!r}: unknown; give one of {', '.join(UNIT_TWISTS)}, 'rotation', 'Rz + pitch Tz' or a Freedom"
+            f"freedom {shown(item)}: unknown; give one of {', '.join(UNIT_TWISTS)}, 'rotation', 'Rz + pitch Tz' or a Freedom"
         )
         return None
     return Freedom(head, UNIT_TWISTS[head], UNIT_TWISTS[slide] if tail else (0.0,) * 6)
@@ -156,29 +157,42 @@ def _named_freedom(item: str, faults: list[str]) -> Freedom | None:
 
 def _given_freedom(item: object, faults: list[str]) -> Freedom | None:
     if not isinstance(item, Freedom):
-        faults.append(f"freedom {item!r}: expected a name, 'rotation' or a Freedom")
+        faults.append(wrong(item, "freedom", "a name, 'rotation' or a Freedom"))
         return None
-    bad = [row for row in (item.twist, item.per_pitch) if not is_numeric(row, (6,))]
-    if bad:
-        faults.append(f"freedom {item.name!r}: twist {bad[0]!r}: expected six finite numbers, angular part first")
-        return None
-    return item
+    found = _name_fault(item.name, "freedom") + _six_faults(
+        item.twist, item.per_pitch, f"freedom {shown(item.name)}: twist"
+    )
+    faults += found
+    return None if found else item
+
+
+def _name_fault(name: object, what: str) -> list[str]:
+    return [] if isinstance(name, str) and name else [wrong(name, f"{what}: name", "a text")]
+
+
+def _six_faults(constant: object, per_pitch: object, what: str) -> list[str]:
+    order = "angular part first" if what.endswith("twist") else "moment part first"
+    return [
+        wrong(row, what, f"six finite numbers, {order}") for row in (constant, per_pitch) if not is_numeric(row, (6,))
+    ]
 
 
 def _component(item: object, faults: list[str], what: str) -> Component | None:
     """A component from ``Component``, ``"Fz@2"`` or ``("Fz", 2)``."""
     if isinstance(item, Component):
-        bad = [row for row in (item.wrench, item.per_pitch) if not is_numeric(row, (6,))]
-        if bad:
-            faults.append(f"{what} {item.name!r}: wrench {bad[0]!r}: expected six finite numbers, moment part first")
-            return None
-        return item
+        found = _name_fault(item.name, what) + _six_faults(
+            item.wrench, item.per_pitch, f"{what} {shown(item.name)}: wrench"
+        )
+        if type(item.frame) is not int:
+            found.append(wrong(item.frame, f"{what} {shown(item.name)}: frame", "a whole number"))
+        faults += found
+        return None if found else item
     name, frame = item if isinstance(item, tuple) and len(item) == 2 else (item, 0)
     if isinstance(name, str) and "@" in name:
         name, _, frame = name.partition("@")
-    if name not in UNIT_WRENCHES or not str(frame).isdigit():
+    if not isinstance(name, str) or name not in UNIT_WRENCHES or not (str(frame).isdecimal() and len(str(frame)) < 3):
         faults.append(
-            f"{what} {item!r}: expected one of {', '.join(UNIT_WRENCHES)}, with '@k' for frame k, or a Component"
+            f"{what} {shown(item)}: expected one of {', '.join(UNIT_WRENCHES)}, with '@k' for frame k, or a Component"
         )
         return None
     return Component(name, UNIT_WRENCHES[name], int(frame))
@@ -247,7 +261,7 @@ class PairType:
         if not faults:
             faults += _row_faults(self)
         if faults:
-            raise DeclarationError(f"pair type {symbol!r}", faults)
+            raise DeclarationError(f"pair type {shown(symbol)}", faults)
 
     def scaled(self, L: float) -> PairType:
         """The row with its lengths divided by ``L``: pitches of turns given as numbers, arms of forces; itself where it has none."""
@@ -337,18 +351,30 @@ def fill_row(
     """Set the fields of a new row; the faults of what is given, before any number is tried."""
     faults: list[str] = []
     if not isinstance(symbol, str) or not symbol.isidentifier():
-        faults.append(f"symbol {symbol!r}: expected letters and digits, starting with a letter")
-    steps = _factors(freedoms, faults)
+        faults.append(wrong(symbol, "symbol", "letters and digits, starting with a letter"))
+    if not isinstance(name, str):
+        faults.append(wrong(name, "name", "a text"))
+    if bookkeeping is not None:
+        faults += _bookkeeping_faults(bookkeeping)
+    flags = (("directed", directed), ("square_second", square_second))
+    faults += [wrong(flag, what, "true or false") for what, flag in flags if not isinstance(flag, bool)]
+    steps = _factors(items_of(freedoms, "freedoms", faults), faults)
     rows = tuple(freedom for step in steps for freedom in step.freedoms)
     starts = accumulate((len(step.freedoms) for step in steps), initial=0)
     before = tuple(start for step, start in zip(steps, starts, strict=False) for _ in step.freedoms)
     parts = None
     if reactions is not None:
-        parts = tuple(c for c in (_component(r, faults, "reaction") for r in reactions) if c is not None)
+        parts = tuple(
+            c
+            for c in (_component(r, faults, "reaction") for r in items_of(reactions, "reactions", faults))
+            if c is not None
+        )
     if efforts is None:
         work = tuple(_dual_effort(f, k) for f, k in zip(rows, before, strict=True))
     else:
-        work = tuple(c for c in (_component(e, faults, "effort") for e in efforts) if c is not None)
+        work = tuple(
+            c for c in (_component(e, faults, "effort") for e in items_of(efforts, "efforts", faults)) if c is not None
+        )
     fields = {
         "symbol": symbol,
         "name": name or str(symbol),
@@ -364,6 +390,20 @@ def fill_row(
     }
     for key, value in fields.items():
         object.__setattr__(row, key, value)
+    return faults
+
+
+def _bookkeeping_faults(given: object) -> list[str]:
+    faults: list[str] = []
+    if not isinstance(given, Bookkeeping):
+        return [wrong(given, "bookkeeping", "a Bookkeeping")]
+    for condition in items_of(given.conditions, "bookkeeping: conditions", faults):
+        _given_freedom(condition, faults)
+    for part in items_of(given.along, "bookkeeping: along", faults):
+        if not isinstance(part, Component):
+            faults.append(wrong(part, "bookkeeping: along", "a Component"))
+        else:
+            _component(part, faults, "bookkeeping: along")
     return faults
 
 

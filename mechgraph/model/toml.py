@@ -6,9 +6,13 @@ its name with ``_deg`` added. ``library/README.md`` describes the format for peo
 
 from __future__ import annotations
 
+import itertools
 import os
+import re
+import stat
 import tempfile
 import tomllib
+import traceback
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -16,21 +20,29 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from mechgraph.errors import DeclarationError, FileError
+from mechgraph.errors import ContentError, DeclarationError, FileError
 from mechgraph.model.chain import chain
-from mechgraph.model.field_format import COEFFICIENTS, SIX, TABLE, Described
+from mechgraph.model.field_format import COEFFICIENTS, SIX, STANDS_AS, TABLE, Described
 from mechgraph.model.file_format import DEGREES, SCHEMA, TABLES_OF_FILE
 from mechgraph.model.library import library_names, library_path
 from mechgraph.model.load import LOADS
-from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.mechanism import Mechanism, check_mechanism
 from mechgraph.model.pair_table import TABLE as PAIR_TABLE
 from mechgraph.model.pair_type import PairType
-from mechgraph.quantities import is_numeric
+from mechgraph.quantities import is_numeric, real_array, shown, wrong
 
 SWEEP_ROUNDING = 1e-12
 """Part of a sweep by which its end may come early and still be excluded (degrees turned into radians are rounded)."""
-STANDS_AS = {str: "a text", bool: "true or false", dict: "a table"}
-"""How the types of values are called in messages."""
+MOST_POSITIONS = 1_000_000
+"""Longest sweep that a file or the command line may ask for."""
+LARGEST_FILE = 64 * 2**20
+"""Bytes of the largest file that is read: some 200,000 links."""
+DEEPEST = 32
+"""Tables and lists of a file may stand in each other so deeply; a mechanism needs six."""
+
+
+LONG_KEY = re.compile(rf"""(?<![\w"'-])[\w"'-]++(?:[ \t]*+\.[ \t]*+[\w"'-]++){{{DEEPEST}}}""")
+"""A dotted key of too many parts: the time that the parser takes for one grows with the square of their number."""
 
 
 class _Reader:
@@ -38,12 +50,14 @@ class _Reader:
 
     def __init__(self) -> None:
         self.faults: list[str] = []
+        self.left_out = False
+        """Whether things are missing because of their faults, so that others seem to refer to nothing."""
         self.pair_types: dict[str, PairType] = dict(PAIR_TABLE)
 
     def fields(self, kind: str, raw: Any, where: str) -> dict[str, Any]:
         """The fields of one table by their names in files, degrees turned into radians."""
         if not isinstance(raw, Mapping):
-            self.faults.append(f"{where}: expected a table, got {raw!r}")
+            self.faults.append(wrong(raw, where, "a table"))
             return {}
         table = TABLES_OF_FILE[kind]
         out: dict[str, Any] = {}
@@ -54,23 +68,23 @@ class _Reader:
                 out[table.in_degrees[key]] = self.radians(value, f"{where}.{key}")
             else:
                 known = ", ".join([*table.fields, *table.in_degrees])
-                self.faults.append(f"{where}: unknown field {key!r} (fields: {known})")
-        for key, value in out.items():
+                self.faults.append(f"{where}: unknown field {shown(key)} (fields: {known})")
+        missing = [key for key in table.needed if key not in out]
+        for key, value in list(out.items()):
             wanted = table.fields[key].kind.stands_as
             if wanted is not None and not isinstance(value, wanted):
-                self.faults.append(f"{where}.{key} = {value!r}: expected {STANDS_AS[wanted]}")
-        missing = [key for key in table.needed if key not in out]
+                self.faults.append(wrong(out.pop(key), f"{where}.{key}", STANDS_AS[wanted]))
         if missing:
             self.faults.append(f"{where}: field{'s' if len(missing) > 1 else ''} {', '.join(missing)} missing")
         return out
 
     def radians(self, value: Any, where: str) -> Any:
         """Degrees as radians."""
-        try:
-            return np.deg2rad(np.asarray(value, dtype=float)).tolist()
-        except (TypeError, ValueError):
-            self.faults.append(f"{where} = {value!r}: expected numbers")
-            return value
+        array = real_array(value)
+        if array is None:
+            self.faults.append(wrong(value, where, "numbers"))
+            return 0.0
+        return np.deg2rad(array).tolist()
 
     def item(self, kind: str, raw: Any, where: str) -> Any:
         """The object of one table, or None with the faults noted."""
@@ -94,26 +108,29 @@ class _Reader:
     def items(self, key: str, raw: Any) -> list[Any]:
         """The objects of an array of tables; those at fault are left out."""
         if not isinstance(raw, list):
-            self.faults.append(f"[[{key}]]: expected an array of tables, got {raw!r}")
+            self.faults.append(wrong(raw, f"[[{key}]]", "an array of tables"))
+            self.left_out = True
             return []
         out = []
         for i, entry in enumerate(raw):
-            where = f"{key} {entry.get('name', i + 1)!r}" if isinstance(entry, Mapping) else f"{key} {i + 1}"
+            where = f"{key} {shown(entry.get('name', i + 1))}" if isinstance(entry, Mapping) else f"{key} {i + 1}"
             out.append(self.load(entry, where) if key == "load" else self.item(key, entry, where))
-        return [item for item in out if item is not None]
+        made = [item for item in out if item is not None]
+        self.left_out |= len(made) < len(raw)
+        return made
 
     def load(self, raw: Any, where: str) -> Any:
         """The load of a table, whose ``kind`` says which."""
         kind = raw.get("kind") if isinstance(raw, Mapping) else None
         if isinstance(kind, str) and kind in LOADS:
             return self.item(f"load {kind}", {key: value for key, value in raw.items() if key != "kind"}, where)
-        self.faults.append(f"{where}: kind {kind!r}: expected one of {', '.join(LOADS)}")
+        self.faults.append(wrong(kind, f"{where}: kind", f"one of {', '.join(LOADS)}"))
         return None
 
     def start(self, raw: Any) -> dict[str, Any]:
         """Start values, degrees turned into radians."""
         if not isinstance(raw, Mapping):
-            self.faults.append(f"[start]: expected a table, got {raw!r}")
+            self.faults.append(wrong(raw, "[start]", "a table"))
             return {}
         return {
             key.removesuffix(DEGREES): self.radians(value, f"start.{key}") if key.endswith(DEGREES) else value
@@ -123,7 +140,7 @@ class _Reader:
     def parts(self, kind: str, items: Any, where: str) -> Any:
         """Freedoms or components: names unchanged, tables as objects."""
         if not isinstance(items, list):
-            self.faults.append(f"{where}: expected a list, got {items!r}")
+            self.faults.append(wrong(items, where, "a list"))
             return ()
         return tuple(self.item(kind, item, where) if isinstance(item, Mapping) else item for item in items)
 
@@ -138,9 +155,9 @@ def _with_sweep(reader: _Reader, fields: dict[str, Any], where: str) -> None:
         if "position" not in fields:
             reader.faults.append(f"{where}: position or sweep missing")
     elif "position" in fields or not is_numeric(sweep, (3,)) or not sweep[2]:
-        reader.faults.append(
-            f"{where}.sweep = {sweep!r}: expected [first, end (excluded), step], and no position beside it"
-        )
+        reader.faults.append(wrong(sweep, f"{where}.sweep", "[first, end (excluded), step], and no position beside it"))
+    elif (sweep[1] - sweep[0]) / sweep[2] > MOST_POSITIONS:
+        reader.faults.append(wrong(sweep, f"{where}.sweep", f"at most {MOST_POSITIONS} positions; take a larger step"))
     else:
         fields["position"] = _swept(*sweep)
 
@@ -176,7 +193,7 @@ def _with_six(reader: _Reader, fields: dict[str, Any], where: str) -> None:
     formats = {**TABLES_OF_FILE["freedom"].fields, **TABLES_OF_FILE["component"].fields}
     for key, value in fields.items():
         if formats[key].kind is SIX and not is_numeric(value, (6,)):
-            reader.faults.append(f"{where}.{key} = {value!r}: expected six finite numbers")
+            reader.faults.append(wrong(value, f"{where}.{key}", "six finite numbers"))
         elif isinstance(value, list):
             fields[key] = tuple(value)
 
@@ -203,7 +220,7 @@ def parse(data: Mapping[str, Any], subject: str) -> Mechanism:
     reader, table = _Reader(), TABLES_OF_FILE["file"]
     top = reader.fields("file", data, "file")
     if top.get("schema", SCHEMA) != SCHEMA:
-        reader.faults.append(f"schema = {top['schema']!r}: this version reads schema {SCHEMA}")
+        reader.faults.append(f"schema = {shown(top['schema'])}: this version reads schema {SCHEMA}")
     reader.pair_types |= {row.symbol: row for row in reader.items("pair_type", top.get("pair_type", []))}
     arguments: dict[str, Any] = {}
     for key, attribute in table.attributes.items():
@@ -217,15 +234,21 @@ def parse(data: Mapping[str, Any], subject: str) -> Mechanism:
     if "chain" in top and top.get("pair"):
         reader.faults.append("both [chain] and [[pair]]; give one form")
     chained = reader.fields("chain", top["chain"], "chain") if "chain" in top else {}
-    if reader.faults:
-        raise DeclarationError(subject, reader.faults)
+    if reader.left_out or ("chain" in top and "pairs" not in chained):
+        alone = (*arguments.get("links", ()), *arguments.get("pairs", ()))
+        raise DeclarationError(subject, [*reader.faults, *(fault for item in alone for fault in item.faults())])
+    arguments = {"name": "?", **arguments}
     try:
         if chained:
             arguments.pop("pairs", None)
-            return chain(chained.pop("pairs"), drive=None, **chained, **arguments)
-        return Mechanism(**{**arguments, "links": arguments.get("links") or None})
+            made = chain(chained.pop("pairs"), drive=None, **chained, **arguments)
+        else:
+            made = Mechanism(**{**arguments, "links": arguments.get("links") or None})
     except DeclarationError as error:
-        raise DeclarationError(subject, error.faults) from None
+        reader.faults += error.faults
+    if reader.faults:
+        raise DeclarationError(subject, list(dict.fromkeys(reader.faults)))
+    return made
 
 
 def load(name: str | os.PathLike[str]) -> Mechanism:
@@ -234,9 +257,11 @@ def load(name: str | os.PathLike[str]) -> Mechanism:
     Raises
     ------
     FileError
-        where the file cannot be read or is no TOML; DeclarationError where its content is at fault.
+        where the file cannot be read or is no TOML; ContentError, which is a DeclarationError too, where its content is at fault.
     """
-    text = os.fspath(name)
+    if not isinstance(name, str | os.PathLike):
+        raise DeclarationError("load", [wrong(name, "name", "a name of the library or a path")])
+    text = os.fsdecode(name)
     is_path = text.endswith(".toml") or os.sep in text or not isinstance(name, str)
     if not is_path and text not in library_names():
         raise FileError(
@@ -244,13 +269,77 @@ def load(name: str | os.PathLike[str]) -> Mechanism:
             f"no mechanism of that name in the library ({', '.join(library_names())}), and no path to a .toml file",
         )
     path = Path(text) if is_path else library_path(text)
+    data = _data_of(path, _text_of(path))
     try:
-        data = tomllib.loads(path.read_bytes().decode("utf-8"))
+        return parse(data, f"file {path.name}")
+    except DeclarationError as error:
+        raise ContentError(path, error) from None
+
+
+def _text_of(path: Path) -> str:
+    """The text of a file; devices and pipes, which may never end, are refused."""
+    try:
+        if not path.is_dir() and not stat.S_ISREG(path.stat().st_mode):
+            raise FileError(path, "cannot be read: it is no regular file")
+        with path.open("rb") as file:
+            content = file.read(LARGEST_FILE + 1)
+        if len(content) > LARGEST_FILE:
+            raise FileError(path, f"cannot be read: it is larger than {LARGEST_FILE // 2**20} MB")
+        text = content.decode("utf-8")
     except OSError as error:
         raise FileError(path, f"cannot be read: {error.strerror or error}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise FileError(path, f"is no TOML: line {line}: not in UTF-8; save it in that encoding") from None
+    except ValueError as error:  # a path with a null character
+        raise FileError(path, f"cannot be read: {error}") from None
+    if text.startswith("\ufeff"):
+        raise FileError(path, "is no TOML: line 1 begins with a byte-order mark; save it as UTF-8 without one")
+    return text
+
+
+def _data_of(path: Path, text: str) -> dict[str, Any]:
+    """The content of TOML; refused with its place where it is none, or where Python or a mechanism cannot hold it."""
+    try:
+        long = LONG_KEY.search(text)
+        if long:
+            raise FileError(path, f"cannot be read: line {text.count(chr(10), 0, long.start()) + 1}: nested too deeply")
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
         raise FileError(path, f"is no TOML: {error}") from None
-    return parse(data, f"file {path.name}")
+    except (RecursionError, ValueError) as error:
+        what = (
+            "nested too deeply" if isinstance(error, RecursionError) else "an integer of more digits than can be read"
+        )
+        raise FileError(path, f"cannot be read: {_place_reached(error)}{what}") from None
+    for key, value in data.items():
+        fault = _unholdable(value)
+        if fault:
+            raise FileError(path, f"cannot be read: field {shown(key)}: {fault}")
+    return data
+
+
+def _place_reached(error: BaseException) -> str:
+    """The line at which the parser stood, from the variables of its own frames; empty where they cannot be told."""
+    line = ""
+    for frame, _ in traceback.walk_tb(error.__traceback__):
+        source, at = frame.f_locals.get("src"), frame.f_locals.get("pos")
+        if isinstance(source, str) and isinstance(at, int):
+            line = f"line {source.count(chr(10), 0, at) + 1}: "
+    return line
+
+
+def _unholdable(value: Any) -> str:
+    """What keeps a value of a file from being held: deep nesting, or an integer beyond the 64 bits of TOML."""
+    level = [value]
+    for _ in range(DEEPEST):
+        if any(type(item) is int and abs(item) >= 2**63 for item in level):
+            return "an integer beyond 64 bits"
+        inner = (item.values() if isinstance(item, dict) else item for item in level if isinstance(item, dict | list))
+        level = list(itertools.chain.from_iterable(inner))
+        if not level:
+            return ""
+    return f"nested more than {DEEPEST} levels deep"
 
 
 # --- writing -----------------------------------------------------------------------------------------------------------
@@ -331,10 +420,13 @@ def save(m: Mechanism, path: str | os.PathLike[str]) -> None:
     FileError
         where a load is a callable, or the file cannot be written.
     """
+    check_mechanism(m, "save")
+    if not isinstance(path, str | os.PathLike):
+        raise DeclarationError("save", [wrong(path, "path", "a path")])
     try:
         text = tomli_w.dumps(to_data(m, os.fspath(path)))
         text.encode("utf-8")
-    except (TypeError, UnicodeEncodeError) as error:
+    except (TypeError, ValueError, RecursionError) as error:
         raise FileError(path, f"mechanism {m.name!r} cannot be written as TOML: {error}") from None
     write_whole(path, text)
 

@@ -10,7 +10,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.rank import EngineName
-from mechgraph.equations.build import formulate
+from mechgraph.equations.build import BOOKKEEPINGS, BookkeepingName, formulate
 from mechgraph.equations.terms import Ledger, LedgerRow
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.linear import independent_rows
@@ -84,9 +84,9 @@ class Facts:
         """Kutzbach mobility: sum of freedoms - closure equations."""
         return self.freedom_count - self.equation_count
 
-    def ledger(self, bookkeeping: str = "lee") -> Ledger:
+    def ledger(self, bookkeeping: BookkeepingName = "lee") -> Ledger:
         """Unknowns against equations in a bookkeeping, ``"lee"`` or ``"minimal"``."""
-        countable = bookkeeping in ("lee", "minimal") and not self.mechanism.couplings
+        countable = bookkeeping in list(BOOKKEEPINGS) and not self.mechanism.couplings
         if countable:
             return counted_ledger(self.mechanism, bookkeeping)
         return formulate(self.mechanism, bookkeeping).ledger()

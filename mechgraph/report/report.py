@@ -7,11 +7,13 @@ from collections.abc import Mapping
 from functools import cached_property
 from typing import Any, get_args
 
+from mechgraph.arguments import option_faults
 from mechgraph.closure.assembly import assembled, assembled_at, named_columns
 from mechgraph.closure.rank import EngineName
 from mechgraph.document import Document, to_html, to_markdown, to_text
 from mechgraph.errors import AssemblyError, DeclarationError
-from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.declaration import mapping_faults
+from mechgraph.model.mechanism import Mechanism, check_mechanism
 from mechgraph.report import sections, sentences
 from mechgraph.report.facts import Facts, Geometry
 from mechgraph.structure.mobility import free_motion
@@ -62,8 +64,10 @@ def check(m: Mechanism, at: Mapping[str, float] | None = None, *, engine: Engine
     AssemblyError
         where ``at`` is given and cannot be reached. Without it, loops that cannot be closed are reported in ``note``.
     """
-    if engine not in get_args(EngineName):
-        raise DeclarationError("check", [f"engine = {engine!r}: expected one of {', '.join(get_args(EngineName))}"])
+    check_mechanism(m, "check")
+    faults = option_faults({"engine": (engine, get_args(EngineName))}) + mapping_faults(at=at)
+    if faults:
+        raise DeclarationError(f"check {m.name!r}", faults)
     graph = m.once(link_graph)
     if not m.has_geometry:
         return DeterminacyReport(m, graph, "Topology only: no geometry is declared.", asked=engine)

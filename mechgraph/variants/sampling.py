@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import scipy
@@ -141,6 +141,12 @@ def _quantiles(distributions: Sequence[Any], u: Array) -> Array:
     return np.stack([np.asarray(w.ppf(column), dtype=float) for w, column in zip(distributions, u.T, strict=True)])
 
 
+def grid_size(distributions: Sequence[Any], n: int) -> float:
+    """Number of variants of a grid with ``n`` levels of every distribution."""
+    return float(np.prod([float(len(w.values)) if isinstance(w, Levels) else n for w in distributions]))
+
+
+SamplingName = Literal["random", "latin", "grid"]
 SAMPLINGS: dict[str, Callable[[Sequence[Any], int, np.random.Generator], Array]] = {
     "random": _random,
     "latin": _latin,

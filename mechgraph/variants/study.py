@@ -11,17 +11,19 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.arguments import option_faults
 from mechgraph.closure.driver_motion import driven
-from mechgraph.closure.solver import ENGINES
+from mechgraph.closure.solver import ENGINES, EngineName
 from mechgraph.errors import DeclarationError
-from mechgraph.force.dalembert import METHODS
-from mechgraph.kinetostatics import REDUNDANT
+from mechgraph.force.dalembert import METHODS, MethodName
+from mechgraph.kinetostatics import REDUNDANT, RedundantName
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
+from mechgraph.quantities import wrong
 from mechgraph.variants.fields import AnyField, clashes, field_values, find_field
 from mechgraph.variants.outputs import named_outputs
 from mechgraph.variants.result import Study
-from mechgraph.variants.sampling import SAMPLINGS, distributions, spread
+from mechgraph.variants.sampling import SAMPLINGS, SamplingName, distributions, grid_size, spread
 from mechgraph.variants.work import Part, Source, Task, as_rows, motion_of_case, solved
 
 POSITIONS_TOGETHER = 60_000
@@ -31,6 +33,8 @@ MOST_TOGETHER = 500
 DIFFERENCE = 1e-4
 """Step of the central differences of the sensitivities, as a part of the spread of the parameter."""
 
+MOST_VARIANTS = 10_000_000
+"""Largest study: its outputs are kept in memory."""
 SMALLEST = 1e-6
 """Smallest step of a difference, as a part of the parameter (of one, where that is zero)."""
 
@@ -45,11 +49,11 @@ def study(
     seed: int = 0,
     *,
     motions: Mapping[str, Any] | None = None,
-    sampling: str = "random",
+    sampling: SamplingName = "random",
     executor: concurrent.futures.Executor | None = None,
-    method: str = "loop_wrench",
-    redundant: str = "nan",
-    engine: str = "auto",
+    method: MethodName = "loop_wrench",
+    redundant: RedundantName = "nan",
+    engine: EngineName = "auto",
     progress: Progress | None = None,
 ) -> Study:
     """Solve many variants of one mechanism: how outputs vary with its numbers.
@@ -97,6 +101,11 @@ def study(
         raise DeclarationError("study", faults)
     source, given = _source(m, ways, motions)
     kept = named_outputs(source.mechanism, outputs, ways)
+    count = grid_size(list(ways.values()), int(n)) if sampling == "grid" else int(n)
+    if count > MOST_VARIANTS:
+        raise DeclarationError(
+            "study", [f"{sampling}, n = {n}: these are {count:.3g} variants; at most {MOST_VARIANTS} are solved"]
+        )
     values = SAMPLINGS[sampling](list(ways.values()), int(n), np.random.default_rng(seed))
     paths = {name: _rows_of(name, motion, values.shape[1]) for name, motion in given.items()}
     steps = np.array(
@@ -121,20 +130,16 @@ def study(
 def _argument_faults(
     m: Any, n: Any, seed: Any, executor: Any, progress: Any, named: Mapping[str, tuple[Any, Iterable[str]]]
 ) -> list[str]:
-    faults = [
-        f"{what} = {value!r}: expected one of {', '.join(known)}"
-        for what, (value, known) in named.items()
-        if not isinstance(value, str) or value not in known
-    ]
+    faults = option_faults(named)
     if not isinstance(m, Mechanism) and not callable(m):
-        faults.append(f"{m!r}: expected a Mechanism, or a function that builds one")
+        faults.append(wrong(m, "mechanism", "a Mechanism, or a function that builds one"))
     for what, value, least in (("n", n, 1), ("seed", seed, 0)):
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-            faults.append(f"{what} = {value!r}: expected a whole number, at least {least}")
+            faults.append(wrong(value, what, f"a whole number, at least {least}"))
     if executor is not None and not hasattr(executor, "submit"):
-        faults.append(f"executor = {executor!r}: expected an Executor of concurrent.futures")
+        faults.append(wrong(executor, "executor", "an Executor of concurrent.futures"))
     if progress is not None and not callable(progress):
-        faults.append(f"progress = {progress!r}: expected a function of the parts done and of all parts")
+        faults.append(wrong(progress, "progress", "a function of the parts done and of all parts"))
     return faults
 
 

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.driver_path import Status
+from mechgraph.closure.solver import EngineName
 from mechgraph.errors import DeclarationError, MechgraphError
-from mechgraph.kinetostatics import solve
+from mechgraph.force.dalembert import MethodName
+from mechgraph.kinetostatics import RedundantName, solve
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.pipeline import Options
@@ -85,9 +87,9 @@ class Task:
     values: Array
     motions: Mapping[str, Motion]
     outputs: Mapping[str, Output]
-    method: str
-    redundant: str
-    engine: str
+    method: MethodName
+    redundant: RedundantName
+    engine: EngineName
 
 
 @dataclass(frozen=True)
