@@ -218,8 +218,8 @@ class Absolute:
             at, last, moved = self.moved(at, x), size, moved if len(moved) else x
         return None, moved
 
-    def led(self, at, begin, end):
-        """The links led from the drivers' values ``begin`` to ``end``: tangent, correction; shorter steps where that is not small."""
+    def led(self, at, begin, end, limit):
+        """The links led from the drivers' values ``begin`` to ``end``: tangent, correction; shorter steps where it exceeds ``limit``."""
         place, step = 0.0, 0.1
         while place < 1.0 and step > 1e-5:
             step = min(step, 1.0 - place)
@@ -227,7 +227,7 @@ class Absolute:
             rate = np.concatenate([np.zeros(n), end - begin, np.zeros(len(self.relations))])
             ahead = self.moved(at, step * np.linalg.lstsq(G, rate, rcond=RANK)[0])
             found, correction = self.closed(ahead, begin + (place + step) * (end - begin))
-            if found is None or np.abs(correction).max(initial=0.0) > 0.02:
+            if found is None or np.abs(correction).max(initial=0.0) > limit:
                 step /= 2
                 continue
             at, place, step = found, place + step, 2 * step
