@@ -60,6 +60,7 @@ FAULTS = {
     "mass is a text": ({"links": leaf(mass="heavy")}, ["door", "mass"]),
     "NaN centre": ({"links": leaf(center=(NAN, 0, 0))}, ["door", "center", "finite"]),
     "mass without centre": ({"links": leaf(center=None, inertia=None)}, ["door", "center"]),
+    "inertia without mass": ({"links": leaf(mass=0.0)}, ["door", "inertia without mass"]),
     "inertia against the triangle inequality": (
         {"links": leaf(inertia=np.diag([1.0, 0.1, 0.1]))},
         ["door", "inertia", "unphysical=True"],

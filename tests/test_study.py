@@ -232,6 +232,23 @@ def test_grid_takes_every_combination() -> None:
     assert study.outputs["A.effort"][:, 0] == pytest.approx([1, 2, 3, 2, 4, 6])
 
 
+def test_grid_takes_the_middle_of_equal_parts_of_a_distribution() -> None:
+    ways = {"bob.mass": scipy.stats.uniform(1.0, 1.0), "bob.center.x": scipy.stats.norm(0.5, 1e-300)}
+    study = mg.study(pendulum(), ways, "A.effort", n=2, motions={"A": 0.0}, sampling="grid")
+    assert study.parameters["bob.mass"].tolist() == [1.25, 1.25, 1.75, 1.75]
+    assert study.parameters["bob.center.x"].tolist() == [0.5] * 4
+    assert study.outputs["A.effort"][:, 0] == pytest.approx([6.25, 6.25, 8.75, 8.75])
+
+
+def test_lead_of_a_screw_varies_as_a_lead() -> None:
+    """Axial force F on a nut: the driver holds it with ``F lead / (2 pi)``."""
+    screw = mg.Pair("A", "H", "frame", "nut", point=(0, 0, 0), axis=(0, 0, 1), lead=0.5)
+    m = mg.Mechanism("screw", None, [screw], ["A"], [mg.Wrench("nut", force=(0, 0, -3.0), point=(0, 0, 0))])
+    study = mg.study(m, {"A.lead": [0.5, 1.0, 2.0]}, "A.effort", sampling="grid", motions={"A": 0.0})
+    assert study.outputs["A.effort"].ravel() == pytest.approx([3.0 * lead / (2 * np.pi) for lead in (0.5, 1.0, 2.0)])
+    assert study.nominal["A.effort"].ravel() == pytest.approx([3.0 * 0.5 / (2 * np.pi)])
+
+
 def test_function_that_builds_and_function_that_reduces() -> None:
     study = mg.study(pendulum, {"mass": [1.0, 2.0, 4.0], "length": scipy.stats.uniform(0.4, 0.2)},
                      {"peak": lambda s: np.abs(s["A"].effort[..., 0]).max(axis=1)}, n=6, seed=2, motions={"A": [0.0, 0.4]})  # fmt: skip
@@ -409,6 +426,10 @@ def test_builders_may_close_over_what_they_vary() -> None:
     assert study.outputs["A.effort"] == pytest.approx(np.array([[-1.0, -1.0], [-2.0, -2.0]]))
 
 
+def test_a_ring_by_markers_that_is_no_chain_has_no_chain_numbers() -> None:
+    assert "is no chain" in str(find_field(four_bar(), "length[0]"))
+
+
 def test_numbers_of_a_chain_and_of_a_marker_together() -> None:
     """A marker that no chain number places may vary beside them; the one that a chain number places may not."""
     ways = {"length[2]": [0.4, 0.401], "O2.on_a.point.x": [0.499, 0.501]}
@@ -474,7 +495,14 @@ def test_each_bad_argument_is_told(changes: dict[str, Any], told: str) -> None:
 
 def test_bad_questions_to_a_study_are_told() -> None:
     study = mg.study(pendulum(), {"bob.mass": [1.0]}, "A.effort", n=2, motions={"A": 0.0})
-    for ask in (lambda: study.variant(2), lambda: study.quantiles("A.effort", 5), lambda: study.mean("A.weight")):
+    ends = study.quantiles("A.effort", [0.0, 1.0])
+    assert ends.ravel() == pytest.approx([5.0, 5.0])
+    for ask in (
+        lambda: study.variant(2),
+        lambda: study.quantiles("A.effort", 5),
+        lambda: study.mean("A.weight"),
+        lambda: study.sensitivities("A.weight"),
+    ):
         with pytest.raises(mg.DeclarationError):
             ask()
     assert list(study.to_pandas()["A.effort"]) == pytest.approx([5.0, 5.0])

@@ -1,8 +1,9 @@
 """Identities of engines: the dense and the sparse engine say the same, to rounding: values, NaN, statuses, warnings, errors."""
 
+import mechanisms as known
 import numpy as np
 import pytest
-from attack import conditions, differences, solved, warned, without_numbers
+from attack import anywhere, conditions, differences, solved, warned, without_numbers
 from lattices import LATTICES
 from mechanisms import Z
 from strategies import closed_mechanism, motions, open_chain, with_drives, with_loads
@@ -136,3 +137,13 @@ def test_couplings(name, method):
     alone = name in ("one twice", "drivers that agree")
     for redundant in ("nan",) if alone else ("nan", "minimum_norm"):
         assert_engines_agree(m, given, method=method, redundant=redundant)
+
+
+@pytest.mark.parametrize("method", ["loop_wrench", "newton_euler"])
+def test_least_reactions_where_drivers_strain_each_other(method):
+    """What the drivers supply is no reaction: it has no part in the norm, wherever it acts."""
+    m = known.planar().moved(anywhere(np.random.default_rng(0)))
+    m = m.replace(
+        drives=["O1", "O4"], loads=[mg.Wrench(m.links[2].name, force=(3.0, -2.0, 5.0), point=(0.2, 0.1, 0.4))]
+    )
+    assert_engines_agree(m, {"O1": [0.0], "O4": [0.0]}, redundant="minimum_norm", method=method)
