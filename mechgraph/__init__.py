@@ -11,6 +11,7 @@ from mechgraph.errors import (
     FileError,
     IndeterminateError,
     MechgraphError,
+    MechgraphWarning,
     MissingExtraError,
     ReachError,
 )
@@ -52,6 +53,7 @@ __all__ = [
     "Marker",
     "Mechanism",
     "MechgraphError",
+    "MechgraphWarning",
     "MissingExtraError",
     "Motion",
     "Pair",

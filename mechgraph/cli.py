@@ -8,6 +8,7 @@ import importlib.metadata
 import re
 import shutil
 import sys
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from enum import StrEnum
@@ -334,11 +335,15 @@ def check(
             text = report.to_json() if json else report.to_markdown() if markdown else ""
             document = report.document()
         not_closed = m.has_geometry and report.mobility is None
+        bearing = any(p.load_bearing for p in report.passive)
         unsolvable = not_closed or report.undriven or report.contradicting_drives
         if text:
             _write(text)
         else:
-            _show(document, "red" if unsolvable else "green" if report.determinate and not report.near else "yellow")
+            _show(
+                document,
+                "red" if unsolvable else "green" if report.determinate and not (report.near or bearing) else "yellow",
+            )
         if unsolvable:
             raise typer.Exit(NO_ANSWER)
 
@@ -410,14 +415,16 @@ def solve(
         m = _loaded(mechanism)
         motions = _drives(m, drive or ())
         with _working(f"solving {m.name}"):
-            s = mg.solve(
-                m,
-                motions or None,
-                method=method.value,
-                redundant=redundant.value,
-                on_reach=on_reach.value,
-                engine=engine.value,
-            )
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", mg.MechgraphWarning)  # the summary has them
+                s = mg.solve(
+                    m,
+                    motions or None,
+                    method=method.value,
+                    redundant=redundant.value,
+                    on_reach=on_reach.value,
+                    engine=engine.value,
+                )
             unique = mg.check(s.mechanism).unique if redundant is Redundant.minimum_norm else None
             document = summary(s, unique)
             if out is not None:

@@ -33,6 +33,10 @@ class DeclarationError(MechgraphError):
         super().__init__("\n".join([f"{subject}: {count}", *(f"  {fault}" for fault in self.faults)]))
 
 
+class MechgraphWarning(UserWarning):
+    """A result that holds only under an assumption, e.g. that something holds a passive freedom that carries load."""
+
+
 class FileError(MechgraphError):
     """A file cannot be read or written; ``path`` says which."""
 

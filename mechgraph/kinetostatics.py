@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping
 from typing import Any, Literal
 
@@ -12,7 +13,7 @@ from mechgraph.closure.assembly import assembled_at
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.closure.driver_path import Status
 from mechgraph.closure.solver import ENGINES, EngineName
-from mechgraph.errors import DeadPointError, DeclarationError, IndeterminateError, ReachError
+from mechgraph.errors import DeadPointError, DeclarationError, IndeterminateError, MechgraphWarning, ReachError
 from mechgraph.force.dalembert import METHODS, MethodName
 from mechgraph.model.declaration import mapping_faults
 from mechgraph.model.load import Load
@@ -82,6 +83,8 @@ def _solve(m: Mechanism, motions: Mapping[str, Any] | None, on_reach: str, optio
     outcome = line.run()
     _check_drivers(line, outcome)
     solution = Solution(outcome.trajectory)
+    for warning in solution.warnings:
+        warnings.warn(f"mechanism {m.name!r}: {warning}", MechgraphWarning, stacklevel=3)
     error = _unreached(line, outcome, solution) if on_reach == "raise" else None
     if error is not None:
         raise error

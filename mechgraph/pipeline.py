@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure import passive_rest
 from mechgraph.closure.assembly import CLOSED, closed_start, named_columns
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
@@ -29,6 +28,7 @@ from mechgraph.report.report import check
 from mechgraph.result.trajectory import BlockMotion, Trajectory
 from mechgraph.structure.branching import branches, branches_text
 from mechgraph.structure.mobility import Freedoms, free_motion
+from mechgraph.structure.passive import PassiveMotion
 
 CONTRADICTION = 1e-6
 """Relative part of the closure rates that drivers may leave open before they count as contradicting each other."""
@@ -72,7 +72,7 @@ class Pipeline:
     columns, lead : driven freedoms; places of the leading drivers among them (independent ones, which are followed; the others are
         checked to agree).
     solver, engine : the closure equations with the leading drivers given, and what solves them.
-    bodies : links with passive freedoms.
+    passive, bodies : passive motions, and the links that have them.
     """
 
     def __init__(self, drive: DriverMotion, options: Options) -> None:
@@ -85,11 +85,12 @@ class Pipeline:
         self.engine = engine_for(self.system.n_rows, int(np.prod(drive.batch)), options.engine)
         self.solver = closure_solver(self.engine, self.columns)
         self.lead = np.arange(len(self.columns))
+        self.passive: tuple[PassiveMotion, ...] = ()
         self.bodies: tuple[Idle, ...] = ()
         if not self.solver.leaves_nothing_free(self.start):
             self.lead = self._independent()
             self._check_determinate()
-            self.bodies = self.freedoms.bodies
+            self.passive, self.bodies = self.freedoms.passive, self.freedoms.bodies
             self.solver = closure_solver(self.engine, self.leading, self.freedoms.hold)
 
     @cached_property
@@ -236,6 +237,7 @@ class Outcome:
             line.columns,
             coordinates,
             line.options.redundant == "nan",
+            line.passive if line.options.method else (),
         )
         work = found.work
         work.positions, work.nodes = len(variant), len(found.tracks.nodes)
@@ -251,22 +253,12 @@ class Outcome:
             self._fill_shared(good, whole)
             return
         self.trajectory.mark(bad, [status.value for status in found.status[bad]])
-        if not good.size:
-            self._name_holds()
         for places in [good] if whole else in_blocks(good):
             moved = self._moved(places)
             if moved is not None:
                 self._put(*moved)
         for motion, f in self._beside_change_points():
             self._put(motion, f)
-
-    def _name_holds(self) -> None:
-        """What would be held, by name, where no position was reached."""
-        line = self.line
-        if not line.bodies or not line.options.method:
-            return
-        f = line.solver.factored(line.start, line.solver.chosen(line.start, np.full(1, -1)))
-        self.trajectory.name_holds(passive_rest.hold_names(line.start, line.bodies, f.motions()))
 
     def _fill_shared(self, good: Index, whole: bool) -> None:
         """The motion of the first variant serves all; forces in blocks of whole variants."""
@@ -313,7 +305,13 @@ class Outcome:
         """Rates at states for the motions of the drivers at places."""
         line = self.line
         velocity, acceleration = self._velocity[line.lead][:, places], self._acceleration[line.lead][:, places]
-        return rates(here, f, line.leading, velocity, acceleration, line.bodies)
+        with np.errstate(over="ignore", invalid="ignore"):
+            moved = rates(here, f, line.leading, velocity, acceleration, line.bodies)
+            largest = np.square(np.max([np.abs(values).max(initial=0.0) for values in (moved.V, moved.dq, moved.ddq)]))
+        if not np.isfinite(largest):  # accelerations hold squares of rates
+            too_large = "rates are beyond the largest number (1.8e308): give smaller velocities and accelerations"
+            raise DeclarationError(f"solve {line.m.name!r}", [too_large])
+        return moved
 
     def _beside_change_points(self) -> Iterator[tuple[BlockMotion, FactoredClosure | None]]:
         """Motion at and beside the change points passed, interpolated between both sides; without factors where these are singular."""
@@ -352,13 +350,19 @@ class Outcome:
             line.options.method,
             self.starts.loads,
             line.columns,
-            line.bodies,
+            line.passive,
             self.batch,
             line.drive.t,
             line.options.redundant,
         )
         coordinates = self.trajectory.coordinates_at(motion.places)
-        return forces_of_block(task, motion.rates, f, coordinates, motion.places)
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = forces_of_block(task, motion.rates, f, coordinates, motion.places)
+            finite = np.isfinite(found.balance + found.power) | self.contradicting[motion.places]
+        if not finite.all():
+            too_large = "forces are beyond the largest number (1.8e308): masses, loads or rates are too large"
+            raise DeclarationError(f"solve {line.m.name!r}", [too_large])
+        return found
 
     def _dead(self, here: Configuration, f: FactoredClosure) -> Mask:
         """Positions so near to a dead point that their rates would be noise."""

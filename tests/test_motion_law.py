@@ -7,6 +7,7 @@ import pickle
 import numpy as np
 import pytest
 
+import mechgraph as mg
 from mechgraph.errors import DeclarationError
 from mechgraph.model.motion import LAWS, Motion
 
@@ -382,3 +383,48 @@ def test_unknown_law_lists_the_known():
 )
 def test_argument_faults(args, kwargs, says):
     assert says in faults(*args, **kwargs)
+
+
+def test_a_motion_with_times_and_without_rates_has_those_of_the_spline() -> None:
+    """sin(3 t): the spline's rates, as `sampled` gives them, near 3 cos(3 t); without times, or with velocity=0.0, at rest."""
+    t = np.linspace(0, 2, 81)
+    motion, law = Motion(np.sin(3 * t), t=t), Motion.law("sampled", samples=(t, np.sin(3 * t)), t=t)
+    assert np.abs(motion.velocity - 3 * np.cos(3 * t)).max() < 1e-6
+    assert np.abs(motion.acceleration + 9 * np.sin(3 * t)).max() < 1e-4
+    np.testing.assert_array_equal(motion.velocity, law.velocity)
+    np.testing.assert_array_equal(motion.acceleration, law.acceleration)
+    for still in (Motion(np.sin(3 * t), velocity=0.0, t=t), Motion(np.sin(3 * t))):
+        assert not still.velocity.any()
+        assert not still.acceleration.any()
+
+
+def test_rates_that_are_left_out_follow_from_those_given_case_by_case() -> None:
+    t = np.linspace(0, 1, 12)
+    cases = np.array([[1.0], [2.0]])
+    motion = Motion(cases * t**2, t=t)
+    np.testing.assert_allclose(motion.velocity, 2 * cases * t, atol=1e-12)
+    np.testing.assert_allclose(motion.acceleration, 2 * cases + 0 * t, atol=1e-10)
+    np.testing.assert_allclose(Motion(t**2, velocity=2 * t, t=t).acceleration, 2.0, atol=1e-11)
+    np.testing.assert_allclose(Motion(t**2, acceleration=2.0, t=t).velocity, 2 * t, atol=1e-12)
+    np.testing.assert_allclose(
+        Motion([1.0, 2.0, 4.0], t=[0, 1, 2]).velocity, [0.5, 1.5, 2.5]
+    )  # the parabola through three
+    assert Motion(1.0, t=2.0).velocity == 0.0
+
+
+def test_times_that_do_not_increase_give_no_rates() -> None:
+    with pytest.raises(mg.DeclarationError, match="t must increase"):
+        Motion([1.0, 2.0, 3.0], t=[0.0, 1.0, 1.0])
+    assert not Motion([1.0, 2.0, 3.0], velocity=0.0, t=[0.0, 1.0, 1.0]).acceleration.any()
+
+
+def test_a_stored_motion_with_times_keeps_rest_and_takes_rates(tmp_path) -> None:
+    """An arm of 2 kg at 0.5 m on its hinge: the torque is I q''; at rest it is zero, also after a file."""
+    t = np.linspace(0, 1, 30)
+    arm = mg.Mechanism("arm", [mg.Link("frame"), mg.Link("arm", 2.0, (0.5, 0, 0))],
+                       [mg.Pair("A", "R", "frame", "arm", point=(0, 0, 0), axis=(0, 0, 1))])  # fmt: skip
+    for motion, expected in ((Motion(t**3, t=t), 0.5 * 6 * t), (Motion(t**3, velocity=0.0, t=t), 0 * t)):
+        m = arm.replace(drives=[mg.Drive("A", motion)])
+        mg.save(m, tmp_path / "arm.toml")
+        for one in (m, mg.load(tmp_path / "arm.toml")):
+            np.testing.assert_allclose(mg.solve(one)["A"].effort[:, 0], expected, atol=1e-9)

@@ -28,8 +28,8 @@ def _as_motion(m: Mechanism, value: Any, name: str, faults: list[str]) -> Motion
 def driven(m: Mechanism, motions: Mapping[str, Any] | None) -> tuple[Mechanism, dict[str, Motion]]:
     """The mechanism with its drives, and the motion of each by full name.
 
-    Motions given by name go to the declared drives, or become the drives where none is declared; the others use the motion
-    stored with them.
+    Motions given by name go to the declared drives; the others use the motion stored with them. Where a name is no declared drive, the
+    names given are the drives of this call, in place of the declared ones.
     """
     if motions is not None and not isinstance(motions, Mapping):
         raise DeclarationError(
@@ -38,16 +38,14 @@ def driven(m: Mechanism, motions: Mapping[str, Any] | None) -> tuple[Mechanism, 
         )
     given = dict(motions or {})
     faults: list[str] = []
-    if not m.drives and given:
-        faults += [f"drive {name!r}: {why}" for name in given if (why := m.freedom_fault(name, single=True))]
-        if not faults:
-            m = m.replace(drives=[Drive(name) for name in given])
     known = {m.full_name(d.freedom): d for d in m.drives}
+    faults += [f"motion of {name!r}: {why}" for name in given if (why := m.freedom_fault(name, single=True))]
+    if not faults and any(m.full_name(name) not in known for name in given):
+        known = {m.full_name(name): Drive(name) for name in given}
+        m = m.replace(drives=list(known.values()))
     out: dict[str, Motion] = {}
     for name, value in given.items():
-        why = m.freedom_fault(name, single=True)
-        if why or m.full_name(name) not in known:
-            faults.append(f"motion of {name!r}: {why or 'is not a drive'}; drives: {', '.join(known) or 'none'}")
+        if m.freedom_fault(name, single=True):
             continue
         if m.full_name(name) in out:
             faults.append(f"motion of {name!r}: {m.full_name(name)} is given twice")

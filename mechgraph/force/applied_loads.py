@@ -41,7 +41,8 @@ def nothing(shape: tuple[int, ...]) -> Array:
 class Site:
     """Collects loads on links and efforts in freedoms; speaks the user's units, about the internal origin.
 
-    Implements ``model.load.LoadSite``. ``external`` holds what comes from outside, ``internal`` what links exert on each other.
+    Implements ``model.load.LoadSite``. ``external`` holds what comes from outside, ``internal`` what links exert on each other;
+    ``largest`` is the largest single contribution (internal units), against which a sum that cancels is rounding.
     """
 
     def __init__(
@@ -56,6 +57,7 @@ class Site:
         self.internal = nothing(self.external.shape)
         self.efforts = np.zeros((system.n_freedoms, here.T))
         self._target = self.external
+        self.largest = 0.0
 
     def collect(self, loads: tuple[Load, ...]) -> None:
         """Evaluate all loads."""
@@ -168,21 +170,29 @@ class Site:
         par, X = self.here.system.par, self.here.poses
         at = self.L * (rotate(X[:, :3], par.center) + X[:, 3])
         force = np.broadcast_to(par.mass * np.asarray(acceleration, dtype=float).reshape(3, 1, -1), at.shape)
-        self._target[:3] += cross(at, force)
-        self._target[3:] += force
+        self._add(slice(None), cross(at, force), force)
 
     def add_force(self, link: str, force: Array, at: Array) -> None:
         """Force on a link at a position."""
-        self._target[:3, self._link[link]] += cross(at, force)
-        self._target[3:, self._link[link]] += force
+        self._add(self._link[link], cross(at, force), force)
 
     def add_couple(self, link: str, moment: Array) -> None:
         """Couple on a link."""
-        self._target[:3, self._link[link]] += moment
+        self._add(self._link[link], moment, 0.0)
+
+    def _add(self, links: Any, moment: Array, force: Any) -> None:
+        self._target[:3, links] += moment
+        self._target[3:, links] += force
+        self._note(np.abs(moment).max(initial=0.0) / self.L**2, np.abs(force).max(initial=0.0) / self.L)
+
+    def _note(self, *sizes: float) -> None:
+        self.largest = max(self.largest, *map(float, sizes))
 
     def add_effort(self, name: str, effort: Array) -> None:
         """Effort in a freedom."""
-        self.efforts[self._column(name)] += effort
+        column = self._column(name)
+        self.efforts[column] += effort
+        self._note(np.abs(effort).max(initial=0.0) / self.L ** (1 if self.here.system.is_length[column] else 2))
 
     # --- in internal units -------------------------------------------------------------------------------------------
 

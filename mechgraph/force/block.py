@@ -7,17 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure import passive_rest
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
-from mechgraph.closure.passive_rest import Idle
 from mechgraph.closure.rates import Rates
 from mechgraph.closure.solver import FactoredClosure
 from mechgraph.force.applied_loads import Site, inertia_wrenches, kinetic_power
 from mechgraph.force.dalembert import METHODS, ForceProblem, Wrenches, row_efforts
+from mechgraph.force.passive_hold import hold
 from mechgraph.force.reaction_map import reaction_map
 from mechgraph.model.load import Load
 from mechgraph.numerics.linear import add_at
+from mechgraph.structure.passive import PassiveMotion
 from mechgraph.structure.reaction_split import (
     Stress,
     at_pair_points,
@@ -30,24 +30,15 @@ from mechgraph.structure.reaction_split import (
 
 
 @dataclass(frozen=True)
-class Hold:
-    """What keeps a passive body at rest: its name, whether it is a couple (of a turn) or a force, and its size ``(T,)``."""
-
-    name: str
-    turns: bool
-    size: Array
-
-
-@dataclass(frozen=True)
 class BlockForces:
     """Forces at the positions of a block, internal units about the internal origin.
 
     ``reactions (6, P, T)`` and all ``efforts (F, T)`` (of least norm where redundant), ``given (F, T)`` efforts of loads, ``loads
     (6, N, T)`` inertia, applied wrenches and what holds passive bodies (``hold (6, N, T)`` that alone, or None), self-stresses
     ``stress (6, P, s, T)`` with ``stress_efforts (F, s, T)``, ``coupled (F, T)`` efforts of couplings, ``shaking (6, T)``;
-    ``balance (T,)`` and ``power (T,)`` the residuals of equilibrium and power, ``largest`` the largest term of each; ``holds`` by
-    body. ``multipliers (n, T)`` of the closure rows behind those of the loops with ``multiplier_stress (n, s, T)``, of which
-    ``coupled_stress (F, s, T)`` are the efforts in freedoms.
+    ``balance (T,)`` and ``power (T,)`` the residuals of equilibrium and power, ``largest`` the largest term of each; ``holds`` and
+    ``hold_terms (p, T)`` of the passive motions (see ``force.passive_hold``). ``multipliers (n, T)`` of the closure rows behind those of
+    the loops with ``multiplier_stress (n, s, T)``, of which ``coupled_stress (F, s, T)`` are the efforts in freedoms.
     """
 
     reactions: Array
@@ -65,17 +56,18 @@ class BlockForces:
     balance: Array
     power: Array
     largest: tuple[float, float]
-    holds: tuple[Hold, ...] = ()
+    holds: Array
+    hold_terms: Array
 
 
 @dataclass(frozen=True)
 class ForceTask:
-    """The task for every block: force ``method``, ``loads``, ``driven`` freedoms, passive ``bodies``; ``batch`` and times ``t``."""
+    """The task for every block: force ``method``, ``loads``, ``driven`` freedoms, ``passive`` motions; ``batch`` and times ``t``."""
 
     method: str
     loads: tuple[Load, ...]
     driven: Index
-    bodies: tuple[Idle, ...]
+    passive: tuple[PassiveMotion, ...]
     batch: tuple[int, ...]
     t: object
     redundant: str
@@ -90,18 +82,19 @@ def forces_of_block(
     site.collect(task.loads)
     given, applied, inertia = site.scaled_efforts(), site.applied(), inertia_wrenches(here, rates)
     loads = applied + inertia
-    hold: Array | None = None
-    holds: tuple[Hold, ...] = ()
-    if task.bodies:
-        hold, holds = _held(here, task.bodies, f.motions(), loads, given)
-        loads = loads + hold
+    held: Array | None = None
+    holds = hold_terms = np.zeros((0, here.T))
+    if task.passive:
+        held, holds, hold_terms = hold(here, task.passive, f.motions(), loads, given, site.largest)
+        loads = loads + held
     wrenches = METHODS[task.method](ForceProblem(here, loads, given, task.driven, f))
     found = _least(here, wrenches, f, task)
     own = np.zeros_like(found.efforts)
     own[task.driven] = (found.efforts - given - found.coupled)[task.driven]
     acting = own + given + found.coupled
-    balance, wrench = _balance(here, found.reactions, acting, loads, (applied, inertia, hold))
-    power, term = _power(rates, applied if hold is None else applied + hold, acting, inertia)
+    totals = here.pair_sums(here.E * acting) + found.reactions
+    balance, wrench = _balance(here, found.reactions, totals, loads, (applied, inertia, held))
+    power, term = _power(rates, totals, applied if held is None else applied + held, acting, inertia)
     frame = here.system.graph.frame
     shaking = np.delete(loads, frame, axis=1).sum(axis=1) + site.scaled(site.internal)[:, frame]
     return BlockForces(
@@ -109,7 +102,7 @@ def forces_of_block(
         found.efforts,
         given,
         loads,
-        hold,
+        held,
         found.stress.wrenches,
         found.stress.efforts,
         found.coupled,
@@ -121,15 +114,8 @@ def forces_of_block(
         power,
         (wrench, term),
         holds,
+        hold_terms,
     )
-
-
-def _held(
-    here: Configuration, bodies: tuple[Idle, ...], Z: Array, loads: Array, given: Array
-) -> tuple[Array, tuple[Hold, ...]]:
-    hold, sizes = passive_rest.hold(here, bodies, Z, loads, given)
-    names = passive_rest.hold_names(here, bodies, Z)
-    return hold, tuple(Hold(*name, size) for name, size in zip(names, sizes, strict=True))
 
 
 @dataclass(frozen=True)
@@ -167,12 +153,10 @@ def _least(here: Configuration, wrenches: Wrenches, f: FactoredClosure, task: Fo
 
 
 def _balance(
-    here: Configuration, reactions: Array, efforts: Array, loads: Array, parts: tuple[Array | None, ...]
+    here: Configuration, reactions: Array, totals: Array, loads: Array, parts: tuple[Array | None, ...]
 ) -> tuple[Array, float]:
     """Residual ``(T,)`` of the equilibrium of all links and of ``S^T w = effort``, and the largest wrench."""
     s = here.system
-    totals = here.pair_sums(here.E * efforts)
-    totals += reactions
     left = loads.copy()
     add_at(left, s.b, totals)
     add_at(left, s.a, -totals)
@@ -182,12 +166,22 @@ def _balance(
     return np.maximum(residual, work), max(_largest(part) for part in (totals, *parts) if part is not None)
 
 
-def _power(rates: Rates, applied: Array, efforts: Array, inertia: Array) -> tuple[Array, float]:
-    """Driver power + load power - rate of kinetic energy ``(T,)``, and the largest term."""
-    by_load, by_effort = (rates.V * applied).sum(axis=0), rates.dq * efforts
-    kinetic = kinetic_power(rates, inertia)
-    left = by_load.sum(axis=0) + by_effort.sum(axis=0) - kinetic.sum(axis=0)
-    return left, max(_largest(part) for part in (by_load, by_effort, kinetic))
+def _power(rates: Rates, totals: Array, applied: Array, efforts: Array, inertia: Array) -> tuple[Array, float]:
+    """Driver power + load power - rate of kinetic energy ``(T,)``, and the largest term.
+
+    A term is twist times wrench of one link, for loads, inertia and what its pairs transmit, before anything cancels: where forces do no
+    work, the sum is rounding of such products.
+    """
+    s, kinetic = rates.here.system, kinetic_power(rates, inertia)
+    left = (rates.V * applied).sum(axis=(0, 1)) + (rates.dq * efforts).sum(axis=0) - kinetic.sum(axis=0)
+    speed, through = np.abs(rates.V).max(axis=0), np.abs(totals).max(axis=0)
+    terms = (
+        speed * np.abs(applied).max(axis=0),
+        speed * np.abs(inertia).max(axis=0),
+        speed[s.b] * through,
+        speed[s.a] * through,
+    )
+    return left, max(_largest(term) for term in terms)
 
 
 def _largest(values: Array) -> float:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from mechgraph.errors import DeclarationError
 from mechgraph.model.field_format import SERIES, Described
-from mechgraph.model.motion_law import LAWS, Array, Law, LawFault, Smooth, read_series
+from mechgraph.model.motion_law import LAWS, Array, Law, LawFault, Smooth, rates_of_samples, read_series
 from mechgraph.quantities import has_quantity, shown, wrong
 from mechgraph.units import LENGTH, PURE, TIME
 
@@ -34,7 +34,8 @@ class Motion(Described):
     position : (...) array_like
         Radians or lengths. Quantities of pint are converted by the mechanism that they are used for, if it declares units.
     velocity, acceleration : (...) array_like, optional
-        First and second time derivative; 0 where left out.
+        First and second time derivative. Left out: those of the spline through the samples where ``t`` is given (of velocities, where
+        they are; see `Sampled`), else 0. ``velocity=0.0`` says at rest.
     t : (...) array_like, optional
         Times. Where given they are broadcast with the rest.
 
@@ -45,8 +46,10 @@ class Motion(Described):
     """
 
     position: Annotated[Array, SERIES("one a position", LENGTH, PURE, degrees=True, default="this or a sweep")]
-    velocity: Annotated[Array, SERIES("its rate", (1, 0, -1), (0, 0, -1), degrees=True, default="0")]
-    acceleration: Annotated[Array, SERIES("the rate of that", (1, 0, -2), (0, 0, -2), degrees=True, default="0")]
+    velocity: Annotated[
+        Array, SERIES("its rate", (1, 0, -1), (0, 0, -1), degrees=True, default="of a spline over `t`; without `t` 0")
+    ]
+    acceleration: Annotated[Array, SERIES("the rate of that", (1, 0, -2), (0, 0, -2), degrees=True, default="likewise")]
     t: Annotated[Array | None, SERIES("times, where known", TIME, default="none")]
 
     def __init__(
@@ -68,9 +71,9 @@ class Motion(Described):
             return
         faults: list[str] = []
         arrays = {
-            name: read_series(0.0 if value is None and name in ("velocity", "acceleration") else value, name, faults)
+            name: read_series(value, name, faults)
             for name, value in given.items()
-            if name != "t" or value is not None
+            if value is not None or name == "position"
         }
         shape: tuple[int, ...] = ()
         try:
@@ -80,11 +83,15 @@ class Motion(Described):
             faults.append(f"shapes do not broadcast against each other: {shapes}")
         if faults:
             raise DeclarationError("motion", faults)
+        arrays = {name: np.array(np.broadcast_to(array, shape)) for name, array in arrays.items()}
+        try:
+            arrays |= _missing_rates(arrays)
+        except LawFault as fault:
+            raise DeclarationError("motion", [str(fault)]) from None
+        for array in arrays.values():
+            array.setflags(write=False)
         for name in given:
-            array = np.array(np.broadcast_to(arrays[name], shape)) if name in arrays else None
-            if array is not None:
-                array.setflags(write=False)
-            object.__setattr__(self, name, array)
+            object.__setattr__(self, name, arrays.get(name))
 
     def faults(self, where: str = "") -> list[str]:
         """Quantities that are not converted to plain numbers yet, one line each."""
@@ -210,6 +217,17 @@ class Motion(Described):
             return cls(*rule.rates(times, {**given, **numbers}), t=times)
         except LawFault as fault:
             raise DeclarationError(title, [str(fault)]) from None
+
+
+def _missing_rates(arrays: Mapping[str, Array]) -> dict[str, Array]:
+    """Rates that were left out: of the spline through the samples where there are times, else 0."""
+    position, t = arrays["position"], arrays.get("t")
+    missing = {"velocity", "acceleration"} - arrays.keys()
+    found = (np.zeros(position.shape), np.zeros(position.shape))
+    if t is not None and missing:
+        known = arrays.get("velocity")
+        found = rates_of_samples(t, position)[1:] if known is None else (known, rates_of_samples(t, known)[1])
+    return {name: value for name, value in zip(("velocity", "acceleration"), found, strict=True) if name in missing}
 
 
 def _argument_faults(rule: Law, given: Mapping[str, Any]) -> list[str]:

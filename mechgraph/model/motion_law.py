@@ -150,15 +150,37 @@ class Sampled:
         if outside.size:
             span = f"{times[0]:g} to {times[-1]:g}"
             raise LawFault(f"t = {outside[0]:g} is outside the samples, which run from {span}")
-        middle = (times[0] + times[-1]) / 2.0
-        half = (times[-1] - times[0]) / 2.0
-        spline = scipy.interpolate.make_interp_spline((times - middle) / half, values, k=degree)
-        x = (np.clip(t, times[0], times[-1]) - middle) / half
-        return (
-            np.asarray(spline(x), dtype=np.float64),
-            np.asarray(spline(x, 1), dtype=np.float64) / half,
-            np.asarray(spline(x, 2), dtype=np.float64) / half**2,
+        return _splined(times, values, degree, np.clip(t, times[0], times[-1]))
+
+
+def _splined(times: Array, values: Array, degree: int, t: Array) -> Rates:
+    """Value and first two derivatives at t of the spline through samples; times are scaled to -1 ... 1 before."""
+    middle, half = (times[0] + times[-1]) / 2.0, (times[-1] - times[0]) / 2.0
+    spline = scipy.interpolate.make_interp_spline((times - middle) / half, values, k=degree)
+    x = (t - middle) / half
+    first, second = (np.asarray(spline(x, n), dtype=np.float64) / half**n for n in (1, 2))
+    return np.asarray(spline(x), dtype=np.float64), first, second
+
+
+def rates_of_samples(times: Array, values: Array) -> Rates:
+    """Values and rates ``(..., n)`` of the spline of `Sampled` through values at times, row by row; zero where all are the same.
+
+    Raises
+    ------
+    LawFault
+        where times do not increase along the last axis.
+    """
+    n = values.shape[-1] if values.ndim else 1
+    if n == 1 or not np.diff(values, axis=-1).any():
+        return values, np.zeros(values.shape), np.zeros(values.shape)
+    if (np.diff(times, axis=-1) <= 0.0).any():
+        raise LawFault(
+            "t must increase along its last axis, as the rates are those of the spline through the samples; or give velocity"
         )
+    degree = 5 if n >= 6 else min(3, n - 1)
+    rows = [_splined(t, q, degree, t) for t, q in zip(times.reshape(-1, n), values.reshape(-1, n), strict=True)]
+    position, first, second = (np.stack(part).reshape(values.shape) for part in zip(*rows, strict=True))
+    return position, first, second
 
 
 def _checked_samples(samples: Any) -> tuple[Array, Array]:

@@ -16,7 +16,7 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.linear import independent_rows
 from mechgraph.numerics.tolerances import RANKS
 from mechgraph.report import findings
-from mechgraph.report.findings import Finding, LoopFact
+from mechgraph.report.findings import Finding, LoopFact, PassiveFinding
 from mechgraph.structure.finite_motion import FiniteMotion, finite_motion
 from mechgraph.structure.generic import Generic, generic
 from mechgraph.structure.mobility import Freedoms, freedoms_at
@@ -211,10 +211,10 @@ class Facts:
         return findings.left_free(self.geometry.freedoms) if self.geometry else ()
 
     @cached_property
-    def passive(self) -> tuple[Finding, ...]:
-        """Passive freedoms by name and line."""
+    def passive(self) -> tuple[PassiveFinding, ...]:
+        """Passive freedoms by name and line, and whether the declared loads move them."""
         g = self.geometry
-        return tuple(findings.passive_finding(g.system, p) for p in g.freedoms.passive) if g else ()
+        return findings.passive_findings(g.system, g.x, g.freedoms.passive) if g else ()
 
     @property
     def _null_nearby(self) -> Array | None:

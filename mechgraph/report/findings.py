@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import System
+from mechgraph.force.passive_hold import hold_at_rest, hold_names, is_idle, turns
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.linear import independent_rows, rank_of, singular_values
 from mechgraph.numerics.tolerances import MOTIONS
 from mechgraph.structure.mobility import Freedoms, drive_order, single_freedoms
 from mechgraph.structure.passive import PassiveMotion
 from mechgraph.structure.position import Position
+from mechgraph.units import unit_of
 
 NAMED = 8
 """Most freedoms named for one motion."""
@@ -33,6 +36,24 @@ class Finding:
 
     def __str__(self) -> str:
         return self.text
+
+
+@dataclass(frozen=True)
+class PassiveFinding(Finding):
+    """A passive freedom by ``name``: idle under the declared loads at rest here, or load-bearing (None: a load varies over positions).
+
+    ``effort`` (of a ``unit``) is the couple, or for a slide the force, that would have to hold it; no part supplies that.
+    """
+
+    name: str = ""
+    load_bearing: bool | None = False
+    effort: float = 0.0
+    unit: str = ""
+
+    @property
+    def size(self) -> str:
+        """The effort with its unit."""
+        return f"{self.effort:.4g} {self.unit}".rstrip()
 
 
 @dataclass(frozen=True)
@@ -92,25 +113,45 @@ def screw_axis(system: System, twist: Array) -> tuple[tuple[float, ...], tuple[f
     return tuple((par.L * point + par.origin).tolist()), tuple(direction.tolist())
 
 
-def passive_finding(system: System, motion: PassiveMotion) -> Finding:
-    """A passive freedom: which links move, how, between which pairs."""
+def passive_findings(system: System, x: Array, passive: tuple[PassiveMotion, ...]) -> tuple[PassiveFinding, ...]:
+    """Passive freedoms at a state ``x (nx,)``: which links move, how, between which pairs, and whether the declared loads move them."""
+    if not passive:
+        return ()
+    m = system.m
+    q = system.coordinates_of(x[:, None], system.start_coordinates(m.start))
+    held = hold_at_rest(Configuration(system, x[:, None]), q, m.loads, passive)
+    out = []
+    for i, (motion, name) in enumerate(zip(passive, hold_names(m, passive), strict=True)):
+        unit = unit_of(m.units, (2 if turns(motion) else 1, 1, -2))
+        bearing = None if held is None else not is_idle(held[0][i], held[1][i])
+        scale = system.par.L ** (2 if turns(motion) else 1)
+        effort = abs(float(held[0][i, 0])) * scale if held is not None and bearing else 0.0
+        out.append(_passive_finding(system, motion, PassiveFinding("", (), (), None, name, bearing, effort, unit)))
+    return tuple(out)
+
+
+def _passive_finding(system: System, motion: PassiveMotion, found: PassiveFinding) -> PassiveFinding:
     m = system.m
     names = m.link_names()
     links = tuple(names[i] for i in motion.links)
     freedoms = tuple(n for n, r in zip(m.freedom_names(), motion.rates, strict=True) if abs(r) > MOTIONS.still)
     pairs = [p for p in m.pairs if any(n in freedoms for n in p.freedom_names)]
     axis = screw_axis(system, motion.twist)
-    turning = bool(np.linalg.norm(motion.twist[:3]) > 1e-9)
     one = len(links) == 1
     line = f"the line {'-'.join(p.name for p in pairs)} ({'-'.join(p.type.symbol for p in pairs)})"
-    if turning:
+    if turns(motion):
         how = f"turn{'s' if one else ''} about {line}, through {vector(axis[0])} along {vector(axis[1])}"
     else:
         how = f"slide{'s' if one else ''} along {vector(axis[1])} in the pairs {', '.join(p.name for p in pairs)}"
     together = "" if one else " together"
-    return Finding(
-        f"{' and '.join(links)} {how}{together}: carries no load, moves no other link", freedoms, links, axis
-    )
+    what = "couple" if turns(motion) else "force"
+    load = {
+        True: f"load-bearing, only a {what} of {found.size} that no part supplies would hold it",
+        False: "carries no load",
+        None: "the loads on it vary over positions, see the warnings of a solution",
+    }[found.load_bearing]
+    text = f"{' and '.join(links)} {how}{together}: {load}, moves no other link"
+    return replace(found, text=text, freedoms=freedoms, links=links, axis=axis)
 
 
 def locked(freedoms: Freedoms, null_nearby: Array | None) -> tuple[Finding, ...]:

@@ -97,8 +97,16 @@ def _of_position(r: Facts) -> str:
         more = plural(len(r.passive), "unknown")
         held = f" ({plural(len(r.passive), 'passive freedom')} held: {more} more)" if r.passive else ""
         state = "Determinate" if r.mobility else "Determinate structure"
-        return f"{state}: {_counts(r)}; every reaction is unique{held}."
-    return f"{_state(r)}, {_not_unique(r, r.reactions)}{_efforts(r, r.reactions)}."
+        return f"{_bearing(r)}{state}: {_counts(r)}; every reaction is unique{held}."
+    return f"{_bearing(r)}{_state(r)}, {_not_unique(r, r.reactions)}{_efforts(r, r.reactions)}."
+
+
+def _bearing(r: Facts) -> str:
+    """What holds passive freedoms that carry load, before the rest of the verdict."""
+    bearing = [f"{p.name} by {p.size}" for p in r.passive if p.load_bearing]
+    if not bearing:
+        return ""
+    return f"Load-bearing passive freedom, on which reactions rest: no part holds {listed(bearing, SETS)}. With that held: "
 
 
 def _left_free(r: Facts) -> str:

@@ -45,6 +45,39 @@ class MaterialPoint(NamedTuple):
     acceleration: Array
 
 
+@dataclass(frozen=True)
+class LoadBearing:
+    """A passive freedom that the loads would move: only a couple or force that no part supplies holds it there.
+
+    ``name`` as in ``Solution.passive_effort`` and the report, whether it ``turns`` (held by a couple), the greatest ``effort`` with its
+    ``unit``, the ``links`` and ``freedoms`` that would move, and the ``pairs`` of these links, whose reactions rest on that effort.
+    """
+
+    name: str
+    turns: bool
+    effort: float
+    unit: str
+    links: tuple[str, ...]
+    pairs: tuple[str, ...]
+    freedoms: tuple[str, ...]
+
+    @property
+    def size(self) -> str:
+        """``a couple of 20.5 N m``."""
+        return f"a {'couple' if self.turns else 'force'} of {self.effort:.4g}" + (f" {self.unit}" if self.unit else "")
+
+    @property
+    def text(self) -> str:
+        """The warning in one sentence."""
+        return (
+            f"{self.name}: load-bearing passive freedom, held by {self.size} at most, which no part supplies: the real linkage would move "
+            f"({', '.join(self.freedoms)}), and the reactions of {', '.join(self.pairs)} rest on it"
+        )
+
+    def __str__(self) -> str:
+        return self.text
+
+
 class Values(Protocol):
     """Where a Solution takes its values from (see ``result.trajectory``); every method returns batch-first arrays."""
 
@@ -95,7 +128,10 @@ class Values(Protocol):
         """Wrench on the frame about the global origin, ``(..., 6)``."""
 
     def passive_efforts(self) -> dict[str, Array]:
-        """What keeps passive bodies at rest, by body."""
+        """What keeps passive bodies at rest, by name."""
+
+    def load_bearing(self) -> tuple[LoadBearing, ...]:
+        """Passive freedoms that the loads would move."""
 
     def state(self, index: Any) -> State:
         """Screws and loads at one position, in the declared units about the global origin."""
@@ -350,12 +386,17 @@ class Solution:
 
     @property
     def passive_effort(self) -> dict[str, Array]:
-        """What keeps passive bodies from spinning (or sliding) in space, by body: a couple about the axis, or a force.
+        """What keeps passive bodies from spinning (or sliding) in space: a couple about the axis, or a force, by the report's name.
 
-        Zero where nothing turns them. The orientation of such a body depends on the path: from the start on it does not spin about its
-        axis.
+        Zero where nothing turns them; otherwise no part supplies it (see ``warnings``). The orientation of such a body depends on the
+        path: from the start on it does not spin about its axis.
         """
         return self._values.passive_efforts()
+
+    @property
+    def warnings(self) -> tuple[LoadBearing, ...]:
+        """What makes reactions doubtful: passive freedoms that carry load, with size, unit, links and pairs."""
+        return self._values.load_bearing()
 
     def state(self, index: Any = ()) -> State:
         """Screws, loads and coordinates at one position, for ``Formulation.assemble``."""

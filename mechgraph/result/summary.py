@@ -206,8 +206,9 @@ class _View:
         forces, moments = _largest(self.forces), _largest(self.moments)
         scales = (max(forces, moments / self.extent), max(moments, forces * self.extent))
         rows = []
+        resting = {name for warning in self.s.warnings for name in warning.pairs}
         for k, pair in enumerate(self.m.pairs):
-            cells = [pair.name, pair.type.symbol, pair.a, pair.b]
+            cells = [f"{pair.name} *" if pair.name in resting else pair.name, pair.type.symbol, pair.a, pair.b]
             for couple, values, scale in ((False, self.forces[k], scales[0]), (True, self.moments[k], scales[1])):
                 cells += self._greatest(pair, couple, values, scale)
             rows.append(tuple(cells))
@@ -224,7 +225,8 @@ class _View:
         yield Heading("Greatest reactions", 2)
         yield Table(head, tuple(rows), align="llllrrrr")
         of = f"; 'at' is the value of {', '.join(self.drivers)}" if self.drivers else ""
-        yield Paragraph(f"Moments are about the pair's own point on link 'on'{of}.")
+        held = " *: rests on an effort that no part supplies, see the passive freedoms." if resting else ""
+        yield Paragraph(f"Moments are about the pair's own point on link 'on'{of}.{held}")
 
     def _greatest(self, pair: Pair, couple: bool, values: Array, scale: float) -> list[str]:
         mark = ""
@@ -270,19 +272,12 @@ class _View:
         }
 
     def passive(self) -> Iterator[Block]:
-        """The efforts that keep passive freedoms at rest."""
-        found = {name: self.flat(value) for name, value in self.s.passive_effort.items()}
-        if not found:
-            return
-        scale = max(_largest(self.moments), _largest([*self.efforts.values()]))
-        items = []
-        for name, value in found.items():
-            size = float(np.nanmax(np.abs(value), initial=0.0))
-            none = size <= 1e-9 * scale
-            held = f"an effort of at most {_number(size)} holds it"
-            items.append(f"{name} is kept at rest in its passive freedom; {'no effort is needed' if none else held}")
-        yield Heading("Passive freedoms", 2)
-        yield Bullets(tuple(items))
+        """The passive freedoms: idle ones, and those that only an effort that no part supplies holds against the loads."""
+        bearing = {warning.name: warning.text for warning in self.s.warnings}
+        items = tuple(bearing.get(name, f"{name}: idle, no effort is needed") for name in self.s.passive_effort)
+        if items:
+            yield Heading("Passive freedoms", 2)
+            yield Bullets(items)
 
     def checks(self) -> Iterator[Block]:
         """The worst of every check."""

@@ -23,10 +23,14 @@ from mechgraph.errors import MechgraphError
 from mechgraph.force.applied_loads import user_poses, user_twists
 from mechgraph.force.block import BlockForces
 from mechgraph.force.dalembert import given_effort_loads, internal_state
+from mechgraph.force.passive_hold import hold_names, is_idle, turns
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.newton import Work
-from mechgraph.result.solution import Checks, MaterialPoint
+from mechgraph.numerics.tolerances import MOTIONS
+from mechgraph.result.solution import Checks, LoadBearing, MaterialPoint
+from mechgraph.structure.passive import PassiveMotion
 from mechgraph.structure.reaction_split import UNIQUE, PairFrames
+from mechgraph.units import unit_of
 
 
 @dataclass(frozen=True)
@@ -44,7 +48,7 @@ class BlockMotion:
 
 KEPT = (
     "reactions", "efforts", "given", "loads", "hold", "stress", "stress_efforts", "coupled", "multipliers", "multiplier_stress",
-    "coupled_stress", "shaking", "balance", "power",
+    "coupled_stress", "shaking", "balance", "power", "holds", "hold_terms",
 )  # fmt: skip
 """Fields of ``BlockForces`` that are kept for every position."""
 RETAINED = 40_000
@@ -67,16 +71,16 @@ class Trajectory:
         driven: Index,
         coordinates: Array,
         mask_redundant: bool,
+        passive: tuple[PassiveMotion, ...] = (),
     ) -> None:
         self.mechanism: Mechanism = system.m
-        self.batch, self.t, self.driven = batch, t, driven
+        self.batch, self.t, self.driven, self._passive = batch, t, driven, passive
         self._system, self._system_at, self._mask = system, system_at, mask_redundant
         self._L = system.par.L
         self._coordinates = coordinates
         self._count = int(np.prod(batch))
         self._status = np.full(self._count, Status.OK.value, dtype="U24")
         self._kept: dict[str, Array] = {}
-        self._holds: dict[tuple[str, bool], Array] = {}
         self._largest = np.zeros(2)
         self._solved = np.zeros(self._count, dtype=bool)
         self._motions: list[BlockMotion] = []
@@ -110,9 +114,6 @@ class Trajectory:
             values = getattr(forces, name)
             if values is not None:
                 self._keep(name, places, values)
-        for hold in forces.holds:
-            sizes = self._holds.setdefault((hold.name, hold.turns), np.full(self._count, np.nan))
-            sizes[places] = hold.size
         self._largest = np.maximum(self._largest, forces.largest)
 
     def _keep(self, name: str, places: Index, values: Array) -> None:
@@ -126,11 +127,6 @@ class Trajectory:
     def coordinates_at(self, places: Index) -> Array:
         """User coordinates ``(F, n)`` at flat places."""
         return self._coordinates[:, places]
-
-    def name_holds(self, names: list[tuple[str, bool]]) -> None:
-        """Say what is held at rest where no position is solved."""
-        for name in names:
-            self._holds.setdefault(name, np.full(self._count, np.nan))
 
     def mark(self, places: Index, status: Any) -> None:
         """Say why positions are not solved."""
@@ -181,6 +177,7 @@ class Trajectory:
             "x": (s.n_state,), "dq": (F,), "ddq": (F,), "closure": (), "points": (3, P), "reactions": (6, P), "efforts": (F,),
             "given": (F,), "loads": (6, N), "hold": (6, N), "stress": (6, P, 0), "stress_efforts": (F, 0), "coupled": (F,),
             "multipliers": (n,), "multiplier_stress": (n, 0), "coupled_stress": (F, 0), "shaking": (6,), "balance": (), "power": (),
+            "holds": (len(self._passive),), "hold_terms": (len(self._passive),),
         }  # fmt: skip
         empty = 0.0 if name == "hold" else np.nan
         return np.broadcast_to(empty, (*shapes[name], self._count))
@@ -336,11 +333,30 @@ class Trajectory:
         return self._out(self._user_wrench(self._of("hold")[:, link]))
 
     def passive_efforts(self) -> dict[str, Array]:
-        """What keeps passive bodies at rest, by body: a couple about the axis of a turn, a force along a slide."""
-        self._force("loads")
+        """What keeps passive bodies at rest, by name: a couple about the axis of a turn, a force along a slide."""
         return {
-            name: self._out((self._L**2 if turns else self._L) * size) for (name, turns), size in self._holds.items()
+            name: self._out((self._L**2 if turns(motion) else self._L) * size)
+            for name, motion, size in zip(
+                hold_names(self.mechanism, self._passive), self._passive, self._force("holds"), strict=True
+            )
         }
+
+    def load_bearing(self) -> tuple[LoadBearing, ...]:
+        """Passive freedoms that the loads of the motion would move."""
+        if not self.has_forces:
+            return ()
+        m, terms = self.mechanism, self._of("hold_terms")
+        out = []
+        for motion, (name, size), part in zip(self._passive, self.passive_efforts().items(), terms, strict=True):
+            scale = self._L**2 if turns(motion) else self._L
+            if is_idle(size.ravel(), scale * part):
+                continue
+            links = tuple(m.links[i].name for i in motion.links)
+            pairs = tuple(p.name for p in m.pairs if p.a in links or p.b in links)
+            freedoms = tuple(n for n, r in zip(m.freedom_names(), motion.rates, strict=True) if abs(r) > MOTIONS.still)
+            unit = unit_of(m.units, (2 if turns(motion) else 1, 1, -2))
+            out.append(LoadBearing(name, turns(motion), float(np.nanmax(np.abs(size))), unit, links, pairs, freedoms))
+        return tuple(out)
 
     # --- checks and states -----------------------------------------------------------------------------------------------
 

@@ -114,8 +114,13 @@ def freedoms_at(position: Position, columns: Index, engine: EngineName = "auto")
     left = _left_free(closure, at_rest, columns)
     passive = passive_motions(position, left, columns)
     if not len(columns) and passive and len(passive) == null.shape[1]:
-        # nothing else can move: what could be driven is an input, not a passive freedom
-        passive = [p for p in passive if not (np.abs(p.rates[position.drivable]) > MOTIONS.still).any()]
+        # nothing else can move: what could be driven is an input, and what swings all links, with no load to be held against, is free
+        every = 0 if position.m.loads else position.graph.n_links - 1
+        passive = [
+            p
+            for p in passive
+            if len(p.links) != every and not (np.abs(p.rates[position.drivable]) > MOTIONS.still).any()
+        ]
     hold = np.zeros(0, dtype=np.intp)
     if passive:
         _, pivots = scipy.linalg.qr(np.stack([p.rates for p in passive]), mode="r", pivoting=True)

@@ -167,10 +167,8 @@ def _source(
     if not isinstance(first, Mechanism):
         raise DeclarationError("study", [f"the function gave {type(first).__name__}; expected a Mechanism"])
     own, given = driven(first, motions)
-    if own is not first:
-        raise DeclarationError(f"study of {first.name!r}", ["declare the drives in the function that builds it"])
     stored = tuple(name for name in given if name not in {own.full_name(key) for key in motions or {}})
-    return Source(own, names, middle, build=m, stored=stored), given
+    return Source(own, names, middle, build=m, stored=stored, redriven=own is not first), given
 
 
 def _rows_of(name: str, motion: Motion, count: int) -> Motion:

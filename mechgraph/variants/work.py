@@ -34,7 +34,8 @@ STATUSES = np.array([*(status.value for status in Status), NOT_SOLVED])
 class Source:
     """Where variants come from: fields of a mechanism, or a function that builds one; ``start`` are its own values.
 
-    ``stored`` are the drivers whose motion is that stored with the mechanism.
+    ``stored`` are the drivers whose motion is that stored with the mechanism; ``redriven`` whether the study has other drives than those
+    declared.
     """
 
     mechanism: Mechanism
@@ -43,6 +44,7 @@ class Source:
     fields: Mapping[str, AnyField] | None = None
     build: Build | None = None
     stored: tuple[str, ...] = ()
+    redriven: bool = False
 
     def one(self, values: Array) -> Mechanism:
         """The mechanism for ``values (parameters,)``."""
@@ -51,6 +53,8 @@ class Source:
         made = self.build(**dict(zip(self.names, values.tolist(), strict=True)))
         if not isinstance(made, Mechanism):
             raise DeclarationError("study", [f"the function gave {type(made).__name__}; expected a Mechanism"])
+        if self.redriven:
+            made = made.replace(drives=self.mechanism.drives)
         if topology_of(made) != topology_of(self.mechanism):
             raise DeclarationError(
                 f"study of {self.mechanism.name!r}",

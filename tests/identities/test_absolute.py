@@ -15,6 +15,9 @@ from strategies import body, closed_mechanism, motions, placed, unit, with_drive
 
 import mechgraph as mg
 
+pytestmark = pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
+"""Random loads move passive freedoms; ``test_passive_loads`` looks at what is said of it."""
+
 SAME = 1e-9
 """Difference against the largest value of the kind, in ordinary condition."""
 POOR = 1e6

@@ -10,6 +10,9 @@ from strategies import closed_mechanism, motions, open_chain, with_drives, with_
 
 import mechgraph as mg
 
+pytestmark = pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
+"""Random loads move passive freedoms; ``test_passive_loads`` looks at what is said of it."""
+
 SAME = 1e-9
 """Difference of engines over the condition (largest rate for unit rates of the drivers): factors of other pivots round otherwise."""
 

@@ -21,6 +21,9 @@ from strategies import (
 import mechgraph as mg
 from mechgraph.algebra import screw
 
+pytestmark = pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
+"""Random loads move passive freedoms; ``test_passive_loads`` looks at what is said of it."""
+
 NODES = 18
 SEEDS = range(18)
 

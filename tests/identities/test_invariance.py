@@ -12,6 +12,9 @@ import mechgraph as mg
 from mechgraph.algebra.se3 import rotation_exp
 from mechgraph.report.report import DeterminacyReport
 
+pytestmark = pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
+"""Random loads move passive freedoms; ``test_passive_loads`` looks at what is said of it."""
+
 BUILDERS = {
     "planar": known.planar,
     "three cranks": known.three_cranks,

@@ -12,6 +12,9 @@ import pytest
 
 import mechgraph as mg
 
+pytestmark = pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
+"""Random loads move passive freedoms; ``test_passive_loads`` looks at what is said of it."""
+
 MOVING = tuple(name for name in mg.library() if mg.load(name).expected.get("mobility", 0) > 0)
 BOOKKEEPINGS = ("lee", "minimal")
 LETTERS = dict(zip("XYA", np.eye(3), strict=True))

@@ -10,6 +10,9 @@ from strategies import closed_mechanism, with_drives, with_loads
 
 import mechgraph as mg
 
+pytestmark = pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
+"""Random loads move passive freedoms; ``test_passive_loads`` looks at what is said of it."""
+
 SAME = 1e-10
 """Difference over the condition (largest rate of a freedom for unit rates of the drivers; what multiplies rounding near a change point)."""
 

@@ -1,0 +1,56 @@
+"""The keys of a call are its drives: motions given for freedoms that are not declared as drives."""
+
+import numpy as np
+import pytest
+
+import mechgraph as mg
+
+Z = (0, 0, 1)
+
+
+def four_bar(**more: object) -> mg.Mechanism:
+    """A drag-link in its plane, a load on the rocker; A is declared as the drive."""
+    ends = {"A": ("frame", "crank"), "B": ("crank", "coupler"), "C": ("coupler", "rocker"), "D": ("frame", "rocker")}
+    places = {"A": (0, 0, 0), "B": (1, 0, 0), "C": (2, 2, 0), "D": (2.5, 0, 0)}
+    pairs = [mg.Pair(name, "R", *ends[name], point=places[name], axis=Z) for name in ends]
+    return mg.Mechanism("four-bar", pairs=pairs, **{"drives": ["A"], "loads": [mg.Effort("D", 3.0)], **more})
+
+
+@pytest.mark.parametrize("declared", [["A"], [mg.Drive("A", mg.Motion(0.3))], ["C"], []])
+def test_another_drive_than_the_declared_one(declared: list) -> None:
+    """D driven by the positions that A = 0 ... 0.5 gives takes A there; virtual work: the motor in D supplies -3, nothing in A."""
+    angles = np.linspace(0, 0.5, 4)
+    by_a = mg.solve(four_bar(), {"A": angles})
+    for solve in (mg.solve, mg.kinematics):
+        by_d = solve(four_bar(drives=declared), {"D": by_a["D"].position[:, 0]})
+        np.testing.assert_allclose(by_d["A"].position[:, 0], angles, atol=1e-9)
+        assert [d.freedom for d in by_d.mechanism.drives] == ["D"]
+    s = mg.solve(four_bar(drives=declared), {"D": by_a["D"].position[:, 0]})
+    np.testing.assert_allclose(s["D"].effort, -3.0, rtol=1e-12)
+    assert not s["A"].effort.any()
+
+
+def test_a_motion_for_some_of_the_declared_drives_leaves_the_others_theirs() -> None:
+    """Two independent arms: B has a stored motion, which a call for A alone leaves to it."""
+    arms = mg.Mechanism("arms", pairs=[
+        mg.Pair("A", "R", "frame", "one", point=(0, 0, 0), axis=Z), mg.Pair("B", "R", "frame", "two", point=(1, 0, 0), axis=Z),
+    ], drives=["A", mg.Drive("B", mg.Motion(0.4))])  # fmt: skip
+    s = mg.kinematics(arms, {"A": 0.1})
+    assert (s["A"].position, s["B"].position) == (pytest.approx([0.1]), pytest.approx([0.4]))
+
+
+def test_faults_of_names_are_told_together() -> None:
+    with pytest.raises(mg.DeclarationError) as error:
+        mg.solve(four_bar(), {"X": 0.1, "Y": 0.2})
+    assert len(error.value.faults) == 2
+    with pytest.raises(mg.DeclarationError, match="given twice"):
+        mg.solve(four_bar(), {"D": 0.1, "D.Rz": 0.2})
+
+
+@pytest.mark.parametrize("built", [False, True])
+def test_a_study_takes_the_drives_of_its_call(built: bool) -> None:
+    made = (lambda load=3.0: four_bar(loads=[mg.Effort("D", load)])) if built else four_bar()
+    name = "load" if built else "loads[0].value"
+    study = mg.study(made, {name: [1.0, 2.0]}, ["D.effort", "A.effort"], motions={"D": [0.0, 0.1]}, sampling="grid")
+    np.testing.assert_allclose(study.outputs["D.effort"], [[-1, -1], [-2, -2]], rtol=1e-10)
+    assert not study.outputs["A.effort"].any()
