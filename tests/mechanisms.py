@@ -341,3 +341,17 @@ def grid(n: int) -> mg.Mechanism:
             point = (i + 0.3 * j, 0.9 * j, 0.0)
             pairs += [mg.Pair(f"N{i}_{j}{b}", "R", bars[0], b, point=point, axis=Z) for b in bars[1:]]
     return mg.Mechanism(f"{n} x {n} parallelograms", None, pairs)
+
+
+def unclosable_four_bar() -> mg.Mechanism:
+    """A planar four-bar whose crank, coupler and rocker together do not span its frame: 1 + 1 + 1 < 5."""
+    z = (0, 0, 1)
+    lengths = {"crank": 1.0, "coupler": 1.0}
+    ends = {name: mg.Marker((length, 0, 0), z) for name, length in lengths.items()}
+    base = mg.Marker((0, 0, 0), z)
+    return mg.Mechanism("unclosable", pairs=[
+        mg.Pair("A", "R", "frame", "crank", on_a=base, on_b=base),
+        mg.Pair("B", "R", "crank", "coupler", on_a=ends["crank"], on_b=base),
+        mg.Pair("C", "R", "coupler", "rocker", on_a=ends["coupler"], on_b=mg.Marker((1, 0, 0), z)),
+        mg.Pair("D", "R", "frame", "rocker", on_a=mg.Marker((5, 0, 0), z), on_b=base),
+    ], drives=["A"])  # fmt: skip

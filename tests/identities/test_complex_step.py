@@ -104,9 +104,7 @@ def test_random_mechanisms(seed):
     holds(*closed(strategies.closed_mechanism(seed), seed, 0.02), seed)
 
 
-@pytest.mark.parametrize(
-    "name", [name for name in library_names() if name != "rcsr-csr-printed"]
-)  # that one does not close
+@pytest.mark.parametrize("name", library_names())  # that one does not close
 def test_the_library(name):
     holds(*closed(mg.load(library_path(name)), 0, 0.03))
 

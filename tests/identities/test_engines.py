@@ -60,7 +60,7 @@ def test_random_mechanisms(seed):
     assert_engines_agree(m, given, **how)
 
 
-@pytest.mark.parametrize("name", [n for n in mg.library() if n != "rcsr-csr-printed"])
+@pytest.mark.parametrize("name", mg.library())
 def test_library(name):
     m = mg.load(name)
     assert_engines_agree(m, {d.freedom: d.motion.position[:5] for d in m.drives if d.motion is not None})

@@ -177,7 +177,7 @@ def test_coplanar_pphchp_has_an_instantaneous_freedom() -> None:
     assert "Singular here" not in text
 
 
-LIBRARY = [name for name in mg.library() if name != "rcsr-csr-printed"]
+LIBRARY = mg.library()
 
 
 @pytest.mark.parametrize("name", LIBRARY)
@@ -196,10 +196,10 @@ def test_library(name: str) -> None:
 
 
 def test_a_loop_that_cannot_close_still_gets_the_facts_of_its_graph() -> None:
-    r = mg.check(mg.load("rcsr-csr-printed"))
+    r = mg.check(known.unclosable_four_bar())
     assert r.mobility is None
     assert "cannot be closed" in r.note
-    assert r.mobility_by_count == r.mechanism.expected["mobility_by_count"]
+    assert r.mobility_by_count == -2
     assert not r.determinate
 
 

@@ -52,7 +52,7 @@ def first_drive(m):
     return freedom, begin, 1.0 if m.pairs[k].type.freedoms[j].turns else 0.02
 
 
-@pytest.mark.parametrize("name", [n for n in mg.library() if n != "rcsr-csr-printed"])
+@pytest.mark.parametrize("name", mg.library())
 def test_library(name):
     m = mg.load(name)
     freedom, begin, size = first_drive(m)
