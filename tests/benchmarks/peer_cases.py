@@ -6,7 +6,8 @@ import numpy as np
 
 import mechgraph as mg
 
-POSITIONS = 3600
+POSITIONS = (1, 36, 360, 3600)
+"""Positions of the driver at which the job is done."""
 SPEED = 10.0
 SWING = 0.4
 """Half the stroke of the Bricard mechanism, rad: its hinges do not turn fully."""
@@ -56,6 +57,11 @@ class Case:
         """Name of the driven pair."""
         return self.joints[0].name
 
+    @property
+    def step(self) -> float:
+        """Time from one position to the next; 0 for a single one."""
+        return float(self.t[1] - self.t[0]) if len(self.t) > 1 else 0.0
+
     def turned(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Turn of the driver from its first position, its rate and acceleration, at every position."""
         motion = self.motion
@@ -101,7 +107,7 @@ def under_gravity(m: mg.Mechanism) -> mg.Mechanism:
     return m.replace(loads=[load for load in m.loads if isinstance(load, mg.Gravity)])
 
 
-def cases(positions: int = POSITIONS) -> tuple[Case, ...]:
+def cases(positions: int) -> tuple[Case, ...]:
     """The four mechanisms: planar, spatial, spatial of seven links, overconstrained."""
     turning = [under_gravity(m) for m in (mg.load("four-bar"), rscr(), mg.load("7r"))]
     return (*(case_of(m, *turn(positions)) for m in turning), case_of(bricard(), *swing(positions)))

@@ -86,6 +86,8 @@ def settings(case: Case, redundant: bool) -> exu.SimulationSettings:
 
 def solve(case: Case) -> tuple[np.ndarray, np.ndarray]:
     """Torque of the driver ``(T,)`` and wrench of every joint ``(joints, T, 6)``, force first, in the frame of its link a."""
+    if len(case.t) == 1:
+        raise ValueError("integrates")
     mbs, joints, _alive = assembled(case)
     kinds = (exu.OutputVariableType.ForceLocal, exu.OutputVariableType.TorqueLocal)
     sensors = [

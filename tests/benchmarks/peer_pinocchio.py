@@ -41,8 +41,8 @@ def tree(case: Case) -> tuple[pin.Model, int]:
 
 
 def inverse(J: np.ndarray) -> np.ndarray:
-    """Inverse of the passive columns, in the least-squares sense where the loop is overconstrained."""
-    return np.linalg.inv(J) if J.shape[0] == J.shape[1] else np.linalg.pinv(J)
+    """Inverse of the passive columns, by normal equations where the loop is overconstrained."""
+    return np.linalg.inv(J) if J.shape[0] == J.shape[1] else np.linalg.inv(J.T @ J) @ J.T
 
 
 def close(model: pin.Model, data: pin.Data, closing: int, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -65,7 +65,7 @@ def solve(case: Case) -> tuple[np.ndarray, np.ndarray]:
     data = model.createData()
     pull = model.frames[closing].placement
     turned, rate, change = case.turned()
-    dt = case.t[1] - case.t[0]
+    dt = case.step
     q, v, a = pin.neutral(model), np.zeros(model.nv), np.zeros(model.nv)
     outer = pin.StdVec_Force()
     outer.extend([pin.Force.Zero()] * model.njoints)

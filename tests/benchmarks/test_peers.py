@@ -45,15 +45,42 @@ def test_velocities_are_those_of_the_first_step(case):
 
 def test_a_program_that_is_not_installed_says_so(monkeypatch):
     monkeypatch.setattr(bench_peers, "PEERS", {"Other": "no_such_program"})
-    programs, every = bench_peers.installed(), tuple(CASES.values())[:1]
-    text = bench_peers.table(programs, every, [bench_peers.compared(programs, case, 1) for case in every])
-    assert text.count("not installed") == 3
-    assert "| four-bar | R-R-R-R | " in text
+    programs, every = bench_peers.installed(), {"four-bar": [CASES["four-bar"]]}
+    assert programs["Other"] == "not installed"
+    text = bench_peers.table(programs, every, {"four-bar": [bench_peers.compared(programs, CASES["four-bar"], 1)]})
+    assert "| four-bar, R-R-R-R | 24 | " in text
+    assert " ms | not installed |" in text
 
 
 def test_a_program_that_fails_says_why():
-    result = bench_peers.Result(failure="the loop does not close")
-    assert bench_peers.cell(result, 1.0) == "fails: the loop does not close"
+    assert bench_peers.cell(bench_peers.Result(failure="the loop does not close")) == "the loop does not close"
+
+
+def test_a_cell_tells_the_ratio_and_an_error_that_counts():
+    assert bench_peers.cell(bench_peers.Result(0.0123, 1.0, 1e-15)) == "12 ms"
+    assert bench_peers.cell(bench_peers.Result(0.213, 0.184, 1e-2)) == "210 ms (x 0.18), error 1e-02"
+
+
+def test_what_the_table_says_in_short_is_what_it_holds():
+    """Ratios of 1 / 4 and 1 / 2 at the most positions are two to four times as fast."""
+    names = ("mechgraph", *bench_peers.PEERS)
+    programs = dict.fromkeys(names, peer_mechgraph)
+    rows = {
+        f"m{k}": [dict.fromkeys(names, bench_peers.Result(1.0, ratio)) for ratio in (1.0, 0.1, 1.0, 1 / k)]
+        for k in (2, 4)
+    }
+    said = " ".join(bench_peers.in_short(programs, rows))
+    assert "in C++ the job is 2 to 4 times as fast as mechgraph at 3,600 positions, 10 at 36." in said
+    assert "From Python Pinocchio is 10 times as fast at 36 and 2 to 4 at 3,600." in said
+
+
+def test_a_single_position_has_no_step():
+    (case, *_) = cases(1)
+    assert (len(case.t), case.step) == (1, 0.0)
+    torque, wrenches = peer_mechgraph.solve(case)
+    right, _ = peer_mechgraph.solve(case, method="newton_euler")
+    assert bench_peers.largest_error(torque[None], right[None]) < 1e-12
+    assert wrenches.shape == (len(case.joints), 1, 6)
 
 
 def test_the_table_has_its_place_in_the_readme():
