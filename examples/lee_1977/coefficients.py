@@ -6,7 +6,7 @@ import numpy as np
 
 import mechgraph as mg
 from lee_1977.chains import rank
-from lee_1977.tables import G, coefficients
+from lee_1977.tables import coefficients
 from mechgraph.equations.state import State
 
 AXES = "xyz"
@@ -56,7 +56,7 @@ LAYOUTS = {
 
 @dataclass(frozen=True)
 class Entries:
-    """Printed entries, those equal to the generated ones, the others, entries left out; ranks; driver position."""
+    """Printed entries, those equal to the generated ones, the others, entries left out; rank of {Q} as printed; its size."""
 
     printed: int
     equal: int
@@ -64,12 +64,19 @@ class Entries:
     missing: tuple[str, ...]
     rank: int
     size: int
+    right_sides: int
+    wrong_right_sides: tuple[str, ...]
 
 
-def in_lees_axes(name: str) -> mg.Mechanism:
-    """The library mechanism turned so that the global axes are Lee's."""
+def in_general_axes(name: str) -> mg.Mechanism:
+    """The library mechanism in a random frame, in which no axis lies along x, passes through the origin or has a component zero.
+
+    In Lee's own axes A1 = (1, 0, 0) passes through the origin, and a wrong letter that stands for a zero would count as right.
+    """
+    rng = np.random.default_rng(1977)
     pose = np.eye(4)
-    pose[:3, :3] = G
+    turned = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    pose[:3, :3], pose[:3, 3] = turned * np.linalg.det(turned), rng.normal(size=3)
     return mg.load(name).moved(pose)
 
 
@@ -78,8 +85,11 @@ def evaluated(value: str, numbers: dict[str, float]) -> float:
     total = 0.0
     for term in value.replace(" + ", "|").replace(" - ", "|-").split("|"):
         product = -1.0 if term.startswith("-") else 1.0
-        for word in term.removeprefix("-").split():
+        over, _, under = term.removeprefix("-").partition(" / ")
+        for word in over.split():
             product *= 1.0 if word == "1" else numbers[word]
+        for word in under.split():
+            product /= numbers[word]
         total += product
     return total
 
@@ -130,13 +140,21 @@ def ordered_rows(layout: Layout, f: mg.Formulation) -> tuple[list[int], np.ndarr
     return rows, np.array(signs)
 
 
-def generated(number: str, position: int = 3) -> tuple[np.ndarray, dict[str, float]]:
-    """The generated matrix in Lee's order, axes and signs, and the numbers behind his letters."""
+def generated(number: str, position: int = 3) -> tuple[np.ndarray, np.ndarray, dict[str, float]]:
+    """The generated matrix and right side in Lee's order and signs, and the numbers behind his letters."""
     layout = LAYOUTS[number]
-    m = in_lees_axes(layout.name)
+    m = in_general_axes(layout.name)
     f, state = mg.formulate(m, bookkeeping="lee"), mg.solve(m).state(position)
-    A = f.assemble(state)[0].toarray()
+    sparse, b = f.assemble(state)
+    A = sparse.toarray()
     numbers, columns = letters(layout, m, state), []
+    still = mg.solve(m, loads=[]).state(position).loads  # inertia alone
+    moving = [link.name for link in m.links if link.name != m.frame]
+    for n, name in enumerate(moving, 1):
+        wrench = still[:, m.link_index[name], 0]
+        numbers |= {f"MI{n}{x}": wrench[i] for i, x in enumerate(AXES)}
+        numbers |= {f"FI{n}{x}": wrench[3 + i] for i, x in enumerate(AXES)}
+    numbers["Mout"] = m.loads[0].value
     for pair, what, sense in layout.columns:
         mine = [i for i, u in enumerate(f.unknowns) if u.owner == pair and (u.group == "driver") == (what == "IN")]
         if what == "BCD":
@@ -153,17 +171,20 @@ def generated(number: str, position: int = 3) -> tuple[np.ndarray, dict[str, flo
     for i, row in enumerate(rows):  # a condition says zero: its scale is free, ours is that of a unit screw
         if "force along" in f.equations[row].name:
             Q[i] /= np.linalg.norm(Q[i])
-    return Q, numbers
+    return Q, b[rows] * signs, numbers
 
 
 def compared(number: str) -> Entries:
     """Table ``number`` against the generated matrix at one position."""
-    Q, numbers = generated(number)
+    Q, C, numbers = generated(number)
+    entries = coefficients(number)
+    sides = [(i, value) for i, j, value in entries if j == 0]
+    wrong_sides = [f"C({i}) = {v}" for i, v in sides if not np.isclose(evaluated(v, numbers), C[i - 1], atol=1e-9)]
     printed = np.zeros_like(Q)
     right = 0
     wrong = []
     listed = set()
-    for i, j, value in coefficients(number):
+    for i, j, value in (entry for entry in entries if entry[1]):
         found = evaluated(value, numbers)
         printed[i - 1, j - 1] = found
         listed.add((i, j))
@@ -176,4 +197,6 @@ def compared(number: str) -> Entries:
         for i, j in zip(*np.nonzero(np.abs(Q) > 1e-9), strict=True)
         if (i + 1, j + 1) not in listed
     ]
-    return Entries(right + len(wrong), right, tuple(wrong), tuple(gone), rank(printed), len(Q))
+    return Entries(
+        right + len(wrong), right, tuple(wrong), tuple(gone), rank(printed), len(Q), len(sides), tuple(wrong_sides)
+    )

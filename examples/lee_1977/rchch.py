@@ -12,6 +12,8 @@ from lee_1977.tables import axial_sums, dot, largest, lees, printed, table
 TWIST_1, TWIST_5 = np.deg2rad(10.0), np.deg2rad(60.0)
 S1, P1, P5 = 0.2, 1.0, 0.4
 PITCH_3, PITCH_5 = 2.0, 5.0
+W1 = 0.1
+M4, M_OUT, Y4, Z4 = 0.5, 10.0, 0.1, 0.01
 A5 = np.array([np.cos(TWIST_5), 0.0, -np.sin(TWIST_5)])
 O5 = np.array([0.0, P5, 0.0])
 ANGLES = ("O1.Rz", "O2.Rz", "O4.Rz")
@@ -101,9 +103,9 @@ def pitch_identities() -> dict[str, float]:
 
 
 def slope_of_table_xi() -> float:
-    """Largest difference of w5 of Table XII from the difference quotient of theta5 in Table XI (units of w1)."""
+    """Largest difference of w5 / w1, w5 of Table XII in rad/s, from the difference quotient of theta5 in Table XI."""
     theta5, theta1 = table("XI")["theta5"], table("XI")["theta1"]
-    return largest(np.gradient(theta5, theta1) - table("XII")["w5"])
+    return largest(np.gradient(theta5, theta1) - table("XII")["w5"] / W1)
 
 
 @cache
@@ -208,3 +210,18 @@ def axial_force_of_o4() -> float:
         axes = _rotation(0, -first * a5) @ _rotation(2, -turned * theta5) @ _rotation(0, -second * a4)
         greatest.append(largest(dot(force, lees(axes[..., 2]))[calm]))
     return min(greatest)
+
+
+def force_row_of_link_4(mass: float = M4, output: float = M_OUT) -> np.ndarray:
+    """3.104 with the term of Table XXXII over the rows of Tables XXXVI and XXXVII, ``(25, 3)``, zero where the row holds:
+
+    ``-F43 + F54 + (FA5 - M_out / rho5) A5 - M4 a_m4``, a_m4 by 2.130 from theta5 (XI), w5 (XII), alpha5 and S5ddot (XIII).
+    """
+    theta, w, alpha = np.deg2rad(table("XI")["theta5"]), table("XII")["w5"], table("XIII")["alpha5"]
+    c, s = np.cos(theta), np.sin(theta)
+    across, along = Y4 * c - Z4 * s, Z4 * c + Y4 * s
+    turning = np.column_stack([-A5[2] * across, -along, A5[0] * across])
+    inward = np.column_stack([A5[2] * along, -across, -A5[0] * along])
+    a4 = turning * alpha[:, None] + inward * w[:, None] ** 2 + A5 * table("XIII")["S5ddot"][:, None]
+    push = (table("XXXVII")["FA5"] - output / PITCH_5)[:, None] * A5
+    return np.asarray(-printed("XXXVI")[:, :3] + printed("XXXVII")[:, :3] + push - mass * a4)

@@ -1,5 +1,6 @@
 """RCSR, sections 2.6 and 3.4: Tables III to IX and XV to XVIII."""
 
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
@@ -151,8 +152,27 @@ def true_driver() -> dict[int, tuple[float, float]]:
     return {int(theta[i]): (float(found[i]), float(shown[i])) for i in (0, -1)}
 
 
-def driver_of_point_masses() -> float:
-    """M_IN in the last row, 202 degrees, with the masses alone: the printed tensors belong to no body."""
-    m = mg.load("rcsr")
-    points = m.replace(links=[mg.Link(link.name, link.mass, link.center) for link in m.links])
-    return -float(mg.solve(points)["O1"].effort[-1, 0])
+READINGS = ("without tensors", "about the mass centre", "about O_i")
+"""What the printed tensors may refer to, in link axes; the thesis does not keep it apart."""
+
+
+@cache
+def true_drivers() -> dict[str, tuple[float, float]]:
+    """M_IN with the true inertia in the first and last row, 150 and 202 degrees, by what the printed tensors are taken to be.
+
+    About O_i (3.27 to 3.30, 3.65, 3.67): ``I_c = I_o - m (r.r 1 - r r^T)``, r = (.5, 1, 1) from O_i.
+    """
+    m, r = mg.load("rcsr"), ours(CENTRE)
+
+    def with_tensors(change: Callable[[mg.Link], np.ndarray | None]) -> tuple[float, float]:
+        links = [link.replace(inertia=change(link)) if link.mass else link for link in m.links]
+        return ends(mg.solve(m.replace(links=links)))
+
+    shift = r @ r * np.eye(3) - np.outer(r, r)
+    readings = (lambda link: None, lambda link: link.inertia, lambda link: link.inertia - link.mass * shift)
+    return dict(zip(READINGS, map(with_tensors, readings), strict=True))
+
+
+def ends(s: mg.Solution) -> tuple[float, float]:
+    """M_IN of the first row and of the last."""
+    return -float(s["O1"].effort[0, 0]), -float(s["O1"].effort[-1, 0])

@@ -36,10 +36,20 @@ def turned(axis: np.ndarray, angle: float, v: np.ndarray) -> np.ndarray:
     return c * v + s * np.cross(axis, v) + (1 - c) * (axis @ v) * axis
 
 
+SHORT = 1.8e-6
+"""The degree with which theta1 goes in is too short by so much (see ``errata.short_degree``)."""
+
+
+def drive(short: float) -> dict[str, mg.Motion]:
+    """The stored motion of O1, its angles shorter by the factor ``1 - short``."""
+    stored = mg.load("rcsr-csr").drives[0].motion
+    return {"O1": mg.Motion(stored.position * (1.0 - short), stored.velocity, stored.acceleration)}
+
+
 @cache
-def motion() -> mg.Solution:
+def motion(short: float = 0.0) -> mg.Solution:
     """The mechanism that closes (P6 = 1): its first loop is Lee's."""
-    return mg.kinematics(mg.load("rcsr-csr"))
+    return mg.kinematics(mg.load("rcsr-csr"), drive(short))
 
 
 def loop_1() -> dict[str, float]:
@@ -59,9 +69,9 @@ def carried(theta1: float, theta2: float, slide2: float, v: np.ndarray, sign: fl
     return turned(X, -theta1, at) - S1 * X
 
 
-def loop_2_mechanism(row: int, sign: float = 1.0, carry: float = A2) -> mg.Mechanism:
+def loop_2_mechanism(row: int, sign: float = 1.0, carry: float = A2, short: float = 0.0) -> mg.Mechanism:
     """Links 5 and 6 of one row of Table X; ``sign=-1, carry=A1`` is the geometry without the two errors."""
-    s = motion()
+    s = motion(short)
     theta1, theta2, slide2 = s["O1"].position[row, 0], s["O2"].position[row, 0], s["O2"].position[row, 1]
     o5 = carried(theta1, theta2, slide2, -P5 * J, sign)
     o6 = carried(theta1, theta2, slide2, -(P5 + P6) * J, sign)
@@ -91,12 +101,12 @@ def coordinates(s: mg.Solution) -> list[float]:
 
 
 @cache
-def loop_2() -> tuple[mg.Solution, ...]:
+def loop_2(short: float = 0.0) -> tuple[mg.Solution, ...]:
     """Every row with the errors; one row starts the next."""
     out: list[mg.Solution] = []
     start = loop_2_mechanism(0).start
     for row in range(len(table("X")["theta1"])):
-        s = mg.solve(loop_2_mechanism(row).replace(start=start), {"hold": 0.0})
+        s = mg.solve(loop_2_mechanism(row, short=short).replace(start=start), {"hold": 0.0})
         start = dict(zip(s.mechanism.freedom_names()[1:], coordinates(s), strict=True))
         out.append(s)
     return tuple(out)
@@ -136,17 +146,17 @@ def _screw(v: np.ndarray, point: np.ndarray) -> np.ndarray:
 
 
 @cache
-def forces_at_o6() -> np.ndarray:
+def forces_at_o6(short: float = 0.0) -> np.ndarray:
     """F^E, F^F, F^G and the six components of R25 of every row, the dual parts of E, F, G where the thesis has them.
 
     E and G are taken through O6R before the rotation theta7 and the shift S7 (2.77), F through O6L before theta5 and S5
     (2.70); the z component of the output couple has the wrong sign. Everything else is the generated formulation.
     """
     rows = []
-    for row, s in enumerate(loop_2()):
+    for row, s in enumerate(loop_2(short)):
         f = mg.formulate(s.mechanism, bookkeeping="lee")
         state = s.state()
-        motion_1 = motion()
+        motion_1 = motion(short)
         theta1, theta2, slide2 = (
             motion_1["O1"].position[row, 0],
             motion_1["O2"].position[row, 0],
@@ -177,11 +187,11 @@ def true_forces_at_o6() -> np.ndarray:
     return np.array(out)
 
 
-def loop_1_loaded(r25: np.ndarray) -> mg.Solution:
+def loop_1_loaded(r25: np.ndarray, short: float = 0.0) -> mg.Solution:
     """The first loop without mass under M_out1 = 1 about A4 and the reaction of link 5 on link 2, ``-R25 (T, 6)``."""
     m = mg.load("rcsr-csr")
     force, moment = -r25[:, 3:], -r25[:, :3]
-    at = lees(motion().link("link2").point((0.0, 0.0, 0.0)).position)
+    at = lees(motion(short).link("link2").point((0.0, 0.0, 0.0)).position)
     push = mg.Wrench("link2", force=ours(force), moment=ours(moment - np.cross(at, force)), point=(0, 0, 0))
     names = ("O1", "O2", "O3", "O4")
     return mg.solve(
@@ -190,7 +200,8 @@ def loop_1_loaded(r25: np.ndarray) -> mg.Solution:
             pairs=[p for p in m.pairs if p.name in names],
             loads=[mg.Effort("O4", 1.0), push],
             start={k: v for k, v in m.start.items() if k.partition(".")[0] in names},
-        )
+        ),
+        drive(short),
     )
 
 
@@ -227,32 +238,32 @@ DAMAGED = {"XXVI": [(14, 1), (25, 0)], "XXVII": [(27, 6)]}
 
 
 @cache
-def copied() -> dict[str, np.ndarray]:
-    """Tables XXV to XXX with the errors of the thesis, in its columns."""
-    found = forces_at_o6()
+def copied(short: float = 0.0) -> dict[str, np.ndarray]:
+    """Tables XXV to XXX with the errors of the thesis, in its columns; theta1 shorter by the factor ``1 - short``."""
+    found = forces_at_o6(short)
     r25 = np.column_stack([found[:, 6:], found[:, 3:6]])
-    return {**reactions(loop_1_loaded(found[:, 3:])), "XXIX": r25, "XXX": found[:, :3]}
+    return {**reactions(loop_1_loaded(found[:, 3:], short)), "XXIX": r25, "XXX": found[:, :3]}
 
 
-def differences(number: str) -> np.ndarray:
+def differences(number: str, short: float = 0.0) -> np.ndarray:
     """Of a table of section 3.6 with his errors from the printed one; damaged digits are NaN."""
-    out = copied()[number] - printed(number)
+    out = copied(short)[number] - printed(number)
     for cell in DAMAGED.get(number, []):
         out[cell] = np.nan
     return out
 
 
-def kinetostatics() -> dict[str, float]:
+def kinetostatics(short: float = 0.0) -> dict[str, float]:
     """Largest differences from Tables XXV to XXXI, the errors of the thesis copied."""
-    out = {number: largest(differences(number)) for number in copied()}
-    out["XXXI"] = largest(table_xxxi()[0])
-    out["XXXI row 214"] = largest(table_xxxi()[1])
+    out = {number: largest(differences(number, short)) for number in copied()}
+    out["XXXI"] = largest(table_xxxi(short)[0])
+    out["XXXI row 214"] = largest(table_xxxi(short)[1])
     return out
 
 
-def table_xxxi() -> tuple[np.ndarray, np.ndarray]:
+def table_xxxi(short: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Differences from the column F46x of all rows, and from the whole last row."""
-    found = forces_at_o6()[:, 3:]
+    found = forces_at_o6(short)[:, 3:]
     couple = 4.0 * AXIS_7 * [1.0, 1.0, -1.0]
     force, moment = -found[:, 3:], -found[:, :3] - couple
     ours_xxxi = without_axis(force, moment, AXIS_7, POINT_7)

@@ -26,7 +26,7 @@ def printed(number: str, *names: str) -> np.ndarray:
 
 
 def coefficients(number: str) -> list[tuple[int, int, str]]:
-    """Printed entries Q(row, column) = value of Tables XIV, XXIV, XXXII, every entry once."""
+    """Printed entries Q(row, column) = value of Tables XIV, XXIV, XXXII, every entry once; C(row) has column 0."""
     with (DATA / f"lee_table_{number}.csv").open(encoding="utf-8") as handle:
         rows = list(csv.reader(line for line in handle if not line.startswith("#")))
     return sorted({(int(i), int(j), value) for i, j, value in rows[1:]})

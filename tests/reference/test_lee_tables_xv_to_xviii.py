@@ -24,10 +24,13 @@ def test_with_the_true_inertia_the_table_is_another(number: str) -> None:
 
 
 def test_true_input_torque() -> None:
-    """M_IN at 150 and 202 degrees; -134.85 is the value at 202 without the tensors, which belong to no body."""
+    """M_IN at 150 and 202 degrees, by what the printed tensors are taken to be (they belong to no body)."""
     assert rcsr.true_driver()[150] == pytest.approx((-27.313, 8.38), abs=1e-3)
     assert rcsr.true_driver()[202] == pytest.approx((-135.036, -45.57), abs=1e-3)
-    assert rcsr.driver_of_point_masses() == pytest.approx(-134.850, abs=1e-3)
+    found = rcsr.true_drivers()
+    assert found["without tensors"] == pytest.approx((-27.289, -134.850), abs=1e-3)
+    assert found["about the mass centre"] == pytest.approx((-27.313, -135.036), abs=1e-3)
+    assert found["about O_i"] == pytest.approx((-14.522, -53.720), abs=1e-3)
 
 
 def test_both_are_in_balance() -> None:

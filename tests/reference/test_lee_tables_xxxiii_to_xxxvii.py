@@ -75,6 +75,16 @@ def test_output_of_the_calm_rows_does_no_work() -> None:
     assert work["couple"] == pytest.approx(1.776, abs=1e-3)
 
 
+def test_force_row_of_link_4_holds_in_table_xxxvi() -> None:
+    """3.104 with the term M_out / rho5 of Table XXXII: .0105 in all 25 rows, where forces reach 3891; not with another mass or output."""
+    assert rchch.force_row_of_link_4().shape == (25, 3)
+    assert largest(rchch.force_row_of_link_4()) < 0.011
+    assert largest(rchch.force_row_of_link_4(mass=0.4)) > 100.0
+    assert largest(rchch.force_row_of_link_4(mass=0.6)) > 100.0
+    assert largest(rchch.force_row_of_link_4(output=5.0)) > 0.8
+    assert largest(printed("XXXVI")[:, :3]) > 3800.0
+
+
 def test_condition_of_o4_does_not_hold() -> None:
     """Table XXXVI: F43 . A4, A4 from theta5 of Table XI, is 6 lb where rounding would leave .01, whatever the signs."""
     assert rchch.axial_force_of_o4() == pytest.approx(5.98, abs=0.02)
