@@ -23,6 +23,9 @@ from mechgraph.show import draw_skeleton
 
 ROW = 10
 """The position that the picture shows."""
+VIEW = (74.0, 20.0)
+FORCES = (("XV", ("F41x", "F41y", "F41z"), "O1"), ("XVI", ("F21x", "F21y", "F21z"), "O2"))
+"""Table, columns and pair of the reactions that the picture shows (Table XVI is headed F21 and holds F12)."""
 
 
 def solved() -> mg.Solution:
@@ -55,27 +58,36 @@ def compare() -> None:
 
 
 def draw(s: mg.Solution, target: Path) -> None:
-    """Skeleton; angles with Table III; input torque with Table XVIII. Lee's M_IN is minus the effort."""
-    figure = pictures.figure(13.2, 4.6)
-    grid = figure.add_gridspec(1, 3, width_ratios=(1.0, 1.0, 1.0))
+    """Skeleton; angles with Table III; input torque with Table XVIII; forces at O1 and O2 with Tables XV and XVI.
+
+    Lee's M_IN is minus the effort. The axes of O1 and O2 are long and nearly parallel: the view is almost along them.
+    """
+    figure = pictures.figure(14.4, 7.6)
+    grid = figure.add_gridspec(2, 3, width_ratios=(1.25, 1.0, 1.0))
     theta = np.rad2deg(s["O1"].position[:, 0])
-    space = figure.add_subplot(grid[0], projection="3d")
-    draw_skeleton(s, ROW, ax=space, ghosts=0, traces=["O2", "O3"])
+    space = figure.add_subplot(grid[:, 0], projection="3d")
+    draw_skeleton(s, ROW, ax=space, ghosts=0, traces=False, view=VIEW)
     space.set_title(f"RCSR at theta1 = {theta[ROW]:.0f} deg", fontsize=10.5, loc="left")
 
-    left, iii = figure.add_subplot(grid[1]), table("III")
+    left, iii = figure.add_subplot(grid[0, 1]), table("III")
     for k, name in enumerate(("theta2", "theta4")):
         angle = np.rad2deg(s[f"O{name[-1]}"].position[:, 0])
         left.plot(theta, angle, color=pictures.COLOURS[k], lw=2.0, label=name)
         left.plot(iii["theta1"], iii[name], label="Table III" if k else None, **pictures.PRINTED)
     pictures.finish(left, "theta1 [deg]", "angle [deg]", "Angles of O2 and O4")
 
-    right, xviii = figure.add_subplot(grid[2]), table("XVIII")
+    right, xviii = figure.add_subplot(grid[0, 2]), table("XVIII")
     right.plot(theta, -s["O1"].effort[:, 0], color=pictures.COLOURS[0], lw=2.0, label="true inertia")
     copied = -rcsr.as_lee()["O1"].effort[:, 0]
     right.plot(theta, copied, color=pictures.COLOURS[1], lw=2.0, ls="--", label="inertia torque of eq. 3.31")
     right.plot(xviii["theta1"], xviii["MIN"], label="Table XVIII", **pictures.PRINTED)
     pictures.finish(right, "theta1 [deg]", "M_IN [lb in2/s2]", "Input torque")
+
+    with_3_31 = rcsr.reactions(rcsr.as_lee())
+    for column, (number, names, pair) in enumerate(FORCES, 1):
+        ax = figure.add_subplot(grid[1, column])
+        pictures.reactions(ax, number, names, with_3_31[number])
+        pictures.finish(ax, "theta1 [deg]", "force [lb in/s2]", f"Force at {pair}, inertia torque of eq. 3.31")
     pictures.save(figure, target)
 
 

@@ -25,6 +25,9 @@ from mechgraph.show import draw_skeleton
 OUTPUT = {"O4": 1.0, "O7": 4.0}
 ROW = 14
 """The position that the picture shows."""
+VIEW = (74.0, 20.0)
+FORCES = (("XXV", ("F41x", "F41y", "F41z"), "O1"), ("XXX", ("FE", "FF", "FG"), "O6"))
+"""Table, columns and pair of the reactions that the picture shows."""
 
 
 def solved() -> mg.Solution:
@@ -58,15 +61,18 @@ def compare() -> None:
 
 
 def draw(s: mg.Solution, target: Path) -> None:
-    """Skeleton; output angles with Table X; input torque with virtual work. Lee's M_IN is minus the effort."""
-    figure = pictures.figure(13.2, 4.6)
-    grid = figure.add_gridspec(1, 3, width_ratios=(1.0, 1.0, 1.0))
+    """Skeleton; output angles with Table X; input torque with virtual work; forces at O1 and O6 with Tables XXV and XXX.
+
+    Lee's M_IN is minus the effort. The axes of O1 and O2 are long and nearly parallel: the view is almost along them.
+    """
+    figure = pictures.figure(14.4, 7.6)
+    grid = figure.add_gridspec(2, 3, width_ratios=(1.25, 1.0, 1.0))
     theta = np.rad2deg(s["O1"].position[:, 0])
-    space = figure.add_subplot(grid[0], projection="3d")
-    draw_skeleton(s, ROW, ax=space, ghosts=0, traces=["O3", "O6"])
+    space = figure.add_subplot(grid[:, 0], projection="3d")
+    draw_skeleton(s, ROW, ax=space, ghosts=0, traces=False, view=VIEW)
     space.set_title(f"RCSR-CSR at theta1 = {theta[ROW]:.0f} deg", fontsize=10.5, loc="left")
 
-    left, x = figure.add_subplot(grid[1]), table("X")
+    left, x = figure.add_subplot(grid[0, 1]), table("X")
     for k, (name, pair) in enumerate({"theta2": "O2", "theta4": "O4", "theta7": "O7"}.items()):
         angle = np.rad2deg(s[pair].position[:, 0])
         left.plot(theta, angle, color=pictures.COLOURS[k], lw=2.0, label=name + " (P6 = 1)" * (pair == "O7"))
@@ -74,11 +80,16 @@ def draw(s: mg.Solution, target: Path) -> None:
         left.plot(x["theta1"], x[name], label="Table X" if name == "theta4" else None, **pictures.PRINTED)
     pictures.finish(left, "theta1 [deg]", "angle [deg]", "Angles of O2, O4 and O7")
 
-    right = figure.add_subplot(grid[2])
+    right = figure.add_subplot(grid[0, 2])
     right.plot(theta, -s["O1"].effort[:, 0], color=pictures.COLOURS[0], lw=2.0, label="M_IN")
     work = {**pictures.PRINTED, "marker": "x"}
     right.plot(theta, -by_virtual_work(s), label="virtual work of the outputs", **work)
     pictures.finish(right, "theta1 [deg]", "M_IN [lb in2/s2]", "Input torque against 1 at O4 and 4 at O7")
+
+    for column, (number, names, pair) in enumerate(FORCES, 1):
+        ax = figure.add_subplot(grid[1, column])
+        pictures.reactions(ax, number, names, rcsr_csr.copied()[number])
+        pictures.finish(ax, "theta1 [deg]", "force [lb in/s2]", f"Force at {pair}, his errors copied")
     pictures.save(figure, target)
 
 

@@ -2,9 +2,11 @@
 
 from pathlib import Path
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from lee_1977.tables import table
 from mechgraph.show.canvas import INK, PALETTE
 
 COLOURS = PALETTE
@@ -33,6 +35,15 @@ def finish(ax: Axes, x: str, y: str, title: str, legend: str = "best") -> None:
     ax.set_axisbelow(True)
     if legend:
         ax.legend(loc=legend, frameon=False, fontsize=9)
+
+
+def reactions(ax: Axes, number: str, names: tuple[str, ...], found: np.ndarray) -> None:
+    """Columns of a printed table of reactions as marks over the computed ones, ``found (rows, columns)`` in its order."""
+    shown = table(number)
+    columns = list(shown)[1:]
+    for k, name in enumerate(names):
+        ax.plot(shown["theta1"], found[:, columns.index(name)], color=COLOURS[k], lw=2.0, ls="--", label=name)
+        ax.plot(shown["theta1"], shown[name], label=f"Table {number}" if k == len(names) - 1 else None, **PRINTED)
 
 
 def save(drawn: Figure, target: Path) -> None:

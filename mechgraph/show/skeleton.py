@@ -250,11 +250,10 @@ def _labels(ax: Any, shape: _Shape, t: int, colours: dict[str, str]) -> None:
     m = shape.m
     camera = _camera(ax)
     moving = {link: shape.corners(link, t) @ camera.T for link in colours if link != m.frame}
-    room = _Room(
-        [_sides(corners) for corners in moving.values()]
-        + [shape.centers[k][t][None] @ camera.T for k in shape.centers],
-        shape.size,
+    marks = np.array(
+        [shape.ends[pair.name, pair.b][t] for pair in m.pairs] + [shape.centers[k][t] for k in shape.centers]
     )
+    room = _Room([_sides(corners) for corners in moving.values()] + [marks @ camera.T], _extent(shape, camera))
     for pair in m.pairs:
         at = camera @ shape.ends[pair.name, pair.b][t]
         _label(ax, room, f"{pair.name} ({pair.type.symbol})", at, 0.05, camera, INK, "bold")
@@ -267,6 +266,12 @@ def _camera(ax: Any) -> Array:
     """Directions to the right and up on the screen, ``(2, 3)``."""
     el, az = np.deg2rad(ax.elev), np.deg2rad(ax.azim)
     return np.array([[-np.sin(az), np.cos(az), 0.0], [-np.sin(el) * np.cos(az), -np.sin(el) * np.sin(az), np.cos(el)]])
+
+
+def _extent(shape: _Shape, camera: Array) -> float:
+    """Diagonal of what is seen: less than the size of a long mechanism that is seen along its length."""
+    seen = np.concatenate([*shape.ends.values(), *shape.centers.values()]) @ camera.T
+    return float(np.linalg.norm(np.ptp(seen, axis=0))) or shape.size
 
 
 def _sides(corners: Array) -> Array:
@@ -347,11 +352,10 @@ def _set_view(ax: Any, shape: _Shape, view: tuple[float, float]) -> None:
             np.rad2deg(np.arcsin(np.clip(normal[2], -1, 1))),
             -90.0 if upright else np.rad2deg(np.arctan2(normal[1], normal[0])),
         )
-    right, up = _camera(ax)
-    corner = (
-        middle + right * ((points - middle) @ right).min() + up * (((points - middle) @ up).min() - 0.04 * shape.size)
-    )
-    _tripod(ax, corner, 0.06 * shape.size, normal)
+    right, up = camera = _camera(ax)
+    extent = _extent(shape, camera)
+    corner = middle + right * ((points - middle) @ right).min() + up * (((points - middle) @ up).min() - 0.04 * extent)
+    _tripod(ax, corner, 0.06 * extent, normal)
     for setter, c, r in zip((ax.set_xlim, ax.set_ylim, ax.set_zlim), middle, room, strict=True):
         setter(c - r / 2, c + r / 2)
     ax.set_box_aspect(room)
