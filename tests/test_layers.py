@@ -9,6 +9,7 @@ import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
+import networkx as nx
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -114,3 +115,56 @@ def test_the_check_finds_an_import_upward(source: str) -> None:
 )
 def test_the_check_passes_an_import_downward(source: str) -> None:
     assert not faults(source, ["mechgraph", "model"], "model")
+
+
+WITH_CIRCLES = {"equations", "model", "report", "result"}
+"""Rooms in which modules still import each other in circles, for type checking only."""
+
+
+def circles(sources: dict[str, str]) -> list[list[str]]:
+    """Modules (dotted name -> source) that import each other in circles, imports for type checking included."""
+    graph: nx.DiGraph[str] = nx.DiGraph()
+    for name, source in sources.items():
+        for statement in ast.walk(ast.parse(source)):
+            if isinstance(statement, ast.Import):
+                targets = [alias.name for alias in statement.names]
+            elif isinstance(statement, ast.ImportFrom):
+                package = name.split(".")[: -statement.level] if statement.level else []
+                base = ".".join(package + ([statement.module] if statement.module else []))
+                targets = [base, *(f"{base}.{alias.name}" for alias in statement.names)]
+            else:
+                continue
+            graph.add_edges_from((name, target) for target in targets if target in sources and target != name)
+    return sorted(sorted(part) for part in nx.strongly_connected_components(graph) if len(part) > 1)
+
+
+def sources_of(room: Path) -> dict[str, str]:
+    """The modules of a room by dotted name; the package itself imports what it likes from its own modules."""
+    files = [file for file in sorted(room.rglob("*.py")) if file.name != "__init__.py"]
+    names = [".".join(file.relative_to(ROOT).with_suffix("").parts) for file in files]
+    return {name: file.read_text(encoding="utf-8") for name, file in zip(names, files, strict=True)}
+
+
+ROOMS = sorted(folder for folder in PACKAGE.iterdir() if (folder / "__init__.py").is_file())
+
+
+@pytest.mark.parametrize("room", [room for room in ROOMS if room.name not in WITH_CIRCLES], ids=lambda room: room.name)
+def test_no_room_has_circles(room: Path) -> None:
+    assert not circles(sources_of(room))
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "from room.a import f",
+        "import room.a",
+        "from . import a",
+        "from .a import f",
+        "if TYPE_CHECKING:\n    from room.a import f",
+        "def g():\n    from room import a",
+    ],
+)
+def test_the_check_finds_a_circle(source: str) -> None:
+    sources = {"room.a": "from room.b import g", "room.b": "import room.c", "room.c": source, "room.d": "import room.a"}
+    assert circles(sources) == [["room.a", "room.b", "room.c"]]
+    assert not circles({**sources, "room.c": "import other"})

@@ -36,49 +36,46 @@ FIRST = 8
 
 
 def scaled_system(m: Mechanism, q: Array, system: System | None = None) -> System:
-    """The system about the centroid of the pair points at coordinates ``q``, with lengths over their RMS distance L.
+    """The system about the centroid of the pair points at coordinates ``q``, with lengths over their RMS distance L."""
+    raw = system or indexed(m)
+    return scaled(Configuration(raw, raw.state_of(q[:, None]))).system
+
+
+def scaled_start(m: Mechanism) -> Configuration:
+    """The declared start in a system scaled about it.
 
     The last one of the mechanism itself is kept with it, so that another call with the same start begins with all numbers ready.
     """
-    if system is not None:
-        return _rescaled(system, *_measure(system, q))
-    kept, key = m.once(_kept_systems), q.tobytes()
-    found = kept.get(key)
-    if found is None:
-        raw = indexed(m)
-        made = _rescaled(raw, *(_measure(raw, q) if q.any() else m.once(_measure_as_declared)))
+    raw = indexed(m)
+    q = raw.start_coordinates(m.start)
+    kept, key = m.once(_kept_starts), q.tobytes()
+    if key not in kept:
+        here = scaled(Configuration(raw, raw.state_of(q[:, None])))
         for name in ("numbers", "effort_numbers"):
-            getattr(made, name)
+            getattr(here.system, name)
         kept.clear()
-        kept[key] = found = made.known()
-    return System.remembered(m, found)
+        kept[key] = here.system.known(), here.evaluated()
+    known, evaluated = kept[key]
+    return Configuration.of(System.remembered(m, known), evaluated)
 
 
-def _kept_systems(m: Mechanism) -> dict[bytes, dict[str, Any]]:
-    """What scaled systems know beside the mechanism, by the coordinates about which they are scaled."""
+def _kept_starts(m: Mechanism) -> dict[bytes, tuple[dict[str, Any], dict[str, Any]]]:
+    """What is known of a start beside the mechanism, system and configuration, by the coordinates."""
     return {}
 
 
-def _rescaled(raw: System, centroid: Array, L: float) -> System:
-    return raw.with_parameters(raw.par.rescaled(raw.par.origin + raw.par.L * centroid, L * raw.par.L))
-
-
-def _measure(raw: System, q: Array) -> tuple[Array, float]:
-    """Centroid ``(3,)`` of the pair points at coordinates ``q``, and their RMS distance from it (with that of the mass centres)."""
-    here = Configuration(raw, raw.state_of(q[:, None]))
-    points = here.pair_points[:, :, 0]
+def scaled(here: Configuration) -> Configuration:
+    """A state in the system about the centroid of the pair points there, with lengths over their RMS distance L (with mass centres)."""
+    raw, points = here.system, here.pair_points[:, :, 0]
     centroid = points.mean(axis=1)
     massive = [i for i, link in enumerate(raw.m.links) if link.center is not None]
     X = here.poses[:, :, massive]
     centers = (rotate(X[:, :3], raw.par.center[:, massive]) + X[:, 3])[:, :, 0]
     distances = np.concatenate([points, centers], axis=1) - centroid[:, None]
     L = float(np.sqrt((distances**2).sum(axis=0).mean()))
-    return centroid, 1.0 if 1e-12 * max(1.0, float(np.abs(points).max())) >= L else L
-
-
-def _measure_as_declared(m: Mechanism) -> tuple[Array, float]:
-    raw = indexed(m)
-    return _measure(raw, np.zeros(raw.n_freedoms))
+    L = 1.0 if 1e-12 * max(1.0, float(np.abs(points).max())) >= L else L
+    par = raw.par.rescaled(raw.par.origin + raw.par.L * centroid, L * raw.par.L)
+    return here.rescaled(raw.with_parameters(par))
 
 
 def close(system: System, x: Array, fixed: Index, iterations: int = 60, patience: int = 8) -> tuple[Array, float]:
@@ -154,7 +151,10 @@ def named_columns(m: Mechanism, system: System, values: Mapping[str, float]) -> 
 
 def assembled(m: Mechanism, preferred: Mapping[str, float] | None = None) -> tuple[System, Array]:
     """The system and the state of ``closed_start``."""
-    here = closed_start(m, preferred)
+    return _state(closed_start(m, preferred))
+
+
+def _state(here: Configuration) -> tuple[System, Array]:
     return here.system, here.x[:, 0]
 
 
@@ -175,15 +175,12 @@ def closed_start(m: Mechanism, preferred: Mapping[str, float] | None = None) -> 
             f"mechanism {m.name!r}",
             [f"pairs {', '.join(bare)} have no geometry; a topology can be counted, not solved"],
         )
-    q = indexed(m).start_coordinates(m.start)
-    system = scaled_system(m, q)
-    here = Configuration(system, system.state_of(q[:, None]))
-    x, error = here.x[:, 0], float(here.closure[0])
+    here = scaled_start(m)
+    system, x, error = here.system, here.x[:, 0], float(here.closure[0])
     if error <= 10 * CLOSURE_GOAL or (error <= CLOSED and system.many_loops):
         return here
     if error <= CLOSED:
-        system, x = _settled(system, close(system, x, np.arange(0))[0])
-        return Configuration(system, x[:, None])
+        return scaled(Configuration(system, close_all(system, here.x, np.arange(0))[0]))
     x, error = _search(m, system, x, preferred or {})
     if error > CLOSED:
         best = dict(zip(m.freedom_names(), system.coordinates_of(x[:, None])[:, 0].tolist(), strict=True))
@@ -193,18 +190,7 @@ def closed_start(m: Mechanism, preferred: Mapping[str, float] | None = None) -> 
             error,
             best,
         )
-    system, x = _settled(system, x)
-    return Configuration(system, x[:, None])
-
-
-def _settled(system: System, x: Array) -> tuple[System, Array]:
-    """The system scaled about the closed position, with the state in its units."""
-    q = system.coordinates_of(x[:, None])[:, 0]
-    final = scaled_system(system.m, q, system)
-    rows = final.single_rows[np.flatnonzero(final.is_length)]
-    x = x.copy()
-    x[rows] *= system.par.L / final.par.L
-    return final, x
+    return scaled(Configuration(system, x[:, None]))
 
 
 def _search(m: Mechanism, system: System, x: Array, preferred: Mapping[str, float]) -> tuple[Array, float]:
@@ -258,20 +244,20 @@ def assembled_at(
     """
     if guess is not None:
         m = m.replace(start={**m.start, **{m.full_name(k): v for k, v in guess.items()}})
-        raw = scaled_system(m, indexed(m).start_coordinates(m.start))
+        begin = scaled_start(m)
+        raw, x = begin.system, begin.x[:, 0].copy()
         columns, goal = named_columns(m, raw, values)
-        x = raw.state_of(raw.start_coordinates(m.start)[:, None])[:, 0]
         x[raw.single_rows[columns]] = goal
         x, error = close(raw, x, columns)
         if error > CLOSED:
             raise _not_reached(m, raw, x, error, values)
-        return _settled(raw, x)
+        return _state(scaled(Configuration(raw, x[:, None])))
     system, x = assembled(m, values)
     columns, goal = named_columns(m, system, values)
     x, done = led(system, x, columns, goal)
     if not done:
         raise _not_reached(m, system, x, float(np.abs(x[system.single_rows[columns]] - goal).max()), values)
-    return _settled(system, x)
+    return _state(scaled(Configuration(system, x[:, None])))
 
 
 def _not_reached(m: Mechanism, system: System, x: Array, error: float, values: Mapping[str, float]) -> AssemblyError:

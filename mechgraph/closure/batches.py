@@ -31,14 +31,33 @@ class Group:
 
 @dataclass(frozen=True)
 class FactorBatch:
-    """All factors of one kind: their steps in the walk, columns of their freedoms ``(f, n)`` and rows of their state ``(nx, n)``."""
+    """All factors of one kind: their steps in the walk, columns of their freedoms ``(f, n)`` and rows of their state ``(nx, n)``.
 
-    stack: Stack
+    ``member (n,)`` says which of ``factors`` each one is; without ``factors`` it is a pair that has none.
+    """
+
+    factors: tuple[Factor, ...]
+    member: Index
     pairs: Index
     ranks: Index
     steps: Index
     columns: Index
     state_rows: Index
+
+    @cached_property
+    def stack(self) -> Stack:
+        """The factors for evaluation together."""
+        if not self.factors:
+            return FixedStack(len(self.member))
+        starts = np.flatnonzero(np.concatenate([[True], self.member[1:] != self.member[:-1]]))
+        counts = np.diff(np.append(starts, len(self.member))).tolist()
+        runs = [self.factors[i] for i in self.member[starts].tolist()]
+        return runs[0].stack(runs, counts)
+
+    def part(self, at: slice) -> FactorBatch:
+        """Some of the factors."""
+        arrays = (self.member, self.pairs, self.ranks, self.steps, self.columns, self.state_rows)
+        return FactorBatch(self.factors, *(array[..., at] for array in arrays))
 
     @cached_property
     def at_steps(self) -> Place:
@@ -82,22 +101,20 @@ def factor_batches(groups: Sequence[Group], walk: Walk, n_factors: Index) -> lis
     if fixed.size:
         nothing = np.zeros((0, len(fixed)), dtype=np.intp)
         steps = walk.step_of[walk.first[fixed]]
-        ranks = np.zeros(len(fixed), dtype=np.intp)
-        batches.append(FactorBatch(FixedStack(len(fixed)), fixed, ranks, steps, nothing, nothing))
+        zeros = np.zeros(len(fixed), dtype=np.intp)
+        batches.append(FactorBatch((), zeros, fixed, zeros, steps, nothing, nothing))
     return batches
 
 
 def _batch(members: Sequence[tuple[Factor, Group, int]], walk: Walk) -> FactorBatch:
     parts = []
     for number, (_, g, rank) in enumerate(members):
-        columns, rows = evaluation.places(g.row)[rank]
-        ranks = np.full(len(g.pairs), rank, dtype=np.intp)
-        steps = walk.step_of[walk.first[g.pairs] + rank]
-        parts.append([g.columns[columns], g.state_rows[rows], g.pairs, ranks, steps, np.full(len(g.pairs), number)])
+        at_columns, at_rows = evaluation.places(g.row)[rank]
+        same = [np.full(len(g.pairs), value, dtype=np.intp) for value in (rank, number)]
+        parts.append(
+            [g.columns[at_columns], g.state_rows[at_rows], g.pairs, walk.step_of[walk.first[g.pairs] + rank], *same]
+        )
     joined: list[Index] = [np.concatenate(part, axis=-1) for part in zip(*parts, strict=True)]
-    order = np.argsort(joined[4], kind="stable")
-    at_columns, at_rows, pairs, of_pair, at_steps, member = (part[..., order] for part in joined)
-    starts = np.flatnonzero(np.concatenate([[True], member[1:] != member[:-1]]))
-    counts = np.diff(np.append(starts, len(member))).tolist()
-    factors = [members[int(member[i])][0] for i in starts]
-    return FactorBatch(factors[0].stack(factors, counts), pairs, of_pair, at_steps, at_columns, at_rows)
+    order = np.argsort(joined[3], kind="stable")
+    columns, rows, pairs, steps, ranks, member = (part[..., order] for part in joined)
+    return FactorBatch(tuple(factor for factor, _, _ in members), member, pairs, ranks, steps, columns, rows)

@@ -37,6 +37,8 @@ WORSE = 1e-2
 """Part of the smallest pivot at the position of choice below which another bordering is chosen."""
 RETRY = 1e-3
 """Smallest pivot below which another bordering is tried."""
+INDEPENDENT = 1e-5
+"""Smallest over largest singular value that a determinant has to prove, far above ``RANKS.loop`` and above its own rounding."""
 BORDERS_SEED = 17
 
 
@@ -77,11 +79,17 @@ class LoopSystem(ReducedRows):
     def _own_motions(block: Array, own: Mask, columns: Index) -> list[tuple[Array, Index]]:
         """Orthonormal motions of single loops in columns that no other loop has: rows ``(n, c)`` and their columns."""
         some = np.flatnonzero(own.sum(axis=1) > 1)
-        if not some.size:
-            return []
         c = own.shape[1]
         others = np.eye(c) * ~own[some][:, None]  # columns of other loops, and fixed ones, are at rest
         rows = np.concatenate([block[some] * own[some][:, None], others], axis=1)
+        # det R^T R is at most the square of the smallest singular value times the trace to the power c - 1: where that proves the
+        # columns independent no decomposition is needed
+        G = rows.swapaxes(1, 2) @ rows
+        size = np.maximum(np.trace(G, axis1=1, axis2=2), 1.0)
+        doubtful = np.linalg.slogdet(G)[1] <= 2 * np.log(INDEPENDENT) + c * np.log(size)
+        some, rows = some[doubtful], rows[doubtful]
+        if not some.size:
+            return []
         s = np.linalg.svd(rows, compute_uv=False)
         free = (s <= RANKS.loop * np.maximum(s.max(axis=1), 1.0)[:, None]).sum(axis=1)
         mine = np.flatnonzero(free)
@@ -100,7 +108,7 @@ class LoopSystem(ReducedRows):
             shared[self.rows.more.indices] = True
         own = self._free & ~shared
         rows: list[tuple[Array, Index]] = []
-        for _, at in self._by_width():
+        for _, at in self._by_width:
             block = np.moveaxis(blocks[:, at], 0, 1)
             rows += self._own_motions(block, own[self.entries.column[at]], self.entries.column[at])
         return rows

@@ -12,8 +12,10 @@ from mechgraph.closure.batches import FactorBatch, Index, ScrewTable
 from mechgraph.closure.tree import Walk
 from mechgraph.model.parameters import Parameters
 
-MARKER_A, MARKER_B, MARKER_A_INVERSE, MARKER_B_INVERSE = range(4)
+MARKER_A, MARKER_B = range(2)
 """Order of the constant poses in ``Numbers.constants``, after the identity."""
+CHUNK = 4096
+"""Factors whose coefficients are multiplied with their markers at once: what lies between stays in the cache."""
 
 
 class Numbers:
@@ -28,12 +30,12 @@ class Numbers:
 
     @cached_property
     def constants(self) -> Array:
-        """Constant poses ``(3, 4, 1 + 4 P, B)``: the identity, markers A, markers B, and their inverses."""
+        """Constant poses ``(3, 4, 1 + 2 P, B)``: the identity, markers A, markers B."""
         A, B = self.par.marker_a, self.par.marker_b
         batch = np.broadcast_shapes(A.shape[3:], B.shape[3:])[0]
-        markers = np.empty((3, 4, 2 * self.n_pairs, batch), dtype=np.result_type(A, B))
-        markers[:, :, : self.n_pairs], markers[:, :, self.n_pairs :] = A, B
-        return np.concatenate([identity(1, batch), markers, inverse(markers)], axis=2)
+        out = np.empty((3, 4, 1 + 2 * self.n_pairs, batch), dtype=np.result_type(A, B))
+        out[:, :, :1], out[:, :, 1 : 1 + self.n_pairs], out[:, :, 1 + self.n_pairs :] = identity(1, 1), A, B
+        return out
 
     @cached_property
     def is_real(self) -> bool:
@@ -51,26 +53,33 @@ class Numbers:
         """
         out: list[tuple[Array, tuple[Array, Array] | None]] = []
         for b in self.batches:
-            C = b.stack.coefficients(self.par.pitch[b.pairs], np.asarray(self.walk.back[b.steps], dtype=bool))
-            left, right = self._beside(b)
-            alone = left.shape[3] == 1 and C.shape[4] == 1
-            if alone:
-                C = np.einsum("abnt,bcmnt->acmnt", left, C)
-                C = np.einsum("acmnt,cdnt->admnt", C, right)
+            if self.constants.shape[3] == 1 and self.par.pitch.shape[1] == 1:
+                parts = [self._folded(b.part(slice(i, i + CHUNK))) for i in range(0, len(b.pairs), CHUNK)]
+                out.append((np.concatenate(parts) if len(parts) > 1 else parts[0], None))
+                continue
+            C, left, right = self._coefficients(b), *self._beside(b)
             C = C.reshape(16, *C.shape[2:])
-            C = np.ascontiguousarray(C[..., 0].transpose(2, 0, 1)) if C.shape[3] == 1 else C
-            out.append((C, None if alone else (left, right)))
+            out.append((np.ascontiguousarray(C[..., 0].transpose(2, 0, 1)) if C.shape[3] == 1 else C, (left, right)))
         return out
+
+    def _coefficients(self, b: FactorBatch) -> Array:
+        """Coefficients ``(4, 4, m, n, B)`` of the poses of a batch in the sense of the walk."""
+        return b.stack.coefficients(self.par.pitch[b.pairs], np.asarray(self.walk.back[b.steps], dtype=bool))
+
+    def _folded(self, b: FactorBatch) -> Array:
+        """The same with the markers beside them, ``(n, 16, m)``, of one mechanism."""
+        C = self._coefficients(b)[..., 0]
+        left, right = self._beside(b)
+        C = np.einsum("acmn,cdn->admn", np.einsum("abn,bcmn->acmn", left[..., 0], C), right[..., 0])
+        return np.ascontiguousarray(C.reshape(16, *C.shape[2:]).transpose(2, 0, 1))
 
     def _beside(self, b: FactorBatch) -> tuple[Array, Array]:
         """Constant poses before and behind the factors of a batch in the sense of the walk, homogeneous ``(4, 4, n, B)``."""
         n, last = self.n_pairs, np.maximum(self.n_factors, 1) - 1
         back, begins, ends = self.walk.back[b.steps], b.ranks == 0, b.ranks == last[b.pairs]
-        left = np.where(back, ends * (1 + MARKER_B * n + b.pairs), begins * (1 + MARKER_A * n + b.pairs))
-        right = np.where(
-            back, begins * (1 + MARKER_A_INVERSE * n + b.pairs), ends * (1 + MARKER_B_INVERSE * n + b.pairs)
-        )
-        before, behind = (homogeneous(self.constants[:, :, side]) for side in (left, right))
+        at_a, at_b = begins * (1 + MARKER_A * n + b.pairs), ends * (1 + MARKER_B * n + b.pairs)
+        before = homogeneous(self.constants.take(np.where(back, at_b, at_a), axis=2))
+        behind = homogeneous(inverse(self.constants.take(np.where(back, at_a, at_b), axis=2)))
         starts = self.walk.parents[b.steps] == 0
         before[:, :, starts] = np.einsum("abt,bcnt->acnt", homogeneous(self.par.frame), before[:, :, starts])
         return before, behind

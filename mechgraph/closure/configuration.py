@@ -59,6 +59,28 @@ class Configuration:
                 out.__dict__[name] = np.tile(known, count)
         return out
 
+    def rescaled(self, system: System) -> Configuration:
+        """The same state in a system about another origin, in another unit of length; poses are taken over, not evaluated again."""
+        old, new = self.system.par, system.par
+        out = Configuration(system, self.x.copy())
+        out.x[system.single_rows[np.flatnonzero(system.is_length)]] *= old.L / new.L
+        nodes = self._nodes.copy()
+        nodes[:, 3] *= old.L / new.L
+        nodes[:, 3] += ((old.origin - new.origin) / new.L)[:, None, None]
+        out.__dict__["_nodes"] = nodes
+        return out
+
+    def evaluated(self) -> dict[str, Any]:
+        """All that is known of the configuration beside its system, see ``of``."""
+        return {name: value for name, value in vars(self).items() if name != "system"}
+
+    @classmethod
+    def of(cls, system: System, evaluated: dict[str, Any]) -> Configuration:
+        """The configuration of which that is known."""
+        out = cls.__new__(cls)
+        vars(out).update(evaluated, system=system)
+        return out
+
     # --- poses -------------------------------------------------------------------------------------------------------
 
     @kept

@@ -160,11 +160,12 @@ class ReducedRows:
         e = self.entries
         return self.measure.rows(S[:, e.column], e.loop) * (e.sign * self._free[e.column])
 
+    @cached_property
     def _by_width(self) -> list[tuple[Index, Index]]:
         """Loops with the same number of entries: their indices ``(n,)`` and entries ``(n, c)``."""
         width = np.diff(self.entries.first)
         out = []
-        for c in np.unique(width):
+        for c in np.flatnonzero(np.bincount(width)):
             loops = np.flatnonzero(width == c)
             out.append((loops, self.entries.first[loops][:, None] + np.arange(c)))
         return out
@@ -173,7 +174,7 @@ class ReducedRows:
         """Turn the rows of every loop so that the dependent ones come last, all loops of one width at once."""
         n = self.loops
         self._turn, self.kept, self.dropped = np.empty((n, 6, 6)), np.zeros(n, dtype=np.intp), 0.0
-        for loops, at in self._by_width():
+        for loops, at in self._by_width:
             block = np.moveaxis(blocks[:, at], 0, 1)
             U, s, _ = np.linalg.svd(block, full_matrices=block.shape[2] < 6)
             self._turn[loops] = np.swapaxes(U, 1, 2)
@@ -191,7 +192,7 @@ class ReducedRows:
         """Entries ``(6, entries)`` in the turned rows of their loops and columns of unit size."""
         blocks = self._blocks(S) * self._scale[self.entries.column]
         turned = np.empty_like(blocks)
-        for loops, at in self._by_width():
+        for loops, at in self._by_width:
             turned[:, at] = np.moveaxis(self._turn[loops] @ np.moveaxis(blocks[:, at], 0, 1), 0, 1)
         return turned
 

@@ -299,7 +299,7 @@ class Mechanism(Formatted):
             hint if len(able) < len(names) else ""
         )
 
-    @property
+    @cached_property
     def has_geometry(self) -> bool:
         """Whether every pair says where it sits (otherwise: a topology, which can be counted, not solved)."""
         return all(pair.has_geometry for pair in self.pairs)
