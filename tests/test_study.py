@@ -256,6 +256,28 @@ def test_function_that_builds_and_function_that_reduces() -> None:
     assert study.nominal["peak"] == pytest.approx(10 * 2.0 * 0.5)
 
 
+def test_functions_that_fail_say_so_for_their_variant() -> None:
+    def build(length: float = 0.5) -> Any:
+        if length > 3.0:
+            raise ValueError("too long")
+        if length > 2.0:
+            return pendulum(length=length).replace(loads=[])
+        return pendulum(length=length) if length < 1.0 else 3
+
+    study = mg.study(
+        build, {"length": [0.4, 0.5, 0.6, 0.7, 1.5, 2.5, 3.5]}, "A.effort", motions={"A": 0.0}, sampling="grid"
+    )
+    assert study.failed.tolist() == [False] * 4 + [True] * 3
+    assert study.outputs["A.effort"][:4, 0] == pytest.approx([8.0, 10.0, 12.0, 14.0])
+    assert np.isnan(study.outputs["A.effort"][4:]).all()
+    for i, words in (
+        (4, "gave int; expected a Mechanism"),
+        (5, "only numbers may differ"),
+        (6, "ValueError: too long"),
+    ):
+        assert words in study.messages[i]
+
+
 def test_every_variant_may_have_its_own_motion() -> None:
     angles = np.linspace(0, 1, 15).reshape(5, 3)
     study = mg.study(pendulum(), {"bob.mass": [1.0, 3.0]}, "A.effort", n=5, motions={"A": angles})

@@ -275,6 +275,14 @@ def test_rotation_vectors_are_continuous_where_the_axis_wanders_near_a_half_turn
         ({"freedoms": ["Rz"], "reactions": ["Fx", "Fy", "Fz", "Mx"]}, "expected 6 - f = 5"),
         ({"freedoms": ["Rz"], "reactions": ["Fx", "Fy", "Fz", "Mx", "Fx"]}, "repeat"),
         ({"freedoms": ["Rz"], "reactions": ["Fx", "Fy", "Fz", "Mx", "Qy"]}, "Qy"),
+        (
+            {"freedoms": ["Rz"], "reactions": ["Fx", "Fy", "Mx", "My", mg.Component("N", (0, 0, 0, 1, 0, 0))]},
+            "reactions .*: not independent",
+        ),
+        (
+            {"freedoms": ["Rz"], "reactions": ["Fx", "Fy", "Mx", "My", mg.Component("N", (0, 0, 1))]},
+            "six finite numbers",
+        ),
         ({"freedoms": ["Rw"]}, "Rw"),
         ({"freedoms": ["Rz", "Rz"]}, "repeat"),
         ({"freedoms": ["Rz + pitch Ry2"]}, "unknown"),
