@@ -378,7 +378,7 @@ def test_bad_arguments_are_all_told() -> None:
     assert str(caught.value).count("expected a distribution") == 2
     with pytest.raises(mg.DeclarationError, match="is no quantity"):
         mg.study(pendulum(), {"bob.mass": [1.0]}, "A.weight", motions={"A": 0.0})
-    with pytest.raises(mg.DeclarationError, match="expected one of random, latin, grid"):
+    with pytest.raises(mg.DeclarationError, match="expected one of 'random', 'latin', 'grid'"):
         mg.study(pendulum(), {"bob.mass": [1.0]}, "A.effort", motions={"A": 0.0}, sampling="sobol")
     with pytest.raises(mg.DeclarationError, match="reduce over axis 1"):
         mg.study(pendulum(), {"bob.mass": [1.0]}, {"x": lambda s: s["A"].effort.max()}, n=3, motions={"A": 0.0})
