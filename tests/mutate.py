@@ -100,6 +100,8 @@ def places(tree: ast.AST, first: int = 0) -> Iterator[tuple[Any, str, int, int]]
         for i, child in enumerate(value if isinstance(value, list) else [value]):
             if not isinstance(child, ast.AST) or isinstance(child, ast.JoinedStr | ast.expr_context):
                 continue
+            if isinstance(child, ast.keyword) and child.arg == "strict":  # of zip: what it checks does not happen
+                continue
             line = child.lineno if isinstance(child, ast.stmt) else first
             yield tree, field, i, line
             if not isinstance(child, ast.Raise):

@@ -145,6 +145,7 @@ def test_variants_agree_with_solving_each_by_itself(name: str) -> None:
         assert_same(study, i, motions, kept)
 
 
+@pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
 def test_passive_bodies_of_variants() -> None:
     """The coupler of every RSSR variant is held as that of the variant by itself."""
     m = mg.load("rssr")

@@ -68,6 +68,12 @@ def with_own_pair_type(reactions: list[str] | None) -> mg.Mechanism:
     )
 
 
+def with_own_bookkeeping() -> mg.Mechanism:
+    hinge = mg.pair_types()["R"].bookkeeping
+    again = mg.PairType("Hinge", freedoms=["Rz"], reactions=["Fx", "Fy", "Fz", "Mx", "My"], bookkeeping=hinge)
+    return mg.Mechanism("hinge", pairs=[mg.Pair("A", again, "frame", "door", point=(0, 0, 0), axis=(0, 0, 1))])
+
+
 def with_markers() -> mg.Mechanism:
     square = {"axis": (0, 0, 2.0), "second": (1 / 3, 0, 0)}
     return mg.Mechanism(
@@ -102,6 +108,7 @@ def with_markers() -> mg.Mechanism:
 HAND_MADE = {
     "loads": with_every_load,
     "own pair type": lambda: with_own_pair_type(["Fy@1", "Fz", "Mx", "My"]),
+    "own bookkeeping": with_own_bookkeeping,
     "own pair type, null space": lambda: with_own_pair_type(None),
     "markers, pitch, lead, units, start, motion": with_markers,
     "topology": lambda: mg.chain("RPRHRRR"),
