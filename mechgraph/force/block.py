@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
@@ -14,7 +15,7 @@ from mechgraph.closure.solver import FactoredClosure
 from mechgraph.force.applied_loads import Site, inertia_wrenches, kinetic_power
 from mechgraph.force.dalembert import METHODS, ForceProblem, Wrenches, row_efforts
 from mechgraph.force.passive_hold import hold
-from mechgraph.force.reaction_map import reaction_map
+from mechgraph.force.reaction_map import effort_map, reaction_map
 from mechgraph.model.load import Load
 from mechgraph.numerics.linear import add_at
 from mechgraph.structure.passive import PassiveMotion
@@ -93,8 +94,9 @@ def forces_of_block(
     own[task.driven] = (found.efforts - given - found.coupled)[task.driven]
     acting = own + given + found.coupled
     totals = here.pair_sums(here.E * acting) + found.reactions
-    balance, wrench = _balance(here, found.reactions, totals, loads, (applied, inertia, held))
-    power, term = _power(rates, totals, applied if held is None else applied + held, acting, inertia)
+    parts = (own, given, found.coupled)
+    balance, wrench = _balance(here, found.reactions, totals, loads, (applied, inertia, held, *parts))
+    power, term = _power(rates, totals, applied if held is None else applied + held, parts, inertia)
     frame = here.system.graph.frame
     shaking = np.delete(loads, frame, axis=1).sum(axis=1) + site.scaled(site.internal)[:, frame]
     return BlockForces(
@@ -138,8 +140,7 @@ def _least(here: Configuration, wrenches: Wrenches, f: FactoredClosure, task: Fo
     )
     s = stress.wrenches.shape[2]
     if s and not f.complete and task.redundant == "minimum_norm":
-        points = at_pair_points(here, reaction_part(here, totals, pair_power(here, totals)))
-        x = f.least([reaction_map(here, t) for t in range(here.T)], points.swapaxes(0, 1).reshape(-1, here.T))
+        x = _least_multipliers(here, totals, multipliers, f, acting)
         totals = totals + here.pair_wrenches(x[:, None])[:, :, 0]
         multipliers = multipliers - x[6 * here.system.graph.n_loops :]
     efforts = pair_power(here, totals)
@@ -150,6 +151,30 @@ def _least(here: Configuration, wrenches: Wrenches, f: FactoredClosure, task: Fo
         efforts = efforts + np.einsum("fit,it->ft", stress.efforts, y)
         multipliers = multipliers + np.einsum("nit,it->nt", stress.multipliers, y)
     return _Found(reactions, efforts, stress, multipliers, row_efforts(here, multipliers[:, None])[:, 0])
+
+
+STRAIN = 1e-4
+"""Weight of efforts beside reactions: where drivers or couplings strain each other without any reaction, their efforts decide alone."""
+
+
+def _least_multipliers(
+    here: Configuration, totals: Array, multipliers: Array, f: FactoredClosure, acting: Index
+) -> Array:
+    """Multipliers ``(rows, T)`` of the closure rows that make the reactions least, and then the efforts that leave them as they are.
+
+    Minimizes ``|r + R x|^2 + w^2 |e + M x|^2``, then the same with ``M (x - x_1)`` in place of ``e + M x``: what the weight took from the
+    reactions in the first is given back, up to w^4 (method of multipliers, Bertsekas 1982).
+    """
+    efforts = pair_power(here, totals)
+    points = at_pair_points(here, reaction_part(here, totals, efforts)).swapaxes(0, 1).reshape(-1, here.T)
+    R = [reaction_map(here, t) for t in range(here.T)]
+    if len(acting) < 2:
+        return f.least(R, points)
+    M = [STRAIN * effort_map(here, t, acting) for t in range(here.T)]
+    both = [scipy.sparse.csr_array(scipy.sparse.vstack(maps)) for maps in zip(R, M, strict=True)]
+    first = f.least(both, np.concatenate([points, STRAIN * efforts[acting], STRAIN * multipliers]))
+    back = np.stack([-(part @ x) for part, x in zip(M, first.T, strict=True)], axis=1)
+    return f.least(both, np.concatenate([points, back]))
 
 
 def _balance(
@@ -166,20 +191,23 @@ def _balance(
     return np.maximum(residual, work), max(_largest(part) for part in (totals, *parts) if part is not None)
 
 
-def _power(rates: Rates, totals: Array, applied: Array, efforts: Array, inertia: Array) -> tuple[Array, float]:
+def _power(
+    rates: Rates, totals: Array, applied: Array, efforts: tuple[Array, ...], inertia: Array
+) -> tuple[Array, float]:
     """Driver power + load power - rate of kinetic energy ``(T,)``, and the largest term.
 
-    A term is twist times wrench of one link, for loads, inertia and what its pairs transmit, before anything cancels: where forces do no
-    work, the sum is rounding of such products.
+    A term is rate times effort, or twist times wrench of one link, for loads, inertia and what its pairs transmit, before anything
+    cancels: where forces do no work, the sum is rounding of such products.
     """
     s, kinetic = rates.here.system, kinetic_power(rates, inertia)
-    left = (rates.V * applied).sum(axis=(0, 1)) + (rates.dq * efforts).sum(axis=0) - kinetic.sum(axis=0)
+    left = (rates.V * applied).sum(axis=(0, 1)) + (rates.dq * sum(efforts)).sum(axis=0) - kinetic.sum(axis=0)
     speed, through = np.abs(rates.V).max(axis=0), np.abs(totals).max(axis=0)
     terms = (
         speed * np.abs(applied).max(axis=0),
         speed * np.abs(inertia).max(axis=0),
         speed[s.b] * through,
         speed[s.a] * through,
+        *(rates.dq * part for part in efforts),
     )
     return left, max(_largest(term) for term in terms)
 

@@ -1,4 +1,4 @@
-"""What multipliers of the closure rows bring to the reaction parts of all pairs, as a sparse matrix of one position."""
+"""What multipliers of the closure rows bring to the reaction parts and efforts, as sparse matrices of one position."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import scipy
 from mechgraph.algebra.screw import shift_wrench
 from mechgraph.algebra.se3 import cross
 from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import Index
 
 
 def reaction_map(here: Configuration, t: int) -> scipy.sparse.csr_array:
@@ -30,3 +31,20 @@ def reaction_map(here: Configuration, t: int) -> scipy.sparse.csr_array:
     rows = np.broadcast_to(6 * pair + np.arange(6)[:, None, None], w.shape)
     cols = np.broadcast_to(6 * loop + np.arange(6)[None, :, None], w.shape)
     return scipy.sparse.csr_array((w.ravel(), (rows.ravel(), cols.ravel())), shape=(6 * len(s.m.pairs), s.n_rows))
+
+
+def effort_map(here: Configuration, t: int, acting: Index) -> scipy.sparse.csr_array:
+    """``M (n, rows)`` at position ``t``: efforts in the freedoms ``acting`` for unit multipliers of all rows, then minus the multipliers
+    of the rows behind those of the loops.
+    """
+    s = here.system
+    loop, pair, sign = s.graph.loop_steps
+    step, place = np.nonzero(pair[:, None] == np.arange(len(s.m.pairs))[s.owners][acting])
+    values = sign[step] * here.S[:, acting[place], t]
+    shape = (6, len(step))
+    rows, cols = np.broadcast_to(place, shape), 6 * loop[step] + np.arange(6)[:, None]
+    efforts = scipy.sparse.csr_array((values.ravel(), (rows.ravel(), cols.ravel())), shape=(len(acting), s.n_rows))
+    others = s.n_rows - 6 * len(s.graph.loops)
+    return scipy.sparse.csr_array(
+        scipy.sparse.vstack([efforts, -scipy.sparse.eye_array(others, s.n_rows, k=s.n_rows - others)])
+    )

@@ -1,0 +1,94 @@
+"""``redundant="minimum_norm"``: the same reactions in any unit, frame, method and engine; least by a second formulation."""
+
+import numpy as np
+import pytest
+import scipy
+
+import mechgraph as mg
+
+Z = (0, 0, 1)
+ANGLES = {"A": np.array([0.1, 0.5])}
+OPTIONS = [{"engine": e, "method": f} for e in ("dense", "sparse") for f in ("loop_wrench", "newton_euler")]
+
+
+def wheels(*couplings: mg.Coupling, drives: tuple[str, ...] = ("A",)) -> mg.Mechanism:
+    """Two wheels on the frame, geared; 3 is given on the second."""
+    return mg.Mechanism("wheels", pairs=[
+        mg.Pair("A", "R", "frame", "one", point=(0, 0, 0), axis=Z), mg.Pair("B", "R", "frame", "two", point=(1, 0, 0), axis=Z),
+    ], couplings=couplings, drives=drives, loads=[mg.Effort("B", 3.0)])  # fmt: skip
+
+
+@pytest.mark.parametrize("options", OPTIONS)
+def test_drivers_that_strain_each_other_without_reactions_share_by_least_effort(options: dict) -> None:
+    """Both wheels driven: with no coupling force each motor holds its own wheel, 0 and -3."""
+    m = wheels(mg.Coupling({"A": 2.0, "B": -3.0}, name="g"), drives=("A", "B"))
+    s = mg.solve(m, {"A": [0.0, 0.3], "B": [0.0, 0.2]}, redundant="minimum_norm", **options)
+    np.testing.assert_allclose(s["A"].effort[:, 0], 0, atol=1e-12)
+    np.testing.assert_allclose(s["B"].effort[:, 0], -3, atol=1e-12)
+    np.testing.assert_allclose(s.coupling("g").effort, 0, atol=1e-12)
+    assert s.checks.equilibrium.max() < 1e-14
+
+
+@pytest.mark.parametrize("options", OPTIONS)
+def test_couplings_that_say_the_same_twice_share_one_force(options: dict) -> None:
+    """The motor has to supply -2; the couplings of which only 2 m1 + 4 m2 = 2 is known are found, whatever the engine, and balance."""
+    m = wheels(mg.Coupling({"A": 2.0, "B": -3.0}, name="g1"), mg.Coupling({"A": 4.0, "B": -6.0}, name="g2"))
+    s = mg.solve(m, {"A": [0.0, 0.3]}, redundant="minimum_norm", **options)
+    np.testing.assert_allclose(s["A"].effort[:, 0], -2, rtol=1e-12)
+    np.testing.assert_allclose([s.coupling("g1").effort, s.coupling("g2").effort], [[0.5] * 2, [0.25] * 2], rtol=1e-10)
+    assert s.checks.equilibrium.max() < 1e-14
+
+
+@pytest.mark.parametrize("drives", [("A",), ("A", "D")])
+def test_both_engines_and_methods_give_the_same_reactions_and_efforts(drives: tuple[str, ...]) -> None:
+    m = mg.load("four-bar").replace(drives=drives)
+    rocker = mg.kinematics(mg.load("four-bar"), ANGLES)["D"].position[:, 0]
+    given = {**ANGLES, "D": rocker} if len(drives) > 1 else ANGLES
+    first, *others = (mg.solve(m, given, redundant="minimum_norm", **options) for options in OPTIONS)
+    for other in others:
+        for p in m.pairs:
+            np.testing.assert_allclose(other[p.name].reaction, first[p.name].reaction, atol=1e-12)
+            np.testing.assert_allclose(other[p.name].effort, first[p.name].effort, atol=1e-12)
+
+
+def test_no_self_stress_makes_them_smaller() -> None:
+    """Second formulation: scipy's least squares on the sum of |F|^2 + |M / L|^2 at the pair points over all self-stresses."""
+    m = mg.load("four-bar")
+    s = mg.solve(m, {"A": 0.5}, redundant="minimum_norm")
+    # lengths over L, the RMS distance of pair points and mass centres from their middle at the start
+    at = np.array([p.point for p in m.pairs] + [link.center for link in m.links if link.mass])
+    L = np.sqrt(((at - at.mean(axis=0)) ** 2).sum(axis=1).mean())
+    state, rows, parts = s.state(()), [], []
+    moving = [link.name for link in m.links if link.name != m.frame]
+    for k, p in enumerate(m.pairs):
+        W = state.reactions[k][:, :, 0]
+        point = s.link(p.b).point(p.markers[1].point).position
+        parts.append(np.vstack([(W[:3] - np.cross(point, W[3:].T).T) / L, W[3:]]))
+        rows.append(np.vstack([((p.b == name) - (p.a == name)) * W for name in moving]))
+    A, weights = np.hstack(rows), scipy.linalg.block_diag(*parts)
+    found = np.concatenate([list(s[p.name].components.values()) for p in m.pairs])
+    drive = np.zeros((len(A), 1))
+    drive[6 * moving.index("crank") : 6 * moving.index("crank") + 6] = np.array([[0.0], [0], [1], [0], [0], [0]])
+    null = scipy.linalg.null_space(np.hstack([A, drive]), rcond=1e-10)[:-1]
+    assert null.shape[1] == 3
+    y = scipy.linalg.lstsq(weights @ null, -weights @ found)[0]
+    np.testing.assert_allclose(y, 0, atol=1e-9 * np.abs(found).max())
+
+
+def test_they_are_the_same_in_any_unit_and_frame() -> None:
+    """In mm, and turned and moved away: the same forces, and moments a thousand times as large."""
+    m = mg.load("four-bar")
+    s = mg.solve(m, ANGLES, redundant="minimum_norm", loads=[mg.Wrench("coupler", force=(1.0, 2.0, 3.0), point=(0.5, 0.2, 0.1))])
+    X = np.eye(4)
+    X[:3, :3], X[:3, 3] = scipy.spatial.transform.Rotation.from_rotvec([0.3, -1.0, 0.7]).as_matrix(), (30.0, -20.0, 10.0)
+    loaded = m.replace(loads=[mg.Wrench("coupler", force=(1.0, 2.0, 3.0), point=(0.5, 0.2, 0.1))])
+    moved = mg.solve(loaded.moved(X), ANGLES, redundant="minimum_norm")
+    scaled = mg.solve(loaded.to_units(length="mm"), ANGLES, redundant="minimum_norm")
+    size = max(np.abs(s[p.name].force).max() for p in m.pairs)
+    for p in m.pairs:
+        for name, value in s[p.name].components.items():
+            np.testing.assert_allclose(moved[p.name].components[name], value, atol=1e-9 * size)
+        force = np.linalg.norm(s[p.name].force, axis=-1)
+        ratio = np.linalg.norm(scaled[p.name].force, axis=-1) / np.where(force > 0, force, 1.0)
+        moments = np.linalg.norm(scaled[p.name].moment, axis=-1)
+        np.testing.assert_allclose(moments, 1000 * ratio * np.linalg.norm(s[p.name].moment, axis=-1), atol=1e-6 * size * ratio.max())
