@@ -396,7 +396,10 @@ def solve(
     ] = None,
     method: Annotated[Method, typer.Option(help="How the forces are solved.")] = Method.loop_wrench,
     redundant: Annotated[
-        Redundant, typer.Option(help="What stands for reactions that are not unique.")
+        Redundant,
+        typer.Option(
+            help="What stands for reactions that are not unique: no value, or the least (all pairs equally stiff)."
+        ),
     ] = Redundant.nan,
     on_reach: Annotated[
         OnReach, typer.Option("--on-reach", help="Stop at a position that cannot be reached, or flag it and go on.")

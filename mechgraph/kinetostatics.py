@@ -124,7 +124,9 @@ def solve(
         ``start``, other axes are independent cases. Left out where the drives carry their motion.
     method : ``"loop_wrench"`` (one unknown wrench a loop) or ``"newton_euler"`` (the printed equations).
     loads : replace the declared ones.
-    redundant : ``"nan"`` for components that are not unique, or ``"minimum_norm"`` (least ``sum |F|^2 + |M / L|^2``).
+    redundant : ``"nan"`` for components that are not unique, or ``"minimum_norm"``: the least ``sum |F|^2 + |M / L|^2`` of all reactions,
+        moments about the pair points, L the mean radius of the mechanism. That is one assumption of many: every pair as stiff as every
+        other, links rigid, nothing strained at assembly. It is the same in any unit and frame.
     on_reach : ``"raise"`` or ``"flag"`` (NaN rows, see ``Solution.status``).
     engine : ``"dense"`` or ``"sparse"`` linear algebra, or ``"auto"``: the faster one for the size. The values are the same.
 

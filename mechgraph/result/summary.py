@@ -254,7 +254,8 @@ class _View:
             return
         yield Heading("Not unique", 2)
         yield Paragraph(
-            "Any self-stress can be added to these components; the values shown are those of least norm."
+            "Any self-stress can be added to these components; the values shown are those of least norm, an assumption: all pairs "
+            "equally stiff, links rigid, nothing strained at assembly."
             if least_norm
             else "Any self-stress can be added to these components, so they have no value (NaN). The table above shows "
             "what is unique; where components are missing, those that it contains are named in brackets."

@@ -78,9 +78,14 @@ def test_no_self_stress_makes_them_smaller() -> None:
 def test_they_are_the_same_in_any_unit_and_frame() -> None:
     """In mm, and turned and moved away: the same forces, and moments a thousand times as large."""
     m = mg.load("four-bar")
-    s = mg.solve(m, ANGLES, redundant="minimum_norm", loads=[mg.Wrench("coupler", force=(1.0, 2.0, 3.0), point=(0.5, 0.2, 0.1))])
+    s = mg.solve(
+        m, ANGLES, redundant="minimum_norm", loads=[mg.Wrench("coupler", force=(1.0, 2.0, 3.0), point=(0.5, 0.2, 0.1))]
+    )
     X = np.eye(4)
-    X[:3, :3], X[:3, 3] = scipy.spatial.transform.Rotation.from_rotvec([0.3, -1.0, 0.7]).as_matrix(), (30.0, -20.0, 10.0)
+    X[:3, :3], X[:3, 3] = (
+        scipy.spatial.transform.Rotation.from_rotvec([0.3, -1.0, 0.7]).as_matrix(),
+        (30.0, -20.0, 10.0),
+    )
     loaded = m.replace(loads=[mg.Wrench("coupler", force=(1.0, 2.0, 3.0), point=(0.5, 0.2, 0.1))])
     moved = mg.solve(loaded.moved(X), ANGLES, redundant="minimum_norm")
     scaled = mg.solve(loaded.to_units(length="mm"), ANGLES, redundant="minimum_norm")
@@ -91,4 +96,6 @@ def test_they_are_the_same_in_any_unit_and_frame() -> None:
         force = np.linalg.norm(s[p.name].force, axis=-1)
         ratio = np.linalg.norm(scaled[p.name].force, axis=-1) / np.where(force > 0, force, 1.0)
         moments = np.linalg.norm(scaled[p.name].moment, axis=-1)
-        np.testing.assert_allclose(moments, 1000 * ratio * np.linalg.norm(s[p.name].moment, axis=-1), atol=1e-6 * size * ratio.max())
+        np.testing.assert_allclose(
+            moments, 1000 * ratio * np.linalg.norm(s[p.name].moment, axis=-1), atol=1e-6 * size * ratio.max()
+        )
