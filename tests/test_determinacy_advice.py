@@ -150,3 +150,28 @@ def test_effects_hold_where_pairs_have_moved() -> None:
             after.mobility,
             len(after.passive),
         )
+
+
+# --- frames turned about their axis ----------------------------------------------------------------------------------------
+
+
+def test_turned_frames_are_frames_and_turn_to_the_left() -> None:
+    rng = np.random.default_rng(3)
+    frames = np.concatenate([rotation_exp(rng.normal(size=(3, 5))), rng.normal(size=(3, 1, 5))], axis=1)
+    angles = rng.uniform(-3, 3, 5)
+    turned = pair_changes.turned(frames, angles)
+    about_z = rotation_exp(np.array([np.zeros(5), np.zeros(5), angles]))
+    np.testing.assert_allclose(turned[:, :3], np.einsum("ijn,jkn->ikn", frames[:, :3], about_z), atol=1e-14)
+    np.testing.assert_array_equal(turned[:, 3], frames[:, 3])
+
+
+def test_the_best_turn_lays_x_along_the_largest_bending_moment() -> None:
+    """A self-stress with its moment in a known direction across the axis: x comes to lie on that line, the angle in (-90, 90] degrees."""
+    rng = np.random.default_rng(4)
+    frames = np.concatenate([rotation_exp(rng.normal(size=(3, 9))), rng.normal(size=(3, 1, 9))], axis=1)
+    wanted = np.linspace(-1.5, 1.5, 9)
+    moment = np.cos(wanted) * frames[:, 0] + np.sin(wanted) * frames[:, 1] + rng.normal(size=9) * frames[:, 2]
+    force = rng.normal(size=(3, 9))
+    wrenches = np.concatenate([moment + np.cross(frames[:, 3], force, axis=0), force]).T[:, :, None]
+    np.testing.assert_allclose(pair_changes.best_turns(frames, wrenches), wanted, atol=1e-12)
+    assert pair_changes.best_turns(frames, wrenches[:, :, :0]).tolist() == [0.0] * 9

@@ -323,3 +323,66 @@ def test_drivers_are_suggested_for_a_ring_of_many_links() -> None:
     assert report.mobility == 194
     assert len(set(report.suggested_drives)) == len(report.suggested_drives) == 193
     assert "O1.Rz" not in report.suggested_drives
+
+
+# --- one body, several motions; links that stand still together ---------------------------------------------------------------
+
+
+def sleeve() -> mg.Mechanism:
+    """A body on one line of two cylindrical pairs, heavy, with a couple about the line."""
+    links = [mg.Link("frame"), mg.Link("crank"), mg.Link("body", 2.0, (1.2, 0, 0.5), np.eye(3))]
+    pairs = [mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=Z)]
+    pairs += [mg.Pair(n, "C", *ends, point=(1, 0, z), axis=Z) for n, ends, z in
+              (("B", ("crank", "body"), 0.0), ("C", ("body", "crank"), 1.0))]  # fmt: skip
+    loads = [mg.Gravity((0, -1, -9.81)), mg.Wrench("body", moment=(0, 0, 3.0), point=(0, 0, 0))]
+    return mg.Mechanism("sleeve", links, pairs, ["A"], loads)
+
+
+def test_a_sleeve_turns_and_slides() -> None:
+    """Two passive freedoms of one body are a turn and a slide, not twice the same words."""
+    turn, slide = mg.check(sleeve()).passive
+    assert turn.text.startswith("body turns about the line B-C (C-C)")
+    assert slide.text.startswith("body slides along (0, 0, 1) in the pairs B, C")
+    assert slide.freedoms == ("B.Tz", "C.Tz")
+
+
+def test_holds_of_one_body_are_numbered() -> None:
+    """The couple against 3 and the weight across, 2 * 0.2; the force against the weight along the line."""
+    s = mg.solve(sleeve(), {"A": 0.0})
+    assert list(s.passive_effort) == ["body", "body (2)"]
+    np.testing.assert_allclose(s.passive_effort["body"], -2.6, atol=1e-9)
+    np.testing.assert_allclose(s.passive_effort["body (2)"], 2 * 9.81, atol=1e-9)
+
+
+def test_halves_that_no_motion_moves_against_each_other_spin_together() -> None:
+    """Two skew hinges make one body of two links, though each allows a turn."""
+    m = rssr_with_coupler("R")
+    b, c = np.array([0.3, 0, 0.1]), np.array([1.5, 0.6, 0.4])
+    again = mg.Pair("M2", "R", "half1", "half2", point=(b + c) / 2 + (0, 0, 0.2), axis=(0.3, -1, 0.4))
+    report = mg.check(m.replace(pairs=[*m.pairs, again]))
+    (spin,) = report.passive
+    assert spin.links == ("half1", "half2")
+    assert "half1 and half2 turn about the line B-C (S-S)" in spin.text
+
+
+def test_a_welded_shaft_in_three_bearings_is_one_body() -> None:
+    """No two pairs cut it off, so that its two links have to be taken together."""
+    pairs = [mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=Z)]
+    pairs.append(mg.Pair("B", "C", "crank", "half1", point=(1, 0, 0), axis=Z))
+    pairs.append(mg.Pair("M", "W", "half1", "half2", point=(1, 0, 0.5)))
+    pairs += [mg.Pair(n, "C", "half2", "crank", point=(1, 0, z), axis=Z) for n, z in (("C", 1.0), ("D", 2.0))]
+    report = mg.check(mg.Mechanism("shaft", None, pairs, ["A"]))
+    assert [p.links for p in report.passive] == [("half1", "half2")] * 2
+    assert not report.undriven
+
+
+def test_efforts_of_several_drivers_are_unique() -> None:
+    pairs = []
+    for side, shift in (("a", 0.0), ("b", 5.0)):
+        points = np.array([(0, 0, 0), (0.2, 1, 0), (2.2, 1.6, 0), (2, 0, 0)]) + np.array((shift, 0, 0))
+        links = ["frame", *(f"{side}{k}" for k in range(1, 4)), "frame"]
+        pairs += [mg.Pair(f"{side}{k}", "R", links[k - 1], links[k], point=points[k - 1], axis=Z) for k in range(1, 5)]
+    report = mg.check(mg.Mechanism("two four-bars", None, pairs, ["a1", "b1"]))
+    assert report.unique["a1"]["effort"]
+    assert report.unique["b1"]["effort"]
+    assert report.verdict.endswith("form 2 self-stress groups (redundancy 6); all driver efforts are unique.")

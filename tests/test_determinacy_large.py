@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -226,14 +227,45 @@ def test_a_report_holds_the_same_at_any_size(n: int) -> None:
     report = mg.check(known.windows(n))
     text = " ".join(str(report).split())
     assert (report.mobility, report.finite_mobility, report.redundancy) == (1, 1, 3 * n)
-    assert list(report.excess) == ["structural", "dimensions", "here"]
-    assert report.effects
+    assert report.excess == {"structural": 3 * n - 1, "dimensions": 1, "here": 0}
+    assert [len(e.changes) for e in report.effects] == ([n, n, n + 1, n + 1, 1, 1, 1, 1, 1] if n < 60 else [1] * 6)
+    assert report.sets_not_sought == ("Sets of changes were not sought: redundancy above 120." in text) == (n == 60)
     assert report.reactions is not None
     assert report.reactions.groups == 1
     assert len(report.self_stresses) == 3 * n
     assert "Motion checked" in text
     assert "form one self-stress group" in text
     assert "not sought as" not in text
+
+
+def skeleton(report: Any) -> list[str]:
+    """Headings, first words and sentences of a report, every number and every list of names taken out."""
+    blocks = report.document().blocks
+    names = re.compile("|".join(sorted(map(re.escape, [*report.pairs, *report.links]), key=len, reverse=True)))
+    out = []
+    for block in blocks:
+        lines = getattr(block, "items", ()) or (getattr(block, "text", ""),)
+        for line in lines:
+            plain = re.sub(r"-?[0-9]+([.][0-9]+)?(e-?[0-9]+)?", "#", names.sub("@", str(line)))
+            plain = re.sub(r"(\w+ at @ -> \w+(, )?)+", "CHANGES", plain).replace("sparse engine", "dense engine")
+            plain = re.sub(r"@[-.:@# ,+]*(and @)?", "@", plain)
+            out.append("group" if plain.startswith("group #: ") else plain)
+    return list(dict.fromkeys(out))
+
+
+@pytest.mark.parametrize("kind", ["ladder", "four-bars"])
+def test_words_keys_and_advice_do_not_change_with_size(kind: str) -> None:
+    """The same ladder of 15, 16, 17 and 26 loops: the engine changes between 23 and 24."""
+    first, *others = [mg.check(LATTICES[kind](2 * n)) for n in (15, 16, 17, 26)]
+    assert (first.engine, others[-1].engine) == ("dense", "sparse")
+    for report in others:
+        assert set(report.to_dict()) == set(first.to_dict())
+        assert set(report.excess) == set(first.excess)
+        assert {k: v for k, v in report.excess.items() if k != "structural"} == {"dimensions": 1, "here": 0}
+        assert [len(e.changes) == 1 for e in report.effects] == [len(e.changes) == 1 for e in first.effects]
+        singles = [e.changes for e in report.effects if len(e.changes) == 1]
+        assert singles == [e.changes for e in first.effects if len(e.changes) == 1]
+        assert skeleton(report) == skeleton(first)
 
 
 def test_a_long_report_lists_the_first_and_says_what_was_left_out() -> None:

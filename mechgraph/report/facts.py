@@ -20,7 +20,7 @@ from mechgraph.report.findings import Finding, LoopFact, PassiveFinding
 from mechgraph.structure.finite_motion import FiniteMotion, finite_motion
 from mechgraph.structure.generic import Generic, generic
 from mechgraph.structure.mobility import Freedoms, freedoms_at
-from mechgraph.structure.pair_changes import Effect, advice
+from mechgraph.structure.pair_changes import LARGEST_FOR_SETS, Effect, advice
 from mechgraph.structure.self_stress import SelfStress
 from mechgraph.structure.unique_directions import UniqueDirection
 from mechgraph.structure.uniqueness import Uniqueness, uniqueness
@@ -336,6 +336,11 @@ class Facts:
         """Changes with their computed effect: they remove redundancy, or free a structure."""
         g = self.geometry
         return advice(g.freedoms, g.driven, self.finite_mobility or 0, self.asked) if g else ()
+
+    @property
+    def sets_not_sought(self) -> bool:
+        """Whether sets of changes that remove all redundancy were not sought, as there are too many self-stresses."""
+        return (self.redundancy or 0) > LARGEST_FOR_SETS
 
     @cached_property
     def advice(self) -> tuple[Finding, ...]:

@@ -15,6 +15,7 @@ from mechgraph.model.pair_table import TABLE
 from mechgraph.numerics.tolerances import RANKS
 from mechgraph.report.facts import Facts
 from mechgraph.report.sentences import assumed, listed, loop_names, mobility_line, plural, reasons, verdict
+from mechgraph.structure.pair_changes import LARGEST_FOR_SETS
 
 TERMS = 4
 """Most terms of a sum that is printed."""
@@ -193,6 +194,8 @@ def _combined(r: Facts) -> Iterator[Block]:
 
 def _advice(r: Facts) -> Iterator[Block]:
     yield from _listed(a.text for a in r.advice)
+    if r.sets_not_sought:
+        yield Paragraph(f"Sets of changes were not sought: redundancy above {LARGEST_FOR_SETS}.")
     new = sorted({kind for e in r.effects for _, _, kind in e.changes if kind in TABLE})
     if new:
         yield Paragraph(f"Pair types: {'; '.join(f'{kind} {TABLE[kind].name}' for kind in new)}.")
@@ -262,7 +265,7 @@ SECTIONS = (
     Section(
         "Unique only in combination", ("unique_directions", "combinations", "groups_without_combinations"), _combined
     ),
-    Section("Advice", ("advice",), _advice),
+    Section("Advice", ("advice", "sets_not_sought"), _advice),
     Section("Loops", ("loops",), _loops),
     Section("By count alone (unknowns matched to equations)", ("parts",), _count),
     Section("Ledger of the force equations (unknowns / equations)", ("ledger",), _ledger),

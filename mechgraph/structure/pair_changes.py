@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.indexing import Index
@@ -29,8 +30,8 @@ CHANGES_SHOWN = 6
 """Largest number of single changes, and of sets of changes, reported."""
 FREEING = 3
 """Changes reported that let a structure move."""
-LARGEST_FOR_SETS = 48
-"""Redundancy up to which sets of changes that remove all of it are sought; the work grows as its cube."""
+LARGEST_FOR_SETS = 120
+"""Redundancy up to which sets of changes that remove all of it are sought; the work grows as its cube (half a second here)."""
 CHANGES_SEED = 29
 
 BEAM = 12
@@ -203,43 +204,67 @@ def relieving(changes: list[Change], redundancy: int) -> tuple[list[tuple[Change
     return [(c,) for c in _spread(singles)], complete or [chosen for chosen in largest if len(chosen) > 1]
 
 
+@dataclass(frozen=True)
+class _Set:
+    """Changes (by number) that together remove ``removed`` self-stresses; for the changes from ``first`` on, all of later pairs, what
+    these leave of their ``directions (n, a, s)``, and whether they can still be added: all their directions are left.
+    """
+
+    chosen: tuple[int, ...]
+    removed: int
+    first: int
+    directions: Array
+    free: NDArray[np.bool_]
+
+    def with_change(self, i: int, items: Index, added: Index) -> _Set:
+        """One more change; only what overlaps with its directions is looked at anew."""
+        new = np.linalg.svd(self.directions[i - self.first], full_matrices=False)[2][: added[i]]
+        later = int(np.searchsorted(items, items[i], side="right"))
+        directions, free = self.directions[later - self.first :].copy(), self.free[later - self.first :].copy()
+        overlap = directions @ new.T
+        met = np.flatnonzero(free & (np.abs(overlap) > STRESSES.relieved).any(axis=(1, 2)))
+        directions[met] -= overlap[met] @ new
+        free[met] = _independent(directions[met], added[later:][met])
+        return _Set((*self.chosen, i), self.removed + int(added[i]), later, directions, free)
+
+
+def _independent(directions: Array, added: Index) -> NDArray[np.bool_]:
+    """Whether directions ``(n, a, s)``, of which the first ``added (n,)`` count, are independent: by their Gram matrices."""
+    gram = directions @ np.swapaxes(directions, 1, 2)
+    return np.asarray((np.linalg.eigvalsh(gram) > STRESSES.relieved**2).sum(axis=1) == added)
+
+
 def _complete_sets(exact: list[Change], redundancy: int) -> tuple[list[tuple[Change, ...]], list[tuple[Change, ...]]]:
     """Sets of changes that together remove all self-stresses, each as many as it adds freedoms; else those that remove most.
 
-    A set grows by changes of later pairs, a beam of sets at a time. A change removes as many as before where its directions among the
-    self-stresses are independent of those of the set, so each set carries an orthonormal basis of its directions.
+    A set grows by changes of later pairs, a beam of sets at a time, those first that remove most.
     """
-    items, added = np.array([c.item for c in exact]), np.array([c.added for c in exact])
+    exact = sorted(exact, key=lambda c: c.item)
+    items, added = (np.array([getattr(c, name) for c in exact], dtype=np.intp) for name in ("item", "added"))
     directions = np.zeros((len(exact), int(added.max()), exact[0].power.shape[1]))
     for mine, c in zip(directions, exact, strict=True):
         mine[: c.added] = np.linalg.svd(c.power, full_matrices=False)[2][: c.added]
-    beam: list[tuple[tuple[int, ...], Array]] = [((), np.zeros((0, redundancy)))]
+    at: list[int] = items.tolist()
+    beam = [_Set((), 0, 0, directions, np.ones(len(exact), dtype=bool))]
     complete: list[tuple[int, ...]] = []
-    deepest: list[tuple[int, ...]] = []
+    largest: list[tuple[int, ...]] = []
     most = 0
     while beam:
-        grown = []
-        for chosen, basis in beam:
-            later = np.flatnonzero(items > (items[chosen[-1]] if chosen else -1))
-            rest = directions[later] - (directions[later] @ basis.T) @ basis
-            gram = rest @ np.swapaxes(rest, 1, 2)
-            free = np.flatnonzero((np.linalg.eigvalsh(gram) > STRESSES.relieved**2).sum(axis=1) == added[later])
-            grown += [
-                (len(basis) + int(added[i]), (*chosen, int(i)), basis, rest[n])
-                for n, i in zip(free, later[free], strict=True)
-            ]
-        grown.sort(key=lambda item: (-item[0], [items[i] for i in item[1]]))
-        complete += [chosen for removed, chosen, _, _ in grown if removed == redundancy]
-        if grown and grown[0][0] > most:
-            most, deepest = grown[0][0], []
-        deepest = [chosen for removed, chosen, _, _ in grown[:2] if removed == most] + deepest
-        going = [item for item in grown if item[0] < redundancy][:BEAM]
-        beam = [
-            (chosen, np.concatenate([basis, np.linalg.svd(rest, full_matrices=False)[2][: removed - len(basis)]]))
-            for removed, chosen, basis, rest in going
+        grown = [
+            (mine.removed + int(added[i]), mine, i)
+            for mine in beam
+            for i in (mine.first + np.flatnonzero(mine.free)).tolist()
         ]
-    sets = ([tuple(exact[i] for i in chosen) for chosen in some] for some in (complete, deepest))
-    return next(sets), next(sets)
+        # changes are numbered by item, so that equal sets of items stay in the order of their types
+        order = {id(mine): [at[k] for k in mine.chosen] for mine in beam}
+        grown.sort(key=lambda g: (-g[0], order[id(g[1])], at[g[2]]))
+        complete += [(*mine.chosen, i) for removed, mine, i in grown if removed == redundancy]
+        if grown and grown[0][0] > most:
+            most, largest = grown[0][0], []
+        largest = [(*mine.chosen, i) for removed, mine, i in grown[:2] if removed == most] + largest
+        going = [(mine, i) for removed, mine, i in grown if removed < redundancy][:BEAM]
+        beam = [mine.with_change(i, items, added) for mine, i in going]
+    return [tuple(exact[i] for i in s) for s in complete], [tuple(exact[i] for i in s) for s in largest]
 
 
 def _mixed(complete: list[tuple[Change, ...]]) -> list[tuple[Change, ...]]:

@@ -144,12 +144,23 @@ def _of_border(search: _Search, links: tuple[int, ...], border: tuple[int, ...])
     twists = first @ common[: len(columns[0])]
     leaving = np.concatenate([_leaving(position, k, links, moves, twists) for k in border])
     out = []
-    for mix in small_combinations(leaving, MOTIONS.in_place).T:
+    for mix in _turns_and_slides(twists, small_combinations(leaving, MOTIONS.in_place)).T:
         rates, twist = moves @ mix, twists @ mix
         scale = np.abs(rates).max()
         scale *= np.sign(rates[np.argmax(np.abs(rates) > (1 - 1e-9) * scale)])
         out.append(PassiveMotion(rates / scale, links, twist / scale))
     return out
+
+
+def _turns_and_slides(twists: Array, mixes: Array) -> Array:
+    """The same combinations of twists as pure slides, and turns without any part along these; turns first."""
+    _, s, Vt = np.linalg.svd((twists @ mixes)[:3], full_matrices=True)
+    turns = Vt[: int((s > MOTIONS.in_place).sum())].T
+    slides = Vt[turns.shape[1] :].T
+    along = twists[3:] @ mixes @ slides
+    return np.asarray(
+        mixes @ np.concatenate([turns - slides @ np.linalg.pinv(along) @ twists[3:] @ mixes @ turns, slides], axis=1)
+    )
 
 
 def small_combinations(rows: Array, tolerance: float) -> Array:
