@@ -21,6 +21,7 @@ def main() -> None:
             sys.exit(2)
         app()
     except KeyboardInterrupt:
+        print("mechgraph: interrupted", file=sys.stderr)
         sys.exit(130)
 
 

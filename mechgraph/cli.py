@@ -5,25 +5,27 @@ from __future__ import annotations
 import difflib
 import errno
 import importlib.metadata
-import re
+import os
 import shutil
 import sys
 import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from enum import StrEnum
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import Annotated, Any, Literal, NoReturn
 
 import numpy as np
 import typer
 from rich.console import Console
 from rich.text import Text
+from typer.core import TyperGroup
 
 import mechgraph as mg
 from mechgraph.document import Document, Table, to_text
-from mechgraph.model.toml import MOST_POSITIONS
+from mechgraph.errors import visible
 from mechgraph.result.summary import driver_value, summary
+from mechgraph.typed import drives_of, parse_at, refuse
+from mechgraph.writing import writable
 
 DONE, NO_ANSWER, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 """Exit statuses."""
@@ -31,7 +33,8 @@ DONE, NO_ANSWER, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 NO_ANSWERS = (mg.AssemblyError, mg.ReachError, mg.DeadPointError, mg.IndeterminateError)
 """Errors that say that the mechanism has no answer; every other error is bad input."""
 
-"""Longest drive the command line takes."""
+LONGEST_NAME = 100
+"""Characters of a wrong name that are compared with those of the library."""
 
 UNBROKEN = 10_000
 """Width in which nothing is wrapped: where the output goes to a file or another program."""
@@ -40,70 +43,57 @@ EXIT_STATUS = (
     "Exit status: 0 done; 1 the mechanism has no answer, and the message says why; 2 wrong usage or bad input."
 )
 
-app = typer.Typer(
-    name="mechgraph",
-    help="Spatial mechanisms as graphs of links and pairs: determinacy, equations, motion, driver efforts and reactions.\n\n"
-    + EXIT_STATUS,
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-
-
-class Bookkeeping(StrEnum):
-    """Bookkeepings of the ledger."""
-
-    lee = "lee"
-    minimal = "minimal"
-
-
-class Method(StrEnum):
-    """Formulations of the forces."""
-
-    loop_wrench = "loop_wrench"
-    newton_euler = "newton_euler"
-
-
-class Redundant(StrEnum):
-    """What stands for reactions that are not unique."""
-
-    nan = "nan"
-    minimum_norm = "minimum_norm"
-
-
-class Engine(StrEnum):
-    """Linear algebra; the values are the same."""
-
-    auto = "auto"
-    dense = "dense"
-    sparse = "sparse"
-
-
-class OnReach(StrEnum):
-    """What happens at positions that cannot be reached."""
-
-    stop = "raise"
-    flag = "flag"
-
-
 Named = Annotated[
     str, typer.Argument(metavar="NAME_OR_FILE", help="A mechanism of the library (see 'list') or a TOML file.")
 ]
-
-EngineOption = Annotated[
-    Engine, typer.Option(help="Dense or sparse matrices, or the faster ones for the size; the results are the same.")
+Engine = Annotated[
+    Literal["auto", "dense", "sparse"],
+    typer.Option(help="Dense or sparse matrices, or the faster ones for the size; the results are the same."),
+]
+Bookkeeping = Annotated[Literal["lee", "minimal"], typer.Option(help="How the unknowns of a pair are written.")]
+Method = Annotated[Literal["loop_wrench", "newton_euler"], typer.Option(help="How the forces are solved.")]
+Redundant = Annotated[
+    Literal["nan", "minimum_norm"], typer.Option(help="What stands for reactions that are not unique: no value, or the least (all pairs equally stiff).")
+]
+OnReach = Annotated[
+    Literal["raise", "flag"],
+    typer.Option("--on-reach", help="Stop at a position that cannot be reached, or flag it and go on."),
+]
+At = Annotated[
+    list[str] | None,
+    typer.Option("--at", metavar="FREEDOM=VALUE", help="Assemble there first: A=30deg, B.Tz=0.02 (repeat)."),
+]
+Drives = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--drive",
+        metavar="FREEDOM=START:STOP:STEP[@RATE[@ACCELERATION]]",
+        help="Motion of a driver, the end excluded: A=0:360:1deg@10, B.Tz=0:0.1:0.01, or one value A=30deg. Angles in rad, "
+        "or in deg where the suffix says so; lengths, rates and accelerations in the declared units (rates of turns in "
+        "rad/s, or @600deg). "
+        "Repeat for several drivers: they describe the same positions. Without it the stored motion.",
+    ),
+]
+Out = Annotated[
+    Path | None, typer.Option("--out", metavar="FILE.csv", help="Write everything as CSV, one row a position.")
 ]
 
 
 # --- output ------------------------------------------------------------------------------------------------------------
 
 
+def _is_terminal(stream: Any) -> bool:
+    """Whether a stream, which may have been closed, is shown to somebody."""
+    return stream is not None and stream.isatty()
+
+
 def _write(text: str, colour: str = "") -> None:
     """Write a text; on a terminal its headings in bold and the paragraph after the title in ``colour``."""
+    if sys.stdout is None:
+        raise OSError(errno.EBADF, os.strerror(errno.EBADF))
     if not sys.stdout.isatty():
         sys.stdout.write(text)
+        sys.stdout.flush()
         return
     console = Console(highlight=False)
     lines = text.split("\n")
@@ -121,16 +111,19 @@ def _write(text: str, colour: str = "") -> None:
 
 
 def _show(document: Document, colour: str = "") -> None:
-    width = max(shutil.get_terminal_size().columns, 40) if sys.stdout.isatty() else UNBROKEN
+    width = max(shutil.get_terminal_size().columns, 40) if _is_terminal(sys.stdout) else UNBROKEN
     _write(to_text(document, width), colour)
 
 
 def _fail(message: str, status: int) -> NoReturn:
-    if sys.stderr.isatty():
-        Console(stderr=True, highlight=False).print(Text.assemble(("mechgraph: ", "bold red"), message), soft_wrap=True)
-    else:
-        sys.stderr.write(f"mechgraph: {message}\n")
-    raise typer.Exit(status)
+    with suppress(OSError):  # where messages cannot be written either, the status says it
+        if _is_terminal(sys.stderr):
+            text = Text.assemble(("mechgraph: ", "bold red"), visible(message))
+            Console(stderr=True, highlight=False).print(text, soft_wrap=True)
+        elif sys.stderr is not None:
+            sys.stderr.write(f"mechgraph: {visible(message)}\n")
+            sys.stderr.flush()
+    sys.exit(status)
 
 
 def _reached(error: mg.MechgraphError) -> str:
@@ -144,7 +137,7 @@ def _reached(error: mg.MechgraphError) -> str:
 
 @contextmanager
 def _outcome() -> Iterator[None]:
-    """Errors of mechgraph as a message and an exit status; no traceback."""
+    """Every error as a message and an exit status."""
     try:
         yield
     except NO_ANSWERS as error:
@@ -154,21 +147,58 @@ def _outcome() -> Iterator[None]:
     except MemoryError:
         _fail("not enough memory for so many positions; take fewer", BAD_INPUT)
     except KeyboardInterrupt:
-        raise typer.Exit(INTERRUPTED) from None
-    except OSError as error:
-        if error.errno != errno.EPIPE:
-            raise
-        raise typer.Exit(DONE) from None
+        _fail("interrupted", INTERRUPTED)
+    except OSError as error:  # of files there is a FileError: this is the output itself
+        _forget(sys.stdout)
+        if error.errno == errno.EPIPE:
+            sys.exit(DONE)
+        _fail(f"the output cannot be written: {error.strerror or error}", BAD_INPUT)
+
+
+def _forget(stream: Any) -> None:
+    """Let nothing of what waits in a stream be written when the program ends: that would fail again."""
+    with suppress(OSError, AttributeError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+class Program(TyperGroup):
+    """The command line, all of which comes to an outcome: options and help as well as commands."""
+
+    def main(self, *arguments: Any, **options: Any) -> Any:
+        """Run it, with streams that show what they cannot encode; a stream may have been closed."""
+        for stream in (sys.stdout, sys.stderr):
+            if stream is not None and hasattr(stream, "reconfigure"):
+                stream.reconfigure(errors="backslashreplace")
+        with _outcome():
+            return super().main(*arguments, **options)
+
+    def invoke(self, context: Any) -> Any:
+        """Run a command, before the errors that are left are taken for those of the command line itself."""
+        with _outcome():
+            return super().invoke(context)
 
 
 @contextmanager
 def _working(what: str) -> Iterator[None]:
     """A spinner on stderr, where that is a terminal."""
-    if not sys.stderr.isatty():
+    if not _is_terminal(sys.stderr):
         yield
         return
     with Console(stderr=True).status(what):
         yield
+
+
+app = typer.Typer(
+    name="mechgraph",
+    cls=Program,
+    help="Spatial mechanisms as graphs of links and pairs: determinacy, equations, motion, driver efforts and reactions.\n\n"
+    + EXIT_STATUS,
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
 
 
 # --- input -------------------------------------------------------------------------------------------------------------
@@ -180,104 +210,11 @@ def _loaded(name: str) -> mg.Mechanism:
     if name in known:
         return mg.load(name)
     path = Path(name)
-    if path.exists() or path.suffix == ".toml" or len(path.parts) > 1:
+    if os.path.lexists(path) or path.suffix == ".toml" or len(path.parts) > 1:
         return mg.load(path)
-    near = difflib.get_close_matches(name.lower(), known, n=4, cutoff=0.5)
+    near = difflib.get_close_matches(name.lower()[:LONGEST_NAME], known, n=4, cutoff=0.5)
     hint = f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(known)}"
     raise mg.FileError(name, f"no mechanism of that name in the library, and no such file; {hint}")
-
-
-def _usage(what: str, fault: str) -> NoReturn:
-    _fail(f"{what}: {fault}", BAD_INPUT)
-
-
-_NUMBER = re.compile(r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[A-Za-z/^0-9]*)")
-
-
-def _number(text: str, where: str) -> tuple[float, str]:
-    """A number and the unit written after it."""
-    found = _NUMBER.fullmatch(text.strip())
-    value = float(found["number"]) if found else np.nan
-    if found is None or not np.isfinite(value):
-        _usage(where, f"{text!r} is no number; write e.g. 30deg, 0.5rad or 0.02")
-    return value, found["unit"]
-
-
-def _values(texts: Sequence[str], turns: bool, where: str) -> list[float]:
-    """Numbers in radians or the declared length; the unit of the last holds for those without one of their own."""
-    read = [_number(text, where) for text in texts]
-    last = read[-1][1]
-    scales = {"": 1.0, "rad": 1.0, "deg": np.pi / 180} if turns else {"": 1.0}
-    out = []
-    for text, (value, unit) in zip(texts, read, strict=True):
-        if (unit or last) not in scales:
-            what = (
-                "is an angle: deg or rad (the default)"
-                if turns
-                else "is a length, in the unit that the mechanism declares: no unit"
-            )
-            _usage(where, f"unit {unit or last!r} in {text!r}: the freedom {what}")
-        out.append(value * scales[unit or last])
-    return out
-
-
-def _named_value(text: str, what: str) -> tuple[str, str]:
-    name, sign, rest = text.partition("=")
-    if not sign or not name.strip() or not rest.strip():
-        _usage(f"{what} {text!r}", "expected FREEDOM=VALUES, e.g. A=30deg")
-    return name.strip(), rest.strip()
-
-
-def _turns(m: mg.Mechanism, name: str, where: str) -> bool:
-    fault = m.freedom_fault(name, single=True)
-    if fault:
-        _usage(where, fault)
-    k, j = m.freedom(name)
-    return m.pairs[k].type.freedoms[j].turns
-
-
-def parse_drive(m: mg.Mechanism, text: str) -> tuple[str, mg.Motion]:
-    """Freedom and motion of ``A=start:stop:step@rate@acceleration``, the end excluded; a single value in place of the range."""
-    where = f"--drive {text!r}"
-    name, rest = _named_value(text, "--drive")
-    turns = _turns(m, name, where)
-    spec, *rates = rest.split("@")
-    parts = spec.split(":")
-    if len(parts) not in (1, 3) or len(rates) > 2:
-        _usage(where, "expected FREEDOM=START:STOP:STEP or FREEDOM=VALUE, then @RATE and @ACCELERATION where wanted")
-    values = _values(parts, turns, where)
-    velocity, acceleration = (
-        *(_values([r.removesuffix("/s^2").removesuffix("/s2").removesuffix("/s")], turns, where)[0] for r in rates),
-        0.0,
-        0.0,
-    )[:2]
-    if len(values) == 1:
-        return name, mg.Motion(values[0], velocity, acceleration)
-    start, stop, step = values
-    if step == 0 or (stop - start) / step <= 0:
-        _usage(where, f"a step of {parts[2]!r} does not go from {parts[0]!r} to {parts[1]!r}")
-    count = (stop - start) / step
-    if count > MOST_POSITIONS:
-        _usage(where, f"{count:.3g} positions: the command line takes at most {MOST_POSITIONS}")
-    return name, mg.Motion(start + step * np.arange(int(np.ceil(count - 1e-9))), velocity, acceleration)
-
-
-def _drives(m: mg.Mechanism, texts: Sequence[str]) -> dict[str, mg.Motion]:
-    out: dict[str, mg.Motion] = {}
-    for text in texts:
-        name, motion = parse_drive(m, text)
-        if m.full_name(name) in {m.full_name(n) for n in out}:
-            _usage(f"--drive {text!r}", f"{name} is given twice")
-        out[name] = motion
-    return out
-
-
-def _writable(out: Path) -> None:
-    """Refuse a file that cannot be written, before a long run."""
-    if out.is_dir():
-        raise mg.FileError(out, "is a folder; name a file")
-    if not out.absolute().parent.is_dir():
-        raise mg.FileError(out, f"cannot be written: there is no folder {out.parent}")
 
 
 # --- commands ----------------------------------------------------------------------------------------------------------
@@ -299,10 +236,9 @@ def _main(
 @app.command("list")
 def list_() -> None:
     """Name the mechanisms of the library, with what they are."""
-    with _outcome():
-        found = {name: mg.load(name) for name in mg.library()}
-        rows = [(name, " ".join(p.type.symbol for p in m.pairs), m.description) for name, m in found.items()]
-        _show(Document("", (Table(("name", "pairs", "description"), tuple(rows)),)))
+    found = {name: mg.load(name) for name in mg.library()}
+    rows = [(name, " ".join(p.type.symbol for p in m.pairs), m.description) for name, m in found.items()]
+    _show(Document("", (Table(("name", "pairs", "description"), tuple(rows)),)))
 
 
 @app.command()
@@ -310,11 +246,8 @@ def check(
     mechanism: Named,
     json: Annotated[bool, typer.Option("--json", help="All facts as JSON.")] = False,
     markdown: Annotated[bool, typer.Option("--markdown", help="The report as Markdown.")] = False,
-    at: Annotated[
-        list[str] | None,
-        typer.Option("--at", metavar="FREEDOM=VALUE", help="Assemble there first: A=30deg, B.Tz=0.02 (repeat)."),
-    ] = None,
-    engine: EngineOption = Engine.auto,
+    at: At = None,
+    engine: Engine = "auto",
 ) -> None:
     """Print the determinacy report: counts, mobility, redundancy, which reactions are unique, and the verdict.
 
@@ -322,37 +255,31 @@ def check(
     to move, or a freedom is neither driven nor passive. Redundancy is information: a mechanism some of whose reactions are not
     unique has exit status 0, and so has a topology without geometry. 2 wrong usage or bad input.
     """
-    with _outcome():
-        if json and markdown:
-            _usage("check", "--json and --markdown exclude each other")
-        m = _loaded(mechanism)
-        values = {}
-        for text in at or ():
-            name, value = _named_value(text, "--at")
-            values[name] = _values([value], _turns(m, name, f"--at {text!r}"), f"--at {text!r}")[0]
-        with _working("checking"):
-            report = mg.check(m, at=values or None, engine=engine.value)
-            text = report.to_json() if json else report.to_markdown() if markdown else ""
-            document = report.document()
-        not_closed = m.has_geometry and report.mobility is None
-        bearing = any(p.load_bearing for p in report.passive)
-        unsolvable = not_closed or report.undriven or report.contradicting_drives
-        if text:
-            _write(text)
-        else:
-            _show(
-                document,
-                "red" if unsolvable else "green" if report.determinate and not (report.near or bearing) else "yellow",
-            )
-        if unsolvable:
-            raise typer.Exit(NO_ANSWER)
+    if json and markdown:
+        refuse("check", "--json and --markdown exclude each other")
+    m = _loaded(mechanism)
+    values = dict(parse_at(m, text) for text in at or ())
+    with _working("checking"):
+        report = mg.check(m, at=values or None, engine=engine)
+        text = report.to_json() if json else report.to_markdown() if markdown else ""
+        document = report.document()
+    not_closed = m.has_geometry and report.mobility is None
+    bearing = any(p.load_bearing for p in report.passive)
+    unsolvable = not_closed or report.undriven or report.contradicting_drives
+    doubtful = report.near or bearing or not report.determinate
+    if text:
+        _write(text)
+    else:
+        _show(document, "red" if unsolvable else "yellow" if doubtful else "green")
+    if unsolvable:
+        raise typer.Exit(NO_ANSWER)
 
 
 @app.command()
 def equations(
     mechanism: Named,
     latex: Annotated[bool, typer.Option("--latex", help="As LaTeX.")] = False,
-    bookkeeping: Annotated[Bookkeeping, typer.Option(help="How the unknowns of a pair are written.")] = Bookkeeping.lee,
+    bookkeeping: Bookkeeping = "lee",
     blocks: Annotated[bool, typer.Option("--blocks", help="Vector equations only, without their components.")] = False,
     coefficients: Annotated[bool, typer.Option("--coefficients", help="The table of nonzero coefficients.")] = False,
     csv: Annotated[bool, typer.Option("--csv", help="The table of nonzero coefficients as CSV.")] = False,
@@ -361,50 +288,28 @@ def equations(
 
     Exit status: 0 done; 2 wrong usage or bad input.
     """
-    with _outcome():
-        if (latex or blocks) and (coefficients or csv):
-            _usage(
-                "equations", "--coefficients and --csv print a table, --latex and --blocks equations; take one of them"
-            )
-        f = mg.formulate(_loaded(mechanism), bookkeeping.value)
-        if csv:
-            _write(f.coefficients().csv())
-        elif coefficients:
-            _write(f.coefficients().text())
-        elif latex:
-            _write(f.latex(components=not blocks))
-        else:
-            _show(f.document(components=not blocks))
+    if (latex or blocks) and (coefficients or csv):
+        refuse("equations", "--coefficients and --csv print a table, --latex and --blocks equations; take one of them")
+    f = mg.formulate(_loaded(mechanism), bookkeeping)
+    if csv:
+        _write(f.coefficients().csv())
+    elif coefficients:
+        _write(f.coefficients().text())
+    elif latex:
+        _write(f.latex(components=not blocks))
+    else:
+        _show(f.document(components=not blocks))
 
 
 @app.command()
 def solve(
     mechanism: Named,
-    drive: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--drive",
-            metavar="FREEDOM=START:STOP:STEP[@RATE[@ACCELERATION]]",
-            help="Motion of a driver, the end excluded: A=0:360:1deg@10, B.Tz=0:0.1:0.01, or one value A=30deg. Angles in rad, "
-            "or in deg where the suffix says so; lengths, rates and accelerations in the declared units (rates of turns in "
-            "rad/s, or @600deg). "
-            "Repeat for several drivers: they describe the same positions. Without it the stored motion.",
-        ),
-    ] = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE.csv", help="Write everything as CSV, one row a position.")
-    ] = None,
-    method: Annotated[Method, typer.Option(help="How the forces are solved.")] = Method.loop_wrench,
-    redundant: Annotated[
-        Redundant,
-        typer.Option(
-            help="What stands for reactions that are not unique: no value, or the least (all pairs equally stiff)."
-        ),
-    ] = Redundant.nan,
-    on_reach: Annotated[
-        OnReach, typer.Option("--on-reach", help="Stop at a position that cannot be reached, or flag it and go on.")
-    ] = OnReach.stop,
-    engine: EngineOption = Engine.auto,
+    drive: Drives = None,
+    out: Out = None,
+    method: Method = "loop_wrench",
+    redundant: Redundant = "nan",
+    on_reach: OnReach = "raise",
+    engine: Engine = "auto",
 ) -> None:
     """Solve positions, efforts of the drivers and all reactions, print a summary and write a table.
 
@@ -412,28 +317,20 @@ def solve(
     solved), a freedom is neither driven nor passive, or drivers contradict each other; 2 wrong usage or bad input. A file is
     written whole or not at all.
     """
-    with _outcome():
+    if out is not None and writable(out).exists() and os.path.lexists(mechanism) and out.samefile(mechanism):
+        refuse(f"--out {str(out)!r}", "is the file of the mechanism; name another")
+    m = _loaded(mechanism)
+    motions = drives_of(m, drive or ())
+    with _working(f"solving {m.name}"):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", mg.MechgraphWarning)  # the summary has them
+            s = mg.solve(m, motions or None, method=method, redundant=redundant, on_reach=on_reach, engine=engine)
+        unique = mg.check(s.mechanism).unique if redundant == "minimum_norm" else None
+        document = summary(s, unique)
         if out is not None:
-            _writable(out)
-        m = _loaded(mechanism)
-        motions = _drives(m, drive or ())
-        with _working(f"solving {m.name}"):
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", mg.MechgraphWarning)  # the summary has them
-                s = mg.solve(
-                    m,
-                    motions or None,
-                    method=method.value,
-                    redundant=redundant.value,
-                    on_reach=on_reach.value,
-                    engine=engine.value,
-                )
-            unique = mg.check(s.mechanism).unique if redundant is Redundant.minimum_norm else None
-            document = summary(s, unique)
-            if out is not None:
-                s.to_csv(out)
-        _show(document)
-        if out is not None:
-            _write(f"\nWrote {out}: {s.status.size} rows, {len(s.columns())} columns.\n")
-        if not (np.asarray(s.status) == "ok").any():
-            raise typer.Exit(NO_ANSWER)
+            s.to_csv(out)
+    _show(document)
+    if out is not None:
+        _write(f"\nWrote {out}: {s.status.size} rows, {len(s.part(slice(1)).columns())} columns.\n")
+    if not (np.asarray(s.status) == "ok").any():
+        raise typer.Exit(NO_ANSWER)

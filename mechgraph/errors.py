@@ -2,15 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from os import PathLike
 
 
+MOST_FAULTS = 30
+"""Faults that a message lists."""
+MOST_NAMES = 30
+"""Names that a fault lists."""
+LONGEST_FAULT = 2000
+"""Characters of one fault: what was given may be of any size."""
+
+HIDDEN = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+"""Characters that a terminal obeys instead of showing them, that turn the direction of a text, or that cannot be encoded."""
+
+
+def visible(text: str) -> str:
+    """A text with its control characters written out."""
+    return HIDDEN.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+
+
+def listed(names: Iterable[object], most: int = MOST_NAMES) -> str:
+    """Names separated by commas, and how many more there are than are worth reading."""
+    shown = list(map(str, names))
+    more = len(shown) - most
+    return ", ".join(shown[:most]) + (f" and {more} more" if more > 0 else "")
+
+
+def shortened(text: str) -> str:
+    """A text without its middle, where it is too long to be read."""
+    half = LONGEST_FAULT // 2
+    left_out = len(text) - 2 * half
+    return f"{text[:half]} ... ({left_out} characters) ... {text[-half:]}" if left_out > 0 else text
+
+
 class MechgraphError(Exception):
     """The base of every error that mechgraph raises on purpose; it pickles and copies with the data that it carries."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(visible(message))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """By message and data: an exception's own way calls the constructor with the message alone."""
@@ -23,14 +57,16 @@ class DeclarationError(MechgraphError):
     Attributes
     ----------
     subject : what was declared, e.g. ``mechanism 'four-bar'``.
-    faults : one line each: what, where, the value, what was expected, what to do.
+    faults : one line each: what, where, the value, what was expected, what to do. The message lists the first of them.
     """
 
     def __init__(self, subject: str, faults: Sequence[str]) -> None:
-        self.subject = subject
-        self.faults = tuple(faults)
-        count = f"{len(self.faults)} fault{'s' if len(self.faults) != 1 else ''}"
-        super().__init__("\n".join([f"{subject}: {count}", *(f"  {fault}" for fault in self.faults)]))
+        self.subject = shortened(subject)
+        self.faults = tuple(map(shortened, faults))
+        lines = [f"{self.subject}: {len(faults)} fault{'s' if len(faults) != 1 else ''}"]
+        lines += [f"  {fault}" for fault in self.faults[:MOST_FAULTS]]
+        more = len(faults) - MOST_FAULTS
+        super().__init__("\n".join(lines + [f"  and {more} more (in .faults)"] * (more > 0)))
 
 
 class MechgraphWarning(UserWarning):
@@ -42,8 +78,8 @@ class FileError(MechgraphError):
 
     def __init__(self, path: str | PathLike[str], reason: str) -> None:
         self.path = str(path)
-        self.reason = reason
-        super().__init__(f"{path}: {reason}")
+        self.reason = shortened(reason)
+        super().__init__(f"{shortened(self.path)}: {self.reason}")
 
 
 class ContentError(DeclarationError, FileError):

@@ -248,7 +248,7 @@ class Outcome:
         found = self.found
         good = np.flatnonzero((found.status == Status.OK) & (found.near < 0))
         bad = np.flatnonzero(found.status != Status.OK)
-        whole = bool(self.line.bodies) or not all(_by_position(load) for load in self.starts.loads)
+        whole = not all(_by_position(load) for load in self.starts.loads)
         if self.starts.sharing > 1:
             self._fill_shared(good, whole)
             return

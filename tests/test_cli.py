@@ -16,7 +16,8 @@ from mechanisms import unclosable_four_bar
 from typer.testing import CliRunner, Result
 
 import mechgraph as mg
-from mechgraph.cli import app, parse_drive
+from mechgraph.cli import app
+from mechgraph.typed import parse_drive
 
 ROOT = Path(__file__).resolve().parents[1]
 

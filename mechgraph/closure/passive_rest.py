@@ -14,7 +14,7 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array, cross, rotate, rotate_back
 from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.driver_path import DriverPath, Positions, Status
+from mechgraph.closure.driver_path import DriverPath, Positions, Status, in_blocks
 from mechgraph.closure.indexing import Index
 from mechgraph.numerics.continuation import Follower
 from mechgraph.numerics.hermite import Interpolation
@@ -114,7 +114,8 @@ def unspun(path: DriverPath, found: Positions, bodies: tuple[Idle, ...]) -> Posi
         return found
     carried = _Carried(path, interpolation, found.follower, bodies)
     x = found.x.copy()
-    x[:, good] = carried.turned(found.x[:, good], found.which[good], found.track[good], found.place[good])
+    for at in in_blocks(good):
+        x[:, at] = carried.turned(found.x[:, at], found.which[at], found.track[at], found.place[at])
     turned = carried.turned_nodes(nodes)
     tracks = replace(found.tracks, nodes=replace(nodes, x=turned))
     crossings = [replace(c, sides=replace(c.sides, x=carried.turned_nodes(c.sides))) for c in found.crossings]

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from mechgraph.errors import visible
+
 DEEPEST_HEADING = 5
 """Deepest heading level; the title is level 0."""
 
@@ -169,13 +171,13 @@ class Document:
 
 
 def plain(text: str) -> str:
-    """Return running text with every run of white space as one space."""
-    return " ".join(text.split())
+    """Return running text with every run of white space as one space and control characters written out."""
+    return visible(" ".join(text.split()))
 
 
 def kept_lines(text: str) -> list[str]:
-    """Return the lines of preformatted text without trailing spaces and without blank lines at the ends."""
-    lines = [line.rstrip() for line in text.splitlines()]
+    """Return the lines of preformatted text without trailing spaces, without blank lines at the ends, control characters written out."""
+    lines = [visible(line.rstrip()) for line in text.splitlines()]
     filled = [number for number, line in enumerate(lines) if line]
     return lines[filled[0] : filled[-1] + 1] if filled else []
 

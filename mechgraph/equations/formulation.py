@@ -16,6 +16,7 @@ from mechgraph.equations.state import State
 from mechgraph.equations.symbols import Words, factor
 from mechgraph.equations.terms import Block, Ledger, LedgerRow, ScalarEquation, Screw, Term, Unknown
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.writing import cell, csv_of
 
 
 @dataclass(frozen=True)
@@ -176,9 +177,8 @@ class CoefficientTable:
 
     def csv(self) -> str:
         """The table as CSV: matrix, row, column, value."""
-        lines = ["matrix,row,column,value"]
-        lines += [f"{entry[0]},{row},{column or ''},{value}" for entry, row, column, value in self.rows]
-        return "\n".join(lines) + "\n"
+        rows = ((entry[0], row, column or "", cell(value)) for entry, row, column, value in self.rows)
+        return csv_of(("matrix", "row", "column", "value"), rows)
 
     def __len__(self) -> int:
         return len(self.rows)

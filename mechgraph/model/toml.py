@@ -10,7 +10,6 @@ import itertools
 import os
 import re
 import stat
-import tempfile
 import tomllib
 import traceback
 from collections.abc import Mapping
@@ -30,6 +29,7 @@ from mechgraph.model.mechanism import Mechanism, check_mechanism
 from mechgraph.model.pair_table import TABLE as PAIR_TABLE
 from mechgraph.model.pair_type import PairType
 from mechgraph.quantities import is_numeric, real_array, shown, wrong
+from mechgraph.writing import write_whole
 
 SWEEP_ROUNDING = 1e-12
 """Part of a sweep by which its end may come early and still be excluded (degrees turned into radians are rounded)."""
@@ -421,46 +421,9 @@ def save(m: Mechanism, path: str | os.PathLike[str]) -> None:
         where a load is a callable, or the file cannot be written.
     """
     check_mechanism(m, "save")
-    if not isinstance(path, str | os.PathLike):
-        raise DeclarationError("save", [wrong(path, "path", "a path")])
     try:
-        text = tomli_w.dumps(to_data(m, os.fspath(path)))
+        text = tomli_w.dumps(to_data(m, str(path)))
         text.encode("utf-8")
     except (TypeError, ValueError, RecursionError) as error:
         raise FileError(path, f"mechanism {m.name!r} cannot be written as TOML: {error}") from None
-    write_whole(path, text)
-
-
-def write_whole(path: str | os.PathLike[str], text: str) -> None:
-    """Write a text file through a temporary one beside it, so that no half-written file is ever left.
-
-    Raises
-    ------
-    FileError
-        where the file cannot be written.
-    """
-    target = Path(path)
-    temporary = None
-    try:
-        with tempfile.NamedTemporaryFile(
-            "w", encoding="utf-8", newline="", dir=target.parent, prefix=f".{target.name}.", delete=False
-        ) as handle:
-            temporary = Path(handle.name)
-            handle.write(text)
-        mode = target.stat().st_mode & 0o777 if target.exists() else 0o666 & ~_umask()
-        temporary.chmod(mode)
-        os.replace(temporary, target)
-    except OSError as error:
-        if temporary is not None:
-            temporary.unlink(missing_ok=True)
-        raise FileError(target, f"cannot be written: {error.strerror or error}") from None
-    except BaseException:
-        if temporary is not None:
-            temporary.unlink(missing_ok=True)
-        raise
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+    write_whole(path, [text])

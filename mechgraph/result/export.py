@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import csv
 import importlib
-import io
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import MissingExtraError
-from mechgraph.model.toml import write_whole
 from mechgraph.units import unit_of
+from mechgraph.writing import csv_of, write_whole
 
 if TYPE_CHECKING:
     import os
@@ -21,6 +20,9 @@ if TYPE_CHECKING:
     import xarray
 
     from mechgraph.result.solution import Solution
+
+ROWS_TOGETHER = 1024
+"""Rows of a table that are made together: bounds the memory that a long table takes."""
 
 
 def columns(s: Solution) -> dict[str, Array]:
@@ -60,13 +62,16 @@ def columns(s: Solution) -> dict[str, Array]:
 
 
 def to_csv(s: Solution, path: str | os.PathLike[str]) -> None:
-    """Write one row a position; numbers with all digits."""
-    table = {name: np.asarray(values).reshape(-1) for name, values in columns(s).items()}
-    buffer = io.StringIO()
-    writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(table)
-    writer.writerows(zip(*(values.tolist() for values in table.values()), strict=True))
-    write_whole(path, buffer.getvalue())
+    """Write one row a position; numbers with all digits. The rows are made as they are written, some at a time."""
+    write_whole(path, _csv_pieces(s))
+
+
+def _csv_pieces(s: Solution) -> Iterator[str]:
+    count = s.status.size
+    for first in range(0, max(count, 1), ROWS_TOGETHER):
+        table = columns(s.part(slice(first, first + ROWS_TOGETHER)))
+        rows = zip(*(values.tolist() for values in table.values()), strict=True)
+        yield csv_of(table if not first else (), rows)
 
 
 def _optional(module: str) -> Any:

@@ -136,6 +136,9 @@ class Values(Protocol):
     def state(self, index: Any) -> State:
         """Screws and loads at one position, in the declared units about the global origin."""
 
+    def part(self, places: slice) -> Values:
+        """The values at a range of flat positions."""
+
 
 class PairResult:
     """Values of one pair; see the properties."""
@@ -401,6 +404,10 @@ class Solution:
     def state(self, index: Any = ()) -> State:
         """Screws, loads and coordinates at one position, for ``Formulation.assemble``."""
         return self._values.state(index)
+
+    def part(self, places: slice) -> Solution:
+        """The same at a range of flat positions, without a copy; its checks stay relative to the whole batch."""
+        return Solution(self._values.part(places))
 
     # --- tables --------------------------------------------------------------------------------------------------------
 

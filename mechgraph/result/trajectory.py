@@ -7,6 +7,7 @@ Component axes first, the flat batch of positions last, NaN where a position was
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from copy import copy
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -105,7 +106,7 @@ class Trajectory:
             ("closure", motion.here.closure),
         ):
             self._keep(name, places, values)
-        self._motions = [motion] if len(places) == self._count else []
+        self._motions = [motion] if len(places) == self._count and self._small else []
         if forces is None:
             return
         self.has_forces = True
@@ -132,6 +133,19 @@ class Trajectory:
         """Say why positions are not solved."""
         self._status[places] = status
 
+    def part(self, places: slice) -> Trajectory:
+        """The values at a range of flat positions, as views."""
+        out, which = copy(self), np.arange(self._count)[places]
+        out.batch, out._count = which.shape, len(which)
+        out.t = None if self.t is None else np.broadcast_to(self.t, self.batch).reshape(-1)[places]
+        out._system_at = lambda at: self._system_at(which[at])
+        out._coordinates = self._coordinates[:, places]
+        out._status, out._solved = self._status[places], self._solved[places]
+        out._kept = {name: values[..., places] for name, values in self._kept.items()}
+        out._holds = {name: sizes[places] for name, sizes in self._holds.items()}
+        out._motions = []
+        return out
+
     def first(self, count: int) -> Any:
         """The outcomes of the first positions."""
         return self._status[:count]
@@ -150,7 +164,7 @@ class Trajectory:
         if len(self._motions) == 1 and len(self._motions[0].places) == self._count:
             return value(self._motions[0])
         motions: Iterable[BlockMotion] = self._motions or map(self._motion, in_blocks(np.flatnonzero(self._solved)))
-        if len(self.mechanism.links) * self._count <= RETAINED:
+        if self._small:
             motions = self._motions = list(motions)
         out: Array | None = None
         for motion in motions:
@@ -160,6 +174,11 @@ class Trajectory:
             out[..., motion.places] = found
         assert out is not None
         return out
+
+    @property
+    def _small(self) -> bool:
+        """Whether motions that were evaluated are retained."""
+        return len(self.mechanism.links) * self._count <= RETAINED
 
     def _motion(self, places: Index) -> BlockMotion:
         """The motion at some places, evaluated again."""

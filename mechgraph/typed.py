@@ -1,0 +1,111 @@
+"""What is typed at the command line: freedoms and their values, with units."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import NoReturn
+
+import numpy as np
+
+import mechgraph as mg
+from mechgraph.errors import shortened
+
+
+class UsageError(mg.MechgraphError):
+    """Options that are wrong, or that exclude each other."""
+
+
+def refuse(what: str, fault: str) -> NoReturn:
+    """Say what is wrong with something that was typed."""
+    raise UsageError(f"{shortened(what)}: {shortened(fault)}")
+
+
+NUMBER = re.compile(r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[A-Za-z/^0-9]*)")
+
+
+def _number(text: str, where: str) -> tuple[float, str]:
+    """A number and the unit written after it."""
+    found = NUMBER.fullmatch(text.strip())
+    value = float(found["number"]) if found else np.nan
+    if found is None or not np.isfinite(value):
+        refuse(where, f"{text!r} is no number; write e.g. 30deg, 0.5rad or 0.02")
+    return value, found["unit"]
+
+
+def _values(texts: Sequence[str], turns: bool, where: str) -> list[float]:
+    """Numbers in radians or the declared length; the unit of the last holds for those without one of their own."""
+    read = [_number(text, where) for text in texts]
+    last = read[-1][1]
+    scales = {"": 1.0, "rad": 1.0, "deg": np.pi / 180} if turns else {"": 1.0}
+    out = []
+    for text, (value, unit) in zip(texts, read, strict=True):
+        if (unit or last) not in scales:
+            what = (
+                "is an angle: deg or rad (the default)"
+                if turns
+                else "is a length, in the unit that the mechanism declares: no unit"
+            )
+            refuse(where, f"unit {unit or last!r} in {text!r}: the freedom {what}")
+        out.append(value * scales[unit or last])
+    return out
+
+
+def named_value(text: str, what: str) -> tuple[str, str]:
+    """Both sides of ``A=30deg``."""
+    name, sign, rest = text.partition("=")
+    if not sign or not name.strip() or not rest.strip():
+        refuse(f"{what} {text!r}", "expected FREEDOM=VALUES, e.g. A=30deg")
+    return name.strip(), rest.strip()
+
+
+def _turns(m: mg.Mechanism, name: str, where: str) -> bool:
+    fault = m.freedom_fault(name, single=True)
+    if fault:
+        refuse(where, fault)
+    k, j = m.freedom(name)
+    return m.pairs[k].type.freedoms[j].turns
+
+
+def parse_drive(m: mg.Mechanism, text: str) -> tuple[str, mg.Motion]:
+    """Freedom and motion of ``A=start:stop:step@rate@acceleration``, the end excluded; a single value in place of the range."""
+    where = f"--drive {text!r}"
+    name, rest = named_value(text, "--drive")
+    turns = _turns(m, name, where)
+    spec, *rates = rest.split("@")
+    parts = spec.split(":")
+    if len(parts) not in (1, 3) or len(rates) > 2:
+        refuse(where, "expected FREEDOM=START:STOP:STEP or FREEDOM=VALUE, then @RATE and @ACCELERATION where wanted")
+    values = _values(parts, turns, where)
+    velocity, acceleration = (
+        *(_values([r.removesuffix("/s^2").removesuffix("/s2").removesuffix("/s")], turns, where)[0] for r in rates),
+        0.0,
+        0.0,
+    )[:2]
+    if len(values) == 1:
+        return name, mg.Motion(values[0], velocity, acceleration)
+    start, stop, step = values
+    if step == 0 or (stop - start) / step <= 0:
+        refuse(where, f"a step of {parts[2]!r} does not go from {parts[0]!r} to {parts[1]!r}")
+    count = (stop - start) / step
+    if count > MOST_POSITIONS:
+        refuse(where, f"{count:.3g} positions: the command line takes at most {MOST_POSITIONS}")
+    return name, mg.Motion(start + step * np.arange(int(np.ceil(count - 1e-9))), velocity, acceleration)
+
+
+def drives_of(m: mg.Mechanism, texts: Sequence[str]) -> dict[str, mg.Motion]:
+    """The motions of all drives."""
+    out: dict[str, mg.Motion] = {}
+    for text in texts:
+        name, motion = parse_drive(m, text)
+        if m.full_name(name) in {m.full_name(n) for n in out}:
+            refuse(f"--drive {text!r}", f"{name} is given twice")
+        out[name] = motion
+    return out
+
+
+def parse_at(m: mg.Mechanism, text: str) -> tuple[str, float]:
+    """Freedom and value of ``A=30deg``."""
+    where = f"--at {text!r}"
+    name, value = named_value(text, "--at")
+    return name, _values([value], _turns(m, name, where), where)[0]
