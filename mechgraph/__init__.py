@@ -1,5 +1,6 @@
 """mechgraph: spatial mechanisms as graphs of links and pairs; determinacy, equations, motion, drivers and reactions."""
 
+from mechgraph import starting  # noqa: F401  # isort: skip  # before all that takes time to load
 from mechgraph.algebra import inertia
 from mechgraph.equations.build import formulate
 from mechgraph.equations.formulation import Formulation

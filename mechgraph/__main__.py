@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 
+from mechgraph.starting import started
+
 NEEDED = ("typer", "rich")
 """Packages of the ``cli`` extra."""
 
@@ -11,18 +13,15 @@ NEEDED = ("typer", "rich")
 def main() -> None:
     """Run the command line; exit status 2 where its packages are missing, 130 where it is interrupted."""
     try:
-        try:
-            from mechgraph.cli import app
-        except ImportError as error:
-            missing = (error.name or "").partition(".")[0]
-            if missing not in NEEDED:
-                raise
-            print(f"mechgraph: the command line needs {missing}: pip install 'mechgraph[cli]'", file=sys.stderr)
-            sys.exit(2)
-        app()
-    except KeyboardInterrupt:
-        print("mechgraph: interrupted", file=sys.stderr)
-        sys.exit(130)
+        from mechgraph.cli import app
+    except ImportError as error:
+        missing = (error.name or "").partition(".")[0]
+        if missing not in NEEDED:
+            raise
+        print(f"mechgraph: the command line needs {missing}: pip install 'mechgraph[cli]'", file=sys.stderr)
+        sys.exit(2)
+    started()
+    app()
 
 
 if __name__ == "__main__":

@@ -24,10 +24,11 @@ import mechgraph as mg
 from mechgraph.document import Document, Table, to_text
 from mechgraph.errors import visible
 from mechgraph.result.summary import driver_value, summary
+from mechgraph.starting import INTERRUPTED
 from mechgraph.typed import drives_of, parse_at, refuse
 from mechgraph.writing import writable
 
-DONE, NO_ANSWER, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+DONE, NO_ANSWER, BAD_INPUT = 0, 1, 2
 """Exit statuses."""
 
 NO_ANSWERS = (mg.AssemblyError, mg.ReachError, mg.DeadPointError, mg.IndeterminateError)

@@ -430,9 +430,77 @@ def test_interrupted(tmp_path: Path) -> None:
             break
         running.send_signal(signal.SIGINT)
     _, error = running.communicate(timeout=60)
-    assert running.returncode == 130
+    assert running.returncode in (130, -signal.SIGINT)  # which a shell shows as 130
     assert "Traceback" not in error
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of another kind")
+def test_interrupted_while_it_starts(tmp_path: Path) -> None:
+    loading = "import os, signal\ntry:\n    os.kill(os.getpid(), signal.SIGINT)\n    input()\nexcept BaseException:\n    1 / 0"
+    _written(tmp_path / "numpy.py", loading)
+    done = process("list", PYTHONPATH=os.pathsep.join([str(tmp_path), str(ROOT)]))
+    assert done.returncode == 130
+    assert done.stderr == "mechgraph: interrupted\n"
+
+
+def shell(command: str, **environment: str) -> "subprocess.CompletedProcess[str]":
+    """A command line with redirections, ``mechgraph`` being this one."""
+    return subprocess.run(
+        ["bash", "-c", command.replace("mechgraph", f"{sys.executable} -m mechgraph")], capture_output=True, text=True,
+        check=False, env=os.environ | {"PYTHONPATH": str(ROOT)} | environment,
+    )  # fmt: skip
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a shell of another kind")
+@pytest.mark.parametrize(
+    ("command", "status", "message"),
+    [
+        ("mechgraph list >/dev/full", 2, "mechgraph: the output cannot be written: No space left on device\n"),
+        ("mechgraph --version >/dev/full", 2, "No space left"),
+        ("mechgraph --help >/dev/full", 2, "No space left"),
+        ("mechgraph list >&-", 2, "the output cannot be written: Bad file descriptor\n"),
+        ("mechgraph check rcs 2>/dev/full", 2, ""),
+        ("mechgraph check rcs 2>&-", 2, ""),
+        ("mechgraph check rcsr >/dev/full 2>/dev/full", 2, ""),
+        ("mechgraph equations rcsr | true; exit ${PIPESTATUS[0]}", 0, ""),
+        ("mechgraph solve 7r --out /dev/full", 2, "mechgraph: /dev/full: cannot be written: No space left on device\n"),
+        ("mechgraph solve 7r --drive O1=0 --out /dev/stdout | grep -c ,ok", 0, ""),
+        ("mechgraph list </dev/null >/dev/null", 0, ""),
+    ],
+)  # fmt: skip
+def test_outputs_that_fail(command: str, status: int, message: str) -> None:
+    done = shell(command)
+    assert "Traceback" not in done.stderr
+    assert "Exception ignored" not in done.stderr
+    assert done.returncode == status
+    assert message in done.stderr
+
+
+def test_outputs_that_cannot_show_every_character(tmp_path: Path) -> None:
+    text = (ROOT / "library" / "four-bar.toml").read_text(encoding="utf-8")
+    _written(tmp_path / "m.toml", text.replace('"crank"', '"\N{GREEK SMALL LETTER ALPHA}"'))
+    done = process("check", str(tmp_path / "m.toml"), PYTHONIOENCODING="ascii", PYTHONUTF8="0")
+    assert done.returncode == 0
+    assert r"\u03b1" in done.stdout
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("command", ["check", "equations", "solve"])
+@pytest.mark.parametrize(
+    "name", ["x" * 300, "x" * 100_000, "a\0b", "\udcff", "x/" * 5000, "", " ", "\x1b[2J", "~", "."]
+)
+def test_names_that_nothing_can_have(command: str, name: str) -> None:
+    message = bad(command, name)
+    assert message.startswith("mechgraph: ")
+    assert "\x1b" not in message
+    assert len(message) < 10_000
+
+
+def test_the_file_of_the_mechanism_is_not_overwritten(crank_slider: Path) -> None:
+    before = crank_slider.read_text()
+    assert "file of the mechanism" in bad("solve", crank_slider, "--drive", "A=1", "--out", crank_slider)
+    assert crank_slider.read_text() == before
 
 
 def test_the_summary_and_the_table_tell_motor_from_spring(tmp_path: Path) -> None:
