@@ -8,11 +8,12 @@ from typing import NoReturn
 
 import numpy as np
 
-import mechgraph as mg
-from mechgraph.errors import shortened
+from mechgraph.errors import MechgraphError, shortened
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.motion import Motion
 
 
-class UsageError(mg.MechgraphError):
+class UsageError(MechgraphError):
     """Options that are wrong, or that exclude each other."""
 
 
@@ -59,7 +60,7 @@ def named_value(text: str, what: str) -> tuple[str, str]:
     return name.strip(), rest.strip()
 
 
-def _turns(m: mg.Mechanism, name: str, where: str) -> bool:
+def _turns(m: Mechanism, name: str, where: str) -> bool:
     fault = m.freedom_fault(name, single=True)
     if fault:
         refuse(where, fault)
@@ -67,7 +68,7 @@ def _turns(m: mg.Mechanism, name: str, where: str) -> bool:
     return m.pairs[k].type.freedoms[j].turns
 
 
-def parse_drive(m: mg.Mechanism, text: str) -> tuple[str, mg.Motion]:
+def parse_drive(m: Mechanism, text: str) -> tuple[str, Motion]:
     """Freedom and motion of ``A=start:stop:step@rate@acceleration``, the end excluded; a single value in place of the range."""
     where = f"--drive {text!r}"
     name, rest = named_value(text, "--drive")
@@ -83,19 +84,19 @@ def parse_drive(m: mg.Mechanism, text: str) -> tuple[str, mg.Motion]:
         0.0,
     )[:2]
     if len(values) == 1:
-        return name, mg.Motion(values[0], velocity, acceleration)
+        return name, Motion(values[0], velocity, acceleration)
     start, stop, step = values
     if step == 0 or (stop - start) / step <= 0:
         refuse(where, f"a step of {parts[2]!r} does not go from {parts[0]!r} to {parts[1]!r}")
     count = (stop - start) / step
     if count > MOST_POSITIONS:
         refuse(where, f"{count:.3g} positions: the command line takes at most {MOST_POSITIONS}")
-    return name, mg.Motion(start + step * np.arange(int(np.ceil(count - 1e-9))), velocity, acceleration)
+    return name, Motion(start + step * np.arange(int(np.ceil(count - 1e-9))), velocity, acceleration)
 
 
-def drives_of(m: mg.Mechanism, texts: Sequence[str]) -> dict[str, mg.Motion]:
+def drives_of(m: Mechanism, texts: Sequence[str]) -> dict[str, Motion]:
     """The motions of all drives."""
-    out: dict[str, mg.Motion] = {}
+    out: dict[str, Motion] = {}
     for text in texts:
         name, motion = parse_drive(m, text)
         if m.full_name(name) in {m.full_name(n) for n in out}:
@@ -104,7 +105,7 @@ def drives_of(m: mg.Mechanism, texts: Sequence[str]) -> dict[str, mg.Motion]:
     return out
 
 
-def parse_at(m: mg.Mechanism, text: str) -> tuple[str, float]:
+def parse_at(m: Mechanism, text: str) -> tuple[str, float]:
     """Freedom and value of ``A=30deg``."""
     where = f"--at {text!r}"
     name, value = named_value(text, "--at")
