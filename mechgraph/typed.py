@@ -11,6 +11,7 @@ import numpy as np
 from mechgraph.errors import MechgraphError, shortened
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
+from mechgraph.model.toml import MOST_POSITIONS
 
 
 class UsageError(MechgraphError):
