@@ -69,7 +69,7 @@ def writable(path: str | os.PathLike[str]) -> Path:
     except (OSError, ValueError) as error:
         raise _cannot(path, error) from None
     if stat.S_ISDIR(found.st_mode):
-        raise FileError(path, "is a folder; name a file")
+        raise FileError(path, "cannot be written: it is a folder; name a file")
     # to the superuser everything is writable: what is marked as read-only is meant so
     if not os.access(path, os.W_OK) or not found.st_mode & 0o222:
         raise FileError(path, "cannot be written: it is read-only")
