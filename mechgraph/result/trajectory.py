@@ -142,7 +142,6 @@ class Trajectory:
         out._coordinates = self._coordinates[:, places]
         out._status, out._solved = self._status[places], self._solved[places]
         out._kept = {name: values[..., places] for name, values in self._kept.items()}
-        out._holds = {name: sizes[places] for name, sizes in self._holds.items()}
         out._motions = []
         return out
 
