@@ -45,6 +45,7 @@ def things() -> dict[str, Any]:
         "study": mg.study(m, {f"{m.links[1].name}.mass": [1.0, 2.0], "B.point.x": [0.001, 0.0]}, ["A.effort"], n=4),
         "FileError": mg.FileError("a.toml", "is missing"), "DeclarationError": mg.DeclarationError("a", ["b", "c"]),
         "ContentError": mg.ContentError("a.toml", mg.DeclarationError("a", ["b", "c"])),
+        "MechgraphWarning": mg.MechgraphWarning("a freedom carries load"), "warnings": s.warnings,
         "AssemblyError": mg.AssemblyError("open", 0.5, {"A": 1.0}), "MissingExtraError": mg.MissingExtraError("typer", "cli"),
         "DeadPointError": mg.DeadPointError("dead", {"A": 1.0}), "ReachError": mg.ReachError("far", {"A": 1.0}, s),
         "IndeterminateError": mg.IndeterminateError("free", report),
