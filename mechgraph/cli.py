@@ -54,7 +54,10 @@ Engine = Annotated[
 Bookkeeping = Annotated[Literal["lee", "minimal"], typer.Option(help="How the unknowns of a pair are written.")]
 Method = Annotated[Literal["loop_wrench", "newton_euler"], typer.Option(help="How the forces are solved.")]
 Redundant = Annotated[
-    Literal["nan", "minimum_norm"], typer.Option(help="What stands for reactions that are not unique: no value, or the least (all pairs equally stiff).")
+    Literal["nan", "minimum_norm"],
+    typer.Option(
+        help="What stands for reactions that are not unique: no value, or the least (all pairs equally stiff)."
+    ),
 ]
 OnReach = Annotated[
     Literal["raise", "flag"],
