@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 from lee_1977 import pictures, rchch
 from lee_1977.tables import table
+from matplotlib.axes import Axes
 
 import mechgraph as mg
 from mechgraph.show import draw_skeleton
@@ -55,9 +56,9 @@ def compare() -> None:
 
 
 def draw(found: list[mg.Solution], target: Path) -> None:
-    """The four modes at theta1 = 0; theta5 of each with the numbers of Table XI; input torque."""
-    figure = pictures.figure(14.4, 7.6)
-    grid = figure.add_gridspec(2, 3, width_ratios=(1.0, 1.0, 1.2), wspace=0.08)
+    """The four modes at theta1 = 0; theta5 of each with the numbers of Table XI; input torque; forces at O1 and O5 with the tables'."""
+    figure = pictures.figure(14.4, 11.0)
+    grid = figure.add_gridspec(3, 3, width_ratios=(1.0, 1.0, 1.2), wspace=0.08)
     for k, s in enumerate(found):
         space = figure.add_subplot(grid[divmod(k, 2)], projection="3d")
         draw_skeleton(s, 0, ax=space, ghosts=0, traces=False)
@@ -73,9 +74,25 @@ def draw(found: list[mg.Solution], target: Path) -> None:
     left.plot(xi["theta1"], xi["theta5"], label="Table XI (no closure)", **pictures.PRINTED)
     pictures.finish(left, "theta1 [deg]", "theta5 [deg]", "Angle of O5: modes 1 and 2, 3 and 4 share it", "upper left")
     pictures.finish(right, "theta1 [deg]", "M_IN [lb in2/s2]", "Input torque at w1 = .1 rad/s")
+    for column, (number, pair) in enumerate((("XXXIII", "O1"), ("XXXVII", "O5"))):
+        forces(figure.add_subplot(grid[2, column]), number, pair)
     for ax in (left, right):
         ax.set_xticks(np.arange(-180.0, 181.0, 60.0))
     pictures.save(figure, target)
+
+
+def forces(ax: Axes, number: str, pair: str) -> None:
+    """Size of the force at a pair over the range of his tables, with the printed one, whose F^ leaves out the part along the axis."""
+    shown = table(number)
+    for k, s in enumerate(rchch.branches()):
+        theta = np.rad2deg(s["O1"].position[:, 0])
+        style = {"color": pictures.COLOURS[k], "lw": 2.0, "ls": "--" if k in (1, 3) else "-", "label": f"mode {k + 1}"}
+        ax.semilogy(theta, np.linalg.norm(s[pair].force, axis=1), **style)
+    names = list(shown)
+    free, along = np.array([shown[n] for n in names[1:4]]), shown[f"FA{pair[1]}"]
+    size = np.sqrt((free**2).sum(axis=0) + along**2)
+    ax.semilogy(shown["theta1"], size, label=f"Table {number} (no closure)", **pictures.PRINTED)
+    pictures.finish(ax, "theta1 [deg]", "force [lb in/s2]", f"Force at {pair}", "upper left")
 
 
 def main() -> None:

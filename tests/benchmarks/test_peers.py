@@ -1,5 +1,11 @@
 """What the benchmarks hand to other programs, and how they report; without those programs, and without a clock."""
 
+import ast
+import re
+import sys
+import tomllib
+from pathlib import Path
+
 import bench_peers
 import numpy as np
 import peer_mechgraph
@@ -8,6 +14,7 @@ from peer_cases import cases
 
 import mechgraph as mg
 
+HERE = Path(__file__).resolve().parent
 CASES = {case.mechanism.name: case for case in cases(24)}
 each_case = pytest.mark.parametrize("case", CASES.values(), ids=list(CASES))
 
@@ -81,6 +88,31 @@ def test_a_single_position_has_no_step():
     right, _ = peer_mechgraph.solve(case, method="newton_euler")
     assert bench_peers.largest_error(torque[None], right[None]) < 1e-12
     assert wrenches.shape == (len(case.joints), 1, 6)
+
+
+def imported(script: Path, seen: set[Path]) -> set[str]:
+    """Packages that a script imports, and what the modules of the tests imports that it takes from beside it."""
+    seen.add(script)
+    out: set[str] = set()
+    for node in ast.walk(ast.parse(script.read_text(encoding="utf-8"))):
+        names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+        names += [node.module] if isinstance(node, ast.ImportFrom) and node.module else []
+        for name in (name.partition(".")[0] for name in names):
+            beside = [path for folder in (HERE, HERE.parent) if (path := folder / f"{name}.py").exists()]
+            out |= {name} if not beside else set().union(*(imported(p, seen) for p in beside if p not in seen))
+    return out
+
+
+def test_the_extra_bench_has_all_that_the_benchmarks_import():
+    """``pip install '.[bench]'`` suffices; headers of Eigen for the C++ job are in cmeel-eigen."""
+    needed = set().union(*(imported(script, set()) for script in HERE.glob("[bp]e*.py"))) - {"mechgraph"}
+    project = tomllib.loads((HERE.parents[1] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extra = project["optional-dependencies"]["bench"]
+    given = {re.match(r"[\w-]+", line)[0] for line in (*project["dependencies"], *extra)}
+    packages = {name.replace("pinocchio", "pin") for name in needed - sys.stdlib_module_names}
+    assert {"pin", "exudyn", "hypothesis", "numpy"} <= packages
+    assert packages <= given
+    assert "cmeel-eigen" in given
 
 
 def test_the_table_has_its_place_in_the_readme():
