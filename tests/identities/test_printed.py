@@ -269,6 +269,23 @@ def planar() -> mg.Mechanism:
     return mg.Mechanism("plate", links, [pair], drives=["E.Tx", "E.Ty", "E.Rz"], loads=[mg.Gravity((1.0, 2.0, -9.81))])
 
 
+def seen_from_the_other_link() -> mg.Mechanism:
+    """A slider-crank whose pairs name the moving link, or the later one, first: minus in front, and a driver that acts on link a."""
+    links = [
+        mg.Link("frame"), mg.Link("crank", 1.0, (0.0, 0.05, 0.01), np.eye(3) * 0.01),
+        mg.Link("rod", 2.0, (0.2, 0.05, 0.0), np.eye(3) * 0.02), mg.Link("slider", 3.0, (0.4, 0.01, 0.0)),
+    ]  # fmt: skip
+    pairs = [
+        mg.Pair("A", "R", "crank", "frame", point=(0, 0, 0), axis=Z),
+        mg.Pair("B", "R", "rod", "crank", point=(0, 0.1, 0), axis=Z),
+        mg.Pair("C", "R", "slider", "rod", point=(0.4, 0, 0), axis=Z),
+        mg.Pair("D", "P", "slider", "frame", point=(0.4, 0, 0), axis=(1, 0, 0)),
+    ]
+    return mg.Mechanism(
+        "turned", links, pairs, drives=["A"], loads=[mg.Gravity((0.3, -9.81, 0.2)), mg.Effort("D", 4.0)]
+    )
+
+
 def door() -> mg.Mechanism:
     """Two hinges between the same links, with names that mean something in LaTeX, and a wheel geared to them."""
     links = [mg.Link("frame"), mg.Link("door", 20.0, (0.4, 0, 0.9)), mg.Link("wheel", 1.0, (1.1, 0, 0), np.eye(3))]
@@ -288,9 +305,10 @@ def door() -> mg.Mechanism:
     ("m", "motion"),
     [
         (planar(), {"E.Tx": [0.1, 0.2], "E.Ty": [0.3, 0.4], "E.Rz": mg.Motion([0.7, 0.9], 2.0, 3.0)}),
+        (seen_from_the_other_link(), {"A": mg.Motion([0.7, 0.9], 2.0, 3.0)}),
         (door(), {"hinge_low": mg.Motion([0.7, 0.9], 2.0, 3.0)}),
     ],
-    ids=["several drivers", "two pairs between two links, coupling"],
+    ids=["several drivers", "first link moves", "two pairs between two links, coupling"],
 )
 def test_printed_equations_hold_beyond_the_library(m: mg.Mechanism, motion: dict, bookkeeping: str) -> None:
     check_all(m, mg.solve(m, motion, redundant="minimum_norm"), bookkeeping, (0, 1))
