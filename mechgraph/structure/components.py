@@ -24,8 +24,8 @@ Label = tuple[str, str]
 class Components:
     """Places of the components at one position; ``first (P + 1,)`` the first of every pair, ``count`` of them all."""
 
-    def __init__(self, here: Configuration, driven: Index) -> None:
-        self.here, self.system = here, here.system
+    def __init__(self, configuration: Configuration, driven: Index) -> None:
+        self.configuration, self.system = configuration, configuration.system
         widths = np.diff(self.system.first_column)
         self._driven = np.zeros(self.system.n_freedoms, dtype=bool)
         self._driven[driven] = True
@@ -60,7 +60,7 @@ class Components:
     @cached_property
     def _rows(self) -> list[Array]:
         """For every group the inverses of ``[W, E]`` at the pair points ``(n, 6, 6)``."""
-        return [inverse[:, 0] for inverse in PairFrames(self.here).dual]
+        return [inverse[:, 0] for inverse in PairFrames(self.configuration).dual]
 
     def _spread(self, g: int, pairs: Index, values: Array, out: Array, at: Index) -> None:
         """Components ``values (6, n, ...)`` of pairs of group ``g``, driven efforts last, into ``out`` from the rows ``at (n,)`` on."""
@@ -77,16 +77,16 @@ class Components:
 
     def table(self, wrenches: Array) -> Array:
         """Parts ``(count, s)`` in total pair wrenches ``(6, P, s, 1)``."""
-        local = at_pair_points(self.here, wrenches)[..., 0]
+        local = at_pair_points(self.configuration, wrenches)[..., 0]
         out = np.zeros((self.count, wrenches.shape[2]))
         for g, (group, inverse) in enumerate(zip(self.system.groups, self._rows, strict=True)):
             values = np.einsum("nij,jns->ins", inverse, local[:, group.pairs])
             self._spread(g, group.pairs, values, out, self.first[group.pairs])
         return out
 
-    def of_loops(self, found: ClosureRank) -> list[tuple[Index, Index, Array]]:
+    def of_loops(self, closure: ClosureRank) -> list[tuple[Index, Index, Array]]:
         """Self-stresses of single loops, loops of one shape together: loops ``(n,)``, places ``(n, c)`` and parts ``(n, c, s)``."""
-        some, wrenches, counts = found.local
+        some, wrenches, counts = closure.local
         if not some.size:
             return []
         loop, pair, sign = self.system.graph.loop_steps
@@ -113,7 +113,7 @@ class Components:
         """Parts ``(all places, 6)`` in wrenches ``(6, 6 states, steps)`` of pairs, each from its place ``at`` on."""
         s = self.system
         out = np.zeros((int(at[-1] + np.diff(self.first)[pairs[-1]]), 6))
-        points = self.here.pair_points[:, pairs, 0]
+        points = self.configuration.pair_points[:, pairs, 0]
         local = wrenches.copy()
         local[:3] -= np.cross(points[:, None], wrenches[3:], axis=0)
         group = np.empty(len(s.m.pairs), dtype=np.intp)

@@ -74,6 +74,6 @@ def coupling_rows(m: Mechanism, width: int) -> scipy.sparse.csr_array | None:
 
 def generic(m: Mechanism, graph: LinkGraph, engine: EngineName = "auto") -> Generic:
     """Rank for random geometry, by the same engines as at a position; local pivots decide, as chains are ill-conditioned."""
-    found = rank_of_rows(random_rows(m, graph), None, engine, RANKS.generic, RANKS.generic)
-    freedoms = found.reduced.rows.S.shape[1]
-    return Generic(found.rank, freedoms - found.rank, found.count - found.rank, found.sets)
+    closure = rank_of_rows(random_rows(m, graph), None, engine, RANKS.generic, RANKS.generic)
+    freedoms = closure.reduced.rows.S.shape[1]
+    return Generic(closure.rank, freedoms - closure.rank, closure.count - closure.rank, closure.sets)

@@ -87,8 +87,8 @@ class Effect:
         ]
         turned = [f" (its x turned by {turn:.3g} degrees)" if turn else "" for turn in self.turns]
         values = {"redundancy": self.redundancy, "mobility": self.mobility, "passive": self.passive}
-        done = ", ".join(f"{name} {before} -> {after}" for name, (before, after) in values.items())
-        return f"{', '.join(a + b for a, b in zip(what, turned, strict=True))}: {done}"
+        before_after = ", ".join(f"{name} {before} -> {after}" for name, (before, after) in values.items())
+        return f"{', '.join(a + b for a, b in zip(what, turned, strict=True))}: {before_after}"
 
 
 def wider_types(row: PairType) -> Iterator[PairType]:
@@ -270,9 +270,9 @@ def _complete_sets(exact: list[Change], redundancy: int) -> tuple[list[tuple[Cha
 def _mixed(complete: list[tuple[Change, ...]]) -> list[tuple[Change, ...]]:
     """Up to two sets of every size, those whose widest change is smallest first."""
     out: list[tuple[Change, ...]] = []
-    for size in sorted({len(parts) for parts in complete}):
-        mine = [parts for parts in complete if len(parts) == size]
-        out += sorted(mine, key=lambda parts: max(c.added for c in parts))[:2]
+    for size in sorted({len(chosen) for chosen in complete}):
+        mine = [chosen for chosen in complete if len(chosen) == size]
+        out += sorted(mine, key=lambda chosen: max(c.added for c in chosen))[:2]
     return out
 
 
@@ -311,15 +311,15 @@ def effect(before: Freedoms, driven: Index, changes: tuple[Change, ...], engine:
 def advice(freedoms: Freedoms, driven: Index, finite_mobility: int, engine: EngineName = "auto") -> tuple[Effect, ...]:
     """Changes worth making: those that remove redundancy without adding input freedoms; for a structure, those that free it."""
     changes = changes_of(freedoms)
-    found: list[Effect] = []
+    effects: list[Effect] = []
     if not (freedoms.mobility - len(freedoms.passive) and finite_mobility):
         wider = sorted((c for c in changes if c.added > c.relief), key=lambda c: (c.added, c.item))
         freeing = [effect(freedoms, driven, (c,), engine) for c in _spread(wider)[:FREEING]]
-        found += [e for e in freeing if e.inputs[1] > e.inputs[0]]
+        effects += [e for e in freeing if e.inputs[1] > e.inputs[0]]
     if freedoms.redundancy:
         singles, complete = relieving(changes, freedoms.redundancy)
         for chosen in (*_mixed(complete), *singles):
-            done = effect(freedoms, driven, chosen, engine)
-            if done.inputs[1] == done.inputs[0] and done.redundancy[1] < done.redundancy[0] and done not in found:
-                found.append(done)
-    return tuple(found[: CHANGES_SHOWN + FREEING])
+            new = effect(freedoms, driven, chosen, engine)
+            if new.inputs[1] == new.inputs[0] and new.redundancy[1] < new.redundancy[0] and new not in effects:
+                effects.append(new)
+    return tuple(effects[: CHANGES_SHOWN + FREEING])

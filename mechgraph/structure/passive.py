@@ -63,13 +63,13 @@ def passive_motions(position: Position, left: Array, driven: Index) -> list[Pass
     """Independent passive motions with the freedoms ``driven`` at rest; ``left (F, p)`` are all motions that leave free."""
     if not left.shape[1]:
         return []
-    found: list[PassiveMotion] = []
+    motions: list[PassiveMotion] = []
     search = _Search(position, frozenset(driven.tolist()))
     for links, border in sorted(_borders(search, left), key=lambda item: (len(item[0]), item[0])):
         for motion in _of_border(search, links, border):
-            if _independent(motion, found):
-                found.append(motion)
-    return sorted(found, key=lambda p: p.links)
+            if _independent(motion, motions):
+                motions.append(motion)
+    return sorted(motions, key=lambda p: p.links)
 
 
 def links_at_rest_together(position: Position, rates: Array) -> list[list[int]]:
@@ -189,9 +189,9 @@ def _leaving(position: Position, k: int, links: tuple[int, ...], moves: Array, t
     return np.stack(columns, axis=1)
 
 
-def _independent(motion: PassiveMotion, found: list[PassiveMotion]) -> bool:
-    """Whether a motion is no combination of those found to which shared freedoms tie it."""
-    rates = np.stack([*(p.rates for p in found), motion.rates])
+def _independent(motion: PassiveMotion, before: list[PassiveMotion]) -> bool:
+    """Whether a motion is no combination of those before to which shared freedoms tie it."""
+    rates = np.stack([*(p.rates for p in before), motion.rates])
     moving = scipy.sparse.csr_array(np.abs(rates) > MOTIONS.still)
     group = labels_of_bipartite(moving)
     near = rates[group == group[-1]]

@@ -51,24 +51,24 @@ def split_stress(here: Configuration, states: Array, multipliers: Array, acting:
     """Reaction parts and efforts of total wrench states ``(6, P, s, T)``; only the freedoms ``acting`` (driven, coupled) have efforts."""
     s = states.shape[2]
     efforts = np.zeros((here.system.n_freedoms, s, here.T))
-    parts = np.empty_like(states)
+    reactions = np.empty_like(states)
     for i in range(s):
         tau = pair_power(here, states[:, :, i])
         efforts[acting, i] = tau[acting]
-        parts[:, :, i] = reaction_part(here, states[:, :, i], efforts[:, i])
-    return Stress(parts, efforts, multipliers)
+        reactions[:, :, i] = reaction_part(here, states[:, :, i], efforts[:, i])
+    return Stress(reactions, efforts, multipliers)
 
 
 def orthonormal_stress(here: Configuration, states: Array, multipliers: Array, acting: Index) -> Stress:
     """Self-stresses from independent total wrench states ``(6, P, s, T)``, orthonormal at every position."""
-    found, s = split_stress(here, states, multipliers, acting), states.shape[2]
+    stress, s = split_stress(here, states, multipliers, acting), states.shape[2]
     if not s:
-        return found
-    parts, efforts = found.wrenches, found.efforts
-    flat = at_pair_points(here, parts).transpose(3, 0, 1, 2).reshape(here.T, 6 * states.shape[1], s)
+        return stress
+    reactions, efforts = stress.wrenches, stress.efforts
+    flat = at_pair_points(here, reactions).transpose(3, 0, 1, 2).reshape(here.T, 6 * states.shape[1], s)
     mix = _orthonormal(flat, np.concatenate([efforts, multipliers]).transpose(2, 0, 1))
     mixed = (np.einsum("fit,tij->fjt", values, mix) for values in (efforts, multipliers))
-    return Stress(np.einsum("cpit,tij->cpjt", parts, mix), *mixed)
+    return Stress(np.einsum("cpit,tij->cpjt", reactions, mix), *mixed)
 
 
 def _orthonormal(reactions: Array, efforts: Array) -> Array:

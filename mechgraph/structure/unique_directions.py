@@ -59,7 +59,7 @@ def unique_directions(components: Components, table: Array) -> tuple[tuple[Uniqu
                 for i, unique in zip(some, _directions(table[rows[np.ix_(some, mine)]]), strict=True):
                     if unique.shape[1]:
                         pair = int(group.pairs[i])
-                        R = components.here.frames[g][frame][:, :3, i, 0]
+                        R = components.configuration.frames[g][frame][:, :3, i, 0]
                         named.append(((pair, order), _named(components, pair, kind, axes[mine], unique, R)))
                         known |= set(_dependent(unique, rows[i, mine].tolist()))
     return tuple(direction for _, direction in sorted(named, key=lambda item: item[0])), known

@@ -110,7 +110,9 @@ class Uniqueness:
             return basis_of(self.components.count, local, [])
         if shared > CONNECTING:
             return basis_of(self.components.count, local, self._places_of_sets())
-        states = self.components.table(pair_states(self.components.here, self.closure.connecting(np.eye(shared))))
+        states = self.components.table(
+            pair_states(self.components.configuration, self.closure.connecting(np.eye(shared)))
+        )
         touched = np.flatnonzero(np.abs(states).max(axis=1) > UNIQUE * np.abs(states).max())
         number = np.array([self.components.system.graph.n_loops])
         return basis_of(self.components.count, [*local, (number, touched[None], states[touched][None])], [])
