@@ -10,6 +10,7 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import MissingExtraError
+from mechgraph.result.views import PairResult, Values
 from mechgraph.units import unit_of
 from mechgraph.writing import csv_of, write_whole
 
@@ -19,13 +20,12 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-    from mechgraph.result.solution import Solution
 
 ROWS_TOGETHER = 1024
 """Rows of a table that are made together: bounds the memory that a long table takes."""
 
 
-def columns(s: Solution) -> dict[str, Array]:
+def columns(s: Values) -> dict[str, Array]:
     """Columns by name: coordinates, rates, efforts, reaction components, status and checks.
 
     Names are ``B.Tz``, ``B.Tz velocity``, ``B.Tz effort`` (of the drive), ``B.Tz applied effort`` (of springs, dampers, given efforts),
@@ -40,15 +40,15 @@ def columns(s: Solution) -> dict[str, Array]:
 
     if s.t is not None:
         put("t", np.broadcast_to(s.t, s.batch), 0, 0, 1)
-    for pair in m.pairs:
-        r = s[pair.name]
+    for k, pair in enumerate(m.pairs):
+        r = PairResult(s, k)
         values = (r.position, r.velocity, r.acceleration)
         for j, (name, freedom) in enumerate(zip(pair.freedom_names, pair.type.freedoms, strict=True)):
             for order, (label, value) in enumerate(zip(("", " velocity", " acceleration"), values, strict=True)):
                 put(name + label, value[..., j], 0 if freedom.turns else 1, 0, -order)
     if s.has_forces:
-        for pair in m.pairs:
-            r = s[pair.name]
+        for k, pair in enumerate(m.pairs):
+            r = PairResult(s, k)
             efforts = {"effort": r.effort, "applied effort": r.applied_effort}
             for j, (name, part) in enumerate(zip(pair.freedom_names, pair.type.efforts, strict=True)):
                 for label, effort in efforts.items():
@@ -56,18 +56,18 @@ def columns(s: Solution) -> dict[str, Array]:
             for name, value in r.components.items():
                 put(f"{pair.name}:{name}", value, unit=r.units["components"][name])
     for name in ("closure", "equilibrium", "power"):
-        out[name] = getattr(s.checks, name)
-    out["status"] = s.status
+        out[name] = getattr(s.checks(), name)
+    out["status"] = s.status()
     return out
 
 
-def to_csv(s: Solution, path: str | os.PathLike[str]) -> None:
+def to_csv(s: Values, path: str | os.PathLike[str]) -> None:
     """Write one row a position; numbers with all digits. The rows are made as they are written, some at a time."""
     write_whole(path, _csv_pieces(s))
 
 
-def _csv_pieces(s: Solution) -> Iterator[str]:
-    count = s.status.size
+def _csv_pieces(s: Values) -> Iterator[str]:
+    count = s.status().size
     for first in range(0, max(count, 1), ROWS_TOGETHER):
         table = columns(s.part(slice(first, first + ROWS_TOGETHER)))
         rows = zip(*(values.tolist() for values in table.values()), strict=True)
@@ -81,7 +81,7 @@ def _optional(module: str) -> Any:
         raise MissingExtraError(module, module) from None
 
 
-def to_pandas(s: Solution) -> pandas.DataFrame:
+def to_pandas(s: Values) -> pandas.DataFrame:
     """The table as a DataFrame; several batch axes become index levels."""
     pd = _optional("pandas")
     frame = pd.DataFrame({name: np.asarray(values).reshape(-1) for name, values in columns(s).items()})
@@ -90,7 +90,7 @@ def to_pandas(s: Solution) -> pandas.DataFrame:
     return frame
 
 
-def to_xarray(s: Solution) -> xarray.Dataset:
+def to_xarray(s: Values) -> xarray.Dataset:
     """The table as a Dataset over the batch axes."""
     xr = _optional("xarray")
     dims = axis_names(s.batch)

@@ -23,12 +23,13 @@ from mechgraph.equations.state import State
 from mechgraph.errors import MechgraphError
 from mechgraph.force.applied_loads import user_poses, user_twists
 from mechgraph.force.block import BlockForces
-from mechgraph.force.dalembert import given_effort_loads, internal_state
+from mechgraph.force.dalembert import given_effort_loads
 from mechgraph.force.passive_hold import hold_names, is_idle, turns
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.newton import Work
 from mechgraph.numerics.tolerances import MOTIONS
-from mechgraph.result.solution import Checks, LoadBearing, MaterialPoint
+from mechgraph.result.states import flat_place, user_state, user_wrench
+from mechgraph.result.views import Checks, LoadBearing, MaterialPoint
 from mechgraph.structure.passive import PassiveMotion
 from mechgraph.structure.reaction_split import UNIQUE, PairFrames
 from mechgraph.units import unit_of
@@ -57,7 +58,7 @@ RETAINED = 40_000
 
 
 class Trajectory:
-    """The values of a Solution (implements ``result.solution.Values``).
+    """The values of a Solution (implements ``result.views.Values``).
 
     ``system_at(places)`` is the system with the numbers of the positions at flat places (they differ between variants); ``driven`` are the
     freedoms with a driver, ``coordinates (F, T)`` the user's ones of all positions.
@@ -205,15 +206,6 @@ class Trajectory:
             raise MechgraphError("this solution has no forces: it comes from kinematics(); use solve()")
         return self._of(name)
 
-    def _user_wrench(self, f: Array) -> Array:
-        """Wrench about the internal origin -> user's units about the global origin, ``(6, ...)``."""
-        out = np.empty(f.shape)
-        origin = self._system.par.origin.reshape(3, *(1,) * (f.ndim - 1))
-        np.multiply(f[3:], self._L, out=out[3:])
-        np.multiply(f[:3], self._L**2, out=out[:3])
-        out[:3] += cross(origin, out[3:])
-        return out
-
     def _columns(self, pair: int) -> slice:
         first = self._system.first_column
         return slice(int(first[pair]), int(first[pair + 1]))
@@ -292,7 +284,7 @@ class Trajectory:
 
     def _about_origin(self, value: Array, stress: Array) -> Array:
         """Wrench ``(6, T)`` in the user's units about the global origin, NaN where ``stress (6, s, T)`` has a part."""
-        wrench = self._user_wrench(value)
+        wrench = user_wrench(self._system.par, value)
         if stress.shape[1]:
             far = self._system.par.origin / self._L
             shifted = np.concatenate([stress[:3] + cross(far[:, None, None], stress[3:]), stress[3:]])
@@ -343,12 +335,12 @@ class Trajectory:
 
     def shaking(self) -> Array:
         """Wrench on the frame: loads and inertia of all moving links, and what springs do to the frame."""
-        return self._out(self._user_wrench(self._force("shaking")))
+        return self._out(user_wrench(self._system.par, self._force("shaking")))
 
     def link_hold(self, link: int) -> Array:
         """Wrench that keeps a passive body at rest, about the global origin."""
         self._force("loads")
-        return self._out(self._user_wrench(self._of("hold")[:, link]))
+        return self._out(user_wrench(self._system.par, self._of("hold")[:, link]))
 
     def passive_efforts(self) -> dict[str, Array]:
         """What keeps passive bodies at rest, by name: a couple about the axis of a turn, a force along a slide."""
@@ -393,57 +385,7 @@ class Trajectory:
         if not self._solved[flat]:
             raise MechgraphError(f"state({index!r}): this position was not solved ({self._status[flat]})")
         block = self._motion(np.array([flat]))
-        here, s = block.here, self._system
-        loads = np.zeros((6, len(s.m.links), 1))
+        loads = np.zeros((6, len(self.mechanism.links), 1))
         if self.has_forces:
-            loads = self._of("loads")[:, :, [flat]] + given_effort_loads(here, self._of("given")[:, [flat]])
-        inner = internal_state(here, loads)
-        rows = [p.type for p in self.mechanism.pairs]
-        unit = np.where(s.is_length, self._L, 1.0)[:, None]
-        return State(
-            coordinates=self._coordinates[:, [flat]],
-            velocities=unit * block.rates.dq,
-            poses=np.moveaxis(user_poses(here)[..., :3, :], (0, 1), (2, 3)),
-            twists=user_twists(here, block.rates.V),
-            reactions=tuple(
-                self._user_screws(w, [c.is_couple for c in row.reactions or ()])
-                for w, row in zip(inner.reactions, rows, strict=True)
-            ),
-            efforts=tuple(
-                self._user_screws(w, [c.is_couple for c in row.efforts])
-                for w, row in zip(inner.efforts, rows, strict=True)
-            ),
-            along=tuple(
-                self._user_screws(w, [c.is_couple for c in row.bookkeeping.along] if row.bookkeeping else [])
-                for w, row in zip(inner.along, rows, strict=True)
-            ),
-            conditions=tuple(user_twists(here, w) if w.shape[1] else w for w in inner.conditions),
-            loads=self._user_wrench(loads),
-        )
-
-    def _user_screws(self, wrenches: Array, couples: list[bool]) -> Array:
-        """Unit wrenches ``(6, n, T)``: arms in the user's length, about the global origin; unit couples stay."""
-        out = wrenches.copy()
-        for j in range(out.shape[1]):
-            if not (j < len(couples) and couples[j]):
-                out[:3, j] = self._L * out[:3, j] + cross(self._system.par.origin[:, None], out[3:, j])
-        return out
-
-
-def flat_place(batch: tuple[int, ...], index: Any) -> int:
-    """Place in the flat batch of the one position that an index names.
-
-    Raises
-    ------
-    MechgraphError
-    """
-    try:
-        flat = np.arange(int(np.prod(batch))).reshape(batch)[index]
-    except IndexError:
-        text = f"state({index!r}): no such position in a batch {batch}; give one index an axis"
-        raise MechgraphError(text) from None
-    if np.ndim(flat):
-        raise MechgraphError(
-            f"state({index!r}): names {np.size(flat)} positions of a batch {batch}; give one index an axis"
-        )
-    return int(flat)
+            loads = self._of("loads")[:, :, [flat]] + given_effort_loads(block.here, self._of("given")[:, [flat]])
+        return user_state(block.rates, self._coordinates[:, [flat]], loads)

@@ -10,7 +10,8 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.result.solution import LinkResult, PairResult, Solution
+from mechgraph.result.solution import Solution
+from mechgraph.result.views import LinkResult, PairResult
 
 Output = str | Callable[[Solution], Any]
 

@@ -1,0 +1,75 @@
+"""One position for the printed equations: screws, loads and coordinates in the user's units about the global origin."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array, cross
+from mechgraph.closure.rates import Rates
+from mechgraph.equations.state import State
+from mechgraph.errors import MechgraphError
+from mechgraph.force.applied_loads import user_poses, user_twists
+from mechgraph.force.dalembert import internal_state
+from mechgraph.model.parameters import Parameters
+
+
+def user_wrench(par: Parameters, f: Array) -> Array:
+    """Wrench about the internal origin -> user's units about the global origin, ``(6, ...)``."""
+    out = np.empty(f.shape)
+    origin = par.origin.reshape(3, *(1,) * (f.ndim - 1))
+    np.multiply(f[3:], par.L, out=out[3:])
+    np.multiply(f[:3], par.L**2, out=out[:3])
+    out[:3] += cross(origin, out[3:])
+    return out
+
+
+def user_state(rates: Rates, coordinates: Array, loads: Array) -> State:
+    """The State at one position with user coordinates ``(F, 1)`` and internal loads ``(6, N, 1)``."""
+    here = rates.here
+    s, par = here.system, here.system.par
+    inner = internal_state(here, loads)
+    rows = [p.type for p in s.m.pairs]
+    couples = [[c.is_couple for c in row.reactions or ()] for row in rows]
+    efforts = [[c.is_couple for c in row.efforts] for row in rows]
+    along = [[c.is_couple for c in row.bookkeeping.along] if row.bookkeeping else [] for row in rows]
+    return State(
+        coordinates=coordinates,
+        velocities=np.where(s.is_length, par.L, 1.0)[:, None] * rates.dq,
+        poses=np.moveaxis(user_poses(here)[..., :3, :], (0, 1), (2, 3)),
+        twists=user_twists(here, rates.V),
+        reactions=tuple(_user_screws(par, w, which) for w, which in zip(inner.reactions, couples, strict=True)),
+        efforts=tuple(_user_screws(par, w, which) for w, which in zip(inner.efforts, efforts, strict=True)),
+        along=tuple(_user_screws(par, w, which) for w, which in zip(inner.along, along, strict=True)),
+        conditions=tuple(user_twists(here, w) if w.shape[1] else w for w in inner.conditions),
+        loads=user_wrench(par, loads),
+    )
+
+
+def _user_screws(par: Parameters, wrenches: Array, couples: list[bool]) -> Array:
+    """Unit wrenches ``(6, n, T)``: arms in the user's length, about the global origin; unit couples stay."""
+    out = wrenches.copy()
+    for j in range(out.shape[1]):
+        if not (j < len(couples) and couples[j]):
+            out[:3, j] = par.L * out[:3, j] + cross(par.origin[:, None], out[3:, j])
+    return out
+
+
+def flat_place(batch: tuple[int, ...], index: Any) -> int:
+    """Place in the flat batch of the one position that an index names.
+
+    Raises
+    ------
+    MechgraphError
+    """
+    try:
+        flat = np.arange(int(np.prod(batch))).reshape(batch)[index]
+    except IndexError:
+        text = f"state({index!r}): no such position in a batch {batch}; give one index an axis"
+        raise MechgraphError(text) from None
+    if np.ndim(flat):
+        raise MechgraphError(
+            f"state({index!r}): names {np.size(flat)} positions of a batch {batch}; give one index an axis"
+        )
+    return int(flat)

@@ -1,0 +1,313 @@
+"""What a solution hands out by name: values of pairs, couplings and links, checks, warnings; and where they come from (``Values``)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple, Protocol
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.equations.state import State
+from mechgraph.errors import DeclarationError
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.numeric import vector_fault
+from mechgraph.numerics.newton import Work
+from mechgraph.units import unit_of
+
+
+@dataclass(frozen=True)
+class Checks:
+    """Every solution's own checks, arrays over positions.
+
+    closure : closure error, the largest of angle [rad] and length / L over the loops.
+    equilibrium : residual of the equilibrium of all links and of ``S^T w = effort`` in all undriven freedoms, relative to the
+        largest wrench in the batch (NaN without forces).
+    power : driver power + load power - rate of kinetic energy, relative to the largest term in the batch.
+    """
+
+    closure: Array
+    equilibrium: Array
+    power: Array
+
+
+class MaterialPoint(NamedTuple):
+    """Position, velocity and acceleration of a material point, ``(..., 3)`` each."""
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+
+@dataclass(frozen=True)
+class LoadBearing:
+    """A passive freedom that the loads would move: only a couple or force that no part supplies holds it there.
+
+    ``name`` as in ``Solution.passive_effort`` and the report, whether it ``turns`` (held by a couple), the greatest ``effort`` with its
+    ``unit``, the ``links`` and ``freedoms`` that would move, and the ``pairs`` of these links, whose reactions rest on that effort.
+    """
+
+    name: str
+    turns: bool
+    effort: float
+    unit: str
+    links: tuple[str, ...]
+    pairs: tuple[str, ...]
+    freedoms: tuple[str, ...]
+
+    @property
+    def size(self) -> str:
+        """``a couple of 20.5 N m``."""
+        return f"a {'couple' if self.turns else 'force'} of {self.effort:.4g}" + (f" {self.unit}" if self.unit else "")
+
+    @property
+    def text(self) -> str:
+        """The warning in one sentence."""
+        return (
+            f"{self.name}: load-bearing passive freedom, held by {self.size} at most, which no part supplies: the real linkage would move "
+            f"({', '.join(self.freedoms)}), and the reactions of {', '.join(self.pairs)} rest on it"
+        )
+
+    def __str__(self) -> str:
+        return self.text
+
+
+class Values(Protocol):
+    """Where a Solution takes its values from (see ``result.trajectory``); every method returns batch-first arrays."""
+
+    mechanism: Mechanism
+    batch: tuple[int, ...]
+    t: Any
+    has_forces: bool
+    engine: Literal["dense", "sparse"]
+    work: Work
+
+    def status(self) -> Any:
+        """Named outcomes, one a position."""
+
+    def checks(self) -> Checks:
+        """Closure, equilibrium and power."""
+
+    def coordinates(self, pair: int) -> tuple[Array, Array, Array]:
+        """Coordinates, rates and accelerations of the freedoms of a pair, ``(..., f)``."""
+
+    def reaction(self, pair: int) -> Array:
+        """Reaction of a pair about the global origin, ``(..., 6)``."""
+
+    def total(self, pair: int) -> Array:
+        """Total wrench of a pair about the global origin, ``(..., 6)``."""
+
+    def reaction_at_pair(self, pair: int) -> Array:
+        """Reaction about the origin of marker B, global directions, ``(..., 6)``."""
+
+    def components(self, pair: int) -> dict[str, Array]:
+        """Reaction components by name, ``(...)``."""
+
+    def efforts(self, pair: int) -> tuple[Array, Array]:
+        """What the drive supplies, and what springs, dampers and given efforts do, ``(..., f)`` each."""
+
+    def multiplier(self, coupling: int) -> Array:
+        """Multiplier of a coupling, ``(...)``."""
+
+    def link(self, link: int) -> tuple[Array, Array, Array]:
+        """Pose ``(..., 4, 4)``, twist and its rate ``(..., 6)`` of a link."""
+
+    def link_hold(self, link: int) -> Array:
+        """Wrench that keeps a passive body at rest, about the global origin, ``(..., 6)``."""
+
+    def link_point(self, link: int, p: Any) -> MaterialPoint:
+        """A material point given in the link's frame; the mass centre where it is None."""
+
+    def shaking(self) -> Array:
+        """Wrench on the frame about the global origin, ``(..., 6)``."""
+
+    def passive_efforts(self) -> dict[str, Array]:
+        """What keeps passive bodies at rest, by name."""
+
+    def load_bearing(self) -> tuple[LoadBearing, ...]:
+        """Passive freedoms that the loads would move."""
+
+    def state(self, index: Any) -> State:
+        """Screws and loads at one position, in the declared units about the global origin."""
+
+    def part(self, places: slice) -> Values:
+        """The values at a range of flat positions."""
+
+
+class PairResult:
+    """Values of one pair; see the properties."""
+
+    def __init__(self, values: Values, index: int) -> None:
+        self._values, self._index = values, index
+
+    @property
+    def position(self) -> Array:
+        """Coordinates ``(..., f)`` in the order of the pair table; angles unwrapped, of a rotation the rotation vector."""
+        return self._values.coordinates(self._index)[0]
+
+    @property
+    def velocity(self) -> Array:
+        """Rates ``(..., f)``; of a rotation the angular velocity in frame k before it."""
+        return self._values.coordinates(self._index)[1]
+
+    @property
+    def acceleration(self) -> Array:
+        """Rates of the rates ``(..., f)``."""
+        return self._values.coordinates(self._index)[2]
+
+    @property
+    def reaction(self) -> Array:
+        """Wrench ``(..., 6)``, (M, F) about the global origin, that link a exerts on link b: the constraint part alone."""
+        return self._values.reaction(self._index)
+
+    @property
+    def total(self) -> Array:
+        """Reaction and all efforts (of couplings too), all that the pair transmits, ``(..., 6)``."""
+        return self._values.total(self._index)
+
+    @property
+    def effort(self) -> Array:
+        """What the drive supplies ``(..., f)``, the motor's torque or force: + on link b, - on link a; 0 in freedoms not driven."""
+        return self._values.efforts(self._index)[0]
+
+    @property
+    def applied_effort(self) -> Array:
+        """What loads do in the freedoms ``(..., f)``: springs, dampers, given efforts; 0 where nothing acts."""
+        return self._values.efforts(self._index)[1]
+
+    @property
+    def force(self) -> Array:
+        """Force of the reaction ``(..., 3)``, global directions."""
+        return self._values.reaction_at_pair(self._index)[..., 3:]
+
+    @property
+    def moment(self) -> Array:
+        """Moment of the reaction ``(..., 3)`` about the origin of marker B, global directions."""
+        return self._values.reaction_at_pair(self._index)[..., :3]
+
+    @property
+    def components(self) -> dict[str, Array]:
+        """Reaction components of the pair table by name, in frame k about its origin; NaN where not unique.
+
+        Components n1, n2, ... (of a null space) mix force and moment: they count wrenches with ``|F|^2 + |M / L|^2 = 1`` about marker B, L
+        the mean radius of the mechanism, and have the unit of a force.
+        """
+        return self._values.components(self._index)
+
+    @property
+    def units(self) -> dict[str, Any]:
+        """Units of the properties in the declared units: a tuple over freedoms, a dict over components, or one text."""
+        m = self._values.mechanism
+        row = m.pairs[self._index].type
+        lengths = [0 if f.turns else 1 for f in row.freedoms]
+        efforts = tuple(unit_of(m.units, (2 if c.is_couple else 1, 1, -2)) for c in row.efforts)
+        force, moment = (unit_of(m.units, (power, 1, -2)) for power in (1, 2))
+        return {
+            "position": tuple(unit_of(m.units, (n, 0, 0)) for n in lengths),
+            "velocity": tuple(unit_of(m.units, (n, 0, -1)) for n in lengths),
+            "acceleration": tuple(unit_of(m.units, (n, 0, -2)) for n in lengths),
+            "effort": efforts,
+            "applied_effort": efforts,
+            "force": force,
+            "moment": moment,
+            "reaction": (moment,) * 3 + (force,) * 3,
+            "total": (moment,) * 3 + (force,) * 3,
+            "components": {c.name: moment if c.is_couple else force for c in row.reactions}
+            if row.reactions is not None
+            else dict.fromkeys(row.component_names, force and f"{force}, M/L"),
+        }
+
+
+class CouplingResult:
+    """Values of one coupling ``sum c_i q_i = constant``."""
+
+    def __init__(self, values: Values, index: int) -> None:
+        self._values, self._index = values, index
+
+    @property
+    def effort(self) -> Array:
+        """The multiplier m ``(...)``: the coupling exerts the effort ``c_i m`` in freedom i, + on link b.
+
+        Its power ``m sum_i c_i q'_i`` is zero.
+        """
+        return self._values.multiplier(self._index)
+
+
+class LinkResult:
+    """Motion of one link in the global frame."""
+
+    def __init__(self, values: Values, index: int) -> None:
+        self._values, self._index = values, index
+
+    @property
+    def pose(self) -> Array:
+        """Pose of the link's frame, ``(..., 4, 4)``."""
+        return self._values.link(self._index)[0]
+
+    @property
+    def twist(self) -> Array:
+        """Twist ``(..., 6)``, (w, v) with v of the body point at the global origin."""
+        return self._values.link(self._index)[1]
+
+    @property
+    def acceleration(self) -> Array:
+        """dV/dt of the twist about the global origin, ``(..., 6)``."""
+        return self._values.link(self._index)[2]
+
+    @property
+    def hold(self) -> Array:
+        """Wrench ``(..., 6)`` about the global origin that keeps a passive body from spinning; zero for all other links."""
+        return self._values.link_hold(self._index)
+
+    @property
+    def angular_velocity(self) -> Array:
+        """Angular velocity ``(..., 3)``."""
+        return self.twist[..., :3]
+
+    @property
+    def angular_acceleration(self) -> Array:
+        """Angular acceleration ``(..., 3)``."""
+        return self.acceleration[..., :3]
+
+    def point(self, p: Any) -> MaterialPoint:
+        """Position, velocity and acceleration of the material point ``p``, given in the link's frame."""
+        fault = vector_fault(p, "point")
+        if fault:
+            raise DeclarationError(f"link {self._values.mechanism.links[self._index].name!r}", [fault])
+        return self._values.link_point(self._index, p)
+
+    @property
+    def units(self) -> dict[str, Any]:
+        """Units of the properties in the declared units; of twists angular part first."""
+        m = self._values.mechanism
+        length, speed, rate = (unit_of(m.units, (1, 0, -n)) for n in range(3))
+        angular = tuple(unit_of(m.units, (0, 0, -n)) for n in range(3))
+        return {
+            "pose": length,
+            "twist": (angular[1],) * 3 + (speed,) * 3,
+            "acceleration": (angular[2],) * 3 + (rate,) * 3,
+            "center": length,
+            "center_velocity": speed,
+            "center_acceleration": rate,
+            "angular_velocity": angular[1],
+            "angular_acceleration": angular[2],
+        }
+
+    def _center(self) -> MaterialPoint:
+        link = self._values.mechanism.links[self._index]
+        if link.center is None:
+            raise DeclarationError(f"link {link.name!r}", ["has no mass centre; declare center=, or use point(p)"])
+        return self._values.link_point(self._index, None)
+
+    @property
+    def center(self) -> Array:
+        """Mass centre ``(..., 3)``."""
+        return self._center().position
+
+    @property
+    def center_velocity(self) -> Array:
+        """Velocity of the mass centre ``(..., 3)``."""
+        return self._center().velocity
+
+    @property
+    def center_acceleration(self) -> Array:
+        """Acceleration of the mass centre ``(..., 3)``."""
+        return self._center().acceleration
