@@ -387,3 +387,17 @@ def test_efforts_of_several_drivers_are_unique() -> None:
     assert report.unique["a1"]["effort"]
     assert report.unique["b1"]["effort"]
     assert report.verdict.endswith("form 2 self-stress groups (redundancy 6); all driver efforts are unique.")
+
+
+@pytest.mark.parametrize(
+    ("drives", "words"),
+    [
+        (["O1"], "; the driver effort is unique"),
+        (["O3"], "; the driver effort is unique"),
+    ],
+)
+def test_driver_efforts_are_told_apart_from_reactions_that_are_not_unique(drives: list[str], words: str) -> None:
+    """A planar four-bar is redundant by three; one driver balances what it has to, two strain each other."""
+    report = mg.check(known.planar().replace(drives=drives))
+    assert words in report.verdict
+    assert [report.unique[d]["effort"] for d in drives] == [len(drives) == 1] * len(drives)
