@@ -134,7 +134,7 @@ class _Carried:
         self._starts = np.searchsorted(nodes.track, nodes.track[left])
         self._at_nodes = path.at(nodes.x, nodes.drive, nodes.track)
         f = path.factored(self._at_nodes, nodes.which)
-        axes, _ = _axes(self._at_nodes, bodies, f.motions())
+        axes, _, _ = _axes(self._at_nodes, bodies, f.motions())
         points, weights = np.polynomial.legendre.leggauss(GAUSS)
         self._to_series = (
             weights[:, None] * np.polynomial.legendre.legvander(points, GAUSS - 1) * (np.arange(GAUSS) + 0.5)
@@ -196,17 +196,21 @@ class _Carried:
         return self.turned(nodes.x, nodes.which, nodes.track, nodes.place)
 
     def _turn(self, x: Array, which: Index, track: Index, place: Array) -> tuple[Array, Array]:
-        """Angles ``(bodies, n)`` that are missing, and the increments ``(F, n)`` that turn by them."""
+        """Angles ``(turns, n)`` that are missing, and the increments ``(F, n)`` that turn by them.
+
+        Links that one passive motion turns share an angle: the mean, as at rest their mean spin vanishes (welded ones have the same).
+        """
         nodes = self.interpolation.nodes
         tracks = nodes.track[self.interpolation.left]
         moved = np.isin(track, tracks)
         step = self.interpolation.find(np.where(moved, track, tracks[0]), place)
         here = self.path.at(x, x[self.path.rows], track)
         Z = self.path.factored(here, which).motions()
-        axes, unit = _axes(here, self.bodies, Z)
+        axes, numbers, unit = _axes(here, self.bodies, Z)
         integrals = _integrals(2.0 * (place - nodes.place[self.interpolation.left[step]]) / self._h[step] - 1.0)
-        angles, dq = np.zeros((len(self.bodies), x.shape[1])), np.zeros((Z.shape[0], x.shape[1]))
-        for i, (body, known, axis) in enumerate(zip(self.bodies, self._bodies, axes, strict=True)):
+        shared: dict[int, list[Array]] = {}
+        dq = np.zeros((Z.shape[0], x.shape[1]))
+        for body, known, axis, number in zip(self.bodies, self._bodies, axes, numbers, strict=True):
             if known is None or axis is None:
                 continue
             R = here.poses[:, :3, body.link]
@@ -214,9 +218,15 @@ class _Carried:
             n, _ = _across(known.e[:, step], u)
             angle = known.turn[step] + (known.series[step] * integrals).sum(axis=1)
             angle = angle - _angle(n, rotate(R, known.across[:, step]), u)
-            angles[i] = np.where(moved, np.remainder(angle + np.pi, 2 * np.pi) - np.pi, 0.0)
-            dq += unit[i] * np.sign((axis * u).sum(axis=0)) * angles[i]
-        return angles, dq
+            angle = np.sign((axis * u).sum(axis=0)) * np.where(moved, angle, 0.0)
+            shared.setdefault(number, []).append(angle)
+        angles = {
+            number: _wrapped(some[0] + np.mean([_wrapped(a - some[0]) for a in some], axis=0))
+            for number, some in shared.items()
+        }
+        for number, angle in angles.items():
+            dq += unit[number] * angle
+        return np.array(list(angles.values())), dq
 
 
 @dataclass(frozen=True)
@@ -262,16 +272,29 @@ def _angle(a: Array, b: Array, u: Array) -> Array:
     return np.arctan2((cross(a, b) * u).sum(axis=0), (a * b).sum(axis=0))
 
 
-def _axes(here: Configuration, bodies: tuple[Idle, ...], Z: Array) -> tuple[list[Array | None], list[Array]]:
-    """For every body that has one passive turn its axis ``(3, T)`` and the rates ``(F, T)`` that turn it by one radian; else None."""
+def _wrapped(angle: Array) -> Array:
+    """Angles in [-pi, pi)."""
+    return np.remainder(angle + np.pi, 2 * np.pi) - np.pi
+
+
+def _axes(
+    here: Configuration, bodies: tuple[Idle, ...], Z: Array
+) -> tuple[list[Array | None], list[int], dict[int, Array]]:
+    """For every body that has one passive turn its axis ``(3, T)``, else None, and the number of that motion.
+
+    By number the rates ``(F, T)`` that turn by one radian.
+    """
     G = passive_twists(here, bodies, rest_points(here, bodies, Z), Z)
     axes: list[Array | None] = []
-    units: list[Array] = []
+    numbers: list[int] = []
+    units: dict[int, Array] = {}
     for i in range(len(bodies)):
         mine = [p for p in range(Z.shape[1]) if np.abs(G[6 * i : 6 * i + 6, p]).max() > TURNING]
         u = G[6 * i : 6 * i + 3, mine[0]] if len(mine) == 1 else np.zeros((3, here.T))
         length = np.sqrt((u * u).sum(axis=0))
         turns = len(mine) == 1 and bool((length > TURNING).all())
         axes.append(u / length if turns else None)
-        units.append(Z[:, mine[0]] / length if turns else np.zeros((Z.shape[0], here.T)))
-    return axes, units
+        numbers.append(mine[0] if mine else -1)
+        if turns:
+            units[mine[0]] = Z[:, mine[0]] / length
+    return axes, numbers, units

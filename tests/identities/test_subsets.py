@@ -262,3 +262,41 @@ def test_several_parallelograms_on_one_crank(seed):
     assert_parallel(whole, bars, q, start)
     pick = rng.choice(len(q), len(q) // 3, replace=False)
     assert not differences(whole, solved(m, {"A": q[pick]}), pick=pick)[2]
+
+
+# --- several links in one passive motion ------------------------------------------------------------------------------------
+
+
+def welded_coupler():
+    """RSSR with a coupler of two welded halves: both spin as one."""
+    m = mg.load("rssr").replace(loads=[])
+    b, c = (np.asarray(m.pair(name).point) for name in "BC")
+    pairs = [p.replace(a="half") if p.name == "C" else p for p in m.pairs]
+    assert m.pair("C").a == "coupler"
+    weld = mg.Pair("weld", "W", "coupler", "half", point=0.5 * (b + c))
+    return m.replace(links=[*m.links, mg.Link("half")], pairs=[*pairs, weld])
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+def test_welded_halves_stand_where_the_whole_stands(engine):
+    whole = mg.load("rssr").replace(loads=[])
+    drive = whole.drives[0].freedom
+    for n in (2, 9):
+        given = {drive: np.linspace(0.0, 2.0, n)}
+        one, two = (mg.kinematics(m, given, engine=engine) for m in (whole, welded_coupler()))
+        assert np.allclose(two.link("half").pose, one.link("coupler").pose, atol=1e-11)
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.parametrize("n", [2, 9])
+def test_links_that_a_driver_moves_against_each_other_share_their_rest(engine, n):
+    """Two bars that turn idly about the first pair as one: their mean spin vanishes, so that each takes half of the driver's turn."""
+    pairs = [
+        mg.Pair("A", "R", "frame", "b1", point=(-0.13, -0.45, 0), axis=(0, 0, 1)),
+        mg.Pair("B", "R", "b1", "b2", point=(0.4, 0.3, 0.1), axis=(0, 0, 1)),
+        mg.Pair("C", "Cp", "b2", "frame", point=(0.9, -0.2, 0.6), axis=(0, 0, 1), second=(0.6, 0.8, 0)),
+    ]
+    m = mg.Mechanism("two bars on a plane", None, pairs, ["B"])
+    s = mg.kinematics(m, {"B": mg.Motion(np.linspace(0.0, 1.0, n), 1.0, 0.0)}, engine=engine)
+    assert np.allclose(s["A"].position[-1], -0.5, atol=1e-11)
+    assert np.allclose(s["A"].velocity, -0.5, atol=1e-11)
