@@ -9,6 +9,11 @@ from mechanisms import Z
 from strategies import closed_mechanism, motions, open_chain, with_drives, with_loads
 
 import mechgraph as mg
+from mechgraph.closure.assembly import assembled, named_columns
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.driver_path import DriverPath, Request, follow
+from mechgraph.closure.solver import closure_solver
+from mechgraph.numerics.tolerances import PATH
 
 pytestmark = pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
 """Random loads move passive freedoms; ``test_passive_loads`` looks at what is said of it."""
@@ -150,3 +155,29 @@ def test_least_reactions_where_drivers_strain_each_other(method):
         drives=["O1", "O4"], loads=[mg.Wrench(m.links[2].name, force=(3.0, -2.0, 5.0), point=(0.2, 0.1, 0.4))]
     )
     assert_engines_agree(m, {"O1": [0.0], "O4": [0.0]}, redundant="minimum_norm", method=method)
+
+
+def test_another_freedom_is_held_where_the_one_held_no_longer_turns_the_body():
+    """The coupler of a planar RSSR keeps its direction while the crank makes a turn: no freedom at the crank can hold it all along.
+
+    At a held freedom the spin has rate one; where the line of the spheres comes to be across it, the others grow without bound.
+    """
+    corners = [(0, 0, 0), (1, 0, 0), (3.0, 2.4, 0), (3, 0, 0)]
+    m = known.ring("RSSR", corners, [known.Z, None, None, known.Z], name="planar RSSR")
+    system, x = assembled(m)
+    columns, _ = named_columns(m, system, {"O1": 0.0})
+    solver = closure_solver("dense", columns, np.array([m.freedom_names().index("O2.Rx")]))
+    path = DriverPath(system, solver, lambda variants: system)
+    turn = np.linspace(0, 2 * np.pi, 73)
+    found = follow(path, [Request(x, 0, turn[None], np.arange(73))], 73)
+    here = Configuration(system, found.x)
+
+    def fastest(which):
+        return np.abs(solver.factored(here, which).motions()).max(axis=(0, 1))
+
+    first = np.zeros(73, dtype=np.intp)
+    assert fastest(first).max() > 10 * PATH.held
+    worst = PATH.held / PATH.better  # another one is taken where it is that much better
+    assert fastest(solver.chosen(here, first)).max() <= worst
+    assert fastest(solver.chosen(here, found.which)).max() <= worst
+    assert len(set(found.which.tolist())) > 1
