@@ -41,8 +41,13 @@ def bad(*arguments: str | Path) -> str:
 def process(*arguments: str, **environment: str) -> "subprocess.CompletedProcess[str]":
     return subprocess.run(
         [sys.executable, "-m", "mechgraph", *arguments], capture_output=True, text=True, check=False,
-        env=os.environ | {"PYTHONPATH": str(ROOT)} | environment,
+        env=os.environ | {"PYTHONPATH": str(ROOT)} | environment, preexec_fn=heard if os.name == "posix" else None,
     )  # fmt: skip
+
+
+def heard() -> None:
+    """Let Ctrl-C be heard, also where the tests run in the background."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 @pytest.fixture
@@ -422,7 +427,7 @@ def test_interrupted(tmp_path: Path) -> None:
     running = subprocess.Popen(
         [sys.executable, "-m", "mechgraph", "solve", "7r", "--drive", "O1=0:100000:0.1", "--out", str(out)],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ | {"PYTHONPATH": str(ROOT)},
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # also where the tests run in the background
+        preexec_fn=heard,
     )  # fmt: skip
     for _ in range(20):  # a signal that arrives in a destructor is lost: as at a terminal, it is sent again
         time.sleep(3.0)

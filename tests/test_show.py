@@ -1,6 +1,12 @@
 """Pictures: what is drawn, for every mechanism of the library, and what is said without matplotlib."""
 
 import builtins
+import gc
+import os
+import random
+import signal
+import sys
+import warnings
 from typing import Any
 
 import matplotlib
@@ -137,3 +143,25 @@ def test_highlighted_loop_of_a_mechanism_that_was_not_solved() -> None:
         assert np.allclose(one.get_data_3d(), other.get_data_3d())
     with pytest.raises(mg.DeclarationError, match="there is no pair 'X'"):
         draw_skeleton(m, highlight=["X"])
+
+
+def test_nothing_outside_is_changed() -> None:
+    """No figure is left with pyplot; settings, warnings, random numbers, surroundings and numpy's errors stay as they were."""
+
+    def outside() -> list[Any]:
+        return [
+            plt.get_fignums(), dict(matplotlib.rcParams), list(warnings.filters), dict(os.environ), np.geterr(),
+            np.random.get_state()[1].tolist(), random.getstate(), gc.isenabled(), signal.getsignal(signal.SIGINT), os.getcwd(),  # noqa: NPY002
+            sys.excepthook, np.get_printoptions(),
+        ]  # fmt: skip
+
+    before = outside()
+    m = mg.load("rssr")
+    s = mg.solve(m, {"A": THETA})
+    draw_skeleton(s).figure.canvas.draw()
+    draw_skeleton(m)
+    effort_curve(s, "A")
+    mg.check(m)
+    mg.formulate(m).latex()
+    mg.study(m, {"coupler.mass": [0.08, 0.09]}, ["A.effort"], n=2)
+    assert outside() == before

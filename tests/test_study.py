@@ -329,7 +329,7 @@ def test_dask_cluster() -> None:
     ways = {"length[2]": scipy.stats.norm(0.4, 0.004)}
     here = mg.study(mg.load("rcsr"), ways, "O1.effort", n=6, seed=7, motions=RCSR)
     with (
-        distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as cluster,
         distributed.Client(cluster) as client,
     ):
         there = mg.study(mg.load("rcsr"), ways, "O1.effort", n=6, seed=7, motions=RCSR, executor=client.get_executor())

@@ -14,8 +14,8 @@ PALETTE = ("#0b6fa4", "#d1495b", "#2e8b57", "#e09f3e", "#6a4c93", "#00798c", "#8
 """Colours of moving links, in order and then again."""
 
 
-def pyplot() -> Any:
-    """``matplotlib.pyplot``.
+def new_axes(**options: Any) -> Any:
+    """Axes in a figure of their own, which pyplot does not keep: it goes when nobody holds it.
 
     Raises
     ------
@@ -23,10 +23,10 @@ def pyplot() -> Any:
         where matplotlib is not installed.
     """
     try:
-        import matplotlib.pyplot as plt
+        from matplotlib.figure import Figure
     except ImportError:
         raise MissingExtraError("matplotlib", "plot") from None
-    return plt
+    return Figure(layout="constrained").add_subplot(**options)
 
 
 def toolkit(name: str) -> Any:

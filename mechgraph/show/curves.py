@@ -8,7 +8,7 @@ import numpy as np
 
 from mechgraph.errors import DeclarationError
 from mechgraph.result.solution import Solution
-from mechgraph.show.canvas import INK, MUTED, PALETTE, pyplot
+from mechgraph.show.canvas import INK, MUTED, PALETTE, new_axes
 from mechgraph.units import unit_of
 
 
@@ -44,7 +44,7 @@ def effort_curve(s: Solution, freedom: str | None = None, *, ax: Any = None, mar
     if not np.nan_to_num(efforts["applied"]).any():
         efforts.pop("applied")
 
-    ax = pyplot().subplots(layout="constrained")[1] if ax is None else ax
+    ax = new_axes() if ax is None else ax
     unit = unit_of(m.units, (2, 1, -2) if couple else (1, 1, -2))
     length = unit_of(m.units, (1, 0, 0))
     marker, rows = "o" if order.shape[-1] == 1 else "", order.reshape(-1, order.shape[-1])
@@ -59,7 +59,9 @@ def effort_curve(s: Solution, freedom: str | None = None, *, ax: Any = None, mar
     ax.set_ylabel(f"{'torque' if couple else 'force'} {who}" + (f" [{unit}]" if unit else ""), color=INK)
     if turns and np.nanmax(order) - np.nanmin(order) > 90:
         step = next(d for d in (30, 45, 60, 90, 180, 360, 1e9) if (np.nanmax(order) - np.nanmin(order)) / d <= 8)
-        ax.xaxis.set_major_locator(pyplot().MultipleLocator(step))
+        from matplotlib.ticker import MultipleLocator
+
+        ax.xaxis.set_major_locator(MultipleLocator(step))
     ax.spines[["top", "right"]].set_visible(False)
     ax.grid(True, color="#e4e7eb", lw=0.8)
     ax.set_axisbelow(True)

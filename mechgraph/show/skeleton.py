@@ -15,7 +15,7 @@ from mechgraph.errors import DeclarationError
 from mechgraph.force.applied_loads import user_poses
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.result.solution import Solution
-from mechgraph.show.canvas import FAINT, INK, MUTED, PALETTE, pyplot, toolkit
+from mechgraph.show.canvas import FAINT, INK, MUTED, PALETTE, new_axes, toolkit
 
 FLAT = 1e-6
 """Thickness over extent below which a mechanism is drawn as a plane one."""
@@ -98,7 +98,7 @@ def draw_skeleton(
     ----------
     s : a solution; or a mechanism with geometry, which is drawn where its loops are closed.
     position : flat index of the position drawn in full.
-    ax : three-dimensional axes of matplotlib; new ones where left out.
+    ax : three-dimensional axes of matplotlib; new ones where left out, in a figure of their own: ``ax.figure.savefig(...)``.
     ghosts : number of further positions, drawn faintly.
     traces : whether to draw the paths of pair points; or the names of the pairs whose paths are drawn.
     labels : names of pairs (with their type) and links.
@@ -122,7 +122,7 @@ def draw_skeleton(
     shape = _shape(m, poses, good)
     t = int(np.searchsorted(shape.good, position % size))
     if ax is None:
-        ax = pyplot().figure(layout="constrained").add_subplot(projection="3d")
+        ax = new_axes(projection="3d")
     names = [p.name for p in m.pairs] if traces is True else [] if traces is False else list(traces)
     colours = _colours(m, chosen)
     for i in np.unique(np.linspace(0, shape.good.size - 1, ghosts + 1).astype(int)) if ghosts else ():
