@@ -17,7 +17,7 @@ from strategies import body
 
 import mechgraph as mg
 from mechgraph.closure import tree
-from mechgraph.closure.assembly import assembled
+from mechgraph.closure.assembly import assembled, scaled_start
 from mechgraph.closure.bordering import LoopSystem
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.tree import Tree
@@ -225,6 +225,20 @@ def test_dependent_rows_and_columns_are_no_proof() -> None:
     system, x = assembled(known.concurrent_cranks())
     loops = LoopSystem.at(Configuration(system, x[:, None]), np.zeros(0, dtype=np.intp))
     assert not loops.regular
+
+
+@pytest.mark.parametrize(
+    "m", [*map(mg.load, ("rcsr", "7r", "pphchp", "r-sg-c")), ladder(40), scissors(6000)], ids=lambda m: m.name
+)
+def test_the_poses_of_a_start_are_taken_over_when_it_is_scaled(m: mg.Mechanism) -> None:
+    """They are those of the scaled system, at the first call and where the start is known."""
+    for here in (scaled_start(m), scaled_start(m.replace(loads=[]))):
+        fresh = Configuration(here.system, here.x)
+        points = here.pair_points - here.pair_points.mean(axis=1, keepdims=True)
+        assert_allclose(here.poses, fresh.poses, atol=1e-11)
+        assert_allclose(here.S, fresh.S, atol=1e-11)
+        assert_allclose(here.pair_points.mean(axis=1), 0, atol=1e-12)
+        assert 0.5 < np.sqrt((points**2).sum(axis=0).mean()) < 2
 
 
 def test_factors_of_one_pattern_are_renewed() -> None:

@@ -136,7 +136,9 @@ class LoopSystem(ReducedRows):
         self._touch = scipy.sparse.csr_array((np.ones(len(self._inner[0])), self._inner[:2]), shape=shape)
         match = scipy.sparse.csgraph.maximum_bipartite_matching(self._touch, perm_type="column")
         self._left_rows = np.flatnonzero(match < 0).astype(np.intp)
-        self._left_cols = np.setdiff1d(np.arange(self._n), match[match >= 0])
+        left = np.ones(self._n, dtype=bool)
+        left[match[match >= 0]] = False
+        self._left_cols = np.flatnonzero(left)
         self._matched = int((match >= 0).sum())
         self.shared, self.held = len(self._left_rows), self._motions + len(self._left_cols)
         self.redundant = self.rows.count - (self._matched - self._motions)
