@@ -26,6 +26,8 @@ def real_array(value: Any) -> NDArray[np.float64] | None:
     Numbers are integers and floats, Python's and numpy's, and sequences and arrays of them. Texts, true and false, complex numbers,
     dates, masked arrays and quantities are none.
     """
+    if type(value) is np.ndarray and value.dtype == float:
+        return value
     if not _is_real(value, DEEPEST):
         return None
     try:

@@ -25,13 +25,13 @@ def plain(value: Any) -> Any:
     if value is None or kind is float or kind is str or (kind is tuple and all_floats(value)) or callable(value):
         return value
     array = real_array(value)
-    return value if array is None else _as_tuples(array.tolist())
+    return value if array is None else _as_tuples(array.tolist(), array.ndim)
 
 
-def _as_tuples(value: Any) -> Any:
-    if not isinstance(value, list):
-        return value
-    return tuple(value) if all_floats(value) else tuple([_as_tuples(v) for v in value])
+def _as_tuples(value: Any, depth: int) -> Any:
+    if depth < 2:
+        return tuple(value) if depth else value
+    return tuple([_as_tuples(v, depth - 1) for v in value])
 
 
 def vector_fault(value: Any, what: str, *, direction: bool = False) -> str | None:
