@@ -92,12 +92,12 @@ def is_quantity(value: Any) -> bool:
     return hasattr(value, "units") or hasattr(value, "unit")
 
 
-def has_quantity(value: Any) -> bool:
+def has_quantity(value: Any, depth: int = DEEPEST) -> bool:
     """Whether a value is a quantity or a sequence with one."""
     if type(value) is float or value is None:
         return False
     if isinstance(value, list | tuple):
-        return not set(map(type, value)) <= _PLAIN and any(map(has_quantity, value))
+        return depth > 0 and not set(map(type, value)) <= _PLAIN and any(has_quantity(v, depth - 1) for v in value)
     return not isinstance(value, str) and is_quantity(value)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mechgraph.errors import DeclarationError
-from mechgraph.quantities import real_array, shown, wrong
+from mechgraph.quantities import LARGEST, is_numeric, real_array, shown, wrong
 
 __all__ = ["box", "cylinder", "from_components", "physical_faults", "rod", "shifted", "sphere"]
 
@@ -29,7 +29,7 @@ def _numbers(value: ArrayLike, what: str, shape: tuple[int, ...] = (), sign: str
         found is None
         or found.shape != shape
         or not np.isfinite(found).all()
-        or (sign and not (found > 0 if sign == "positive" else found >= 0).all())
+        or (sign and not ((found > 0 if sign == "positive" else found >= 0) & (found < LARGEST)).all())
     ):
         count = {(): "a finite number", (3,): "three finite numbers", (3, 3): "3 x 3 finite numbers"}[shape]
         raise DeclarationError("inertia", [wrong(value, what, f"{count}{sign and ', '}{sign}")])
@@ -267,6 +267,8 @@ def physical_faults(inertia: ArrayLike, tol: float = 1e-9) -> list[str]:
         One sentence a fault, with the values. The first fault that makes the further questions meaningless
         ends the list.
     """
+    if not is_numeric(tol, ()):
+        raise DeclarationError("inertia", [wrong(tol, "tol", "a finite number")])
     tensor = real_array(inertia)
     if tensor is None:
         return [f"inertia must be a 3 x 3 array of numbers, got {shown(inertia)}"]

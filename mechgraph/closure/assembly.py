@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -16,10 +16,11 @@ from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
 from mechgraph.closure.solver import closure_solver, engine_for
 from mechgraph.errors import AssemblyError, DeclarationError
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.pair import Marker
 from mechgraph.numerics.linear import complement
 from mechgraph.numerics.newton import closest_zeros, least_norm_steps
 from mechgraph.numerics.tolerances import PATH
-from mechgraph.quantities import is_numeric, wrong
+from mechgraph.quantities import is_numeric, shown, wrong
 
 CLOSED = 1e-10
 """Closure error (angle, or length / L) up to which loops count as closed."""
@@ -31,6 +32,10 @@ ASSEMBLY_RANK = 1e-9
 """Relative singular value below which a direction is left alone while closing."""
 RESTARTS = 40
 """Perturbed guesses tried where the declared one does not lead to a closed position (fixed seed), all of them together."""
+ASKEW = 1.0
+"""Closure error (radians) from which on a reversed marker axis is looked for."""
+MOST_REVERSED = 30
+"""Pairs up to which that is done: every marker may cost an assembly."""
 FIRST = 8
 """How many of them are tried before the others; an even number, as they are of two kinds in turn."""
 
@@ -183,34 +188,76 @@ def closed_start(m: Mechanism, preferred: Mapping[str, float] | None = None) -> 
         return scaled(Configuration(system, close_all(system, here.x, np.arange(0))[0]))
     x, error = _search(m, system, x, preferred or {})
     if error > CLOSED:
+        turned = _opposite_axis(m, preferred or {}, error)
         best = dict(zip(m.freedom_names(), system.coordinates_of(x[:, None])[:, 0].tolist(), strict=True))
         raise AssemblyError(
             f"mechanism {m.name!r}: the loops cannot be closed near start; the smallest closure error found is {error:.3g} "
-            f"(largest of angle in radians and length / L, L = {system.par.L:.4g}). Check the dimensions, or give another start",
+            f"(largest of angle in radians and length / L, L = {system.par.L:.4g}). "
+            f"{turned or 'Check the dimensions, or give another start'}",
             error,
             best,
         )
     return scaled(Configuration(system, x[:, None]))
 
 
-def _search(m: Mechanism, system: System, x: Array, preferred: Mapping[str, float]) -> tuple[Array, float]:
+def _opposite_axis(m: Mechanism, preferred: Mapping[str, float], error: float) -> str:
+    """Which marker axis points the opposite way, in words, where the loops close with the axis of a single marker reversed.
+
+    Reversing any of several markers may close the loops; of these the axis most opposed to all others is named. Tried only where the
+    loops miss by much and in few pairs: every try is an assembly.
+    """
+    marked = [k for k, pair in enumerate(m.pairs) if pair.on_a is not None]
+    if error < ASKEW or not 0 < len(marked) <= MOST_REVERSED:
+        return ""
+    axes = np.array(
+        [[np.asarray(marker.axis) / np.linalg.norm(marker.axis) for marker in m.pairs[k].markers] for k in marked]
+    )
+    agreement = axes @ axes.sum(axis=(0, 1))
+    for place in np.argsort(agreement, axis=None, kind="stable").tolist():
+        k, side = marked[place // 2], ("on_a", "on_b")[place % 2]
+        pair = m.pairs[k]
+        marker = getattr(pair, side)
+        other = pair.replace(**{side: Marker(marker.point, tuple(-v for v in marker.axis), marker.second)})
+        changed = m.replace(pairs=[*m.pairs[:k], other, *m.pairs[k + 1 :]])
+        q = indexed(changed).start_coordinates(m.start)
+        system = scaled_system(changed, q)
+        attempts = _attempts(changed, system, system.state_of(q[:, None])[:, 0], preferred)
+        if _closed_nearby(system, attempts)[1] <= CLOSED:
+            return f"They close with the axis of marker {side} of pair {pair.name!r} reversed: {shown(marker.axis)} points the opposite way"
+    return ""
+
+
+def _attempts(m: Mechanism, system: System, x: Array, preferred: Mapping[str, float]) -> list[tuple[Array, Index]]:
+    """Guesses to close from, and the freedoms kept at each."""
     drives, _ = named_columns(m, system, {d.freedom: 0.0 for d in m.drives})
     columns, values = named_columns(m, system, preferred)
     at_preferred = x.copy()
     at_preferred[system.single_rows[columns]] = values
-    attempts = (
+    return (
         [(x, drives), (at_preferred, columns), (x, np.arange(0))]
         if m.start
         else [(at_preferred, columns), (x, drives), (x, np.arange(0))]
     )
-    rng = np.random.default_rng(20231)
-    best, best_error = x, np.inf
+
+
+def _closed_nearby(system: System, attempts: Sequence[tuple[Array, Index]]) -> tuple[Array, float]:
+    """The state closed from the first guess that leads to one, else the best; its closure error."""
+    best, best_error = attempts[0][0], np.inf
     for guess, fixed in attempts:
         closed, error = close(system, guess, fixed)
         if error < best_error:
             best, best_error = closed, error
         if error <= CLOSED:
-            return closed, error
+            break
+    return best, best_error
+
+
+def _search(m: Mechanism, system: System, x: Array, preferred: Mapping[str, float]) -> tuple[Array, float]:
+    attempts = _attempts(m, system, x, preferred)
+    best, best_error = _closed_nearby(system, attempts)
+    if best_error <= CLOSED:
+        return best, best_error
+    rng = np.random.default_rng(20231)
     guesses = []
     for i in range(RESTARTS):
         guess, fixed = attempts[i % 2]

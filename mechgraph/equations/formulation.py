@@ -15,7 +15,9 @@ from mechgraph.equations.printing import coefficient_rows, formulation_document
 from mechgraph.equations.state import State
 from mechgraph.equations.symbols import Words, factor
 from mechgraph.equations.terms import Block, Ledger, LedgerRow, ScalarEquation, Screw, Term, Unknown
+from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.quantities import wrong
 from mechgraph.writing import cell, csv_of
 
 
@@ -75,6 +77,8 @@ class Formulation:
 
     def entries(self, state: State) -> Array:
         """Values of all coefficients ``(terms, T)`` in the order of ``pattern``."""
+        if not isinstance(state, State):
+            raise DeclarationError("assemble", [wrong(state, "state", "a State; s.state(i) of a Solution is one")])
         T = state.loads.shape[2]
         values = np.ones((1 + 6 * len(self.screws), T))
         for i, screw in enumerate(self.screws):

@@ -120,7 +120,7 @@ def chain(
 
 def _first_freedom(pairs: list[Pair], drive: str) -> str:
     """The drive as given; for a pair with several freedoms its first."""
-    pair = next((p for p in pairs if p.name == drive), None)
+    pair = next((p for p in pairs if isinstance(drive, str) and p.name == drive), None)
     return pair.freedom_names[0] if pair is not None and pair.type.f > 1 else drive
 
 

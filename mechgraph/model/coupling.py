@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from mechgraph.model.field_format import COEFFICIENTS, NUMBER, TEXT, Described
 from mechgraph.model.numeric import number_fault, plain
-from mechgraph.quantities import is_numeric, without_units, wrong
+from mechgraph.quantities import is_numeric, shown, without_units, wrong
 from mechgraph.units import LENGTH, PURE
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ class Coupling(Described):
     @property
     def freedoms(self) -> tuple[str, ...]:
         """Names of the freedoms, in order."""
-        return tuple(freedom for freedom, _ in self.terms)
+        return tuple(freedom for freedom, _ in self.terms) if _is_terms(self.terms) else ()
 
     @property
     def coefficients(self) -> tuple[float, ...]:
@@ -62,7 +62,7 @@ class Coupling(Described):
 
     def faults(self, m: Mechanism) -> list[str]:
         """What is wrong with this coupling in a mechanism, one line each."""
-        where = f"coupling {self.name!r}: "
+        where = f"coupling {shown(self.name)}: "
         if not isinstance(self.name, str):
             return [wrong(self.name, "coupling: name", "a text")]
         if not _is_terms(self.terms):
@@ -84,6 +84,8 @@ class Coupling(Described):
 
     def in_own_units(self, units: Mapping[str, str], turns: Sequence[bool]) -> Coupling:
         """The same with quantities of pint as plain numbers in these units; ``turns`` says which freedoms are angles."""
+        if not _is_terms(self.terms):
+            return self
         slides = not any(turns)
         terms = [
             (name, plain(without_units(c, PURE if slides or turn else (-1, 0, 0), units)))

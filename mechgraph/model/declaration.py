@@ -110,7 +110,7 @@ def _end_faults(m: Mechanism, names: Sequence[str]) -> list[str]:
                 faults.append(f"pair {pair.name!r}: link {end!r} is not declared (links: {declared})")
     if not isinstance(m.frame, str) or m.frame not in known:
         faults.append(f"frame {shown(m.frame)}: is no link (links: {declared})")
-    elif all_known:
+    elif all_known and len(names) == len(m.links):
         faults += _connection_faults(m)
     return faults
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from mechgraph.algebra.inertia import physical_faults
 from mechgraph.model.field_format import FLAG, NUMBER, POINT, TENSOR, TEXT, Described
-from mechgraph.quantities import is_numeric
+from mechgraph.quantities import is_numeric, shown
 from mechgraph.units import INERTIA, LENGTH, MASS
 
 
@@ -52,16 +52,16 @@ class Link(Described):
 
     def faults(self) -> list[str]:
         """What is wrong with this link, one line each."""
-        where = f"link {self.name!r}: "
+        where = f"link {shown(self.name)}: "
         if not isinstance(self.name, str) or not self.name:
-            return [f"link {self.name!r}: the name must be a non-empty text"]
+            return [f"{where}the name must be a non-empty text"]
         found = self.value_faults(where)
         if self.center is None and is_numeric(self.mass, ()) and self.mass > 0:
             found.append(f"{where}mass = {self.mass:g} without a center; give center=(x, y, z)")
         if is_numeric(self.inertia, (3, 3)):
             if self.center is None:
                 found.append(f"{where}inertia without a center; give center=(x, y, z)")
-            if self.mass == 0 and np.any(self.inertia):
+            if is_numeric(self.mass, ()) and self.mass == 0 and np.any(self.inertia):
                 found.append(f"{where}inertia without mass; give mass=")
             if not self.unphysical:
                 impossible = physical_faults(self.inertia)

@@ -26,6 +26,7 @@ from mechgraph.model.field_format import (
 )
 from mechgraph.model.link import Link
 from mechgraph.model.numeric import same_fields
+from mechgraph.quantities import shown
 from mechgraph.units import ACCELERATION, FORCE, LENGTH, MOMENT
 
 Value = Any
@@ -114,7 +115,8 @@ class _Load(Described):
     @property
     def where(self) -> str:
         """Which load it is, for messages."""
-        return f"{self.subject.format(**vars(self))}: "
+        names = {name: shown(getattr(self, name)) for name in self.formats}
+        return f"{self.subject.format(**names)}: "
 
     def faults(self, names: Nameable) -> list[str]:
         """What is wrong with this load."""
@@ -176,7 +178,7 @@ class Wrench(_Load):
     """
 
     kind: ClassVar[str] = "wrench"
-    subject: ClassVar[str] = "wrench on {link!r}"
+    subject: ClassVar[str] = "wrench on {link}"
     link: Annotated[str, LINK_NAME("the link it acts on")]
     force: Annotated[Value, VECTOR_SERIES("at least one of the two", FORCE, default="none")] = None
     moment: Annotated[Value, VECTOR_SERIES("at least one of the two", MOMENT, default="none")] = None
@@ -219,7 +221,7 @@ class Effort(_Load):
     """
 
     kind: ClassVar[str] = "effort"
-    subject: ClassVar[str] = "effort in {freedom!r}"
+    subject: ClassVar[str] = "effort in {freedom}"
     freedom: Annotated[str, FREEDOM_NAME("the freedom, e.g. D or B.Rx", single=False)]
     value: Annotated[Value, SERIES("couple about a turn, force along a slide; + on link b, - on link a", FORCE, MOMENT)]
 
@@ -236,7 +238,7 @@ class Spring(_Load):
     """
 
     kind: ClassVar[str] = "spring"
-    subject: ClassVar[str] = "spring {a!r} - {b!r}"
+    subject: ClassVar[str] = "spring {a} - {b}"
     between_links: ClassVar[bool] = True
     a: Annotated[str, LINK_NAME("first link")]
     b: Annotated[str, LINK_NAME("second link")]
@@ -265,7 +267,7 @@ class TorsionSpring(_Load):
     """A spring (and damper) in a single freedom: effort ``-stiffness (q - free) - damping dq/dt``; for turns and slides."""
 
     kind: ClassVar[str] = "torsion_spring"
-    subject: ClassVar[str] = "torsion spring in {freedom!r}"
+    subject: ClassVar[str] = "torsion spring in {freedom}"
     freedom: Annotated[str, FREEDOM_NAME("a single turn or slide")]
     stiffness: Annotated[float, NUMBER("effort per coordinate", FORCE_PER_LENGTH, MOMENT)]
     free: Annotated[float, NUMBER("coordinate without effort", **POSITION)] = 0.0

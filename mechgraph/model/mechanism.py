@@ -125,7 +125,7 @@ class Mechanism(Formatted):
 
     def _take_quantities(self) -> bool:
         """Turn quantities of pint into plain numbers, where units are declared; whether there may have been any."""
-        if not self.units:
+        if not self.units or not all(isinstance(pair, Pair) for pair in self.pairs):
             return False
         new: dict[str, list[Any]] = {
             "links": [item.without_quantities(self.units) for item in self.links if isinstance(item, Link)],
@@ -375,6 +375,9 @@ class Mechanism(Formatted):
 
         Needs the present units declared.
         """
+        faults = [wrong(unit, name, "the name of a unit") for name, unit in units.items() if not isinstance(unit, str)]
+        if faults:
+            raise DeclarationError("to_units", faults)
         base, turns = base_factors(self.units, units), self.turns
         return self.replace(
             links=[link.in_units(base) for link in self.links],
@@ -388,8 +391,8 @@ class Mechanism(Formatted):
 
     def moved(self, pose: Any) -> Mechanism:
         """The whole mechanism after a rigid motion: a 4 x 4 (or 3 x 4) pose. Coordinates of the pairs stay what they are."""
-        given = np.asarray(pose, dtype=float) if is_numeric(pose, np.shape(pose)) else np.zeros(0)
-        G = given[:3] if given.shape in ((4, 4), (3, 4)) else np.zeros((3, 4))
+        fits = is_numeric(pose, (4, 4)) or is_numeric(pose, (3, 4))
+        G = np.asarray(pose, dtype=float)[:3] if fits else np.zeros((3, 4))
         R = G[:, :3]
         if np.abs(R @ R.T - np.eye(3)).max() > 1e-9 or np.linalg.det(R) < 0:
             raise DeclarationError(f"mechanism {self.name!r}", ["moved: expected a 4 x 4 pose with a proper rotation"])
@@ -422,7 +425,10 @@ def _named(items: tuple[Any, ...], pairs: Iterable[Any]) -> tuple[Any, ...]:
         return ()
     taken = {getattr(item, "name", None) for item in (*items, *pairs) if isinstance(getattr(item, "name", None), str)}
     free = (name for name in (f"g{i}" for i in itertools.count(1)) if name not in taken)
-    return tuple(c.replace(name=next(free)) if isinstance(c, Coupling) and c.name == "" else c for c in items)
+    return tuple(
+        c.replace(name=next(free)) if isinstance(c, Coupling) and isinstance(c.name, str) and not c.name else c
+        for c in items
+    )
 
 
 def _places(names: Iterable[Any]) -> dict[Any, int]:

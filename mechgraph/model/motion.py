@@ -189,11 +189,11 @@ class Motion(Described):
         rule: Law
         if callable(name):
             rule, title = Smooth(name), f"motion law {getattr(name, '__name__', name)!r}"
-        elif name in LAWS:
+        elif isinstance(name, str) and name in LAWS:
             rule, title = LAWS[name], f"motion law {name!r}"
         else:
             raise DeclarationError(
-                "motion law", [f"no law is named {name!r}; use {', '.join(LAWS)} or a callable of t"]
+                "motion law", [f"no law is named {shown(name)}; use {', '.join(LAWS)} or a callable of t"]
             )
         numeric: dict[str, Any] = {"rise": rise, "duration": duration, "start": start, "speed": speed}
         everything: dict[str, Any] = {**numeric, "samples": samples, "degree": degree}

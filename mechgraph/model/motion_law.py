@@ -16,7 +16,7 @@ import scipy
 from numpy.polynomial import Polynomial, chebyshev
 from numpy.typing import NDArray
 
-from mechgraph.quantities import real_array, wrong
+from mechgraph.quantities import real_array, shown, wrong
 
 Array = NDArray[np.float64]
 Rates = tuple[Array, Array, Array]
@@ -143,8 +143,10 @@ class Sampled:
         """Return position, velocity and acceleration at t; outside the range of the samples is a fault."""
         times, values = _checked_samples(given["samples"])
         degree = given.get("degree", 5 if times.size >= 6 else 3)
-        if degree not in (3, 5) or times.size <= degree:
-            raise LawFault(f"degree must be 3 (from 4 samples) or 5 (from 6), got {degree!r} with {times.size} samples")
+        if type(degree) is not int or degree not in (3, 5) or times.size <= degree:
+            raise LawFault(
+                f"degree must be 3 (from 4 samples) or 5 (from 6), got {shown(degree)} with {times.size} samples"
+            )
         margin = RANGE_TOLERANCE * (times[-1] - times[0])
         outside = t[(t < times[0] - margin) | (t > times[-1] + margin)]
         if outside.size:

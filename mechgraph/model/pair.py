@@ -190,9 +190,9 @@ class Pair(Described):
 
     def faults(self) -> list[str]:
         """What is wrong with this pair alone, one line each."""
-        where = f"pair {self.name!r}: "
+        where = f"pair {shown(self.name)}: "
         if not isinstance(self.name, str) or not self.name:
-            return [f"pair {self.name!r}: the name must be a non-empty text"]
+            return [f"{where}the name must be a non-empty text"]
         if not isinstance(self.type, PairType):
             return [f"{where}unknown type {shown(self.type)}; known: {', '.join(TABLE)}, or pass a PairType"]
         found: list[str | None] = [
@@ -200,7 +200,7 @@ class Pair(Described):
             for side, end in (("a", self.a), ("b", self.b))
             if not isinstance(end, str | None)
         ]
-        if self.a == self.b:
+        if isinstance(self.a, str) and isinstance(self.b, str) and self.a == self.b:
             found.append(f"{where}joins link {self.a!r} to itself; a pair joins two links")
         found += list(self._pitch_faults(where))
         if (self.on_a is None) != (self.on_b is None):
@@ -226,7 +226,9 @@ class Pair(Described):
     def _pitch_faults(self, where: str) -> Iterator[str | None]:
         given = [(n, v) for n, v in (("pitch", self.pitch), ("lead", self.lead)) if v is not None]
         if not self.type.takes_pitch:
-            yield from (f"{where}{n} = {v!r}: type {self.type.symbol} has no pitch; leave it out" for n, v in given)
+            yield from (
+                f"{where}{n} = {shown(v)}: type {self.type.symbol} has no pitch; leave it out" for n, v in given
+            )
         elif len(given) == 2:
             yield f"{where}has both pitch and lead; give exactly one (lead = 2 pi pitch)"
         elif not given and self.has_geometry:

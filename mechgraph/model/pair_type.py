@@ -183,6 +183,8 @@ def _component(item: object, faults: list[str], what: str) -> Component | None:
         found = _name_fault(item.name, what) + _six_faults(
             item.wrench, item.per_pitch, f"{what} {shown(item.name)}: wrench"
         )
+        if not isinstance(item.at_b, bool):
+            found.append(wrong(item.at_b, f"{what} {shown(item.name)}: at_b", "true or false"))
         if type(item.frame) is not int:
             found.append(wrong(item.frame, f"{what} {shown(item.name)}: frame", "a whole number"))
         faults += found
@@ -377,7 +379,7 @@ def fill_row(
         )
     fields = {
         "symbol": symbol,
-        "name": name or str(symbol),
+        "name": symbol if isinstance(name, str) and not name else name,
         "freedoms": rows,
         "reactions": parts,
         "efforts": work,

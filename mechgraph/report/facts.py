@@ -86,7 +86,7 @@ class Facts:
 
     def ledger(self, bookkeeping: BookkeepingName = "lee") -> Ledger:
         """Unknowns against equations in a bookkeeping, ``"lee"`` or ``"minimal"``."""
-        countable = bookkeeping in list(BOOKKEEPINGS) and not self.mechanism.couplings
+        countable = isinstance(bookkeeping, str) and bookkeeping in BOOKKEEPINGS and not self.mechanism.couplings
         if countable:
             return counted_ledger(self.mechanism, bookkeeping)
         return formulate(self.mechanism, bookkeeping).ledger()

@@ -13,6 +13,7 @@ from mechgraph.errors import MechgraphError
 from mechgraph.force.applied_loads import user_poses, user_twists
 from mechgraph.force.dalembert import internal_state
 from mechgraph.model.parameters import Parameters
+from mechgraph.quantities import shown
 
 
 def user_wrench(par: Parameters, f: Array) -> Array:
@@ -65,11 +66,11 @@ def flat_place(batch: tuple[int, ...], index: Any) -> int:
     """
     try:
         flat = np.arange(int(np.prod(batch))).reshape(batch)[index]
-    except IndexError:
-        text = f"state({index!r}): no such position in a batch {batch}; give one index an axis"
+    except (IndexError, ValueError, TypeError):
+        text = f"state({shown(index)}): no such position in a batch {batch}; give one index an axis"
         raise MechgraphError(text) from None
     if np.ndim(flat):
         raise MechgraphError(
-            f"state({index!r}): names {np.size(flat)} positions of a batch {batch}; give one index an axis"
+            f"state({shown(index)}): names {np.size(flat)} positions of a batch {batch}; give one index an axis"
         )
     return int(flat)

@@ -10,6 +10,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.quantities import shown, wrong
 from mechgraph.result.solution import Solution
 from mechgraph.result.views import LinkResult, PairResult
 
@@ -41,7 +42,8 @@ def named_outputs(m: Mechanism, outputs: Any, parameters: Iterable[str]) -> dict
     if not isinstance(outputs, Mapping):
         if not isinstance(outputs, Iterable) or not all(isinstance(name, str) for name in outputs):
             raise DeclarationError(
-                "study: outputs", [f"{outputs!r}: expected names, or a mapping name -> name or function of a Solution"]
+                "study: outputs",
+                [wrong(outputs, "outputs", "names, or a mapping name -> name or function of a Solution")],
             )
         outputs = {name: name for name in outputs}
     faults = [
@@ -64,7 +66,7 @@ def _fault(m: Mechanism, name: str, what: Any) -> str | None:
         return None
     pair = m.pairs[0]
     return (
-        f"{name!r}: {what!r} is no quantity; expected e.g. '{pair.name}.effort', '{pair.name}.position', "
+        f"{shown(name)}: {shown(what)} is no quantity; expected e.g. '{pair.name}.effort', '{pair.name}.position', "
         f"'{pair.freedom_names[0] if pair.freedom_names else pair.name}', '{pair.name}:{(*pair.type.component_names, 'Fx')[0]}', "
         f"'{m.links[-1].name}.center', 'shaking', or a function of a Solution"
     )

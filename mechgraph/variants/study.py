@@ -101,11 +101,8 @@ def study(
         raise DeclarationError("study", faults)
     source, given = _source(m, ways, motions)
     kept = named_outputs(source.mechanism, outputs, ways)
-    count = grid_size(list(ways.values()), int(n)) if sampling == "grid" else int(n)
-    if count > MOST_VARIANTS:
-        raise DeclarationError(
-            "study", [f"{sampling}, n = {n}: these are {count:.3g} variants; at most {MOST_VARIANTS} are solved"]
-        )
+    if sampling == "grid" and (count := grid_size(list(ways.values()), int(n))) > MOST_VARIANTS:
+        raise DeclarationError("study", [f"a grid of {count:.3g} variants: at most {MOST_VARIANTS} are solved"])
     values = SAMPLINGS[sampling](list(ways.values()), int(n), np.random.default_rng(seed))
     paths = {name: _rows_of(name, motion, values.shape[1]) for name, motion in given.items()}
     steps = np.array(
@@ -136,6 +133,8 @@ def _argument_faults(
     for what, value, least in (("n", n, 1), ("seed", seed, 0)):
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
             faults.append(wrong(value, what, f"a whole number, at least {least}"))
+        elif what == "n" and value > MOST_VARIANTS:
+            faults.append(wrong(value, what, f"at most {MOST_VARIANTS} variants"))
     if executor is not None and not hasattr(executor, "submit"):
         faults.append(wrong(executor, "executor", "an Executor of concurrent.futures"))
     if progress is not None and not callable(progress):
