@@ -219,7 +219,7 @@ def contexts(tree: Path) -> dict[str, Any]:
     found.read()
     lines = {
         Path(file).relative_to(tree).as_posix(): {
-            str(line): sorted(filter(None, tests)) for line, tests in found.contexts_by_lineno(file).items()
+            str(line): sorted(tests) for line, tests in found.contexts_by_lineno(file).items()
         }
         for file in found.measured_files()
     }
@@ -229,14 +229,13 @@ def contexts(tree: Path) -> dict[str, Any]:
 def tests_of(mutant: Mutant, known: dict[str, Any], budget: float) -> tuple[list[str], int]:
     """Tests for a mutant, quick ones first, as many as ``budget`` seconds hold, and how many there are.
 
-    Those that execute its line, or another one of its statement; for what runs at the import alone those that execute anything in its file.
+    Those that execute its line, or another one of its statement; for what runs at the import those that execute anything in its file.
     """
     lines, seconds = known["lines"].get(mutant.file, {}), known["seconds"]
-    statement = (test for line in range(mutant.first, mutant.line) for test in lines.get(str(line), ()))
-    at_import = (test for tests in lines.values() for test in tests)
-    found = set(lines.get(str(mutant.line), ())) or set(statement)
-    if not found and str(mutant.first) in lines:
-        found = set(at_import)
+    statement = {test for line in range(mutant.first, mutant.line) for test in lines.get(str(line), ())}
+    found = set(lines.get(str(mutant.line), ())) or statement
+    if "" in found:  # the context of the import
+        found = {test for tests in lines.values() for test in tests}
     ordered = sorted(found & seconds.keys(), key=lambda test: (seconds[test], test))
     total, chosen = 0.0, []
     for test in ordered:
