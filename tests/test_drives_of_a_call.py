@@ -54,3 +54,22 @@ def test_a_study_takes_the_drives_of_its_call(built: bool) -> None:
     study = mg.study(made, {name: [1.0, 2.0]}, ["D.effort", "A.effort"], motions={"D": [0.0, 0.1]}, sampling="grid")
     np.testing.assert_allclose(study.outputs["D.effort"], [[-1, -1], [-2, -2]], rtol=1e-10)
     assert not study.outputs["A.effort"].any()
+
+
+def test_a_landing_gear_at_its_lock_is_solved_from_its_knee() -> None:
+    """The strut is stretched, so the leg that is declared as the drive stands still: a named error; a call that drives the knee solves all.
+
+    By hand: 100 on the wheel, 2 below the hinge, against the strut at 45 degrees from 1 below: its horizontal part is 200, and the lock
+    takes no torque.
+    """
+    gear = mg.Mechanism("gear", pairs=[
+        mg.Pair("A", "R", "frame", "leg", point=(0, 0, 0), axis=Z), mg.Pair("B", "R", "leg", "lower", point=(0, -1, 0), axis=Z),
+        mg.Pair("C", "R", "lower", "upper", point=(0.5, -0.5, 0), axis=Z), mg.Pair("D", "R", "upper", "frame", point=(1, 0, 0), axis=Z),
+    ], drives=["A"], loads=[mg.Wrench("leg", force=(-100.0, 0, 0), point=(0, -2, 0))])  # fmt: skip
+    with pytest.raises(mg.DeadPointError, match=r"A\.Rz stands still"):
+        mg.solve(gear, {"A": 0.0})
+    s = mg.solve(gear, {"C": 0.0})
+    assert s["A"].components["Fx"] == pytest.approx(-100.0)
+    assert s["B"].components["Fx"] == pytest.approx(-200.0)
+    assert s["B"].components["Fy"] == pytest.approx(-200.0)
+    assert abs(s["C"].effort[0]) < 1e-11
