@@ -82,6 +82,7 @@ FEW = {
 }
 
 
+@pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
 @given(name=st.sampled_from(list(FEW)), seed=st.integers(0, 999), many=st.booleans(), least=st.booleans())
 def test_sparse_and_dense_agree(name: str, seed: int, many: bool, least: bool) -> None:
     m = heavy(FEW[name](), seed)
@@ -195,6 +196,7 @@ def test_small_mechanisms_are_dense_and_what_is_left_free_is_an_error_on_both_en
             mg.solve(free, {"N0_0v0_0": 0.0}, engine=engine)
 
 
+@pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
 def test_passive_freedoms_are_the_same_on_both_engines() -> None:
     m = heavy(mg.load("rssr").replace(loads=()), 3)
     turns = np.linspace(0.0, 2.0, 9)
