@@ -15,6 +15,7 @@ from mechgraph.errors import (
     MechgraphWarning,
     MissingExtraError,
     ReachError,
+    ResponseError,
 )
 from mechgraph.kinetostatics import assemble, kinematics, solve
 from mechgraph.model.chain import chain
@@ -30,6 +31,7 @@ from mechgraph.model.pair_table import pair_types
 from mechgraph.model.pair_type import Bookkeeping, Component, Freedom, PairType
 from mechgraph.model.toml import load, save
 from mechgraph.report.report import DeterminacyReport, check
+from mechgraph.response.respond import Response, respond
 from mechgraph.result.solution import Solution
 from mechgraph.variants.result import Study
 from mechgraph.variants.study import study
@@ -60,6 +62,8 @@ __all__ = [
     "Pair",
     "PairType",
     "ReachError",
+    "Response",
+    "ResponseError",
     "Solution",
     "Spring",
     "Study",
@@ -74,6 +78,7 @@ __all__ = [
     "library",
     "load",
     "pair_types",
+    "respond",
     "save",
     "solve",
     "study",

@@ -145,6 +145,14 @@ class IndeterminateError(MechgraphError):
         super().__init__(message)
 
 
+class ResponseError(MechgraphError):
+    """A motion in time cannot be followed to its end; ``solution`` is the Response so far, or None."""
+
+    def __init__(self, message: str, solution: Any = None) -> None:
+        self.solution = solution
+        super().__init__(message)
+
+
 class MissingExtraError(MechgraphError, ImportError):
     """An optional package is needed; the message names the extra to install."""
 

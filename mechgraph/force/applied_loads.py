@@ -9,7 +9,7 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array, cross, rotate, rotate_back, to_matrix
 from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.rates import Rates
+from mechgraph.closure.rates import Rates, Velocities
 from mechgraph.errors import DeclarationError
 from mechgraph.model.load import Load, Value
 from mechgraph.model.numeric import PerCase
@@ -46,7 +46,7 @@ class Site:
     """
 
     def __init__(
-        self, here: Configuration, rates: Rates, coordinates: Array, batch: tuple[int, ...], good: Any, t: Any
+        self, here: Configuration, rates: Velocities, coordinates: Array, batch: tuple[int, ...], good: Any, t: Any
     ) -> None:
         self.here, self.rates, self.coordinates = here, rates, coordinates
         self.batch, self.good, self.t = batch, good, t
@@ -171,6 +171,12 @@ class Site:
         at = self.L * (rotate(X[:, :3], par.center) + X[:, 3])
         force = np.broadcast_to(par.mass * np.asarray(acceleration, dtype=float).reshape(3, 1, -1), at.shape)
         self._add(slice(None), cross(at, force), force)
+
+    def weight_energy(self, acceleration: Any) -> Array:
+        """See ``model.load.LoadSite``."""
+        par, X = self.here.system.par, self.here.poses
+        at = self.L * (rotate(X[:, :3], par.center) + X[:, 3]) + par.origin[:, None, None]
+        return -np.asarray((par.mass * np.asarray(acceleration, dtype=float).reshape(3, 1, 1) * at).sum(axis=(0, 1)))
 
     def add_force(self, link: str, force: Array, at: Array) -> None:
         """Force on a link at a position."""

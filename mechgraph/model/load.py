@@ -71,6 +71,9 @@ class LoadSite(Protocol):
     def add_effort(self, name: str, effort: Array) -> None:
         """Effort ``(T,)`` in a freedom: + on link b, - on link a."""
 
+    def weight_energy(self, acceleration: Any) -> Array:
+        """Potential energy ``-sum m g . c`` of the weight of all links, ``(T,)``."""
+
 
 class Nameable(Protocol):
     """The names that a load may refer to."""
@@ -143,6 +146,14 @@ class _Load(Described):
         names = [name for name, about in self.formats.items() if about.kind is FREEDOM_NAME]
         return self.replace(**{name: full_name(getattr(self, name)) for name in names}) if names else self
 
+    def parts(self) -> tuple[Self | None, Self | None]:
+        """The part that has a potential energy, and the rest."""
+        return None, self
+
+    def energy(self, site: LoadSite) -> Any:
+        """Potential energy ``(T,)`` of a load that has one."""
+        return 0.0
+
     def links(self, names: Nameable) -> tuple[str, ...]:
         """Links that this load acts on: those that it names, or those of the pair of its freedom."""
         if self.in_freedom is not None:
@@ -165,6 +176,14 @@ class Gravity(_Load):
     def act(self, site: LoadSite) -> None:
         """Add the weight of every link."""
         site.add_weight(site.number(self.acceleration))
+
+    def parts(self) -> tuple[Self | None, Self | None]:
+        """See ``_Load``; all of it."""
+        return self, None
+
+    def energy(self, site: LoadSite) -> Any:
+        """``-sum m g . c``."""
+        return site.weight_energy(site.number(self.acceleration))
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,6 +280,16 @@ class Spring(_Load):
         site.add_force(self.a, pull, p)
         site.add_force(self.b, -pull, q)
 
+    def parts(self) -> tuple[Self | None, Self | None]:
+        """See ``_Load``; the spring, and its damper."""
+        return self.replace(damping=0.0), None if self.damping == 0.0 else self.replace(stiffness=0.0)
+
+    def energy(self, site: LoadSite) -> Any:
+        """``stiffness (l - free_length)^2 / 2``."""
+        (p, _), (q, _) = site.point(self.a, self.p), site.point(self.b, self.q)
+        stretch = np.sqrt(((q - p) ** 2).sum(axis=0)) - self.free_length
+        return 0.5 * self.stiffness * stretch**2
+
 
 @dataclass(frozen=True, eq=False)
 class TorsionSpring(_Load):
@@ -278,6 +307,14 @@ class TorsionSpring(_Load):
         stiffness, free, damping = map(site.number, (self.stiffness, self.free, self.damping))
         q, rate = site.freedom(self.freedom)
         site.add_effort(self.freedom, -stiffness * (q - free) - damping * rate)
+
+    def parts(self) -> tuple[Self | None, Self | None]:
+        """See ``_Load``; the spring, and its damper."""
+        return self.replace(damping=0.0), None if self.damping == 0.0 else self.replace(stiffness=0.0)
+
+    def energy(self, site: LoadSite) -> Any:
+        """``stiffness (q - free)^2 / 2``."""
+        return 0.5 * self.stiffness * (site.freedom(self.freedom)[0] - self.free) ** 2
 
 
 Load = Gravity | Wrench | Effort | Spring | TorsionSpring

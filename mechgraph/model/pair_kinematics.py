@@ -178,9 +178,14 @@ def turn_between(q1: Array, q0: Array) -> Array:
 
 
 def turn_tangent(v: Array, w: Array) -> Array:
-    """``dexp^-1(v) w = w - v x w / 2 + v x (v x w) / 12 + ...``."""
+    """``dexp^-1(v) w = w - v x w / 2 + (1 - (a / 2) cot(a / 2)) / a^2  v x (v x w)`` with ``a = |v|``, below two turns."""
     once = cross(v, w)
-    return np.asarray(w - 0.5 * once + cross(v, once) / 12.0)
+    square = (v * v).sum(axis=0)
+    small = square < 1e-2
+    angle = np.sqrt(np.where(small, 1.0, square))
+    series = 1 / 12 + square / 720 + square**2 / 30240 + square**3 / 1209600
+    factor = np.where(small, series, (1.0 - 0.5 * angle / np.tan(0.5 * angle)) / angle**2)
+    return np.asarray(w - 0.5 * once + factor * cross(v, once))
 
 
 def advance(row: PairType, x: Array, dq: Array) -> Array:

@@ -59,9 +59,10 @@ class Crossing:
 
     def states(self, places: Array) -> Array:
         """States ``(nx, n)`` at places, interpolated between the sides."""
-        base = self.sides.take(np.full(len(places), len(self.sides) // 2))
-        dq = self.problem.difference(self.sides.x, base.x[:, :1]) @ self.weights(places)
-        return self.problem.advance(base.x, dq, base.track)
+        x = self.sides.x
+        base = x[:, [len(self.sides) // 2]]
+        dq = self.problem.difference(x, base) @ self.weights(places)
+        return self.problem.advance(np.repeat(base, len(places), axis=1), dq, np.full(len(places), self.track))
 
 
 def passed(follower: Follower, nodes: Nodes, track: int, place: float) -> Crossing | None:

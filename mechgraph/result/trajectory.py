@@ -88,7 +88,7 @@ class Trajectory:
         self._motions: list[BlockMotion] = []
         self.has_forces = False
         self.engine: Literal["dense", "sparse"] = "dense"
-        self.work = Work()
+        self.work: Any = Work()
 
     def __getstate__(self) -> dict[str, Any]:
         """Without the retained motions, which are most of its size and are evaluated again."""

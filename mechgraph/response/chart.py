@@ -1,0 +1,112 @@
+"""Charts: independent freedoms in which the motion is followed for a while, and states closed for given values of them.
+
+A chart is laid out at a closed state: its independent freedoms are those that a pivoted QR of the motions picks, so that all others move
+at like rates there. Rotations are measured from the state at which the chart was laid out, so that no rotation has a singular place. When
+the other freedoms come to move much faster, a new chart takes over.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import scipy
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import Index, System
+from mechgraph.closure.rank import closure_rank
+from mechgraph.closure.solver import ClosureSolver, FactoredClosure, closure_solver
+from mechgraph.numerics.tolerances import PATH
+
+STEEP = 3.0
+"""Largest rate of a freedom for unit rates of the independent ones, against that where the chart was laid out, before a new one is."""
+TURNED = 1.0
+"""Angle of an independent rotation from where the chart was laid out above which a new one is."""
+ITERATIONS = 12
+"""Most Newton steps to a closed state."""
+SETTLED = 1e-12
+"""Newton step from which on a state counts as closed; the step before it was a millionth, so that only rounding is left."""
+LOST = 1.0
+"""Correction above which closing is given up: the step was too long."""
+
+
+@dataclass(frozen=True)
+class Closed:
+    """A closed state: evaluated, factored, and which positions were closed ``(T,)``."""
+
+    here: Configuration
+    f: FactoredClosure
+    done: Array
+
+
+class Chart:
+    """Independent freedoms ``free`` beside the ``prescribed`` ones, from the closed state ``x0 (nx,)``."""
+
+    def __init__(self, system: System, x0: Array, prescribed: Index, engine: Literal["dense", "sparse"]) -> None:
+        self.system, self.x0, self.prescribed = system, x0, prescribed
+        here = Configuration(system, x0[:, None])
+        null = closure_rank(here, prescribed, engine).motions
+        n = null.shape[1]
+        _, _, order = scipy.linalg.qr(null.T, mode="economic", pivoting=True) if n else (0, 0, np.zeros(0, dtype=int))
+        self.free: Index = np.sort(order[:n]).astype(np.intp)
+        self.solver: ClosureSolver = closure_solver(engine, np.concatenate([self.free, prescribed]))
+        self.which = self.solver.chosen(here, np.full(1, -1))
+        self._start = here
+        f = self.solver.factored(here, self.which)
+        self.steepness = self._steepness(f)
+        self._singles = system.single_rows[self.free]
+        self.turns = bool((self._singles < 0).any())
+        self._rows = system.single_rows[prescribed]
+
+    def _steepness(self, f: FactoredClosure) -> float:
+        n = len(self.free)
+        return float(np.abs(f.sensitivity()[:, :n]).max(initial=1.0))
+
+    def worn(self, f: FactoredClosure, u: Array) -> bool:
+        """Whether another chart should take over at a state with coordinates ``u (n,)``."""
+        far = self.turns and np.abs(u[self._singles < 0]).max(initial=0.0) > TURNED
+        return bool(far or self._steepness(f) > STEEP * self.steepness or not f.condition[0] < PATH.doubtful)
+
+    def coordinates(self, x: Array) -> Array:
+        """Independent coordinates ``u (n, T)`` of states: how far they are from where the chart was laid out."""
+        return self.system.difference(x, self.x0[:, None])[self.free]
+
+    def rates_of_coordinates(self, x: Array, dq: Array) -> Array:
+        """``u' (n, T)`` from the rates ``dq (F, T)`` of the freedoms."""
+        if not self.turns:
+            return dq[self.free]
+        return self.system.tangent(self.system.difference(x, self.x0[:, None]), dq)[self.free]
+
+    def close(self, x: Array, u: Array, p: Array, first: Configuration | None = None) -> Closed:
+        """States near ``x (nx, T)`` with independent coordinates ``u (n, T)`` and prescribed positions ``p (p, T)``, all loops closed.
+
+        Newton on the closure and on ``difference(x, x0) = u``; what the first leaves free the second settles.
+        """
+        s, n = self.system, len(self.free)
+        x = x.copy()
+        x[self._rows] = p
+        single = self._singles >= 0
+        x[self._singles[single]] = self.x0[self._singles[single], None] + u[single]
+        total = np.zeros(x.shape[1])
+        for _ in range(ITERATIONS):
+            here = Configuration(s, x)
+            f = self.solver.factored(here, np.repeat(self.which, here.T))
+            step = f.solve(-here.residual[:, None])[:, 0]
+            size = np.abs(step).max(axis=0, initial=0.0)
+            if self.turns:
+                y = s.difference(x, self.x0[:, None])
+                Z = f.sensitivity()[:, :n]
+                A = np.stack([s.tangent(y, Z[:, k])[self.free] for k in range(n)], axis=1)
+                wanted = u - y[self.free] - s.tangent(y, step)[self.free]
+                a = np.linalg.solve(np.moveaxis(A, -1, 0), wanted.T[..., None])[..., 0].T
+                step = step + (Z * a).sum(axis=1)
+                size = np.maximum(size, np.abs(u - y[self.free]).max(axis=0, initial=0.0))
+            total = total + size
+            with np.errstate(invalid="ignore"):
+                closed = size <= SETTLED
+            if closed.all() or not np.isfinite(size).all() or (total > LOST).any():
+                break
+            x = s.advance(x, step)
+        return Closed(here, f, closed & (here.closure <= PATH.accepted))

@@ -1,0 +1,109 @@
+"""Stages of independent freedoms, for any mobility: the loops are closed at every evaluation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.closure.indexing import Index, System
+from mechgraph.response.chart import Chart, Closed
+from mechgraph.response.motion_equations import Loads, Moved, kinetic_energy, moved
+from mechgraph.response.prescribed import Prescribed
+
+
+@dataclass(frozen=True)
+class Task:
+    """What moves: the scaled system, its loads, the prescribed freedoms and their columns, and the engine."""
+
+    system: System
+    loads: Loads
+    prescribed: Prescribed
+    columns: Index
+    engine: Literal["dense", "sparse"]
+
+    def prescribed_at(self, t: Array) -> Array:
+        """Prescribed positions, velocities, accelerations ``(3, p, T)``, internal units."""
+        unit = np.where(self.system.is_length[self.columns], self.system.par.L, 1.0)
+        return np.stack([self.prescribed.at(float(one)) / unit for one in t], axis=-1)
+
+
+@dataclass(frozen=True)
+class _Known:
+    """A state that was evaluated, from which others are predicted."""
+
+    t: float
+    x: Array
+    dq: Array
+    ddq: Array
+
+    def ahead(self, system: System, t: Array) -> Array:
+        """States at other times, to second order, ``(nx, T)``."""
+        h = t - self.t
+        return system.advance(self.x[:, None], self.dq[:, None] * h + 0.5 * self.ddq[:, None] * (h * h))
+
+
+class ChartStage:
+    """Implements ``integration.Stage`` from a closed state ``x (nx,)`` with rates ``dq (F,)`` at a time."""
+
+    def __init__(self, task: Task, t: float, x: Array, dq: Array) -> None:
+        self.task = task
+        self.chart = Chart(task.system, x, task.columns, task.engine)
+        self.n = len(self.chart.free)
+        self._first = np.concatenate([np.zeros(self.n), dq[self.chart.free], [0.0]])
+        self._last = _Known(t, x, dq, np.zeros_like(dq))
+        self._path = [self._last]
+        found = self._found(t, self._first)
+        assert found is not None
+        self._path = [self._last]
+        # kinetic energy, and the work of the forces over a unit of the coordinates
+        kinetic = float(kinetic_energy(found.rates.here, found.rates.V)[0])
+        self.energy = kinetic + float(np.abs(found.force).sum()) or 1.0
+
+    def begin(self) -> Array:
+        """See ``Stage``."""
+        return self._first
+
+    def rates(self, t: float, y: Array) -> Array:
+        """See ``Stage``."""
+        found = self._found(t, y)
+        if found is None:
+            return np.full(len(y), np.nan)
+        du = self.chart.rates_of_coordinates(found.rates.here.x, found.rates.dq)
+        return np.concatenate([du[:, 0], found.rates.ddq[self.chart.free, 0], found.power])
+
+    def accepted(self, t: float, y: Array) -> bool:
+        """See ``Stage``."""
+        if self._last.t != t or not np.array_equal(self._y, y):
+            self._found(t, y)
+        self._path.append(self._last)
+        return not self.chart.worn(self._f, y[: self.n])
+
+    def following(self, t: float, y: Array) -> ChartStage:
+        """See ``Stage``."""
+        return ChartStage(self.task, t, self._last.x, self._last.dq)
+
+    def states(self, t: Array, y: Array) -> tuple[Closed, Array]:
+        """See ``Stage``."""
+        times = np.array([known.t for known in self._path])
+        before = np.maximum(np.searchsorted(times, t, side="right") - 1, 0)
+        guess = np.concatenate(
+            [self._path[i].ahead(self.task.system, t[before == i]) for i in dict.fromkeys(before.tolist())], axis=1
+        )
+        return self.chart.close(guess, y[: self.n], self.task.prescribed_at(t)[0]), y[self.n : 2 * self.n]
+
+    def _found(self, t: float, y: Array) -> Moved | None:
+        """Rates and accelerations at a time; None where no closed state is found near the last ones."""
+        at, n = np.array([t]), self.n
+        near = self._last if abs(self._last.t - t) < abs(self._path[-1].t - t) else self._path[-1]
+        p = self.task.prescribed_at(at)
+        closed = self.chart.close(near.ahead(self.task.system, at), y[:n, None], p[0])
+        if not closed.done[0]:
+            return None
+        found = moved(closed.here, closed.f, y[n : 2 * n, None], p[1:], self.task.loads, at)
+        rates = found.rates
+        self._last = _Known(t, closed.here.x[:, 0], rates.dq[:, 0], rates.ddq[:, 0])
+        self._f, self._y = closed.f, y
+        return found

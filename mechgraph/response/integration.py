@@ -1,0 +1,136 @@
+"""The equations of motion integrated in time by the steppers of scipy, stage after stage.
+
+A stage is a choice of coordinates that serves for a while: a local chart of independent freedoms (``charts``), or the distance along the
+only path there is (``along_path``). A segment is one accepted step: its times, its stage and the dense output of the stepper in the
+stage's coordinates ``y = (u, v, work)``: independent coordinates, rates of independent freedoms, work done since the start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+import scipy
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.closure.indexing import Index
+from mechgraph.response.chart import Closed
+
+METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
+
+
+class Stage(Protocol):
+    """Coordinates that serve for a while."""
+
+    energy: float
+    """An energy of the size that moves here, against which work is measured."""
+
+    def begin(self) -> Array:
+        """The coordinates ``y`` where the stage begins; the work is 0."""
+
+    def rates(self, t: float, y: Array) -> Array:
+        """``y'``; NaN where the coordinates do not reach (the stepper takes a shorter step)."""
+
+    def accepted(self, t: float, y: Array) -> bool:
+        """Keep what is known at the end of an accepted step; whether the stage serves on."""
+
+    def following(self, t: float, y: Array) -> Stage:
+        """The stage that takes over."""
+
+    def states(self, t: Array, y: Array) -> tuple[Closed, Array]:
+        """Closed states at times ``(T,)`` of accepted steps with coordinates ``y (k, T)``, and the rates ``v (n, T)`` of the columns that
+        their factors hold fixed.
+        """
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One accepted step from ``begin`` to ``end``; ``work`` was done before the stage began."""
+
+    begin: float
+    end: float
+    stage: Stage
+    dense: Callable[[Any], Array]
+    work: float
+
+
+@dataclass
+class Count:
+    """How much was computed: evaluations of ``y'``, accepted steps, stages, and how the coordinates were chosen."""
+
+    evaluations: int = 0
+    steps: int = 0
+    stages: int = 0
+    coordinates: str = ""
+
+    def __str__(self) -> str:
+        return ", ".join(f"{getattr(self, name)} {name}" for name in ("evaluations", "steps", "stages")) + (
+            f"; {self.coordinates}"
+        )
+
+
+class Stopped(Exception):
+    """The integration cannot go on; the message says why."""
+
+
+@dataclass
+class Integration:
+    """A motion followed by a stepper; ``run`` adds ``segments``."""
+
+    method: str
+    rtol: float
+    atol: float
+    segments: list[Segment] = field(default_factory=list)
+    work: Count = field(default_factory=Count)
+
+    def run(self, stage: Stage, begin: float, end: float) -> Iterator[Segment]:
+        """Follow the motion from a stage; yields every accepted step.
+
+        Raises
+        ------
+        Stopped
+            where steps become shorter than rounding.
+        """
+        make = getattr(scipy.integrate, self.method)
+        t, work, h = begin, 0.0, None
+        while t < end:
+            self.work.stages += 1
+            y = stage.begin()
+            atol = np.full(len(y), self.atol)
+            atol[-1] *= stage.energy
+            # the step goes on with its length, which a multistep method finds anew
+            first: dict[str, float] = (
+                {} if h is None or self.method in ("BDF", "LSODA") else {"first_step": min(h, end - t)}
+            )
+            stepper = make(stage.rates, t, y, end, rtol=self.rtol, atol=atol, **first)
+            serves = True
+            while stepper.status == "running" and serves:
+                message = stepper.step()
+                if stepper.status == "failed":
+                    raise Stopped(message)
+                self.work.steps += 1
+                self.segments.append(Segment(t, stepper.t, stage, stepper.dense_output(), work))
+                t, h = stepper.t, stepper.t - t
+                serves = stage.accepted(t, stepper.y)
+                yield self.segments[-1]
+            self.work.evaluations += stepper.nfev
+            if t < end:
+                work += float(stepper.y[-1])
+                stage = stage.following(t, stepper.y)
+
+    def at(self, t: Array) -> Iterator[tuple[Index, Stage, Array, Array]]:
+        """Times ``(T,)`` by stage: their places, the stage, coordinates ``y (k, n)`` and the work ``(n,)`` since the start."""
+        ends = np.array([segment.end for segment in self.segments])
+        step = np.minimum(np.searchsorted(ends, t), len(ends) - 1)
+        of = np.array([id(self.segments[i].stage) for i in step])
+        for stage in dict.fromkeys(of.tolist()):
+            places = np.flatnonzero(of == stage)
+            parts, work = [], []
+            for i in dict.fromkeys(step[places].tolist()):
+                segment = self.segments[i]
+                parts.append(np.asarray(segment.dense(t[places[step[places] == i]])))
+                work.append(segment.work + parts[-1][-1])
+            y = np.concatenate(parts, axis=1)
+            yield places, self.segments[int(step[places[0]])].stage, y, np.concatenate(work)

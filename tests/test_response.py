@@ -1,0 +1,280 @@
+"""Motion in time against closed forms, equations written by hand and integrated by themselves, and identities of mechanics."""
+
+import numpy as np
+import pytest
+import scipy
+
+import mechgraph as mg
+
+X, Y, Z = np.eye(3)
+G = 9.81
+DOWN = mg.Gravity((0, -G, 0))
+
+
+def rod(name, p, q, mass=1.0):
+    """A slender rod between two points."""
+    p, q = np.array(p, dtype=float), np.array(q, dtype=float)
+    d = q - p
+    return mg.Link(name, mass=mass, center=(p + q) / 2, inertia=mass * (d @ d * np.eye(3) - np.outer(d, d)) / 12)
+
+
+def pendulum(loads=()):
+    """A1: point mass 1 kg on a massless bar of 1 m, released level."""
+    links = [mg.Link("frame"), mg.Link("bob", mass=1.0, center=(-1, 0, 0))]
+    return mg.Mechanism(
+        "pendulum", links, [mg.Pair("A", "R", "frame", "bob", point=(0, 0, 0), axis=Z)], loads=[DOWN, *loads]
+    )
+
+
+def nothing(pose, twist, t):
+    """A load that is a function of time, so that the motion is followed in charts and not along a path."""
+    return 0.0 * t
+
+
+def windows(n, loads=()):
+    """A2: n four-bars in a row, rods of 1 m and 1 kg."""
+    links = [mg.Link("frame"), *(rod(f"c{i}", (i, 0, 0), (i, 1, 0)) for i in range(n + 1))]
+    links += [rod(f"r{i}", (i, 1, 0), (i + 1, 1, 0)) for i in range(n)]
+    pairs = [mg.Pair(f"A{i}", "R", "frame", f"c{i}", point=(i, 0, 0), axis=Z) for i in range(n + 1)]
+    for i in range(n):
+        pairs.append(mg.Pair(f"B{i}", "R", f"c{i}", f"r{i}", point=(i, 1, 0), axis=Z))
+        pairs.append(mg.Pair(f"C{i}", "R", f"r{i}", f"c{i + 1}", point=(i + 1, 1, 0), axis=Z))
+    return mg.Mechanism("windows", links, pairs, loads=[DOWN, *loads])
+
+
+def bricard():
+    """A4: five rods of 1 m and 1 kg along the edges of a cube, six revolutes."""
+    points = [(0, 0, 0), (1, 0, 0), (1, -1, 0), (1, -1, 1), (0, -1, 1), (0, 0, 1)]
+    links = [mg.Link("l0"), *(rod(f"l{k + 1}", points[k], points[k + 1]) for k in range(5))]
+    axes = [Y, Z, X, Y, Z, X]
+    pairs = [mg.Pair(f"J{k}", "R", f"l{k}", f"l{(k + 1) % 6}", point=points[k], axis=axes[k]) for k in range(6)]
+    return mg.Mechanism("Bricard", links, pairs, loads=[DOWN])
+
+
+def slider_crank():
+    """Haug's spatial slider-crank: A revolute, B spherical, C universal, D prismatic."""
+    a, b, c = np.array((0, 0.1, 0.12)), np.array((0, 0.1, 0.2)), np.array((0.2, 0, 0))
+    u = (c - b) / np.linalg.norm(c - b)
+    links = [
+        mg.Link("frame"),
+        mg.Link("crank", mass=0.12, center=(a + b) / 2, inertia=np.diag([1e-4, 1e-4, 1e-5])),
+        mg.Link("rod", mass=0.5, center=(b + c) / 2, inertia=4e-3 * np.eye(3) - 3.6e-3 * np.outer(u, u)),
+        mg.Link("slider", mass=2.0, center=c, inertia=1e-4 * np.eye(3)),
+    ]
+    pairs = [
+        mg.Pair("A", "R", "frame", "crank", point=a, axis=X),
+        mg.Pair("B", "S", "crank", "rod", point=b),
+        mg.Pair("C", "U", "slider", "rod", point=c, axis=X, second=np.cross(X, u)),
+        mg.Pair("D", "P", "frame", "slider", point=c, axis=X),
+    ]
+    return mg.Mechanism("slider-crank", links, pairs, loads=[mg.Gravity((0, 0, -G))])
+
+
+@pytest.mark.parametrize("loads", [(), (mg.Effort("A", nothing),)])
+def test_pendulum_swings_as_the_elliptic_functions_say(loads):
+    """sin(theta / 2) = k sn(K - w t), k = sin(45 deg), from level."""
+    period = 2.36784194757624
+    t = np.linspace(0, 3 * period, 50)
+    r = mg.respond(pendulum(loads), t, rtol=1e-11, atol=1e-13)
+    k2, w = 0.5, np.sqrt(G)
+    sn, cn, dn, _ = scipy.special.ellipj(scipy.special.ellipk(k2) - w * t, k2)
+    below = -2 * np.arcsin(np.sqrt(k2) * sn)  # from the vertical below, counter-clockwise: -90 deg at the start
+    np.testing.assert_allclose(r["A"].position[:, 0], below + np.pi / 2, atol=2e-10)
+    np.testing.assert_allclose(r["A"].velocity[:, 0], 2 * np.sqrt(k2) * w * cn, atol=2e-9)
+    # tension in the bar: weight along it and the centripetal force
+    tension = G * np.cos(below) + r["A"].velocity[:, 0] ** 2
+    np.testing.assert_allclose(np.linalg.norm(r["A"].force, axis=1), np.abs(tension), atol=1e-8)
+    assert np.abs(r.energy.balance).max() < 1e-8
+
+
+@pytest.mark.parametrize("n", [1, 3])
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+def test_windows_pass_their_change_points(n, engine):
+    """All links translate or turn with the cranks: ((n + 1) / 3 + n) theta'' = -g ((n + 1) / 2 + n) cos theta."""
+    inertia, arm = (n + 1) / 3 + n, (n + 1) / 2 + n
+    t = np.linspace(0, 4, 41)
+    exact = scipy.integrate.solve_ivp(
+        lambda t, y: [y[1], -G * arm / inertia * np.cos(y[0])],
+        (0, 4), [np.pi / 2, -1.0], "DOP853", t, rtol=1e-12, atol=1e-13,
+    )  # fmt: skip
+    r = mg.respond(windows(n), t, rates={"A0": -1.0}, rtol=1e-10, atol=1e-12, engine=engine)
+    np.testing.assert_allclose(r["A0"].position[:, 0], exact.y[0] - np.pi / 2, atol=2e-7)
+    assert np.abs(r.energy.balance).max() < 1e-7
+    assert r.checks.closure.max() < 1e-12
+    assert r.engine == engine
+
+
+def test_spatial_slider_crank_starts_as_printed_and_moves_alone_and_in_charts():
+    """Printed initial velocities (rod centre, rod angular, slider); two choices of coordinates give one motion."""
+    m, t = slider_crank(), np.linspace(0, 1, 21)
+    r = mg.respond(m, t, rates={"A": 6.0}, rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(r.link("rod").center_velocity[0], [0.12, -0.24, 0], atol=1e-12)
+    np.testing.assert_allclose(r.link("rod").angular_velocity[0], [1.92, -0.96, 0.48], atol=1e-12)
+    np.testing.assert_allclose(r["D"].velocity[0], 0.24, atol=1e-12)
+    charts = mg.respond(
+        m.replace(loads=[*m.loads, mg.Effort("A", nothing)]), t, rates={"A": 6.0}, rtol=1e-10, atol=1e-12
+    )
+    for pair in "ABCD":
+        np.testing.assert_allclose(charts[pair].position, r[pair].position, atol=1e-7)
+        np.testing.assert_allclose(charts[pair].force, r[pair].force, atol=1e-5)
+
+
+@pytest.mark.parametrize("make", [lambda: windows(1), bricard, slider_crank])
+def test_what_moves_by_itself_needs_no_drive(make):
+    """Kinetostatics along the response: the effort that drives it so is nothing, and the reactions are the same."""
+    m = make()
+    driver = m.pairs[0].name
+    r = mg.respond(m, np.linspace(0, 0.9, 10), rates={driver: -1.0}, rtol=1e-10, atol=1e-12)
+    q = r[driver]
+    motion = mg.Motion(q.position[:, 0], velocity=q.velocity[:, 0], acceleration=q.acceleration[:, 0])
+    s = mg.solve(m, {driver: motion})
+    largest = 10.0  # the weight of a link
+    assert np.abs(s[driver].effort).max() < 1e-9 * largest
+    for p in m.pairs:
+        np.testing.assert_allclose(r[p.name].reaction, s[p.name].reaction, atol=1e-8 * largest)
+
+
+def test_bricard_keeps_its_energy():
+    """One freedom, one redundant constraint, from rest; the fastest freedom changes on the way."""
+    r = mg.respond(bricard(), (0, 10), rtol=1e-11, atol=1e-13)
+    assert np.abs(r.energy.balance).max() < 1e-8 * r.energy.kinetic.max()
+    assert r.work.stages >= 1
+    assert r.checks.closure.max() < 1e-12
+
+
+def test_double_pendulum():
+    """Two rods, against Lagrange's equations written by hand."""
+    links = [mg.Link("frame"), rod("upper", (0, 0, 0), (1, 0, 0)), rod("lower", (1, 0, 0), (2, 0, 0))]
+    pairs = [
+        mg.Pair("A", "R", "frame", "upper", point=(0, 0, 0), axis=Z),
+        mg.Pair("B", "R", "upper", "lower", point=(1, 0, 0), axis=Z),
+    ]
+    m = mg.Mechanism("double pendulum", links, pairs, loads=[DOWN])
+
+    def by_hand(t, y):
+        a, b, u, v = y  # absolute angles and rates
+        c, s = np.cos(b - a), np.sin(b - a)
+        M = np.array([[1 / 3 + 1, c / 2], [c / 2, 1 / 3]])
+        Q = [v * v * s / 2 - 1.5 * G * np.cos(a), -u * u * s / 2 - 0.5 * G * np.cos(b)]
+        return [u, v, *np.linalg.solve(M, Q)]
+
+    t = np.linspace(0, 2, 21)
+    exact = scipy.integrate.solve_ivp(by_hand, (0, 2), [0.0, 0.4, 1.0, 0.5], "DOP853", t, rtol=1e-11, atol=1e-12)
+    r = mg.respond(m, t, start={"B": 0.4}, rates={"A": 1.0, "B": -0.5}, rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(r["A"].position[:, 0], exact.y[0], atol=1e-8)
+    np.testing.assert_allclose(r["B"].position[:, 0], exact.y[1] - exact.y[0], atol=1e-8)
+    assert np.abs(r.energy.balance).max() < 1e-7
+
+
+def test_tumbling_body_keeps_its_angular_momentum():
+    """An asymmetric body free about its mass centre, near its unstable axis: rotations without a singular place."""
+    I = np.diag([1.0, 2.0, 3.0])
+    m = mg.Mechanism(
+        "body",
+        [mg.Link("frame"), mg.Link("body", mass=1.0, center=(0, 0, 0), inertia=I)],
+        [mg.Pair("A", "S", "frame", "body", point=(0, 0, 0))],
+    )
+    r = mg.respond(m, np.linspace(0, 20, 41), rates={"A.Rx": 0.01, "A.Ry": 2.0, "A.Rz": 0.02}, rtol=1e-10, atol=1e-12)
+    R, w = r.link("body").pose[:, :3, :3], r.link("body").angular_velocity
+    momentum = np.einsum("tij,jk,tlk,tl->ti", R, I, R, w)
+    np.testing.assert_allclose(momentum, np.broadcast_to(momentum[0], momentum.shape), atol=1e-7)
+    np.testing.assert_allclose(r.energy.kinetic, r.energy.kinetic[0], rtol=1e-8)
+    own = np.einsum("tji,tj->ti", R, w)
+    assert own[:, 1].min() < -1.9  # it has turned over
+
+
+def test_pendulum_under_a_driven_slide():
+    """The slide follows a law of time: theta'' = -(g cos(theta) - x'' sin(theta)) for a rod bob at 1 from level; driver effort by hand."""
+    links = [mg.Link("frame"), mg.Link("cart"), mg.Link("bob", mass=2.0, center=(1, 0, 0))]
+    pairs = [
+        mg.Pair("P", "P", "frame", "cart", point=(0, 0, 0), axis=X),
+        mg.Pair("A", "R", "cart", "bob", point=(0, 0, 0), axis=Z),
+    ]
+    m = mg.Mechanism("cart", links, pairs, loads=[DOWN])
+    law = lambda t: (0.3 * np.sin(4 * t), 1.2 * np.cos(4 * t), -4.8 * np.sin(4 * t))
+    t = np.linspace(0, 3, 31)
+    exact = scipy.integrate.solve_ivp(
+        lambda s, y: [y[1], -(G * np.cos(y[0]) - law(s)[2] * np.sin(y[0]))],
+        (0, 3), [0.0, 0.5], "DOP853", t, rtol=1e-12, atol=1e-13,
+    )  # fmt: skip
+    fine = np.linspace(0, 3, 301)
+    sampled = mg.Motion(*np.array([law(s) for s in fine]).T, t=fine)
+    for motion in (law, sampled):
+        r = mg.respond(m, t, rates={"A": 0.5}, motions={"P": motion}, rtol=1e-11, atol=1e-12)
+        np.testing.assert_allclose(r["A"].position[:, 0], exact.y[0], atol=1e-7)
+        theta, u, a = (r["A"].position[:, 0], r["A"].velocity[:, 0], r["A"].acceleration[:, 0])
+        x2 = np.array([law(s)[2] for s in t])
+        np.testing.assert_allclose(
+            r["P"].effort[:, 0], 2.0 * (x2 - a * np.sin(theta) - u * u * np.cos(theta)), atol=1e-4
+        )
+        assert np.abs(r.energy.balance).max() < 1e-4 if motion is sampled else np.abs(r.energy.balance).max() < 1e-7
+
+
+def test_spring_and_damper():
+    """m x'' = -k x - c x' in closed form, and the heat in the damper is the work that is missing."""
+    links = [mg.Link("frame"), mg.Link("block", mass=2.0, center=(0, 0, 0))]
+    m = mg.Mechanism(
+        "oscillator",
+        links,
+        [mg.Pair("P", "P", "frame", "block", point=(0, 0, 0), axis=X)],
+        loads=[mg.TorsionSpring("P", stiffness=50.0, damping=3.0)],
+    )
+    t = np.linspace(0, 4, 41)
+    r = mg.respond(m, t, start={"P": 0.2}, rtol=1e-11, atol=1e-13)
+    d, w = 3.0 / 4.0, np.sqrt(25.0 - (3.0 / 4.0) ** 2)
+    np.testing.assert_allclose(
+        r["P"].position[:, 0], 0.2 * np.exp(-d * t) * (np.cos(w * t) + d / w * np.sin(w * t)), atol=1e-9
+    )
+    np.testing.assert_allclose(r.energy.potential, 25.0 * r["P"].position[:, 0] ** 2, atol=1e-12)
+    np.testing.assert_allclose(r.energy.balance, 0.0, atol=1e-9)
+
+
+def test_any_stepper_and_time_reversal():
+    """Every method of scipy follows the same motion; with the rates turned round it goes back."""
+    m, t = windows(1), np.array([0.0, 0.5, 1.0])
+    r = mg.respond(m, t, rates={"A0": -1.0}, rtol=1e-11, atol=1e-12)
+    end = {"A0": float(r["A0"].position[-1, 0])}
+    for method in ("RK23", "RK45", "Radau", "BDF", "LSODA"):
+        other = mg.respond(m, t, rates={"A0": -1.0}, rtol=1e-6, atol=1e-8, method=method)
+        np.testing.assert_allclose(other["A0"].position, r["A0"].position, atol=1e-3)
+    back = mg.respond(m, t, start=end, rates={"A0": -float(r["A0"].velocity[-1, 0])}, rtol=1e-11, atol=1e-12)
+    assert back["A0"].position[-1, 0] == pytest.approx(0.0, abs=1e-8)
+
+
+def test_at_other_times():
+    """The dense output is closed too."""
+    r = mg.respond(windows(1), (0, 2), rates={"A0": -1.0}, rtol=1e-10, atol=1e-12)
+    again = r.at(np.array([0.3, 1.7]))
+    direct = mg.respond(windows(1), np.array([0.0, 0.3, 1.7]), rates={"A0": -1.0}, rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(again["A0"].position, direct["A0"].position[1:], atol=1e-8)
+    assert r.at(0.5)["A0"].position.shape == (1,)
+    with pytest.raises(mg.DeclarationError, match="between 0 and 2"):
+        r.at(3.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"t": 3.0}, "begin, end"),
+        ({"t": (1.0, 0.0)}, "rising"),
+        ({"rates": {"A0": 1.0, "A1": 2.0}}, "contradict the closure"),
+        ({"rates": {"Q": 1.0}}, "unknown freedom"),
+        ({"start": {"Q": 1.0}}, "unknown freedom"),
+        ({"motions": {"A0": np.zeros(3)}}, "expected a Motion with t"),
+        ({"motions": {"A0": mg.Motion(0.0)}}, "has no times"),
+        ({"motions": {"A0": lambda t: 0.0}}, "three finite numbers"),
+        ({"method": "Euler"}, "DOP853"),
+        ({"rtol": 0.0}, "rtol"),
+    ],
+)
+def test_bad_input_is_named(arguments, words):
+    """One error, with what was expected."""
+    with pytest.raises(mg.DeclarationError, match=words):
+        mg.respond(windows(1), **{"t": (0, 1), **arguments})
+
+
+def test_samples_that_end_too_early():
+    """A table that ends before the motion does."""
+    motion = mg.Motion(np.linspace(0, 1, 11), velocity=1.0, t=np.linspace(0, 1, 11))
+    with pytest.raises(mg.DeclarationError, match="its samples end at t = 1"):
+        mg.respond(windows(1), (0, 2), motions={"A0": motion})
