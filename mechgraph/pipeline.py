@@ -14,7 +14,8 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import CLOSED, closed_start, named_columns
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
-from mechgraph.closure.driver_path import BLOCK, DriverPath, Positions, Request, Status, follow, in_blocks
+from mechgraph.closure.driver_path import BLOCK, DriverPath, Positions, Request, Status, in_blocks
+from mechgraph.closure.following import follow
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.passive_rest import Idle, unspun
 from mechgraph.closure.rates import Rates, Velocities, distance_to_dead_point, rates

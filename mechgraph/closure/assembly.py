@@ -10,7 +10,8 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array, rotate
 from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.driver_path import DriverPath, Request, Status, follow
+from mechgraph.closure.driver_path import DriverPath, Request, Status
+from mechgraph.closure.following import follow
 from mechgraph.closure.indexing import Index, System, indexed
 from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
 from mechgraph.closure.solver import closure_solver, engine_for

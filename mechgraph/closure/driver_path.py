@@ -24,14 +24,12 @@ from mechgraph.numerics.hermite import Interpolation
 from mechgraph.numerics.newton import Work
 from mechgraph.numerics.refinement import refined
 from mechgraph.numerics.tolerances import PATH
-from mechgraph.numerics.tracks import Nodes, Paths
+from mechgraph.numerics.tracks import Nodes, Paths, places_of
 
 Mask = NDArray[np.bool_]
 
 BLOCK = 1024
 """Positions evaluated together, so that what is computed on the way stays in the cache of a core (measured)."""
-GAPS = 20
-"""Most gaps behind which a path of several drivers is taken up again."""
 
 
 class Status(Enum):
@@ -156,12 +154,25 @@ class Positions:
             at = np.flatnonzero(self.near == i)
             self.x[:, at] = crossing.states(self.place[at])
 
-    def put(self, other: Positions, places: Index) -> None:
-        """Take some places from positions that were followed afterwards."""
-        for name in ("x", "status", "which", "reached"):
-            getattr(self, name)[..., places] = getattr(other, name)[..., places]
+    def take_up(self, more: Positions, places: Index) -> None:
+        """Take some places from positions that were followed afterwards, with the tracks on which they lie."""
+        known = len(self.tracks.end)
+        for name in ("x", "status", "which", "reached", "place"):
+            getattr(self, name)[..., places] = getattr(more, name)[..., places]
+        self.track[places] = known + more.track[places]
+        self.near[places] = np.where(more.near[places] < 0, -1, len(self.crossings) + more.near[places])
+        self.crossings += [replace(c, track=c.track + known, sides=c.sides.moved_by(known)) for c in more.crossings]
         for name in ("evaluations", "calls", "factorizations", "careful"):
-            setattr(self.work, name, getattr(self.work, name) + getattr(other.work, name))
+            setattr(self.work, name, getattr(self.work, name) + getattr(more.work, name))
+        crossings = [(known + track, place) for track, place in more.tracks.crossings]
+        self.tracks = Tracks(
+            Nodes.join([self.tracks.nodes, more.tracks.nodes.moved_by(known)]),
+            self.tracks.end + more.tracks.end,
+            self.tracks.crossings + crossings,
+            self.work,
+        )
+        self.follower.paths = Paths(self.follower.paths.points + more.follower.paths.points)
+        self.here = None
 
     def nodes_of(self, track: int) -> Nodes:
         """Nodes of a track."""
@@ -173,22 +184,7 @@ class Positions:
         return self.tracks.work
 
 
-def follow(path: DriverPath, requests: list[Request], total: int) -> Positions:
-    """States at all positions asked for; ``total`` positions in all."""
-    if path.size[1] == 1:
-        return _one_curve(path, requests, total).followed().positions
-    found = last = _along_polygons(path, requests, total)
-    for _ in range(GAPS):
-        requests = [again for request in requests if (again := _taken_up_again(path, last, request)) is not None]
-        if not requests:
-            break
-        last = _along_polygons(path, requests, total)
-        for request in requests:
-            found.put(last, request.places)
-    return found
-
-
-def _along_polygons(path: DriverPath, requests: list[Request], total: int) -> Positions:
+def along_polygons(path: DriverPath, requests: list[Request], total: int) -> Positions:
     """Polygons followed with nodes where interpolation does not do."""
     legs = _polygons(path, requests, total)
     for _ in range(REPEATS):
@@ -196,32 +192,6 @@ def _along_polygons(path: DriverPath, requests: list[Request], total: int) -> Po
         if not found.bad.size or not legs.stop_at(found.bad):
             break
     return found.positions
-
-
-def _taken_up_again(path: DriverPath, found: Positions, request: Request) -> Request | None:
-    """What is left of a polygon behind what could not be passed: from the last node straight to where the polygon comes back to this side.
-
-    The other side is what lies ahead of the last node in the direction in which the polygon left it. The rule is one of the polygon, not
-    of the positions asked for on it.
-    """
-    track = int(found.track[request.places[0]])
-    if found.tracks.end[track] is End.REACHED:
-        return None
-    nodes = found.nodes_of(track)
-    last = int(np.argmax(nodes.place))
-    reached, points = nodes.drive[:, last], request.polygon(path.rows)
-    length = np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(points) ** 2).sum(axis=0)))])
-    ahead = np.flatnonzero(length > nodes.place[last])
-    beyond = (points[:, ahead] - reached[:, None]).T @ (points[:, ahead[0]] - reached)
-    back = np.flatnonzero(beyond < 0)
-    if not back.size:
-        return None
-    k = int(back[0])
-    u = beyond[k - 1] / (beyond[k - 1] - beyond[k])
-    left, right = ahead[k - 1], ahead[k]
-    entry = points[:, left] + u * (points[:, right] - points[:, left])
-    rest = length[-request.values.shape[1] :] > length[left] + u * (length[right] - length[left])
-    return Request(nodes.x[:, last], request.variant, request.values[:, rest], request.places[rest], entry[:, None])
 
 
 REPEATS = 12
@@ -236,7 +206,7 @@ class _Found:
     bad: Index
 
 
-class _Legs:
+class Legs:
     """Tracks through the positions asked for: where each position lies, and reading positions off the nodes."""
 
     def __init__(self, path: DriverPath, total: int) -> None:
@@ -399,25 +369,11 @@ FINER = 4
 """Times that nodes are put where positions did not come out as predicted."""
 
 
-def _one_curve(path: DriverPath, requests: list[Request], total: int) -> _Legs:
-    """One driver: from every start one track up and one down."""
-    legs = _Legs(path, total)
-    for request in requests:
-        begin, value = request.x[path.rows[0]], request.values[0]
-        for sense, mine in ((1.0, value >= begin), (-1.0, value < begin)):
-            if not mine.any():
-                continue
-            way = sense * (value[mine] - begin)
-            points = np.array([[begin, begin + sense * way.max()]]) if way.max() > 0 else np.array([[begin]])
-            legs.add(request, points, value[None, mine], request.places[mine], way)
-    return legs
-
-
-def _polygons(path: DriverPath, requests: list[Request], total: int) -> _Legs:
+def _polygons(path: DriverPath, requests: list[Request], total: int) -> Legs:
     """Several drivers: from every start the polygon through its positions in their order."""
-    legs = _Legs(path, total)
+    legs = Legs(path, total)
     for request in requests:
         points = request.polygon(path.rows)
-        at = np.cumsum(np.sqrt((np.diff(points, axis=1) ** 2).sum(axis=0)))[-request.values.shape[1] :]
+        at = places_of(points)[-request.values.shape[1] :]
         legs.add(request, points, request.values, request.places, at)
     return legs

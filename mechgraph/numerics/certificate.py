@@ -27,12 +27,12 @@ def middles(problem: Problem, a: Nodes, b: Nodes, drive: Array) -> Array:
     return problem.advance(a.x, dq, a.track)
 
 
-def smooth(problem: Problem, a: Nodes, m: Nodes, b: Nodes, correction: Array) -> Mask:
+def smooth(problem: Problem, a: Nodes, m: Nodes, b: Nodes, correction: Array, free: Array) -> Mask:
     """Whether states and rates in the middles ``m`` are those of the Hermite cubic of both ends, against the change of rates over the step.
 
     On a smooth track ``r_m = 3/2 (x_b - x_a) / h - (r_a + r_b) / 4`` and the correction of ``x_m`` vanishes, both to higher order than
     the change of rates; where a step leads from one branch onto another by a jump of the rates, the one holds for a jump at a sixth
-    of the step, the other at a quarter, so never both.
+    of the step, the other at a quarter, so never both. Motions left ``free (F, p, n)`` do not count: corrections move nodes along them.
     """
     h = b.place - a.place
     direction = (b.drive - a.drive) / h
@@ -41,7 +41,11 @@ def smooth(problem: Problem, a: Nodes, m: Nodes, b: Nodes, correction: Array) ->
     for node in (m, b):
         rates.append(problem.tangent(problem.difference(node.x, a.x), (node.Z * direction).sum(axis=1)))
     r_a, r_m, r_b = rates
-    gap = np.abs(r_m - 1.5 * y / h + 0.25 * (r_a + r_b)).max(axis=0, initial=0.0)
+    off_cubic = r_m - 1.5 * y / h + 0.25 * (r_a + r_b)
+    if free.shape[1]:
+        N = np.moveaxis(free, -1, 0)
+        off_cubic -= (N @ (np.linalg.pinv(N) @ off_cubic.T[..., None]))[..., 0].T
+    gap = np.abs(off_cubic).max(axis=0, initial=0.0)
     change = np.max([np.abs(p - q).max(axis=0, initial=0.0) for p, q in ((r_a, r_m), (r_m, r_b), (r_a, r_b))], axis=0)
     off = np.abs(m.drive - 0.5 * (a.drive + b.drive)).max(axis=0, initial=0.0) / h
     noise = (4.0 * off + 1e-6) * np.abs(r_m).max(axis=0, initial=0.0) + 1e-14 * m.condition / h

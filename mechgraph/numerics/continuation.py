@@ -56,13 +56,18 @@ class Follower:
         self.work = Work()
         self.newton = Newton(problem, self.work)
 
-    def follow(self, x: Array, paths: Paths, first: float = PATH.first) -> Tracks:
-        """All tracks from their closed states ``x (nx, V)``; ``first`` is the first step tried."""
+    def follow(
+        self, x: Array, paths: Paths, first: float = PATH.first, which: Index | None = None, careful: bool = True
+    ) -> Tracks:
+        """All tracks from their closed states ``x (nx, V)`` in forms ``which``; ``first`` is the first step tried.
+
+        Unless ``careful`` a track ends, not named, where the quick march or its certificate ends.
+        """
         V = x.shape[1]
         self.paths = paths
         self.crossings: list[tuple[int, float]] = []
-        start = self._start(x)
-        stuck = ~(start.condition <= PATH.singular) & (paths.end > 0)
+        start = self._start(x, np.full(V, -1) if which is None else which)
+        self.stuck = stuck = ~(start.condition <= PATH.singular) & (paths.end > 0)
         self.ends = [End.CROSSING if here else End.REACHED for here in stuck]
         open_ = np.flatnonzero(~stuck & (paths.end > 0))
         if not open_.size:
@@ -72,17 +77,17 @@ class Follower:
         nodes = self._cut(self._certified_all(nodes))
         reached = np.zeros(V)
         np.maximum.at(reached, nodes.track, nodes.place)
-        for v in np.flatnonzero((reached < paths.end) & ~stuck):
+        for v in np.flatnonzero((reached < paths.end) & ~stuck & careful):
             nodes = self._careful(nodes, int(v))
         return Tracks(nodes, self.ends, self.crossings, self.work)
 
     # --- nodes -----------------------------------------------------------------------------------------------------------
 
-    def _start(self, x: Array) -> Nodes:
+    def _start(self, x: Array, which: Index) -> Nodes:
         tracks = np.arange(x.shape[1])
         drive = self.paths.drive(tracks, np.zeros(len(tracks)))
         point = self.problem.at(x, drive, tracks)
-        which = self.problem.chosen(point, np.full(len(tracks), -1))
+        which = self.problem.chosen(point, which)
         f = self.problem.factored(point, which)
         Z = self.problem.sensitivity(point, f)
         return Nodes(point.x, Z, drive, tracks, np.zeros(len(tracks)), which, f.condition, np.ones(len(tracks), bool))
@@ -205,14 +210,17 @@ class Follower:
         middle = Nodes.closed(found, drive, a.track, place, sure=True)
         ok = found.done & (found.which == a.which) & (found.correction <= PATH.correction)
         ok &= np.isfinite(a.condition) & np.isfinite(b.condition)
-        ok &= smooth(self.problem, a, middle, b, found.correction)
+        here = self.problem.at(found.x, drive, a.track)
+        f = self.problem.factored(here, a.which)
+        ok &= smooth(self.problem, a, middle, b, found.correction, f.motions())
+        self.work.evaluations += 3 * len(ok)
+        self.work.factorizations += len(ok)
         test = np.flatnonzero(ok)
         if test.size:
-            here = self.problem.at(found.x[:, test], drive[:, test], a.track[test])
-            f = self.problem.factored(here, a.which[test])
-            self.work.evaluations += 3 * test.size
-            self.work.factorizations += test.size
             ends = [self.problem.at(end.x, end.drive, end.track) for end in (a.take(test), b.take(test))]
+            if test.size < len(ok):
+                here = here.part(test)
+                f = self.problem.factored(here, a.which[test])
             ok[test] = f.regular_between(*ends)
         return ok, middle
 

@@ -27,6 +27,9 @@ class Factored(Protocol):
     def solve(self, b: Array) -> Array:
         """Increments ``(F, k, n)`` for right sides ``(m, k, n)``."""
 
+    def motions(self) -> Array:
+        """Increments ``(F, p, n)`` that the equations leave free with the path values at rest."""
+
     def regular_between(self, a: Any, b: Any) -> Mask:
         """Whether no matrix on the parabola through those at ``a``, here and at ``b`` is singular or nearly so, ``(n,)``."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,11 @@ Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
 
+def places_of(points: Array) -> Array:
+    """Lengths ``(M,)`` along a polyline ``(d, M)`` up to each of its points."""
+    return np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(points) ** 2).sum(axis=0)))])
+
+
 class Paths:
     """Polylines of path values: for every track its ``points (d, M)``, the first one where it starts.
 
@@ -24,7 +29,7 @@ class Paths:
     def __init__(self, points: list[Array], stops: list[Mask] | None = None) -> None:
         self.points = points
         self.stops = stops or [np.zeros(p.shape[1], dtype=bool) for p in points]
-        self.length = [np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(p) ** 2).sum(axis=0)))]) for p in points]
+        self.length = [places_of(p) for p in points]
         self.end = np.array([length[-1] for length in self.length])
         count = np.array([len(length) for length in self.length])
         self._last = np.cumsum(count) - 1
@@ -95,6 +100,10 @@ class Nodes:
     def take(self, at: Index | Mask) -> Nodes:
         """Some of the nodes."""
         return Nodes(*[getattr(self, name)[..., at] for name in self.__dataclass_fields__])
+
+    def moved_by(self, tracks: int) -> Nodes:
+        """The same on tracks that are numbered higher."""
+        return replace(self, track=self.track + tracks)
 
     @staticmethod
     def join(parts: list[Nodes]) -> Nodes:

@@ -151,3 +151,105 @@ def test_a_structure_is_refused_for_any_subset_of_positions(engine):
     m = mechanisms.ring("RRR", [(0, 0, 0), (1, 0, 0), (0.3, 1, 0)], [Z] * 3)
     found = [type(solved(m, {"O1": q}, engine=engine)) for q in ([0.0, 0.1], [0.1], [0.0], 0.0)]
     assert len(set(found)) == 1, found
+
+
+def rssr_on_a_slide():
+    """An RSSR whose rocker stands on a second driven slide; its coupler may spin."""
+    pairs = [
+        mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=Z),
+        mg.Pair("P", "P", "frame", "slide", point=(3, 0, 0), axis=(1, 0, 0)),
+        mg.Pair("D", "R", "slide", "rocker", point=(3, 0, 0.5), axis=(0, 1, 0)),
+        mg.Pair("B", "S", "crank", "coupler", point=(1, 0, 0)),
+        mg.Pair("C", "S", "coupler", "rocker", point=(3, 0, 2.5)),
+    ]
+    return mg.Mechanism("rssr on a slide", None, pairs, ["A", "P"])
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+def test_two_drivers_go_on_behind_a_gap_in_space(engine):
+    """What can be reached behind a gap is solved, though the way straight along its edge does not lead there."""
+    t = np.linspace(0, 1, 61)
+    crank, out = 0.5 + 0.2 * t, 8 * np.sin(np.pi * t) ** 2
+    s = mg.kinematics(rssr_on_a_slide(), {"A": crank, "P": out}, on_reach="flag", engine=engine)
+    # the distance of B from the circle of C, against the rod
+    B = np.stack([np.cos(crank), np.sin(crank), np.zeros(61)], axis=1)
+    across = np.hypot(B[:, 0] - 3 - out, B[:, 2] - 0.5)
+    can = (np.hypot(np.abs(across - 2), B[:, 1]) < np.sqrt(10.25)) & (np.hypot(across + 2, B[:, 1]) > np.sqrt(10.25))
+    assert 20 < can.sum() < 40
+    assert s.status.tolist() == np.where(can, "ok", "out of reach").tolist()
+    for i in (50, 60):
+        alone = mg.kinematics(rssr_on_a_slide(), {"A": crank[i : i + 1], "P": out[i : i + 1]}, engine=engine)
+        np.testing.assert_allclose(s["D"].position[i], alone["D"].position[0], atol=1e-10)
+
+
+def test_turns_behind_a_gap_are_those_of_the_way_back():
+    """The way back is straight from the nearest point reached: rotation vectors and the spin of a passive rod are those along it."""
+    before, behind = [(0.6, 1.0), (0.6, 2.0)], [(0.2, 2.7), (0.3, 1.0), (1.3, 0.5), (1.0, 1.5)]
+    gap, way = [(0.6, 3.2), (0.2, 3.2)], [(0.6, 2.7)]
+    found = []
+    for between in (gap, way):
+        crank, out = np.array(before + between + behind).T
+        found.append(mg.kinematics(rssr_on_a_slide(), {"A": crank, "P": out}, on_reach="flag"))
+    s, straight = found
+    assert s.status.tolist() == ["ok"] * 2 + ["out of reach"] * 2 + ["ok"] * 4
+    for name in "BCD":
+        np.testing.assert_allclose(s[name].position[4:], straight[name].position[3:], atol=1e-10)
+    np.testing.assert_allclose(s.link("coupler").pose[4:], straight.link("coupler").pose[3:], atol=1e-10)
+
+
+def five_bar(rng):
+    """A planar five-bar with both cranks driven, and the closed form of its head for crank angles: NaN out of reach."""
+    while True:
+        first, second, b, c, g = rng.uniform(0.5, 1.5, 5)
+        start, side = rng.uniform(-np.pi, np.pi, 2), rng.choice([-1, 1])
+
+        def tips(turns, first=first, second=second, g=g, start=start):
+            t = start[:, None] + turns
+            return (
+                first * np.stack([np.cos(t[0]), np.sin(t[0])]),
+                np.array([[g], [0.0]]) + second * np.stack([np.cos(t[1]), np.sin(t[1])]),
+            )
+
+        def head(turns, tips=tips, b=b, c=c, side=side):
+            p, q = tips(turns)
+            d = np.linalg.norm(q - p, axis=0)
+            x = (b * b - c * c + d * d) / (2 * d)
+            with np.errstate(invalid="ignore"):
+                y = side * np.sqrt((b - x) * (b + x))
+            u = (q - p) / d
+            return p + x * u + y * np.stack([-u[1], u[0]]), np.minimum(b + c - d, d - abs(b - c))
+
+        (p, q), (h, margin) = tips(np.zeros((2, 1))), head(np.zeros((2, 1)))
+        if margin > 0.1:
+            break
+    points = {"A": (0, 0), "B": p[:, 0], "C": h[:, 0], "D": q[:, 0], "E": (g, 0)}
+    ends = ("frame", "crank"), ("crank", "rod"), ("rod", "other rod"), ("other rod", "other"), ("other", "frame")
+    pairs = [mg.Pair(k, "R", *e, point=(*points[k], 0), axis=Z) for k, e in zip(points, ends, strict=True)]
+    pairs[4] = mg.Pair("E", "R", "frame", "other", point=(g, 0, 0), axis=Z)
+    return mg.Mechanism("five-bar", None, pairs, ["A", "E"]), head
+
+
+@pytest.mark.seeds(10)
+def test_a_polygon_misses_nothing_that_is_reached_alone(seed):
+    """Behind gaps of random polygons: on the branch of the closed form, nothing flagged that is reached by itself, the same for any
+    further positions on the polygon."""
+    rng = np.random.default_rng((seed, 25))
+    m, head = five_bar(rng)
+    n = int(rng.choice([3, 7, 20]))
+    turns = np.cumsum(rng.uniform(-1, 1, (2, n)), axis=1) if seed % 2 else rng.uniform(-1.5, 1.5, (2, n))
+    engine = "sparse" if seed % 5 == 4 else "dense"
+    s = mg.kinematics(m, {"A": turns[0], "E": turns[1]}, on_reach="flag", engine=engine)
+    h, margin = head(turns)
+    ok = s.status == "ok"
+    assert not (ok & ~(margin > 0)).any()
+    C = s.link("rod").point((*head(np.zeros((2, 1)))[0][:, 0], 0.0)).position
+    np.testing.assert_allclose(C[ok, :2] * np.sqrt(margin[ok, None]), h.T[ok] * np.sqrt(margin[ok, None]), atol=1e-9)
+    for i in np.flatnonzero(~ok & (margin > 0)):
+        alone = mg.kinematics(m, {"A": turns[0, i : i + 1], "E": turns[1, i : i + 1]}, on_reach="flag", engine=engine)
+        assert alone.status[0] != "ok"
+    corners = np.concatenate([np.zeros((2, 1)), turns], axis=1)
+    finer = np.stack([corners[:, :-1], 0.5 * (corners[:, :-1] + corners[:, 1:])], axis=2).reshape(2, -1)[:, 1:]
+    finer = np.concatenate([finer, turns[:, -1:]], axis=1)
+    more = mg.kinematics(m, {"A": finer[0], "E": finer[1]}, on_reach="flag", engine=engine)
+    assert more.status[1::2].tolist() == s.status.tolist()
+    np.testing.assert_allclose(more["C"].position[1::2], s["C"].position, atol=1e-9)
