@@ -406,19 +406,26 @@ def continued(path: DriverPath, found: Positions) -> Array:
     s = path.system
     start = s.start_coordinates(s.m.start)
     if all(len(factor) == 1 for g in s.groups for factor in g.row.factors):
-        return s.coordinates_of(found.x)
+        q = s.coordinates_of(found.x)
+        return q if found.gained is None else q + found.gained
     out = np.full((s.n_freedoms, found.x.shape[1]), np.nan)
     good = np.flatnonzero(found.moved)
+    turns = np.zeros(found.x.shape[1], dtype=np.intp) if found.turns is None else found.turns
     for track, mine in _by_track(found.track[good]):
-        at, nodes = good[mine], found.nodes_of(track)
-        place = np.concatenate([nodes.place, found.place[at]])
-        order = np.argsort(place, kind="stable")
-        states = np.concatenate([nodes.x, found.x[:, at]], axis=1)[:, order]
-        q = s.coordinates_of(states, start)
-        back = np.empty_like(order)
-        back[order] = np.arange(len(order))
-        out[:, at] = q[:, back[len(nodes) :]]
-    return out
+        nodes, near = found.nodes_of(track), start
+        spin = np.zeros((s.n_freedoms, len(nodes)))
+        if found.spin is not None:
+            spin = found.spin[:, found.tracks.nodes.track == track]
+        for turn in range(int(turns[good[mine]].max()) + 1):
+            at = good[mine][turns[good[mine]] == turn]
+            place = np.concatenate([nodes.place, found.place[at]])
+            order = np.argsort(place, kind="stable")
+            on_the_way = path.advance(nodes.x, turn * spin, nodes.track) if turn else nodes.x
+            q = s.coordinates_of(np.concatenate([on_the_way, found.x[:, at]], axis=1)[:, order], near)
+            back = np.empty_like(order)
+            back[order] = np.arange(len(order))
+            out[:, at], near = q[:, back[len(nodes) :]], q[:, -1]
+    return out if found.gained is None else out + found.gained
 
 
 def _by_track(track: Index) -> list[tuple[int, Index]]:

@@ -128,7 +128,8 @@ class Positions:
     not reached; ``here`` the evaluation where all positions were closed in one block.
 
     ``place (T,)`` and ``track (T,)`` say where on the followed tracks they lie; ``near (T,)`` is the number of the crossing beside which
-    a position lies, or -1.
+    a position lies, or -1. Where the motion repeats itself, ``turns (T,)`` periods are taken off, in which freedoms ``gained (F, T)``;
+    ``spin (F, nodes)`` is what turns passive bodies on by a period.
     """
 
     x: Array
@@ -142,6 +143,9 @@ class Positions:
     near: Index
     crossings: list[Crossing]
     here: Configuration | None = None
+    turns: Index | None = None
+    gained: Array | None = None
+    spin: Array | None = None
 
     @property
     def moved(self) -> Mask:

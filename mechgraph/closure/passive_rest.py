@@ -114,12 +114,14 @@ def unspun(path: DriverPath, found: Positions, bodies: tuple[Idle, ...]) -> Posi
         return found
     carried = _Carried(path, interpolation, found.follower, bodies)
     x = found.x.copy()
+    turns = np.zeros(found.x.shape[1], dtype=np.intp) if found.turns is None else found.turns
     for at in in_blocks(good):
-        x[:, at] = carried.turned(found.x[:, at], found.which[at], found.track[at], found.place[at])
+        x[:, at] = carried.turned(found.x[:, at], found.which[at], found.track[at], found.place[at], turns[at])
     turned = carried.turned_nodes(nodes)
     tracks = replace(found.tracks, nodes=replace(nodes, x=turned))
     crossings = [replace(c, sides=replace(c.sides, x=carried.turned_nodes(c.sides))) for c in found.crossings]
-    return replace(found, x=x, here=None, tracks=tracks, crossings=crossings)
+    spin = None if found.turns is None else carried.spin(tracks.nodes)
+    return replace(found, x=x, here=None, tracks=tracks, crossings=crossings, spin=spin)
 
 
 class _Carried:
@@ -179,12 +181,15 @@ class _Carried:
         turn[first] = at_start[first]
         total = np.cumsum(turn)
         begin = (total - turn)[np.flatnonzero(first)][np.cumsum(first) - 1]
-        return _Body(body_axis, across, e, total - begin, series)
+        # a track that comes back to where it starts comes back with the vector turned
+        after = total - begin + series[:, 0] - _angle(end, rotate(R[:, :, self._starts], across), right)
+        last = np.flatnonzero(np.append(first[1:], True))
+        return _Body(body_axis, across, e, total - begin, series, after[last][np.cumsum(first) - 1])
 
-    def turned(self, x: Array, which: Index, track: Index, place: Array) -> Array:
-        """States with every body turned to where it stands when it does not spin."""
+    def turned(self, x: Array, which: Index, track: Index, place: Array, turns: Index | None = None) -> Array:
+        """States with every body turned to where it stands when it does not spin, ``turns`` periods of the track later."""
         for _ in range(TURNS):
-            angles, dq = self._turn(x, which, track, place)
+            angles, dq = self._turn(x, which, track, place, turns)
             if np.abs(angles).max(initial=0.0) < TURNED:
                 break
             # exact where the rates of the turn are constant (ball joints, hinges); over a plane it comes nearer with every repetition
@@ -195,7 +200,13 @@ class _Carried:
         """States of nodes on the tracks."""
         return self.turned(nodes.x, nodes.which, nodes.track, nodes.place)
 
-    def _turn(self, x: Array, which: Index, track: Index, place: Array) -> tuple[Array, Array]:
+    def spin(self, nodes: Nodes) -> Array:
+        """Increments ``(F, nodes)`` from nodes to one period later."""
+        return self._turn(nodes.x, nodes.which, nodes.track, nodes.place, np.ones(len(nodes), dtype=np.intp))[1]
+
+    def _turn(
+        self, x: Array, which: Index, track: Index, place: Array, turns: Index | None = None
+    ) -> tuple[Array, Array]:
         """Angles ``(turns, n)`` that are missing, and the increments ``(F, n)`` that turn by them.
 
         Links that one passive motion turns share an angle: the mean, as at rest their mean spin vanishes (welded ones have the same).
@@ -218,6 +229,8 @@ class _Carried:
             n, _ = _across(known.e[:, step], u)
             angle = known.turn[step] + (known.series[step] * integrals).sum(axis=1)
             angle = angle - _angle(n, rotate(R, known.across[:, step]), u)
+            if turns is not None:
+                angle = angle + turns * known.period[step]
             angle = np.sign((axis * u).sum(axis=0)) * np.where(moved, angle, 0.0)
             shared.setdefault(number, []).append(angle)
         angles = {
@@ -234,7 +247,8 @@ class _Body:
     """One passive body along all steps, ``(3, steps)`` and ``(steps,)``.
 
     ``axis`` and a vector ``across`` it in the body's own frame; the reference ``e`` of every step, the angle ``turn`` of the carried
-    vector against it where the step begins, and the Legendre ``series`` of its further turning.
+    vector against it where the step begins, the Legendre ``series`` of its further turning, and by how much it is turned after the whole
+    track, where that is a ``period``.
     """
 
     axis: Array
@@ -242,6 +256,7 @@ class _Body:
     e: Array
     turn: Array
     series: Array
+    period: Array
 
 
 def _integrals(t: Array) -> Array:
