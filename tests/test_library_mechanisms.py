@@ -7,7 +7,8 @@ from mechanisms import unclosable_four_bar
 import mechgraph as mg
 from mechgraph.closure.assembly import assembled, named_columns, scaled_system
 from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.driver_path import DriverPath, Request, Status, follow
+from mechgraph.closure.driver_path import DriverPath, Request, Status
+from mechgraph.closure.following import follow
 from mechgraph.closure.indexing import System
 from mechgraph.closure.solver import closure_solver
 from mechgraph.topology.linkgraph import link_graph

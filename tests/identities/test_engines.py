@@ -11,7 +11,8 @@ from strategies import closed_mechanism, motions, open_chain, with_drives, with_
 import mechgraph as mg
 from mechgraph.closure.assembly import assembled, named_columns
 from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.driver_path import DriverPath, Request, follow
+from mechgraph.closure.driver_path import DriverPath, Request
+from mechgraph.closure.following import follow
 from mechgraph.closure.solver import closure_solver
 from mechgraph.numerics.tolerances import PATH
 
