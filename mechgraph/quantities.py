@@ -93,19 +93,23 @@ def is_quantity(value: Any) -> bool:
 
 
 def has_quantity(value: Any, depth: int = DEEPEST) -> bool:
-    """Whether a value is a quantity or a sequence with one."""
+    """Whether a value is a quantity, or a sequence or table with one."""
     if type(value) is float or value is None:
         return False
+    if isinstance(value, Mapping):
+        value = tuple(value.values())
     if isinstance(value, list | tuple):
         return depth > 0 and not set(map(type, value)) <= _PLAIN and any(has_quantity(v, depth - 1) for v in value)
     return not isinstance(value, str) and is_quantity(value)
 
 
 def without_units(value: Any, dimension: Dimension, units: Mapping[str, str]) -> Any:
-    """Quantities, in sequences too, as plain numbers in the given units, angles in radians; unchanged where they do not fit.
+    """Quantities, in sequences and tables too, as plain numbers in the given units, angles in radians; unchanged where they do not fit.
 
     Plain numbers beside them stay what they are. Without ``units`` nothing is converted.
     """
+    if isinstance(value, Mapping):
+        return {name: without_units(item, dimension, units) for name, item in value.items()}
     if isinstance(value, list | tuple) and has_quantity(value):
         return tuple(without_units(item, dimension, units) for item in value)
     powers = {name: power for name, power in zip(BASE_UNITS, dimension, strict=True) if power}

@@ -92,8 +92,9 @@ class Site:
         return self.here.poses[:, :3, self._link[link]]
 
     def point(self, link: str, p: Any) -> tuple[Array, Array]:
-        """Position and velocity of a material point given in the link's frame."""
+        """Position and velocity of a material point given in the link's frame, or by its name."""
         i = self._link[link]
+        p = self.m.links[i].point(p) if isinstance(p, str) else p
         par = self.here.system.par
         local = (np.asarray(p, dtype=float).reshape(3, -1) - par.offset[:, i, None]) / self.L
         X = self.here.poses[:, :, i]

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
+from types import MappingProxyType
 from typing import Any, ClassVar, Self, get_type_hints
 
 import numpy as np
@@ -65,10 +67,11 @@ class Kind:
 class FieldFormat:
     """One field: its kind, its meaning in a sentence, and its dimension (``slide`` and ``turn`` differ where a freedom decides).
 
-    ``degrees``: may be given in degrees under its name with ``_deg`` added; ``minimum``: smallest number; ``choices``: the texts allowed;
-    ``key``: its name in files where it is another; ``table``: the table of the file that it holds; ``single``: of the name of a
-    freedom, whether it must not be part of a rotation; ``default``: in words, where the value does not say it; ``held_in``: the array
-    of ``Declared`` that holds the number, and the factor, where the array has another name than the field; ``rules``: more of its schema.
+    ``degrees``: may be given in degrees under its name with ``_deg`` added; ``minimum``: smallest number; ``choices``: the texts
+    allowed; ``of``: of the name of a point, the field that names its link; ``key``: its name in files where it is another; ``table``:
+    the table of the file that it holds; ``single``: of the name of a freedom, whether it must not be part of a rotation; ``default``:
+    in words, where the value does not say it; ``held_in``: the array of ``Declared`` that holds the number, and the factor, where the
+    array has another name than the field; ``rules``: more of its schema.
     """
 
     kind: Kind
@@ -78,6 +81,7 @@ class FieldFormat:
     degrees: bool = False
     minimum: float | None = None
     choices: tuple[str, ...] = ()
+    of: str = ""
     key: str = ""
     table: str = ""
     single: bool = True
@@ -129,7 +133,7 @@ class Described(Formatted):
         for name in self._numeric:
             value = getattr(self, name)
             if value is not None and type(value) is not float:
-                object.__setattr__(self, name, plain(value))
+                object.__setattr__(self, name, _on_each(plain, value))
 
     def value_faults(self, where: str) -> list[str]:
         """What is wrong with the values alone; None is no fault where the field may be left out."""
@@ -185,8 +189,8 @@ class Described(Formatted):
                     raise DeclarationError(
                         "to_units", [f"{name} of a load is a callable; convert it yourself, or sample it first"]
                     )
-                if factor != 1.0:
-                    changes[name] = plain(np.asarray(value) * factor)
+                if factor != 1.0 and not isinstance(value, str):
+                    changes[name] = _on_each(partial(_times, factor), value)
         return self.replace(**changes) if changes else self
 
 
@@ -210,8 +214,21 @@ class MovedFunction:
         return np.asarray(self.function(back @ pose @ G, local, t)) @ R.T
 
 
+def _on_each(change: Callable[[Any], Any], value: Any) -> Any:
+    """A changed value; of a table of values each, read-only."""
+    if isinstance(value, Mapping):
+        return MappingProxyType({name: change(item) for name, item in value.items()})
+    return change(value)
+
+
+def _times(factor: float, value: Any) -> Any:
+    return plain(np.asarray(value) * factor)
+
+
 def _moved_point(value: Any, pose: Array) -> Any:
-    return plain(pose[:, :3] @ np.asarray(value) + pose[:, 3])
+    if isinstance(value, str):
+        return value
+    return _on_each(lambda p: plain(pose[:, :3] @ np.asarray(p) + pose[:, 3]), value)
 
 
 def _turned(value: Any, pose: Array) -> Any:
@@ -248,6 +265,24 @@ def _vector_fault(value: Any, what: str, minimum: float | None) -> str | None:
     return vector_fault(value, what)
 
 
+def _named_point_fault(value: Any, what: str, minimum: float | None) -> str | None:
+    if isinstance(value, str) or is_numeric(value, (3,)):
+        return None
+    return wrong(value, what, "three finite numbers, or the name of a point of the link")
+
+
+def _points_fault(value: Any, what: str, minimum: float | None) -> str | None:
+    if not isinstance(value, Mapping):
+        return wrong(value, what, "a table name -> (x, y, z)")
+    for name, point in value.items():
+        if not isinstance(name, str) or not name:
+            return wrong(name, f"{what}: name", "a text")
+        fault = vector_fault(point, f"{what}: {name}")
+        if fault:
+            return fault
+    return None
+
+
 _VECTOR: Schema = {"$ref": "#/$defs/vector"}
 TEXT = Kind("text", {"type": "string"}, str)
 LINK_NAME = Kind("text", {"type": "string"}, str)
@@ -258,6 +293,24 @@ NUMBER = Kind(
     "number", {"type": "number"}, None, (), True, lambda value, what, least: number_fault(value, what, minimum=least)
 )
 POINT = Kind("3 numbers", _VECTOR, None, (3,), True, _vector_fault, _moved_point)
+NAMED_POINT = Kind(
+    "3 numbers or a name",
+    {"anyOf": [_VECTOR, {"type": "string", "minLength": 1}]},
+    None,
+    (3,),
+    True,
+    _named_point_fault,
+    _moved_point,
+)
+POINTS = Kind(
+    "table of 3 numbers",
+    {"type": "object", "additionalProperties": _VECTOR},
+    None,
+    None,
+    True,
+    _points_fault,
+    _moved_point,
+)
 VECTOR = Kind("3 numbers", _VECTOR, None, (3,), True, _vector_fault, _turned)
 DIRECTION = Kind(
     "3 numbers", _VECTOR, None, (3,), True, lambda value, what, _: vector_fault(value, what, direction=True), _turned

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
+from types import MappingProxyType
 from typing import Annotated, Any
 
 import numpy as np
 
 from mechgraph.algebra.inertia import physical_faults
-from mechgraph.model.field_format import FLAG, NUMBER, POINT, TENSOR, TEXT, Described
+from mechgraph.errors import DeclarationError
+from mechgraph.model.field_format import FLAG, NUMBER, POINT, POINTS, TENSOR, TEXT, Described
 from mechgraph.quantities import is_numeric, shown
 from mechgraph.units import INERTIA, LENGTH, MASS
 
@@ -25,6 +28,7 @@ class Link(Described):
         needed where mass > 0.
     inertia : 3 x 3 tensor about the mass centre, in the link's frame (off-diagonals are minus the products of inertia).
     unphysical : accept an inertia that no body can have.
+    points : named points, ``{"tip": (x, y, z)}`` in the coordinates of ``center``, for loads, prescribed motion and results.
     """
 
     name: Annotated[str, TEXT("in a chain: `frame`, `link1`, `link2`, ...")]
@@ -46,9 +50,32 @@ class Link(Described):
         ),
     ] = None
     unphysical: Annotated[bool, FLAG("accept an inertia that no body can have")] = False
+    points: Annotated[
+        Any, POINTS("named points, name → 3 numbers, in the coordinates of `center`", LENGTH, default="none")
+    ] = field(default=None, hash=False)
 
     def __post_init__(self) -> None:
+        if self.points is None:
+            object.__setattr__(self, "points", MappingProxyType({}))
         self.read_numbers()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        given = {name: getattr(self, name) for name in self.formats}
+        return partial(type(self), **given | {"points": dict(self.points)}), ()
+
+    def point(self, name: str) -> tuple[float, float, float]:
+        """The point of that name, in the link's frame."""
+        if name not in self.points:
+            raise DeclarationError(f"link {self.name!r}", [self.point_fault(name)])
+        at: tuple[float, float, float] = self.points[name]
+        return at
+
+    def point_fault(self, name: Any) -> str:
+        """What to say of a name that is no point of this link."""
+        known = (
+            f"its points: {', '.join(self.points)}" if self.points else "it has none; declare points={'tip': (x, y, z)}"
+        )
+        return f"link {self.name!r} has no point {shown(name)} ({known})"
 
     def faults(self) -> list[str]:
         """What is wrong with this link, one line each."""

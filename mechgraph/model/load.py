@@ -15,8 +15,8 @@ from mechgraph.algebra.se3 import Array, rotate
 from mechgraph.model.field_format import (
     FREEDOM_NAME,
     LINK_NAME,
+    NAMED_POINT,
     NUMBER,
-    POINT,
     POSITION,
     SERIES,
     TEXT,
@@ -45,7 +45,7 @@ class LoadSite(Protocol):
         """Rotation of the link, ``(3, 3, T)``."""
 
     def point(self, link: str, p: Any) -> tuple[Array, Array]:
-        """Position and velocity ``(3, T)`` of a material point, given in the link's frame."""
+        """Position and velocity ``(3, T)`` of a material point, given in the link's frame or by its name."""
 
     def center(self, link: str) -> Any:
         """Mass centre in the link's frame, or None."""
@@ -132,6 +132,8 @@ class _Load(Described):
                 found.append(f"unknown link {value!r} (links: {', '.join(names.link_index)})")
             elif about.kind is FREEDOM_NAME:
                 found.append(names.freedom_fault(value, single=about.single))
+            elif about.of and (link := getattr(self, about.of)) in names.link_index:
+                found.append(None if value in names.link(link).points else names.link(link).point_fault(value))
         found += self.value_faults("")
         return [self.where + fault for fault in found if fault]
 
@@ -191,9 +193,9 @@ class Wrench(_Load):
     """A force at a material point and a moment on one link.
 
     ``point`` is in the coordinates of the declared configuration, in which link frames stand on the global one (for a link
-    placed by markers: its own frame); the mass centre where it is left out (a force on a link without one
-    needs it). ``frame`` says whether force and moment have global directions or turn with the link. Values may be arrays over
-    positions or a callable ``(pose, twist, t)`` of the link.
+    placed by markers: its own frame), or the name of a point of the link; the mass centre where it is left out (a force on
+    a link without one needs it). ``frame`` says whether force and moment have global directions or turn with the link.
+    Values may be arrays over positions or a callable ``(pose, twist, t)`` of the link.
     """
 
     kind: ClassVar[str] = "wrench"
@@ -203,7 +205,12 @@ class Wrench(_Load):
     moment: Annotated[Value, VECTOR_SERIES("at least one of the two", MOMENT, default="none")] = None
     point: Annotated[
         Any,
-        POINT("material point, in the coordinates of the declared configuration", LENGTH, default="mass centre"),
+        NAMED_POINT(
+            "material point, in the coordinates of the declared configuration, or the name of one of the link",
+            LENGTH,
+            default="mass centre",
+            of="link",
+        ),
     ] = None
     frame: Annotated[
         Literal["global", "link"],
@@ -261,8 +268,8 @@ class Spring(_Load):
     between_links: ClassVar[bool] = True
     a: Annotated[str, LINK_NAME("first link")]
     b: Annotated[str, LINK_NAME("second link")]
-    p: Annotated[Any, POINT("point of link a", LENGTH)]
-    q: Annotated[Any, POINT("point of link b", LENGTH)]
+    p: Annotated[Any, NAMED_POINT("point of link a, or its name", LENGTH, of="a")]
+    q: Annotated[Any, NAMED_POINT("point of link b, or its name", LENGTH, of="b")]
     stiffness: Annotated[float, NUMBER("force per length", FORCE_PER_LENGTH)]
     free_length: Annotated[float, NUMBER("length without tension", LENGTH, minimum=0.0)] = 0.0
     damping: Annotated[float, NUMBER("force per velocity", FORCE_PER_VELOCITY)] = 0.0

@@ -367,7 +367,7 @@ def _data(item: Described, path: str, where: str) -> dict[str, Any]:
     out = {}
     for key, about in item.formats.items():
         value = getattr(item, key)
-        if value is not None:
+        if value is not None and not (isinstance(value, Mapping) and not value):
             out[key] = dict(value) if about.kind is COEFFICIENTS else _plain(value, f"{where}.{key}", path)
     return out
 

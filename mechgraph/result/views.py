@@ -274,6 +274,11 @@ class LinkResult:
             raise DeclarationError(f"link {self._values.mechanism.links[self._index].name!r}", [fault])
         return self._values.link_point(self._index, p)
 
+    def at(self, name: str) -> MaterialPoint:
+        """Position, velocity and acceleration of a named point, ``Link(points={name: (x, y, z)})``."""
+        link = self._values.mechanism.links[self._index]
+        return self._values.link_point(self._index, link.point(name))
+
     @property
     def units(self) -> dict[str, Any]:
         """Units of the properties in the declared units; of twists angular part first."""

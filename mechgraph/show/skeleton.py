@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -33,14 +34,27 @@ MARKS: dict[tuple[int, int], tuple[str, float]] = {
 
 @dataclass(frozen=True)
 class _Shape:
-    """All that is drawn, over the positions drawn from: ``ends[pair, link]`` and ``centers[link]`` ``(T, 3)``."""
+    """All that is drawn, over the positions drawn from.
+
+    ``ends[pair, link]``, mass ``centers[link]`` and named ``points[link, name]``, ``(T, 3)`` each.
+    """
 
     m: Mechanism
     good: Any
     ends: dict[tuple[str, str], Array]
     axes: dict[str, Array]
     centers: dict[str, Array]
-    size: float
+    points: dict[tuple[str, str], Array]
+
+    @cached_property
+    def everything(self) -> Array:
+        """All points that are drawn."""
+        return np.concatenate([*self.ends.values(), *self.centers.values(), *self.points.values()])
+
+    @cached_property
+    def size(self) -> float:
+        """Diagonal of the box about all points."""
+        return float(np.linalg.norm(np.ptp(self.everything, axis=0))) or 1.0
 
     def corners(self, link: str, t: int) -> Array:
         """Pair points of a link at one position, ``(n, 3)``."""
@@ -73,9 +87,8 @@ def _shape(m: Mechanism, poses: dict[str, Array], good: Any) -> _Shape:
     }
     axes = {pair.name: poses[pair.a][:, :, :3] @ pair.markers[0].pose()[:, 2] for pair in m.pairs}
     centers = {k.name: moved(k.name, k.center) for k in m.links if k.mass > 0 and k.center is not None}
-    everything = np.concatenate([*ends.values(), *centers.values()])
-    size = float(np.linalg.norm(np.ptp(everything, axis=0))) or 1.0
-    return _Shape(m, good, ends, axes, centers, size)
+    points = {(k.name, name): moved(k.name, p) for k in m.links for name, p in k.points.items()}
+    return _Shape(m, good, ends, axes, centers, points)
 
 
 def draw_skeleton(
@@ -178,6 +191,9 @@ def _links(ax: Any, shape: _Shape, t: int, colours: dict[str, str], *, ghost: bo
             ax.plot(*points.T, solid_capstyle="round", **line)
         if not ghost and link in shape.centers:
             _center(ax, shape, link, t, colour)
+        for at in [at[t] for (owner, _), at in shape.points.items() if owner == link and not ghost]:
+            ax.plot(*np.array([points.mean(axis=0), at]).T, color=colour, lw=0.9, ls=(0, (2, 2)), zorder=3)
+            ax.scatter(*at, marker="x", s=40, color=colour, depthshade=False, zorder=7)
 
 
 def _center(ax: Any, shape: _Shape, link: str, t: int, colour: str) -> None:
@@ -251,12 +267,15 @@ def _labels(ax: Any, shape: _Shape, t: int, colours: dict[str, str]) -> None:
     camera = _camera(ax)
     moving = {link: shape.corners(link, t) @ camera.T for link in colours if link != m.frame}
     marks = np.array(
-        [shape.ends[pair.name, pair.b][t] for pair in m.pairs] + [shape.centers[k][t] for k in shape.centers]
+        [shape.ends[pair.name, pair.b][t] for pair in m.pairs]
+        + [at[t] for at in (*shape.centers.values(), *shape.points.values())]
     )
     room = _Room([_sides(corners) for corners in moving.values()] + [marks @ camera.T], _extent(shape, camera))
     for pair in m.pairs:
         at = camera @ shape.ends[pair.name, pair.b][t]
         _label(ax, room, f"{pair.name} ({pair.type.symbol})", at, 0.05, camera, INK, "bold")
+    for (link, name), at in shape.points.items():
+        _label(ax, room, f"{link}.{name}", camera @ at[t], 0.04, camera, colours.get(link, INK), "normal")
     for link, corners in moving.items():
         at = corners.mean(axis=0)
         _label(ax, room, link, at, 0.035, camera, colours[link], "normal")
@@ -270,7 +289,7 @@ def _camera(ax: Any) -> Array:
 
 def _extent(shape: _Shape, camera: Array) -> float:
     """Diagonal of what is seen: less than the size of a long mechanism that is seen along its length."""
-    seen = np.concatenate([*shape.ends.values(), *shape.centers.values()]) @ camera.T
+    seen = shape.everything @ camera.T
     return float(np.linalg.norm(np.ptp(seen, axis=0))) or shape.size
 
 
@@ -337,7 +356,7 @@ def _plane_normal(points: Array) -> Array | None:
 
 def _set_view(ax: Any, shape: _Shape, view: tuple[float, float]) -> None:
     """Equal scales, no box, a small tripod of the global directions; a plane mechanism is seen along its normal."""
-    points = np.concatenate([*shape.ends.values(), *shape.centers.values()])
+    points = shape.everything
     low, high = points.min(axis=0), points.max(axis=0)
     room, middle = np.maximum(high - low, 0.12 * shape.size), (low + high) / 2
     normal = _plane_normal(points)

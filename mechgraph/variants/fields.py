@@ -264,8 +264,9 @@ def topology_of(m: Mechanism) -> tuple[Any, ...]:
 
 
 def _alike(m: Mechanism, other: Mechanism) -> bool:
-    """Whether start, stored motions, and all of the loads that is no number are the same, so that only numbers differ."""
-    if dict(m.start) != dict(other.start) or m.drives != other.drives:
+    """Whether start, stored motions, named points, and all of the loads that is no number are the same, so that only numbers differ."""
+    points = [[link.points for link in one.links] for one in (m, other)]
+    if dict(m.start) != dict(other.start) or m.drives != other.drives or points[0] != points[1]:
         return False
     for one, two in zip(m.loads, other.loads, strict=True):
         for f in dataclasses.fields(one):
