@@ -32,6 +32,7 @@ from mechgraph.model.pair_type import Bookkeeping, Component, Freedom, PairType
 from mechgraph.model.toml import load, save
 from mechgraph.report.report import DeterminacyReport, check
 from mechgraph.response.respond import Response, respond
+from mechgraph.response.small_motion import equilibrium, linearize
 from mechgraph.result.solution import Solution
 from mechgraph.variants.result import Study
 from mechgraph.variants.study import study
@@ -72,10 +73,12 @@ __all__ = [
     "assemble",
     "chain",
     "check",
+    "equilibrium",
     "formulate",
     "inertia",
     "kinematics",
     "library",
+    "linearize",
     "load",
     "pair_types",
     "respond",

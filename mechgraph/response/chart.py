@@ -53,7 +53,7 @@ class Chart:
         self.free: Index = np.sort(order[:n]).astype(np.intp)
         self.solver: ClosureSolver = closure_solver(engine, np.concatenate([self.free, prescribed]))
         self.which = self.solver.chosen(here, np.full(1, -1))
-        self._start = here
+        self.start = here
         f = self.solver.factored(here, self.which)
         self.steepness = self._steepness(f)
         self._singles = system.single_rows[self.free]

@@ -16,18 +16,17 @@ from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.rank import closure_rank
 from mechgraph.closure.solver import engine_for
 from mechgraph.errors import DeclarationError, ResponseError
-from mechgraph.force.applied_loads import Site
-from mechgraph.force.block import ForceTask, forces_of_block
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.linear import rank_of, singular_values
 from mechgraph.numerics.tolerances import MOTIONS
 from mechgraph.response.along_path import Arc, PathStage
 from mechgraph.response.charts import ChartStage, Task
 from mechgraph.response.integration import METHODS, Integration, Stage, Stopped
-from mechgraph.response.motion_equations import Loads, kinetic_energy, moved
+from mechgraph.response.motion_equations import Loads
 from mechgraph.response.prescribed import Prescribed
+from mechgraph.response.reading import trajectory_of
 from mechgraph.result.solution import Solution
-from mechgraph.result.trajectory import BlockMotion, Trajectory
+from mechgraph.result.trajectory import Trajectory
 
 SLACK = 1e-9
 """Part of the given rates by which they may miss the closure before they contradict it."""
@@ -96,11 +95,8 @@ class _Motion:
 
 def _read(motion: _Motion, times: Array) -> Response:
     """States, rates and forces at times; the positions of a stage are closed and evaluated together."""
-    task, m = motion.task, motion.mechanism
-    s, flat = task.system, times.reshape(-1)
-    T = flat.size
-    x, works = np.full((s.n_state, T), np.nan), np.zeros(T)
-    blocks = []
+    task, m, flat = motion.task, motion.mechanism, times.reshape(-1)
+    works, blocks = np.zeros(flat.size), []
     for places, stage, y, work in motion.integration.at(flat):
         works[places] = work
         for part in in_blocks(np.arange(len(places))):
@@ -109,26 +105,11 @@ def _read(motion: _Motion, times: Array) -> Response:
                 raise ResponseError(
                     f"mechanism {m.name!r}: the loops do not close at some time of {flat[places[part]]}"
                 )
-            x[:, places[part]] = closed.here.x
             blocks.append((places[part], closed, v))
-    coordinates = s.coordinates_of(x, s.start_coordinates(m.start))
-    trajectory = Trajectory(s, lambda places: s, times.shape, times, task.columns, coordinates, True)
-    trajectory.engine = task.engine
+    trajectory, kinetic, potential = trajectory_of(task, m, times, blocks)
     trajectory.work = motion.integration.work
-    kinetic, potential = np.zeros(T), np.zeros(T)
-    for part, closed, v in blocks:
-        # the batch of a block is its own: loads are functions of time here, not arrays over positions
-        t, count = flat[part], len(part)
-        rates = moved(closed.here, closed.f, v, task.prescribed_at(t)[1:], task.loads, t).rates
-        force = ForceTask("loop_wrench", m.loads, task.columns, (), (count,), t, "nan")
-        forces = forces_of_block(force, rates, closed.f, coordinates[:, part], np.arange(count))
-        trajectory.put(BlockMotion(part, rates), forces)
-        kinetic[part] = kinetic_energy(closed.here, rates.V) * s.par.L**2
-        site = Site(closed.here, rates, coordinates[:, part], (count,), np.arange(count), t)
-        for load in task.loads.stored:
-            potential[part] += load.energy(site)
     shape = times.shape
-    energy = Energy(kinetic.reshape(shape), potential.reshape(shape), (works * s.par.L**2).reshape(shape))
+    energy = Energy(kinetic.reshape(shape), potential.reshape(shape), (works * task.system.par.L**2).reshape(shape))
     return Response(trajectory, energy, motion)
 
 

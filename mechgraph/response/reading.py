@@ -1,0 +1,43 @@
+"""Closed states with rates of independent freedoms, turned into a trajectory with all forces, and their energies."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.closure.indexing import Index
+from mechgraph.force.applied_loads import Site
+from mechgraph.force.block import ForceTask, forces_of_block
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.response.chart import Closed
+from mechgraph.response.charts import Task
+from mechgraph.response.motion_equations import kinetic_energy, moved
+from mechgraph.result.trajectory import BlockMotion, Trajectory
+
+Block = tuple[Index, Closed, Array]
+"""Places, closed states, and the rates ``v (n, T)`` of the independent columns of their factors."""
+
+
+def trajectory_of(task: Task, m: Mechanism, times: Array, blocks: Iterable[Block]) -> tuple[Trajectory, Array, Array]:
+    """The trajectory at times (a number or ``(T,)``) from blocks of states, with kinetic and potential energy ``(T,)``."""
+    s, t, blocks = task.system, times.reshape(-1), list(blocks)
+    x = np.full((s.n_state, t.size), np.nan)
+    for places, closed, _ in blocks:
+        x[:, places] = closed.here.x
+    coordinates = s.coordinates_of(x, s.start_coordinates(m.start))
+    out = Trajectory(s, lambda places: s, times.shape, times, task.columns, coordinates, True)
+    out.engine = task.engine
+    kinetic, potential = np.zeros(t.size), np.zeros(t.size)
+    for places, closed, v in blocks:
+        # the batch of a block is its own: loads are functions of time here, not arrays over positions
+        at, count, q = t[places], len(places), coordinates[:, places]
+        rates = moved(closed.here, closed.f, v, task.prescribed_at(at)[1:], task.loads, at).rates
+        forces = ForceTask("loop_wrench", m.loads, task.columns, (), (count,), at, "nan")
+        out.put(BlockMotion(places, rates), forces_of_block(forces, rates, closed.f, q, np.arange(count)))
+        kinetic[places] = kinetic_energy(closed.here, rates.V) * s.par.L**2
+        site = Site(closed.here, rates, q, (count,), np.arange(count), at)
+        for load in task.loads.stored:
+            potential[places] += load.energy(site)
+    return out, kinetic, potential
