@@ -44,7 +44,7 @@ FASTEST = 6.0
 AROUND = 0.32
 """Length of the piece with a change point in its middle: the accelerations of states beside it lose rounding over the cube of the
 distance, 4e-11 at the nearest point of the series."""
-TAIL = 1e-10
+TAIL = 1e-12
 """Part of the largest coefficient that the last two of a series may have; what a smooth series leaves out behind them is far smaller."""
 SHORTEST = 0.01
 """Shortest piece."""
