@@ -49,8 +49,8 @@ class MotionTolerances:
     """Singular value against the largest below which passive motions depend on each other."""
     proportional: float = 3e-5
     """Sine of the angle between the parts of two freedoms in the motions up to which they move in proportion."""
-    idle: float = 1e-8
-    """Part of the loads' power in a passive motion below which they leave it alone: far above rounding, far below any effect."""
+    idle: float = 1e-6
+    """Part of the loads' power in a passive motion below which they leave it alone: inertias of five printed digits leave 1e-7."""
     error: float = 1e-9
     """Error of such a part that has to be expected near a singular position: near a dead point parts are small."""
 

@@ -13,14 +13,16 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_path import DriverPath
-from mechgraph.closure.indexing import Index
+from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.rank import closure_rank
 from mechgraph.closure.solver import closure_solver
 from mechgraph.numerics.continuation import Follower
@@ -77,7 +79,7 @@ class Arc:
         self.column = int(self.singles[np.argmax(np.abs(motion[self.singles]))])
         self.row = int(s.single_rows[self.column])
         columns = np.array([self.column], dtype=np.intp)
-        self.path = DriverPath(s, closure_solver(task.engine, columns), lambda variants: s)
+        self.path = DriverPath(s, closure_solver(task.engine, columns), partial(_same, s))
         self.begin = float(x[self.row])
         self._pieces: dict[float, list[_Piece]] = {1.0: [], -1.0: []}
         self._ends = {1.0: x, -1.0: x}
@@ -291,6 +293,10 @@ class PathStage:
     def states(self, t: Array, y: Array) -> tuple[Closed, Array]:
         """See ``Stage``."""
         return self.arc.close(y[0]), y[1:2]
+
+
+def _same(system: System, variants: Any) -> System:
+    return system
 
 
 _ORDERS = np.arange(POINTS, dtype=float)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import partial
+from typing import Any
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.indexing import Index
+from mechgraph.closure.indexing import Index, System
 from mechgraph.force.applied_loads import Site
 from mechgraph.force.block import ForceTask, forces_of_block
 from mechgraph.model.mechanism import Mechanism
@@ -27,7 +29,7 @@ def trajectory_of(task: Task, m: Mechanism, times: Array, blocks: Iterable[Block
     for places, closed, _ in blocks:
         x[:, places] = closed.here.x
     coordinates = s.coordinates_of(x, s.start_coordinates(m.start))
-    out = Trajectory(s, lambda places: s, times.shape, times, task.columns, coordinates, True)
+    out = Trajectory(s, partial(_same, s), times.shape, times, task.columns, coordinates, True)
     out.engine = task.engine
     kinetic, potential = np.zeros(t.size), np.zeros(t.size)
     for places, closed, v in blocks:
@@ -41,3 +43,8 @@ def trajectory_of(task: Task, m: Mechanism, times: Array, blocks: Iterable[Block
         for load in task.loads.stored:
             potential[places] += load.energy(site)
     return out, kinetic, potential
+
+
+def _same(system: System, places: Any) -> System:
+    """The one system of all positions; a function of the module, so that solutions can be pickled."""
+    return system

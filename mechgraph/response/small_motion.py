@@ -28,7 +28,7 @@ from mechgraph.response.reading import trajectory_of
 from mechgraph.result.solution import Solution
 
 STEP = 0.004
-"""Step of the differences (radians, lengths / L); of eighth order: their error and rounding are both near 1e-13 where forces bend within 0.3."""
+"""Step of the differences (radians, lengths / L); their error and rounding are both near 1e-13 where forces bend within 0.3."""
 STENCIL = ((1, 4 / 5), (2, -1 / 5), (3, 4 / 105), (4, -1 / 280))
 """Steps and weights of the first derivative by central differences of eighth order."""
 ITERATIONS = 60
@@ -124,6 +124,9 @@ class Equilibrium(Mechanism):
     stable: bool | None
     solution: Solution
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _balanced, (self._arguments(), self.stable, self.solution)
+
 
 def equilibrium(m: Mechanism, start: Mapping[str, float] | None = None, *, engine: str = "auto") -> Equilibrium:
     """A position in which the declared loads balance, with the declared drives at their place: Newton from ``start``.
@@ -165,10 +168,15 @@ def equilibrium(m: Mechanism, start: Mapping[str, float] | None = None, *, engin
         raise ResponseError(
             f"mechanism {m.name!r}: no equilibrium was found: the motion towards it is stopped by the loops"
         )
-    out = Equilibrium(**{**m._arguments(), "start": place.start()})
     w = np.linalg.eigvalsh(0.5 * (K + K.T))
     flat = STIFF * float(np.abs(w).max(initial=0.0))
-    out._set(stable=None if np.abs(w).min() <= flat else bool(w.min() > 0), solution=place.solution())
+    stable = None if np.abs(w).min() <= flat else bool(w.min() > 0)
+    return _balanced({**m._arguments(), "start": place.start()}, stable, place.solution())
+
+
+def _balanced(arguments: dict[str, Any], stable: bool | None, solution: Solution) -> Equilibrium:
+    out = Equilibrium(**arguments)
+    out._set(stable=stable, solution=solution)
     return out
 
 
