@@ -9,7 +9,7 @@ import os
 import shutil
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated, Any, Literal, NoReturn
@@ -17,6 +17,7 @@ from typing import Annotated, Any, Literal, NoReturn
 import numpy as np
 import typer
 from rich.console import Console
+from rich.progress import Progress
 from rich.text import Text
 from typer.core import TyperGroup
 
@@ -25,13 +26,13 @@ from mechgraph.document import Document, Table, to_text
 from mechgraph.errors import visible
 from mechgraph.result.summary import driver_value, summary
 from mechgraph.starting import INTERRUPTED
-from mechgraph.typed import drives_of, parse_at, refuse
+from mechgraph.typed import drives_of, duration, parse_at, refuse
 from mechgraph.writing import writable
 
 DONE, NO_ANSWER, BAD_INPUT = 0, 1, 2
 """Exit statuses."""
 
-NO_ANSWERS = (mg.AssemblyError, mg.ReachError, mg.DeadPointError, mg.IndeterminateError)
+NO_ANSWERS = (mg.AssemblyError, mg.ReachError, mg.DeadPointError, mg.IndeterminateError, mg.ResponseError)
 """Errors that say that the mechanism has no answer; every other error is bad input."""
 
 LONGEST_NAME = 100
@@ -192,6 +193,17 @@ def _working(what: str) -> Iterator[None]:
         yield
 
 
+@contextmanager
+def _progress(what: str, end: float) -> Iterator[Callable[[float], None] | None]:
+    """A bar on stderr over a time span, where that is a terminal."""
+    if not _is_terminal(sys.stderr):
+        yield None
+        return
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(what, total=end)
+        yield lambda reached: bar.update(task, completed=reached)
+
+
 app = typer.Typer(
     name="mechgraph",
     cls=Program,
@@ -303,6 +315,61 @@ def equations(
         _write(f.latex(components=not blocks))
     else:
         _show(f.document(components=not blocks))
+
+
+@app.command()
+def respond(
+    mechanism: Named,
+    span: Annotated[str, typer.Option("--for", metavar="TIME", help="How long: 10s.")],
+    start: Annotated[
+        list[str] | None, typer.Option("--start", metavar="FREEDOM=VALUE", help="Coordinate at the beginning (repeat).")
+    ] = None,
+    rate: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--rate", metavar="FREEDOM=VALUE", help="Rate at the beginning: A=2, A=90deg a unit of time (repeat)."
+        ),
+    ] = None,
+    points: Annotated[
+        int | None,
+        typer.Option("--points", min=2, help="Number of output times, evenly spread; without it the steps taken."),
+    ] = None,
+    out: Out = None,
+    method: Annotated[
+        Literal["auto", "RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"],
+        typer.Option(help="Stepper of scipy; Radau for stiff loads."),
+    ] = "auto",
+    rtol: Annotated[float, typer.Option(help="Relative tolerance of a step.")] = 1e-8,
+    atol: Annotated[float, typer.Option(help="Absolute tolerance (radians, lengths / L, and their rates).")] = 1e-10,
+    engine: Engine = "auto",
+) -> None:
+    """Follow the motion that the loads produce, print a summary with the energy balance and write a table.
+
+    Exit status: 0 done; 1 the loops cannot be closed, or the motion cannot be followed to its end (what there is is written); 2 wrong
+    usage or bad input. Ctrl-C keeps what was computed. A file is written whole or not at all.
+    """
+    if out is not None and writable(out).exists() and os.path.lexists(mechanism) and out.samefile(mechanism):
+        refuse(f"--out {str(out)!r}", "is the file of the mechanism; name another")
+    m, end = _loaded(mechanism), duration(span)
+    begin = dict(parse_at(m, text, "--start") for text in start or ())
+    rates = dict(parse_at(m, text, "--rate") for text in rate or ())
+    t = np.linspace(0.0, end, points) if points else (0.0, end)
+    with _progress(f"moving {m.name}", end) as progress:
+        r = mg.respond(
+            m, t, start=begin, rates=rates, rtol=rtol, atol=atol, method=method, engine=engine, on_stop="return",
+            progress=progress,
+        )  # fmt: skip
+        document = summary(r, None)
+        if out is not None:
+            r.to_csv(out)
+    _show(document)
+    largest = float(np.abs(r.energy.kinetic).max())
+    off = float(np.abs(r.energy.balance).max()) / (largest or 1.0)
+    _write(f"\nEnergy balance to {off:.2g} of the largest kinetic energy; {r.work}.\n")
+    if out is not None:
+        _write(f"Wrote {out}: {r.status.size} rows, {len(r.part(slice(1)).columns())} columns.\n")
+    if r.stopped:
+        _fail(r.stopped, NO_ANSWER)
 
 
 @app.command()

@@ -61,6 +61,15 @@ def named_value(text: str, what: str) -> tuple[str, str]:
     return name.strip(), rest.strip()
 
 
+def duration(text: str) -> float:
+    """A time span: ``10`` or ``10s`` (``ms`` too), in the unit of time that the mechanism declares where none is written."""
+    value, unit = _number(text, f"--for {text!r}")
+    scales = {"": 1.0, "s": 1.0, "ms": 1e-3}
+    if unit not in scales or value <= 0:
+        refuse(f"--for {text!r}", "expected a time above 0, e.g. 10s")
+    return value * scales[unit]
+
+
 def _turns(m: Mechanism, name: str, where: str) -> bool:
     fault = m.freedom_fault(name, single=True)
     if fault:
@@ -106,8 +115,8 @@ def drives_of(m: Mechanism, texts: Sequence[str]) -> dict[str, Motion]:
     return out
 
 
-def parse_at(m: Mechanism, text: str) -> tuple[str, float]:
+def parse_at(m: Mechanism, text: str, option: str = "--at") -> tuple[str, float]:
     """Freedom and value of ``A=30deg``."""
-    where = f"--at {text!r}"
-    name, value = named_value(text, "--at")
+    where = f"{option} {text!r}"
+    name, value = named_value(text, option)
     return name, _values([value], _turns(m, name, where), where)[0]

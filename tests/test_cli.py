@@ -526,3 +526,26 @@ def test_a_drive_of_the_call_takes_the_place_of_the_declared_one() -> None:
     text = run("solve", "four-bar", "--drive", "D=0:10deg:5deg").stdout
     assert "D.Rz [N m]" in text
     assert "A.Rz [N m]" not in text
+
+
+def test_respond_prints_a_summary_and_writes_the_motion(tmp_path):
+    out = tmp_path / "motion.csv"
+    done = run("respond", "windows-2", "--for", "500ms", "--rate", "A0=-1", "--points", "6", "--out", str(out))
+    assert done.exit_code == 0, done.output
+    assert "Energy balance to" in done.output
+    assert len(out.read_text().splitlines()) == 7
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--for", "-1s"), "above 0"),
+        (("--for", "3min"), "expected a time"),
+        (("--for", "1s", "--rate", "A0=1", "--rate", "A1=2"), "contradict the closure"),
+        (("--for", "1s", "--start", "A0=3kg"), "--start"),
+    ],
+)
+def test_respond_refuses_what_it_cannot_read(options, words):
+    done = run("respond", "windows-2", *options)
+    assert done.exit_code == 2
+    assert words in done.output

@@ -30,6 +30,7 @@ def things() -> dict[str, Any]:
     s, report, f = mg.solve(m, {"A": THETA}), mg.check(m), mg.formulate(m)
     spring = mg.Spring("frame", m.links[2].name, (0, 0, 0), (0, 0, 0), stiffness=2.0, free_length=0.1)
     coupled = mg.Coupling({"A": 2.0, "D": -3.0}, name="g")
+    pushed = mg.load("windows-2").replace(loads=[mg.Effort("A1", load_of_a_module)])
     hanging = mg.equilibrium(mg.load("windows-2").replace(drives=[]), {"A0": 3.0})
     out: dict[str, Any] = {
         "mechanism": m, "link": m.links[1], "pair": m.pairs[0], "marker": m.pairs[0].markers[0], "drive": spatial.drives[0],
@@ -49,7 +50,7 @@ def things() -> dict[str, Any]:
         "MechgraphWarning": mg.MechgraphWarning("a freedom carries load"), "warnings": s.warnings,
         "AssemblyError": mg.AssemblyError("open", 0.5, {"A": 1.0}), "MissingExtraError": mg.MissingExtraError("typer", "cli"),
         "DeadPointError": mg.DeadPointError("dead", {"A": 1.0}), "ReachError": mg.ReachError("far", {"A": 1.0}, s),
-        "response": mg.respond(mg.load("windows-2"), (0, 0.2)), "response in charts": mg.respond(mg.load("flyball-governor"), (0, 1e-4)),
+        "response": mg.respond(mg.load("windows-2"), (0, 0.2)), "response in charts": mg.respond(pushed, (0, 0.2)),
         "ResponseError": mg.ResponseError("stopped", s), "equilibrium": hanging, "linearized": mg.linearize(hanging),
         "IndeterminateError": mg.IndeterminateError("free", report),
     }  # fmt: skip

@@ -100,6 +100,16 @@ class Work:
     def __str__(self) -> str:
         return ", ".join(f"{getattr(self, name)} {name}" for name in self.__dataclass_fields__)
 
+    @property
+    def counts(self) -> tuple[tuple[int, str], ...]:
+        """What a summary shows: numbers, and of what."""
+        return (
+            (self.positions, "position"),
+            (self.nodes, "node of the path"),
+            (self.evaluations, "evaluation"),
+            (self.factorizations, "factorization"),
+        )
+
 
 @dataclass(frozen=True)
 class Closed:

@@ -58,7 +58,7 @@ class Segment:
 
 @dataclass
 class Count:
-    """How much was computed: evaluations of ``y'``, accepted steps, stages, and how the coordinates were chosen."""
+    """How much was computed: evaluations of ``y'``, accepted steps, stages, and which ``coordinates`` they had."""
 
     evaluations: int = 0
     steps: int = 0
@@ -66,9 +66,14 @@ class Count:
     coordinates: str = ""
 
     def __str__(self) -> str:
-        return ", ".join(f"{getattr(self, name)} {name}" for name in ("evaluations", "steps", "stages")) + (
-            f"; {self.coordinates}"
+        return ", ".join(f"{number} {name}{'' if number == 1 else 's'}" for number, name in self.counts) + (
+            f" {self.coordinates}"
         )
+
+    @property
+    def counts(self) -> tuple[tuple[int, str], ...]:
+        """What a summary shows: numbers, and of what."""
+        return (self.evaluations, "evaluation"), (self.steps, "step"), (self.stages, "stage")
 
 
 class Stopped(Exception):

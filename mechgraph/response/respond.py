@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -57,7 +57,10 @@ class Response(Solution):
     Attributes
     ----------
     energy : kinetic and potential energy, and the work done.
+    stopped : why the motion was not followed to its end; empty where it was.
     """
+
+    stopped = ""
 
     def __init__(self, trajectory: Trajectory, energy: Energy, motion: _Motion) -> None:
         super().__init__(trajectory)
@@ -125,6 +128,8 @@ def respond(
     atol: float = 1e-10,
     method: str = "auto",
     engine: str = "auto",
+    on_stop: Literal["raise", "return"] = "raise",
+    progress: Callable[[float], None] | None = None,
 ) -> Response:
     """The motion that given efforts and loads produce, with all reactions (dynamic response).
 
@@ -143,12 +148,15 @@ def respond(
     method : a stepper of ``scipy.integrate``: explicit ``"RK23"``, ``"RK45"``, ``"DOP853"``, for stiff laws ``"Radau"``, ``"BDF"``,
         ``"LSODA"``; ``"auto"`` is DOP853.
     engine : as in ``solve``.
+    on_stop : where the motion cannot be followed to its end, or is interrupted: ``"raise"``, or ``"return"`` what there is, with
+        ``stopped`` saying why.
+    progress : called with the time reached after every step.
 
     Raises
     ------
     DeclarationError, AssemblyError
     ResponseError
-        where the motion cannot be followed to its end; carries the time reached and the Response so far.
+        where the motion cannot be followed to its end, or is interrupted; carries the Response so far.
     """
     times = _times(m, t)
     faults = [
@@ -156,6 +164,8 @@ def respond(
         for name, value in (("rtol", rtol), ("atol", atol))
         if not isinstance(value, int | float) or not 1e-14 <= value <= 0.1
     ]
+    if on_stop not in ("raise", "return"):
+        faults.append(f"on_stop = {on_stop!r}: expected 'raise' or 'return'")
     if method not in ("auto", *METHODS):
         faults.append(f"method = {method!r}: expected one of 'auto', {', '.join(map(repr, METHODS))}")
     if faults:
@@ -172,19 +182,27 @@ def respond(
     it = Integration("DOP853" if method == "auto" else method, float(rtol), float(atol))
     motion = _Motion(it, task, m)
     try:
-        for _ in it.run(_first_stage(task, begin, x, dq), begin, end):
-            pass
-    except Stopped as stop:
+        for segment in it.run(_first_stage(it, task, begin, x, dq), begin, end):
+            if progress is not None:
+                progress(segment.end)
+    except (Stopped, KeyboardInterrupt) as stop:
         reached = it.segments[-1].end if it.segments else begin
-        raise ResponseError(
-            f"mechanism {m.name!r}: the motion was followed to t = {reached:.6g} of {end:.6g}: {stop} Steps collapse where loads are stiff "
-            "or jump, and at positions where the mechanism locks; for stiff loads use method='Radau'",
-            _so_far(motion, times),
-        ) from None
+        why = (
+            f"{stop} Steps collapse where loads are stiff or jump, and at positions where the mechanism locks; for stiff loads use "
+            "method='Radau'"
+            if isinstance(stop, Stopped)
+            else "interrupted"
+        )
+        text = f"mechanism {m.name!r}: the motion was followed to t = {reached:.6g} of {end:.6g}: {why}"
+        so_far = _so_far(motion, times)
+        if on_stop == "raise" or so_far is None:
+            raise ResponseError(text, so_far) from None
+        so_far.stopped = text
+        return so_far
     return motion.response(times if len(times) > 2 else np.concatenate([[begin], motion.ends]))
 
 
-def _first_stage(task: Task, begin: float, x: Array, dq: Array) -> Stage:
+def _first_stage(it: Integration, task: Task, begin: float, x: Array, dq: Array) -> Stage:
     """Along the path where there is one path and loads that depend on the place on it, and linearly on the rate; charts otherwise."""
     motions = closure_rank(Configuration(task.system, x[:, None]), engine=task.engine).motions
     if (
@@ -193,7 +211,9 @@ def _first_stage(task: Task, begin: float, x: Array, dq: Array) -> Stage:
         and not any(map(_varies, (*task.loads.stored, *task.loads.rest)))
     ):
         arc = Arc(task, x)
+        it.work.coordinates = "along the path"
         return PathStage(arc, arc.begin, float(dq[arc.column]))
+    it.work.coordinates = "in independent freedoms"
     return ChartStage(task, begin, x, dq)
 
 

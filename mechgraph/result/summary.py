@@ -79,9 +79,9 @@ class _View:
         self.efforts = {name: self.of_freedom(name, "effort") for name in self.drivers} if s.has_forces else {}
         self.applied = self._applied() if s.has_forces else {}
         self.extent = self._extent()
-        self.loaded = any(
-            _largest(rows) > 0 for rows in (self.forces, self.moments, [*self.efforts.values(), *self.applied.values()])
-        )
+        every = (*self.forces, *self.moments, *self.efforts.values(), *self.applied.values())
+        # what is not unique has no value, and may be anything
+        self.loaded = _largest(every) > 0 or any(np.isnan(row[self.solved]).any() for row in every)
 
     def flat(self, values: Any) -> Array:
         """One value a position."""
@@ -127,6 +127,9 @@ class _View:
             for n, v in zip(self.drivers, self.driver_values, strict=True)
             if np.isfinite(v[index])
         ]
+        if not values and self.s.t is not None:
+            t, unit = np.asarray(self.s.t, dtype=float).reshape(-1)[index], unit_of(self.m.units, (0, 0, 1))
+            return f"t = {_with_unit(_number(t), unit)}"
         return ", ".join(values) or f"position {index}"
 
     def effort_unit(self, name: str) -> str:
@@ -293,14 +296,10 @@ class _View:
 
     def work(self) -> Paragraph:
         """Which engine ran, and how much it did, in one line."""
-        work = self.s.work
-        counts = (
-            (work.positions, "position"),
-            (work.nodes, "node", " of the path"),
-            (work.evaluations, "evaluation"),
-            (work.factorizations, "factorization"),
-        )
-        shown = [f"{n} {name}{'' if n == 1 else 's'}{''.join(more)}" for n, name, *more in counts]
+        shown = [
+            f"{n} {name if n == 1 else name.replace(' ', 's ', 1) if ' ' in name else name + 's'}"
+            for n, name in self.s.work.counts
+        ]
         return Paragraph(f"Engine {self.s.engine}: {', '.join(shown)}.")
 
 

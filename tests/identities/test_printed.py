@@ -249,7 +249,8 @@ def check_all(m: mg.Mechanism, s: mg.Solution, bookkeeping: str, positions: tupl
 @pytest.mark.parametrize("bookkeeping", BOOKKEEPINGS)
 @pytest.mark.parametrize("name", MOVING)
 def test_printed_equations_of_the_library_hold(name: str, bookkeeping: str) -> None:
-    m = mg.load(name)
+    # springs pull on links: their wrenches stand in the printed loads, which this test takes from given efforts and gravity alone
+    m = mg.load(name).replace(loads=[load for load in mg.load(name).loads if not load.between_links])
     (drive,) = m.drives
     if drive.motion is None:
         s = mg.solve(m, {drive.freedom: mg.Motion([0.0, 0.1], 2.0, 3.0)}, redundant="minimum_norm")
