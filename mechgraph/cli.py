@@ -365,7 +365,7 @@ def respond(
     _show(document)
     largest = float(np.abs(r.energy.kinetic).max())
     off = float(np.abs(r.energy.balance).max()) / (largest or 1.0)
-    _write(f"\nEnergy balance to {off:.2g} of the largest kinetic energy; {r.work}.\n")
+    _write(f"\nEnergy balance to {off:.0e} of the largest kinetic energy; {r.work}.\n")
     if out is not None:
         _write(f"Wrote {out}: {r.status.size} rows, {len(r.part(slice(1)).columns())} columns.\n")
     if r.stopped:
