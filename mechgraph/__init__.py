@@ -21,9 +21,11 @@ from mechgraph.kinetostatics import assemble, kinematics, solve
 from mechgraph.model.chain import chain
 from mechgraph.model.coupling import Coupling
 from mechgraph.model.drive import Drive
+from mechgraph.model.force_law import Damper, ForceLaw, Spring, TorsionSpring
+from mechgraph.model.force_table import ForceTable
 from mechgraph.model.library import library_names as library
 from mechgraph.model.link import Link
-from mechgraph.model.load import Effort, Gravity, Spring, TorsionSpring, Wrench
+from mechgraph.model.load import Effort, Gravity, Wrench
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.model.pair import Marker, Pair
@@ -43,12 +45,15 @@ __all__ = [
     "Component",
     "ContentError",
     "Coupling",
+    "Damper",
     "DeadPointError",
     "DeclarationError",
     "DeterminacyReport",
     "Drive",
     "Effort",
     "FileError",
+    "ForceLaw",
+    "ForceTable",
     "Formulation",
     "Freedom",
     "Gravity",

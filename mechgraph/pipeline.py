@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -249,7 +248,7 @@ class Outcome:
         found = self.found
         good = np.flatnonzero((found.status == Status.OK) & (found.near < 0))
         bad = np.flatnonzero(found.status != Status.OK)
-        whole = not all(_by_position(load) for load in self.starts.loads)
+        whole = not all(load.by_position for load in self.starts.loads)
         if self.starts.sharing > 1:
             self._fill_shared(good, whole)
             return
@@ -392,13 +391,6 @@ class Outcome:
 def _system_at(starts: Starts, variant: Index, places: Index) -> System:
     """The system with the numbers of the positions at flat places."""
     return starts.system_of(variant[places])
-
-
-def _by_position(load: Load) -> bool:
-    """Whether a load can be evaluated position by position: it holds values, no callables, which see the whole batch."""
-    if not dataclasses.is_dataclass(load):
-        return False
-    return not any(callable(getattr(load, field.name)) for field in dataclasses.fields(load))
 
 
 def continued(path: DriverPath, found: Positions) -> Array:

@@ -23,6 +23,9 @@ ACCELERATION: Dimension = (1, 0, -2)
 FORCE: Dimension = (1, 1, -2)
 MOMENT: Dimension = (2, 1, -2)
 INERTIA: Dimension = (2, 1, 0)
+FORCE_PER_LENGTH: Dimension = (0, 1, -2)
+FORCE_PER_VELOCITY: Dimension = (0, 1, -1)
+MOMENT_PER_RATE: Dimension = (2, 1, -1)
 
 COHERENT: dict[tuple[str, ...], dict[tuple[float, ...], str]] = {("m", "kg", "s"): {FORCE: "N", MOMENT: "N m"}}
 """Sets of units whose derived units have names of their own."""

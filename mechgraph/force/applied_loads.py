@@ -11,7 +11,8 @@ from mechgraph.algebra.se3 import Array, cross, rotate, rotate_back, to_matrix
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.rates import Rates, Velocities
 from mechgraph.errors import DeclarationError
-from mechgraph.model.load import Load, Value
+from mechgraph.model.load import Load
+from mechgraph.model.load_base import Value
 from mechgraph.model.numeric import PerCase
 from mechgraph.quantities import real_array, wrong
 
@@ -69,7 +70,7 @@ class Site:
         if not self._finite():
             wrong = next((load for load in loads if not self._alone(load)), loads[-1])
             raise DeclarationError(
-                f"load {wrong.kind} {getattr(wrong, 'link', getattr(wrong, 'freedom', ''))}".strip(),
+                f"load {wrong.where.removesuffix(': ')}",
                 ["gives a value that is not finite at some position; check its callable, or a spring of length 0"],
             )
 
@@ -110,6 +111,10 @@ class Site:
     def second_link(self, name: str) -> str:
         """Link b of the pair of a freedom."""
         return self.m.ends_of(name)[1]
+
+    def time(self) -> Array | None:
+        """Time of every position, ``(T,)``; None where the motion has no times."""
+        return None if self.t is None else np.broadcast_to(self.t, self.batch).reshape(-1)[self.good]
 
     def number(self, value: Any) -> Any:
         """A number or vector, unchanged; one that varies from case to case at every position, ``(T,)`` or ``(3, T)``."""

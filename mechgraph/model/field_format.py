@@ -183,12 +183,12 @@ class Described(Formatted):
             value = getattr(self, name)
             if isinstance(value, Described):
                 changes[name] = value.in_units(base, turns)
+            elif callable(value):
+                raise DeclarationError(
+                    "to_units", [f"{name} of a load is a callable; convert it yourself, or sample it first"]
+                )
             elif value is not None and about.kind.numeric:
                 factor = factor_of(about.turn if turns else about.slide, base)
-                if callable(value):
-                    raise DeclarationError(
-                        "to_units", [f"{name} of a load is a callable; convert it yourself, or sample it first"]
-                    )
                 if factor != 1.0 and not isinstance(value, str):
                     changes[name] = _on_each(partial(_times, factor), value)
         return self.replace(**changes) if changes else self
@@ -255,6 +255,10 @@ def _series_fault(width: int) -> Callable[[Any, str, float | None], str | None]:
         return wrong(value, what, f"{wanted}, an array of them over positions, or a callable (pose, twist, t)")
 
     return fault
+
+
+def _samples_fault(value: Any, what: str, minimum: float | None) -> str | None:
+    return None if is_numeric(value, np.shape(value)) else wrong(value, what, "finite numbers")
 
 
 def _tensor_fault(value: Any, what: str, minimum: float | None) -> str | None:
@@ -329,6 +333,7 @@ SERIES = Kind("number(s)", {"$ref": "#/$defs/series"}, None, (), True, _series_f
 VECTOR_SERIES = Kind(
     "3 numbers (series)", {"$ref": "#/$defs/vector_series"}, None, (3,), True, _series_fault(3), _turned
 )
+SAMPLES = Kind("n numbers", {"$ref": "#/$defs/series"}, None, None, True, _samples_fault)
 NUMBERS = Kind("n numbers", {"type": "array", "items": {"type": "number"}})
 FACTS = Kind("table", {"type": "object"}, dict)
 COEFFICIENTS = Kind("table", {"type": "object", "additionalProperties": {"type": "number"}, "minProperties": 1}, dict)
@@ -339,3 +344,5 @@ OTHER = Kind("", {})
 
 POSITION = {"dimension": LENGTH, "turn": PURE, "degrees": True}
 """Of a field that holds a coordinate: an angle or a length, as the freedom is."""
+RATE = {"dimension": (1, 0, -1), "turn": (0, 0, -1), "degrees": True}
+"""Of a field that holds its rate."""

@@ -25,6 +25,7 @@ from mechgraph.model.field_format import (
     Formatted,
     Schema,
 )
+from mechgraph.model.force_table import ForceTable
 from mechgraph.model.link import Link
 from mechgraph.model.load import LOADS
 from mechgraph.model.mechanism import Mechanism
@@ -143,6 +144,7 @@ TABLES_OF_FILE: dict[str, Table] = {
         rules=_one_of("oneOf", "position", f"position{DEGREES}", "sweep", f"sweep{DEGREES}"),
         sweep=_SWEEP,
     ),
+    "law": _table(ForceTable, needed=("force",), rules=_one_of("anyOf", "x", "v", f"x{DEGREES}", f"v{DEGREES}")),
     **{f"load {kind}": _table(load) for kind, load in LOADS.items()},
     "pair_type": _table(
         PairType,
@@ -190,3 +192,6 @@ TABLES_OF_FILE: dict[str, Table] = {
     ),
 }
 TABLES_OF_FILE["load wrench"] = _table(LOADS["wrench"], rules=_one_of("anyOf", "force", "moment"))
+for _kind in ("damper", "force_law"):
+    _places = {"oneOf": [{"required": ["freedom"]}, {"required": ["a", "b", "p", "q"]}]}
+    TABLES_OF_FILE[f"load {_kind}"] = _table(LOADS[_kind], rules=_places)

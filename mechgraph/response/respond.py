@@ -208,18 +208,13 @@ def _first_stage(it: Integration, task: Task, begin: float, x: Array, dq: Array)
     if (
         motions.shape[1] == 1
         and not len(task.columns)
-        and not any(map(_varies, (*task.loads.stored, *task.loads.rest)))
+        and all(load.smooth for load in (*task.loads.stored, *task.loads.rest))
     ):
         arc = Arc(task, x)
         it.work.coordinates = "along the path"
         return PathStage(arc, arc.begin, float(dq[arc.column]))
     it.work.coordinates = "in independent freedoms"
     return ChartStage(task, begin, x, dq)
-
-
-def _varies(load: Any) -> bool:
-    """Whether a load is a function of more than the place: it has callables."""
-    return any(callable(getattr(load, name)) for name in load.formats)
 
 
 def _so_far(motion: _Motion, times: Array) -> Response | None:

@@ -1,0 +1,227 @@
+"""Force laws: a force that depends on a coordinate, its rate and time, in a freedom or between two points.
+
+One convention for all of them: the force acts along the coordinate ``x``, so that its power is ``F x'``. In a freedom that is an effort,
++ on link b and - on link a; between two points ``x`` is their distance, and a positive force pushes them apart.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.errors import DeclarationError
+from mechgraph.model.field_format import FREEDOM_NAME, LINK_NAME, NAMED_POINT, NUMBER, POSITION, TABLE
+from mechgraph.model.force_table import ForceTable
+from mechgraph.model.load_base import BaseLoad, LoadSite, Nameable
+from mechgraph.quantities import real_array, shown, wrong
+from mechgraph.units import FORCE_PER_LENGTH, FORCE_PER_VELOCITY, LENGTH, MOMENT, MOMENT_PER_RATE
+
+
+class Law(BaseLoad):
+    """A force ``F(x, x', t)`` in the freedom that it names, or between the point ``p`` of link ``a`` and ``q`` of link ``b``."""
+
+    if TYPE_CHECKING:  # fields of those that act between points; annotated here, they would come before all others
+        a: Any
+        b: Any
+        p: Any
+        q: Any
+
+    @property
+    def between_links(self) -> bool:
+        """Whether it is a force that two links exert on each other."""
+        return self.in_freedom is None
+
+    @abstractmethod
+    def force(self, site: LoadSite, x: Array, v: Array) -> Array:
+        """The force ``(T,)`` at coordinates and rates ``(T,)``."""
+
+    def act(self, site: LoadSite) -> None:
+        """Add the effort, or the forces on both links."""
+        if self.in_freedom is not None:
+            site.add_effort(self.in_freedom, self.force(site, *site.freedom(self.in_freedom)))
+            return
+        p, q, length, u, rate = self._line(site)
+        force = self.force(site, length, rate)
+        # between points that meet, a force has no direction
+        push = np.where((length > 0) | (force == 0), force * u, np.nan)
+        site.add_force(self.a, -push, p)
+        site.add_force(self.b, push, q)
+
+    def _line(self, site: LoadSite) -> tuple[Array, ...]:
+        """Both points ``(3, T)``, their distance ``(T,)``, the direction from p to q, and the rate of the distance."""
+        (p, vp), (q, vq) = site.point(self.a, site.number(self.p)), site.point(self.b, site.number(self.q))
+        d = q - p
+        length = np.sqrt((d * d).sum(axis=0))
+        u = np.divide(d, length, out=np.zeros_like(d), where=length > 0)
+        return p, q, length, u, (u * (vq - vp)).sum(axis=0)
+
+    def coordinate(self, site: LoadSite) -> Array:
+        """The coordinate or distance ``(T,)``."""
+        return self._line(site)[2] if self.in_freedom is None else site.freedom(self.in_freedom)[0]
+
+
+class Elastic(Law):
+    """``F = -stiffness (x - free) - damping x'``; ``rest`` is the name of the free coordinate."""
+
+    rest: ClassVar[str]
+    if TYPE_CHECKING:
+        stiffness: Any
+        damping: Any
+
+    def force(self, site: LoadSite, x: Array, v: Array) -> Array:
+        """See ``Law``."""
+        stiffness, free, damping = map(site.number, (self.stiffness, getattr(self, self.rest), self.damping))
+        return np.asarray(-stiffness * (x - free) - damping * v)
+
+    def parts(self) -> tuple[Self | None, Self | None]:
+        """The spring, and its damper."""
+        return self.replace(damping=0.0), None if self.damping == 0.0 else self.replace(stiffness=0.0)
+
+    def energy(self, site: LoadSite) -> Any:
+        """``stiffness (x - free)^2 / 2``."""
+        return 0.5 * self.stiffness * (self.coordinate(site) - getattr(self, self.rest)) ** 2
+
+
+@dataclass(frozen=True, eq=False)
+class Spring(Elastic):
+    """A straight spring (and damper) between point ``p`` of link ``a`` and point ``q`` of link ``b``.
+
+    Tension ``stiffness (l - free_length) + damping dl/dt`` along the line of the points; points as in ``Wrench``.
+    """
+
+    kind: ClassVar[str] = "spring"
+    subject: ClassVar[str] = "spring {a} - {b}"
+    rest: ClassVar[str] = "free_length"
+    a: Annotated[str, LINK_NAME("first link")]
+    b: Annotated[str, LINK_NAME("second link")]
+    p: Annotated[Any, NAMED_POINT("point of link a, or its name", LENGTH, of="a")]
+    q: Annotated[Any, NAMED_POINT("point of link b, or its name", LENGTH, of="b")]
+    stiffness: Annotated[float, NUMBER("force per length", FORCE_PER_LENGTH)]
+    free_length: Annotated[float, NUMBER("length without tension", LENGTH, minimum=0.0)] = 0.0
+    damping: Annotated[float, NUMBER("force per velocity", FORCE_PER_VELOCITY)] = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class TorsionSpring(Elastic):
+    """A spring (and damper) in a single freedom: effort ``-stiffness (q - free) - damping dq/dt``; for turns and slides."""
+
+    kind: ClassVar[str] = "torsion_spring"
+    subject: ClassVar[str] = "torsion spring in {freedom}"
+    rest: ClassVar[str] = "free"
+    freedom: Annotated[str, FREEDOM_NAME("a single turn or slide")]
+    stiffness: Annotated[float, NUMBER("effort per coordinate", FORCE_PER_LENGTH, MOMENT)]
+    free: Annotated[float, NUMBER("coordinate without effort", **POSITION)] = 0.0
+    damping: Annotated[float, NUMBER("effort per rate", FORCE_PER_VELOCITY, MOMENT_PER_RATE)] = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Placed(Law):
+    """A law placed by its first argument: the name of a freedom, or ``(link a, link b, p, q)``."""
+
+    freedom: Annotated[str | None, FREEDOM_NAME("a single turn or slide", default="this,")] = None
+    a: Annotated[str | None, LINK_NAME("first link", default="or these four")] = None
+    b: Annotated[str | None, LINK_NAME("second link", default="likewise")] = None
+    p: Annotated[Any, NAMED_POINT("point of link a, or its name", LENGTH, of="a", default="likewise")] = None
+    q: Annotated[Any, NAMED_POINT("point of link b, or its name", LENGTH, of="b", default="likewise")] = None
+
+    def __post_init__(self) -> None:
+        if isinstance(self.freedom, tuple | list) and len(self.freedom) == 4:
+            for name, value in zip(("freedom", "a", "b", "p", "q"), (None, *self.freedom), strict=True):
+                object.__setattr__(self, name, value)
+        super().__post_init__()
+
+    @property
+    def where(self) -> str:
+        """Which load it is, for messages."""
+        place = f"{shown(self.a)} - {shown(self.b)}" if self.freedom is None else f"in {shown(self.freedom)}"
+        return f"{self.subject} {place}: "
+
+    def faults(self, names: Nameable) -> list[str]:
+        """What is wrong with this load."""
+        given = sum(getattr(self, name) is not None for name in "abpq")
+        if given != (4 if self.freedom is None else 0):
+            return [self.where + "expected a freedom, e.g. 'D', or two links with a point of each, ('a', 'b', p, q)"]
+        return super().faults(names)
+
+
+@dataclass(frozen=True, eq=False)
+class Damper(_Placed):
+    """A linear damper: ``F = -coefficient x'``, in a freedom ``"D"`` or between points ``(link a, link b, p, q)``."""
+
+    kind: ClassVar[str] = "damper"
+    subject: ClassVar[str] = "damper"
+    coefficient: Annotated[float, NUMBER("effort or force per rate", FORCE_PER_VELOCITY, MOMENT_PER_RATE)] = field(
+        kw_only=True
+    )
+
+    def force(self, site: LoadSite, x: Array, v: Array) -> Array:
+        """See ``Law``."""
+        return np.asarray(-site.number(self.coefficient) * v)
+
+
+@dataclass(frozen=True, eq=False)
+class ForceLaw(_Placed):
+    """A force ``F = scale law(x - free, x', t)``, in a freedom ``"D"`` or between points ``(link a, link b, p, q)``.
+
+    ``law`` is a ``ForceTable`` or a function of arrays ``(T,)``: coordinate, rate and time (None where the motion has no times). ``F``
+    acts along the coordinate, its power is ``F x'``: + on link b and - on link a in a freedom; + pushes the points apart.
+    """
+
+    kind: ClassVar[str] = "force_law"
+    subject: ClassVar[str] = "force law"
+    law: Annotated[Any, TABLE("force over coordinate and rate", table="law")] = field(kw_only=True)
+    free: Annotated[float, NUMBER("coordinate or distance at which the `x` of the law is 0", **POSITION)] = field(
+        default=0.0, kw_only=True
+    )
+    scale: Annotated[float, NUMBER("factor of the force")] = field(default=1.0, kw_only=True)
+
+    def faults(self, names: Nameable) -> list[str]:
+        """What is wrong with this load."""
+        found = super().faults(names)
+        if isinstance(self.law, ForceTable):
+            return found + [self.where + fault for fault in self.law.faults("law.")]
+        if not callable(self.law):
+            found.append(self.where + wrong(self.law, "law", "a function (x, v, t) or a ForceTable"))
+        return found
+
+    @property
+    def by_position(self) -> bool:
+        """See ``BaseLoad``; functions are given arrays of positions, any of them."""
+        return True
+
+    @property
+    def smooth(self) -> bool:
+        """See ``BaseLoad``; a table is not where its points are."""
+        return False
+
+    def force(self, site: LoadSite, x: Array, v: Array) -> Array:
+        """See ``Law``."""
+        x = x - site.number(self.free)
+        try:
+            found = self.law.at(x, v) if isinstance(self.law, ForceTable) else self.law(x, v, site.time())
+        except Exception as error:
+            hint = (
+                ""
+                if isinstance(self.law, ForceTable)
+                else "its function of arrays x, v, t (t None without times) failed: "
+            )
+            raise DeclarationError(self.where.removesuffix(": "), [f"{hint}{error}"]) from error
+        force = real_array(found)
+        if force is None or force.shape not in ((), x.shape):
+            raise DeclarationError(
+                self.where.removesuffix(": "),
+                [wrong(found, "value of its function", f"one number for each of {len(x)} positions")],
+            )
+        return site.number(self.scale) * np.broadcast_to(force, x.shape)
+
+    def parts(self) -> tuple[Self | None, Self | None]:
+        """The whole, as stored where it is a table of the coordinate alone."""
+        return (self, None) if isinstance(self.law, ForceTable) and self.law.has_energy else (None, self)
+
+    def energy(self, site: LoadSite) -> Any:
+        """``-scale int F dx``."""
+        return self.scale * self.law.energy(self.coordinate(site) - self.free)
