@@ -298,6 +298,7 @@ WRONG = [
 @functools.cache
 def _doors() -> list[tuple[str, Callable, tuple, dict]]:
     m = mg.load("four-bar").replace(drives=["A"])
+    law = {"law": mg.ForceTable(x=(0, 1), force=(1, 2)), "free": 0.0, "scale": 1.0}
     s, report, f = mg.solve(m, {"A": [0.0, 0.1]}), mg.check(m), mg.formulate(m)
     Z, mass = (0, 0, 1), (1.0, (0, 0, 0), np.eye(3))
     gears = mg.Mechanism(
@@ -356,6 +357,15 @@ def _doors() -> list[tuple[str, Callable, tuple, dict]]:
         ("Effort", built(mg.Effort, "loads"), ("A", 1.0), {}),
         ("Spring", built(mg.Spring, "loads"), ("frame", "crank", (0, 0, 0), (1, 0, 0), 1.0, 0.0, 0.0), {}),
         ("TorsionSpring", built(mg.TorsionSpring, "loads"), ("A", 1.0, 0.0, 0.0), {}),
+        ("Damper", built(mg.Damper, "loads"), ("A",), {"coefficient": 1.0}),
+        ("ForceLaw", built(mg.ForceLaw, "loads"), (None, "frame", "crank", (0, 0, 0), (1, 0, 0)), law),
+        ("ForceLaw by one argument", built(mg.ForceLaw, "loads"), (("frame", "crank", (0, 0, 0), (1, 0, 0)),), law),
+        (
+            "ForceTable",
+            lambda *a: built(mg.ForceLaw, "loads")("A", law=mg.ForceTable(*a)),
+            ((0, 1), (0, 1, 2), ((1, 2, 3), (4, 5, 6)), "cubic", "hold"),
+            {},
+        ),
         ("Coupling", built(mg.Coupling, "couplings"), ({"A": 1.0, "B": 2.0},), {"name": "g", "constant": 0.0}),
         (
             "PairType",

@@ -36,6 +36,8 @@ def things() -> dict[str, Any]:
         "mechanism": m, "link": m.links[1], "pair": m.pairs[0], "marker": m.pairs[0].markers[0], "drive": spatial.drives[0],
         "coupling": coupled, "spring": spring, "wrench": mg.Wrench("a", force=(1, 0, 0), point=(0, 0, 0)),
         "effort": mg.Effort("D", 1.0), "gravity": mg.Gravity((0, 0, -9.81)), "torsion spring": mg.TorsionSpring("D", stiffness=1.0),
+        "damper": mg.Damper("D", coefficient=2.0), "law": mg.ForceLaw("D", law=mg.ForceTable(x=[0, 1], force=[2, 3])),
+        "table": mg.ForceTable(v=[0, 1], force=[2, 3]),
         "load of a function": mg.solve(m.replace(loads=[mg.Effort("D", load_of_a_module)]), {"A": THETA}),
         "motion": mg.Motion.law("cycloidal", 1.0, 2.0, np.linspace(0, 2, 5)), "table of pair types": mg.pair_types(),
         "report": report, "large report": mg.check(spatial_ladder(120)), "ledger": report.ledger("lee"),

@@ -51,6 +51,13 @@ def with_every_load() -> mg.Mechanism:
             mg.Effort("D", [0.1, 0.2, 0.3, 0.4]),
             mg.Spring("crank", "rocker", (0, 0.1, 0), (0.4, 0, 0), stiffness=100.0, free_length=0.1, damping=0.5),
             mg.TorsionSpring("D", stiffness=2.0, free=0.3, damping=0.01),
+            mg.Damper("D", coefficient=2.0),
+            mg.Damper(("crank", "rocker", (0, 0.1, 0), (0.4, 0, 0)), coefficient=3.0),
+            mg.ForceLaw("D", law=mg.ForceTable(x=[0, 1, 3], force=[1, 2, 2], outside="hold"), free=0.2, scale=2.0),
+            mg.ForceLaw(
+                ("crank", "rocker", (0, 0.1, 0), (0.4, 0, 0)),
+                law=mg.ForceTable(x=[0, 1], v=[0, 1, 2], force=[[1, 2, 3], [3, 4, 4]], interpolation="cubic"),
+            ),
         ]
     )
 

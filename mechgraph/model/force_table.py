@@ -14,8 +14,8 @@ from mechgraph.model.field_format import POSITION, RATE, SAMPLES, TEXT, Describe
 from mechgraph.quantities import shown, wrong
 from mechgraph.units import FORCE, MOMENT
 
-CUBICS = {"monotone": scipy.interpolate.PchipInterpolator, "cubic": scipy.interpolate.CubicSpline}
-"""Piecewise cubics by the name of the interpolation."""
+CUBICS = {"monotone": "PchipInterpolator", "cubic": "CubicSpline"}
+"""Piecewise cubics of ``scipy.interpolate`` by the name of the interpolation."""
 
 
 @dataclass(frozen=True)
@@ -80,17 +80,20 @@ class ForceTable(Described):
             )
         return inside
 
+    def _cubic(self, places: Any, values: Any, axis: int) -> Any:
+        return getattr(scipy.interpolate, CUBICS[self.interpolation])(places, values, axis=axis)
+
     @cached_property
     def _last(self) -> Any:
         """The piecewise cubic over the last axis."""
-        return CUBICS[self.interpolation](self.x if self.v is None else self.v, np.asarray(self.force), axis=-1)
+        return self._cubic(self.x if self.v is None else self.v, self.force, -1)
 
     def at(self, x: Array, v: Array) -> Array:
         """The force ``(T,)`` at coordinates and rates ``(T,)``."""
         if self.v is None or self.x is None:
             return np.asarray(self._last(self.within("x", x) if self.v is None else self.within("v", v)))
         rows, x = self._last(self.within("v", v)), self.within("x", x)
-        pieces = CUBICS[self.interpolation](self.x, rows, axis=0)
+        pieces = self._cubic(self.x, rows, 0)
         i = np.clip(np.searchsorted(self.x, x, side="right") - 1, 0, len(self.x) - 2)
         c, d = pieces.c[:, i, np.arange(len(x))], x - pieces.x[i]
         return np.asarray(((c[0] * d + c[1]) * d + c[2]) * d + c[3])

@@ -1,0 +1,252 @@
+"""Force laws against hand calculations: signs, tables, what lies outside of them, energy, units, studies, motion in time."""
+
+import numpy as np
+import pytest
+import scipy
+
+import mechgraph as mg
+
+X = (1.0, 0.0, 0.0)
+SI = {"length": "m", "mass": "kg", "time": "s"}
+
+
+def block(*loads: object, drives: tuple[str, ...] = ("P",), **more: object) -> mg.Mechanism:
+    """A block of 2 kg that slides along x, its centre at the origin."""
+    slide = mg.Pair("P", "P", "frame", "block", point=(0, 0, 0), axis=X)
+    return mg.Mechanism("block", [mg.Link("frame"), mg.Link("block", 2.0, (0, 0, 0))], [slide], drives, loads, **more)  # type: ignore[arg-type]
+
+
+def wheel(*loads: object, drives: tuple[str, ...] = ("A",)) -> mg.Mechanism:
+    """A wheel of 0.5 kg m^2 about z."""
+    pair = mg.Pair("A", "R", "frame", "wheel", point=(0, 0, 0), axis=(0, 0, 1))
+    inertia = np.diag([0.3, 0.3, 0.5])
+    return mg.Mechanism("wheel", [mg.Link("frame"), mg.Link("wheel", 1.0, (0, 0, 0), inertia)], [pair], drives, loads)  # type: ignore[arg-type]
+
+
+def effort(m: mg.Mechanism, x: object, v: object = 0.0, t: object = None) -> np.ndarray:
+    """With what the driver holds the only freedom."""
+    name = m.pairs[0].name
+    s = mg.solve(m, {name: mg.Motion(x, v, 0.0, t=t)})
+    if all(load.in_freedom for load in m.loads):
+        np.testing.assert_allclose(s[name].applied_effort, -s[name].effort, atol=1e-12)
+    assert np.abs(s.checks.power).max() < 1e-12
+    return s[name].effort[..., 0]
+
+
+AT = np.linspace(-0.2, 0.3, 7)
+PLACES = {"freedom": ("P", 0.0), "points": (("frame", "block", (-1, 0, 0), (0, 0, 0)), 1.0)}
+
+
+@pytest.mark.parametrize(("place", "zero"), PLACES.values(), ids=PLACES)
+def test_a_positive_force_drives_the_coordinate_on(place: object, zero: float) -> None:
+    """The distance from (-1, 0, 0) to the block is 1 + P, so that one law means the same in both places."""
+    push = effort(block(mg.ForceLaw(place, law=lambda x, v, t: 5.0 + 0.0 * x)), AT)  # type: ignore[arg-type]
+    np.testing.assert_allclose(push, -5.0)
+    law = lambda x, v, t: -7.0 * (x - zero - 0.1) - 3.0 * v
+    np.testing.assert_allclose(effort(block(mg.ForceLaw(place, law=law)), AT, 2.0), 7.0 * (AT - 0.1) + 6.0)  # type: ignore[arg-type]
+    np.testing.assert_allclose(effort(block(mg.Damper(place, coefficient=3.0)), AT, 2.0), 6.0)  # type: ignore[arg-type]
+
+
+def test_springs_are_laws() -> None:
+    """On a four-bar in motion: a spring and the same law between the same points, and in a freedom."""
+    m = mg.load("four-bar")
+    place = ("crank", "rocker", (0.0, 0.1, 0.0), (0.4, 0.0, 0.0))
+    spring = mg.Spring(*place, stiffness=100.0, free_length=0.1, damping=0.5)
+    law = mg.ForceLaw(place, law=lambda x, v, t: -100.0 * (x - 0.1) - 0.5 * v)
+    parts = [
+        mg.ForceLaw(place, law=mg.ForceTable(x=[-9, 9], force=[900, -900]), free=0.1),
+        mg.Damper(place, coefficient=0.5),
+    ]
+    turned = mg.TorsionSpring("D", stiffness=2.0, free=0.3, damping=0.01)
+    turned_law = mg.ForceLaw("D", law=lambda x, v, t: -2.0 * (x - 0.3) - 0.01 * v)
+    motion = {"A": mg.Motion(np.linspace(0, 6, 9), 3.0, 1.0)}
+    s, *others = (mg.solve(m, motion, loads=loads) for loads in ([spring, turned], [law, turned_law], [*parts, turned]))
+    assert np.abs(s["A"].effort).max() > 1.0
+    for other in others:
+        np.testing.assert_allclose(other["A"].effort, s["A"].effort, atol=1e-11)
+        np.testing.assert_allclose(other["B"].components["Fx"], s["B"].components["Fx"], atol=1e-11)
+
+
+def test_a_table_goes_through_its_points_and_not_beyond_them() -> None:
+    x, force = [0.0, 0.1, 0.2, 0.3], [0.0, 0.0, 10.0, 11.0]
+    at = np.linspace(0, 0.3, 61)
+    monotone, cubic = (
+        -effort(block(mg.ForceLaw("P", law=mg.ForceTable(x=x, force=force, interpolation=how))), at)  # type: ignore[arg-type]
+        for how in ("monotone", "cubic")
+    )
+    for found in (monotone, cubic):
+        np.testing.assert_allclose(found[::20], force, atol=1e-12)
+    assert (np.diff(monotone) > -1e-12).all()
+    assert np.abs(monotone[:21]).max() < 1e-12  # flat where its points are
+    assert cubic[:21].min() < -0.5  # the spline swings below
+    curve = np.linspace(-1, 1, 6)
+    cube = mg.ForceTable(x=curve, force=curve**3 - curve, interpolation="cubic")
+    np.testing.assert_allclose(-effort(block(mg.ForceLaw("P", law=cube)), at), at**3 - at, atol=1e-14)
+
+
+@pytest.mark.parametrize("how", ["monotone", "cubic"])
+def test_a_grid_over_coordinate_and_rate(how: str) -> None:
+    """What is linear in both is met exactly; so are the points of any grid, whatever stands between them."""
+    x, v = np.array([0.0, 0.1, 0.4]), np.array([-2.0, 0.0, 1.0, 3.0])
+    linear = mg.ForceTable(x=x, v=v, force=4 - 30 * x[:, None] - 2 * v, interpolation=how)  # type: ignore[arg-type]
+    at, rate = np.array([0.0, 0.05, 0.33, 0.4]), np.array([-2.0, 0.7, 2.5, 3.0])
+    np.testing.assert_allclose(-effort(block(mg.ForceLaw("P", law=linear)), at, rate), 4 - 30 * at - 2 * rate)
+    rows = np.random.default_rng(3).normal(size=(3, 4))
+    m = block(mg.ForceLaw("P", law=mg.ForceTable(x=x, v=v, force=rows, interpolation=how)))  # type: ignore[arg-type]
+    every = np.repeat(x, 4), np.tile(v, 3)
+    np.testing.assert_allclose(-effort(m, *every), rows.ravel(), atol=1e-12)
+
+
+def test_a_table_over_the_rate_alone_is_a_motor() -> None:
+    motor = mg.ForceTable(v=[0, 100, 150], force=[12, 10, 0])
+    np.testing.assert_allclose(
+        -effort(wheel(mg.ForceLaw("A", law=motor)), 0.0, [0.0, 100.0, 150.0]), [12, 10, 0], atol=1e-12
+    )
+
+
+def test_outside_of_a_table() -> None:
+    table = mg.ForceTable(x=[0, 0.1], force=[3, 5])
+    m = block(mg.ForceLaw("P", law=table, free=-0.02))
+    with pytest.raises(
+        mg.DeclarationError, match=r"(?s)force law in 'P'.*x = 0\.22 lies outside.* 0 and 0\.1.*outside='hold'"
+    ):
+        mg.solve(m, {"P": [0.0, 0.2]})
+    held = m.replace(loads=[mg.ForceLaw("P", law=mg.ForceTable(x=[0, 0.1], force=[3, 5], outside="hold"))])
+    np.testing.assert_allclose(-effort(held, [-1.0, 0.05, 0.1, 2.0]), [3, 4, 5, 5])
+
+
+def test_time_and_what_a_function_may_give() -> None:
+    t = np.linspace(0, 1, 5)
+    found = effort(block(mg.ForceLaw("P", law=lambda x, v, t: 3 * np.sin(t) + x)), AT[0] + 0 * t, t=t)
+    np.testing.assert_allclose(-found, 3 * np.sin(t) + AT[0])
+    assert float(effort(block(mg.ForceLaw("P", law=lambda x, v, t: 2.0)), 0.1)) == -2.0
+    with pytest.raises(mg.DeclarationError, match="t None without times"):
+        effort(block(mg.ForceLaw("P", law=lambda x, v, t: 3 * t)), AT)
+    with pytest.raises(mg.DeclarationError, match="one number for each of 7"):
+        effort(block(mg.ForceLaw("P", law=lambda x, v, t: [1.0, 2.0])), AT)
+    with pytest.raises(mg.DeclarationError, match=r"load force law in 'P'.*\n.*not finite"):
+        effort(block(mg.ForceLaw("P", law=lambda x, v, t: x / 0 if False else x * np.nan)), AT)
+
+
+def test_points_that_meet() -> None:
+    """A force between points that coincide has no direction; none is needed where it is zero."""
+    place = ("frame", "block", (0, 0, 0), (0, 0, 0))
+    assert effort(block(mg.ForceLaw(place, law=lambda x, v, t: -4 * x)), [0.0, 0.5]).tolist() == [0.0, 2.0]
+    with pytest.raises(mg.DeclarationError, match="spring of length 0"):
+        effort(block(mg.ForceLaw(place, law=lambda x, v, t: 4.0 + x)), [0.0, 0.5])
+
+
+BAD = {
+    "no law": (dict(law=3), "a function (x, v, t) or a ForceTable"),
+    "no axis": (dict(law=mg.ForceTable(force=[1, 2])), "neither is given"),
+    "falling": (
+        dict(law=mg.ForceTable(x=[1, 0], force=[1, 2])),
+        "law.x = (1.0, 0.0): expected at least two rising numbers",
+    ),
+    "one point": (dict(law=mg.ForceTable(x=[1], force=[1])), "at least two rising"),
+    "sizes": (dict(law=mg.ForceTable(x=[0, 1], v=[0, 1, 2], force=[1, 2])), "expected 2 x 3 numbers"),
+    "NaN": (dict(law=mg.ForceTable(x=[0, 1], force=[1, np.nan])), "law.force"),
+    "choice": (dict(law=mg.ForceTable(x=[0, 1], force=[1, 2], outside="guess")), "'error' or 'hold'"),  # type: ignore[arg-type]
+    "half a place": (dict(a="frame", freedom=None, law=len), "expected a freedom, e.g. 'D', or two links"),
+    "two places": (dict(a="frame", b="block", p=(0, 0, 0), q=X, law=len), "expected a freedom, e.g. 'D', or two links"),
+    "scale": (dict(law=len, scale="a"), "scale"),
+    "rotation": (dict(freedom="S.Rx", law=len), "unknown freedom 'S.Rx'"),
+}
+
+
+@pytest.mark.parametrize(("fields", "said"), BAD.values(), ids=BAD)
+def test_bad_laws(fields: dict[str, object], said: str) -> None:
+    with pytest.raises(mg.DeclarationError) as caught:
+        block(mg.ForceLaw(**{"freedom": "P", **fields}))  # type: ignore[arg-type]
+    assert said in str(caught.value)
+
+
+def test_points_of_links_and_unknown_ones() -> None:
+    m = block().replace(
+        links=[
+            mg.Link("frame", points={"seat": (-1, 0, 0)}),
+            mg.Link("block", 2.0, (0, 0, 0), points={"eye": (0, 0, 0)}),
+        ]
+    )
+    by_name = m.replace(loads=[mg.Damper(("frame", "block", "seat", "eye"), coefficient=3.0)])
+    np.testing.assert_allclose(effort(by_name, AT, 2.0), 6.0)
+    with pytest.raises(mg.DeclarationError, match="link 'block' has no point 'ear'"):
+        m.replace(loads=[mg.Damper(("frame", "block", "seat", "ear"), coefficient=3.0)])
+
+
+# --- units, studies --------------------------------------------------------------------------------------------------------
+
+
+def test_other_units() -> None:
+    table = mg.ForceTable(x=[-1, 0, 1], v=[-5, 5], force=[[30, 20], [10, 5], [-3, -9]])
+    loads = [
+        mg.ForceLaw("P", law=table, free=0.1, scale=2.0),
+        mg.Damper(("frame", "block", (-1, 0, 0), (0, 0, 0)), coefficient=3.0),
+    ]
+    m = block(*loads, units=SI)
+    mm = m.to_units(length="mm", time="ms")
+    assert mm.loads[0].law.x == (-1000.0, 0.0, 1000.0)  # type: ignore[union-attr]
+    # N = kg m/s^2 = 1e-3 kg mm/ms^2
+    np.testing.assert_allclose(effort(mm, 1e3 * AT, 2.0), 1e-3 * effort(m, AT, 2.0))
+    turn = wheel(mg.ForceLaw("A", law=mg.ForceTable(x=[-1, 1], force=[3, -3]))).replace(units=SI)
+    assert turn.to_units(length="mm").loads[0].law == mg.ForceTable(x=[-1, 1], force=[3e6, -3e6])  # type: ignore[union-attr]
+    with pytest.raises(mg.DeclarationError, match="law of a load is a callable"):
+        block(mg.ForceLaw("P", law=len), units=SI).to_units(length="mm")
+
+
+def test_quantities() -> None:
+    U = pytest.importorskip("pint").UnitRegistry()
+    table = mg.ForceTable(x=[0, 100] * U.mm, force=[0, 2] * U.kN)
+    m = block(mg.ForceLaw("P", law=table, free=10 * U.mm), mg.Damper("P", coefficient=2 * U.N * U.s / U.mm), units=SI)
+    assert m.loads == (
+        mg.ForceLaw("P", law=mg.ForceTable(x=[0, 0.1], force=[0, 2000]), free=0.01), mg.Damper("P", coefficient=2000.0)
+    )  # fmt: skip
+
+
+def test_numbers_of_laws_in_a_study() -> None:
+    table = mg.ForceTable(x=[-1, 1], force=[-40, 40])
+    m = block(
+        mg.ForceLaw("P", law=table, free=0.0), mg.Damper(("frame", "block", (-1, 0, 0), (0, 0, 0)), coefficient=3.0)
+    )
+    fields = {"loads[0].free": [0.1, 0.2], "loads[0].scale": [1.0, -2.0], "loads[1].coefficient": [1.0, 5.0]}
+    found = mg.study(m, fields, {"force": "P.effort"}, sampling="grid", motions={"P": mg.Motion([0.0, 0.3], 2.0)})
+    for row, parameters in zip(
+        found.outputs["force"], np.transpose([found.parameters[k] for k in fields]), strict=True
+    ):
+        free, scale, c = parameters
+        np.testing.assert_allclose(row.ravel(), -scale * 40 * (np.array([0.0, 0.3]) - free) + 2 * c)
+
+
+# --- motion in time --------------------------------------------------------------------------------------------------------
+
+
+def test_a_mass_on_a_cubic_spring() -> None:
+    """m x'' = -k x^3 swings with T = 4 sqrt(2 m / k) / a * int_0^1 dz / sqrt(1 - z^4); the table stores energy."""
+    a, k = 0.3, 700.0
+    x = np.linspace(-0.4, 0.4, 9)
+    table = mg.ForceTable(x=x, force=-k * x**3, interpolation="cubic")
+    m = block(mg.ForceLaw(("frame", "block", (-1, 0, 0), (0, 0, 0)), law=table, free=1.0), drives=())
+    quarter = scipy.special.beta(0.25, 0.5) / 4 * np.sqrt(2 * 2.0 / k) / a
+    r = mg.respond(m, np.linspace(0, 4 * quarter, 5), start={"P": a})
+    np.testing.assert_allclose(r["P"].position[:, 0], [a, 0, -a, 0, a], atol=1e-7)
+    np.testing.assert_allclose(np.ptp(r.energy.potential), k * a**4 / 4, rtol=1e-7)
+    assert np.abs(r.energy.balance).max() < 1e-7
+    assert np.abs(r.energy.work).max() == 0.0
+
+
+def test_a_damped_block_and_a_motor_come_to_their_speeds() -> None:
+    t = np.linspace(0, 2, 6)
+    r = mg.respond(block(mg.Damper("P", coefficient=3.0), drives=()), t, rates={"P": 4.0})
+    np.testing.assert_allclose(r["P"].velocity[:, 0], 4 * np.exp(-1.5 * t), rtol=1e-7)
+    np.testing.assert_allclose(r.energy.work, r.energy.kinetic - 16.0, atol=1e-6)
+    motor = mg.ForceTable(v=[0, 20], force=[10, 0], outside="hold")
+    r = mg.respond(wheel(mg.ForceLaw("A", law=motor), drives=()), t)
+    np.testing.assert_allclose(r["A"].velocity[:, 0], 20 * (1 - np.exp(-t)), rtol=1e-6, atol=1e-9)
+    r = mg.respond(block(mg.ForceLaw("P", law=lambda x, v, t: 2 * np.cos(t)), drives=()), t)
+    np.testing.assert_allclose(r["P"].position[:, 0], 1 - np.cos(t), atol=1e-8)
+
+
+def test_a_motion_that_leaves_its_table_says_so() -> None:
+    m = block(mg.ForceLaw("P", law=mg.ForceTable(x=[0, 1], force=[2, 2])), drives=())
+    with pytest.raises(mg.MechgraphError, match=r"force law in 'P'.*\n?.*lies outside of the table"):
+        mg.respond(m, [0.0, 9.0])
