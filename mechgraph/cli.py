@@ -135,7 +135,7 @@ def _reached(error: mg.MechgraphError) -> str:
     """The driver values reached, in the words of the command line."""
     if not isinstance(error, mg.ReachError | mg.DeadPointError) or error.solution is None:
         return ""
-    m = error.solution.mechanism
+    m = error.solution.whole
     at = ", ".join(driver_value(m, name, value) for name, value in error.value.items())
     return f"\n  reached {at}; --on-reach flag solves the positions that can be reached"
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from mechgraph.arguments import items_of, option_faults
 from mechgraph.closure.assembly import assembled_at
+from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.closure.driver_path import Status
 from mechgraph.closure.solver import ENGINES, EngineName
@@ -32,7 +33,8 @@ REDUNDANT: tuple[RedundantName, ...] = ("nan", "minimum_norm")
 def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exception | None:
     """The named error for the first position that was not solved, with the solution so far."""
     status = solution.status.reshape(-1)
-    bad = np.flatnonzero((status != Status.OK.value) & (status != Status.CHANGE_POINT.value))
+    moved = (Status.OK.value, Status.CHANGE_POINT.value, Status.ACTUATORS_REST.value)
+    bad = np.flatnonzero(~np.isin(status, moved))
     if not bad.size:
         return None
     first = int(bad[0])
@@ -78,10 +80,24 @@ def _check_drivers(line: Pipeline, outcome: Outcome) -> None:
     raise IndeterminateError(f"mechanism {line.m.name!r}: {why}", check(line.m))
 
 
-def _solve(m: Mechanism, motions: Mapping[str, Any] | None, on_reach: str, options: Options) -> Solution:
-    line = Pipeline(DriverMotion(m, motions), options)
+def _check_actuators(line: Pipeline, outcome: Outcome) -> None:
+    status = outcome.trajectory.status().reshape(-1)
+    rest = np.flatnonzero(status == Status.ACTUATORS_REST.value)
+    if rest.size and not (status == Status.OK.value).any():
+        raise line.actuation_error(Configuration(line.system, outcome.found.x[:, rest[:1]]), line.acting)
+
+
+def _solve(
+    m: Mechanism,
+    motions: Mapping[str, Any] | None,
+    on_reach: str,
+    options: Options,
+    actuate: Iterable[str] | None = None,
+) -> Solution:
+    line = Pipeline(DriverMotion(m, motions, actuate), options)
     outcome = line.run()
     _check_drivers(line, outcome)
+    _check_actuators(line, outcome)
     solution = Solution(outcome.trajectory)
     for warning in solution.warnings:
         warnings.warn(f"mechanism {m.name!r}: {warning}", MechgraphWarning, stacklevel=3)
@@ -110,6 +126,7 @@ def solve(
     m: Mechanism,
     motions: Mapping[str, Any] | None = None,
     *,
+    actuate: Iterable[str] | None = None,
     method: MethodName = "loop_wrench",
     loads: Iterable[Load] | None = None,
     redundant: RedundantName = "nan",
@@ -122,6 +139,8 @@ def solve(
     ----------
     motions : driver -> ``Motion``, or positions at zero rates; shapes broadcast, the last axis is followed as a path from
         ``start``, other axes are independent cases. Left out where the drives carry their motion.
+    actuate : freedoms in which the unknown efforts stand, as many as independent motions are prescribed; left out, they stand where
+        motion is prescribed. Where these freedoms rest while the mechanism moves, forces are NaN (status "actuators at dead point").
     method : ``"loop_wrench"`` (one unknown wrench a loop) or ``"newton_euler"`` (the printed equations).
     loads : replace the declared ones.
     redundant : ``"nan"`` for components that are not unique, or ``"minimum_norm"``: the least ``sum |F|^2 + |M / L|^2`` of all reactions,
@@ -148,7 +167,7 @@ def solve(
         raise DeclarationError(f"solve {m.name!r}", faults)
     if loads is not None:
         m = m.replace(loads=given)
-    return _solve(m, motions, on_reach, Options(method, redundant, engine))
+    return _solve(m, motions, on_reach, Options(method, redundant, engine), actuate)
 
 
 def assemble(

@@ -26,6 +26,7 @@ from mechgraph.numerics.linear import independent_rows, rank_of, singular_values
 from mechgraph.numerics.tolerances import PATH
 from mechgraph.report.report import check
 from mechgraph.result.trajectory import BlockMotion, Trajectory
+from mechgraph.structure.actuation import actuation_fault, stand_still
 from mechgraph.structure.branching import branches, branches_text
 from mechgraph.structure.mobility import Freedoms, free_motion
 from mechgraph.structure.passive import PassiveMotion
@@ -69,6 +70,7 @@ class Pipeline:
     Attributes
     ----------
     system, x : scaled system and closed state at the start.
+    acting : freedoms in which the unknown efforts stand.
     columns, lead : driven freedoms; places of the leading drivers among them (independent ones, which are followed; the others are
         checked to agree).
     solver, engine : the closure equations with the leading drivers given, and what solves them.
@@ -87,11 +89,13 @@ class Pipeline:
         self.lead = np.arange(len(self.columns))
         self.passive: tuple[PassiveMotion, ...] = ()
         self.bodies: tuple[Idle, ...] = ()
+        self.hold: Index | None = None
         if not self.solver.leaves_nothing_free(self.start):
             self.lead = self._independent()
             self._check_determinate()
-            self.passive, self.bodies = self.freedoms.passive, self.freedoms.bodies
-            self.solver = closure_solver(self.engine, self.leading, self.freedoms.hold)
+            self.passive, self.bodies, self.hold = self.freedoms.passive, self.freedoms.bodies, self.freedoms.hold
+            self.solver = closure_solver(self.engine, self.leading, self.hold)
+        self.acting = self._acting() if options.method else self.columns
 
     @cached_property
     def freedoms(self) -> Freedoms:
@@ -156,6 +160,22 @@ class Pipeline:
                 f"mechanism {self.m.name!r}: {count} neither driven nor passive (moving: {names}); add {more}, or change a pair",
                 check(self.m),
             )
+
+    def _acting(self) -> Index:
+        """The freedoms in which the unknown efforts stand: those that are driven, or as many that are named instead."""
+        if self.drive.actuated is None:
+            return self.columns
+        acting, _ = named_columns(self.m, self.system, dict.fromkeys(self.drive.actuated, 0.0))
+        if len(acting) != len(self.lead):
+            raise self.actuation_error(self.start, acting)
+        return acting
+
+    def actuation_error(self, here: Configuration, acting: Index) -> IndeterminateError:
+        """The error for freedoms whose efforts cannot hold the mechanism at a position."""
+        Z = self.solver.factored(here, self.solver.chosen(here, np.full(1, -1))).sensitivity()[:, :, 0]
+        return IndeterminateError(
+            f"mechanism {self.m.name!r}: actuate: {actuation_fault(self.m, Z, acting)}", check(self.m)
+        )
 
     def _refuse_change_point(self) -> None:
         """A path that starts where branches cross has no velocity that it could continue."""
@@ -234,10 +254,12 @@ class Outcome:
             self._system_at,
             batch,
             line.drive.t,
-            line.columns,
+            line.acting,
             coordinates,
             line.options.redundant == "nan",
             line.passive if line.options.method else (),
+            line.drive.shown,
+            line.drive.names,
         )
         work = found.work
         work.positions, work.nodes = len(variant), len(found.tracks.nodes)
@@ -336,20 +358,29 @@ class Outcome:
                 yield BlockMotion(at, motion), factors
 
     def _put(self, motion: BlockMotion, f: FactoredClosure | None) -> None:
-        forces = self._forces(motion, f) if self.line.options.method and f is not None else None
-        self.trajectory.put(motion, forces)
         self.trajectory.has_forces |= self.line.options.method is not None
+        if not self.line.options.method or f is None:
+            self.trajectory.put(motion, None)
+            return
+        if self.line.drive.actuated:
+            rest = stand_still(f.sensitivity(), self.line.acting)
+            if rest.any():
+                self.trajectory.mark(motion.places[rest], Status.ACTUATORS_REST.value)
+                self.trajectory.put(motion.part(np.flatnonzero(rest)), None)
+                motion = motion.part(np.flatnonzero(~rest))
+        if len(motion.places):
+            self.trajectory.put(motion, self._forces(motion, f))
 
     def _forces(self, motion: BlockMotion, f: FactoredClosure) -> BlockForces:
         line = self.line
-        if len(line.lead) < len(line.columns):  # the efforts of all drivers are unknowns
-            solver = closure_solver(line.engine, line.columns, line.freedoms.hold)
+        if line.acting is not line.columns or len(line.lead) < len(line.columns):  # all their efforts are unknowns
+            solver = closure_solver(line.engine, line.acting, line.hold)
             f = solver.factored(motion.here, solver.chosen(motion.here, np.full(motion.here.T, -1)))
         assert line.options.method is not None
         task = ForceTask(
             line.options.method,
             self.starts.loads,
-            line.columns,
+            line.acting,
             line.passive,
             self.batch,
             line.drive.t,

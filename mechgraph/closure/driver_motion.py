@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.arguments import items_of
 from mechgraph.errors import DeclarationError
 from mechgraph.model.drive import Drive
 from mechgraph.model.mechanism import Mechanism
@@ -76,13 +77,40 @@ def _batch(m: Mechanism, motions: Mapping[str, Motion]) -> tuple[int, ...]:
         ) from None
 
 
-class DriverMotion:
-    """The mechanism ``m`` with the drives of a call, the motion of each, and the shape of the batch of positions."""
+def actuators(m: Mechanism, actuate: Any) -> tuple[str, ...]:
+    """Full names of the freedoms in which the unknown efforts stand.
 
-    def __init__(self, m: Mechanism, motions: Mapping[str, Any] | None) -> None:
+    Raises
+    ------
+    DeclarationError
+    """
+    faults: list[str] = []
+    names = items_of([actuate] if isinstance(actuate, str) else actuate, "actuate", faults)
+    faults += [f"actuate {name!r}: {why}" for name in names if (why := m.freedom_fault(name, single=True))]
+    if not faults:
+        names = tuple(map(m.full_name, names))
+        faults += [f"actuate: {name} is given twice" for name in dict.fromkeys(names) if names.count(name) > 1]
+    if faults:
+        raise DeclarationError(f"solve {m.name!r}", faults)
+    return names
+
+
+class DriverMotion:
+    """The mechanism ``m`` with the drives of a call, the motion of each, and the shape of the batch of positions.
+
+    ``actuated`` are the freedoms in which the unknown efforts stand; None: in those whose motion is prescribed.
+    """
+
+    def __init__(self, m: Mechanism, motions: Mapping[str, Any] | None, actuate: Any = None) -> None:
         self.m, self.motions = driven(m, motions)
+        self.actuated = None if actuate is None else actuators(m, actuate)
         self.batch = _batch(self.m, self.motions)
         self.t = next((motion.t for motion in self.motions.values() if motion.t is not None), None)
+
+    @property
+    def shown(self) -> Mechanism:
+        """The mechanism that a solution shows: its drives are the freedoms that take the unknown efforts."""
+        return self.m if self.actuated is None else self.m.replace(drives=self.actuated)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -40,6 +40,7 @@ class Status(Enum):
     OUT_OF_REACH = "out of reach"
     BEYOND_DEAD_POINT = "beyond a dead point"
     CHANGE_POINT = "change point"
+    ACTUATORS_REST = "actuators at dead point"
     NOT_CLOSED = "loops not closed"
 
 

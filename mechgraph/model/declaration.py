@@ -145,7 +145,7 @@ def _links_are_sound(links: Sequence[Link]) -> bool:
         or column([link.center for link in links if link.center is not None], (3,)) is None
     ):
         return False
-    if any(link.faults() for link in links if link.points):
+    if any(link.faults() for link in links if link.points != {}):
         return False
     if any(link.center is None and (link.mass > 0 or link.inertia is not None) for link in links):
         return False

@@ -40,18 +40,21 @@ def columns(s: Values) -> dict[str, Array]:
 
     if s.t is not None:
         put("t", np.broadcast_to(s.t, s.batch), 0, 0, 1)
-    for k, pair in enumerate(m.pairs):
+    shown = {*m.freedom_names(), *s.prescribed}
+    for k, pair in enumerate(s.whole.pairs):
         r = PairResult(s, k)
         values = (r.position, r.velocity, r.acceleration)
         for j, (name, freedom) in enumerate(zip(pair.freedom_names, pair.type.freedoms, strict=True)):
+            if name not in shown:
+                continue
             for order, (label, value) in enumerate(zip(("", " velocity", " acceleration"), values, strict=True)):
                 put(name + label, value[..., j], 0 if freedom.turns else 1, 0, -order)
     if s.has_forces:
-        for k, pair in enumerate(m.pairs):
+        for k, pair in enumerate(s.whole.pairs):
             r = PairResult(s, k)
             efforts = {"effort": r.effort, "applied effort": r.applied_effort}
             for j, (name, part) in enumerate(zip(pair.freedom_names, pair.type.efforts, strict=True)):
-                for label, effort in efforts.items():
+                for label, effort in efforts.items() if name in shown else ():
                     put(f"{name} {label}", effort[..., j], 2 if part.is_couple else 1, 1, -2)
             for name, value in r.components.items():
                 put(f"{pair.name}:{name}", value, unit=r.units["components"][name])

@@ -30,8 +30,23 @@ class Solution:
 
     @property
     def mechanism(self) -> Mechanism:
-        """The mechanism that was solved."""
+        """The mechanism that was solved; its drives are the freedoms that take unknown efforts."""
         return self._values.mechanism
+
+    @property
+    def prescribed(self) -> tuple[str, ...]:
+        """Full names of what was prescribed: freedoms, coordinates of points and links."""
+        return self._values.prescribed
+
+    @property
+    def actuated(self) -> tuple[str, ...]:
+        """Full names of the freedoms in which unknown efforts stand; those prescribed, unless others were named."""
+        return self._values.actuated
+
+    @property
+    def whole(self) -> Mechanism:
+        """The mechanism with the free pairs through which the motion of points and links is prescribed."""
+        return self._values.whole
 
     @property
     def batch(self) -> tuple[int, ...]:
@@ -39,7 +54,7 @@ class Solution:
         return self._values.batch
 
     def __getitem__(self, pair: str) -> PairResult:
-        return PairResult(self._values, self.mechanism.place_of_pair(pair))
+        return PairResult(self._values, self.whole.place_of_pair(pair))
 
     def link(self, name: str) -> LinkResult:
         """Motion of a link."""

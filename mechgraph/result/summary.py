@@ -57,8 +57,7 @@ def driver_value(m: Mechanism, name: str, value: float) -> str:
 
 
 def _shown_value(m: Mechanism, name: str, value: float) -> str:
-    k, j = m.freedom(name)
-    if m.pairs[k].type.freedoms[j].turns:
+    if m.turns(name):
         return f"{_number(float(np.rad2deg(value)))} deg"
     return _with_unit(_number(value), unit_of(m.units, (1, 0, 0)))
 
@@ -71,12 +70,12 @@ class _View:
         self.m: Mechanism = s.mechanism
         self.status = np.asarray(s.status).reshape(-1)
         self.solved = self.status == OK
-        self.drivers = tuple(self.m.full_name(d.freedom) for d in self.m.drives)
+        self.drivers = s.prescribed
         self.driver_values = [self.of_freedom(name, "position") for name in self.drivers]
         self.force_unit = unit_of(self.m.units, (1, 1, -2))
         self.moment_unit = unit_of(self.m.units, (2, 1, -2))
         self.forces, self.moments = self._magnitudes() if s.has_forces else ([], [])
-        self.efforts = {name: self.of_freedom(name, "effort") for name in self.drivers} if s.has_forces else {}
+        self.efforts = {name: self.of_freedom(name, "effort") for name in s.actuated} if s.has_forces else {}
         self.applied = self._applied() if s.has_forces else {}
         self.extent = self._extent()
         every = (*self.forces, *self.moments, *self.efforts.values(), *self.applied.values())
@@ -89,8 +88,8 @@ class _View:
 
     def of_freedom(self, name: str, what: str) -> Array:
         """A quantity of one freedom over the positions."""
-        k, j = self.m.freedom(name)
-        return self.flat(getattr(self.s[self.m.pairs[k].name], what)[..., j])
+        k, j = self.s.whole.freedom(name)
+        return self.flat(getattr(self.s[self.s.whole.pairs[k].name], what)[..., j])
 
     def _applied(self) -> dict[str, Array]:
         """What loads do in freedoms, of those in which they do something."""
@@ -113,12 +112,11 @@ class _View:
         )
 
     def turns(self, name: str) -> bool:
-        k, j = self.m.freedom(name)
-        return self.m.pairs[k].type.freedoms[j].turns
+        return self.s.whole.turns(name)
 
     def shown_value(self, name: str, value: float) -> str:
         """A driver's value with its unit: degrees for a turn."""
-        return _shown_value(self.m, name, value)
+        return _shown_value(self.s.whole, name, value)
 
     def place(self, index: int) -> str:
         """The driver values of a position; its number where the driver values are not known."""
@@ -133,8 +131,8 @@ class _View:
         return ", ".join(values) or f"position {index}"
 
     def effort_unit(self, name: str) -> str:
-        k, j = self.m.freedom(name)
-        return self.moment_unit if self.m.pairs[k].type.efforts[j].is_couple else self.force_unit
+        k, j = self.s.whole.freedom(name)
+        return self.moment_unit if self.s.whole.pairs[k].type.efforts[j].is_couple else self.force_unit
 
     # --- parts -------------------------------------------------------------------------------------------------------
 

@@ -47,6 +47,11 @@ class BlockMotion:
         """The evaluation of the states."""
         return self.rates.here
 
+    def part(self, at: Index) -> BlockMotion:
+        """Some of the positions."""
+        rates = Velocities(self.here.part(at), self.rates.dq[:, at])
+        return BlockMotion(self.places[at], Rates(rates, self.rates.ddq[:, at], self.rates.contradiction[at]))
+
 
 KEPT = (
     "reactions", "efforts", "given", "loads", "hold", "stress", "stress_efforts", "coupled", "multipliers", "multiplier_stress",
@@ -61,7 +66,7 @@ class Trajectory:
     """The values of a Solution (implements ``result.views.Values``).
 
     ``system_at(places)`` is the system with the numbers of the positions at flat places (they differ between variants); ``driven`` are the
-    freedoms with a driver, ``coordinates (F, T)`` the user's ones of all positions.
+    freedoms with an unknown effort, ``mechanism`` and ``prescribed`` as in ``Values``, ``coordinates (F, T)`` the user's ones of all positions.
     """
 
     def __init__(
@@ -74,8 +79,14 @@ class Trajectory:
         coordinates: Array,
         mask_redundant: bool,
         passive: tuple[PassiveMotion, ...] = (),
+        mechanism: Mechanism | None = None,
+        prescribed: tuple[str, ...] | None = None,
     ) -> None:
-        self.mechanism: Mechanism = system.m
+        self.whole: Mechanism = system.m
+        self.mechanism: Mechanism = mechanism or self.whole
+        names = self.whole.freedom_names()
+        self.actuated = tuple(names[column] for column in driven)
+        self.prescribed = self.actuated if prescribed is None else prescribed
         self.batch, self.t, self.driven, self._passive = batch, t, driven, passive
         self._system, self._system_at, self._mask = system, system_at, mask_redundant
         self._L = system.par.L
@@ -363,7 +374,8 @@ class Trajectory:
                 continue
             links = tuple(m.links[i].name for i in motion.links)
             pairs = tuple(p.name for p in m.pairs if p.a in links or p.b in links)
-            freedoms = tuple(n for n, r in zip(m.freedom_names(), motion.rates, strict=True) if abs(r) > MOTIONS.still)
+            # the freedoms of pairs that prescribe motion come last
+            freedoms = tuple(n for n, r in zip(m.freedom_names(), motion.rates, strict=False) if abs(r) > MOTIONS.still)
             unit = unit_of(m.units, (2 if turns(motion) else 1, 1, -2))
             out.append(LoadBearing(name, turns(motion), float(np.nanmax(np.abs(size))), unit, links, pairs, freedoms))
         return tuple(out)

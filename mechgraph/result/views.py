@@ -71,9 +71,16 @@ class LoadBearing:
 
 
 class Values(Protocol):
-    """Where a Solution takes its values from (see ``result.trajectory``); every method returns batch-first arrays."""
+    """Where a Solution takes its values from (see ``result.trajectory``); every method returns batch-first arrays.
+
+    ``mechanism`` is the one that was solved, with the freedoms that take efforts as its drives; ``whole`` the same with the free pairs
+    through which the motion of points and links is prescribed, behind its own; ``prescribed`` and ``actuated`` are freedoms of that.
+    """
 
     mechanism: Mechanism
+    whole: Mechanism
+    prescribed: tuple[str, ...]
+    actuated: tuple[str, ...]
     batch: tuple[int, ...]
     t: Any
     has_forces: bool
@@ -195,7 +202,7 @@ class PairResult:
     @property
     def units(self) -> dict[str, Any]:
         """Units of the properties in the declared units: a tuple over freedoms, a dict over components, or one text."""
-        m = self._values.mechanism
+        m = self._values.whole
         row = m.pairs[self._index].type
         lengths = [0 if f.turns else 1 for f in row.freedoms]
         efforts = tuple(unit_of(m.units, (2 if c.is_couple else 1, 1, -2)) for c in row.efforts)
