@@ -66,7 +66,8 @@ class Trajectory:
     """The values of a Solution (implements ``result.views.Values``).
 
     ``system_at(places)`` is the system with the numbers of the positions at flat places (they differ between variants); ``driven`` are the
-    freedoms with an unknown effort, ``mechanism`` and ``prescribed`` as in ``Values``, ``coordinates (F, T)`` the user's ones of all positions.
+    freedoms with an unknown effort, ``coordinates (F, T)`` the user's ones of all positions, ``mechanism`` and
+    ``prescribed`` as in ``Values``.
     """
 
     def __init__(
