@@ -24,6 +24,8 @@ from typer.core import TyperGroup
 import mechgraph as mg
 from mechgraph.document import Document, Table, to_text
 from mechgraph.errors import visible
+from mechgraph.exchange.comparison import compare
+from mechgraph.exchange.files import READERS
 from mechgraph.result.summary import driver_value, summary
 from mechgraph.starting import INTERRUPTED
 from mechgraph.typed import drives_of, duration, parse_at, refuse
@@ -46,7 +48,11 @@ EXIT_STATUS = (
 )
 
 Named = Annotated[
-    str, typer.Argument(metavar="NAME_OR_FILE", help="A mechanism of the library (see 'list') or a TOML file.")
+    str,
+    typer.Argument(
+        metavar="NAME_OR_FILE",
+        help=f"A mechanism of the library (see 'list'), a TOML file, or one of another program ({', '.join(READERS)}).",
+    ),
 ]
 Engine = Annotated[
     Literal["auto", "dense", "sparse"],
@@ -81,6 +87,10 @@ Drives = Annotated[
 ]
 Out = Annotated[
     Path | None, typer.Option("--out", metavar="FILE.csv", help="Write everything as CSV, one row a position.")
+]
+
+Compare = Annotated[
+    bool, typer.Option("--compare", help="Also the results stored in a FreeCAD assembly (.asmt) beside ours.")
 ]
 
 
@@ -226,11 +236,24 @@ def _loaded(name: str) -> mg.Mechanism:
     if name in known:
         return mg.load(name)
     path = Path(name)
-    if os.path.lexists(path) or path.suffix == ".toml" or len(path.parts) > 1:
-        return mg.load(path)
+    if os.path.lexists(path) or path.suffix.lower() in (".toml", *READERS) or len(path.parts) > 1:
+        with warnings.catch_warnings(record=True) as notes:
+            warnings.simplefilter("always", mg.MechgraphWarning)
+            made = mg.load(path)
+        if sys.stderr is not None:
+            sys.stderr.write("".join(f"mechgraph: {visible(str(note.message))}\n" for note in notes))
+        return made
     near = difflib.get_close_matches(name.lower()[:LONGEST_NAME], known, n=4, cutoff=0.5)
     hint = f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(known)}"
     raise mg.FileError(name, f"no mechanism of that name in the library, and no such file; {hint}")
+
+
+def _show_compared(mechanism: str) -> None:
+    """What FreeCAD stored beside what comes out here, below a report or summary."""
+    if Path(mechanism).suffix.lower() != ".asmt":
+        refuse(f"--compare {mechanism!r}", "is no FreeCAD assembly (.asmt)")
+    _write("\n")
+    _show(compare(mechanism).document())
 
 
 # --- commands ----------------------------------------------------------------------------------------------------------
@@ -264,6 +287,7 @@ def check(
     markdown: Annotated[bool, typer.Option("--markdown", help="The report as Markdown.")] = False,
     at: At = None,
     engine: Engine = "auto",
+    compared: Compare = False,
 ) -> None:
     """Print the determinacy report: counts, mobility, redundancy, which reactions are unique, and the verdict.
 
@@ -271,8 +295,8 @@ def check(
     to move, or a freedom is neither driven nor passive. Redundancy is information: a mechanism some of whose reactions are not
     unique has exit status 0, and so has a topology without geometry. 2 wrong usage or bad input.
     """
-    if json and markdown:
-        refuse("check", "--json and --markdown exclude each other")
+    if json + markdown + compared > 1:
+        refuse("check", "--json, --markdown and --compare exclude each other")
     m = _loaded(mechanism)
     values = dict(parse_at(m, text) for text in at or ())
     with _working("checking"):
@@ -287,6 +311,8 @@ def check(
         _write(text)
     else:
         _show(document, "red" if unsolvable else "yellow" if doubtful else "green")
+    if compared:
+        _show_compared(mechanism)
     if unsolvable:
         raise typer.Exit(NO_ANSWER)
 
@@ -381,6 +407,7 @@ def solve(
     redundant: Redundant = "nan",
     on_reach: OnReach = "raise",
     engine: Engine = "auto",
+    compared: Compare = False,
 ) -> None:
     """Solve positions, efforts of the drivers and all reactions, print a summary and write a table.
 
@@ -403,5 +430,7 @@ def solve(
     _show(document)
     if out is not None:
         _write(f"\nWrote {out}: {s.status.size} rows, {len(s.part(slice(1)).columns())} columns.\n")
+    if compared:
+        _show_compared(mechanism)
     if not (np.asarray(s.status) == "ok").any():
         raise typer.Exit(NO_ANSWER)

@@ -269,15 +269,15 @@ def load(name: str | os.PathLike[str]) -> Mechanism:
             f"no mechanism of that name in the library ({', '.join(library_names())}), and no path to a .toml file",
         )
     path = Path(text) if is_path else library_path(text)
-    data = _data_of(path, _text_of(path))
+    data = _data_of(path, text_of(path, "TOML"))
     try:
         return parse(data, f"file {path.name}")
     except DeclarationError as error:
         raise ContentError(path, error) from None
 
 
-def _text_of(path: Path) -> str:
-    """The text of a file; devices and pipes, which may never end, are refused."""
+def text_of(path: Path, kind: str) -> str:
+    """The text of a file that is meant to be of some kind; devices and pipes, which may never end, are refused."""
     try:
         if not path.is_dir() and not stat.S_ISREG(path.stat().st_mode):
             raise FileError(path, "cannot be read: it is no regular file")
@@ -290,11 +290,11 @@ def _text_of(path: Path) -> str:
         raise FileError(path, f"cannot be read: {error.strerror or error}") from None
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        raise FileError(path, f"is no TOML: line {line}: not in UTF-8; save it in that encoding") from None
+        raise FileError(path, f"is no {kind}: line {line}: not in UTF-8; save it in that encoding") from None
     except ValueError as error:  # a path with a null character
         raise FileError(path, f"cannot be read: {error}") from None
     if text.startswith("\ufeff"):
-        raise FileError(path, "is no TOML: line 1 begins with a byte-order mark; save it as UTF-8 without one")
+        raise FileError(path, f"is no {kind}: line 1 begins with a byte-order mark; save it as UTF-8 without one")
     return text
 
 

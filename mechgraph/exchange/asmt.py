@@ -1,0 +1,250 @@
+"""FreeCAD assemblies as files hold them: parts, markers, joints, motions, limits, and the results that were stored with them.
+
+The format is that of FreeCAD's Assembly workbench and its solver (OndselSolver 2023 to 2026, class names ASMT...): an indented text whose
+first line names the program; `Position3D` and `RotationMatrix` place a part in the assembly, a `RefPoint` in its part and a `Marker` in
+its RefPoint, the rows of a matrix one below the other; a `PrincipalMassMarker` has the mass centre, the principal directions as columns
+and the principal moments; joints and motions name markers by path, `/Assembly/Part/Marker`. Joints hold marker J to marker I.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array, compose
+from mechgraph.errors import DeclarationError, FileError
+from mechgraph.exchange.indented import Node, numbers_of, tree_of
+from mechgraph.model.toml import MOST_POSITIONS
+from mechgraph.quantities import shown
+
+FIRST_LINES = ("OndselSolver", "freeCAD: 3D CAD with Motion Simulation  by  askoh.com")
+NOT_A_ROTATION = 1e-3
+"""Largest entry of ``R^T R - 1`` of a rotation matrix of few digits; it is made orthogonal."""
+RESULTS = "TimeSeries"
+"""The line from which on results stand."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part, or the assembly itself, which is the ground: its placement, mass data in its own frame, where it stands in the file."""
+
+    name: str
+    path: str
+    pose: Array
+    mass: float = 0.0
+    center: Array | None = None
+    inertia: Array | None = None
+    placeholder: bool = False
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class Marker:
+    """A marker: its part and its pose ``(3, 4)`` in the frame of the part."""
+
+    path: str
+    part: str
+    pose: Array
+
+
+@dataclass(frozen=True)
+class Connection:
+    """A joint, motion or limit between marker I and marker J; ``node`` holds its numbers and formulas."""
+
+    kind: str
+    name: str
+    i: str
+    j: str
+    joint: str
+    node: Node
+
+    @property
+    def title(self) -> str:
+        """Kind, name and line, for messages."""
+        return f"line {self.node.line}: {self.kind} {shown(self.name)}"
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """A whole file. ``ground`` is the assembly itself; ``notes`` says what was read otherwise than it stands."""
+
+    name: str
+    ground: Part
+    parts: Mapping[str, Part]
+    markers: Mapping[str, Marker]
+    joints: Sequence[Connection]
+    motions: Sequence[Connection]
+    limits: Sequence[Connection]
+    gravity: Array
+    times: Array
+    results: Sequence[str]
+    results_line: int
+    notes: Sequence[str]
+
+
+class Reader:
+    """Reads a file and collects its faults."""
+
+    def __init__(self, path: Path, text: str) -> None:
+        lines = text.splitlines()
+        if not lines or lines[0].strip() not in FIRST_LINES:
+            raise FileError(path, f"is no FreeCAD assembly: line 1 is {shown(lines[0][:80] if lines else '')}")
+        end = next((k for k, line in enumerate(lines) if line.startswith(RESULTS)), len(lines))
+        self.results, self.results_line = lines[end:], end + 1
+        top = tree_of(lines[1:end], 2).child("Assembly")
+        if top is None:
+            raise FileError(path, "is no FreeCAD assembly: there is no line Assembly")
+        self.top = top
+        self.faults: list[str] = []
+        self.notes: list[str] = []
+        self.markers: dict[str, Marker] = {}
+        self.stem = path.stem
+
+    def pose(self, node: Node, where: str) -> Array:
+        """Position3D and RotationMatrix of a node as a pose; the identity where it has neither."""
+        if node.child("Position3D") is None and node.child("RotationMatrix") is None:
+            return np.eye(3, 4)
+        position = node.numbers("Position3D", (3,), where, self.faults)
+        R = node.numbers("RotationMatrix", (3, 3), where, self.faults)
+        error = float(np.abs(R.T @ R - np.eye(3)).max())
+        if not R.any():  # a fault already
+            R = np.eye(3)
+        elif error > NOT_A_ROTATION or np.linalg.det(R) < 0:
+            self.faults.append(f"line {node.line}: {where}: RotationMatrix is no rotation (R^T R - 1 = {error:.2g})")
+            R = np.eye(3)
+        u, _, vt = np.linalg.svd(R)
+        return np.column_stack([u @ vt if error > 1e-15 else R, position])
+
+    def container(self, node: Node, name: str, path: str) -> Part:
+        """A part with its mass data; its markers are noted."""
+        where = f"part {shown(name)}"
+        for point in node.under("RefPoints"):
+            at = self.pose(point, f"{where}: RefPoint")
+            for entry in point.under("Markers"):
+                marker = entry.word("Name")
+                full = f"{path}/{marker}"
+                if full in self.markers:
+                    self.faults.append(f"line {entry.line}: two markers are named {full}")
+                self.markers[full] = Marker(full, name, compose(at, self.pose(entry, f"marker {full}")))
+        mass = node.child("PrincipalMassMarker")
+        pose = self.pose(node, where)
+        if mass is None:
+            return Part(name, path, pose, line=node.line)
+        axes = self.pose(mass, f"{where}: PrincipalMassMarker")
+        weight = float(mass.numbers("Mass", (1,), where, self.faults)[0])
+        moments = mass.numbers("MomentOfInertias", (3,), where, self.faults)
+        if weight < 0:
+            self.faults.append(f"line {mass.line}: {where}: Mass = {weight:g}: a mass is not below 0")
+        inertia = axes[:, :3] @ np.diag(moments) @ axes[:, :3].T
+        placeholder = weight == 1.0 and bool((moments == 1.0).all())
+        return Part(name, path, pose, weight, axes[:, 3], (inertia + inertia.T) / 2, placeholder, node.line)
+
+    def connections(self, entries: Sequence[Node]) -> list[Connection]:
+        """Joints, motions or limits; those without a name of their own get one."""
+        found: list[Connection] = []
+        taken = {entry.word("Name") for entry in entries}
+        for k, entry in enumerate(entries, 1):
+            name = given = entry.word("Name")
+            if not given or any(given == other.name for other in found):
+                name = next(
+                    free for n in range(k, k + len(taken) + 1) if (free := f"{given or entry.text}-{n}") not in taken
+                )
+                why = "has no name" if not given else f"is the second one named {given!r}"
+                self.notes.append(f"{entry.text} on line {entry.line} {why} and is called {name!r}")
+                taken.add(name)
+            i, j, joint = (entry.word(key) for key in ("MarkerI", "MarkerJ", "MotionJoint"))
+            found.append(Connection(entry.text, name, i, j, joint, entry))
+        return found
+
+    def times(self) -> Array:
+        """Times from tstart to tend in steps of hout."""
+        node = self.top.child("SimulationParameters")
+        if node is None:
+            return np.zeros(1)
+        start, end, step = (
+            float(node.numbers(key, (1,), "SimulationParameters", self.faults)[0]) for key in ("tstart", "tend", "hout")
+        )
+        count = round((end - start) / step) if step > 0 and end > start else 0
+        return np.asarray(start + step * np.arange(min(count, MOST_POSITIONS - 1) + 1), float)
+
+    def read(self) -> Assembly:
+        """The whole file.
+
+        Raises
+        ------
+        DeclarationError
+            with all faults of the file.
+        """
+        name = self.top.word("Name") or self.stem
+        ground = self.container(self.top, name, f"/{name}")
+        parts: dict[str, Part] = {}
+        for entry in self.top.under("Parts"):
+            label = entry.word("Name")
+            if not label or label in parts or label == name:
+                why = "has no name" if not label else f"has the name {label!r}, which is taken"
+                self.faults.append(f"line {entry.line}: a part {why}")
+            parts[label] = self.container(entry, label, f"/{name}/{label}")
+        sets = self.top.child("ConstraintSets") or Node("", 0)
+        for force in self.top.under("ForceTorques"):
+            self.faults.append(
+                f"line {force.line}: {force.text} {shown(force.word('Name'))}: forces are not read from FreeCAD files; delete it there "
+                "and give the load in Python (mg.Spring, mg.Wrench, mg.Effort)"
+            )
+        gravity = np.zeros(3)
+        if self.top.child("ConstantGravity") is not None:
+            gravity = self.top.numbers("ConstantGravity", (3,), "assembly", self.faults)
+        joints, motions, limits = (self.connections(sets.under(key)) for key in ("Joints", "Motions", "Limits"))
+        made = Assembly(
+            name, ground, parts, self.markers, joints, motions, limits,
+            gravity, self.times(), self.results, self.results_line, self.notes,
+        )  # fmt: skip
+        if self.faults:
+            raise DeclarationError(f"assembly {shown(name)}", self.faults)
+        return made
+
+
+@dataclass(frozen=True)
+class Results:
+    """What a file that was simulated holds: times ``(T,)`` and, by kind and path, rows of numbers ``(T,)``; the input state is left out."""
+
+    times: Array
+    series: Mapping[tuple[str, str], Mapping[str, Array]]
+
+
+def results_of(assembly: Assembly, path: Path) -> Results:
+    """The stored results: lines ``Time``, then ``PartSeries``, ``...JointSeries`` and ``...MotionSeries`` with their path and rows.
+
+    The first number of a row belongs to the input state. Rows of some writers are longer than the times; the rest is left out.
+
+    Raises
+    ------
+    FileError
+        where there are none, or a row has too few numbers.
+    """
+    series: dict[tuple[str, str], dict[str, Array]] = {}
+    times, here = np.zeros(0), None
+    for number, line in enumerate(assembly.results, assembly.results_line):
+        label, _, rest = line.strip().partition("\t")
+        head, _, tail = label.partition(" ")
+        if head.endswith("Series") and head != RESULTS:
+            here = series.setdefault((head.removesuffix("Series"), (rest or tail).strip()), {})
+        elif label in ("Time", "Number") or here is not None:
+            row = numbers_of(rest.replace("Input", ""))
+            if row is None:
+                raise FileError(path, f"line {number}: {label}: expected finite numbers")
+            if label == "Time":
+                ends = np.flatnonzero(np.diff(row) <= 0)
+                times = np.array(row[: int(ends[0]) + 1] if ends.size else row)
+            elif here is not None and label:
+                here[label] = np.array(row[1:])
+    for (kind, owner), rows in series.items():
+        short = {label: row.size for label, row in rows.items() if row.size < times.size}
+        if short:
+            raise FileError(path, f"{kind}Series {owner}: {shown(short)} numbers at {times.size} times")
+        rows.update({label: row[: times.size] for label, row in rows.items()})
+    if not times.size or not series:
+        raise FileError(path, "holds no results to compare with: simulate it in FreeCAD and save it again")
+    return Results(times, series)

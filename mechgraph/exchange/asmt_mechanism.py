@@ -1,0 +1,378 @@
+"""From a FreeCAD assembly to a mechanism: parts are links, joints are pairs by markers, motions are drives.
+
+Names, placements and the zeros of joint coordinates are FreeCAD's. CAD writes about as many digits as its solver closes loops to (1e-6), so
+markers that fit to ``FITS`` are made to fit exactly where the parts stand: first axes that are parallel or perpendicular to that accuracy,
+and lines that are one, are made so, then each marker J is moved to the place that its joint gives it. What was moved is said. Markers that
+fit less are left as they are, and the loops are closed from there.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy
+
+from mechgraph.algebra.inertia import physical_faults
+from mechgraph.algebra.se3 import Array, compose, inverse
+from mechgraph.errors import DeclarationError, listed
+from mechgraph.exchange.asmt import Assembly, Connection, Part
+from mechgraph.exchange.asmt_joints import JOINTS, REFUSED, SLIDES, Directions, Row, free, motion_type
+from mechgraph.exchange.exact import FITS, Snapping
+from mechgraph.exchange.formula import FormulaFault, evaluated
+from mechgraph.model.drive import Drive
+from mechgraph.model.link import Link
+from mechgraph.model.load import Gravity
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.motion import Motion
+from mechgraph.model.pair import Marker, Pair
+from mechgraph.quantities import shown
+
+ROUNDING = 1e-12
+"""Corrections up to here are not worth a word."""
+
+
+@dataclass
+class Seat:
+    """A joint with its row and marker poses in the assembly: I, J as the file has it, J as it shall be, and the pair coordinates there."""
+
+    joint: Connection
+    row: Row
+    on_a: Array
+    on_b: Array
+    given: Array
+    start: dict[str, float]
+    directions: Directions
+
+    @property
+    def misfit(self) -> tuple[float, float]:
+        """Distance and angle by which J misses its place."""
+        return float(np.linalg.norm(self.given[:, 3] - self.on_b[:, 3])), self.directions.error
+
+
+@dataclass
+class Builder:
+    """Builds a mechanism and collects what is wrong (``faults``) and what was taken otherwise than it stands (``notes``)."""
+
+    assembly: Assembly
+    faults: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    moved: dict[str, tuple[float, float]] = field(default_factory=dict)
+
+    def part(self, name: str) -> Part:
+        """The part, or the ground."""
+        return self.assembly.parts.get(name, self.assembly.ground)
+
+    def ends(self, found: Connection) -> tuple[str, str] | None:
+        """The parts of the two markers; None, and a fault, where a marker is not there."""
+        markers = self.assembly.markers
+        missing = [path for path in (found.i, found.j) if path not in markers]
+        if missing:
+            known = listed(markers, 8)
+            self.faults.append(
+                f"{found.title}: there is no marker {', '.join(map(shown, missing))} (there are: {known})"
+            )
+            return None
+        return markers[found.i].part, markers[found.j].part
+
+    def pose(self, marker: str) -> Array:
+        """A marker in the assembly, where the parts stand."""
+        found = self.assembly.markers[marker]
+        return compose(self.part(found.part).pose, found.pose)
+
+    # --- joints ----------------------------------------------------------------------------------------------------
+
+    def rows(self) -> Iterator[tuple[Connection, Row]]:
+        """The joints that hold two parts to each other."""
+        for joint in self.assembly.joints:
+            ends = self.ends(joint)
+            row = JOINTS.get(joint.kind)
+            if row is None:
+                why = REFUSED.get(joint.kind, f"not known here (known: {', '.join(JOINTS)})")
+                self.faults.append(f"{joint.title}: {why}")
+            elif ends and ends[0] == ends[1]:
+                what = "the ground" if ends[0] == self.assembly.name else f"part {ends[0]!r}"
+                self.notes.append(f"{joint.kind} {joint.name!r} joins {what} to itself and was left out")
+            elif ends:
+                yield joint, self.numbered(joint, row)
+
+    def numbered(self, joint: Connection, row: Row) -> Row:
+        """The row with the angle of the joint; axes at the angle 0 are parallel."""
+        if row.number != "theIzJz" or joint.node.child(row.number) is None:
+            return row
+        angle = self.number(joint, row)
+        return row._replace(angle=angle) if abs(np.sin(angle)) > FITS else JOINTS["ParallelAxesJoint"]
+
+    def number(self, joint: Connection, row: Row) -> float:
+        """The number of a joint (offset, pitch, angle); 0 where it has none."""
+        if not row.number or joint.node.child(row.number) is None:
+            return 0.0
+        return float(joint.node.numbers(row.number, (1,), joint.title.partition(": ")[2], self.faults)[0])
+
+    def seat(self, joint: Connection, row: Row, I: Array) -> Seat:
+        """Markers of the pair for the pose of I: the place of J, and the coordinates there."""
+        J = self.pose(joint.j)
+        d = row.turns(I[:, :3], J[:, :3], row.angle)
+        offset = self.number(joint, row) if row.slides[:2] == (True, True) and not row.anywhere else 0.0
+        A = np.column_stack([d.on_a, J[:, 3] if row.anywhere else I[:, 3] + offset * I[:, 2]])
+        along = np.where(row.slides, d.on_a.T @ (J[:, 3] - A[:, 3]), 0.0)
+        on_b = np.column_stack([d.on_b, A[:, 3] + d.on_a @ along])
+        start = {name: float(value) for name, value, is_free in zip(SLIDES, along, row.slides, strict=True) if is_free}
+        return Seat(joint, row, A, on_b, np.column_stack([d.given, J[:, 3]]), start | {"Rz": d.angle}, d)
+
+    def seats(self) -> list[Seat]:
+        """All joints, their axes and lines made exactly parallel, perpendicular and one where they are nearly so."""
+        found = list(self.rows())
+        snap = Snapping(FITS * self.size)
+        out = []
+        for joint, row in found:
+            I = self.pose(joint.i)
+            fixed = np.column_stack([*self.straightened(snap, joint, row, I)])
+            out.append(self.seat(joint, row, fixed))
+        if snap.largest > ROUNDING:
+            self.notes.append(
+                f"axes that are parallel or perpendicular to {FITS:g} rad, and lines that are one to {FITS:g} L, were made so exactly "
+                f"(largest turn {snap.largest:.2g} rad)"
+            )
+        return out
+
+    def straightened(self, snap: Snapping, joint: Connection, row: Row, I: Array) -> tuple[Array, Array]:
+        """Rotation and origin of marker I with its axis made exact."""
+        if row.turns is free and not any(row.slides):
+            return I[:, :3], I[:, 3]
+        z = snap.direction(I[:, 2])
+        x = snap.direction(I[:, 0] - (I[:, 0] @ z) * z)
+        x = x - (x @ z) * z
+        R = np.column_stack([x / np.linalg.norm(x), np.cross(z, x / np.linalg.norm(x)), z])
+        is_line = row.slides in (JOINTS["RevoluteJoint"].slides, JOINTS["CylindricalJoint"].slides)
+        return R, snap.on_line(I[:, 3], z) if is_line else I[:, 3]
+
+    @functools.cached_property
+    def size(self) -> float:
+        """Mean radius of the markers and of the origins of the parts; 1 where all are one point."""
+        a = self.assembly
+        points = np.array(
+            [self.pose(path)[:, 3] for path in a.markers] + [part.pose[:, 3] for part in (a.ground, *a.parts.values())]
+        )
+        radius = float(np.sqrt(((points - points.mean(axis=0)) ** 2).sum(axis=1).mean()))
+        return radius if radius > ROUNDING * float(np.abs(points).max()) else 1.0
+
+    def pair(self, seat: Seat) -> Pair:
+        """The pair, marker J moved to its place where it is meant to be there."""
+        distance, angle = seat.misfit
+        joint, d = seat.joint, seat.directions
+        fits = distance <= FITS * self.size and angle <= FITS
+        if d.turned:
+            self.notes.append(
+                f"{joint.kind} {joint.name!r}: marker {joint.j} points the opposite way of {joint.i} and was turned half round"
+            )
+        if not fits:
+            self.notes.append(
+                f"{joint.kind} {joint.name!r} does not fit as the parts stand: its markers are {distance:.3g} and {angle:.3g} rad "
+                "off; the loops are closed by moving the parts"
+            )
+        elif max(distance / self.size, angle) > ROUNDING:
+            self.moved[joint.j] = (distance, angle)
+        pitch = self.number(joint, seat.row) / (2 * np.pi) if seat.row.number == "pitch" else None
+        return self.by_markers(
+            joint.name, seat.row.pair_type(), joint, seat.on_a, seat.on_b if fits else seat.given, pitch
+        )
+
+    def by_markers(
+        self, name: str, kind: object, of: Connection, A: Array, B: Array, pitch: float | None = None
+    ) -> Pair:
+        """A pair whose markers have these poses in the assembly; each is written in the frame of its part, that of the ground is global."""
+        links = [self.assembly.markers[path].part for path in (of.i, of.j)]
+        markers = []
+        for link, X in zip(links, (A, B), strict=True):
+            own = X if link == self.assembly.name else compose(inverse(self.part(link).pose), X)
+            markers.append(Marker(tuple(own[:, 3]), tuple(own[:, 2]), tuple(own[:, 0])))
+        return Pair(name, kind, *links, on_a=markers[0], on_b=markers[1], pitch=pitch)  # type: ignore[arg-type]
+
+    # --- motions ---------------------------------------------------------------------------------------------------
+
+    def driven(self, seats: Sequence[Seat]) -> tuple[list[Pair], list[Drive], dict[str, float]]:
+        """Drives of all motions, pairs for those between markers that no joint connects, and start values of all pairs."""
+        pairs = {seat.joint.name: self.pair(seat) for seat in seats}
+        start = {
+            f"{name}.{key}": value
+            for seat in seats
+            for name, freedoms in [(seat.joint.name, [f.name for f in pairs[seat.joint.name].type.freedoms])]
+            for key, value in seat.start.items()
+            if key in freedoms and not seat.row.anywhere
+        }
+        drives: dict[str, Drive] = {}
+        for motion in self.assembly.motions:
+            found, formulas = self.moved_by(motion, seats), self.formulas(motion)
+            if found is None:
+                continue
+            seat, sign = found
+            if seat is None:
+                if self.ends(motion) is None:
+                    continue
+                pair, at = self.motion_pair(motion)
+                pairs[motion.name], name = pair, motion.name
+                start |= {f"{name}.{key}": value for key, value in at.items()}
+            else:
+                name = seat.joint.name
+            self.drive(motion, pairs[name], formulas, sign, start, drives)
+        return list(pairs.values()), list(drives.values()), start
+
+    def moved_by(self, motion: Connection, seats: Sequence[Seat]) -> tuple[Seat | None, float] | None:
+        """The joint that a motion moves, and -1 where it names the markers the other way round; no joint where it names markers alone."""
+        if motion.kind not in ("RotationalMotion", "TranslationalMotion", "GeneralMotion"):
+            self.faults.append(f"{motion.title}: not known here")
+            return None
+        for seat in seats:
+            joint = seat.joint
+            if motion.joint in (f"/{self.assembly.name}/{joint.name}", joint.name) or (motion.i, motion.j) == (
+                joint.i,
+                joint.j,
+            ):
+                return seat, 1.0
+            if (motion.i, motion.j) == (joint.j, joint.i):
+                return seat, -1.0
+        if motion.joint and not motion.i:
+            joints = listed(f"/{self.assembly.name}/{seat.joint.name}" for seat in seats)
+            self.faults.append(f"{motion.title}: there is no joint {shown(motion.joint)} (joints: {joints})")
+            return None
+        return None, 1.0
+
+    def formulas(self, motion: Connection) -> dict[str, str]:
+        """The formulas of a motion by freedom."""
+        node = motion.node
+        order = node.word("rotationOrder") or node.word("RotationOrder") or "1 2 3"
+        axes = ["xyz"[int(c) - 1] for c in order.split() if c in "123"] if motion.kind == "GeneralMotion" else []
+        keys = {
+            "RotationalMotion": {"Rz": "RotationZ"},
+            "TranslationalMotion": {"Tz": "TranslationZ"},
+            "GeneralMotion": {
+                **{name: f"rIJI{k}" for k, name in enumerate(SLIDES, 1)},
+                **{f"R{axis}": f"angIJJ{k}" for k, axis in enumerate(axes, 1)},
+            },
+        }.get(motion.kind, {})
+        found = {freedom: node.word(key) for freedom, key in keys.items()}
+        if keys and not any(found.values()):
+            self.faults.append(f"{motion.title}: has no formula ({', '.join(keys.values())})")
+        return {freedom: text for freedom, text in found.items() if text}
+
+    def motion_pair(self, motion: Connection) -> tuple[Pair, dict[str, float]]:
+        """The pair of a motion between markers that no joint connects, and its coordinates where the parts stand."""
+        self.notes.append(
+            f"{motion.kind} {motion.name!r} moves marker {motion.j} against {motion.i}, which no joint connects"
+        )
+        turns = "".join(name[1] for name in self.formulas(motion) if name.startswith("R")) or "z"
+        turns = turns if len(set(turns)) == 3 else turns[0] + {"x": "yz", "y": "zx", "z": "xy"}[turns[0]]
+        I, J = self.pose(motion.i), self.pose(motion.j)
+        relative = compose(inverse(I), J)
+        turn = scipy.spatial.transform.Rotation.from_matrix(relative[:, :3])
+        angles = turn.as_euler(turns.upper())  # type: ignore[call-overload]
+        at = dict(zip([*SLIDES, *(f"R{c}" for c in turns)], [*relative[:, 3].tolist(), *angles.tolist()], strict=True))
+        return self.by_markers(motion.name, motion_type(turns), motion, I, J), at
+
+    def drive(
+        self,
+        motion: Connection,
+        pair: Pair,
+        formulas: dict[str, str],
+        sign: float,
+        start: dict[str, float],
+        drives: dict[str, Drive],
+    ) -> None:
+        """Drives of a motion in the freedoms of a pair; an angle starts in the turn in which its motion does."""
+        able = [f.name for f, single in zip(pair.type.freedoms, pair.type.drivable, strict=True) if single]
+        for freedom, text in formulas.items():
+            try:
+                s, v, a = (sign * part for part in evaluated(text, self.assembly.times))
+            except FormulaFault as fault:
+                self.faults.append(f"{motion.title}: {fault}")
+                continue
+            name = f"{pair.name}.{freedom}"
+            if freedom not in able:
+                if motion.kind == "GeneralMotion" and not (s.any() or v.any()):
+                    continue
+                where = f"{motion.title}: drives {freedom} of {pair.name!r} ({pair.type.name})"
+                self.faults.append(f"{where}, which takes a drive in {', '.join(able) or 'no freedom'}")
+            elif name in drives:
+                self.faults.append(f"{motion.title}: {name} is driven twice")
+            else:
+                drives[name] = Drive(name, Motion(s, v, a, self.assembly.times))
+                if freedom.startswith("R") and name in start:
+                    start[name] += 2 * np.pi * round((s[0] - start[name]) / (2 * np.pi))
+
+    # --- links -----------------------------------------------------------------------------------------------------
+
+    def links(self, pairs: Sequence[Pair]) -> list[Link]:
+        """The ground and the parts that joints or motions reach; parts that hang together without the ground are a fault."""
+        a = self.assembly
+        reached, grown = {a.name}, True
+        while grown:
+            new = {end for pair in pairs if {pair.a, pair.b} & reached for end in (pair.a, pair.b)} - reached
+            reached |= new
+            grown = bool(new)
+        joined = {end for pair in pairs for end in (pair.a, pair.b)}
+        loose = [name for name in a.parts if name in joined - reached]
+        alone = [name for name in a.parts if name not in joined]
+        if loose:
+            self.faults.append(
+                f"parts {listed(loose)} are joined to each other, but not to the ground; ground one of them in FreeCAD"
+            )
+        if alone:
+            self.notes.append(f"no joint and no motion holds {listed(alone)}: left out")
+        used = [part for name, part in a.parts.items() if name in reached]
+        if used and all(part.placeholder for part in used):
+            self.notes.append(
+                "all parts have mass 1 and moments of inertia 1, which FreeCAD writes where it was told none"
+            )
+        return [Link(a.name), *(self.link(part) for part in used)]
+
+    def link(self, part: Part) -> Link:
+        """A link with the mass of its part."""
+        if not part.mass:
+            return Link(part.name)
+        odd = part.inertia is not None and bool(physical_faults(part.inertia))
+        if odd:
+            self.notes.append(f"the moments of inertia of part {part.name!r} are those of no body")
+        return Link(part.name, part.mass, part.center, part.inertia, unphysical=odd)
+
+    def limit(self, found: Connection) -> str:
+        """A limit in words."""
+        what = f"between {found.i} and {found.j}" if found.i else f"of {found.joint}"
+        return (
+            f"{found.kind} {found.name!r} {what} ({found.node.word('Type')} {found.node.word('Limit')}) is not applied"
+        )
+
+    def build(self) -> tuple[Mechanism, tuple[str, ...]]:
+        """The mechanism and the notes.
+
+        Raises
+        ------
+        DeclarationError
+            with all faults.
+        """
+        a = self.assembly
+        pairs, drives, start = self.driven(self.seats())
+        links = self.links(pairs)
+        if self.moved:
+            far = max(self.moved, key=lambda path: max(self.moved[path][0] / self.size, self.moved[path][1]))
+            distance, angle = self.moved[far]
+            self.notes.append(
+                f"{len(self.moved)} marker{'s' * (len(self.moved) > 1)} moved so that the joints fit exactly, {far} the most: "
+                f"by {distance:.2g} and {angle:.2g} rad"
+            )
+        self.notes += [self.limit(found) for found in a.limits]
+        notes = (*a.notes, *self.notes)
+        if self.faults:
+            raise DeclarationError(f"assembly {shown(a.name)}", self.faults)
+        made = Mechanism(
+            a.name, links, pairs, drives, [Gravity(tuple(a.gravity))] if a.gravity.any() else [],
+            start=start, source="a FreeCAD assembly", description=". ".join(notes),
+        )  # fmt: skip
+        return made, notes
+
+
+def mechanism_of(assembly: Assembly) -> tuple[Mechanism, tuple[str, ...]]:
+    """The mechanism of an assembly, and what was taken otherwise than it stands in the file."""
+    return Builder(assembly).build()

@@ -1,0 +1,133 @@
+"""Formulas of time, as FreeCAD's motions hold them: value, rate and acceleration, differentiated exactly.
+
+A formula is a sum of products of numbers, ``time``, ``pi``, the four operations, powers (``^``) and the functions of ``FUNCTIONS``. It is
+read into a syntax tree of which only these parts are known; nothing of it is ever executed.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.quantities import shown
+
+LONGEST = 2000
+"""Characters of a formula."""
+DOUBLE = re.compile(r"(?<=[\d.])d(?![a-z])")
+"""The letter that Smalltalk writes after a number of double precision: ``4.0d*pi*time``."""
+
+
+class FormulaFault(Exception):
+    """Why a formula cannot be evaluated."""
+
+
+@dataclass(frozen=True)
+class Jet:
+    """A function of time by its value, rate and acceleration; ``(uv)'' = u''v + 2u'v' + uv''``."""
+
+    s: Any
+    v: Any = 0.0
+    a: Any = 0.0
+
+    def __add__(self, other: Jet) -> Jet:
+        return Jet(self.s + other.s, self.v + other.v, self.a + other.a)
+
+    def __neg__(self) -> Jet:
+        return Jet(-self.s, -self.v, -self.a)
+
+    def __sub__(self, other: Jet) -> Jet:
+        return self + -other
+
+    def __mul__(self, other: Jet) -> Jet:
+        acceleration = self.a * other.s + 2 * self.v * other.v + self.s * other.a
+        return Jet(self.s * other.s, self.v * other.s + self.s * other.v, acceleration)
+
+    def __truediv__(self, other: Jet) -> Jet:
+        return self * other.through(lambda u: 1 / u, lambda u: -1 / u**2, lambda u: 2 / u**3)
+
+    def __pow__(self, other: Jet) -> Jet:
+        if np.any(other.v) or np.any(other.a):
+            raise FormulaFault("a power whose exponent changes with time")
+        n = other.s
+        zero = np.zeros_like(self.s)
+        rate = (lambda u: n * u ** (n - 1)) if n else (lambda u: zero)
+        second = (lambda u: n * (n - 1) * u ** (n - 2)) if n not in (0, 1) else (lambda u: zero)
+        return self.through(lambda u: u**n, rate, second)
+
+    def through(self, f: Callable[[Any], Any], rate: Callable[[Any], Any], second: Callable[[Any], Any]) -> Jet:
+        """``f(u)``, ``f'(u) u'`` and ``f''(u) u'^2 + f'(u) u''``."""
+        slope = rate(self.s)
+        return Jet(f(self.s), slope * self.v, second(self.s) * self.v**2 + slope * self.a)
+
+
+Derivatives = tuple[Callable[[Any], Any], Callable[[Any], Any], Callable[[Any], Any]]
+FUNCTIONS: dict[str, Derivatives] = {
+    "sin": (np.sin, np.cos, lambda u: -np.sin(u)),
+    "cos": (np.cos, lambda u: -np.sin(u), lambda u: -np.cos(u)),
+    "tan": (np.tan, lambda u: 1 / np.cos(u) ** 2, lambda u: 2 * np.tan(u) / np.cos(u) ** 2),
+    "arcsin": (np.arcsin, lambda u: (1 - u**2) ** -0.5, lambda u: u * (1 - u**2) ** -1.5),
+    "arccos": (np.arccos, lambda u: -((1 - u**2) ** -0.5), lambda u: -u * (1 - u**2) ** -1.5),
+    "arctan": (np.arctan, lambda u: 1 / (1 + u**2), lambda u: -2 * u / (1 + u**2) ** 2),
+    "exp": (np.exp, np.exp, np.exp),
+    "ln": (np.log, lambda u: 1 / u, lambda u: -1 / u**2),
+    "sqrt": (np.sqrt, lambda u: 0.5 * u**-0.5, lambda u: -0.25 * u**-1.5),
+}
+"""Functions of a formula with their first and second derivatives."""
+FUNCTIONS |= {short: FUNCTIONS[long] for short, long in (("asin", "arcsin"), ("acos", "arccos"), ("atan", "arctan"))}
+OPERATIONS: dict[type[ast.operator], Callable[[Jet, Jet], Jet]] = {
+    ast.Add: Jet.__add__,
+    ast.Sub: Jet.__sub__,
+    ast.Mult: Jet.__mul__,
+    ast.Div: Jet.__truediv__,
+    ast.Pow: Jet.__pow__,
+}
+
+
+def evaluated(formula: str, t: Array) -> tuple[Array, Array, Array]:
+    """Value, rate and acceleration ``(T,)`` of a formula at times ``t (T,)``.
+
+    Raises
+    ------
+    FormulaFault
+        where it is none, holds what is not known here, or has no finite value.
+    """
+    text = DOUBLE.sub("", formula.strip().lower()).replace("^", "**")
+    if len(text) > LONGEST:
+        raise FormulaFault(f"longer than {LONGEST} characters")
+    try:
+        tree = ast.parse(text, mode="eval").body
+        with np.errstate(all="ignore"):
+            jet = _jet(tree, Jet(t, np.ones_like(t), np.zeros_like(t)))
+    except (SyntaxError, ValueError, OverflowError, MemoryError, RecursionError, ZeroDivisionError):
+        raise FormulaFault(f"{shown(formula)} is no formula of time, such as 2*pi*time") from None
+    value, rate, acceleration = (np.array(np.broadcast_to(part, t.shape), float) for part in (jet.s, jet.v, jet.a))
+    if not all(np.isfinite(part).all() for part in (value, rate, acceleration)):
+        raise FormulaFault(f"{shown(formula)} has no finite value, rate or acceleration at some of the times")
+    return value, rate, acceleration
+
+
+def _jet(node: ast.expr, time: Jet) -> Jet:
+    """The jet of a part of a formula."""
+    match node:
+        case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
+            return Jet(float(number))
+        case ast.Name(id="time"):
+            return time
+        case ast.Name(id="pi"):
+            return Jet(np.pi)
+        case ast.UnaryOp(op=ast.USub(), operand=inner):
+            return -_jet(inner, time)
+        case ast.UnaryOp(op=ast.UAdd(), operand=inner):
+            return _jet(inner, time)
+        case ast.BinOp(left=left, op=op, right=right) if type(op) in OPERATIONS:
+            return OPERATIONS[type(op)](_jet(left, time), _jet(right, time))
+        case ast.Call(func=ast.Name(id=name), args=[inner], keywords=[]) if name in FUNCTIONS:
+            return _jet(inner, time).through(*FUNCTIONS[name])
+    known = ", ".join(["time", "pi", *FUNCTIONS])
+    raise FormulaFault(f"{shown(ast.unparse(node))} is not known in a formula (known: {known}, + - * / ^)")
