@@ -285,11 +285,14 @@ def check(
     mechanism: Named,
     json: Annotated[bool, typer.Option("--json", help="All facts as JSON.")] = False,
     markdown: Annotated[bool, typer.Option("--markdown", help="The report as Markdown.")] = False,
+    full: Annotated[
+        bool, typer.Option("--full", help="The whole report: every pair, self-stress, loop and count.")
+    ] = False,
     at: At = None,
     engine: Engine = "auto",
     compared: Compare = False,
 ) -> None:
-    """Print the determinacy report: counts, mobility, redundancy, which reactions are unique, and the verdict.
+    """Print the determinacy report: the verdict, what to do, and what may be trusted; with --full all of it.
 
     Exit status: 0 where forces can be solved; 1 where the loops cannot be closed, drivers depend on each other or have nothing
     to move, or a freedom is neither driven nor passive. Redundancy is information: a mechanism some of whose reactions are not
@@ -301,8 +304,8 @@ def check(
     values = dict(parse_at(m, text) for text in at or ())
     with _working("checking"):
         report = mg.check(m, at=values or None, engine=engine)
-        text = report.to_json() if json else report.to_markdown() if markdown else ""
-        document = report.document()
+        text = report.to_json() if json else report.to_markdown(full) if markdown else ""
+        document = report.document(full)
     not_closed = m.has_geometry and report.mobility is None
     bearing = any(p.load_bearing for p in report.passive)
     unsolvable = not_closed or report.undriven or report.contradicting_drives

@@ -485,7 +485,7 @@ def test_outputs_that_fail(command: str, status: int, message: str) -> None:
 def test_outputs_that_cannot_show_every_character(tmp_path: Path) -> None:
     text = (ROOT / "library" / "four-bar.toml").read_text(encoding="utf-8")
     _written(tmp_path / "m.toml", text.replace('"crank"', '"\N{GREEK SMALL LETTER ALPHA}"'))
-    done = process("check", str(tmp_path / "m.toml"), PYTHONIOENCODING="ascii", PYTHONUTF8="0")
+    done = process("check", "--full", str(tmp_path / "m.toml"), PYTHONIOENCODING="ascii", PYTHONUTF8="0")
     assert done.returncode == 0
     assert r"\u03b1" in done.stdout
     assert "Traceback" not in done.stderr

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.closure.assembly import CLOSED
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.rank import EngineName
 from mechgraph.equations.build import BOOKKEEPINGS, BookkeepingName, formulate
@@ -16,9 +17,11 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.linear import independent_rows
 from mechgraph.numerics.tolerances import RANKS
 from mechgraph.report import findings
+from mechgraph.report.advice import Advice
 from mechgraph.report.findings import Finding, LoopFact, PassiveFinding
 from mechgraph.structure.finite_motion import FiniteMotion, finite_motion
 from mechgraph.structure.generic import Generic, generic
+from mechgraph.structure.kind import Kind, kind_of, kind_of_mechanism
 from mechgraph.structure.mobility import Freedoms, freedoms_at
 from mechgraph.structure.pair_changes import LARGEST_FOR_SETS, Effect, advice
 from mechgraph.structure.self_stress import SelfStress
@@ -153,6 +156,24 @@ class Facts:
         nearby = self.equation_count - self.motion.rank_nearby
         structural = min(self.generic.excess, nearby)
         return {"structural": structural, "dimensions": nearby - structural, "here": self.redundancy - nearby}
+
+    @cached_property
+    def kind(self) -> Kind:
+        """Planar, spherical or neither: of all pairs, else of the motion; its place about the internal origin."""
+        return kind_of_mechanism(self.geometry.freedoms, self.motion) if self.geometry else Kind()
+
+    @cached_property
+    def loop_kinds(self) -> tuple[Kind, ...]:
+        """The kind of every loop by its pairs."""
+        g = self.geometry
+        return (
+            tuple(kind_of(g.freedoms.position.rows.S[:, columns]) for columns, _ in g.system.loop_columns) if g else ()
+        )
+
+    @cached_property
+    def own_forces_unique(self) -> bool:
+        """Whether what a planar mechanism carries in its plane (a spherical one about its centre) is unique, driver efforts with it."""
+        return bool(self.kind.name and self.reactions and self.reactions.is_unique_on(self.kind.twists))
 
     # --- how sure that is ----------------------------------------------------------------------------------------------
 
@@ -343,17 +364,33 @@ class Facts:
         return (self.redundancy or 0) > LARGEST_FOR_SETS
 
     @cached_property
-    def advice(self) -> tuple[Finding, ...]:
-        """What would make it determinate: drivers to add, changes with their computed effect."""
-        out = []
+    def advice(self) -> tuple[Advice, ...]:
+        """What would make it determinate: drivers to add, changes with their computed effect; each can be applied."""
+        out, g = [], self.geometry
+        if g is None:
+            return ()
+        m = at_position(self.mechanism, g.system, g.x)
         if self.suggested_drives:
             names, drives = ", ".join(self.suggested_drives), self.mechanism.drives
             what = f"drive {'also ' if drives and not self.replaced_drives else ''}{names}"
             instead = f" instead of {', '.join(self.replaced_drives)}" if self.replaced_drives else ""
             where = " beside the change point" if self.change_point else ""
             then = f"then every freedom is driven or passive{where}"
-            out.append(Finding(f"{what}{instead}: {then}", self.suggested_drives))
-        return (*out, *(Finding(e.text, tuple(item for item, _, _ in e.changes)) for e in self.effects))
+            driving = Advice(
+                f"{what}{instead}: {then}", self.suggested_drives, replaced=self.replaced_drives, mechanism=m
+            )
+            out.append(driving)
+        changes = (Advice(e.text, tuple(item for item, _, _ in e.changes), effect=e, mechanism=m) for e in self.effects)
+        return (*out, *changes)
+
+
+def at_position(m: Mechanism, system: System, x: Array) -> Mechanism:
+    """The mechanism with its start at a closed state ``x (nx,)``; as it is where that is its start."""
+    given = system.start_coordinates(m.start)
+    q = system.coordinates_of(x[:, None], given)[:, 0]
+    if np.abs(q - given).max(initial=0.0) <= CLOSED:
+        return m
+    return m.replace(start=dict(zip(m.freedom_names(), q.tolist(), strict=True)))
 
 
 def counted_ledger(m: Mechanism, bookkeeping: str) -> Ledger:

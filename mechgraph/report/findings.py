@@ -49,6 +49,7 @@ class PassiveFinding(Finding):
     load_bearing: bool | None = False
     effort: float = 0.0
     unit: str = ""
+    turns: bool = True
 
     @property
     def size(self) -> str:
@@ -126,7 +127,8 @@ def passive_findings(system: System, x: Array, passive: tuple[PassiveMotion, ...
         bearing = None if held is None else not is_idle(held[0][i], held[1][i])
         scale = system.par.L ** (2 if turns(motion) else 1)
         effort = abs(float(held[0][i, 0])) * scale if held is not None and bearing else 0.0
-        out.append(_passive_finding(system, motion, PassiveFinding("", (), (), None, name, bearing, effort, unit)))
+        found = PassiveFinding("", (), (), None, name, bearing, effort, unit, turns(motion))
+        out.append(_passive_finding(system, motion, found))
     return tuple(out)
 
 

@@ -14,7 +14,7 @@ from mechgraph.document import Document, to_html, to_markdown, to_text
 from mechgraph.errors import AssemblyError, DeclarationError
 from mechgraph.model.declaration import mapping_faults
 from mechgraph.model.mechanism import Mechanism, check_mechanism
-from mechgraph.report import sections, sentences
+from mechgraph.report import brief, sections, sentences
 from mechgraph.report.facts import Facts, Geometry
 from mechgraph.structure.mobility import free_motion
 from mechgraph.topology.linkgraph import link_graph
@@ -28,9 +28,17 @@ class DeterminacyReport(Facts):
         """The verdict in one sentence."""
         return sentences.verdict(self)
 
-    def document(self) -> Document:
-        """The report as a document."""
-        return sections.document(self)
+    def document(self, full: bool = False) -> Document:
+        """The report as a document: verdict, what to do and what may be trusted, or all of it."""
+        return sections.document(self) if full else brief.document(self)
+
+    def text(self, full: bool = False) -> str:
+        """The report as text, at most 25 lines of 80 columns, or all of it."""
+        return to_text(self.document(full))
+
+    def to_markdown(self, full: bool = False) -> str:
+        """The report as Markdown."""
+        return to_markdown(self.document(full))
 
     def to_dict(self) -> dict[str, Any]:
         """All facts as plain data."""
@@ -40,12 +48,8 @@ class DeterminacyReport(Facts):
         """All facts as JSON."""
         return json.dumps(self.to_dict(), indent=2) + "\n"
 
-    def to_markdown(self) -> str:
-        """The report as Markdown."""
-        return to_markdown(self.document())
-
     def __str__(self) -> str:
-        return to_text(self.document())
+        return self.text()
 
     def _repr_html_(self) -> str:
         return to_html(self.document())

@@ -14,7 +14,8 @@ from mechgraph.equations.terms import Ledger
 from mechgraph.model.pair_table import TABLE
 from mechgraph.numerics.tolerances import RANKS
 from mechgraph.report.facts import Facts
-from mechgraph.report.sentences import assumed, listed, loop_names, mobility_line, plural, reasons, verdict
+from mechgraph.report.sentences import assumed, kind_line, loop_names, mobility_line, place, reasons, verdict
+from mechgraph.report.words import component_words, listed, plural
 from mechgraph.structure.pair_changes import LARGEST_FOR_SETS
 
 TERMS = 4
@@ -23,7 +24,7 @@ LISTED = 20
 """Most items of one kind that are printed; all are in the JSON."""
 NOT_UNIQUE = (
     "Unique: equilibrium alone gives it. Not unique: it also depends on fits, stiffness and temperature; a rigid-body program can only "
-    "assume it."
+    "assume it, and how much force a misfit locks in it cannot know."
 )
 MEANINGS = (
     "A self-stress is a set of reactions that balance each other without any load: any multiple of it may be built in. Components "
@@ -75,6 +76,11 @@ _VALUES: dict[str, Callable[[Facts], Any]] = {
         {"steps": _plain(loop), **_plain(fact)} for loop, fact in zip(r.loops, r.loop_facts, strict=True)
     ],
     "ledger": lambda r: {name: _ledger_data(r.ledger(name)) for name in ("lee", "minimal")},
+    "kind": lambda r: {"name": r.kind.name, "by_pairs": r.kind.by_pairs, "place": place(r, r.kind)},
+    "loop_kinds": lambda r: [kind.name for kind in r.loop_kinds],
+    "advice": lambda r: [
+        {key: _plain(getattr(a, key)) for key in ("text", "freedoms", "links", "axis", "brief")} for a in r.advice
+    ],
     "unique_directions": lambda r: [{"text": d.text, **_plain(d)} for d in r.unique_directions],
 }
 """Facts whose plain data are not those of the attribute of that name."""
@@ -121,7 +127,7 @@ def _best_change(r: Facts) -> Iterator[Block]:
     """The change that removes most redundancy, in one line near the top."""
     better = [e for e in r.effects if e.redundancy[1] < e.redundancy[0]]
     if better:
-        best = min(better, key=lambda e: (e.redundancy[1], len(e.changes)))
+        best = min(better, key=lambda e: e.redundancy[1])
         start = "To remove all redundancy" if not best.redundancy[1] else "To lower the redundancy"
         yield Paragraph(f"{start}: {best.text} (more under Advice).")
 
@@ -149,15 +155,19 @@ def _reactions(r: Facts) -> Iterator[Block]:
     if not r.unique:
         return
     kinds = {p.name: p.type.symbol for p in r.mechanism.pairs}
-    rows = []
+    lines = []
     for name, components in list(r.unique.items())[:LISTED]:
         sides = (" ".join(n for n, ok in components.items() if ok is side) or "none" for side in (True, False))
-        rows.append((name, kinds.get(name, "coupling"), *sides))
+        lines.append((name, kinds.get(name, "coupling"), *sides))
     if len(r.unique) > LISTED:
-        rows.append(("...", "", f"and {len(r.unique) - LISTED} pairs more (see report.to_dict())", ""))
-    yield Table(("pair", "type", "unique", "not unique"), tuple(rows))
+        lines.append(("...", "", f"and {len(r.unique) - LISTED} pairs more (see report.to_dict())", ""))
+    yield Table(("pair", "type", "unique", "not unique"), tuple(lines))
     if not all(ok for components in r.unique.values() for ok in components.values()):
         yield Paragraph(NOT_UNIQUE)
+    rows = {p.type.symbol: p.type for p in r.mechanism.pairs if p.type.reactions and p.type.directed}
+    if rows:
+        told = (f"{symbol}: {component_words(row, row.component_names)}" for symbol, row in rows.items())
+        yield Paragraph(f"In words: {'; '.join(told)}.")
 
 
 def _stresses(r: Facts) -> Iterator[Block]:
@@ -171,7 +181,8 @@ def _stresses(r: Facts) -> Iterator[Block]:
         lines.append(f"... and {known.listed - len(lines)} more (report.self_stresses)")
     if known.count > known.listed:
         lines.append(f"{known.count - known.listed} more that connect loops are not listed: too many")
-    yield Paragraph(MEANINGS.format(L=r.geometry.system.par.L))
+    form = "form one self-stress group" if known.groups == 1 else f"form {known.groups} self-stress groups"
+    yield Paragraph(f"{MEANINGS.format(L=r.geometry.system.par.L)} Those that share components {form}.")
     yield Bullets(tuple(lines))
 
 
@@ -250,6 +261,7 @@ SECTIONS = (
     Section("", ("mechanism", "verdict", "determinate"), lambda r: [Paragraph(verdict(r))]),
     Section("", ("note",), lambda r: [Paragraph(r.note)] if r.note else []),
     Section("", ("links", "pairs", "mobility_by_count", "generic", "mobility", "redundancy"), _numbers),
+    Section("", ("kind", "loop_kinds", "own_forces_unique"), lambda r: [Paragraph(kind_line(r))]),
     Section("", ("inputs", "finite_mobility", "stroke", "excess", "change_point", "margin", "near"), _why),
     Section("", ("effects",), _best_change),
     Section("Neither driven nor passive", ("undriven",), _findings("undriven")),

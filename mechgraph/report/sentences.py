@@ -2,33 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
+from numpy.typing import NDArray
 
 from mechgraph.closure.indexing import Index
 from mechgraph.model.pair import second_direction
 from mechgraph.numerics.tolerances import RANKS
 from mechgraph.report.facts import Facts
+from mechgraph.report.findings import vector
+from mechgraph.report.words import KINDS, NAMED, component_words, joined, listed, plural
+from mechgraph.structure.kind import Kind
 from mechgraph.structure.uniqueness import Uniqueness
 
-NAMED = 8
-"""Most names that a sentence lists."""
 DROPPED = 1e-9
 """Part of the margin above which a dropped singular value is reported rather than the margin."""
 SETS = 3
 """Most sets of components that the verdict names."""
 
 
-def plural(count: int, one: str, many: str = "") -> str:
-    """``1 driver``, ``3 drivers``."""
-    return f"{count} {one if count == 1 else many or one + 's'}"
-
-
-def listed(names: Sequence[str], most: int = NAMED, count: int | None = None) -> str:
-    """Names in a row, the first few of many (of ``count``, where only those are given)."""
-    more = (len(names) if count is None else count) - most
-    return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")
+Pattern = tuple[str, list[str], int]
+"""Components in words, the names of their pairs, the number of components."""
 
 
 def verdict(r: Facts) -> str:
@@ -94,11 +87,18 @@ def _of_position(r: Facts) -> str:
     if not r.mobility and drivers:
         return _driven_structure(r)
     if r.reactions is None or r.reactions.all_unique:
-        more = plural(len(r.passive), "unknown")
-        held = f" ({plural(len(r.passive), 'passive freedom')} held: {more} more)" if r.passive else ""
+        idle = f": {len(r.passive)} of them {spins(r)}" if r.passive else ""
         state = "Determinate" if r.mobility else "Determinate structure"
-        return f"{_bearing(r)}{state}: {_counts(r)}; every reaction is unique{held}."
-    return f"{_bearing(r)}{_state(r)}, {_not_unique(r, r.reactions)}{_efforts(r, r.reactions)}."
+        return f"{_bearing(r)}{state}: {_counts(r)}{idle}; every reaction is unique."
+    return f"{_bearing(r)}{_state(r)}{_not_unique(r, r.reactions)}."
+
+
+def spins(r: Facts) -> str:
+    """The passive freedoms that no load moves: ``the spins of rod1, rod2``."""
+    kinds = {"spin" if p.turns else "slide" for p in r.passive}
+    what = kinds.pop() if len(kinds) == 1 else "passive motion"
+    bodies = list(dict.fromkeys(" with ".join(p.links) for p in r.passive))
+    return f"the {plural(len(r.passive), what).split(maxsplit=1)[1]} of {joined(bodies)}"
 
 
 def _bearing(r: Facts) -> str:
@@ -141,48 +141,66 @@ def _state(r: Facts) -> str:
         return "A structure (mobility 0)"
     if _shaky(r):
         return f"Shaky structure: its mobility {r.mobility} is only infinitesimal"
-    return f"Moves with mobility {r.finite_mobility}"
+    return f"Moves with mobility {r.finite_mobility}" + (f" ({len(r.passive)} of it {spins(r)})" if r.passive else "")
 
 
 def _not_unique(r: Facts, known: Uniqueness) -> str:
-    """Which components are not unique, and in how many groups of self-stresses."""
-    m, sets = r.mechanism, _patterns(known)
-    total = sum(len(names) * len(pairs) for names, pairs in sets)
-    shown = [
-        f"{_joined(names)} of {listed([m.pairs[k].name for k in pairs[:NAMED]], NAMED, len(pairs))}"
-        for names, pairs in sets[:SETS]
-    ]
-    if len(sets) > SETS:
-        shown.append(f"others of {plural(sum(len(p) for _, p in sets[SETS:]), 'further pair')}")
-    loose = [c.name for c, ok in zip(m.couplings, known.coupling_is_unique.tolist(), strict=True) if not ok]
+    """Which components are not unique: for a planar or spherical mechanism by what it is made for, else by name."""
+    sets = patterns(known, ~known.is_unique)
+    loose = [c.name for c, ok in zip(r.mechanism.couplings, known.coupling_is_unique.tolist(), strict=True) if not ok]
     who = "effort of the coupling {} is" if len(loose) == 1 else "efforts of the couplings {} are"
     tied = f"the {who.format(listed(loose, NAMED))} not unique"
-    if not total:
-        return f"but {tied} (redundancy {r.redundancy})"
-    more = f"; {tied}" if loose else ""
-    form = "form one self-stress group" if known.groups == 1 else f"form {plural(known.groups, 'self-stress group')}"
+    if not sets:
+        return f", but {tied} (redundancy {r.redundancy})"
+    if r.own_forces_unique:
+        efforts = " and the driver effort" if len(r.mechanism.drives) == 1 else " and driver efforts"
+        words = f"{KINDS[r.kind.name].own}{efforts if r.mechanism.drives else ''}"
+        return f", {r.kind.name}: all {words} are unique; what is not: {_others(r, sets)} (redundancy {r.redundancy})"
+    total = sum(count for *_, count in sets)
     components = "reaction component is" if total == 1 else "reaction components are"
-    return f"but {total} {components} not unique: {'; '.join(shown)} {form}{more} (redundancy {r.redundancy})"
+    more = f"; {tied}" if loose else ""
+    kind = f", {r.kind.name}" if r.kind.name else ""
+    return f"{kind}, but {total} {components} not unique: {_of_pairs(sets)}{more} (redundancy {r.redundancy}){_efforts(r, known)}"
 
 
-def _patterns(known: Uniqueness) -> list[tuple[list[str], Index]]:
-    """Names of reaction components that are not unique, and the pairs of which they are, in order of declaration."""
-    components, loose = known.components, ~known.is_unique
+def _others(r: Facts, sets: list[Pattern]) -> str:
+    """What is not unique in a planar or spherical mechanism all of whose pairs are of its kind; else by name."""
+    if not r.kind.by_pairs:
+        return _of_pairs(sets)
+    words, turning = KINDS[r.kind.name], any(f.turns for p in r.mechanism.pairs for f in p.type.freedoms)
+    names = list(dict.fromkeys(name for _, pairs, _ in sets for name in pairs))
+    which = f" of {listed(names)}" if len(names) < len(r.pairs) else ""
+    return (words.others if turning else words.without_pins) + which
+
+
+def _of_pairs(sets: list[Pattern]) -> str:
+    shown = [f"{words} of {listed(pairs)}" for words, pairs, _ in sets[:SETS]]
+    if len(sets) > SETS:
+        shown.append(f"others of {plural(sum(len(pairs) for _, pairs, _ in sets[SETS:]), 'further pair')}")
+    return "; ".join(shown)
+
+
+def patterns(known: Uniqueness, which: NDArray[np.bool_]) -> list[Pattern]:
+    """The reaction components in ``which (components,)`` in words, their pairs in order of declaration, and their number."""
+    components = known.components
     pairs = components.system.m.pairs
-    by_names: dict[tuple[str, ...], list[Index]] = {}
+    found: dict[str, list[tuple[Index, int]]] = {}
     for g in components.system.groups:
-        names = pairs[int(g.pairs[0])].type.component_names
-        mine = loose[components.first[g.pairs][:, None] + np.arange(len(names))]
+        row = pairs[int(g.pairs[0])].type
+        names = row.component_names
+        mine = which[components.first[g.pairs][:, None] + np.arange(len(names))]
         code = mine @ (1 << np.arange(len(names)))
         for value in np.unique(code[code > 0]):
-            which = tuple(n for i, n in enumerate(names) if value >> i & 1)
-            by_names.setdefault(which, []).append(g.pairs[code == value])
-    out = [(list(which), np.sort(np.concatenate(some))) for which, some in by_names.items()]
-    return sorted(out, key=lambda item: int(item[1][0]))
-
-
-def _joined(names: list[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+            some = [n for i, n in enumerate(names) if value >> i & 1]
+            every = "all components" if len(some) == len(names) > 1 else component_words(row, some)
+            found.setdefault(every, []).append((g.pairs[code == value], len(some)))
+    sets = [
+        (words, np.sort(np.concatenate([at for at, _ in some])), sum(len(at) * n for at, n in some))
+        for words, some in found.items()
+    ]
+    return [
+        (words, [pairs[k].name for k in at.tolist()], n) for words, at, n in sorted(sets, key=lambda s: int(s[1][0]))
+    ]
 
 
 def _efforts(r: Facts, known: Uniqueness) -> str:
@@ -231,7 +249,7 @@ def reasons(r: Facts) -> list[str]:
     """Why count and rank differ, in the words of the report."""
     if not r.geometry:
         return []
-    return _excess(r) + _finite(r) + _margin(r) or ["Count and rank agree: no equation is redundant."]
+    return _excess(r) + _finite(r) + motion_line(r) + _margin(r) or ["Count and rank agree: no equation is redundant."]
 
 
 def assumed(r: Facts) -> list[str]:
@@ -266,15 +284,18 @@ def _excess(r: Facts) -> list[str]:
 
 
 def _finite(r: Facts) -> list[str]:
-    out = []
+    """What part of the mobility is finite, where not all of it is."""
     if _shaky(r):
-        out.append("Shaky: the mobility is infinitesimal only; the loops stay closed over no finite stroke.")
-    elif r.mobility and r.finite_mobility is not None and r.finite_mobility < r.mobility:
-        out.append(f"Of mobility {r.mobility} here, {r.finite_mobility} is finite; the rest is instantaneous.")
-    if r.stroke:
-        length = f"{r.stroke:.2g} (radians, or lengths / L)"
-        out.append(f"Motion checked: followed over a stroke of {length} with the loops closed.")
-    return out
+        return ["Shaky: the mobility is infinitesimal only; the loops stay closed over no finite stroke."]
+    if r.mobility and r.finite_mobility is not None and r.finite_mobility < r.mobility:
+        return [f"Of mobility {r.mobility} here, {r.finite_mobility} is finite; the rest is instantaneous."]
+    return []
+
+
+def motion_line(r: Facts) -> list[str]:
+    """The stroke over which a motion was followed."""
+    length = f"a stroke of {r.stroke:.2g} (radians, or lengths / L)" if r.stroke else ""
+    return [f"Motion checked: followed over {length} with the loops closed."] if length else []
 
 
 def _margin(r: Facts) -> list[str]:
@@ -304,3 +325,54 @@ def mobility_line(r: Facts) -> str:
         f"Mobility {r.mobility} = {plural(r.inputs or 0, 'input freedom')} + {plural(len(r.passive), 'passive freedom')}; "
         f"finite mobility: {r.finite_mobility}. Margin to a singular position: {r.margin:.3g} (near below {r.near_below:.3g})."
     )
+
+
+def kind_line(r: Facts) -> str:
+    """What kind of mechanism it is, or of what kinds its loops are."""
+    how = "" if r.kind.by_pairs else " in its motion, not in all of its pairs"
+    if r.kind.name and r.geometry:
+        return f"{r.kind.name.capitalize()}{how}: {place(r, r.kind)}."
+    names = [kind.name for kind in r.loop_kinds]
+    if not any(names):
+        return ""
+    kinds = {(kind.name, place(r, kind)) for kind in r.loop_kinds}
+    parts = []
+    for name in dict.fromkeys(names):
+        of = [i for i, other in enumerate(names) if other == name]
+        places = sorted(where for other, where in kinds if other == name)
+        where = f" ({'; '.join(places[:SETS])}{'; ...' if len(places) > SETS else ''})" if name else ""
+        parts.append(f"{loop_names(r, tuple(of))} {'is' if len(of) == 1 else 'are'} {name or 'spatial'}{where}")
+    return f"Loops of different kinds: {'; '.join(parts)}." if len(parts) > 1 or len(kinds) > 1 else f"All {parts[0]}."
+
+
+def place(r: Facts, kind: Kind) -> str:
+    """The plane or the centre of a kind, in the global frame."""
+    if not kind.name or r.geometry is None:
+        return ""
+    par, values = r.geometry.system.par, np.array(kind.place)
+    shown = values if kind.is_direction else par.L * values + par.origin
+    return f"{'normal of the plane' if kind.is_direction else 'centre'} {vector(tuple(shown.tolist()))}"
+
+
+def doubts(r: Facts) -> list[str]:
+    """What may turn out otherwise: a position near a singular one, a mobility that is infinitesimal only, directions that were taken."""
+    return [*_margin(r), *_finite(r), *assumed(r)] if r.geometry else []
+
+
+def count_line(r: Facts) -> str:
+    """Links, pairs and loops; mobility by count and here; how many closure equations repeat others, and why."""
+    many = (("link", r.links), ("pair", r.pairs), ("loop", r.loops), ("driver", r.mechanism.drives))
+    line = f"{', '.join(plural(len(items), what) for what, items in many)}; mobility {r.mobility_by_count} by count"
+    if r.mobility is None or r.redundancy is None:
+        return f"{line}, {r.generic.mobility} for general geometry."
+    line += f", {r.mobility} here" + (f" ({r.inputs} to be driven, {len(r.passive)} passive)" if r.passive else "")
+    if not r.redundancy:
+        return f"{line}: no constraint is redundant."
+    why = {
+        "structural": "for any dimensions",
+        "dimensions": "for these dimensions",
+        "here": "in this position only",
+    }
+    parts = ", ".join(f"{r.excess[key]} {words}" for key, words in why.items() if r.excess.get(key))
+    verb = "repeats" if r.redundancy == 1 else "repeat"
+    return f"{line}: {r.redundancy} of {r.equation_count} closure equations {verb} others (redundancy; {parts})."

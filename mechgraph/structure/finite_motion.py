@@ -174,10 +174,15 @@ class FiniteMotion:
         return start.followed(v) or self.step or start.regular(v)
 
     @cached_property
-    def null_nearby(self) -> Array | None:
-        """Motions ``(F, M)`` at a position reached by a motion; None where nothing moves."""
+    def closure_nearby(self) -> ClosureRank | None:
+        """The closure equations at a position reached by a motion; None where nothing moves."""
         x = self.begin[0].moved(self.begin[1], STEPS[0]) if self.begin else None
-        return self.begin[0].reached(x).closure.motions if self.begin and x is not None else None
+        return self.begin[0].reached(x).closure if self.begin and x is not None else None
+
+    @property
+    def null_nearby(self) -> Array | None:
+        """Motions ``(F, M)`` there."""
+        return self.closure_nearby.motions if self.closure_nearby else None
 
 
 def finite_motion(system: System, x: Array, closure: ClosureRank, engine: EngineName = "auto") -> FiniteMotion:

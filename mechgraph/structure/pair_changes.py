@@ -34,6 +34,11 @@ LARGEST_FOR_SETS = 120
 """Redundancy up to which sets of changes that remove all of it are sought; the work grows as its cube (half a second here)."""
 CHANGES_SEED = 29
 
+EFFORTS = {"C": 0, "S": 0, "Sg": 1, "U": 1}
+"""How hard pair types are to build: locating and floating bearings first, then what is both, or has two pins; then the others."""
+PLANE = 3
+"""The same of a plane that takes the place of a hinge: advised where nothing else is left."""
+
 BEAM = 12
 """Partial sets of changes kept while searching."""
 
@@ -42,13 +47,13 @@ COUPLING, LEFT_OUT = "coupling", "left out"
 """What a coupling is changed from and to."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Change:
     """One pair given another type, or one coupling left out; ``added`` the freedoms that it adds, ``power (n, s)`` of these on the
     self-stresses, ``relief`` the number of self-stresses that it removes alone.
 
-    ``item`` counts the pairs, then the couplings. ``pair`` is the new pair where it stands (None for a coupling), ``turn`` the angle by
-    which its second direction x is turned about the axis, for types in which it matters.
+    ``item`` counts the pairs, then the couplings; ``effort`` says how hard it is to build. ``pair`` is the new pair where it stands
+    (None for a coupling), ``turn`` the angle by which its second direction x is turned about the axis, where that matters.
     """
 
     item: int
@@ -56,6 +61,7 @@ class Change:
     power: Array
     added: int
     relief: int
+    effort: int = 0
     turn: float = 0.0
 
 
@@ -107,6 +113,12 @@ def wider_types(row: PairType) -> Iterator[PairType]:
                 yield other
 
 
+def building_effort(old: PairType, new: PairType) -> int:
+    """How hard a pair is to build in place of another: ``PLANE`` where it slides in two more directions, else by the table."""
+    more = sum(not f.turns for f in new.freedoms) - sum(not f.turns for f in old.freedoms)
+    return PLANE if more > 1 else EFFORTS.get(new.symbol, max(EFFORTS.values()) + 1)
+
+
 def changes_of(freedoms: Freedoms) -> list[Change]:
     """All single changes that leave the drivers in place, with their power on the self-stresses (drivers free).
 
@@ -129,7 +141,7 @@ def changes_of(freedoms: Freedoms) -> list[Change]:
             keeps = [needed.get(k, set()) <= single for k in group.pairs.tolist()]
             some = np.flatnonzero(keeps).astype(np.intp)
             pairs = group.pairs[some]
-            made = _changes_to(new, frames[:, :, some], stress[pairs], pairs, new.f - group.row.f)
+            made = _changes_to(group.row, new, frames[:, :, some], stress[pairs], pairs)
             out += [(c.item, 2 * number + turned, c) for turned, c in made]
     for i, power in enumerate(states[rows.count - rows.further :, None]):
         relief = int(_ranks(power[None])[0])
@@ -137,12 +149,21 @@ def changes_of(freedoms: Freedoms) -> list[Change]:
     return [c for _, _, c in sorted(out, key=lambda item: item[:2])]
 
 
-def _changes_to(new: PairType, frames: Array, stress: Array, pairs: Index, added: int) -> list[tuple[int, Change]]:
+def _changes_to(old: PairType, new: PairType, frames: Array, stress: Array, pairs: Index) -> list[tuple[int, Change]]:
     """Changes of pairs to one type: as they stand (0), and turned about z (1) where that relieves more; all pairs at once."""
 
     def change(i: int, power: Array, relief: Array, frames: Array, turn: float = 0.0) -> Change:
-        return Change(int(pairs[i]), PlacedPair.at_zero(new, frames[:, :, i]), power[i], added, int(relief[i]), turn)
+        return Change(
+            int(pairs[i]),
+            PlacedPair.at_zero(new, frames[:, :, i]),
+            power[i],
+            new.f - old.f,
+            int(relief[i]),
+            effort,
+            turn,
+        )
 
+    effort = building_effort(old, new)
     power = _power(new, frames, stress)
     relief = _ranks(power)
     out = [(0, change(i, power, relief, frames)) for i in range(len(pairs))]
@@ -198,10 +219,16 @@ def relieving(changes: list[Change], redundancy: int) -> tuple[list[tuple[Change
 
     Ranked by how little they change: freedoms added beyond need, then number of changes, then the order of declaration.
     """
-    singles = sorted((c for c in changes if c.relief), key=lambda c: (c.added - c.relief, -c.relief, c.item))
-    exact = [c for c in singles if c.added == c.relief]
-    complete, largest = _complete_sets(exact, redundancy) if exact and redundancy <= LARGEST_FOR_SETS else ([], [])
-    return [(c,) for c in _spread(singles)], complete or [chosen for chosen in largest if len(chosen) > 1]
+    every = sorted((c for c in changes if c.relief), key=lambda c: (c.added - c.relief, -c.relief, c.effort, c.item))
+    built = [c for c in every if c.effort < PLANE]
+    largest: list[tuple[Change, ...]] = []
+    for some in (built, every) if redundancy <= LARGEST_FOR_SETS else ():
+        exact = [c for c in some if c.added == c.relief]
+        complete, most = _complete_sets(exact, redundancy) if exact else ([], [])
+        if complete:
+            return [(c,) for c in _spread(built or every)], complete
+        largest = largest or most
+    return [(c,) for c in _spread(built or every)], [chosen for chosen in largest if len(chosen) > 1]
 
 
 @dataclass(frozen=True)
@@ -268,11 +295,11 @@ def _complete_sets(exact: list[Change], redundancy: int) -> tuple[list[tuple[Cha
 
 
 def _mixed(complete: list[tuple[Change, ...]]) -> list[tuple[Change, ...]]:
-    """Up to two sets of every size, those whose widest change is smallest first."""
+    """Up to two sets of every size, those that are easily built and whose widest change is smallest first."""
     out: list[tuple[Change, ...]] = []
     for size in sorted({len(chosen) for chosen in complete}):
         mine = [chosen for chosen in complete if len(chosen) == size]
-        out += sorted(mine, key=lambda chosen: max(c.added for c in chosen))[:2]
+        out += sorted(mine, key=lambda chosen: (max(c.effort for c in chosen), max(c.added for c in chosen)))[:2]
     return out
 
 
@@ -314,12 +341,17 @@ def advice(freedoms: Freedoms, driven: Index, finite_mobility: int, engine: Engi
     effects: list[Effect] = []
     if not (freedoms.mobility - len(freedoms.passive) and finite_mobility):
         wider = sorted((c for c in changes if c.added > c.relief), key=lambda c: (c.added, c.item))
-        freeing = [effect(freedoms, driven, (c,), engine) for c in _spread(wider)[:FREEING]]
-        effects += [e for e in freeing if e.inputs[1] > e.inputs[0]]
+        for plane in (False, True):
+            some = _spread([c for c in wider if (c.effort == PLANE) == plane])[:FREEING]
+            freeing = [effect(freedoms, driven, (c,), engine) for c in some] if not effects else []
+            effects += [e for e in freeing if e.inputs[1] > e.inputs[0]]
     if freedoms.redundancy:
         singles, complete = relieving(changes, freedoms.redundancy)
-        for chosen in (*_mixed(complete), *singles):
+        found: list[tuple[int, Effect]] = []
+        for chosen in dict.fromkeys((*_mixed(complete), *singles)):
             new = effect(freedoms, driven, chosen, engine)
             if new.inputs[1] == new.inputs[0] and new.redundancy[1] < new.redundancy[0] and new not in effects:
-                effects.append(new)
+                found.append((max(c.effort for c in chosen), new))
+        found.sort(key=lambda item: (item[0] == PLANE, item[1].redundancy[1] > 0, item[0]))
+        effects += [new for _, new in found]
     return tuple(effects[: CHANGES_SHOWN + FREEING])

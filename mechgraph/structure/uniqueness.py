@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -32,13 +32,14 @@ class Uniqueness:
     ``closure`` are the closure equations with the drivers at rest, ``table (components, probes)`` the parts of the components in
     self-stresses of size one in the measure of every loop, so that the verdict does not depend on how many loops there are: in an
     orthonormal basis of them, or in random ones where they are many; ``coupled (couplings, probes)`` the greatest effort of every
-    coupling in them.
+    coupling in them; ``probes`` are these self-stresses in the closure rows.
     """
 
     components: Components
     closure: ClosureRank
     table: Array
     coupled: Array
+    probes: Array = field(repr=False)
 
     @property
     def count(self) -> int:
@@ -59,6 +60,12 @@ class Uniqueness:
     def coupling_is_unique(self) -> NDArray[np.bool_]:
         """Whether the multiplier of each coupling is unique, in order of declaration."""
         return self.sizes[self.components.count :] <= UNIQUE
+
+    def is_unique_on(self, twists: Array) -> bool:
+        """Whether the power of every pair's total wrench on ``twists (6, n)`` about the internal origin is unique, and every multiplier."""
+        wrenches = pair_states(self.components.configuration, self.probes)[..., 0]
+        power = np.einsum("in,ips->nps", twists, wrenches)
+        return bool(np.abs(power).max(initial=0.0) <= UNIQUE and self.coupling_is_unique.all())
 
     @property
     def all_unique(self) -> bool:
@@ -186,7 +193,7 @@ def uniqueness(
     coefficients = np.abs(here.system.coupling_matrix).max(axis=1, initial=0.0)
     multipliers = probes[6 * here.system.graph.n_loops :]
     table = components.table(pair_states(here, probes))
-    return Uniqueness(components, closure, table, coefficients[:, None] * multipliers)
+    return Uniqueness(components, closure, table, coefficients[:, None] * multipliers, probes)
 
 
 def pair_states(here: Configuration, rows: Array) -> Array:

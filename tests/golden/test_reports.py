@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 from typing import Any
 
+import machines
 import mechanisms as known
 import pytest
 
@@ -18,6 +19,9 @@ MECHANISMS = {
     "rssr": lambda: mg.load("rssr"),
     "pinned-bar": lambda: known.ring("RR", [(0, 0, 0), (3, 4, 0)], [known.Z] * 2, drives=[], name="pinned bar"),
     "rchch-topology": lambda: mg.chain("RCHCH"),
+    "excavator": machines.excavator,
+    "five-rods": machines.five_rods,
+    "windows": lambda: known.windows(50),
 }
 Golden = Callable[[str, str], None]
 
@@ -27,6 +31,13 @@ def test_text(name: str, golden: Golden) -> None:
     text = str(mg.check(MECHANISMS[name]()))
     assert max(len(line) for line in text.splitlines()) <= 80
     golden(f"{name}.txt", text)
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_full_text(name: str, golden: Golden) -> None:
+    text = mg.check(MECHANISMS[name]()).text(full=True)
+    assert max(len(line) for line in text.splitlines()) <= 80
+    golden(f"{name}-full.txt", text)
 
 
 @pytest.mark.parametrize("name", MECHANISMS)
@@ -50,7 +61,7 @@ def rounded(value: Any) -> Any:
     return value
 
 
-@pytest.mark.parametrize("name", MECHANISMS)
+@pytest.mark.parametrize("name", [n for n in MECHANISMS if n != "windows"])
 def test_json(name: str, golden: Golden) -> None:
     facts = json.loads(mg.check(MECHANISMS[name]()).to_json())
     golden(f"{name}.json", json.dumps(rounded(facts), indent=2) + "\n")
