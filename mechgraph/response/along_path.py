@@ -31,11 +31,11 @@ from mechgraph.numerics.hermite import Interpolation
 from mechgraph.numerics.tracks import Paths
 from mechgraph.response.chart import Closed
 from mechgraph.response.charts import Task
-from mechgraph.response.motion_equations import kinetic_energy, moved
+from mechgraph.response.motion_equations import along_one, kinetic_energy
 
 CHUNK = 0.8
 """Length of path that is followed at a time (radians, or lengths / L)."""
-PIECE = 0.16
+PIECE = 0.32
 """Longest piece of one series (radians, or lengths / L)."""
 POINTS = 16
 """Points of a series; even, so that none lies in the middle."""
@@ -48,6 +48,8 @@ AROUND = 0.32
 distance, 4e-11 at the nearest point of the series."""
 TAIL = 1e-12
 """Part of the largest coefficient that the last two of a series may have; what a smooth series leaves out behind them is far smaller."""
+ROUNDING = 1e-14
+"""Rounding of what a series is made of, times the square of the condition."""
 SHORTEST = 0.01
 """Shortest piece."""
 TURN = 2 * np.pi
@@ -204,39 +206,31 @@ class _Chunk:
         out: list[_Piece] = []
         while spans:
             again = []
-            for (a, b), c, steepness in zip(spans, *self._series(spans), strict=True):
-                size = np.abs(c).max(axis=0)
-                if (
-                    (np.abs(c[-2:]).max(axis=0) > TAIL * np.maximum(size, 1e-3 * size[:3].max())).any()
-                    and b - a > SHORTEST
-                    and not (np.abs(middles - 0.5 * (a + b)) < 0.25 * (b - a)).any()
-                ):
+            for (a, b), c, steepness, noise in zip(spans, *self._series(spans), strict=True):
+                tail, size = np.abs(c[-2:]).max(axis=0), np.abs(c).max(axis=0)
+                coarse = (tail > max(TAIL, noise) * np.maximum(size, 1e-3 * size[:3].max())).any()
+                if coarse and b - a > SHORTEST and not (np.abs(middles - 0.5 * (a + b)) < 0.25 * (b - a)).any():
                     again += [(a, 0.5 * (a + b)), (0.5 * (a + b), b)]
                 else:
                     out.append(_Piece(self.begin + self.sense * a, self.begin + self.sense * b, c, float(steepness)))
             spans = again
         return sorted(out, key=lambda p: self.sense * p.begin)
 
-    def _series(self, spans: list[tuple[float, float]]) -> tuple[Array, Array]:
-        """Series ``(spans, POINTS, 5)`` over spans of places, and how steep the path is in each."""
+    def _series(self, spans: list[tuple[float, float]]) -> tuple[Array, Array, Array]:
+        """Series ``(spans, POINTS, 5)`` over spans of places, how steep the path is in each, and the noise of the series."""
         nodes = np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS)
         u = np.concatenate([self.begin + self.sense * (0.5 * (a + b) + 0.5 * (b - a) * nodes) for a, b in spans])
         x, which = self.states(u)
         here = Configuration(self.arc.task.system, x)
         f = self.arc.path.solver.factored(here, which)
-        nothing = np.zeros((2, 0, len(u)))
-        t = np.zeros(len(u))
-        rows = []
-        for v in (0.0, 1.0, -1.0):
-            found = moved(here, f, np.full((1, len(u)), v), nothing, self.arc.task.loads, t)
-            rows.append((found.force[0] / found.mass[0, 0], found.power))
-        (q0, _), (qp, pp), (qm, pm) = rows
-        values = np.stack([q0, 0.5 * (qp - qm), 0.5 * (qp + qm) - q0, 0.5 * (pp - pm), 0.5 * (pp + pm)], axis=-1)
-        values = values.reshape(len(spans), POINTS, 5)
+        quotients, powers = along_one(here, f, self.arc.task.loads)
+        values = np.concatenate([quotients, powers]).T.reshape(len(spans), POINTS, 5)
         T = np.polynomial.chebyshev.chebvander(nodes, POINTS - 1) * (2.0 / POINTS)
         T[:, 0] *= 0.5
         steepness = np.abs(f.sensitivity()[self.arc.singles, 0]).max(axis=0).reshape(len(spans), POINTS).max(axis=1)
-        return np.einsum("pk,spq->skq", T, values), steepness
+        # rounding over the square of the distance from a singular position, which the condition measures
+        noise = ROUNDING * (f.condition**2).reshape(len(spans), POINTS).max(axis=1)
+        return np.einsum("pk,spq->skq", T, values), steepness, noise
 
 
 class PathStage:

@@ -63,53 +63,82 @@ def _inertia(here: Configuration, V: Array, A: Array) -> Array:
     return inertia_wrenches(here, SimpleNamespace(V=V, A=A))  # type: ignore[arg-type]
 
 
-def moved(
-    here: Configuration,
-    f: FactoredClosure,
-    v: Array,
-    p: Array,
-    loads: Loads,
-    t: Array,
-) -> Moved:
+class Columns:
+    """What the motions of unit rates do at closed states: ``Z (F, n, T)`` of the independent columns and ``Zp`` of the prescribed ones.
+
+    The factors ``f`` have the ``n`` independent columns fixed, and behind them the prescribed ones.
+    """
+
+    def __init__(self, here: Configuration, f: FactoredClosure, n: int) -> None:
+        self.here, self.f, self.n = here, f, n
+        self.Z, self.Zp = np.split(f.sensitivity(), [n], axis=1)
+        self.V = [here.link_twists(self.Z[:, k]) for k in range(n)]
+        still = np.zeros((6, len(here.system.m.links), here.T))
+        self.reluctance = [_inertia(here, still, V) for V in self.V]
+        self.mass = np.empty((n, n, here.T))
+        for k in range(n):
+            for j in range(k, n):
+                self.mass[k, j] = self.mass[j, k] = -(self.V[k] * self.reluctance[j]).sum(axis=(0, 1))
+
+    def force(self, wrenches: Array, efforts: Array) -> Array:
+        """Generalized forces ``(n, T)`` of wrenches on the links and efforts in the freedoms."""
+        return np.array(
+            [(V * wrenches).sum(axis=(0, 1)) + (self.Z[:, k] * efforts).sum(axis=0) for k, V in enumerate(self.V)]
+        ).reshape(self.n, self.here.T)
+
+    def bound(self, dq: Array, ddq: Array | None = None) -> tuple[Velocities, Array, Array]:
+        """At rates ``dq (F, T)``, the independent ones constant: velocities, accelerations ``ddq`` of all freedoms, and the inertia."""
+        here, velocities = self.here, Velocities(self.here, dq)
+        free = self.f.solve(-here.closure_bias(dq, velocities.V)[:, None])[:, 0]
+        ddq = free if ddq is None else free + ddq
+        return velocities, ddq, _inertia(here, velocities.V, here.accelerations_with(ddq, velocities.bias))
+
+    def applied(self, loads: tuple[Load, ...], velocities: Velocities, t: Array) -> tuple[Array, Array]:
+        """Wrenches ``(6, N, T)`` of loads on the links and efforts ``(F, T)`` in the freedoms."""
+        here = self.here
+        if not loads:
+            return np.zeros((6, len(here.system.m.links), here.T)), np.zeros((here.system.n_freedoms, here.T))
+        site = Site(here, velocities, here.system.coordinates_of(here.x), (here.T,), np.arange(here.T), t)
+        site.collect(loads)
+        return site.applied(), site.scaled_efforts()
+
+
+def moved(here: Configuration, f: FactoredClosure, v: Array, p: Array, loads: Loads, t: Array) -> Moved:
     """Accelerations at closed states with independent rates ``v (n, T)`` and prescribed rates and accelerations ``p (2, p, T)``.
 
-    ``f`` is factored with the independent columns fixed, and behind them the prescribed ones.
+    ``f`` as in ``Columns``.
     """
-    T, n = here.T, len(v)
-    Z, Zp = np.split(f.sensitivity(), [n], axis=1)
+    columns = Columns(here, f, len(v))
+    Z, Zp = columns.Z, columns.Zp
     dq = (Z * v).sum(axis=1) + (Zp * p[0]).sum(axis=1)
-    velocities = Velocities(here, dq)
+    velocities, ddq, inertia = columns.bound(dq, (Zp * p[1]).sum(axis=1))
     V = velocities.V
-    ddq = f.solve(-here.closure_bias(dq, V)[:, None])[:, 0] + (Zp * p[1]).sum(axis=1)
-    A = here.accelerations_with(ddq, velocities.bias)
-    coordinates = here.system.coordinates_of(here.x)
-    applied, efforts, power = np.zeros_like(V), np.zeros_like(dq), np.zeros(T)
-    for some in (loads.stored, loads.rest):
-        if some:
-            site = Site(here, velocities, coordinates, (T,), np.arange(T), t)
-            site.collect(some)
-            wrenches, given = site.applied(), site.scaled_efforts()
-            applied, efforts = applied + wrenches, efforts + given
-            if some is loads.rest:
-                power += (V * wrenches).sum(axis=(0, 1)) + (dq * given).sum(axis=0)
-    rest = applied + _inertia(here, V, A)
-    columns = [here.link_twists(Z[:, k]) for k in range(n)]
-    still = np.zeros_like(V)
-    reluctance = [_inertia(here, still, Vk) for Vk in columns]
-    mass, force = np.empty((n, n, T)), np.empty((n, T))
-    for k, Vk in enumerate(columns):
-        force[k] = (Vk * rest).sum(axis=(0, 1)) + (Z[:, k] * efforts).sum(axis=0)
-        for j in range(k, n):
-            mass[k, j] = mass[j, k] = -(Vk * reluctance[j]).sum(axis=(0, 1))
-    a = accelerations(mass, force)
-    ddq = ddq + (Z * a).sum(axis=1)
-    out = Rates(velocities, ddq, np.zeros(T))
-    for j in range(n):
-        rest = rest + reluctance[j] * a[j]
+    (stored, by_stored), (rest, by_rest) = (columns.applied(some, velocities, t) for some in (loads.stored, loads.rest))
+    wrenches, efforts = stored + rest + inertia, by_stored + by_rest
+    force = columns.force(wrenches, efforts)
+    a = accelerations(columns.mass, force)
+    for reluctance, one in zip(columns.reluctance, a, strict=True):
+        wrenches = wrenches + reluctance * one
+    power = (V * rest).sum(axis=(0, 1)) + (dq * by_rest).sum(axis=0)
     for k in range(Zp.shape[1]):
-        effort = -((here.link_twists(Zp[:, k]) * rest).sum(axis=(0, 1)) + (Zp[:, k] * efforts).sum(axis=0))
+        effort = -((here.link_twists(Zp[:, k]) * wrenches).sum(axis=(0, 1)) + (Zp[:, k] * efforts).sum(axis=0))
         power += effort * p[0, k]
-    return Moved(out, mass, force, power)
+    return Moved(Rates(velocities, ddq + (Z * a).sum(axis=1), np.zeros(here.T)), columns.mass, force, power)
+
+
+def along_one(here: Configuration, f: FactoredClosure, loads: Loads) -> tuple[Array, Array]:
+    """Of mobility 1: ``(Q_0, Q_1, Q_2) / M (3, T)`` of ``M u'' = Q_0 + Q_1 u' + Q_2 u'^2``, and ``(P_1, P_2) (2, T)`` of the power
+    ``P_1 u' + P_2 u'^2`` of loads without a potential energy, which may depend on rates linearly.
+    """
+    columns, t = Columns(here, f, 1), np.zeros(here.T)
+    forward, _, inertia = columns.bound(columns.Z[:, 0])
+    still, back = (Velocities(here, factor * columns.Z[:, 0]) for factor in (0.0, -1.0))
+    nothing = np.zeros((here.system.n_freedoms, here.T))
+    stored = columns.force(*columns.applied(loads.stored, still, t))[0]
+    gyroscopic = columns.force(inertia, nothing)[0]
+    ahead, behind = (columns.force(*columns.applied(loads.rest, way, t))[0] for way in (forward, back))
+    constant, linear = 0.5 * (ahead + behind), 0.5 * (ahead - behind)
+    return np.stack([stored + constant, linear, gyroscopic]) / columns.mass[0], np.stack([constant, linear])
 
 
 def kinetic_energy(here: Configuration, V: Array) -> Array:
