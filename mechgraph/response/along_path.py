@@ -89,10 +89,11 @@ class Arc:
         self._closed = {1.0: False, -1.0: False}
         self._chunks: dict[float, list[_Chunk]] = {1.0: [], -1.0: []}
         self._advance: Array | None = None
+        self._sense = 1.0
 
     def piece(self, u: float) -> tuple[_Piece, float] | None:
         """The piece in which a place lies, and the whole turns by which the place is further on; None where the table ends before."""
-        turns = np.floor((u - self.begin) / TURN) if self._advance is not None else 0.0
+        turns = float(self._turns(np.array([u]))[0])
         u -= TURN * turns
         sense = 1.0 if u >= self.begin else -1.0
         pieces = self._pieces[sense]
@@ -103,12 +104,18 @@ class Arc:
         if not pieces or sense * u > sense * self._reach[sense]:
             return None
         starts = [sense * p.begin for p in pieces]
-        return pieces[max(0, bisect_right(starts, sense * u) - 1)], float(turns)
+        return pieces[max(0, bisect_right(starts, sense * u) - 1)], turns
+
+    def _turns(self, u: Array) -> Array:
+        """Whole turns by which places ``u (T,)`` are further on than where they are tabulated."""
+        if self._advance is None:
+            return np.zeros(len(u))
+        return np.asarray(self._sense * np.floor(self._sense * (u - self.begin) / TURN))
 
     def close(self, u: Array) -> Closed:
         """Closed states at places ``u (T,)`` within the table."""
         s = self.task.system
-        turns = np.floor((u - self.begin) / TURN) if self._advance is not None else np.zeros(len(u))
+        turns = self._turns(u)
         home = u - TURN * turns
         x, which = np.empty((s.n_state, len(u))), np.empty(len(u), dtype=np.intp)
         for sense, mine in ((1.0, home >= self.begin), (-1.0, home < self.begin)):
@@ -133,18 +140,19 @@ class Arc:
         self._chunks[sense].append(chunk)
         self._pieces[sense] += chunk.pieces()
         self._ends[sense], self._reach[sense], self._closed[sense] = chunk.last, chunk.end, chunk.closed
-        if sense > 0 and chunk.end >= self.begin + TURN and not self.task.system.is_length[self.column]:
-            self._advance = self._after_a_turn()
+        whole = sense * (chunk.end - self.begin) >= TURN and not self.task.system.is_length[self.column]
+        if whole and self._advance is None:
+            self._advance, self._sense = self._after_a_turn(sense), sense
 
-    def _after_a_turn(self) -> Array | None:
+    def _after_a_turn(self, sense: float) -> Array | None:
         """How the state has advanced after a turn of the coordinate, where all links are back; None where they are not."""
         s = self.task.system
-        here = self.close(np.array([self.begin, self.begin + TURN])).here
+        here = self.close(self.begin + np.array([0.0, sense * TURN])).here
         if np.abs(here.poses[..., 1] - here.poses[..., 0]).max() > BACK:
             return None
         out = np.zeros(s.n_state)
         rows = s.single_rows[self.singles]
-        turned = here.x[rows, 1] - here.x[rows, 0]
+        turned = sense * (here.x[rows, 1] - here.x[rows, 0])
         out[rows] = np.where(s.is_length[self.singles], 0.0, TURN * np.round(turned / TURN))
         return out
 
