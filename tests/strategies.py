@@ -14,7 +14,7 @@ import mechgraph as mg
 SEEDS = st.integers(0, 2**32 - 1)
 
 COMMON = ("R", "R", "R", "P", "H", "C", "U", "S", "E", "Sc", "Sg", "Cp", "Sp")
-"""Pair types as they are drawn: revolutes more often, every movable row of the table at least once."""
+"""Pair types as they are drawn: revolutes more often, every movable row that bears a force at least once."""
 
 PLANE_ON_PLANE = mg.PairType("PlTilt", "plane tilting on a plane", freedoms=["Tx", "Rz", "Ry"], reactions=None)
 """A row of a user without constant reaction components: the null space of S^T serves."""

@@ -103,7 +103,7 @@ class Pair(Described):
     """
 
     name: Annotated[str, TEXT("freedoms are named NAME.Rz and so on")]
-    type: Annotated[PairType, TEXT("R P H C U S E Sc Sg Cp Sp W, or a `[[pair_type]]`")]
+    type: Annotated[PairType, TEXT("R P H C U S E Sc Sg Cp Sp Tc Fr W, or a `[[pair_type]]`")]
     a: Annotated[str, LINK_NAME("first link; groove, plane and slot belong to it; the reaction is that of `a` on `b`")]
     b: Annotated[str, LINK_NAME("second link")]
     point: Annotated[Any, POINT("a point of the pair, global, at the declared configuration", LENGTH)] = None

@@ -1,4 +1,4 @@
-"""The pair table: twelve pair types as rows of data, looked up by symbol and printed. To add a pair type, add a row."""
+"""The pair table: pair types as rows of data, looked up by symbol and printed. To add a pair type, add a row."""
 
 from __future__ import annotations
 
@@ -48,10 +48,16 @@ class PairTable(Mapping[str, PairType]):
         return to_text(Document("Pair types", (Table(header, tuple(rows)),)))
 
 
-def _row(symbol: str, name: str, freedoms: Sequence[object], reactions: Sequence[object], **rest: Any) -> PairType:
-    """A row of the table, not tried at random positions: a test does that for all of them, once and not at every start."""
+def _row(
+    symbol: str, name: str, freedoms: Sequence[object], reactions: Sequence[object], *, dual: bool = True, **rest: Any
+) -> PairType:
+    """A row of the table, not tried at random positions: a test does that for all of them, once and not at every start.
+
+    ``dual``: whether unit couples about the turns and unit forces along the slides are dual to the freedoms.
+    """
     row = object.__new__(PairType)
     fill_row(row, symbol, name, freedoms, reactions, **rest)
+    object.__setattr__(row, "computed_efforts", not dual)
     return row
 
 
@@ -106,6 +112,8 @@ TABLE = PairTable(
             "Cp", "cylinder on plane", freedoms=["Tx", "Ty", "Rz", "Rx"], reactions=["Fz@2", "My@3"], square_second=True
         ),
         _row("Sp", "sphere on plane", freedoms=["Tx", "Ty", "rotation"], reactions=["Fz@2"]),
+        _row("Tc", "torque coupling", freedoms=["Tx", "Ty", "Tz", "Rx", "Ry"], reactions=["Mz@4"]),
+        _row("Fr", "free, all six", freedoms=["Tx", "Ty", "Tz", "Rx", "Ry", "Rz"], reactions=[], dual=False),
         _row("W", "weld", freedoms=[], reactions=["Fx", "Fy", "Fz", "Mx", "My", "Mz"], directed=False),
     ]
 )

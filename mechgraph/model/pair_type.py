@@ -330,6 +330,11 @@ class PairType:
         return tuple(not step.holds_rotation for step in self.steps for _ in step.freedoms)
 
     @property
+    def bears(self) -> bool:
+        """Whether it transmits a force, so that it can hold a link; a torque coupling does not."""
+        return self.reactions is None or not all(c.is_couple for c in self.reactions)
+
+    @property
     def unknowns_and_equations(self) -> tuple[int, int]:
         """Lee's ledger entry of the row; ``(6 - f, 0)`` without a bookkeeping."""
         return (self.bookkeeping.unknowns, self.bookkeeping.equations) if self.bookkeeping else (6 - self.f, 0)

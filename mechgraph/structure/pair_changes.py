@@ -107,7 +107,7 @@ def wider_types(row: PairType) -> Iterator[PairType]:
 
     mine = span(row)
     for other in sorted(TABLE.values(), key=lambda t: t.f):
-        if row.f < other.f and not other.takes_pitch:
+        if row.f < other.f and other.bears and not other.takes_pitch:
             both = np.concatenate([span(other), mine], axis=1)
             if np.linalg.matrix_rank(both, tol=1e-9) == other.f:
                 yield other

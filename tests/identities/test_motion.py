@@ -98,7 +98,7 @@ def test_rates_are_the_derivatives_of_positions(seed):
 def test_rates_are_the_derivatives_of_positions_for_every_pair_type(symbol):
     """A ring that holds the type at least once, declared in both directions."""
     f = mg.pair_types()[symbol].f
-    rest = {1: ["S", "C", "R"], 2: ["S", "R", "R"], 3: ["R", "C", "R"], 4: ["C", "R"], 5: ["R", "R"]}[f]
+    rest = {1: ["S", "C", "R"], 2: ["S", "R", "R"], 3: ["R", "C", "R"], 4: ["C", "R"], 5: ["R", "R"], 6: ["R"]}[f]
     for seed in (100, 101):
         m, t, _, s = moving(seed, symbols=[symbol, *rest], loops=1, branches=0)
         assert_all_rates(m, t, s)
