@@ -77,7 +77,7 @@ def _check_drivers(line: Pipeline, outcome: Outcome) -> None:
         f"the drivers {names} contradict each other: no position meets all their motions (mobility {mobility}, "
         f"{len(line.columns)} drivers). Remove a driver, or give motions that agree"
     )
-    raise IndeterminateError(f"mechanism {line.m.name!r}: {why}", check(line.m))
+    raise IndeterminateError(f"mechanism {line.m.name!r}: {why}", check(line.drive.m))
 
 
 def _check_actuators(line: Pipeline, outcome: Outcome) -> None:

@@ -80,6 +80,9 @@ class Pipeline:
     def __init__(self, drive: DriverMotion, options: Options) -> None:
         self.drive, self.m, self.options = drive, drive.m, options
         self.start = closed_start(self.m, drive.first)
+        if drive.free:
+            self.m = drive.whole(self.start)
+            self.start = closed_start(self.m)
         self.system, self.x = self.start.system, self.start.x[:, 0]
         self.columns, _ = named_columns(self.m, self.system, dict.fromkeys(drive.names, 0.0))
         self.unit = np.where(self.system.is_length[self.columns], self.system.par.L, 1.0)
@@ -135,7 +138,7 @@ class Pipeline:
             raise IndeterminateError(
                 f"mechanism {self.m.name!r}: {', '.join(self.drive.names)} cannot drive it: it is a structure (mobility 0) where it was "
                 "assembled. Change a pair, see mg.check",
-                check(self.m),
+                check(self.drive.m),
             )
         still = np.sqrt((self.freedoms.null[self.columns] ** 2).sum(axis=1)) < PATH.independent
         if free and still.any() and len(self.columns) <= self.freedoms.mobility:
@@ -150,7 +153,8 @@ class Pipeline:
             )
         self._refuse_change_point()
         if free:
-            names = ", ".join(dict.fromkeys(name for motion in free for name in motion.names))
+            own = self.drive.m.freedom_names()
+            names = ", ".join(dict.fromkeys(name for motion in free for name in motion.names if name in own))
             count, more = (
                 ("1 freedom is", "one driver")
                 if len(free) == 1
@@ -158,7 +162,7 @@ class Pipeline:
             )
             raise IndeterminateError(
                 f"mechanism {self.m.name!r}: {count} neither driven nor passive (moving: {names}); add {more}, or change a pair",
-                check(self.m),
+                check(self.drive.m),
             )
 
     def _acting(self) -> Index:
@@ -174,7 +178,7 @@ class Pipeline:
         """The error for freedoms whose efforts cannot hold the mechanism at a position."""
         Z = self.solver.factored(here, self.solver.chosen(here, np.full(1, -1))).sensitivity()[:, :, 0]
         return IndeterminateError(
-            f"mechanism {self.m.name!r}: actuate: {actuation_fault(self.m, Z, acting)}", check(self.m)
+            f"mechanism {self.m.name!r}: actuate: {actuation_fault(self.drive.m, Z, acting)}", check(self.drive.m)
         )
 
     def _refuse_change_point(self) -> None:

@@ -72,7 +72,10 @@ def _kept_starts(m: Mechanism) -> dict[bytes, tuple[dict[str, Any], dict[str, An
 
 def scaled(here: Configuration) -> Configuration:
     """A state in the system about the centroid of the pair points there, with lengths over their RMS distance L (with mass centres)."""
-    raw, points = here.system, here.pair_points[:, :, 0]
+    raw = here.system
+    # pairs of six freedoms hold nothing: they may stand anywhere
+    holding = [k for k, pair in enumerate(raw.m.pairs) if pair.type.f < 6] or slice(None)
+    points = here.pair_points[:, holding, 0]
     centroid = points.mean(axis=1)
     massive = [i for i, link in enumerate(raw.m.links) if link.center is not None]
     X = here.poses[:, :, massive]

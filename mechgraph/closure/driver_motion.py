@@ -9,10 +9,13 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.arguments import items_of
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.prescription import Prescription, with_free_pairs
 from mechgraph.errors import DeclarationError
 from mechgraph.model.drive import Drive
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
+from mechgraph.model.pair import Pair
 
 
 def _as_motion(m: Mechanism, value: Any, name: str, faults: list[str]) -> Motion | None:
@@ -26,8 +29,8 @@ def _as_motion(m: Mechanism, value: Any, name: str, faults: list[str]) -> Motion
         return None
 
 
-def driven(m: Mechanism, motions: Mapping[str, Any] | None) -> tuple[Mechanism, dict[str, Motion]]:
-    """The mechanism with its drives, and the motion of each by full name.
+def driven(m: Mechanism, motions: Mapping[str, Any] | None) -> tuple[Mechanism, dict[str, Motion], tuple[Pair, ...]]:
+    """The mechanism with its drives, the motion of each by full name, and the free pairs of points and links whose motion is prescribed.
 
     Motions given by name go to the declared drives; the others use the motion stored with them. Where a name is no declared drive, the
     names given are the drives of this call, in place of the declared ones.
@@ -37,17 +40,23 @@ def driven(m: Mechanism, motions: Mapping[str, Any] | None) -> tuple[Mechanism, 
             f"solve {m.name!r}",
             [f"motions = {type(motions).__name__}: expected a mapping driver -> motion, e.g. {{'A': angles}}"],
         )
-    given = dict(motions or {})
     faults: list[str] = []
+    spatial = Prescription(m, faults)
+    given = {}
+    for name, value in dict(motions or {}).items():
+        why = m.freedom_fault(name, single=True)
+        if why is None:
+            given[name] = value
+        elif isinstance(name, str):
+            spatial.add(name, value)
+        else:
+            faults.append(f"motion of {name!r}: {why}")
     known = {m.full_name(d.freedom): d for d in m.drives}
-    faults += [f"motion of {name!r}: {why}" for name in given if (why := m.freedom_fault(name, single=True))]
-    if not faults and any(m.full_name(name) not in known for name in given):
+    if spatial.motions or any(m.full_name(name) not in known for name in given):
         known = {m.full_name(name): Drive(name) for name in given}
         m = m.replace(drives=list(known.values()))
     out: dict[str, Motion] = {}
     for name, value in given.items():
-        if m.freedom_fault(name, single=True):
-            continue
         if m.full_name(name) in out:
             faults.append(f"motion of {name!r}: {m.full_name(name)} is given twice")
             continue
@@ -61,7 +70,7 @@ def driven(m: Mechanism, motions: Mapping[str, Any] | None) -> tuple[Mechanism, 
             faults.append(f"drive {name!r} has no motion; give one: {{{name!r}: angles or mg.Motion(...)}}")
     if faults:
         raise DeclarationError(f"solve {m.name!r}", faults)
-    return m, {name: out[name] for name in known}
+    return m, {name: out[name] for name in known} | spatial.motions, tuple(spatial.free.values())
 
 
 def _batch(m: Mechanism, motions: Mapping[str, Motion]) -> tuple[int, ...]:
@@ -102,7 +111,7 @@ class DriverMotion:
     """
 
     def __init__(self, m: Mechanism, motions: Mapping[str, Any] | None, actuate: Any = None) -> None:
-        self.m, self.motions = driven(m, motions)
+        self.m, self.motions, self.free = driven(m, motions)
         self.actuated = None if actuate is None else actuators(m, actuate)
         self.batch = _batch(self.m, self.motions)
         self.t = next((motion.t for motion in self.motions.values() if motion.t is not None), None)
@@ -119,8 +128,21 @@ class DriverMotion:
 
     @property
     def first(self) -> dict[str, float]:
-        """Driver values at the first position."""
-        return {name: float(np.asarray(motion.position).reshape(-1)[0]) for name, motion in self.motions.items()}
+        """Values of the freedoms of pairs at the first position."""
+        own = {self.m.full_name(drive.freedom) for drive in self.m.drives}
+        return {
+            name: float(np.asarray(self.motions[name].position).reshape(-1)[0]) for name in self.motions if name in own
+        }
+
+    def whole(self, start: Configuration) -> Mechanism:
+        """The mechanism with the free pairs behind its own, in a closed position."""
+        par, X = start.system.par, start.poses[:, :, :, 0]
+        R = np.moveaxis(X[:, :3], -1, 0)
+        poses = np.tile(np.eye(4), (len(R), 1, 1))
+        poses[:, :3, :3] = R
+        poses[:, :3, 3] = par.origin + par.L * X[:, 3].T - (R @ par.offset.T[:, :, None])[..., 0]
+        q = start.system.coordinates_of(start.x, start.system.start_coordinates(self.m.start))[:, 0]
+        return with_free_pairs(self.m, self.free, self.names, poses, q)
 
     def values(self, kind: str, batch: tuple[int, ...]) -> Array:
         """Driver ``position``, ``velocity`` or ``acceleration`` ``(d, T)`` in the user's units, spread over a batch."""

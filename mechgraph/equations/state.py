@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mechgraph.algebra.se3 import Array
 
@@ -31,3 +31,8 @@ class State:
     conditions: tuple[Array, ...]
     loads: Array
     coefficients: tuple[Array, ...] = ()
+
+    def of_first(self, pairs: int, freedoms: int) -> State:
+        """The same of the first pairs alone, which have so many freedoms."""
+        by_pair = {name: getattr(self, name)[:pairs] for name in ("reactions", "efforts", "along", "conditions")}
+        return replace(self, coordinates=self.coordinates[:freedoms], velocities=self.velocities[:freedoms], **by_pair)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -39,6 +39,9 @@ class Motion(Described):
     t : (...) array_like, optional
         Times. Where given they are broadcast with the rest.
 
+    Of a point of a link the arrays are ``(..., 3)``, of a link poses ``(..., 4, 4)`` with twists and their rates ``(..., 6)`` about the
+    global origin; ``t`` stays ``(...)``. The arrays as they were given are kept in ``given``.
+
     Raises
     ------
     DeclarationError
@@ -51,6 +54,7 @@ class Motion(Described):
     ]
     acceleration: Annotated[Array, SERIES("the rate of that", (1, 0, -2), (0, 0, -2), degrees=True, default="likewise")]
     t: Annotated[Array | None, SERIES("times, where known", TIME, default="none")]
+    given: ClassVar[tuple[Any, ...]] = ()
 
     def __init__(
         self,
@@ -66,8 +70,7 @@ class Motion(Described):
             "t": t,
         }
         if any(map(has_quantity, given.values())):  # kept as given: only a mechanism knows its units
-            for name, value in given.items():
-                object.__setattr__(self, name, value)
+            self._set(given, tuple(given.values()))
             return
         faults: list[str] = []
         arrays = {
@@ -75,10 +78,14 @@ class Motion(Described):
             for name, value in given.items()
             if value is not None or name == "position"
         }
+        read = tuple(arrays.get(name) for name in given)
         shape: tuple[int, ...] = ()
         try:
             shape = np.broadcast_shapes(*(array.shape for array in arrays.values()))
         except ValueError:
+            if not faults and _is_of_vectors(arrays):
+                self._set(dict(zip(given, read, strict=True)), read)
+                return
             shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
             faults.append(f"shapes do not broadcast against each other: {shapes}")
         if faults:
@@ -88,14 +95,21 @@ class Motion(Described):
             arrays |= _missing_rates(arrays)
         except LawFault as fault:
             raise DeclarationError("motion", [str(fault)]) from None
-        for array in arrays.values():
-            array.setflags(write=False)
-        for name in given:
-            object.__setattr__(self, name, arrays.get(name))
+        self._set({name: arrays.get(name) for name in given}, read)
+
+    def _set(self, fields: Mapping[str, Any], given: tuple[Any, ...]) -> None:
+        for array in (*fields.values(), *given):
+            if isinstance(array, np.ndarray):
+                array.setflags(write=False)
+        for name, value in fields.items():
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "given", given)
 
     def faults(self, where: str = "") -> list[str]:
         """Quantities that are not converted to plain numbers yet, one line each."""
         left = {name: value for name in self.formats if has_quantity(value := getattr(self, name))}
+        if not left and self.velocity is None:
+            return [f"{where}holds points or poses, shape {self.shape}; expected one number a position"]
         return [wrong(value, where + name, "plain numbers") for name, value in left.items()]
 
     @property
@@ -138,7 +152,7 @@ class Motion(Described):
 
     def __reduce__(self) -> tuple[type[Motion], tuple[Array | None, ...]]:
         """Copy and unpickle through the constructor, so that the arrays are read-only again."""
-        return type(self), self._arrays
+        return type(self), self.given
 
     @classmethod
     def law(
@@ -217,6 +231,21 @@ class Motion(Described):
             return cls(*rule.rates(times, {**given, **numbers}), t=times)
         except LawFault as fault:
             raise DeclarationError(title, [str(fault)]) from None
+
+
+def _is_of_vectors(arrays: Mapping[str, Array]) -> bool:
+    """Whether arrays are those of points ``(..., 3)`` or poses ``(..., 4, 4)``: their times have one or two axes less."""
+    position = arrays["position"].shape
+    for entry, rate in (((3,), (3,)), ((4, 4), (6,))):
+        batch = position[: -len(entry)]
+        if position[-len(entry) :] != entry:
+            continue
+        own = {"position": position, "velocity": (*batch, *rate), "acceleration": (*batch, *rate), "t": batch}
+        try:
+            return all(np.broadcast_shapes(own[name], array.shape) == own[name] for name, array in arrays.items())
+        except ValueError:
+            return False
+    return False
 
 
 def _missing_rates(arrays: Mapping[str, Array]) -> dict[str, Array]:

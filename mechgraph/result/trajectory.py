@@ -397,8 +397,10 @@ class Trajectory:
         flat = flat_place(self.batch, index)
         if not self._solved[flat]:
             raise MechgraphError(f"state({index!r}): this position was not solved ({self._status[flat]})")
-        block = self._motion(np.array([flat]))
+        block, own = self._motion(np.array([flat])), len(self.mechanism.freedom_names())
         loads = np.zeros((6, len(self.mechanism.links), 1))
         if self.has_forces:
-            loads = self._of("loads")[:, :, [flat]] + given_effort_loads(block.here, self._of("given")[:, [flat]])
-        return user_state(block.rates, self._coordinates[:, [flat]], loads)
+            acting = self._of("given")[:, [flat]].copy()
+            acting[own:] += self._of("efforts")[own:, [flat]]  # what moves points and links is a load on these
+            loads = self._of("loads")[:, :, [flat]] + given_effort_loads(block.here, acting)
+        return user_state(block.rates, self._coordinates[:, [flat]], loads).of_first(len(self.mechanism.pairs), own)

@@ -19,8 +19,9 @@ from mechgraph.closure.driver_path import DriverPath
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.solver import FactoredClosure, closure_solver
 from mechgraph.errors import DeclarationError
+from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
-from mechgraph.model.parameters import Parameters
+from mechgraph.model.parameters import Declared, Parameters, declared
 from mechgraph.numerics.continuation import End, Follower
 from mechgraph.numerics.tracks import Paths
 from mechgraph.pipeline import Options, Pipeline, Starts
@@ -47,7 +48,8 @@ class NumbersPath(DriverPath):
         key = part.tobytes() + variants.tobytes()
         if self._known is None or self._known[0] != key:
             par, m = self.system.par, self._line.m
-            made = self._numbers_at(part, variants).numbers.parameters(m, par.offset, par.origin, par.L)
+            numbers = self._numbers_at(part, variants).numbers
+            made = _behind(numbers, self._line.m).parameters(m, par.offset, par.origin, par.L)
             # one array with all variants says how many there are
             mass = np.broadcast_to(made.mass, (len(m.links), len(part)))
             self._known = key, self.system.with_parameters(dataclasses.replace(made, mass=mass))
@@ -81,12 +83,30 @@ class Together:
     starts: Array
 
 
-def solve_together(numbers_at: NumbersAt, count: int, motions: Mapping[str, Motion], options: Options) -> Together:
+def _behind(numbers: Declared, m: Mechanism) -> Declared:
+    """The numbers of variants with those of the pairs of ``m`` behind theirs (free pairs, which do not vary)."""
+    P = numbers.pitch.shape[0]
+    if len(m.pairs) == P:
+        return numbers
+    rest, joined = declared(m), {}
+    for name in ("point", "axis", "second", "pitch"):
+        mine, theirs = getattr(numbers, name), getattr(rest, name)[..., P:, :]
+        joined[name] = np.concatenate([mine, np.repeat(theirs, mine.shape[-1], axis=-1)], axis=-2)
+    return dataclasses.replace(numbers, **joined)
+
+
+def solve_together(
+    numbers_at: NumbersAt,
+    count: int,
+    motions: Mapping[str, Motion],
+    options: Options,
+    actuate: tuple[str, ...] | None = None,
+) -> Together:
     """All variants as one batch; NaN for those to be solved alone: they cannot be built, or not followed from the mechanism itself."""
     every = np.arange(count)
     variants, V = numbers_at(np.ones(count), every), count
     nothing = np.full((sum(p.type.f for p in variants.mechanism.pairs), V), np.nan)
-    line = Pipeline(DriverMotion(variants.mechanism, motions), options)
+    line = Pipeline(DriverMotion(variants.mechanism, motions, actuate), options)
     path = NumbersPath(line, numbers_at)
     valid = variants.valid()
     good = np.flatnonzero(valid)
@@ -101,7 +121,7 @@ def solve_together(numbers_at: NumbersAt, count: int, motions: Mapping[str, Moti
     else:
         begun, x, sharing = *_led(line, path, valid), 1
     starts = Starts(x, systems.cases, variants.loads, sharing)
-    q = systems.coordinates_of(starts.x[..., None], line.system.start_coordinates(line.m.start))[..., 0]
+    q = systems.coordinates_of(starts.x[..., None], line.system.start_coordinates(line.m.start))[..., 0][: len(nothing)]
     try:
         outcome = line.run(starts, np.broadcast_shapes((V, 1), line.drive.batch))
     except DeclarationError:

@@ -12,7 +12,7 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.arguments import option_faults
-from mechgraph.closure.driver_motion import driven
+from mechgraph.closure.driver_motion import actuators, driven
 from mechgraph.closure.solver import ENGINES, EngineName
 from mechgraph.errors import DeclarationError
 from mechgraph.force.dalembert import METHODS, MethodName
@@ -49,6 +49,7 @@ def study(
     seed: int = 0,
     *,
     motions: Mapping[str, Any] | None = None,
+    actuate: Iterable[str] | None = None,
     sampling: SamplingName = "random",
     executor: concurrent.futures.Executor | None = None,
     method: MethodName = "loop_wrench",
@@ -70,7 +71,7 @@ def study(
     motions : of the drivers as in ``solve``; a leading axis of length ``n`` gives every variant its own.
     sampling : ``"random"``, ``"latin"`` (Latin hypercube) or ``"grid"``.
     executor : any ``concurrent.futures`` Executor, e.g. that of a cluster; left out, the processors of this machine.
-    method, redundant, engine : as in ``solve``.
+    actuate, method, redundant, engine : as in ``solve``.
     progress : called with the numbers of parts done and of all parts.
 
     Returns
@@ -100,6 +101,7 @@ def study(
     if faults:
         raise DeclarationError("study", faults)
     source, given = _source(m, ways, motions)
+    acting = None if actuate is None else actuators(source.mechanism, actuate)
     kept = named_outputs(source.mechanism, outputs, ways)
     if sampling == "grid" and (count := grid_size(list(ways.values()), int(n))) > MOST_VARIANTS:
         raise DeclarationError("study", [f"a grid of {count:.3g} variants: at most {MOST_VARIANTS} are solved"])
@@ -115,7 +117,7 @@ def study(
 
     def task(part: Array, at: slice) -> Task:
         own = {name: motion_of_case(motion, at) for name, motion in paths.items()}
-        return Task(source, part, own, kept, method, redundant, engine)
+        return Task(source, part, own, kept, method, redundant, engine, acting)
 
     size = max(1, min(MOST_TOGETHER, POSITIONS_TOGETHER // max(motion.shape[-1] for motion in paths.values())))
     tasks = [task(near, slice(0, 1))]
@@ -147,7 +149,7 @@ def _source(
 ) -> tuple[Source, dict[str, Motion]]:
     names = tuple(ways)
     if isinstance(m, Mechanism):
-        own, given = driven(m, motions)
+        own, given, _ = driven(m, motions)
         found = {name: find_field(own, name) for name in names}
         faults = [fault for fault in found.values() if isinstance(fault, str)]
         fields: dict[str, AnyField] = {name: f for name, f in found.items() if not isinstance(f, str)}
@@ -165,8 +167,9 @@ def _source(
         ) from error
     if not isinstance(first, Mechanism):
         raise DeclarationError("study", [f"the function gave {type(first).__name__}; expected a Mechanism"])
-    own, given = driven(first, motions)
-    stored = tuple(name for name in given if name not in {own.full_name(key) for key in motions or {}})
+    own, given, _ = driven(first, motions)
+    named = {own.full_name(key) for key in motions or {} if own.freedom_fault(key, single=True) is None}
+    stored = tuple(name for name in given if name in own.freedom_names() and name not in named)
     return Source(own, names, middle, build=m, stored=stored, redriven=own is not first), given
 
 

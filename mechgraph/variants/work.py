@@ -94,6 +94,7 @@ class Task:
     method: MethodName
     redundant: RedundantName
     engine: EngineName
+    actuate: tuple[str, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -115,6 +116,7 @@ def solved(task: Task) -> Part:
         count,
         task.motions,
         Options(task.method, task.redundant, task.engine),
+        task.actuate,
     )
     alone = together.alone
     N = max(motion.shape[-1] for motion in task.motions.values())
@@ -172,7 +174,8 @@ def _solved_alone(task: Task, i: int, start: Array) -> Solution:
                 "study", [f"the motion stored with drive {name!r} has other positions than that of the first"]
             )
         motions[name] = as_rows(own[name])
-    return solve(m, motions, method=task.method, redundant=task.redundant, engine=task.engine, on_reach="flag")
+    how: dict[str, Any] = {"method": task.method, "redundant": task.redundant, "engine": task.engine}
+    return solve(m, motions, actuate=task.actuate, on_reach="flag", **how)
 
 
 def as_rows(motion: Motion) -> Motion:
