@@ -21,7 +21,8 @@ def boom(**changes: object) -> mg.Mechanism:
                   mg.Link("tube"), mg.Link("rod"), mg.Link("tube 2"), mg.Link("rod 2")],
         "pairs": [
             mg.Pair("A", "R", "frame", "arm", point=(0, 0, 0), axis=Z), mg.Pair("B", "R", "arm", "bucket", point=(5, 0, 0), axis=Z),
-            mg.Pair("C", "R", "frame", "tube", point=(1, -1, 0), axis=Z), mg.Pair("lift", "P", "tube", "rod", point=(1, -1, 0), axis=(1, 1, 0)),
+            mg.Pair("C", "R", "frame", "tube", point=(1, -1, 0), axis=Z),
+            mg.Pair("lift", "P", "tube", "rod", point=(1, -1, 0), axis=(1, 1, 0)),
             mg.Pair("D", "R", "rod", "arm", point=(2, 0, 0), axis=Z), mg.Pair("E", "R", "arm", "tube 2", point=(3, 1, 0), axis=Z),
             mg.Pair("curl", "P", "tube 2", "rod 2", point=(3, 1, 0), axis=(2.8, -0.2, 0)),
             mg.Pair("F", "R", "rod 2", "bucket", point=(5.8, 0.8, 0), axis=Z),
@@ -285,7 +286,7 @@ def test_far_from_the_origin_and_in_other_units() -> None:
 
 def test_cases_and_variants() -> None:
     t, points = tip_path()
-    two = np.stack([points, points + [0.05, 0.0, 0.0]])
+    two = np.stack([points, points + np.array([0.05, 0.0, 0.0])])
     s = mg.solve(bent(), {"bucket.tip": mg.Motion(two, t=t)}, actuate=["lift", "curl"])
     assert s.batch == (2, 7)
     one = mg.solve(bent(), {"bucket.tip": mg.Motion(two[1], t=t)}, actuate=["lift", "curl"])

@@ -20,6 +20,7 @@ from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.model.pair import Marker, Pair
+from mechgraph.model.pair_table import TABLE
 from mechgraph.model.pair_type import UNIT_TWISTS, Freedom, PairType
 from mechgraph.quantities import has_quantity, is_numeric
 
@@ -106,11 +107,6 @@ def _of_points() -> PairType:
     return PairType("free_point", freedoms=[*SLIDES, "rotation"], reactions=())
 
 
-@cache
-def _of_links() -> PairType:
-    return PairType("free_link", freedoms=[*SLIDES, *TURNS], reactions=())
-
-
 def coordinates(pair: Pair, poses: Array) -> Array:
     """Coordinates ``(6, ...)`` of a free pair for poses ``(..., 4, 4)`` of its link; angles continued along the last axis."""
     A, B = (homogeneous(marker.pose()[..., None])[..., 0] for marker in pair.markers)
@@ -191,7 +187,7 @@ class Prescription:
     def _pair_of(self, target: Target) -> Pair:
         """The free pair that has a coordinate; every line has one of its own."""
         if not target.part.startswith("T("):
-            return self._made(target.owner, target, _of_points if target.point else _of_links)
+            return self._made(target.owner, target, _of_points if target.point else lambda: TABLE["Fr"])
         d = _direction(target.part)
         assert d is not None
         across = np.linalg.svd(d[None])[2][1]
