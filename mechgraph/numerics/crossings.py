@@ -89,7 +89,7 @@ def passed(follower: Follower, nodes: Nodes, track: int, place: float) -> Crossi
         drives = drive[:, None] + direction[:, None] * (at - place)
         ahead = problem.corrigible(newton_form(coefficients, places, at - base.place), base.which)
         x = problem.advance(base.x, ahead, base.track)
-        found = follower.newton.nodes(x, drives, base.track, base.which, PATH.exact)
+        found = follower.newton.nodes(x, drives, base.track, base.which, PATH.node)
         nearness = found.condition * np.abs(at - place)
         regular = nearness.max() <= SCATTER * nearness.min()
         if found.done.all() and (found.correction <= 1e-2 * span).all() and regular:
