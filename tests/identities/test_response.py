@@ -1,0 +1,66 @@
+"""Identities of motion in time, over random mechanisms of all pair types, mobility 1 to 6."""
+
+import numpy as np
+import pytest
+from strategies import closed_mechanism, with_drives, with_loads
+
+import mechgraph as mg
+
+T = np.linspace(0.0, 0.25, 6)
+TIGHT = {"rtol": 1e-10, "atol": 1e-12}
+
+
+def moving(seed, loaded=True):
+    """A random mechanism with masses, without drives, with random rates that its closure allows; gravity, springs, wrenches, efforts."""
+    rng = np.random.default_rng((seed, 71))
+    m = closed_mechanism(seed, mobility=int(rng.integers(1, 7)))
+    driven = with_drives(m, seed)
+    m = with_loads(m, seed, constant=True) if loaded else m
+    names = [] if driven is None else [d.freedom for d in driven.drives]
+    return m, {name: float(rng.uniform(-1, 1)) for name in names[:3]}
+
+
+def size_of(r):
+    """The largest energy that came and went."""
+    return max(np.ptp(r.energy.kinetic), np.abs(r.energy.kinetic).max(), np.ptp(r.energy.potential), 1e-6)
+
+
+@pytest.mark.seeds(8)
+def test_energy_is_what_the_loads_bring(seed):
+    """Kinetic and potential energy less the work done is constant; loops are closed at every output; both engines move alike."""
+    m, rates = moving(seed)
+    r = mg.respond(m, T, rates=rates, engine="dense", **TIGHT)
+    assert r.checks.closure.max() < 1e-12
+    assert np.nanmax(np.abs(r.checks.equilibrium)) < 1e-9
+    assert np.abs(r.energy.balance).max() < 1e-7 * size_of(r)
+    other = mg.respond(m, T, rates=rates, engine="sparse", **TIGHT)
+    for p in m.pairs:
+        size = max(1.0, np.abs(r[p.name].velocity).max(initial=0.0))
+        np.testing.assert_allclose(other[p.name].velocity, r[p.name].velocity, atol=1e-6 * size)
+
+
+@pytest.mark.seeds(8)
+def test_back_to_the_start(seed):
+    """Without loads that take energy, with the rates turned round, it goes back to where it came from."""
+    m, rates = moving(seed)
+    m = m.replace(loads=[load.parts()[0] for load in m.loads if load.parts()[0] is not None])
+    r = mg.respond(m, T, rates=rates, **TIGHT)
+    single = [(p.name, j) for p in m.pairs for j, able in enumerate(p.type.drivable) if able]
+    if len(single) < len(m.freedom_names()):
+        pytest.skip("rotations take no start value")
+    last = {m.pair(k).freedom_names[j]: float(r[k].position[-1, j]) for k, j in single}
+    rate = {m.pair(k).freedom_names[j]: -float(r[k].velocity[-1, j]) for k, j in single}
+    back = mg.respond(m.replace(start={**m.start, **last}), T, rates=rate, **TIGHT)
+    for k, j in single:
+        assert back[k].position[-1, j] == pytest.approx(r[k].position[0, j], abs=1e-6)
+
+
+@pytest.mark.seeds(8)
+def test_doubling_the_accuracy(seed):
+    """Results move by no more than the coarser tolerance allows."""
+    m, rates = moving(seed)
+    coarse = mg.respond(m, T, rates=rates, rtol=1e-6, atol=1e-8)
+    fine = mg.respond(m, T, rates=rates, **TIGHT)
+    for p in m.pairs:
+        size = max(1.0, np.abs(fine[p.name].velocity).max(initial=0.0))
+        np.testing.assert_allclose(coarse[p.name].velocity, fine[p.name].velocity, atol=1e-3 * size)
