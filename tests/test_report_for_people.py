@@ -239,13 +239,37 @@ def test_no_plane_takes_the_place_of_a_hinge_where_bearings_do(name: str) -> Non
     assert planes == sorted(planes)
 
 
-def test_advice_on_a_dead_point_says_instead() -> None:
-    pairs = [
-        mg.Pair(n, "R", a, b, point=(x, 0, 0), axis=known.Z)
-        for n, a, b, x in (("A", "frame", "crank", 0), ("B", "crank", "rod", 1), ("C", "rod", "slider", 3))
-    ]
+@pytest.mark.parametrize("height", [0.0, 1e-4])
+def test_advice_at_a_dead_point_and_near_it_says_instead(height: float) -> None:
+    bars = (("A", "frame", "crank", 0, 0), ("B", "crank", "rod", 1, height), ("C", "rod", "slider", 3, 0))
+    pairs = [mg.Pair(name, "R", a, b, point=(x, y, 0), axis=known.Z) for name, a, b, x, y in bars]
     slide = mg.Pair("D", "P", "slider", "frame", point=(3, 0, 0), axis=known.X)
     report = mg.check(mg.Mechanism("slider-crank", None, [*pairs, slide], ["D"]))
     assert report.advice[0].text.startswith("drive A.Rz instead of D.Tz")
     assert "also" not in report.text()
-    assert [d.freedom for d in report.advice[0].apply().drives] == ["A.Rz"]
+    changed = report.advice[0].apply()
+    assert [d.freedom for d in changed.drives] == ["A.Rz"]
+    assert not mg.check(changed).near
+
+
+def test_a_cylinder_between_balls_and_a_spline_are_advised() -> None:
+    first = mg.check(machines.excavator()).advice[0]
+    assert first.brief.startswith("cylinders boomcyl, stickcyl and bucketcyl between ball joints (S-C-S)")
+    assert "redundancy 12 -> 0" in first.brief
+    shaft = mg.check(machines.double_cardan()).advice[-1]
+    assert shaft.text == "spline inserted in shaft: redundancy 1 -> 0, mobility 1 -> 1, passive 0 -> 0"
+    assert {p.type.symbol for p in shaft.apply().pairs} == {"R", "U", "P"}
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_advice_on_random_mechanisms_does_what_it_says(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    kind = ["planar", "spherical", "spatial"][seed % 3]
+    types = "".join(rng.choice(list("RRP" if kind == "planar" else "R" if kind == "spherical" else "RPCU"), size=4))
+    m = turned(random_mechanism(kind, types, rng), rng)
+    report = mg.check(m)
+    for a in report.advice:
+        after = mg.check(a.apply())
+        if a.effect is not None:
+            assert a.effect.redundancy == (report.redundancy, after.redundancy), a.text
+            assert a.effect.mobility == (report.mobility, after.mobility), a.text

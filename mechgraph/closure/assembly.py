@@ -87,6 +87,15 @@ def scaled(here: Configuration) -> Configuration:
     return here.rescaled(raw.with_parameters(par))
 
 
+def at_position(m: Mechanism, system: System, x: Array) -> Mechanism:
+    """The mechanism with its start at a closed state ``x (nx,)``; as it is where that is its start."""
+    given = system.start_coordinates(m.start)
+    q = system.coordinates_of(x[:, None], given)[:, 0]
+    if np.abs(q - given).max(initial=0.0) <= CLOSED:
+        return m
+    return m.replace(start=dict(zip(m.freedom_names(), q.tolist(), strict=True)))
+
+
 def close(system: System, x: Array, fixed: Index, iterations: int = 60, patience: int = 8) -> tuple[Array, float]:
     """Close the loops from state ``x (nx,)`` with the coordinates in ``fixed`` kept; smallest change of the others."""
     closed, error = close_all(system, x[:, None], fixed, iterations, patience)

@@ -14,7 +14,8 @@ from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.pair_table import TABLE
 from mechgraph.report.findings import Finding
 from mechgraph.report.words import exchange, joined
-from mechgraph.structure.pair_changes import LEFT_OUT, Effect
+from mechgraph.structure.pair_changes import LEFT_OUT, RIGID, WHOLE, Effect
+from mechgraph.structure.splines import with_spline
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class Advice(Finding):
     @property
     def brief(self) -> str:
         """The advice in the words of a workshop, with what it does."""
-        return self.text if self.effect is None else f"{exchanges(self.effect.changes)}: {consequence(self.effect)}"
+        return self.text if self.effect is None else f"{exchanges(self.effect)}: {consequence(self.effect)}"
 
     def apply(self) -> Mechanism:
         """The changed mechanism, at the position of the report."""
@@ -40,9 +41,12 @@ class Advice(Finding):
         if self.effect is None:
             kept = [d for d in m.drives if m.full_name(d.freedom) not in self.replaced]
             return m.replace(drives=[*kept, *self.freedoms])
-        for (name, _, new), turn in zip(self.effect.changes, self.effect.turns, strict=True):
+        for (name, old, new), turn in zip(self.effect.changes, self.effect.turns, strict=True):
             if new == LEFT_OUT:
                 m = m.replace(couplings=[c for c in m.couplings if c.name != name])
+                continue
+            if old == RIGID:
+                m = with_spline(m, name)
                 continue
             m = m.with_pair_type(name, new)
             if turn:
@@ -50,17 +54,20 @@ class Advice(Finding):
         return m
 
 
-def exchanges(changes: Iterable[tuple[str, str, str]], word: str = "and") -> str:
-    """Changes (pair, old type, new type) by their parts: ``floating bearing (R -> C) at A, ball joint or ... (R -> S) at B``."""
+def exchanges(effect: Effect, names: Iterable[str] = ()) -> str:
+    """Changes by their parts: ``floating bearing (R -> C) at A, ball joint ... (R -> S) at B``; ``names`` are others to choose among."""
+    others = list(names)
+    in_cylinders = {name for three in effect.cylinders for name in three}
+    slides = [slide for _, slide, _ in effect.cylinders]
+    parts = [f"cylinder{'s' * (len(slides) > 1)} {joined(slides)} between ball joints (S-C-S)"] if slides else []
     at: dict[tuple[str, str], list[str]] = {}
-    for name, old, new in changes:
-        at.setdefault((old, new), []).append(name)
-    return ", ".join(
-        f"coupling {joined(names, word)} left out"
-        if new == LEFT_OUT
-        else f"{exchange(old, TABLE[new])} at {joined(names, word)}"
-        for (old, new), names in at.items()
-    )
+    for name, old, new in effect.changes:
+        if name not in in_cylinders:
+            at.setdefault((old, new), []).append(name)
+    for (old, new), mine in at.items():
+        where = joined([*mine, *others], "or" if others else "and")
+        parts.append(WHOLE[old].format(where) if old in WHOLE else f"{exchange(old, TABLE[new])} at {where}")
+    return ", ".join(parts)
 
 
 def consequence(effect: Effect) -> str:
@@ -71,15 +78,15 @@ def consequence(effect: Effect) -> str:
 
 def alternatives(advice: Iterable[Advice]) -> list[str]:
     """Advice in brief, single changes of one kind with the same effect together: ``... (R -> S) at A or B: redundancy 3 -> 1``."""
-    found: dict[tuple[Any, ...], list[tuple[str, str, str]]] = {}
-    for a in advice:
-        if a.effect is not None:
-            key = (tuple(sorted(change[1:] for change in a.effect.changes)), consequence(a.effect))
-            if key not in found or len(a.effect.changes) == 1:
-                found.setdefault(key, []).extend(a.effect.changes)
-    return [
-        f"{exchanges(changes, 'or' if len(kinds) == 1 else 'and')}: {does}" for (kinds, does), changes in found.items()
-    ]
+    first: dict[tuple[Any, ...], Effect] = {}
+    others: dict[tuple[Any, ...], list[str]] = {}
+    for effect in (a.effect for a in advice):
+        if effect is not None:
+            key = (tuple(sorted(change[1:] for change in effect.changes)), consequence(effect))
+            if key in first and len(effect.changes) == 1:
+                others.setdefault(key, []).append(effect.changes[0][0])
+            first.setdefault(key, effect)
+    return [f"{exchanges(effect, others.get(key, ()))}: {consequence(effect)}" for key, effect in first.items()]
 
 
 def _turned(pair: Pair, angle: float) -> Pair:

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.assembly import CLOSED
+from mechgraph.closure.assembly import at_position
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.rank import EngineName
 from mechgraph.equations.build import BOOKKEEPINGS, BookkeepingName, formulate
@@ -19,11 +19,12 @@ from mechgraph.numerics.tolerances import RANKS
 from mechgraph.report import findings
 from mechgraph.report.advice import Advice
 from mechgraph.report.findings import Finding, LoopFact, PassiveFinding
+from mechgraph.structure.advice import advice
 from mechgraph.structure.finite_motion import FiniteMotion, finite_motion
 from mechgraph.structure.generic import Generic, generic
 from mechgraph.structure.kind import Kind, kind_of, kind_of_mechanism
 from mechgraph.structure.mobility import Freedoms, freedoms_at
-from mechgraph.structure.pair_changes import LARGEST_FOR_SETS, Effect, advice
+from mechgraph.structure.pair_changes import LARGEST_FOR_SETS, Effect
 from mechgraph.structure.self_stress import SelfStress
 from mechgraph.structure.unique_directions import UniqueDirection
 from mechgraph.structure.uniqueness import Uniqueness, uniqueness
@@ -257,11 +258,22 @@ class Facts:
         g = self.geometry
         return findings.not_drivable(g.freedoms, self.drivable, self._null_nearby) if g else ()
 
+    @property
+    def weak_drives(self) -> list[int]:
+        """Columns of the drivers that move least when the mechanism does, and as little as the weakest combination of them."""
+        g = self.geometry
+        if g is None or len(g.driven) < 2:
+            return g.driven.tolist() if g else []
+        size = np.sqrt((g.freedoms.null[g.driven] ** 2).sum(axis=1))
+        return [int(c) for c, mine in zip(g.driven, size, strict=True) if mine < 2 * g.freedoms.drive * size.max()]
+
     @cached_property
     def _drivers_that_move(self) -> Index:
-        """Columns of the declared drivers without those that stand still here or depend on the ones before."""
+        """Columns of the declared drivers without those that depend on the ones before, stand still, or nearly do (at a dead point)."""
         g = self.geometry
-        return np.array(independent_rows(g.freedoms.null, g.driven.tolist(), len(g.driven)) if g else [], dtype=np.intp)
+        columns = independent_rows(g.freedoms.null, g.driven.tolist(), len(g.driven)) if g else []
+        weak = self.weak_drives if self.dead_point and len(columns) == len(self.mechanism.drives) else []
+        return np.array([c for c in columns if [c] != weak], dtype=np.intp)
 
     @cached_property
     def replaced_drives(self) -> tuple[str, ...]:
@@ -382,15 +394,6 @@ class Facts:
             out.append(driving)
         changes = (Advice(e.text, tuple(item for item, _, _ in e.changes), effect=e, mechanism=m) for e in self.effects)
         return (*out, *changes)
-
-
-def at_position(m: Mechanism, system: System, x: Array) -> Mechanism:
-    """The mechanism with its start at a closed state ``x (nx,)``; as it is where that is its start."""
-    given = system.start_coordinates(m.start)
-    q = system.coordinates_of(x[:, None], given)[:, 0]
-    if np.abs(q - given).max(initial=0.0) <= CLOSED:
-        return m
-    return m.replace(start=dict(zip(m.freedom_names(), q.tolist(), strict=True)))
 
 
 def counted_ledger(m: Mechanism, bookkeeping: str) -> Ledger:

@@ -57,11 +57,10 @@ def _over_driven(r: Facts) -> bool:
 
 def weakest_drive(r: Facts) -> str:
     """The driver that moves least; drivers, where several depend on each other."""
-    g, drives = r.geometry, [r.mechanism.full_name(d.freedom) for d in r.mechanism.drives]
-    if g is None or len(drives) == 1:
-        return f"the driver {drives[0]}" if drives else "no driver"
-    size = np.sqrt((g.freedoms.null[g.driven] ** 2).sum(axis=1))
-    weak = [name for name, mine in zip(drives, size, strict=True) if mine < 2 * g.freedoms.drive * size.max()]
+    names = r.mechanism.freedom_names()
+    weak = [names[c] for c in r.weak_drives]
+    if not r.mechanism.drives:
+        return "no driver"
     return f"the driver {weak[0]}" if len(weak) == 1 else "a combination of the drivers"
 
 

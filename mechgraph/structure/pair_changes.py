@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.indexing import Index
@@ -28,8 +27,6 @@ from mechgraph.structure.uniqueness import pair_states
 
 CHANGES_SHOWN = 6
 """Largest number of single changes, and of sets of changes, reported."""
-FREEING = 3
-"""Changes reported that let a structure move."""
 LARGEST_FOR_SETS = 120
 """Redundancy up to which sets of changes that remove all of it are sought; the work grows as its cube (half a second here)."""
 CHANGES_SEED = 29
@@ -39,12 +36,13 @@ EFFORTS = {"C": 0, "S": 0, "Sg": 1, "U": 1}
 PLANE = 3
 """The same of a plane that takes the place of a hinge: advised where nothing else is left."""
 
-BEAM = 12
-"""Partial sets of changes kept while searching."""
-
 
 COUPLING, LEFT_OUT = "coupling", "left out"
 """What a coupling is changed from and to."""
+RIGID, SPLINE = "rigid", "P"
+"""What a shaft is changed from and to, in which a spline is inserted."""
+WHOLE = {COUPLING: "coupling {} left out", RIGID: "spline inserted in {}"}
+"""Changes that are not those of a pair, in words, by what is changed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +67,8 @@ class Change:
 class Effect:
     """Changes and what they do: before -> after.
 
-    ``changes`` are (pair, old type, new type), or (coupling, "coupling", "left out"); ``turns`` the angles in degrees by which the second
-    direction x of the new pair is turned.
+    ``changes`` are (pair, old type, new type), (coupling, "coupling", "left out") or (link, "rigid", "P"); ``turns`` the angles in degrees
+    by which the second direction x of the new pair is turned; ``cylinders`` the pairs (foot, slide, head) that become S-C-S together.
     """
 
     changes: tuple[tuple[str, str, str], ...]
@@ -78,6 +76,7 @@ class Effect:
     mobility: tuple[int, int]
     passive: tuple[int, int]
     turns: tuple[float, ...] = ()
+    cylinders: tuple[tuple[str, ...], ...] = ()
 
     @property
     def inputs(self) -> tuple[int, int]:
@@ -88,8 +87,7 @@ class Effect:
     def text(self) -> str:
         """E.g. ``R at D -> S: redundancy 3 -> 1, mobility 1 -> 1, passive 0 -> 0``."""
         what = [
-            f"coupling {name} left out" if new == LEFT_OUT else f"{old} at {name} -> {new}"
-            for name, old, new in self.changes
+            WHOLE[old].format(name) if old in WHOLE else f"{old} at {name} -> {new}" for name, old, new in self.changes
         ]
         turned = [f" (its x turned by {turn:.3g} degrees)" if turn else "" for turn in self.turns]
         values = {"redundancy": self.redundancy, "mobility": self.mobility, "passive": self.passive}
@@ -119,15 +117,20 @@ def building_effort(old: PairType, new: PairType) -> int:
     return PLANE if more > 1 else EFFORTS.get(new.symbol, max(EFFORTS.values()) + 1)
 
 
+def stresses_of(freedoms: Freedoms) -> Array:
+    """Orthonormal self-stresses (drivers free) in the closure rows: all of them where sets of changes are sought, else random ones."""
+    count = freedoms.redundancy if freedoms.redundancy <= LARGEST_FOR_SETS else PROBES
+    return np.linalg.qr(freedoms.closure.random_stress(np.random.default_rng(CHANGES_SEED), count))[0]
+
+
 def changes_of(freedoms: Freedoms) -> list[Change]:
     """All single changes that leave the drivers in place, with their power on the self-stresses (drivers free).
 
-    On all self-stresses where sets of changes are sought, else on random ones, which give the same rank at one pair.
+    Random self-stresses give the same rank at one pair as all of them.
     """
     here, rows = freedoms.position.declared, freedoms.position.rows
     system = here.system
-    count = freedoms.redundancy if freedoms.redundancy <= LARGEST_FOR_SETS else PROBES
-    states = np.linalg.qr(freedoms.closure.random_stress(np.random.default_rng(CHANGES_SEED), count))[0]
+    states = stresses_of(freedoms)
     stress = np.moveaxis(pair_states(here, states)[..., 0], 1, 0)
     tied = [d.freedom for d in system.m.drives] + [name for c in system.couplings for name, _ in c.terms]
     needed: dict[int, set[str]] = {}
@@ -214,106 +217,6 @@ def best_turns(frames: Array, wrenches: Array) -> Array:
     return np.where(s[:, 0] < STRESSES.relieved, 0.0, angle)
 
 
-def relieving(changes: list[Change], redundancy: int) -> tuple[list[tuple[Change, ...]], list[tuple[Change, ...]]]:
-    """Single changes that lower the redundancy, and smallest sets that remove it, without more freedoms than self-stresses removed.
-
-    Ranked by how little they change: freedoms added beyond need, then number of changes, then the order of declaration.
-    """
-    every = sorted((c for c in changes if c.relief), key=lambda c: (c.added - c.relief, -c.relief, c.effort, c.item))
-    built = [c for c in every if c.effort < PLANE]
-    largest: list[tuple[Change, ...]] = []
-    for some in (built, every) if redundancy <= LARGEST_FOR_SETS else ():
-        exact = [c for c in some if c.added == c.relief]
-        complete, most = _complete_sets(exact, redundancy) if exact else ([], [])
-        if complete:
-            return [(c,) for c in _spread(built or every)], complete
-        largest = largest or most
-    return [(c,) for c in _spread(built or every)], [chosen for chosen in largest if len(chosen) > 1]
-
-
-@dataclass(frozen=True)
-class _Set:
-    """Changes (by number) that together remove ``removed`` self-stresses; for the changes from ``first`` on, all of later pairs, what
-    these leave of their ``directions (n, a, s)``, and whether they can still be added: all their directions are left.
-    """
-
-    chosen: tuple[int, ...]
-    removed: int
-    first: int
-    directions: Array
-    free: NDArray[np.bool_]
-
-    def with_change(self, i: int, items: Index, added: Index) -> _Set:
-        """One more change; only what overlaps with its directions is looked at anew."""
-        new = np.linalg.svd(self.directions[i - self.first], full_matrices=False)[2][: added[i]]
-        later = int(np.searchsorted(items, items[i], side="right"))
-        directions, free = self.directions[later - self.first :].copy(), self.free[later - self.first :].copy()
-        overlap = directions @ new.T
-        met = np.flatnonzero(free & (np.abs(overlap) > STRESSES.relieved).any(axis=(1, 2)))
-        directions[met] -= overlap[met] @ new
-        free[met] = _independent(directions[met], added[later:][met])
-        return _Set((*self.chosen, i), self.removed + int(added[i]), later, directions, free)
-
-
-def _independent(directions: Array, added: Index) -> NDArray[np.bool_]:
-    """Whether directions ``(n, a, s)``, of which the first ``added (n,)`` count, are independent: by their Gram matrices."""
-    gram = directions @ np.swapaxes(directions, 1, 2)
-    return np.asarray((np.linalg.eigvalsh(gram) > STRESSES.relieved**2).sum(axis=1) == added)
-
-
-def _complete_sets(exact: list[Change], redundancy: int) -> tuple[list[tuple[Change, ...]], list[tuple[Change, ...]]]:
-    """Sets of changes that together remove all self-stresses, each as many as it adds freedoms; else those that remove most.
-
-    A set grows by changes of later pairs, a beam of sets at a time, those first that remove most.
-    """
-    exact = sorted(exact, key=lambda c: c.item)
-    items, added = (np.array([getattr(c, name) for c in exact], dtype=np.intp) for name in ("item", "added"))
-    directions = np.zeros((len(exact), int(added.max()), exact[0].power.shape[1]))
-    for mine, c in zip(directions, exact, strict=True):
-        mine[: c.added] = np.linalg.svd(c.power, full_matrices=False)[2][: c.added]
-    at: list[int] = items.tolist()
-    beam = [_Set((), 0, 0, directions, np.ones(len(exact), dtype=bool))]
-    complete: list[tuple[int, ...]] = []
-    largest: list[tuple[int, ...]] = []
-    most = 0
-    while beam:
-        grown = [
-            (mine.removed + int(added[i]), mine, i)
-            for mine in beam
-            for i in (mine.first + np.flatnonzero(mine.free)).tolist()
-        ]
-        # changes are numbered by item, so that equal sets of items stay in the order of their types
-        order = {id(mine): [at[k] for k in mine.chosen] for mine in beam}
-        grown.sort(key=lambda g: (-g[0], order[id(g[1])], at[g[2]]))
-        complete += [(*mine.chosen, i) for removed, mine, i in grown if removed == redundancy]
-        if grown and grown[0][0] > most:
-            most, largest = grown[0][0], []
-        largest = [(*mine.chosen, i) for removed, mine, i in grown[:2] if removed == most] + largest
-        going = [(mine, i) for removed, mine, i in grown if removed < redundancy][:BEAM]
-        beam = [mine.with_change(i, items, added) for mine, i in going]
-    return [tuple(exact[i] for i in s) for s in complete], [tuple(exact[i] for i in s) for s in largest]
-
-
-def _mixed(complete: list[tuple[Change, ...]]) -> list[tuple[Change, ...]]:
-    """Up to two sets of every size, those that are easily built and whose widest change is smallest first."""
-    out: list[tuple[Change, ...]] = []
-    for size in sorted({len(chosen) for chosen in complete}):
-        mine = [chosen for chosen in complete if len(chosen) == size]
-        out += sorted(mine, key=lambda chosen: (max(c.effort for c in chosen), max(c.added for c in chosen)))[:2]
-    return out
-
-
-def _spread(singles: list[Change]) -> list[Change]:
-    """The best changes, not all at one pair: the best of every pair first."""
-    first: list[Change] = []
-    rest: list[Change] = []
-    seen: set[int] = set()
-    for c in singles:
-        (rest if c.item in seen else first).append(c)
-        seen.add(c.item)
-    return (first + rest)[:CHANGES_SHOWN]
-
-
 def effect(before: Freedoms, driven: Index, changes: tuple[Change, ...], engine: EngineName = "auto") -> Effect:
     """The effect of changes, computed from the changed rows at the same position."""
     position = before.position
@@ -333,25 +236,3 @@ def effect(before: Freedoms, driven: Index, changes: tuple[Change, ...], engine:
         (len(before.passive), len(after.passive)),
         tuple(float(np.degrees(c.turn)) for c in changes),
     )
-
-
-def advice(freedoms: Freedoms, driven: Index, finite_mobility: int, engine: EngineName = "auto") -> tuple[Effect, ...]:
-    """Changes worth making: those that remove redundancy without adding input freedoms; for a structure, those that free it."""
-    changes = changes_of(freedoms)
-    effects: list[Effect] = []
-    if not (freedoms.mobility - len(freedoms.passive) and finite_mobility):
-        wider = sorted((c for c in changes if c.added > c.relief), key=lambda c: (c.added, c.item))
-        for plane in (False, True):
-            some = _spread([c for c in wider if (c.effort == PLANE) == plane])[:FREEING]
-            freeing = [effect(freedoms, driven, (c,), engine) for c in some] if not effects else []
-            effects += [e for e in freeing if e.inputs[1] > e.inputs[0]]
-    if freedoms.redundancy:
-        singles, complete = relieving(changes, freedoms.redundancy)
-        found: list[tuple[int, Effect]] = []
-        for chosen in dict.fromkeys((*_mixed(complete), *singles)):
-            new = effect(freedoms, driven, chosen, engine)
-            if new.inputs[1] == new.inputs[0] and new.redundancy[1] < new.redundancy[0] and new not in effects:
-                found.append((max(c.effort for c in chosen), new))
-        found.sort(key=lambda item: (item[0] == PLANE, item[1].redundancy[1] > 0, item[0]))
-        effects += [new for _, new in found]
-    return tuple(effects[: CHANGES_SHOWN + FREEING])
