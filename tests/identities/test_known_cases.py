@@ -171,7 +171,7 @@ def test_pphchp_with_three_parallel_axes_is_under_driven() -> None:
 
 def test_coplanar_pphchp_has_an_instantaneous_freedom() -> None:
     """It only slides, so that the three axes stay coplanar: the rank is the same all along (values of 4e-8 there are a double root's)."""
-    text = str(report("pphchp, coplanar"))
+    text = report("pphchp, coplanar").text(full=True)
     assert "instantaneous" in text
     assert "Overconstrained by its dimensions" in text
     assert "Singular here" not in text
