@@ -17,7 +17,7 @@ from mechgraph.errors import (
     ReachError,
     ResponseError,
 )
-from mechgraph.exchange.files import load
+from mechgraph.exchange.files import load, save
 from mechgraph.kinetostatics import assemble, kinematics, solve
 from mechgraph.model.chain import chain
 from mechgraph.model.coupling import Coupling
@@ -32,7 +32,6 @@ from mechgraph.model.motion import Motion
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.pair_table import pair_types
 from mechgraph.model.pair_type import Bookkeeping, Component, Freedom, PairType
-from mechgraph.model.toml import save
 from mechgraph.report.report import DeterminacyReport, check
 from mechgraph.response.respond import Response, respond
 from mechgraph.response.small_motion import equilibrium, linearize
