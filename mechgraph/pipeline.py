@@ -268,6 +268,7 @@ class Outcome:
         work = found.work
         work.positions, work.nodes = len(variant), len(found.tracks.nodes)
         self.trajectory.engine, self.trajectory.work = line.engine, work
+        self.trajectory.loads = starts.loads
         self._fill()
 
     def _fill(self) -> None:

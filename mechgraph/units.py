@@ -6,8 +6,8 @@ A number of dimension ``(a, b, c)`` carries the unit ``length^a mass^b time^c``.
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping, Sequence
-from math import prod
+from collections.abc import Callable, Mapping, Sequence
+from math import isclose, prod
 
 from mechgraph.errors import DeclarationError, MissingExtraError
 
@@ -27,39 +27,97 @@ FORCE_PER_LENGTH: Dimension = (0, 1, -2)
 FORCE_PER_VELOCITY: Dimension = (0, 1, -1)
 MOMENT_PER_RATE: Dimension = (2, 1, -1)
 
-COHERENT: dict[tuple[str, ...], dict[tuple[float, ...], str]] = {("m", "kg", "s"): {FORCE: "N", MOMENT: "N m"}}
-"""Sets of units whose derived units have names of their own."""
+KNOWN: dict[str, dict[str, float]] = {
+    "length": {
+        "m": 1.0,
+        "dm": 0.1,
+        "cm": 0.01,
+        "mm": 1e-3,
+        "um": 1e-6,
+        "µm": 1e-6,
+        "km": 1e3,
+        "ft": 0.3048,
+        "in": 0.0254,
+    },
+    "mass": {
+        "kg": 1.0,
+        "g": 1e-3,
+        "mg": 1e-6,
+        "t": 1e3,
+        "tonne": 1e3,
+        "Mg": 1e3,
+        "slug": 0.45359237 * 9.80665 / 0.3048,
+    },
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6},
+}
+"""Units of a base in terms of m, kg, s, as far as they make forces that have names."""
+FORCES = {"N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "µN": 1e-6, "nN": 1e-9, "dyn": 1e-5, "lbf": 0.45359237 * 9.80665}
+"""Units of force in N."""
+USUAL = ("N", "kN", "MN", "lbf")
+"""Those in which people think."""
+
+
+def force_unit(units: Mapping[str, str]) -> str:
+    """The name of the force ``mass length / time^2`` of a set of units; empty where it has none."""
+    if not all(units.get(base) in known for base, known in KNOWN.items()):
+        return ""
+    length, mass, time = (KNOWN[base][units[base]] for base in BASE_UNITS)
+    return next((name for name, size in FORCES.items() if isclose(size, mass * length / time**2, rel_tol=1e-9)), "")
+
+
+def force_hint(units: Mapping[str, str]) -> str:
+    """What to say where the unit of force that belongs to a set of units is not a usual one; empty where it is, or is not known."""
+    name = force_unit(units)
+    if not name or name in USUAL:
+        return ""
+    set_, others = ", ".join(units[base] for base in BASE_UNITS), ("t", "kg", "g")
+    better = next((mass for mass in others if force_unit({**units, "mass": mass}) == "N"), "")
+    advice = (
+        f"mass in {better} would make it N, m.to_units(mass={better!r})"
+        if better
+        else "m.to_units(length='m', mass='kg') makes it N"
+    )
+    return f"Units: {set_} belong to the force {name} ({FORCES[name]:g} N), in which loads are read and results given; {advice}."
+
+
+def _shortest(dimension: Sequence[float], force: bool = True) -> dict[str, float]:
+    """Powers by the letters L, M, T and F = M L/T^2, whichever way is shorter."""
+    a, b, c = dimension
+    ways = [{"M": b, "L": a, "T": c}, {"F": b, "L": a - b, "T": c + 2 * b}]
+    return min(ways[: 1 + force], key=lambda way: sum(map(abs, way.values())))
 
 
 def unit_of(units: Mapping[str, str], dimension: Sequence[float]) -> str:
-    """The unit of ``length^a mass^b time^c`` in the declared units; empty where units are not declared or not needed.
+    """The unit of ``length^a mass^b time^c`` in the declared units, ``N mm``, ``m/s^2``; empty where units are not declared or not needed.
 
-    Angles are radians and shown without a unit of their own.
+    A pure number of three exponents is an angle, in radians, and so is what is left of a rate.
     """
-    if not units or len(dimension) != 3:
+    if (
+        not units
+        or len(dimension) != 3
+        or any(p and base not in units for base, p in zip(BASE_UNITS, dimension, strict=True))
+    ):
         return ""
-    own = COHERENT.get(tuple(units.get(name, "") for name in BASE_UNITS), {})
-    if tuple(dimension) in own:
-        return own[tuple(dimension)]
-    parts = ["rad"] if not any(dimension[:2]) and dimension[2] <= 0 else []
-    for name, power in zip(BASE_UNITS, dimension, strict=True):
-        if power and name in units:
-            parts.append(units[name] if power == 1 else f"{units[name]}^{power:g}")
-    return " ".join(parts)
+    force = force_unit(units)
+    names = {"F": force, "L": units.get("length", ""), "M": units.get("mass", ""), "T": units.get("time", "")}
+    powers = {names[letter]: n for letter, n in _shortest(dimension, bool(force)).items() if n}
+    angle = "rad" if not any(dimension[:2]) and dimension[2] <= 0 else ""
+    return _quotient(powers, lambda n: f"^{n:g}", angle)
 
 
 def symbol_of(dimension: Dimension) -> str:
-    """A dimension in the letters L, M, T and F = M L/T², whichever way is shorter: ``F L``, ``M L²``, ``L/T²``; empty for a pure number."""
-    a, b, c = dimension
-    ways = [{"M": b, "L": a, "T": c}, {"F": b, "L": a - b, "T": c + 2 * b}]
-    powers = min(ways, key=lambda way: sum(map(abs, way.values())))
-    above = " ".join(_power(letter, n) for letter, n in powers.items() if n > 0)
-    below = " ".join(_power(letter, -n) for letter, n in powers.items() if n < 0)
+    """A dimension in letters: ``F L``, ``M L²``, ``L/T²``; empty for a pure number."""
+    return _quotient(_shortest(dimension), lambda n: {2: "²", 3: "³"}.get(int(n), f"^{n:g}"))
+
+
+def _quotient(powers: Mapping[str, float], power: Callable[[float], str], angle: str = "") -> str:
+    """``F L/T²``: what has a positive power over what has a negative one."""
+    above, below = (
+        " ".join(name + (power(abs(n)) if abs(n) != 1 else "") for name, n in powers.items() if n * sign > 0)
+        for sign in (1, -1)
+    )
+    above = above or angle
     return f"{above or '1'}/{below}" if below else above
-
-
-def _power(letter: str, n: int) -> str:
-    return letter + {1: "", 2: "²", 3: "³"}.get(n, f"^{n}")
 
 
 def base_factors(old: Mapping[str, str], new: Mapping[str, str]) -> tuple[float, float, float]:

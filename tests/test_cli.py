@@ -169,7 +169,7 @@ def test_solve_of_one_position_and_of_a_slide(crank_slider: Path) -> None:
     assert result.exit_code == 0
     assert "Solved 1 of 1 position." in result.stdout
     assert "12.5 mm" in result.stdout
-    row = re.search(r"^A\.Tz \[mm kg s\^-2\] +(\S+)", result.stdout, re.MULTILINE)
+    row = re.search(r"^A\.Tz \[mN\] +(\S+)", result.stdout, re.MULTILINE)
     assert row is not None
     assert np.isclose(float(row[1]), 2.0 * 3.0 + 7.0)
 

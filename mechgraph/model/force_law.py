@@ -41,11 +41,11 @@ class Law(BaseLoad):
 
     def act(self, site: LoadSite) -> None:
         """Add the effort, or the forces on both links."""
+        length, _, force = self.reading(site)
         if self.in_freedom is not None:
-            site.add_effort(self.in_freedom, self.force(site, *site.freedom(self.in_freedom)))
+            site.add_effort(self.in_freedom, force)
             return
-        p, q, length, u, rate = self._line(site)
-        force = self.force(site, length, rate)
+        p, q, _, u, _ = self._line(site)
         # between points that meet, a force has no direction
         push = np.where((length > 0) | (force == 0), force * u, np.nan)
         site.add_force(self.a, -push, p)
@@ -59,9 +59,17 @@ class Law(BaseLoad):
         u = np.divide(d, length, out=np.zeros_like(d), where=length > 0)
         return p, q, length, u, (u * (vq - vp)).sum(axis=0)
 
-    def coordinate(self, site: LoadSite) -> Array:
-        """The coordinate or distance ``(T,)``."""
-        return self._line(site)[2] if self.in_freedom is None else site.freedom(self.in_freedom)[0]
+    def coordinate(self, site: LoadSite) -> tuple[Array, Array]:
+        """The coordinate or distance ``(T,)`` and its rate."""
+        if self.in_freedom is not None:
+            return site.freedom(self.in_freedom)
+        _, _, length, _, rate = self._line(site)
+        return length, rate
+
+    def reading(self, site: LoadSite) -> tuple[Array, Array, Array]:
+        """Coordinate, rate and force, ``(T,)`` each."""
+        x, v = self.coordinate(site)
+        return x, v, self.force(site, x, v)
 
 
 class Elastic(Law):
@@ -83,7 +91,7 @@ class Elastic(Law):
 
     def energy(self, site: LoadSite) -> Any:
         """``stiffness (x - free)^2 / 2``."""
-        return 0.5 * self.stiffness * (self.coordinate(site) - getattr(self, self.rest)) ** 2
+        return 0.5 * self.stiffness * (self.coordinate(site)[0] - getattr(self, self.rest)) ** 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,4 +232,4 @@ class ForceLaw(_Placed):
 
     def energy(self, site: LoadSite) -> Any:
         """``-scale int F dx``."""
-        return self.scale * self.law.energy(self.coordinate(site) - self.free)
+        return self.scale * self.law.energy(self.coordinate(site)[0] - self.free)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.equations.state import State
+from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.newton import Work
+from mechgraph.quantities import wrong
 from mechgraph.result import export
-from mechgraph.result.views import Checks, CouplingResult, LinkResult, LoadBearing, PairResult, Values
+from mechgraph.result.views import Checks, CouplingResult, LinkResult, LoadBearing, LoadResult, PairResult, Values
 
 if TYPE_CHECKING:
     import os
@@ -64,6 +66,15 @@ class Solution:
         """Values of a coupling."""
         m = self.mechanism
         return CouplingResult(self._values, m.couplings.index(m.coupling(name)))
+
+    def load(self, index: int) -> LoadResult:
+        """What the load of that number in ``mechanism.loads`` does: wrenches on links, power, and how a force law is read."""
+        count = len(self.mechanism.loads)
+        if type(index) is not int or not 0 <= index < count:
+            raise DeclarationError(
+                f"load of {self.mechanism.name!r}", [wrong(index, "index", f"a number below {count}, counted from 0")]
+            )
+        return self._values.load(index)
 
     @property
     def has_forces(self) -> bool:
@@ -124,21 +135,25 @@ class Solution:
 
     # --- tables --------------------------------------------------------------------------------------------------------
 
-    def columns(self) -> Mapping[str, Array]:
-        """All numbers of the table by column name with unit, ``(...)`` each."""
-        return export.columns(self._values)
+    def columns(self, include: Sequence[export.Include] = ()) -> Mapping[str, Array]:
+        """All numbers of the table by column name with unit, ``(...)`` each.
 
-    def to_pandas(self) -> pandas.DataFrame:
-        """A DataFrame, one row a position (``pandas`` extra)."""
-        return export.to_pandas(self._values)
+        ``include`` adds the motion of named ``"points"``, the poses of ``"links"`` (origin x, y, z and rotation matrix Rxx, Rxy, ...) with
+        angular rates, the motion of mass ``"centers"``, and what the ``"loads"`` do.
+        """
+        return export.columns(self._values, include)
 
-    def to_xarray(self) -> xarray.Dataset:
-        """A Dataset over the batch axes (``xarray`` extra)."""
-        return export.to_xarray(self._values)
+    def to_pandas(self, include: Sequence[export.Include] = ()) -> pandas.DataFrame:
+        """A DataFrame, one row a position (``pandas`` extra); ``include`` as in ``columns``."""
+        return export.to_pandas(self._values, include)
 
-    def to_csv(self, path: str | os.PathLike[str]) -> None:
-        """Write the table as CSV, whole or not at all."""
-        export.to_csv(self._values, path)
+    def to_xarray(self, include: Sequence[export.Include] = ()) -> xarray.Dataset:
+        """A Dataset over the batch axes (``xarray`` extra); ``include`` as in ``columns``."""
+        return export.to_xarray(self._values, include)
+
+    def to_csv(self, path: str | os.PathLike[str], include: Sequence[export.Include] = ()) -> None:
+        """Write the table as CSV, whole or not at all; ``include`` as in ``columns``."""
+        export.to_csv(self._values, path, include)
 
     def __repr__(self) -> str:
         return f"Solution({self.mechanism.name!r}, batch {self.batch})"

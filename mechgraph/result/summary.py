@@ -12,7 +12,7 @@ from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Tab
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.result.solution import Solution
-from mechgraph.units import unit_of
+from mechgraph.units import force_hint, unit_of
 
 OK = "ok"
 """Status of a solved position."""
@@ -47,7 +47,8 @@ def summary(s: Solution, not_unique: Mapping[str, Mapping[str, bool]] | None = N
         blocks += [*view.redundant(not_unique), *view.passive()]
     if view.solved.any():
         blocks += view.checks()
-    blocks.append(view.work())
+    hint = force_hint(s.mechanism.units)
+    blocks += [view.work(), *([Paragraph(hint)] if hint and s.has_forces else [])]
     return Document(f"Solution of {s.mechanism.name}", tuple(blocks))
 
 

@@ -21,15 +21,17 @@ from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.rates import Rates, Velocities
 from mechgraph.equations.state import State
 from mechgraph.errors import MechgraphError
-from mechgraph.force.applied_loads import user_poses, user_twists
+from mechgraph.force.applied_loads import Site, user_poses, user_twists
 from mechgraph.force.block import BlockForces
 from mechgraph.force.dalembert import given_effort_loads
 from mechgraph.force.passive_hold import hold_names, is_idle, turns
+from mechgraph.model.force_law import Law
+from mechgraph.model.load import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.newton import Work
 from mechgraph.numerics.tolerances import MOTIONS
 from mechgraph.result.states import flat_place, user_state, user_wrench
-from mechgraph.result.views import Checks, LoadBearing, MaterialPoint
+from mechgraph.result.views import Checks, LoadBearing, LoadResult, MaterialPoint
 from mechgraph.structure.passive import PassiveMotion
 from mechgraph.structure.reaction_split import UNIQUE, PairFrames
 from mechgraph.units import unit_of
@@ -92,7 +94,9 @@ class Trajectory:
         self._system, self._system_at, self._mask = system, system_at, mask_redundant
         self._L = system.par.L
         self._coordinates = coordinates
+        self.loads: tuple[Load, ...] = self.whole.loads
         self._count = int(np.prod(batch))
+        self._asked = batch, t, np.arange(self._count)
         self._status = np.full(self._count, Status.OK.value, dtype="U24")
         self._kept: dict[str, Array] = {}
         self._largest = np.zeros(2)
@@ -153,6 +157,7 @@ class Trajectory:
         out.t = None if self.t is None else np.broadcast_to(self.t, self.batch).reshape(-1)[places]
         out._system_at = lambda at: self._system_at(which[at])
         out._coordinates = self._coordinates[:, places]
+        out._asked = (*self._asked[:2], self._asked[2][places])
         out._status, out._solved = self._status[places], self._solved[places]
         out._kept = {name: values[..., places] for name, values in self._kept.items()}
         out._motions = []
@@ -380,6 +385,30 @@ class Trajectory:
             unit = unit_of(m.units, (2 if turns(motion) else 1, 1, -2))
             out.append(LoadBearing(name, turns(motion), float(np.nanmax(np.abs(size))), unit, links, pairs, freedoms))
         return tuple(out)
+
+    def load(self, index: int) -> LoadResult:
+        """What one load does."""
+        load, L = self.loads[index], self._L
+        links = () if load.in_freedom is not None else load.links(self.mechanism)
+        batch, t, asked = self._asked
+
+        def effect(block: BlockMotion) -> Array:
+            here, rates = block.here, block.rates
+            site = Site(here, rates, self._coordinates[:, block.places], batch, asked[block.places], t)
+            site.collect((load,))
+            wrenches, efforts = site.applied(), site.scaled_efforts()
+            power = (rates.V * wrenches).sum(axis=(0, 1)) + (rates.dq * efforts).sum(axis=0)
+            on_links = [user_wrench(self._system.par, wrenches[:, self.mechanism.link_index[name]]) for name in links]
+            read = (
+                load.reading(site)
+                if isinstance(load, Law)
+                else (*np.full((2, here.T), np.nan), site.efforts.sum(axis=0))
+            )
+            return np.concatenate([*on_links, np.stack([L**2 * power, *read])])
+
+        found = self._evaluated(effect) if self._solved.any() else np.full((6 * len(links) + 4, self._count), np.nan)
+        wrenches = {name: self._out(found[6 * i : 6 * i + 6]) for i, name in enumerate(links)}
+        return LoadResult(load, wrenches, *(self._out(row) for row in found[6 * len(links) :]))
 
     # --- checks and states -----------------------------------------------------------------------------------------------
 

@@ -8,6 +8,7 @@ from typing import Any, Literal, NamedTuple, Protocol
 from mechgraph.algebra.se3 import Array
 from mechgraph.equations.state import State
 from mechgraph.errors import DeclarationError
+from mechgraph.model.load import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.numeric import vector_fault
 from mechgraph.numerics.newton import Work
@@ -35,6 +36,22 @@ class MaterialPoint(NamedTuple):
     position: Array
     velocity: Array
     acceleration: Array
+
+
+class LoadResult(NamedTuple):
+    """What one load does, ``(...)`` each.
+
+    ``wrenches``: by the names of the links on which it acts (none for a load in a freedom), (M, F) about the global origin ``(..., 6)``;
+    ``power`` on all links; of a force law ``coordinate``, ``rate`` and ``force`` along the coordinate; of an effort the ``force`` is
+    the effort.
+    """
+
+    load: Load
+    wrenches: dict[str, Array]
+    power: Array
+    coordinate: Array
+    rate: Array
+    force: Array
 
 
 @dataclass(frozen=True)
@@ -125,6 +142,9 @@ class Values(Protocol):
 
     def shaking(self) -> Array:
         """Wrench on the frame about the global origin, ``(..., 6)``."""
+
+    def load(self, index: int) -> LoadResult:
+        """What one load does."""
 
     def passive_efforts(self) -> dict[str, Array]:
         """What keeps passive bodies at rest, by name."""
