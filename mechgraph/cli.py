@@ -82,7 +82,16 @@ Drives = Annotated[
         help="Motion of a driver, the end excluded: A=0:360:1deg@10, B.Tz=0:0.1:0.01, or one value A=30deg. Angles in rad, "
         "or in deg where the suffix says so; lengths, rates and accelerations in the declared units (rates of turns in "
         "rad/s, or @600deg). "
-        "Repeat for several drivers: they describe the same positions. Without it the stored motion.",
+        "Repeat for several drivers: they describe the same positions. Also coordinates of a named point (bucket.tip.Tz, or "
+        "bucket.tip.T(1,0,1) along a direction) and of a link (platform.Rz). Without it the stored motion.",
+    ),
+]
+Actuate = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--actuate",
+        metavar="FREEDOM",
+        help="A freedom in which an unknown effort stands, in place of those that are moved (repeat: as many as these).",
     ),
 ]
 Out = Annotated[
@@ -405,6 +414,7 @@ def respond(
 def solve(
     mechanism: Named,
     drive: Drives = None,
+    actuate: Actuate = None,
     out: Out = None,
     method: Method = "loop_wrench",
     redundant: Redundant = "nan",
@@ -425,7 +435,8 @@ def solve(
     with _working(f"solving {m.name}"):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", mg.MechgraphWarning)  # the summary has them
-            s = mg.solve(m, motions or None, method=method, redundant=redundant, on_reach=on_reach, engine=engine)
+            how: dict[str, Any] = {"method": method, "redundant": redundant, "on_reach": on_reach, "engine": engine}
+            s = mg.solve(m, motions or None, actuate=actuate, **how)
         unique = mg.check(s.mechanism).unique if redundant == "minimum_norm" else None
         document = summary(s, unique)
         if out is not None:

@@ -8,6 +8,7 @@ from typing import NoReturn
 
 import numpy as np
 
+from mechgraph.closure.prescription import coordinate
 from mechgraph.errors import MechgraphError, shortened
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
@@ -74,15 +75,22 @@ def _turns(m: Mechanism, name: str, where: str) -> bool:
     fault = m.freedom_fault(name, single=True)
     if fault:
         refuse(where, fault)
-    k, j = m.freedom(name)
-    return m.pairs[k].type.freedoms[j].turns
+    return m.turns(name)
+
+
+def _coordinate_turns(m: Mechanism, name: str, where: str) -> bool:
+    """Whether a freedom, or a coordinate of a point or link, is an angle."""
+    found = coordinate(m, name)
+    if isinstance(found, str):
+        refuse(where, found)
+    return found
 
 
 def parse_drive(m: Mechanism, text: str) -> tuple[str, Motion]:
     """Freedom and motion of ``A=start:stop:step@rate@acceleration``, the end excluded; a single value in place of the range."""
     where = f"--drive {text!r}"
     name, rest = named_value(text, "--drive")
-    turns = _turns(m, name, where)
+    turns = _coordinate_turns(m, name, where)
     spec, *rates = rest.split("@")
     parts = spec.split(":")
     if len(parts) not in (1, 3) or len(rates) > 2:
@@ -107,10 +115,13 @@ def parse_drive(m: Mechanism, text: str) -> tuple[str, Motion]:
 def drives_of(m: Mechanism, texts: Sequence[str]) -> dict[str, Motion]:
     """The motions of all drives."""
     out: dict[str, Motion] = {}
+    known: set[str] = set()
     for text in texts:
         name, motion = parse_drive(m, text)
-        if m.full_name(name) in {m.full_name(n) for n in out}:
+        full = name if m.freedom_fault(name, single=True) else m.full_name(name)
+        if full in known:
             refuse(f"--drive {text!r}", f"{name} is given twice")
+        known.add(full)
         out[name] = motion
     return out
 

@@ -174,6 +174,40 @@ def test_solve_of_one_position_and_of_a_slide(crank_slider: Path) -> None:
     assert np.isclose(float(row[1]), 2.0 * 3.0 + 7.0)
 
 
+def test_a_point_is_moved_by_a_cylinder(tmp_path: Path) -> None:
+    """Level, by hand: lift sqrt(2) = 5 * 1000; the same as through Python."""
+    z = (0, 0, 1)
+    crane = mg.Mechanism("crane", [
+        mg.Link("frame"), mg.Link("arm", points={"hook": (5, 0, 0)}), mg.Link("tube"), mg.Link("rod"),
+    ], [
+        mg.Pair("A", "R", "frame", "arm", point=(0, 0, 0), axis=z), mg.Pair("B", "R", "frame", "tube", point=(1, -1, 0), axis=z),
+        mg.Pair("lift", "P", "tube", "rod", point=(1, -1, 0), axis=(1, 1, 0)), mg.Pair("C", "R", "rod", "arm", point=(2, 0, 0), axis=z),
+    ], loads=[mg.Wrench("arm", force=(0, -1000, 0), point="hook")])  # fmt: skip
+    mg.save(crane, tmp_path / "crane.toml")
+    out = tmp_path / "crane.csv"
+    result = run(
+        "solve", tmp_path / "crane.toml", "--drive", "arm.hook.Ty=0:2:0.5@1", "--actuate", "lift", "--out", out
+    )
+    assert result.exit_code == 0, result.output
+    assert "arm.hook.Ty     0  1.5     1" in result.stdout
+    rows = list(csv.DictReader(out.read_text().splitlines()))
+    assert float(rows[0]["lift.Tz effort"]) == pytest.approx(5000 / np.sqrt(2))
+    assert float(rows[3]["arm.hook.Ty"]) == pytest.approx(1.5)
+    s = mg.solve(crane, {"arm.hook.Ty": mg.Motion(np.arange(0, 2, 0.5), 1.0)}, actuate=["lift"])
+    np.testing.assert_allclose([float(row["lift.Tz effort"]) for row in rows], s["lift"].effort[:, 0], rtol=1e-12)
+    along = run("solve", tmp_path / "crane.toml", "--drive", "arm.hook.T(0,1,0)=0.5")
+    assert "arm.hook.T(0,1,0)" in along.stdout
+    turned = run("solve", tmp_path / "crane.toml", "--drive", "arm.Rz=0:20:10deg", "--actuate", "lift")
+    assert turned.exit_code == 0, turned.output
+    where = tmp_path / "crane.toml"
+    assert "has several coordinates; give one or more of arm.hook.Tx" in bad("solve", where, "--drive", "arm.hook=1")
+    assert "link 'arm' has no point 'tip' (its points: hook)" in bad("solve", where, "--drive", "arm.tip.Ty=1")
+    assert "unit 'deg' in '1deg': the freedom is a length" in bad("solve", where, "--drive", "arm.hook.Ty=1deg")
+    assert "given twice" in bad("solve", where, "--drive", "arm.hook.Ty=1", "--drive", "arm.hook.Ty=2")
+    stuck = run("solve", where, "--drive", "arm.hook.Ty=1", "--actuate", "lift", "--actuate", "A")
+    assert (stuck.exit_code, "2 freedoms are named, 1 independent motion is prescribed" in stuck.stderr) == (1, True)
+
+
 def test_both_methods_print_the_same() -> None:
     first, second = (run("solve", "7r", "--method", method).stdout for method in ("loop_wrench", "newton_euler"))
     assert first.partition("Checks")[0] == second.partition("Checks")[0]

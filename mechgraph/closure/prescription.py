@@ -69,7 +69,8 @@ def target_of(m: Mechanism, name: str) -> Target | str:
                 target if target.part in SLIDES or _direction(target.part) is not None else _NO_DIRECTION.format(name)
             )
         if m.freedom_fault(rest, single=False) is not None:
-            return f"{link.point_fault(rest)}; of a link itself {', '.join((*SLIDES, *TURNS))} can be given"
+            point = found["point"] if found else rest
+            return f"{link.point_fault(point)}; of a link itself {', '.join((*SLIDES, *TURNS))} can be given"
     return str(m.freedom_fault(name, single=True))
 
 
