@@ -33,6 +33,7 @@ from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.pair_table import pair_types
 from mechgraph.model.pair_type import Bookkeeping, Component, Freedom, PairType
 from mechgraph.report.report import DeterminacyReport, check
+from mechgraph.response.events import Event
 from mechgraph.response.respond import Response, respond
 from mechgraph.response.small_motion import equilibrium, linearize
 from mechgraph.result.solution import Solution
@@ -51,6 +52,7 @@ __all__ = [
     "DeterminacyReport",
     "Drive",
     "Effort",
+    "Event",
     "FileError",
     "ForceLaw",
     "ForceTable",

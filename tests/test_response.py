@@ -273,6 +273,30 @@ def test_bad_input_is_named(arguments, words):
         mg.respond(windows(1), **{"t": (0, 1), **arguments})
 
 
+def test_events_are_found_and_end_the_motion():
+    """The pendulum passes its lowest place every half period; the bar's tension reaches 20 N on the way; terminal ones end it there."""
+    period = 2.36784194757624
+    lowest = mg.Event("A", np.pi / 2)
+    r = mg.respond(pendulum(), (0, 2 * period), rtol=1e-11, atol=1e-13, events=[lowest])
+    np.testing.assert_allclose([e.t for e in r.events], period * (np.arange(4) / 2 + 0.25), atol=1e-9)
+    assert [e.rising for e in r.events] == [True, False, True, False]
+    still = mg.Event("A", what="velocity", direction=-1, terminal=True)
+    ended = mg.respond(pendulum(), np.linspace(0, 4, 401), rtol=1e-11, atol=1e-13, events=still)
+    assert ended.t[-1] == pytest.approx(period / 2, abs=1e-9)
+    assert ended["A"].position[-1, 0] == pytest.approx(np.pi, abs=1e-8)
+    assert "passes 0 at t" in ended.stopped
+
+    def tension(s):
+        return np.linalg.norm(s["A"].force)
+
+    pulled = mg.respond(pendulum(), (0, 2.0), rtol=1e-11, atol=1e-13, events=[mg.Event(tension, 20.0, direction=1)])
+    # 3 g sin(angle from level) = 20
+    found = pulled.at(pulled.events[0].t)["A"].position[0]
+    assert 3 * G * np.sin(found) == pytest.approx(20.0, abs=1e-7)
+    with pytest.raises(mg.DeclarationError, match="unknown freedom"):
+        mg.respond(pendulum(), (0, 1), events=[mg.Event("Q")])
+
+
 def test_samples_that_end_too_early():
     """A table that ends before the motion does."""
     motion = mg.Motion(np.linspace(0, 1, 11), velocity=1.0, t=np.linspace(0, 1, 11))

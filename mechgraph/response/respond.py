@@ -21,6 +21,7 @@ from mechgraph.numerics.linear import rank_of, singular_values
 from mechgraph.numerics.tolerances import MOTIONS
 from mechgraph.response.along_path import Arc, PathStage
 from mechgraph.response.charts import ChartStage, Task
+from mechgraph.response.events import Event, Occurrence, Watch, read_events
 from mechgraph.response.integration import METHODS, Integration, Stage, Stopped
 from mechgraph.response.motion_equations import Loads
 from mechgraph.response.prescribed import Prescribed
@@ -58,9 +59,11 @@ class Response(Solution):
     ----------
     energy : kinetic and potential energy, and the work done.
     stopped : why the motion was not followed to its end; empty where it was.
+    events : what happened, in the order of time.
     """
 
     stopped = ""
+    events: tuple[Occurrence, ...] = ()
 
     def __init__(self, trajectory: Trajectory, energy: Energy, motion: _Motion) -> None:
         super().__init__(trajectory)
@@ -128,6 +131,7 @@ def respond(
     atol: float = 1e-10,
     method: str = "auto",
     engine: str = "auto",
+    events: Iterable[Event] = (),
     on_stop: Literal["raise", "return"] = "raise",
     progress: Callable[[float], None] | None = None,
 ) -> Response:
@@ -148,6 +152,7 @@ def respond(
     method : a stepper of ``scipy.integrate``: explicit ``"RK23"``, ``"RK45"``, ``"DOP853"``, for stiff laws ``"Radau"``, ``"BDF"``,
         ``"LSODA"``; ``"auto"`` is DOP853.
     engine : as in ``solve``.
+    events : ``Event``s to be watched; a terminal one ends the motion, at its time.
     on_stop : where the motion cannot be followed to its end, or is interrupted: ``"raise"``, or ``"return"`` what there is, with
         ``stopped`` saying why.
     progress : called with the time reached after every step.
@@ -164,6 +169,8 @@ def respond(
         for name, value in (("rtol", rtol), ("atol", atol))
         if not isinstance(value, int | float) or not 1e-14 <= value <= 0.1
     ]
+    watched, wrong = read_events(m, events)
+    faults += wrong
     if on_stop not in ("raise", "return"):
         faults.append(f"on_stop = {on_stop!r}: expected 'raise' or 'return'")
     if method not in ("auto", *METHODS):
@@ -181,10 +188,19 @@ def respond(
     dq = _start_rates(m, task, x, rates, begin)
     it = Integration("DOP853" if method == "auto" else method, float(rtol), float(atol))
     motion = _Motion(it, task, m)
+    watch, happened = Watch(watched, motion.response), []
     try:
         for segment in it.run(_first_stage(it, task, begin, x, dq), begin, end):
             if progress is not None:
                 progress(segment.end)
+            for one in watch.passed(segment.begin, segment.end):
+                happened.append(one)
+                if one.event.terminal:
+                    out = motion.response(
+                        np.append(times[times < one.t] if len(times) > 2 else _steps(motion, one.t), one.t)
+                    )
+                    out.stopped, out.events = str(one), tuple(happened)
+                    return out
     except (Stopped, KeyboardInterrupt) as stop:
         reached = it.segments[-1].end if it.segments else begin
         why = (
@@ -197,9 +213,17 @@ def respond(
         so_far = _so_far(motion, times)
         if on_stop == "raise" or so_far is None:
             raise ResponseError(text, so_far) from None
-        so_far.stopped = text
+        so_far.stopped, so_far.events = text, tuple(happened)
         return so_far
-    return motion.response(times if len(times) > 2 else np.concatenate([[begin], motion.ends]))
+    out = motion.response(times if len(times) > 2 else np.concatenate([[begin], motion.ends]))
+    out.events = tuple(happened)
+    return out
+
+
+def _steps(motion: _Motion, end: float) -> Array:
+    """The beginning and the ends of steps before a time."""
+    ends = np.concatenate([[motion.integration.segments[0].begin], motion.ends])
+    return ends[ends < end]
 
 
 def _first_stage(it: Integration, task: Task, begin: float, x: Array, dq: Array) -> Stage:
