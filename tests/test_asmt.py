@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from asmt_writer import KINDS, Writer, lines_of, random_pose, written
+from typer.testing import CliRunner
 
 import mechgraph as mg
+from mechgraph.cli import app
 from mechgraph.exchange.asmt_joints import JOINTS, REFUSED
 from mechgraph.exchange.comparison import compare
 from mechgraph.exchange.formula import FUNCTIONS, FormulaFault, evaluated
@@ -532,6 +534,39 @@ def test_rows_longer_than_the_times_and_times_that_start_again(tmp_path):
     file = tmp_path / "swing.asmt"
     file.write_text(w.text())
     assert compare(file).agrees
+
+
+# --- command line ---------------------------------------------------------------------------------------------------------
+
+
+def run(*arguments):
+    result = CliRunner().invoke(app, [str(a) for a in arguments])
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    return result
+
+
+@pytest.mark.parametrize("command", ["check", "solve"])
+def test_the_command_line_reads_an_assembly_and_compares(tmp_path, command):
+    w = swing()
+    w.part("lamp", np.eye(4))
+    file = tmp_path / "swing.asmt"
+    file.write_text(w.text())
+    plain, both = run(command, file), run(command, file, "--compare")
+    assert plain.exit_code == both.exit_code == 0
+    assert plain.stderr == "mechgraph: swing.asmt: no joint and no motion holds lamp: left out\n"
+    assert both.stdout.startswith(plain.stdout)
+    assert "FreeCAD's stored results beside mechgraph's" in both.stdout
+    assert "All that is unique agrees to 0.0001, at 5 times." in both.stdout
+
+
+def test_the_command_line_compares_assemblies_only(tmp_path):
+    assert "is no FreeCAD assembly" in run("check", "four-bar", "--compare").stderr
+    file = tmp_path / "x.asmt"
+    file.write_text(four_bar().text())
+    result = run("check", file, "--compare")
+    assert (result.exit_code, "holds no results" in result.stderr) == (2, True)
+    assert "exclude each other" in run("check", file, "--compare", "--json").stderr
+    assert run("check", tmp_path / "none.urdf").exit_code == 2
 
 
 def test_lines_are_written_by_their_depth():

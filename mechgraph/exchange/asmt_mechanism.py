@@ -151,13 +151,12 @@ class Builder:
 
     @functools.cached_property
     def size(self) -> float:
-        """Mean radius of the markers and of the origins of the parts; 1 where all are one point."""
+        """Mean radius of the markers and of the mass centres; 1 where all are one point."""
         a = self.assembly
-        points = np.array(
-            [self.pose(path)[:, 3] for path in a.markers] + [part.pose[:, 3] for part in (a.ground, *a.parts.values())]
-        )
+        centers = [part.pose @ [*part.center, 1.0] for part in a.parts.values() if part.center is not None]
+        points = np.array([self.pose(path)[:, 3] for path in a.markers] + centers or [np.zeros(3)])
         radius = float(np.sqrt(((points - points.mean(axis=0)) ** 2).sum(axis=1).mean()))
-        return radius if radius > ROUNDING * float(np.abs(points).max()) else 1.0
+        return radius if radius > ROUNDING * max(1.0, float(np.abs(points).max())) else 1.0
 
     def pair(self, seat: Seat) -> Pair:
         """The pair, marker J moved to its place where it is meant to be there."""
