@@ -54,6 +54,17 @@ class Advice(Finding):
         return m
 
 
+def driving_advice(m: Mechanism, names: tuple[str, ...], replaced: tuple[str, ...], beside: bool) -> tuple[Advice, ...]:
+    """The advice to drive ``names``, in place of the drivers ``replaced``; ``beside`` a change point."""
+    if not names:
+        return ()
+    also = "also " if m.drives and not replaced else ""
+    instead = f" instead of {', '.join(replaced)}" if replaced else ""
+    where = " beside the change point" if beside else ""
+    text = f"drive {also}{', '.join(names)}{instead}: then every freedom is driven or passive{where}"
+    return (Advice(text, names, replaced=replaced, mechanism=m),)
+
+
 def exchanges(effect: Effect, names: Iterable[str] = ()) -> str:
     """Changes by their parts: ``floating bearing (R -> C) at A, ball joint ... (R -> S) at B``; ``names`` are others to choose among."""
     others = list(names)

@@ -14,19 +14,17 @@ from mechgraph.closure.rank import EngineName
 from mechgraph.equations.build import BOOKKEEPINGS, BookkeepingName, formulate
 from mechgraph.equations.terms import Ledger, LedgerRow
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.numerics.linear import independent_rows
 from mechgraph.numerics.tolerances import RANKS
-from mechgraph.report import findings
-from mechgraph.report.advice import Advice
+from mechgraph.report import driving, findings
+from mechgraph.report.advice import Advice, driving_advice
 from mechgraph.report.findings import Finding, LoopFact, PassiveFinding
 from mechgraph.structure.advice import advice
 from mechgraph.structure.finite_motion import FiniteMotion, finite_motion
 from mechgraph.structure.generic import Generic, generic
 from mechgraph.structure.kind import Kind, kind_of, kind_of_mechanism
-from mechgraph.structure.mobility import Freedoms, freedoms_at
+from mechgraph.structure.mobility import Freedoms
 from mechgraph.structure.pair_changes import LARGEST_FOR_SETS, Effect
 from mechgraph.structure.self_stress import SelfStress
-from mechgraph.structure.unique_directions import UniqueDirection
 from mechgraph.structure.uniqueness import Uniqueness, uniqueness
 from mechgraph.topology.linkgraph import LinkGraph
 from mechgraph.topology.matching import Parts, parts_of
@@ -160,16 +158,17 @@ class Facts:
 
     @cached_property
     def kind(self) -> Kind:
-        """Planar, spherical or neither: of all pairs, else of the motion; its place about the internal origin."""
-        return kind_of_mechanism(self.geometry.freedoms, self.motion) if self.geometry else Kind()
+        """Planar, spherical or neither: of all pairs, else of the motion; its normal or centre in the global frame."""
+        g = self.geometry
+        return kind_of_mechanism(g.freedoms, self.motion).in_global(g.system.par) if g else Kind()
 
     @cached_property
     def loop_kinds(self) -> tuple[Kind, ...]:
         """The kind of every loop by its pairs."""
-        g = self.geometry
-        return (
-            tuple(kind_of(g.freedoms.position.rows.S[:, columns]) for columns, _ in g.system.loop_columns) if g else ()
-        )
+        if not (g := self.geometry):
+            return ()
+        S, loops = g.freedoms.position.rows.S, g.system.loop_columns
+        return tuple(kind_of(S[:, columns]).in_global(g.system.par) for columns, _ in loops)
 
     @cached_property
     def own_forces_unique(self) -> bool:
@@ -261,52 +260,36 @@ class Facts:
     @property
     def weak_drives(self) -> list[int]:
         """Columns of the drivers that move least when the mechanism does, and as little as the weakest combination of them."""
-        g = self.geometry
-        if g is None or len(g.driven) < 2:
-            return g.driven.tolist() if g else []
-        size = np.sqrt((g.freedoms.null[g.driven] ** 2).sum(axis=1))
-        return [int(c) for c, mine in zip(g.driven, size, strict=True) if mine < 2 * g.freedoms.drive * size.max()]
+        return driving.weak(self.geometry.freedoms, self.geometry.driven) if self.geometry else []
 
     @cached_property
-    def _drivers_that_move(self) -> Index:
+    def _moving_drives(self) -> Index:
         """Columns of the declared drivers without those that depend on the ones before, stand still, or nearly do (at a dead point)."""
         g = self.geometry
-        columns = independent_rows(g.freedoms.null, g.driven.tolist(), len(g.driven)) if g else []
-        weak = self.weak_drives if self.dead_point and len(columns) == len(self.mechanism.drives) else []
-        return np.array([c for c in columns if [c] != weak], dtype=np.intp)
+        return driving.moving(g.freedoms, g.driven, near=self.dead_point) if g else np.zeros(0, dtype=np.intp)
 
     @cached_property
     def replaced_drives(self) -> tuple[str, ...]:
         """Drivers that do not move the mechanism here, where others are suggested instead of them."""
         g, names = self.geometry, self.mechanism.freedom_names()
-        at_rest = set(g.driven.tolist()) - set(self._drivers_that_move.tolist()) if g and self.suggested_drives else ()
+        at_rest = set(g.driven.tolist()) - set(self._moving_drives.tolist()) if g and self.suggested_drives else ()
         return tuple(names[c] for c in sorted(at_rest))
 
     @cached_property
     def suggested_drives(self) -> tuple[str, ...]:
         """Freedoms that would complete the drivers (all of them where none is declared): at the frame first, independent.
 
-        A driver may stop a motion that was passive, and so leave another one undriven; then more are sought. At a change point there
-        are no more of them than the finite motion needs, and they move in it.
+        At a change point there are no more of them than the finite motion needs, and they move in it.
         """
         g = self.geometry
         if not g:
             return ()
-        moving = columns = self._drivers_that_move
         able, wanted = np.ones(self.freedom_count, dtype=bool), self.freedom_count
         if self.change_point:
             able = findings.moves_nearby(self._null_nearby, self.freedom_count)
             wanted = max((self.finite_mobility or 0) - len(g.freedoms.passive), 0)
-        after = g.freedoms if len(moving) == len(g.driven) else freedoms_at(g.freedoms.position, moving, self.asked)
-        while after.undriven and len(columns) < wanted:
-            both = [*columns.tolist(), *findings.completing(after, able)]
-            independent = np.array(independent_rows(g.freedoms.null, both, wanted), dtype=np.intp)
-            if len(independent) == len(columns):
-                break
-            columns = independent
-            after = freedoms_at(g.freedoms.position, columns, self.asked)
-        names = self.mechanism.freedom_names()
-        return tuple(names[c] for c in np.sort(columns[len(moving) :]))
+        more = driving.suggested(g.freedoms, g.driven, self._moving_drives, able, wanted, self.asked)
+        return tuple(self.mechanism.freedom_names()[c] for c in more)
 
     @cached_property
     def dependent_drives(self) -> tuple[tuple[str, ...], ...]:
@@ -327,11 +310,6 @@ class Facts:
         """For every pair: component -> whether it is unique; ``effort`` for a driven freedom and for a coupling."""
         return self.reactions.unique if self.reactions else {}
 
-    @property
-    def self_stress_count(self) -> int | None:
-        """Number of self-stresses with the declared drivers."""
-        return self.reactions.count if self.reactions else None
-
     @cached_property
     def self_stresses(self) -> tuple[SelfStress, ...]:
         """Reaction states without load, with the declared drivers: a canonical sparse basis.
@@ -339,21 +317,6 @@ class Facts:
         Those that connect loops are left out where they are more than ``structure.uniqueness.CONNECTING``.
         """
         return self.reactions.states if self.reactions else ()
-
-    @property
-    def unique_directions(self) -> tuple[UniqueDirection, ...]:
-        """Directions of force and moment that are unique in a pair though its components are not."""
-        return self.reactions.unique_directions if self.reactions else ()
-
-    @property
-    def combinations(self) -> tuple[tuple[int, str], ...]:
-        """(group, sum) of sums of components across pairs that are unique although their terms are not."""
-        return self.reactions.combinations if self.reactions else ()
-
-    @property
-    def groups_without_combinations(self) -> int:
-        """Number of groups in which such sums were not sought, as they have too many components."""
-        return self.reactions.unsought if self.reactions else 0
 
     @property
     def determinate(self) -> bool:
@@ -378,22 +341,15 @@ class Facts:
     @cached_property
     def advice(self) -> tuple[Advice, ...]:
         """What would make it determinate: drivers to add, changes with their computed effect; each can be applied."""
-        out, g = [], self.geometry
+        g = self.geometry
         if g is None:
             return ()
         m = at_position(self.mechanism, g.system, g.x)
-        if self.suggested_drives:
-            names, drives = ", ".join(self.suggested_drives), self.mechanism.drives
-            what = f"drive {'also ' if drives and not self.replaced_drives else ''}{names}"
-            instead = f" instead of {', '.join(self.replaced_drives)}" if self.replaced_drives else ""
-            where = " beside the change point" if self.change_point else ""
-            then = f"then every freedom is driven or passive{where}"
-            driving = Advice(
-                f"{what}{instead}: {then}", self.suggested_drives, replaced=self.replaced_drives, mechanism=m
-            )
-            out.append(driving)
-        changes = (Advice(e.text, tuple(item for item, _, _ in e.changes), effect=e, mechanism=m) for e in self.effects)
-        return (*out, *changes)
+        drives = driving_advice(m, self.suggested_drives, self.replaced_drives, beside=self.change_point)
+        return (
+            *drives,
+            *(Advice(e.text, tuple(item for item, *_ in e.changes), effect=e, mechanism=m) for e in self.effects),
+        )
 
 
 def counted_ledger(m: Mechanism, bookkeeping: str) -> Ledger:

@@ -14,7 +14,7 @@ from mechgraph.equations.terms import Ledger
 from mechgraph.model.pair_table import TABLE
 from mechgraph.numerics.tolerances import RANKS
 from mechgraph.report.facts import Facts
-from mechgraph.report.sentences import assumed, kind_line, loop_names, mobility_line, place, reasons, verdict
+from mechgraph.report.sentences import assumed, kind_line, loop_names, mobility_line, reasons, verdict
 from mechgraph.report.words import component_words, listed, plural
 from mechgraph.structure.pair_changes import LARGEST_FOR_SETS
 
@@ -76,12 +76,17 @@ _VALUES: dict[str, Callable[[Facts], Any]] = {
         {"steps": _plain(loop), **_plain(fact)} for loop, fact in zip(r.loops, r.loop_facts, strict=True)
     ],
     "ledger": lambda r: {name: _ledger_data(r.ledger(name)) for name in ("lee", "minimal")},
-    "kind": lambda r: {"name": r.kind.name, "by_pairs": r.kind.by_pairs, "place": place(r, r.kind)},
+    "kind": lambda r: {key: _plain(getattr(r.kind, key)) for key in ("name", "is_direction", "place", "by_pairs")},
     "loop_kinds": lambda r: [kind.name for kind in r.loop_kinds],
     "advice": lambda r: [
         {key: _plain(getattr(a, key)) for key in ("text", "freedoms", "links", "axis", "brief")} for a in r.advice
     ],
-    "unique_directions": lambda r: [{"text": d.text, **_plain(d)} for d in r.unique_directions],
+    "self_stress_count": lambda r: r.reactions.count if r.reactions else None,
+    "unique_directions": lambda r: (
+        [{"text": d.text, **_plain(d)} for d in r.reactions.unique_directions] if r.reactions else []
+    ),
+    "combinations": lambda r: _plain(r.reactions.combinations) if r.reactions else [],
+    "groups_without_combinations": lambda r: r.reactions.unsought if r.reactions else 0,
 }
 """Facts whose plain data are not those of the attribute of that name."""
 
@@ -121,15 +126,6 @@ def _why(r: Facts) -> Iterator[Block]:
         yield Paragraph(mobility_line(r))
     if r.geometry:
         yield Bullets((*reasons(r), *assumed(r)))
-
-
-def _best_change(r: Facts) -> Iterator[Block]:
-    """The change that removes most redundancy, in one line near the top."""
-    better = [e for e in r.effects if e.redundancy[1] < e.redundancy[0]]
-    if better:
-        best = min(better, key=lambda e: e.redundancy[1])
-        start = "To remove all redundancy" if not best.redundancy[1] else "To lower the redundancy"
-        yield Paragraph(f"{start}: {best.text} (more under Advice).")
 
 
 def _drivers(r: Facts) -> Iterator[Block]:
@@ -188,18 +184,20 @@ def _stresses(r: Facts) -> Iterator[Block]:
 
 def _combined(r: Facts) -> Iterator[Block]:
     """Directions and sums that are unique though components are not; sums of many terms are only in the JSON."""
-    if r.unique_directions:
+    if not (known := r.reactions):
+        return
+    if known.unique_directions:
         yield Paragraph("Directions in the axes x, y, z of the pair's marker.")
-        yield from _listed(d.text for d in r.unique_directions)
-    if r.combinations:
-        lines = [f"group {group + 1}: {text}" for group, text in r.combinations if text.count(":") <= TERMS]
-        more = len(r.combinations) - len(lines)
+        yield from _listed(d.text for d in known.unique_directions)
+    if known.combinations:
+        lines = [f"group {group + 1}: {text}" for group, text in known.combinations if text.count(":") <= TERMS]
+        more = len(known.combinations) - len(lines)
         if more:
             lines.append(f"{'and ' if lines else ''}{more} of more than {TERMS} terms (see report.to_dict())")
         yield Paragraph("These sums are unique though their terms are not:")
         yield from _listed(lines)
-    if r.groups_without_combinations:
-        where = f"{plural(r.groups_without_combinations, 'group')} of many components"
+    if known.unsought:
+        where = f"{plural(known.unsought, 'group')} of many components"
         yield Paragraph(f"Sums across pairs were not sought in {where}.")
 
 
@@ -263,7 +261,7 @@ SECTIONS = (
     Section("", ("links", "pairs", "mobility_by_count", "generic", "mobility", "redundancy"), _numbers),
     Section("", ("kind", "loop_kinds", "own_forces_unique"), lambda r: [Paragraph(kind_line(r))]),
     Section("", ("inputs", "finite_mobility", "stroke", "excess", "change_point", "margin", "near"), _why),
-    Section("", ("effects",), _best_change),
+    Section("Advice", ("effects", "advice", "sets_not_sought"), _advice),
     Section("Neither driven nor passive", ("undriven",), _findings("undriven")),
     Section("Passive freedoms", ("passive",), _findings("passive")),
     Section("Locked freedoms", ("locked",), _findings("locked")),
@@ -277,7 +275,6 @@ SECTIONS = (
     Section(
         "Unique only in combination", ("unique_directions", "combinations", "groups_without_combinations"), _combined
     ),
-    Section("Advice", ("advice", "sets_not_sought"), _advice),
     Section("Loops", ("loops",), _loops),
     Section("By count alone (unknowns matched to equations)", ("parts",), _count),
     Section("Ledger of the force equations (unknowns / equations)", ("ledger",), _ledger),

@@ -329,12 +329,12 @@ def mobility_line(r: Facts) -> str:
 def kind_line(r: Facts) -> str:
     """What kind of mechanism it is, or of what kinds its loops are."""
     how = "" if r.kind.by_pairs else " in its motion, not in all of its pairs"
-    if r.kind.name and r.geometry:
-        return f"{r.kind.name.capitalize()}{how}: {place(r, r.kind)}."
+    if r.kind.name:
+        return f"{r.kind.name.capitalize()}{how}: {place(r.kind)}."
     names = [kind.name for kind in r.loop_kinds]
     if not any(names):
         return ""
-    kinds = {(kind.name, place(r, kind)) for kind in r.loop_kinds}
+    kinds = {(kind.name, place(kind)) for kind in r.loop_kinds}
     parts = []
     for name in dict.fromkeys(names):
         of = [i for i, other in enumerate(names) if other == name]
@@ -344,13 +344,9 @@ def kind_line(r: Facts) -> str:
     return f"Loops of different kinds: {'; '.join(parts)}." if len(parts) > 1 or len(kinds) > 1 else f"All {parts[0]}."
 
 
-def place(r: Facts, kind: Kind) -> str:
-    """The plane or the centre of a kind, in the global frame."""
-    if not kind.name or r.geometry is None:
-        return ""
-    par, values = r.geometry.system.par, np.array(kind.place)
-    shown = values if kind.is_direction else par.L * values + par.origin
-    return f"{'normal of the plane' if kind.is_direction else 'centre'} {vector(tuple(shown.tolist()))}"
+def place(kind: Kind) -> str:
+    """The plane or the centre of a kind."""
+    return f"{'normal of the plane' if kind.is_direction else 'centre'} {vector(kind.place)}" if kind.name else ""
 
 
 def doubts(r: Facts) -> list[str]:

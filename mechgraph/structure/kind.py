@@ -18,6 +18,7 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array, skew
 from mechgraph.closure.rank import ClosureRank
+from mechgraph.model.parameters import Parameters
 from mechgraph.numerics.tolerances import MOTIONS, RANKS
 from mechgraph.structure.finite_motion import FiniteMotion
 from mechgraph.structure.mobility import Freedoms
@@ -44,6 +45,11 @@ class Kind:
     def twists(self) -> Array:
         """Orthonormal twists ``(6, 3)`` of the kind; none for neither."""
         return np.zeros((6, 0)) if self.outside is None else np.linalg.svd(self.outside)[2][3:].T
+
+    def in_global(self, par: Parameters) -> Kind:
+        """The kind with its centre in the global frame."""
+        centre = par.L * np.array(self.place) + par.origin if self.place and not self.is_direction else self.place
+        return replace(self, place=tuple(map(float, centre)))
 
     def holds(self, twists: Array) -> bool:
         """Whether twists ``(6, n)`` are all of this kind."""
