@@ -228,8 +228,15 @@ def test_a_report_holds_the_same_at_any_size(n: int) -> None:
     text = " ".join(report.text(full=True).split())
     assert (report.mobility, report.finite_mobility, report.redundancy) == (1, 1, 3 * n)
     assert report.excess == {"structural": 3 * n - 1, "dimensions": 1, "here": 0}
-    assert [len(e.changes) for e in report.effects] == ([n, n, n + 1, n + 1, 1, 1, 1, 1, 1] if n < 60 else [1] * 6)
-    assert report.sets_not_sought == ("Sets of changes were not sought: redundancy above 120." in text) == (n == 60)
+    assert [len(e.changes) for e in report.effects] == (
+        [n, n, n + 1, n + 1, 1, 1, 1, 1, 1] if n < 60 else [60, 1, 1, 1, 1, 1, 1]
+    )
+    assert report.effects[0].redundancy == (3 * n, 0)
+    assert (
+        report.sets_not_sought
+        == ("Smaller sets of changes were not sought: redundancy above 120." in text)
+        == (n == 60)
+    )
     assert report.reactions is not None
     assert report.reactions.groups == 1
     assert len(report.self_stresses) == 3 * n

@@ -28,7 +28,7 @@ def advice(freedoms: Freedoms, driven: Index, finite_mobility: int, engine: Engi
             freeing = [effect(freedoms, driven, (c,), engine) for c in some] if not effects else []
             effects += [e for e in freeing if e.inputs[1] > e.inputs[0]]
     if freedoms.redundancy:
-        singles, complete = relieving(changes, freedoms.redundancy)
+        singles, complete = relieving(position, changes, freedoms.redundancy)
         found: list[tuple[int, Effect]] = []
         on_balls = between_balls(position, changes, freedoms.redundancy)
         for chosen in dict.fromkeys((*on_balls, *mixed(complete), *singles)):

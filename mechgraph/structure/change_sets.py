@@ -6,6 +6,7 @@ their powers one below the other.
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,21 +26,42 @@ BEAM = 12
 """Partial sets of changes kept while searching."""
 
 
-def relieving(changes: list[Change], redundancy: int) -> tuple[list[tuple[Change, ...]], list[tuple[Change, ...]]]:
+def relieving(
+    position: Position, changes: list[Change], redundancy: int
+) -> tuple[list[tuple[Change, ...]], list[tuple[Change, ...]]]:
     """Single changes that lower the redundancy, and smallest sets that remove it, without more freedoms than self-stresses removed.
 
-    Ranked by how little they change: freedoms added beyond need, then number of changes, then the order of declaration.
+    Ranked by how little they change: freedoms added beyond need, then number of changes, then the order of declaration. Where there are
+    too many self-stresses for that the set is one change in every loop.
     """
     every = sorted((c for c in changes if c.relief), key=lambda c: (c.added - c.relief, -c.relief, c.effort, c.item))
     built = [c for c in every if c.effort < PLANE]
+    singles: list[tuple[Change, ...]] = [(c,) for c in spread(built or every)]
+    if redundancy > LARGEST_FOR_SETS:
+        return singles, [_one_in_every_loop(position, built or every)]
     largest: list[tuple[Change, ...]] = []
-    for some in (built, every) if redundancy <= LARGEST_FOR_SETS else ():
+    for some in (built, every):
         exact = [c for c in some if c.added == c.relief]
         complete, most = _complete_sets(exact, redundancy) if exact else ([], [])
         if complete:
-            return [(c,) for c in spread(built or every)], complete
+            return singles, complete
         largest = largest or most
-    return [(c,) for c in spread(built or every)], [chosen for chosen in largest if len(chosen) > 1]
+    return singles, [chosen for chosen in largest if len(chosen) > 1]
+
+
+def _one_in_every_loop(position: Position, ranked: list[Change]) -> tuple[Change, ...]:
+    """For every loop the best change of a pair that no loop before has changed, if possible of one that is in no other loop."""
+    best: dict[int, Change] = {}
+    for c in ranked:
+        best.setdefault(c.item, c)
+    loops_of = Counter(k for loop in position.graph.loops for k, _ in loop)
+    chosen: dict[int, Change] = {}
+    for loop in position.graph.loops:
+        mine = [best[k] for k, _ in loop if k in best and k not in chosen]
+        if mine:
+            c = min(mine, key=lambda c: (c.added - c.relief, -c.relief, loops_of[c.item], c.effort, c.item))
+            chosen[c.item] = c
+    return tuple(chosen[k] for k in sorted(chosen))
 
 
 @dataclass(frozen=True)
