@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -25,6 +26,7 @@ from mechgraph.model.load import Load
 from mechgraph.numerics.linear import independent_rows, rank_of, singular_values
 from mechgraph.numerics.tolerances import PATH
 from mechgraph.report.report import check
+from mechgraph.result.solution import Solution
 from mechgraph.result.trajectory import BlockMotion, Trajectory
 from mechgraph.structure.actuation import actuation_fault, stand_still
 from mechgraph.structure.branching import branches, branches_text
@@ -150,6 +152,7 @@ class Pipeline:
                 f"mechanism {self.m.name!r}: dead point where it was assembled: {names} stands still there while the mechanism moves, so "
                 "that it does not determine the motion; drive another freedom, or start at another position",
                 value,
+                self._standing(),
             )
         self._refuse_change_point()
         if free:
@@ -164,6 +167,28 @@ class Pipeline:
                 f"mechanism {self.m.name!r}: {count} neither driven nor passive (moving: {names}); add {more}, or change a pair",
                 check(self.drive.m),
             )
+
+    def _standing(self) -> Solution | None:
+        """The start at rest, where the drivers leave motions free: what equilibrium determines of the forces.
+
+        The free motions are held by freedoms of their own. Where one of these has to bear load, the drivers cannot keep the mechanism at
+        rest, and all forces are NaN; otherwise they are what the drivers and it leave unique.
+        """
+        m, drive, s = self.drive.m, self.drive, self.system
+        single = np.flatnonzero(s.single_rows >= 0)
+        kept = independent_rows(self.freedoms.left, single.tolist(), self.freedoms.left.shape[1])
+        if drive.free or drive.actuated is not None or len(kept) < self.freedoms.left.shape[1]:
+            return None
+        q = s.coordinates_of(self.start.x, s.start_coordinates(m.start))[:, 0]
+        start = dict(zip(m.freedom_names(), q.tolist(), strict=True))
+        names = [*drive.names, *(m.freedom_names()[c] for c in kept)]
+        at_rest = DriverMotion(m.replace(drives=names, start=start), {name: start[name] for name in names})
+        line = Pipeline(at_rest, self.options)
+        found = line.run().trajectory
+        if found.has_forces and not found.bears_nothing(line.columns[len(drive.names) :]):
+            found = Pipeline(at_rest, dataclasses.replace(self.options, method=None)).run().trajectory
+            found.has_forces = True
+        return Solution(found.shown_as(m, line.columns[: len(drive.names)]))
 
     def _acting(self) -> Index:
         """The freedoms in which the unknown efforts stand: those that are driven, or as many that are named instead."""

@@ -73,3 +73,48 @@ def test_a_landing_gear_at_its_lock_is_solved_from_its_knee() -> None:
     assert s["B"].components["Fx"] == pytest.approx(-200.0)
     assert s["B"].components["Fy"] == pytest.approx(-200.0)
     assert abs(s["C"].effort[0]) < 1e-11
+
+
+def gear_with_foot(*loads: object) -> mg.Mechanism:
+    """The same gear, its wheel on a foot that is welded to the leg."""
+    return mg.Mechanism("gear", pairs=[
+        mg.Pair("A", "R", "frame", "leg", point=(0, 0, 0), axis=Z), mg.Pair("B", "R", "leg", "lower", point=(0, -1, 0), axis=Z),
+        mg.Pair("C", "R", "lower", "upper", point=(0.5, -0.5, 0), axis=Z), mg.Pair("D", "R", "upper", "frame", point=(1, 0, 0), axis=Z),
+        mg.Pair("W", "W", "leg", "foot", point=(0, -1.5, 0)),
+    ], drives=["A"], loads=loads)  # type: ignore[arg-type] # fmt: skip
+
+
+@pytest.mark.parametrize("method", ["loop_wrench", "newton_euler"])
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+def test_at_a_dead_point_the_error_carries_what_equilibrium_determines(engine: str, method: str) -> None:
+    """The foot gets 100 N at 0.5 below its weld from the leg, whatever the rest does; the torque of A and the force of the strut share the
+    load in a way that is not unique. With a torque on the strut there is no equilibrium at all, only a position.
+    """
+    load = mg.Wrench("foot", force=(-100.0, 0, 0), point=(0, -2, 0))
+    m = gear_with_foot(load)
+    with pytest.raises(mg.DeadPointError) as caught:
+        mg.solve(m, {"A": [0.0, 0.1]}, engine=engine, method=method)  # type: ignore[arg-type]
+    s = caught.value.solution
+    assert s.batch == ()
+    assert s.status == "dead point"
+    assert s.mechanism == m
+    np.testing.assert_allclose(s["W"].force, [100, 0, 0], atol=1e-9)
+    np.testing.assert_allclose(s["W"].moment, [0, 0, 50], atol=1e-9)
+    assert np.isnan(s["A"].effort).all()
+    assert np.isnan(s["B"].components["Fx"])
+    assert s["C"].effort == 0
+    assert s["A"].position == 0
+    with pytest.raises(mg.DeadPointError) as caught:
+        mg.solve(gear_with_foot(load, mg.Effort("D", 3.0)), {"A": 0.0}, engine=engine, method=method)  # type: ignore[arg-type]
+    s = caught.value.solution
+    assert np.isnan(s["W"].force).all()
+    assert np.isnan(s["A"].effort).all()
+    np.testing.assert_allclose(s["B"].position, 0.0)
+
+
+def test_a_dead_point_of_kinematics_has_its_position() -> None:
+    with pytest.raises(mg.DeadPointError) as caught:
+        mg.kinematics(gear_with_foot(), {"A": 0.0})
+    s = caught.value.solution
+    assert not s.has_forces
+    np.testing.assert_allclose(s.link("foot").pose, np.eye(4), atol=1e-12)

@@ -29,7 +29,7 @@ from mechgraph.model.force_law import Law
 from mechgraph.model.load import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.newton import Work
-from mechgraph.numerics.tolerances import MOTIONS
+from mechgraph.numerics.tolerances import MOTIONS, PATH
 from mechgraph.result.states import flat_place, user_state, user_wrench
 from mechgraph.result.views import Checks, LoadBearing, LoadResult, MaterialPoint
 from mechgraph.structure.passive import PassiveMotion
@@ -161,6 +161,20 @@ class Trajectory:
         out._status, out._solved = self._status[places], self._solved[places]
         out._kept = {name: values[..., places] for name, values in self._kept.items()}
         out._motions = []
+        return out
+
+    def bears_nothing(self, columns: Index) -> bool:
+        """Whether the efforts that hold some driven freedoms are nothing beside the loads, to the accuracy of a dead point."""
+        largest = max(float(np.abs(self._of(name)).max(initial=0.0)) for name in ("loads", "given"))
+        held = (self._of("efforts") - self._of("given") - self._of("coupled"))[columns]
+        return bool((np.abs(held) <= PATH.independent * largest).all())
+
+    def shown_as(self, mechanism: Mechanism, driven: Index) -> Trajectory:
+        """The same of a mechanism with fewer drives, which stands at a dead point of them."""
+        out, names = copy(self), self.whole.freedom_names()
+        out.mechanism, out.driven = mechanism, driven
+        out.actuated = out.prescribed = tuple(names[column] for column in driven)
+        out._status = np.full(self._count, Status.DEAD_POINT.value, dtype="U24")
         return out
 
     def first(self, count: int) -> Any:
