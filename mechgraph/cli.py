@@ -59,7 +59,7 @@ Engine = Annotated[
     typer.Option(help="Dense or sparse matrices, or the faster ones for the size; the results are the same."),
 ]
 Bookkeeping = Annotated[Literal["lee", "minimal"], typer.Option(help="How the unknowns of a pair are written.")]
-Method = Annotated[Literal["loop_wrench", "newton_euler"], typer.Option(help="How the forces are solved.")]
+Method = Annotated[Literal["loop_wrench", "newton_euler", "printed"], typer.Option(help="How the forces are solved.")]
 Redundant = Annotated[
     Literal["nan", "minimum_norm"],
     typer.Option(
@@ -73,6 +73,12 @@ OnReach = Annotated[
 At = Annotated[
     list[str] | None,
     typer.Option("--at", metavar="FREEDOM=VALUE", help="Assemble there first: A=30deg, B.Tz=0.02 (repeat)."),
+]
+EquationsAt = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--at", metavar="FREEDOM=VALUE[@RATE[@ACCELERATION]]", help="Numbers at this position: A=30deg@10 (repeat)."
+    ),
 ]
 Drives = Annotated[
     list[str] | None,
@@ -337,18 +343,29 @@ def equations(
     blocks: Annotated[bool, typer.Option("--blocks", help="Vector equations only, without their components.")] = False,
     coefficients: Annotated[bool, typer.Option("--coefficients", help="The table of nonzero coefficients.")] = False,
     csv: Annotated[bool, typer.Option("--csv", help="The table of nonzero coefficients as CSV.")] = False,
+    unknowns: Annotated[
+        Literal["kinetostatics", "response"],
+        typer.Option(help="What is sought: forces for a given motion, or accelerations beside the reactions."),
+    ] = "kinetostatics",
+    at: EquationsAt = None,
 ) -> None:
-    """Print the d'Alembert equations of every link and the conditions of the pairs; needs no geometry.
+    """Print the closure equations, the d'Alembert equations of every link and the conditions of the pairs; needs no geometry.
 
-    Exit status: 0 done; 2 wrong usage or bad input.
+    With --at the coefficients {Q}, the right sides {C} and the unknowns {u} with numbers, at one position.
+
+    Exit status: 0 done; 1 the mechanism has no such position; 2 wrong usage or bad input.
     """
     if (latex or blocks) and (coefficients or csv):
         refuse("equations", "--coefficients and --csv print a table, --latex and --blocks equations; take one of them")
-    f = mg.formulate(_loaded(mechanism), bookkeeping)
-    if csv:
-        _write(f.coefficients().csv())
-    elif coefficients:
-        _write(f.coefficients().text())
+    if at and (latex or blocks):
+        refuse("equations", "--at prints a table of numbers, --latex and --blocks equations; take one of them")
+    m = _loaded(mechanism)
+    s = _solved_at(m, at) if at else None
+    f = mg.formulate(s.mechanism if s else m, bookkeeping, unknowns=unknowns)
+    if csv or coefficients or at:
+        table = f.coefficients(s.state() if s else None)
+        names = "" if csv or not at else "".join(f"u({i}): {u.name}\n" for i, u in enumerate(f.unknowns, 1))
+        _write(names + (table.csv() if csv else table.text()))
     elif latex:
         _write(f.latex(components=not blocks))
     else:
@@ -408,6 +425,16 @@ def respond(
         _write(f"Wrote {out}: {r.status.size} rows, {len(r.part(slice(1)).columns())} columns.\n")
     if r.stopped:
         _fail(r.stopped, NO_ANSWER)
+
+
+def _solved_at(m: mg.Mechanism, at: list[str]) -> mg.Solution:
+    """The one position that is named, with its rates."""
+    motions = drives_of(m, at)
+    if any(np.ndim(motion.position) for motion in motions.values()):
+        refuse("--at", "expected one position, e.g. A=30deg@10")
+    with _working("solving"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", mg.MechgraphWarning)
+        return mg.solve(m, motions)
 
 
 @app.command()

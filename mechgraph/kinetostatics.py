@@ -141,7 +141,8 @@ def solve(
         ``start``, other axes are independent cases. Left out where the drives carry their motion.
     actuate : freedoms in which the unknown efforts stand, as many as independent motions are prescribed; left out, they stand where
         motion is prescribed. Where these freedoms rest while the mechanism moves, forces are NaN (status "actuators at dead point").
-    method : ``"loop_wrench"`` (one unknown wrench a loop) or ``"newton_euler"`` (the printed equations).
+    method : ``"loop_wrench"`` (one unknown wrench a loop), ``"newton_euler"`` (all reaction components and efforts at once) or
+        ``"printed"`` (exactly the system that ``formulate(m)`` prints, by sparse LU position by position; the slowest).
     loads : replace the declared ones.
     redundant : ``"nan"`` for components that are not unique, or ``"minimum_norm"``: the least ``sum |F|^2 + |M / L|^2`` of all reactions,
         moments about the pair points, L the mean radius of the mechanism. That is one assumption of many: every pair as stiff as every

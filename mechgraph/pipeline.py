@@ -294,6 +294,7 @@ class Outcome:
         work.positions, work.nodes = len(variant), len(found.tracks.nodes)
         self.trajectory.engine, self.trajectory.work = line.engine, work
         self.trajectory.loads = starts.loads
+        self.trajectory.method = line.options.method
         self._fill()
 
     def _fill(self) -> None:

@@ -10,7 +10,7 @@ from mechgraph.document import to_text
 from mechgraph.result.summary import summary
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-WAYS = [(engine, method) for engine in ("dense", "sparse") for method in ("loop_wrench", "newton_euler")]
+WAYS = [(engine, method) for engine in ("dense", "sparse") for method in ("loop_wrench", "newton_euler", "printed")]
 
 
 def slider_crank(**changes: object) -> mg.Mechanism:

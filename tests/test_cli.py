@@ -145,7 +145,7 @@ def test_solve_prints_a_summary() -> None:
     assert float(row[2]) == 5.0 * force.argmax()
     assert re.search(r"^closure error.*e-", result.stdout, re.MULTILINE)
     work = f"{s.work.nodes} nodes of the path, {s.work.evaluations} evaluations, {s.work.factorizations} factorizations"
-    assert f"Engine dense: 72 positions, {work}." in result.stdout
+    assert f"Engine dense, method loop_wrench: 72 positions, {work}." in result.stdout
 
 
 def test_the_engine_is_taken_and_named() -> None:
@@ -153,7 +153,7 @@ def test_the_engine_is_taken_and_named() -> None:
     for engine in ("dense", "sparse"):
         result = run("solve", "rssr", "--drive", "A=0:30:10deg@10", "--engine", engine)
         assert result.exit_code == 0
-        assert f"Engine {engine}: 3 positions, " in result.stdout
+        assert f"Engine {engine}, method loop_wrench: 3 positions, " in result.stdout
         shown[engine] = result.stdout.partition("Passive freedoms")[0]
         assert json.loads(run("check", "rssr", "--json", "--engine", engine).stdout)["engine"] == engine
     assert shown["dense"] == shown["sparse"]

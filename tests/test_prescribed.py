@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 import mechgraph as mg
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-WAYS = [(engine, method) for engine in ("dense", "sparse") for method in ("loop_wrench", "newton_euler")]
+WAYS = [(engine, method) for engine in ("dense", "sparse") for method in ("loop_wrench", "newton_euler", "printed")]
 
 
 def boom(**changes: object) -> mg.Mechanism:

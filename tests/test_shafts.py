@@ -34,7 +34,7 @@ def assert_bearings(s: mg.Solution) -> None:
 
 
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
-@pytest.mark.parametrize("method", ["loop_wrench", "newton_euler"])
+@pytest.mark.parametrize("method", ["loop_wrench", "newton_euler", "printed"])
 def test_a_motor_on_a_shaft_in_two_ball_bearings(method: str, engine: str) -> None:
     """The torque is that of the belt, 100 N at 50 mm, about the axis, and of the inertia; the arm turns with the shaft."""
     m = shaft(BELT, GRAVITY)

@@ -190,7 +190,7 @@ def _of_link(at: Matrix, link: str) -> Statement:
         if free:
             other = at.number[pair.a if pair.b == link else pair.b]
             terms.append(f"R{other}{n}" if (free > 0) == (pair.b == link) else f"R{n}{other}")
-    known = [symbol.place[0] for symbol in at.f.equations[rows[0]].known]
+    known = [k.symbol.place[0] for k in at.f.equations[rows[0]].known]
     terms += [f"FI{n}"] * ("I" in known) + ["FOUT"] * ("L" in known)
     drives = [j for j, u in enumerate(at.f.unknowns) if u.group == "driver"]
     terms += ["FIN"] * bool(np.abs(at.Q[np.ix_(rows, drives)]).max() > 0)

@@ -1,4 +1,7 @@
-"""Building a formulation from the graph and the pair table: equilibrium of every moving link, conditions of every pair."""
+"""Building a formulation from the graph and the pair table: equilibrium of every moving link, conditions of every pair.
+
+In a response the accelerations of all freedoms are unknowns beside the reactions, and their closure stands beside the equilibrium.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ from typing import Literal
 
 from mechgraph.arguments import items_of, option_faults
 from mechgraph.equations.formulation import Formulation
+from mechgraph.equations.motion import ACCELERATION, MotionWords, has_inertia
 from mechgraph.equations.symbols import (
     LeeNames,
     Symbol,
@@ -19,7 +23,7 @@ from mechgraph.equations.symbols import (
     names_of,
     summed,
 )
-from mechgraph.equations.terms import AXES, Block, ScalarEquation, Screw, Term, Unknown
+from mechgraph.equations.terms import AXES, Block, Known, ScalarEquation, Screw, Term, Unknown
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism, check_mechanism
 from mechgraph.model.pair import Pair
@@ -42,6 +46,7 @@ class _Draft:
     duals: dict[int, list[int]] = field(default_factory=dict)
     blocks: list[Block] = field(default_factory=list)
     driven: list[tuple[int, Symbol]] = field(default_factory=list)
+    accelerations: list[int] = field(default_factory=list)
 
     def unknown(self, symbol: Symbol, owner: str, group: str, couple: bool, meaning: str, freedom: str = "") -> int:
         self.unknowns.append(Unknown(symbol, owner, group, couple, meaning, freedom))
@@ -176,7 +181,7 @@ def _exert(
     draft.block(words, kind, owner)
 
 
-def _equilibrium(draft: _Draft) -> list[ScalarEquation]:
+def _equilibrium(draft: _Draft, words: MotionWords | None) -> list[ScalarEquation]:
     """Six equations for every moving link: three of force, three of moment about the origin."""
     m, names = draft.m, draft.names
     touched = {link for load in m.loads for link in load.links(m)}
@@ -195,25 +200,73 @@ def _equilibrium(draft: _Draft) -> list[ScalarEquation]:
             printed.append(("+", (names.reaction[k] if sign > 0 else names.opposite[k],)))
             for t in draft.acts[k]:
                 terms[t.part].append(Term(t.unknown, sign, t.screw, t.part, t.coupling))
-        known = [f"I{number}"] + [f"L{number}"] * (link.name in touched)
-        printed += [("+", (Symbol("F", place, "dual"),)) for place in known]
+        loaded = [f"L{number}"] * (link.name in touched)
+        known = [(f"I{number}", "loads"), *((place, "") for place in loaded)]  # loads hold the inertia, too
+        if words is not None:
+            known = [(f"B{number}", "gyroscopic")] * has_inertia(link) + [(place, "applied") for place in loaded]
+            screws, resisting = words.inertia_terms(link, len(draft.screws))
+            draft.screws += screws
+            for part, mine in enumerate(resisting):
+                terms[part] += [replace(t, unknown=draft.accelerations[t.unknown]) for t in mine]
+        printed += [("+", (Symbol("F", place, "dual"),)) for place in (f"I{number}", *loaded)]
         for k, exerted in draft.driven:
             if link.name in (m.pairs[k].a, m.pairs[k].b):
                 printed.append(("+" if m.pairs[k].b == link.name else "-", (exerted,)))
         draft.block((*summed(printed), "=", "0"), "link", link.name)
         for what, letter, offset in (("force", "F", 3), ("moment", "M", 0)):
             for i, axis in enumerate(AXES):
+                part = offset + i
+                symbols = [(Symbol(letter, place, "vector", axis=axis), array) for place, array in known]
                 equations.append(
                     ScalarEquation(
                         f"link {number} ({link.name}): {what} {axis}",
                         link.name,
                         "link",
-                        tuple(terms[offset + i]),
+                        tuple(terms[part]),
                         index,
-                        offset + i,
-                        tuple(Symbol(letter, place, "vector", axis=axis) for place in known),
+                        part,
+                        tuple(Known(symbol, array, (part, index)) for symbol, array in symbols),
                     )
                 )
+    return equations
+
+
+def _accelerations(draft: _Draft, words: MotionWords) -> None:
+    """The accelerations of all freedoms as unknowns, those of the drives first: Lee's 24th is that of the input."""
+    found = words.unknowns(ACCELERATION)
+    places = [draft.m.freedom(drive.freedom) for drive in draft.m.drives]
+    first = [words.first[k] + j for k, j in places]
+    order = [*first, *(i for i in range(len(found)) if i not in set(first))]
+    draft.accelerations = [len(draft.unknowns) + order.index(i) for i in range(len(found))]
+    draft.unknowns += [found[i] for i in order]
+
+
+def _closure(draft: _Draft, words: MotionWords) -> list[ScalarEquation]:
+    """The acceleration closure among the equations, and the accelerations that drivers prescribe."""
+    closure, offset = words.closure(ACCELERATION), len(draft.screws)
+    draft.screws += closure.screws
+    equations = [
+        replace(
+            equation,
+            terms=tuple(
+                replace(t, unknown=draft.accelerations[t.unknown], screw=None if t.screw is None else offset + t.screw)
+                for t in equation.terms
+            ),
+        )
+        for equation in closure.equations
+    ]
+    draft.blocks += words.influence_blocks()
+    for unknown in [u for u in draft.unknowns if u.group == "driver"]:
+        k, j = draft.m.freedom(unknown.freedom)
+        column = words.first[k] + j
+        acceleration = words.freedoms[k][j].numbers[ACCELERATION]
+        given = replace(acceleration, name="IN")
+        known = (Known(given, "accelerations", (column,), -1.0),)
+        name = f"driver {unknown.freedom}: prescribed acceleration"
+        draft.block((acceleration, "=", given), "prescribed", unknown.owner)
+        equations.append(
+            ScalarEquation(name, unknown.owner, "driver", (Term(draft.accelerations[column], 1.0),), known=known)
+        )
     return equations
 
 
@@ -246,17 +299,32 @@ def _condition(draft: _Draft, k: int, i: int, twist: Freedom, dual: list[int]) -
     return ScalarEquation(f"pair {k + 1} ({pair.name}): {what} the axis", pair.name, pair.type.symbol, tuple(terms))
 
 
-def formulate(m: Mechanism, bookkeeping: BookkeepingName = "lee", efforts: Iterable[str] | None = None) -> Formulation:
-    """The d'Alembert equations of a mechanism as named unknowns and equations.
+SoughtName = Literal["kinetostatics", "response"]
+SOUGHT: tuple[SoughtName, ...] = ("kinetostatics", "response")
+
+
+def formulate(
+    m: Mechanism,
+    bookkeeping: BookkeepingName = "lee",
+    efforts: Iterable[str] | None = None,
+    *,
+    unknowns: SoughtName = "kinetostatics",
+) -> Formulation:
+    """The equations of a mechanism as named unknowns and equations: closure, d'Alembert, conditions of the pairs, couplings.
 
     For every moving link ``sum of reactions + inertia + applied + efforts of drivers and couplings = 0`` (six scalar equations about the
-    global origin) and, in Lee's bookkeeping, the conditions of the pairs. Needs no geometry. The multiplier of a coupling ``g`` is the
-    unknown ``M_C(g)``, or ``F_C(g)`` where all its freedoms are slides.
+    global origin) and, in Lee's bookkeeping, the conditions of the pairs; beside them the closure equations of position, velocity
+    and acceleration, ``Formulation.closure``. Needs no geometry. The multiplier of a coupling ``g`` is the unknown ``M_C(g)``, or
+    ``F_C(g)`` where all its freedoms are slides.
 
     Parameters
     ----------
     bookkeeping : ``"lee"`` (Lee 1977, equations 3.33 to 3.53) or ``"minimal"`` (reaction components of the pair table).
-    efforts : freedoms whose effort is unknown; the driven ones where left out.
+    efforts : freedoms whose effort is unknown; left out, the driven ones, and none in a response.
+    unknowns : ``"kinetostatics"`` (the motion is given) or ``"response"`` (the efforts are given): the accelerations of all freedoms are
+        unknowns beside the reactions, those of the drives first, and their closure (2.60) is among the equations. Lee (section 3.5)
+        eliminates all but that of the input, his unknown number 24, beforehand. A freedom named in ``efforts`` has a prescribed
+        acceleration.
 
     Raises
     ------
@@ -264,16 +332,29 @@ def formulate(m: Mechanism, bookkeeping: BookkeepingName = "lee", efforts: Itera
         for an unknown bookkeeping or freedom.
     """
     check_mechanism(m, "formulate")
-    faults = option_faults({"bookkeeping": (bookkeeping, BOOKKEEPINGS)})
+    faults = option_faults({"bookkeeping": (bookkeeping, BOOKKEEPINGS), "unknowns": (unknowns, SOUGHT)})
     named = () if efforts is None else items_of(efforts, "efforts", faults)
     if faults:
         raise DeclarationError(f"formulate {m.name!r}", faults)
     draft = _Draft(m, names_of(m))
     for k in range(len(m.pairs)):
         BOOKKEEPINGS[bookkeeping](draft, k)
-    _driver_efforts(draft, tuple(d.freedom for d in m.drives) if efforts is None else named)
+    words = MotionWords(m) if unknowns == "response" else None
+    drives = tuple(d.freedom for d in m.drives) if words is None else ()
+    _driver_efforts(draft, drives if efforts is None else named)
     _multipliers(draft)
-    equations = _equilibrium(draft) + _conditions(draft)
+    if words is not None:
+        _accelerations(draft, words)
+    equations = _equilibrium(draft, words) + _conditions(draft)
+    if words is not None:
+        equations += _closure(draft, words)
     return Formulation(
-        m, bookkeeping, tuple(draft.unknowns), tuple(equations), tuple(draft.blocks), tuple(draft.screws)
+        m,
+        tuple(draft.unknowns),
+        tuple(equations),
+        tuple(draft.blocks),
+        tuple(draft.screws),
+        bookkeeping,
+        unknowns,
+        tuple(map(tuple, draft.acts)),
     )

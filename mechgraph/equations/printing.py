@@ -1,25 +1,77 @@
-"""Formulations as documents: block-wise, component-wise, and Lee's table of nonzero coefficients."""
+"""Formulations as documents: closure, motion, forces, block-wise and component-wise, and the list of unknowns."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from functools import cached_property
 
 from mechgraph.document import Block as Piece
 from mechgraph.document import Bullets, Document, Equation, Heading, Legend, Paragraph, Table
-from mechgraph.equations.symbols import Symbol, Words, moment_of, names_of, summed, written
-from mechgraph.equations.terms import ScalarEquation
-
-if TYPE_CHECKING:
-    from mechgraph.equations.formulation import Formulation
+from mechgraph.equations.motion import Closure, closure_of
+from mechgraph.equations.symbols import Symbol, Words, moment_of, names_of, written
+from mechgraph.equations.system import LinearSystem
+from mechgraph.equations.terms import Ledger, LedgerRow, ScalarEquation, Term
+from mechgraph.model.factors import ConstantScrew
 
 SECTIONS = (
-    ("reaction", "Reactions of the pairs"),
-    ("effort", "Driver efforts"),
+    ("reaction", "Reactions of the pairs (3.34 to 3.37)"),
+    ("effort", "Driver efforts (3.42)"),
     ("coupling", "Couplings"),
-    ("link", "Equations of motion"),
-    ("condition", "Conditions at the pairs"),
+    ("link", "Equations of motion (3.33)"),
+    ("condition", "Conditions at the pairs (3.38 to 3.40)"),
+    ("influence", "Accelerations as unknowns (3.57 to 3.64)"),
+    ("prescribed", "Prescribed accelerations"),
 )
+
+
+@dataclass(frozen=True)
+class Printed(LinearSystem):
+    """What a formulation is printed from: its equations and its closure, and how they are counted.
+
+    ``acts`` are the terms with which every pair acts on its link b.
+    """
+
+    bookkeeping: str
+    sought: str
+    acts: tuple[tuple[Term, ...], ...]
+
+    @cached_property
+    def closure(self) -> Closure:
+        """The closure equations of position, velocity and acceleration, and what defines their symbols."""
+        return closure_of(self.mechanism)
+
+    @cached_property
+    def transmitted(self) -> LinearSystem:
+        """What the pairs transmit as functions of the unknowns: six rows a pair, ``A u`` the wrench of link a on link b."""
+        rows = [
+            ScalarEquation("", pair.name, "", tuple(t for t in act if t.part == part), None, part)
+            for pair, act in zip(self.mechanism.pairs, self.acts, strict=True)
+            for part in range(6)
+        ]
+        return LinearSystem(self.mechanism, self.unknowns, tuple(rows), (), self.screws)
+
+    def ledger(self) -> Ledger:
+        """The ledger: unknowns and equations by kind."""
+        groups: dict[str, int] = {}
+        for pair in self.mechanism.pairs:
+            groups[pair.type.symbol] = groups.get(pair.type.symbol, 0) + 1
+        if self.mechanism.couplings:
+            groups["coupling"] = len(self.mechanism.couplings)
+        groups["driver"] = sum(u.group == "driver" for u in self.unknowns)
+        groups["link"] = len(self.mechanism.links) - 1
+        if self.sought == "response":
+            groups["acceleration"] = sum(u.group == "acceleration" for u in self.unknowns)
+            groups["closure"] = len({e.owner for e in self.equations if e.group == "closure"})
+        rows = {
+            name: LedgerRow(
+                count,
+                sum(u.group == name for u in self.unknowns),
+                sum(e.group == name for e in self.equations),
+            )
+            for name, count in groups.items()
+        }
+        return Ledger(self.bookkeeping, rows)
 
 
 def _dual(letter: str, place: str, name: str = "") -> Symbol:
@@ -68,9 +120,58 @@ COUPLINGS = (
     _entry(_dual("F", "C", "g,q")),
     "what coupling g exerts in freedom q: its number there times its multiplier, M or F with C(g)",
 )
+CONSTANT = (_entry(Symbol("K", "C", name="g")), "the constant of coupling g")
 
 
-def _symbols(f: Formulation) -> Iterator[tuple[Equation, str]]:
+def _vector(letter: str, place: str = "b") -> Symbol:
+    return Symbol(letter, place, "vector")
+
+
+MOTION = (
+    (
+        _entry(*(word for letter in ("theta", "omega", "alpha") for word in (Symbol(letter, "k"), ",")), "..."),
+        "angle of pair k, its rate and acceleration; S, dS, ddS for a slide; with a direction where pair k has several",
+    ),
+    (
+        _entry("exp(", Symbol("theta", "k"), _dual("A", ""), ")"),
+        "displacement by theta about A, a slide for e S A; A, X, Y there are axes of the frame before it",
+    ),
+    (
+        _entry(Symbol("L", "b", name="k,l")),
+        "shape of link b: pose of the marker of pair l on it, seen from the marker of pair k on it",
+    ),
+    (
+        _entry(_dual("V", "b"), "=", _vector("w"), "+", "e", _vector("v")),
+        "twist of link b: angular velocity, and velocity of its point at the global origin",
+    ),
+    (_entry(_dual("dV", "b"), "=", _vector("dw"), "+", "e", _vector("dv")), "rate of the twist of link b"),
+    (
+        _entry(_dual("N", "k")),
+        "velocity part of the acceleration of pair k (N_5 of 2.60); among components N0 is its dual part",
+    ),
+    (
+        _entry(Symbol("m", "b"), ",", _vector("c"), ",", _vector("a"), ",", _vector("I")),
+        "mass of link b, position and acceleration of its mass centre, inertia about it in global directions, turning with the link",
+    ),
+)
+"""What the symbols of closure and motion mean."""
+VARYING = (
+    _entry(Symbol("W", "k", "dual", name="dS")),
+    "own rate of a screw that is not constant in its frame; D the displacement that it belongs to",
+)
+RESPONSE = (
+    (
+        _entry(Symbol("K", "b,k", "vector", along="A"), ",", Symbol("H", "b,k", "vector", along="A")),
+        "acceleration of mass centre b, rate of the moment of momentum of link b about the origin, for a unit acceleration of pair k",
+    ),
+    (
+        _entry(_dual("F", "Bb")),
+        "inertia of link b were the accelerations of all freedoms zero; k, z, y are a, dw, dv then",
+    ),
+)
+
+
+def _symbols(f: Printed) -> Iterator[tuple[Equation, str]]:
     """The symbols that occur."""
     m = f.mechanism
     yield from SYMBOLS
@@ -84,16 +185,22 @@ def _symbols(f: Formulation) -> Iterator[tuple[Equation, str]]:
         yield DRIVERS
     if m.couplings:
         yield COUPLINGS
+        yield CONSTANT
+    yield from MOTION
+    if not all(isinstance(step, ConstantScrew) or step.holds_rotation for p in m.pairs for step in p.type.steps):
+        yield VARYING
+    if f.sought == "response":
+        yield from RESPONSE
 
 
-def formulation_document(f: Formulation, components: bool) -> Document:
-    """All equations of a formulation, with what the symbols mean."""
+def formulation_document(f: Printed, components: bool) -> Document:
+    """All equations of a formulation, with what the symbols mean: closure, motion, forces, then the components and the unknowns."""
     m = f.mechanism
     numbers = names_of(m).link_number
     ledger = f.ledger()
     count = f"{len(f.unknowns)} unknowns, {len(f.equations)} equations"
     blocks: list[Piece] = [
-        Paragraph(f"Bookkeeping {f.bookkeeping}: {count}."),
+        Paragraph(f"Bookkeeping {f.bookkeeping}, {f.sought}: {count}. Numbers in brackets are those of Lee (1977)."),
         Table(
             ("kind", "count", "unknowns", "equations"),
             tuple((k, str(r.count), str(r.unknowns), str(r.equations)) for k, r in ledger.by_kind.items()),
@@ -107,34 +214,35 @@ def formulation_document(f: Formulation, components: bool) -> Document:
         ),
         Legend(tuple(_symbols(f))),
     ]
-    for kind, title in SECTIONS:
-        mine = [b for b in f.blocks if b.kind == kind]
+    closure = f.closure
+    forces = [(title, [b for b in f.blocks if b.kind == kind]) for kind, title in SECTIONS]
+    for title, mine in (
+        ("Displacement closure (2.19)", closure.position),
+        ("Velocity closure (2.47)", closure.velocity.blocks),
+        ("Acceleration closure (2.60)", closure.acceleration.blocks),
+        ("Motion of the links", closure.motion),
+        ("Inertia (3.22, 3.30, 3.32)", closure.inertia),
+        *forces,
+    ):
         if mine:
             blocks.append(Heading(title, 2))
             blocks += [Equation(b.text, b.latex) for b in mine]
+    blocks.append(Heading("Unknowns (3.52)", 2))
+    rows = tuple((str(i), u.name, u.meaning) for i, u in enumerate(f.unknowns, 1))
+    blocks.append(Table(("column", "unknown", "meaning"), rows, align="rll"))
     if components:
-        blocks.append(Heading("Components", 2))
-        blocks += [_numbered(i, _scalar(f, e)) for i, e in enumerate(f.equations, 1)]
+        blocks += _components("Components of the velocity closure", closure.velocity, "V")
+        blocks += _components("Components of the acceleration closure", closure.acceleration, "A")
+        blocks += _components("Components", f, "")
     return Document(f"Equations of {m.name}", tuple(blocks))
 
 
-def _numbered(number: int, words: Words) -> Equation:
+def _components(title: str, system: LinearSystem, mark: str) -> list[Piece]:
+    if not system.equations:
+        return []
+    numbered = (_numbered(f"{mark}{i}", system.scalar(e)) for i, e in enumerate(system.equations, 1))
+    return [Heading(title, 2), *numbered]
+
+
+def _numbered(number: str, words: Words) -> Equation:
     return Equation(f"({number})  {written(words)}", rf"{written(words, latex=True)} \tag{{{number}}}")
-
-
-def _scalar(f: Formulation, equation: ScalarEquation) -> Words:
-    terms = [(f.sign_of(term), (*f.coefficient(term), f.unknowns[term.unknown].symbol)) for term in equation.terms]
-    return (*summed([*terms, *(("+", (symbol,)) for symbol in equation.known)]), "=", "0")
-
-
-def coefficient_rows(f: Formulation) -> Iterator[tuple[str, int, int, str]]:
-    """Right sides ``C(row)`` and coefficients ``Q(row, column)`` that are not zero by structure."""
-    for i, equation in enumerate(f.equations, 1):
-        if equation.known:
-            yield f"C({i})", i, 0, written(summed(("-", (symbol,)) for symbol in equation.known))
-    for i, equation in enumerate(f.equations, 1):
-        cells: dict[int, list[tuple[str, Words]]] = {}
-        for term in sorted(equation.terms, key=lambda t: t.unknown):  # a multiplier may act twice on one link
-            cells.setdefault(term.unknown, []).append((f.sign_of(term), f.coefficient(term) or ("1",)))
-        for unknown, terms in cells.items():
-            yield f"Q({i}, {unknown + 1})", i, unknown + 1, written(summed(terms))

@@ -36,3 +36,36 @@ class State:
         """The same of the first pairs alone, which have so many freedoms."""
         by_pair = {name: getattr(self, name)[:pairs] for name in ("reactions", "efforts", "along", "conditions")}
         return replace(self, coordinates=self.coordinates[:freedoms], velocities=self.velocities[:freedoms], **by_pair)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MovingState(State):
+    """A batch of positions with rates: what the closure equations and the equations of motion are assembled from, too.
+
+    Attributes
+    ----------
+    accelerations (F, T)
+    freedoms : for every pair the twists of its freedoms ``(6, f, T)``.
+    biases (6, P, T) : velocity part of the acceleration of link b against link a, for every pair.
+    inertias (6, 6, N, T) : the inertia of every link about the global origin, twist to wrench.
+    applied (6, N, T) : the applied part of ``loads``.
+    gyroscopic (6, N, T) : the inertia wrench of every link were the accelerations of all freedoms zero.
+    """
+
+    accelerations: Array
+    freedoms: tuple[Array, ...]
+    biases: Array
+    inertias: Array
+    applied: Array
+    gyroscopic: Array
+
+    def of_first(self, pairs: int, freedoms: int) -> MovingState:
+        """The same of the first pairs alone."""
+        first = super().of_first(pairs, freedoms)
+        assert isinstance(first, MovingState)
+        return replace(
+            first,
+            accelerations=self.accelerations[:freedoms],
+            freedoms=self.freedoms[:pairs],
+            biases=self.biases[:, :pairs],
+        )

@@ -14,6 +14,13 @@ from mechgraph.model.pair_type import Component, Freedom
 LETTERS = {"x": "X", "y": "Y", "z": "A"}
 """Letter of a marker direction: A is the pair axis, as in Lee."""
 
+LATEX_LETTERS = {
+    "rho": r"\rho", "theta": r"\theta", "omega": r"\omega", "alpha": r"\alpha", "dS": r"\dot{S}", "ddS": r"\ddot{S}",
+    "dV": r"\dot{V}", "w": r"\bar{\omega}", "dw": r"\bar{\alpha}", "v": r"\bar{v}", "dv": r"\dot{\bar{v}}", "a": r"\bar{a}",
+    "c": r"\bar{c}", "k": r"\bar{k}", "z": r"\bar{z}", "y": r"\bar{y}",
+}  # fmt: skip
+"""Letters that are not the same in LaTeX; a bar marks a vector of a link, as in Lee."""
+
 
 @dataclass(frozen=True)
 class Symbol:
@@ -25,7 +32,8 @@ class Symbol:
     Attributes
     ----------
     letter, along : what it is, with primes for the frame of a direction, and the direction along which it is counted.
-    place, name : what it belongs to, numbers of links or of a pair, and a name where numbers do not tell.
+    place, name : what it belongs to, numbers of links or of a pair (none inside the displacement of a pair), and a name where numbers
+        do not tell.
     kind : ``"scalar"``, ``"vector"`` or ``"dual"`` (a vector with a moment part).
     moment : the moment of that direction about the origin.
     axis : ``x``, ``y`` or ``z`` of a component.
@@ -43,19 +51,21 @@ class Symbol:
     def text(self) -> str:
         """In plain text."""
         name = f"({self.name})" if self.name else ""
-        return f"{self.letter}{self.along}{'0' if self.moment else ''}_{self.place}{name}{self.axis}"
+        below = f"_{self.place}" if self.place else ""
+        return f"{self.letter}{self.along}{'0' if self.moment else ''}{below}{name}{self.axis}"
 
     @property
     def latex(self) -> str:
         """In LaTeX, with a hat on a whole dual vector."""
         letter = self.letter.rstrip("'")
         primes = self.letter[len(letter) :]
-        shown = r"\rho" if letter == "rho" else letter if len(letter) == 1 else rf"\text{{{latex_words(letter)}}}"
+        shown = LATEX_LETTERS.get(letter) or (letter if len(letter) == 1 else rf"\text{{{latex_words(letter)}}}")
         if self.kind == "dual" and not self.axis:
             shown = rf"\hat{{{shown}}}"
-        above = "0" if self.moment else self.along
+        above = "0" if self.moment else self.along if self.along.strip("AXY-1'") == "" else latex_words(self.along)
         name = rf"(\text{{{latex_words(self.name)}}})" if self.name else ""
-        return f"{shown}{primes}{f'^{{{above}}}' if above else ''}_{{{self.place}{name}{self.axis}}}"
+        below = f"{self.place}{name}{self.axis}"
+        return f"{shown}{primes}{f'^{{{above}}}' if above else ''}{f'_{{{below}}}' if below else ''}"
 
     def component(self, axis: str) -> Symbol:
         """One component of a vector; a scalar stays what it is."""
@@ -63,9 +73,10 @@ class Symbol:
 
 
 Words = tuple["str | Symbol", ...]
-"""A product or an equation: symbols, numbers, signs, brackets, ``e`` for epsilon and ``.`` for the product of dual vectors."""
+"""A product or an equation: symbols, numbers, signs, brackets, ``e`` for epsilon, ``.`` and ``x`` for the products of dual vectors,
+``exp(`` for the displacement by a screw."""
 
-LATEX = {"e": r"\epsilon", ".": r"\cdot", "x": r"\times"}
+LATEX = {"e": r"\epsilon", ".": r"\cdot", "x": r"\times", "exp(": r"\exp("}
 
 
 def written(words: Iterable[str | Symbol], latex: bool = False) -> str:
@@ -76,7 +87,7 @@ def written(words: Iterable[str | Symbol], latex: bool = False) -> str:
             piece = word.latex if latex else word.text
         else:
             piece = LATEX.get(word, word) if latex else word
-        close = not out or piece == ")" or out == "-" or out.endswith(("(", "= -"))
+        close = not out or piece in (")", ",") or out == "-" or out.endswith(("(", "(-", "= -"))
         out += piece if close else f" {piece}"
     return out
 
@@ -114,10 +125,13 @@ def names_of(m: Mechanism) -> LeeNames:
     )
 
 
-def direction(k: int, part: Component | Freedom) -> Symbol:
-    """Direction of a component or freedom of pair ``k``, a line: A, X, Y with a prime for every frame, else by its own name."""
+def direction(k: int, part: Component | Freedom, before: int = 0) -> Symbol:
+    """Direction of a component or freedom of pair ``k``, a line: A, X, Y with a prime for every frame, else by its own name.
+
+    The frame of a freedom is that ``before`` it.
+    """
     values = part.wrench if isinstance(part, Component) else part.twist
-    frame = part.frame if isinstance(part, Component) else 0
+    frame = part.frame if isinstance(part, Component) else before
     nonzero = [i for i, v in enumerate(values) if v]
     plain = len(nonzero) == 1 and values[nonzero[0]] == 1.0
     return Symbol(LETTERS["xyz"[nonzero[0] % 3]] + "'" * frame if plain else part.name, str(k + 1), "dual")

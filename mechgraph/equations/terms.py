@@ -15,7 +15,8 @@ class Screw:
     """A unit wrench or twist of a pair that appears in coefficients: ``kind`` and ``index`` place it in a State.
 
     ``real`` and ``dual`` are printed for its real part (force of a wrench, velocity of a twist) and its dual part (moment, rotation),
-    a component of each vector in them; empty where that part is zero.
+    a component of each vector in them; empty where that part is zero. With a ``link`` it is the wrench ``I S`` that gives this link the
+    acceleration ``S`` of the screw.
     """
 
     kind: str
@@ -23,6 +24,7 @@ class Screw:
     index: int
     real: Words
     dual: Words
+    link: int | None = None
 
     def coefficient(self, part: int) -> Words:
         """Component ``part`` of the screw, 0 to 2 of the dual part and 3 to 5 of the real one; nothing where it is zero."""
@@ -32,10 +34,10 @@ class Screw:
 
 @dataclass(frozen=True)
 class Unknown:
-    """An unknown number: a component of a reaction or an effort.
+    """An unknown number: a component of a reaction, an effort, or the rate or acceleration of a freedom.
 
     ``owner`` is the pair or coupling, ``group`` what the ledger books it under, ``couple`` whether it is a moment rather than a
-    force; ``freedom`` the freedom of an effort.
+    force (of a rate: a turn rather than a slide); ``freedom`` the freedom of an effort, a rate or an acceleration.
     """
 
     symbol: Symbol
@@ -67,8 +69,18 @@ class Term:
 
 
 @dataclass(frozen=True)
+class Known:
+    """``sign * symbol``, a known number in an equation: ``place`` in the ``array`` of a State; no array where the one before has it too."""
+
+    symbol: Symbol
+    array: str
+    place: tuple[int, ...]
+    sign: float = 1.0
+
+
+@dataclass(frozen=True)
 class ScalarEquation:
-    """One scalar equation ``sum of terms + known = 0``; ``known`` is a component of the load on a link."""
+    """One scalar equation ``sum of terms + known = 0``; ``link`` and ``part`` of the wrench that it balances, in one of a link."""
 
     name: str
     owner: str
@@ -76,14 +88,15 @@ class ScalarEquation:
     terms: tuple[Term, ...]
     link: int | None = None
     part: int = 0
-    known: tuple[Symbol, ...] = ()
+    known: tuple[Known, ...] = ()
 
 
 @dataclass(frozen=True)
 class Block:
-    """A vector equation as it is printed block-wise: equilibrium of a link, condition of a pair, or a definition.
+    """A vector equation as it is printed block-wise: equilibrium of a link, condition of a pair, a closure, or a definition.
 
-    ``kind`` is ``"link"``, ``"condition"``, ``"reaction"``, ``"effort"`` or ``"coupling"``.
+    ``kind`` is ``"link"``, ``"condition"``, ``"reaction"``, ``"effort"`` or ``"coupling"`` of the force equations; ``"position"``,
+    ``"velocity"`` or ``"acceleration"`` of a closure; ``"bias"``, ``"twist"``, ``"inertia"`` or ``"influence"`` of what defines a symbol.
     """
 
     words: Words
@@ -112,7 +125,8 @@ class LedgerRow:
 
 @dataclass(frozen=True)
 class Ledger:
-    """Unknowns against equations by kind: pair symbols, ``coupling``, ``driver``, ``link`` (moving); read off the registry.
+    """Unknowns against equations by kind: pair symbols, ``coupling``, ``driver``, ``link`` (moving), and of a response ``acceleration``
+    and ``closure``; read off the registry.
 
     ``balance = equations - unknowns = mobility by count - drivers``: zero is determinate by count, positive leaves freedoms
     undriven, negative is redundant.

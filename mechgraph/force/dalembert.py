@@ -1,6 +1,6 @@
-"""Two ways to the wrenches of all pairs: one unknown wrench a loop, or all reaction components and efforts at once.
+"""Ways to the wrenches of all pairs: one unknown wrench a loop, or all reaction components and efforts at once.
 
-Both return total pair wrenches and independent self-stress states; they must agree to rounding.
+All return total pair wrenches and independent self-stress states; they must agree to rounding.
 """
 
 from __future__ import annotations
@@ -16,10 +16,11 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.solver import FactoredClosure
-from mechgraph.equations.build import formulate
+from mechgraph.equations.build import BookkeepingName, formulate
 from mechgraph.equations.formulation import Formulation
 from mechgraph.equations.state import State
 from mechgraph.numerics.linear import Choice, ChosenSystem, add_at, choose
+from mechgraph.numerics.sparse import least_solution
 
 ENTRIES_TOGETHER = 4_000_000
 """Largest number of matrix entries solved in one batch."""
@@ -82,11 +83,26 @@ def tree_wrenches(here: Configuration, loads: Array) -> Array:
 
 
 def newton_euler(problem: ForceProblem) -> Wrenches:
-    """All reaction components and driver efforts from the printed equations: six for every moving link.
+    """All reaction components and driver efforts: six equations for every moving link, in the minimal bookkeeping.
 
-    Assembled from the minimal formulation; redundant systems through independent rows and columns. Positions at which
-    different freedoms are held are solved separately.
+    Redundant systems through independent rows and columns.
     """
+    return _by_equations(problem, "minimal", _by_choice if problem.solver.complete else _by_sparse)
+
+
+def printed(problem: ForceProblem) -> Wrenches:
+    """Exactly the system that ``formulate(m)`` prints, in Lee's bookkeeping (3.53), by sparse LU position by position.
+
+    Redundant systems have more unknowns than equations: their solution of least norm.
+    """
+    return _by_equations(problem, "lee", _by_sparse)
+
+
+Solve = Callable[[Formulation, State, int], tuple[Array, Array | None]]
+
+
+def _by_equations(problem: ForceProblem, bookkeeping: BookkeepingName, solve: Solve) -> Wrenches:
+    """The wrenches from the equations of a formulation; positions at which different freedoms are held are solved separately."""
     here = problem.here
     n = here.system.n_rows - 6 * here.system.graph.n_loops
     parts = []
@@ -94,7 +110,7 @@ def newton_euler(problem: ForceProblem) -> Wrenches:
         mine = here if at.size == here.T else here.part(at)
         f = problem.solver if at.size == here.T else problem.solver.part(at, mine)
         mine_alone = ForceProblem(mine, problem.loads[:, :, at], problem.efforts[:, at], problem.driven, f)
-        parts.append((at, _components_and_efforts(mine_alone, held)))
+        parts.append((at, _components_and_efforts(mine_alone, held, bookkeeping, solve)))
     s = max((part.stress.shape[2] for _, part in parts), default=0)
     P = len(here.system.m.pairs)
     shapes = {"totals": (6, P), "stress": (6, P, s), "multipliers": (n,), "multiplier_stress": (n, s)}
@@ -106,19 +122,19 @@ def newton_euler(problem: ForceProblem) -> Wrenches:
     return Wrenches(**out)
 
 
-def _components_and_efforts(problem: ForceProblem, held: Index) -> Wrenches:
+def _components_and_efforts(problem: ForceProblem, held: Index, bookkeeping: BookkeepingName, solve: Solve) -> Wrenches:
     here, m = problem.here, problem.here.system.m
     names = m.freedom_names()
-    f = formulate(m, "minimal", efforts=[names[c] for c in sorted({*problem.driven.tolist(), *held.tolist()})])
+    f = formulate(m, bookkeeping, efforts=[names[c] for c in sorted({*problem.driven.tolist(), *held.tolist()})])
     state = internal_state(here, problem.loads + given_effort_loads(here, problem.efforts))
-    u, null = (_by_choice if problem.solver.complete else _by_saddle)(f, state, here.T)
-    totals, multipliers = (part[..., 0, :] for part in _pair_totals(here, f, state, u[:, None]))
+    u, null = solve(f, state, here.T)
+    totals, multipliers = (part[..., 0, :] for part in _pair_totals(f, state, u[:, None]))
     totals = totals + here.pair_sums(here.E * problem.efforts)
     if null is None:
         loops = problem.solver.self_stresses()
         stress, multiplier_stress = here.pair_wrenches(loops), -loops[6 * here.system.graph.n_loops :]
     else:
-        stress, multiplier_stress = _pair_totals(here, f, state, null)
+        stress, multiplier_stress = _pair_totals(f, state, null)
     return Wrenches(totals, stress, multipliers, multiplier_stress)
 
 
@@ -139,19 +155,14 @@ def _by_choice(f: Formulation, state: State, T: int) -> tuple[Array, Array]:
     return np.concatenate([p[0] for p in parts], axis=1), np.concatenate([p[1] for p in parts], axis=2)
 
 
-def _by_saddle(f: Formulation, state: State, T: int) -> tuple[Array, None]:
-    """Unknowns ``(unknowns, T)`` of least norm, ``[1 A^T; A 0] [u; y] = [0; b]``, sparse; the equations are independent."""
+def _by_sparse(f: Formulation, state: State, T: int) -> tuple[Array, None]:
+    """Unknowns ``(unknowns, T)`` by sparse LU, of least norm where there are more than equations; the equations are independent."""
     rows, cols, _, _ = f.pattern
     entries, right = f.entries(state), f.right_side(state)
     shape = (len(f.equations), len(f.unknowns))
     out = np.empty((shape[1], T))
     for t in range(T):
-        A = scipy.sparse.coo_array((entries[:, t], (rows, cols)), shape=shape)
-        saddle = scipy.sparse.block_array([[scipy.sparse.eye_array(shape[1]), A.T], [A, None]], format="csc")
-        b = np.concatenate([np.zeros(shape[1]), right[:, t]])
-        lu = scipy.sparse.linalg.splu(saddle)
-        x = lu.solve(b)
-        out[:, t] = (x + lu.solve(b - saddle @ x))[: shape[1]]
+        out[:, t] = least_solution(scipy.sparse.csc_array((entries[:, t], (rows, cols)), shape=shape), right[:, t])
     return out, None
 
 
@@ -189,27 +200,13 @@ def _null(A: Array, solver: ChosenSystem) -> Array:
     return flipped.null_of_transpose()
 
 
-def _pair_totals(here: Configuration, f: Formulation, state: State, u: Array) -> tuple[Array, Array]:
-    """Total pair wrenches ``(6, P, k, T)`` and multipliers ``(n, k, T)`` from unknowns ``(unknowns, k, T)`` of the minimal formulation."""
-    m = here.system.m
-    out = np.zeros((6, len(m.pairs), *u.shape[1:]))
-    at = 0
-    for p, pair in enumerate(m.pairs):
-        n = 6 - pair.type.f
-        out[:, p] += np.einsum("ict,ckt->ikt", state.reactions[p], u[at : at + n])
-        at += n
-    multipliers = []
-    for unknown, value in zip(f.unknowns[at:], u[at:], strict=True):
-        if not unknown.freedom:
-            multipliers.append(value)
-            continue
-        p, j = m.freedom(unknown.freedom)
-        out[:, p] += state.efforts[p][:, j, None] * value
-    rows = np.stack(multipliers) if multipliers else np.zeros((0, *u.shape[1:]))
-    brought = row_efforts(here, rows)
-    for i in range(u.shape[1] if multipliers else 0):
-        out[:, :, i] += here.pair_sums(here.E * brought[:, i])
-    return out, rows
+def _pair_totals(f: Formulation, state: State, u: Array) -> tuple[Array, Array]:
+    """Total pair wrenches ``(6, P, k, T)`` and multipliers of couplings ``(n, k, T)`` from unknowns ``(unknowns, k, T)``."""
+    rows, cols, _, _ = f.transmitted.pattern
+    out = np.zeros((len(f.transmitted.equations), *u.shape[1:]))
+    np.add.at(out, rows, f.transmitted.entries(state)[:, None] * u[cols])
+    multipliers = [i for i, unknown in enumerate(f.unknowns) if unknown.group == "coupling"]
+    return out.reshape(len(f.mechanism.pairs), 6, *u.shape[1:]).swapaxes(0, 1), u[multipliers]
 
 
 def given_effort_loads(here: Configuration, efforts: Array) -> Array:
@@ -253,6 +250,10 @@ def internal_state(here: Configuration, loads: Array) -> State:
     )
 
 
-MethodName = Literal["loop_wrench", "newton_euler"]
-METHODS: dict[str, Callable[[ForceProblem], Wrenches]] = {"loop_wrench": loop_wrench, "newton_euler": newton_euler}
+MethodName = Literal["loop_wrench", "newton_euler", "printed"]
+METHODS: dict[str, Callable[[ForceProblem], Wrenches]] = {
+    "loop_wrench": loop_wrench,
+    "newton_euler": newton_euler,
+    "printed": printed,
+}
 """Force methods by name."""

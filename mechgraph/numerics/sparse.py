@@ -12,6 +12,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from mechgraph.numerics.linear import rank_of
+
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
@@ -127,3 +129,67 @@ def _to_places(b: Array, order: Index) -> Array:
     out = np.empty_like(b)
     out[order] = b
     return out
+
+
+WEIGHT = 1e-4
+"""Weight of the norm in ``least_solution``, beside rows of size one."""
+
+
+def least_solution(A: scipy.sparse.csc_array, b: Array) -> Array:
+    """The solution ``(n,)`` of ``A x = b`` with independent rows ``A (m, n)``, of least norm where ``n > m``, refined once.
+
+    LU of ``A`` where it is square, of ``[w A^T; A 0]`` otherwise; a weight ``w`` near the smallest singular value keeps the condition that
+    of ``A``, where 1 squares it (Bjorck, Numerical Methods for Least Squares Problems, 1996, sections 2.5 and 7.1).
+    """
+    m, n = A.shape
+    if m != n:
+        A = scipy.sparse.block_array([[WEIGHT * scipy.sparse.eye_array(n), A.T], [A, None]], format="csc")
+        b = np.concatenate([np.zeros(n), b])
+    if not b.size:
+        return b
+    lu = Factors(A)
+    x = lu.solve(b)
+    return np.asarray(x + lu.solve(b - A @ x))[:n]
+
+
+WHOLE = 400
+"""Unknowns up to which a singular value decomposition is a matter of a tenth of a second."""
+REGULAR = 1e-9
+"""Distance from a singular matrix, rows and columns of size one, below which an LU is not trusted."""
+ROUNDING = 1e-13
+"""Size of a row, against the largest, that is rounding of zeros."""
+OPEN = 1e-7
+"""Part that an unknown has in the solutions without a right side, above which it is not unique; relative residual of a contradiction."""
+
+
+def unique_solution(A: scipy.sparse.csc_array, b: Array) -> Array:
+    """The solution ``(n,)`` of ``A x = b``, NaN in unknowns that the equations leave open; all NaN where they contradict each other.
+
+    Rows may depend on each other: a singular value decomposition says what is open; LU of a large matrix that is square and regular.
+    """
+    rows, K = _unit_rows(A)
+    columns, K = _unit_rows(K.T.tocsc())
+    K, b = K.T.tocsc(), b / rows
+    m, n = K.shape
+    if (
+        m == n > WHOLE and scipy.sparse.csgraph.structural_rank(K) == n
+    ):  # SuperLU itself fails on a matrix without that rank
+        places = K.tocoo()
+        factor = Pattern(places.row.astype(np.intp), places.col.astype(np.intp), n).factor(places.data)
+        if factor.distance > REGULAR:
+            return np.asarray(factor.solve(b[:, None])[:, 0] / columns)
+    U, s, Vt = np.linalg.svd(K.toarray())
+    rank = rank_of(s)
+    x = Vt[:rank].T @ ((U[:, :rank].T @ b) / s[:rank])
+    left, size = np.abs(K @ x - b).max(initial=0.0), np.abs(b).max(initial=0.0)
+    not_unique = np.sqrt((Vt[rank:] ** 2).sum(axis=0)) > OPEN
+    return np.where(not_unique | (left > OPEN * size), np.nan, x / columns)
+
+
+def _unit_rows(A: scipy.sparse.csc_array) -> tuple[Array, scipy.sparse.csc_array]:
+    """Largest entry of every row, and the matrix with its rows divided by it; rows that are rounding stay what they are."""
+    size = np.zeros(A.shape[0])
+    places = A.tocoo()
+    np.maximum.at(size, places.row, np.abs(places.data))
+    size[size <= ROUNDING * size.max(initial=0.0)] = 1.0
+    return size, scipy.sparse.csc_array(scipy.sparse.diags_array(1.0 / size) @ A)

@@ -30,13 +30,13 @@ def trajectory_of(task: Task, m: Mechanism, times: Array, blocks: Iterable[Block
         x[:, places] = closed.here.x
     coordinates = s.coordinates_of(x, s.start_coordinates(m.start))
     out = Trajectory(s, partial(_same, s), times.shape, times, task.columns, coordinates, True)
-    out.engine = task.engine
+    out.engine, out.method = task.engine, "loop_wrench"
     kinetic, potential = np.zeros(t.size), np.zeros(t.size)
     for places, closed, v in blocks:
         # the batch of a block is its own: loads are functions of time here, not arrays over positions
         at, count, q = t[places], len(places), coordinates[:, places]
         rates = moved(closed.here, closed.f, v, task.prescribed_at(at)[1:], task.loads, at).rates
-        forces = ForceTask("loop_wrench", m.loads, task.columns, (), (count,), at, "nan")
+        forces = ForceTask(out.method, m.loads, task.columns, (), (count,), at, "nan")
         out.put(BlockMotion(places, rates), forces_of_block(forces, rates, closed.f, q, np.arange(count)))
         kinetic[places] = kinetic_energy(closed.here, rates.V) * s.par.L**2
         site = Site(closed.here, rates, q, (count,), np.arange(count), at)

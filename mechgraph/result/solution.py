@@ -97,6 +97,11 @@ class Solution:
         return self._values.engine
 
     @property
+    def method(self) -> str | None:
+        """How the forces were solved, ``"loop_wrench"``, ``"newton_euler"`` or ``"printed"``; None for a motion alone."""
+        return self._values.method
+
+    @property
     def work(self) -> Work:
         """How much was computed: positions, nodes of the path, evaluations and factorizations of the equations."""
         return self._values.work

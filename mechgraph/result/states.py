@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, cross
+from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.rates import Rates
-from mechgraph.equations.state import State
+from mechgraph.equations.state import MovingState
 from mechgraph.errors import MechgraphError
-from mechgraph.force.applied_loads import user_poses, user_twists
+from mechgraph.force.applied_loads import inertia_wrenches, user_poses, user_twists
 from mechgraph.force.dalembert import internal_state
 from mechgraph.model.parameters import Parameters
 from mechgraph.quantities import shown
@@ -26,8 +29,8 @@ def user_wrench(par: Parameters, f: Array) -> Array:
     return out
 
 
-def user_state(rates: Rates, coordinates: Array, loads: Array) -> State:
-    """The State at one position with user coordinates ``(F, 1)`` and internal loads ``(6, N, 1)``."""
+def user_state(rates: Rates, coordinates: Array, loads: Array, applied: Array) -> MovingState:
+    """The State at one position with user coordinates ``(F, 1)`` and internal loads, all and the applied ones alone, ``(6, N, 1)``."""
     here = rates.here
     s, par = here.system, here.system.par
     inner = internal_state(here, loads)
@@ -35,9 +38,13 @@ def user_state(rates: Rates, coordinates: Array, loads: Array) -> State:
     couples = [[c.is_couple for c in row.reactions or ()] for row in rows]
     efforts = [[c.is_couple for c in row.efforts] for row in rows]
     along = [[c.is_couple for c in row.bookkeeping.along] if row.bookkeeping else [] for row in rows]
-    return State(
+    unit = np.where(s.is_length, par.L, 1.0)[:, None]
+    freedoms = user_twists(here, here.S) / unit
+    columns = [slice(first, end) for first, end in pairwise(s.first_column.tolist())]
+    without = here.accelerations_with(np.zeros_like(rates.ddq), rates.bias)
+    return MovingState(
         coordinates=coordinates,
-        velocities=np.where(s.is_length, par.L, 1.0)[:, None] * rates.dq,
+        velocities=unit * rates.dq,
         poses=np.moveaxis(user_poses(here)[..., :3, :], (0, 1), (2, 3)),
         twists=user_twists(here, rates.V),
         reactions=tuple(_user_screws(par, w, which) for w, which in zip(inner.reactions, couples, strict=True)),
@@ -45,7 +52,28 @@ def user_state(rates: Rates, coordinates: Array, loads: Array) -> State:
         along=tuple(_user_screws(par, w, which) for w, which in zip(inner.along, along, strict=True)),
         conditions=tuple(user_twists(here, w) if w.shape[1] else w for w in inner.conditions),
         loads=user_wrench(par, loads),
+        accelerations=unit * rates.ddq,
+        freedoms=tuple(freedoms[:, mine] for mine in columns),
+        biases=user_twists(here, rates.bias),
+        inertias=_user_inertias(here),
+        applied=user_wrench(par, applied),
+        gyroscopic=user_wrench(par, _inertia_wrenches(here, rates.V, without)),
     )
+
+
+def _inertia_wrenches(here: Configuration, V: Array, A: Array) -> Array:
+    return inertia_wrenches(here, SimpleNamespace(V=V, A=A))  # type: ignore[arg-type]
+
+
+def _user_inertias(here: Configuration) -> Array:
+    """Inertias of all links about the global origin ``(6, 6, N, T)``, in the user's units."""
+    par, still = here.system.par, np.zeros((6, len(here.system.m.links), here.T))
+    columns = []
+    for unit in np.eye(6):
+        inner = np.concatenate([unit[:3], (unit[3:] - cross(par.origin, unit[:3])) / par.L])
+        wrenches = -_inertia_wrenches(here, still, np.broadcast_to(inner[:, None, None], still.shape))
+        columns.append(user_wrench(par, wrenches))
+    return np.stack(columns, axis=1)
 
 
 def _user_screws(par: Parameters, wrenches: Array, couples: list[bool]) -> Array:

@@ -294,12 +294,13 @@ class _View:
         )
 
     def work(self) -> Paragraph:
-        """Which engine ran, and how much it did, in one line."""
+        """Which engine and which force method ran, and how much they did, in one line."""
         shown = [
             f"{n} {name if n == 1 else name.replace(' ', 's ', 1) if ' ' in name else name + 's'}"
             for n, name in self.s.work.counts
         ]
-        return Paragraph(f"Engine {self.s.engine}: {', '.join(shown)}.")
+        method = f", method {self.s.method}" if self.s.method else ""
+        return Paragraph(f"Engine {self.s.engine}{method}: {', '.join(shown)}.")
 
 
 def _runs(status: Any) -> list[tuple[int, int]]:

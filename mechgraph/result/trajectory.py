@@ -21,7 +21,7 @@ from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.rates import Rates, Velocities
 from mechgraph.equations.state import State
 from mechgraph.errors import MechgraphError
-from mechgraph.force.applied_loads import Site, user_poses, user_twists
+from mechgraph.force.applied_loads import Site, inertia_wrenches, user_poses, user_twists
 from mechgraph.force.block import BlockForces
 from mechgraph.force.dalembert import given_effort_loads
 from mechgraph.force.passive_hold import hold_names, is_idle, turns
@@ -104,6 +104,7 @@ class Trajectory:
         self._motions: list[BlockMotion] = []
         self.has_forces = False
         self.engine: Literal["dense", "sparse"] = "dense"
+        self.method: str | None = None
         self.work: Any = Work()
 
     def __getstate__(self) -> dict[str, Any]:
@@ -441,9 +442,12 @@ class Trajectory:
         if not self._solved[flat]:
             raise MechgraphError(f"state({index!r}): this position was not solved ({self._status[flat]})")
         block, own = self._motion(np.array([flat])), len(self.mechanism.freedom_names())
-        loads = np.zeros((6, len(self.mechanism.links), 1))
+        loads = applied = np.zeros((6, len(self.mechanism.links), 1))
         if self.has_forces:
             acting = self._of("given")[:, [flat]].copy()
             acting[own:] += self._of("efforts")[own:, [flat]]  # what moves points and links is a load on these
             loads = self._of("loads")[:, :, [flat]] + given_effort_loads(block.here, acting)
-        return user_state(block.rates, self._coordinates[:, [flat]], loads).of_first(len(self.mechanism.pairs), own)
+            held = self._kept["hold"][:, :, [flat]] if "hold" in self._kept else 0.0
+            applied = loads - inertia_wrenches(block.here, block.rates) - held
+        state = user_state(block.rates, self._coordinates[:, [flat]], loads, applied)
+        return state.of_first(len(self.mechanism.pairs), own)

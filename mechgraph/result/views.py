@@ -102,6 +102,7 @@ class Values(Protocol):
     t: Any
     has_forces: bool
     engine: Literal["dense", "sparse"]
+    method: str | None
     work: Work
 
     def status(self) -> Any:

@@ -46,7 +46,7 @@ BESIDE = np.array([0.0, 1e-7, 3e-7, 1e-6, 1e-5, 1e-4, 5e-4, 1e-3, 5e-3])
 
 
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
-@pytest.mark.parametrize("method", ["loop_wrench", "newton_euler"])
+@pytest.mark.parametrize("method", ["loop_wrench", "newton_euler", "printed"])
 @pytest.mark.parametrize("moved", TURNS)
 def test_parallelogram_at_and_beside_its_change_point(engine, method, moved):
     """D follows A; the torque 10 to 1e-10 times the condition, which is the inverse of the distance; at the point it does not exist."""

@@ -117,7 +117,7 @@ def test_overconstrained_four_bars_have_mobility_one_and_redundancy_three(build)
 
 
 @pytest.mark.parametrize("build", OVERCONSTRAINED.values(), ids=OVERCONSTRAINED)
-@pytest.mark.parametrize("method", ["loop_wrench", "newton_euler"])
+@pytest.mark.parametrize("method", ["loop_wrench", "newton_euler", "printed"])
 def test_components_that_are_not_unique_are_nan_and_those_that_are_do_not_change(build, method):
     """Brute force: equilibrium plus any null-space vector of the assembled equations changes exactly the components that are NaN."""
     m = build()

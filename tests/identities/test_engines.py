@@ -72,7 +72,7 @@ def test_library(name):
     assert_engines_agree(m, {d.freedom: d.motion.position[:5] for d in m.drives if d.motion is not None})
 
 
-@pytest.mark.parametrize("method", ["loop_wrench", "newton_euler"])
+@pytest.mark.parametrize("method", ["loop_wrench", "newton_euler", "printed"])
 @pytest.mark.parametrize("kind", LATTICES)
 def test_lattices_around_the_crossover(kind, method):
     m = LATTICES[kind](8)
@@ -138,7 +138,7 @@ COUPLED = {
 
 
 @pytest.mark.parametrize("name", COUPLED)
-@pytest.mark.parametrize("method", ["loop_wrench", "newton_euler"])
+@pytest.mark.parametrize("method", ["loop_wrench", "newton_euler", "printed"])
 def test_couplings(name, method):
     """Redundant and contradicting ones too: a result or one of our errors, and the same from both engines."""
     m, given = COUPLED[name]
@@ -148,7 +148,7 @@ def test_couplings(name, method):
         assert_engines_agree(m, given, method=method, redundant=redundant)
 
 
-@pytest.mark.parametrize("method", ["loop_wrench", "newton_euler"])
+@pytest.mark.parametrize("method", ["loop_wrench", "newton_euler", "printed"])
 def test_least_reactions_where_drivers_strain_each_other(method):
     """What the drivers supply is no reaction: it has no part in the norm, wherever it acts."""
     m = known.planar().moved(anywhere(np.random.default_rng(0)))

@@ -520,7 +520,7 @@ def test_a_users_row_works_like_one_of_the_table():
         np.testing.assert_allclose(other[p.name].total, s[p.name].total, atol=1e-9 * largest(s, m))
     assert list(other[name].components) == ["n1", "n2", "n3", "n4"]
     m, given, _ = problem(22, symbols=["R", PLANE_ON_PLANE, "R", "C"], loops=1, branches=0)
-    for method in ("loop_wrench", "newton_euler"):
+    for method in ("loop_wrench", "newton_euler", "printed"):
         s = mg.solve(m, given, method=method)
         assert s.checks.equilibrium.max() < 1e-9
         assert np.abs(s.checks.power).max() < 1e-8

@@ -8,7 +8,7 @@ import mechgraph as mg
 
 Z = (0, 0, 1)
 ANGLES = {"A": np.array([0.1, 0.5])}
-OPTIONS = [{"engine": e, "method": f} for e in ("dense", "sparse") for f in ("loop_wrench", "newton_euler")]
+OPTIONS = [{"engine": e, "method": f} for e in ("dense", "sparse") for f in ("loop_wrench", "newton_euler", "printed")]
 
 
 def wheels(*couplings: mg.Coupling, drives: tuple[str, ...] = ("A",)) -> mg.Mechanism:

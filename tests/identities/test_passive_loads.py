@@ -107,7 +107,7 @@ def test_a_swing_that_nothing_loads_is_not_passive() -> None:
 
 
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
-@pytest.mark.parametrize("method", ["loop_wrench", "newton_euler"])
+@pytest.mark.parametrize("method", ["loop_wrench", "newton_euler", "printed"])
 def test_a_chain_of_balls_that_sags_is_held_about_the_line_of_its_ends(engine: str, method: str) -> None:
     """Weights about the line B-D for both rods together, the first rod's about its own line B-C; the second one's passes through its."""
     angles = np.linspace(0, 0.6, 4)

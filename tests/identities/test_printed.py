@@ -1,7 +1,8 @@
 """The printed equations hold: text and LaTeX are read back and evaluated with numbers that owe nothing to the formulation.
 
 Directions and points come from the poses of the links and the markers, inertia from the accelerations of the mass centres, loads
-from their declaration, unknowns from the reactions of a solution, taken apart by Lee's definitions.
+from their declaration, unknowns from the reactions of a solution, taken apart by Lee's definitions; rates of pairs and links from
+the same solution. Closure of position, velocity and acceleration, motion, inertia, forces, couplings, and the response.
 """
 
 import re
@@ -9,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+import scipy
 
 import mechgraph as mg
 
@@ -19,10 +21,15 @@ MOVING = tuple(name for name in mg.library() if mg.load(name).expected.get("mobi
 BOOKKEEPINGS = ("lee", "minimal")
 LETTERS = dict(zip("XYA", np.eye(3), strict=True))
 PART = r"[A-Za-z]\w*?'*0?_[\w,]+?(?:\([^()]*\))?"
+SPOKEN = {
+    r"\dot{\bar{v}}": "dv", r"\bar{\omega}": "w", r"\bar{\alpha}": "dw", r"\dot{V}": "dV", r"\dot{S}": "dS", r"\ddot{S}": "ddS",
+    **{rf"\bar{{{letter}}}": letter for letter in "vackzy"}, r"\theta": "theta", r"\omega": "omega", r"\alpha": "alpha", r"\rho": "rho",
+}  # fmt: skip
+"""What letters of LaTeX are in text."""
 SYMBOL = re.compile(rf"(?P<name>{PART})(?P<axis>[xyz]?)")
-TOKEN = re.compile(rf"{PART}[xyz]?(?![\w(])|e(?!\w)|\d+(?:\.\d+)?|[-+().=]")
+TOKEN = re.compile(rf"{PART}[xyz]?(?![\w(]|,\d)|[exXYA](?!\w)|\d+(?:\.\d+)?|[-+().=]")
 TEX = re.compile(
-    r"(?:\\hat\{(?P<hat>\w|\\text\{\w+\})\}|(?P<plain>\\rho|\\text\{\w+\}|[A-Z]))(?P<primes>'*)"
+    r"(?:\\hat\{(?P<hat>\w|\\text\{\w+\})\}|(?P<plain>\\text\{\w+\}|[A-Zm]))(?P<primes>'*)"
     r"(?:\^\{(?P<above>[^{}]*)\})?_\{(?P<below>(?:[^{}]|\{[^{}]*\})*)\}"
 )
 
@@ -34,7 +41,11 @@ def untexed(latex: str) -> str:
         letter = (m["hat"] or m["plain"]).removeprefix("\\")
         return re.sub(r"\\?text\{([^{}]*)\}", r"\1", f"{letter}{m['primes']}{m['above'] or ''}_{m['below']}")
 
-    words = TEX.sub(symbol, latex).replace(r"\epsilon", "e").replace(r"\cdot", ".")
+    for tex, text in SPOKEN.items():
+        latex = latex.replace(tex, rf"\text{{{text}}}")
+    words = re.sub(r"\\hat\{([XYA])\}", r"\1", TEX.sub(symbol, latex))
+    for tex, text in {r"\epsilon": "e", r"\cdot": ".", r"\times": "x", r"\exp": "exp"}.items():
+        words = words.replace(tex, text)
     assert "\\" not in words.replace(r"\_", "_"), latex
     return words.replace(r"\_", "_")
 
@@ -63,6 +74,10 @@ class Dual:
     def __mul__(self, other: "Dual") -> "Dual":
         return Dual(self.real * other.real, self.real * other.dual + self.dual * other.real)
 
+    def cross(self, other: "Dual") -> "Dual":
+        real = np.cross(self.real, other.real)
+        return Dual(real, np.cross(self.real, full_vector(other.dual)) + np.cross(full_vector(self.dual), other.real))
+
     def dot(self, other: "Dual") -> "Dual":
         return Dual(np.asarray(self.real @ other.real), self.real @ other.dual + self.dual @ other.real)
 
@@ -81,6 +96,44 @@ class Numbers(dict[str, Dual]):
         for link in m.links:
             if link.name != m.frame:
                 self.put_link(link)
+                self.put_motion(link)
+        self.update({letter: Dual.of(unit) for letter, unit in LETTERS.items()})
+        for coupling in m.couplings:
+            places = [m.freedom(name) for name in coupling.freedoms]
+            values = [s[m.pairs[k].name].position[i, j] for k, j in places]
+            self[f"K_C({coupling.name})"] = Dual.of(np.dot(coupling.coefficients, values))
+
+    def put_motion(self, link: mg.Link) -> None:
+        """Twist and its rate, acceleration of the mass centre, inertia in global directions."""
+        here, n = self.s.link(link.name), self.number[link.name]
+        for mark, both in (("", here.twist[self.i]), ("d", here.acceleration[self.i])):
+            turning, moving = both[:3], both[3:]
+            self[f"{mark}V_{n}"] = Dual.of(turning, moving)
+            self[f"{mark}w_{n}"], self[f"{mark}v_{n}"] = Dual.of(turning), Dual.of(moving)
+        R = self.pose(link.name)[:3, :3]
+        self[f"m_{n}"] = Dual.of(link.mass)
+        if link.mass:
+            self[f"c_{n}"], self[f"a_{n}"] = Dual.of(here.center[self.i]), Dual.of(here.center_acceleration[self.i])
+        if link.inertia is not None:
+            self[f"I_{n}"] = Dual.of(R @ link.inertia @ R.T)
+
+    def put_freedoms(self, k: str, pair: mg.Pair) -> None:
+        """Position, rate and acceleration of every freedom, with a direction where the pair has several of its sort."""
+        joint, turns = self.s[pair.name], [f.turns for f in pair.type.freedoms]
+        for j, freedom in enumerate(pair.type.freedoms):
+            direction = "XYA"["xyz".index(freedom.name[1])] + pair.type.frame_before[j] * "'"
+            where = f"{direction if turns.count(turns[j]) > 1 else ''}_{k}"
+            for letter, values in zip(
+                ("theta", "omega", "alpha") if turns[j] else ("S", "dS", "ddS"),
+                (joint.position, joint.velocity, joint.acceleration),
+                strict=True,
+            ):
+                self[letter + where] = Dual.of(values[self.i, j])
+
+    def shape(self, link: str, k: int, n: int) -> np.ndarray:
+        """Pose of the marker of pair ``n`` (numbered from 1) on a link, seen from that of pair ``k``."""
+        first, second = (full(self.m.pairs[i - 1].markers[self.m.pairs[i - 1].a != link].pose()) for i in (k, n))
+        return np.linalg.inv(first) @ second
 
     def pose(self, link: str) -> np.ndarray:
         return self.s.link(link).pose[self.i]
@@ -114,6 +167,7 @@ class Numbers(dict[str, Dual]):
                 self[f"{name}_{k}"], self[f"{name}0_{k}"] = Dual.of(line, moment), Dual.of(moment)
         if pair.pitch is not None:
             self[f"rho_{k}"] = Dual.of(pair.pitch)
+        self.put_freedoms(k, pair)
         joint = self.s[pair.name]
         moment, force = joint.reaction[self.i, :3], joint.reaction[self.i, 3:]
         a, b = self.number[pair.a], self.number[pair.b]
@@ -177,30 +231,67 @@ def full(pose: np.ndarray) -> np.ndarray:
     return np.vstack([pose, [0, 0, 0, 1]])
 
 
+def full_vector(value: np.ndarray) -> np.ndarray:
+    return np.broadcast_to(value, (3,))
+
+
 def evaluated(text: str, numbers: Numbers) -> Dual:
-    """A sum of products; ``.`` is the product of dual vectors."""
+    """A sum of products; ``.`` and ``x`` of dual vectors bind less than a product with a number, a tensor acts on a vector."""
     words = TOKEN.findall(text)
     assert "".join(words) == text.replace(" ", ""), text
 
-    def summed(end: str) -> Dual:
+    def product() -> Dual:
+        parts = []
+        while words and words[0] not in ("+", "-", ")", ".", "x"):
+            word = words.pop(0)
+            parts.append(summed() if word == "(" else numbers.value(word))
+        total = parts.pop()
+        for part in reversed(parts):
+            total = Dual.of(part.real @ total.real) if part.real.ndim == 2 else part * total
+        return total
+
+    def summed() -> Dual:
         total = Dual.of(0.0)
-        sign = "+"
-        while words and words[0] != end:
-            if words[0] in "+-":
-                sign = words.pop(0)
-            product = Dual.of(1.0)
-            while words and words[0] not in ("+", "-", end):
-                word = words.pop(0)
-                if word == ".":
-                    product = product.dot(numbers.value(words.pop(0)))
-                else:
-                    product = product * (summed(")") if word == "(" else numbers.value(word))
-            total = total + (product if sign == "+" else -product)
-        if end:
+        while words and words[0] != ")":
+            sign = words.pop(0) if words[0] in "+-" else "+"
+            term = product()
+            while words and words[0] in (".", "x"):
+                term = (term.dot if words.pop(0) == "." else term.cross)(product())
+            total = total + (term if sign == "+" else -term)
+        if words:
             words.pop(0)
         return total
 
-    return summed("")
+    return summed()
+
+
+def displaced(text: str, numbers: Numbers) -> np.ndarray:
+    """A product of displacements ``exp(screw)`` and shapes of links ``L_2(1,2)``."""
+    pose, named = np.eye(4), {n: name for name, n in numbers.number.items()}
+    while text:
+        shape = re.match(r"L_(\d+)\((\d+),(\d+)\) ?", text)
+        if shape:
+            link, k, n = shape.groups()
+            pose, text = pose @ numbers.shape(named[link], int(k), int(n)), text[shape.end() :]
+            continue
+        assert text.startswith("exp("), text
+        depth = np.cumsum([(c == "(") - (c == ")") for c in text[3:]])
+        end = 3 + int(np.argmin(depth != 0))
+        twist = evaluated(text[4:end], numbers)
+        w = np.cross(full_vector(twist.real), -np.eye(3))
+        screw = np.vstack([np.column_stack([w, full_vector(twist.dual)]), np.zeros(4)])
+        pose, text = pose @ scipy.linalg.expm(screw), text[end + 1 :].lstrip()
+    return pose
+
+
+def assert_closed(block: mg.equations.terms.Block, numbers: Numbers) -> None:
+    """A displacement closure holds: its product is the identity, lengths against the largest of all."""
+    product, _, right = block.text.rpartition(" = ")
+    if right != "1":
+        assert_holds(block.text, numbers)
+        return
+    scale = max(number.size for number in numbers.values())
+    assert np.abs(displaced(product, numbers) - np.eye(4)).max() <= 1e-11 * scale, block.text
 
 
 def assert_holds(text: str, numbers: Numbers) -> None:
@@ -210,40 +301,74 @@ def assert_holds(text: str, numbers: Numbers) -> None:
     assert max(np.abs(gap.real).max(), np.abs(gap.dual).max()) <= 1e-11 * scale + numbers.held, text
 
 
-def numbered(text: str, latex: str) -> list[tuple[str, str]]:
-    """Text and LaTeX of the component equations, each by its number."""
-    flat = " ".join(text.partition("Components\n~~~~~~~~~~\n")[2].split())
-    pieces = re.split(r"(?:^| )\((\d+)\) ", flat)[1:]
-    tagged = {n: line for line, n in re.findall(r"^(.*) \\tag\{(\d+)\}$", latex, re.MULTILINE)}
-    assert list(tagged) == pieces[::2] == [str(n + 1) for n in range(len(tagged))]
-    return [(words, tagged[n]) for n, words in zip(pieces[::2], pieces[1::2], strict=True)]
+def numbered(text: str, latex: str) -> dict[str, tuple[str, str]]:
+    """Text and LaTeX of the component equations by number: V1 ... and A1 ... of the closure, 1 ... of the forces."""
+    flat = " ".join(text[text.index("\nComponents") :].split())
+    pieces = re.split(r"(?:^| )\(([VA]?\d+)\) ", re.sub(r" Components( of the \w+ closure)? [-~]+", "", flat))[1:]
+    tagged = {n: line for line, n in re.findall(r"^(.*) \\tag\{([VA]?\d+)\}$", latex, re.MULTILINE)}
+    assert list(tagged) == pieces[::2]
+    return {n: (words, tagged[n]) for n, words in zip(pieces[::2], pieces[1::2], strict=True)}
+
+
+def put_unknowns(f: mg.Formulation, s: mg.Solution, i: int, numbers: Numbers) -> None:
+    """Efforts and multipliers of a solution, and what the driver prescribes."""
+    for u in f.unknowns:
+        if u.group == "driver":
+            k, j = f.mechanism.freedom(u.freedom)
+            joint = s[f.mechanism.pairs[k].name]
+            numbers[u.name] = Dual.of(joint.effort[i, j])
+            for given in [a for a in f.unknowns if a.group == "acceleration" and a.freedom == u.freedom]:
+                numbers[f"{given.name}(IN)"] = Dual.of(joint.acceleration[i, j])
+        elif u.group == "coupling":
+            numbers[u.name] = Dual.of(s.coupling(u.owner).effort[i])
+
+
+def put_definition(block: mg.equations.terms.Block, numbers: Numbers) -> None:
+    """A symbol gets the value of its definition: one dual vector, or two vectors, ``z_1 + e y_1 = ...``."""
+    left, _, right = block.text.partition(" = ")
+    value = evaluated(right, numbers)
+    real, plus, dual = left.partition(" + e ")
+    if not plus:
+        numbers[left] = value
+    else:
+        numbers[real], numbers[dual] = Dual.of(full_vector(value.real)), Dual.of(full_vector(value.dual))
+    name = re.fullmatch(r"([NF])(_\w+)", left)
+    if name:  # its dual part among the components
+        dual_name = {"N": "N0", "F": "M"}[name[1]] + name[2]
+        numbers[dual_name] = Dual.of(full_vector(value.dual))
+        numbers[left] = Dual(full_vector(value.real), full_vector(value.dual))
 
 
 def check_all(m: mg.Mechanism, s: mg.Solution, bookkeeping: str, positions: tuple[int, ...]) -> None:
     """Every printed equation, block by block and component by component, as text and as LaTeX."""
-    f = mg.formulate(m, bookkeeping)
-    names = [u.name for u in f.unknowns]
-    assert len(set(names)) == len(names)
-    components = numbered(f.text(), f.latex())
-    assert len(components) == len(f.equations)
-    for text, latex in [*components, *((b.text, b.latex) for b in f.blocks)]:
-        assert untexed(latex) == text
-    for i in positions:
-        numbers = Numbers(m, s, i)
-        for u in f.unknowns:
-            if u.group == "driver":
-                k, j = m.freedom(u.freedom)
-                numbers[u.name] = Dual.of(s[m.pairs[k].name].effort[i, j])
-            elif u.group == "coupling":
-                numbers[u.name] = Dual.of(s.coupling(u.owner).effort[i])
-        for block in f.blocks:
-            if block.kind in ("effort", "coupling"):
-                left, _, right = block.text.partition(" = ")
-                numbers[left] = evaluated(right, numbers)
-            else:
-                assert_holds(block.text, numbers)
-        for text, _ in components:
-            assert_holds(text, numbers)
+    drives = [d.freedom for d in m.drives]
+    for sought, efforts in (("kinetostatics", None), ("response", drives)):
+        f = mg.formulate(m, bookkeeping, efforts, unknowns=sought)
+        names = [u.name for u in f.unknowns]
+        assert len(set(names)) == len(names)
+        whole = f.text()
+        components = numbered(whole, f.latex())
+        systems = (f.closure.velocity, f.closure.acceleration, f)
+        assert len(components) == sum(len(system.equations) for system in systems)
+        closure = f.closure
+        closed = (*closure.velocity.blocks, *closure.acceleration.blocks)
+        every = (*closure.position, *closed, *closure.motion, *closure.inertia, *f.blocks)
+        for text, latex in [*components.values(), *((b.text, b.latex) for b in every)]:
+            assert untexed(latex) == text
+        flat = " ".join(whole.split())
+        assert all(block.text in flat for block in every)
+        for i in positions:
+            numbers = Numbers(m, s, i)
+            put_unknowns(f, s, i, numbers)
+            for block in (*closure.motion, *closure.inertia, *f.blocks):
+                if block.kind in ("bias", "effort", "coupling", "influence"):
+                    put_definition(block, numbers)
+                else:
+                    assert_holds(block.text, numbers)
+            for block in closure.position:
+                assert_closed(block, numbers)
+            for text in [*(b.text for b in closed), *(text for text, _ in components.values())]:
+                assert_holds(text, numbers)
 
 
 @pytest.mark.parametrize("bookkeeping", BOOKKEEPINGS)
@@ -328,7 +453,8 @@ def test_a_wrong_sign_would_be_seen(bookkeeping: str) -> None:
     numbers["MA_IN"] = Dual.of(s["O1"].effort[3, 0])
     numbers["F_IN"] = evaluated("e MA_IN A_1", numbers)
     f = mg.formulate(m, bookkeeping)
-    texts = [text for text, _ in numbered(f.text(), f.latex())] + [b.text for b in f.blocks if b.kind == "link"]
+    texts = [text for n, (text, _) in numbered(f.text(), f.latex()).items() if n.isdecimal()]
+    texts += [b.text for b in f.blocks if b.kind == "link"]
     for text in texts:
         assert_holds(text, numbers)
         for sign in re.finditer(r"(?:^-| [-+] )(?=[A-Z(])", text):
