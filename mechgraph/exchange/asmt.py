@@ -8,6 +8,7 @@ and the principal moments; joints and motions name markers by path, `/Assembly/P
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -144,20 +145,19 @@ class Reader:
 
     def connections(self, entries: Sequence[Node]) -> list[Connection]:
         """Joints, motions or limits; those without a name of their own get one."""
-        found: list[Connection] = []
+        found: dict[str, Connection] = {}
         taken = {entry.word("Name") for entry in entries}
         for k, entry in enumerate(entries, 1):
             name = given = entry.word("Name")
-            if not given or any(given == other.name for other in found):
-                name = next(
-                    free for n in range(k, k + len(taken) + 1) if (free := f"{given or entry.text}-{n}") not in taken
-                )
+            if not given or given in found:
+                tries = (f"{given or entry.text}-{n}" for n in itertools.count(k))
+                name = next(free for free in tries if free not in taken)
                 why = "has no name" if not given else f"is the second one named {given!r}"
                 self.notes.append(f"{entry.text} on line {entry.line} {why} and is called {name!r}")
                 taken.add(name)
             i, j, joint = (entry.word(key) for key in ("MarkerI", "MarkerJ", "MotionJoint"))
-            found.append(Connection(entry.text, name, i, j, joint, entry))
-        return found
+            found[name] = Connection(entry.text, name, i, j, joint, entry)
+        return list(found.values())
 
     def times(self) -> Array:
         """Times from tstart to tend in steps of hout."""

@@ -306,14 +306,17 @@ class Builder:
     def links(self, pairs: Sequence[Pair]) -> list[Link]:
         """The ground and the parts that joints or motions reach; parts that hang together without the ground are a fault."""
         a = self.assembly
-        reached, grown = {a.name}, True
-        while grown:
-            new = {end for pair in pairs if {pair.a, pair.b} & reached for end in (pair.a, pair.b)} - reached
-            reached |= new
-            grown = bool(new)
-        joined = {end for pair in pairs for end in (pair.a, pair.b)}
-        loose = [name for name in a.parts if name in joined - reached]
-        alone = [name for name in a.parts if name not in joined]
+        neighbours: dict[str, list[str]] = {}
+        for pair in pairs:
+            neighbours.setdefault(pair.a, []).append(pair.b)
+            neighbours.setdefault(pair.b, []).append(pair.a)
+        reached, front = {a.name}, [a.name]
+        while front:
+            new = [end for end in neighbours.get(front.pop(), ()) if end not in reached]
+            reached.update(new)
+            front += new
+        loose = [name for name in a.parts if name in neighbours and name not in reached]
+        alone = [name for name in a.parts if name not in neighbours]
         if loose:
             self.faults.append(
                 f"parts {listed(loose)} are joined to each other, but not to the ground; ground one of them in FreeCAD"

@@ -9,6 +9,7 @@ stand in the frames of their links. Source: MuJoCo documentation, XML reference 
 from __future__ import annotations
 
 import os
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -57,7 +58,6 @@ class Writer:
         self.m = assemble(m)
         self.faults: list[str] = []
         self.equalities: list[tuple[str, dict[str, Any]]] = []
-        self.frames: dict[str, list[Array]] = {}
         self.poses: dict[str, Array] = {self.m.frame: np.eye(3, 4)}
         self.cuts: dict[str, int] = {}
         self.root = Body(WORLD, self.m.frame, np.eye(3, 4))
@@ -124,23 +124,26 @@ class Writer:
     # --- tree and loops ----------------------------------------------------------------------------------------------
 
     def build(self) -> None:
-        """Grow the tree from the frame, link by link; close loops with the pairs that are left."""
-        m, left, grown = self.m, list(self.m.pairs), True
-        while grown:
-            grown, rest = False, []
-            for pair in left:
-                known = [end in self.bodies for end in (pair.a, pair.b)]
-                if all(known) or not any(known):
-                    rest.append(pair)
-                    continue
-                grown = True
-                parent, child = (pair.a, pair.b) if known[0] else (pair.b, pair.a)
-                move = self.step(pair) if known[0] else inverse(self.step(pair))
-                self.poses[child] = compose(self.poses[parent], move)
-                self.bodies[child] = self.hung(Body(child, child, move), parent, pair)
-            left = rest
-        for pair in left:
-            self.close(pair)
+        """Grow the tree from the frame, the nearest links first; close loops with the pairs that are left."""
+        m, hung = self.m, set()
+        at: dict[str, list[Pair]] = {link.name: [] for link in m.links}
+        for pair in m.pairs:
+            at[pair.a].append(pair)
+            at[pair.b].append(pair)
+        front = deque([m.frame])
+        while front:
+            parent = front.popleft()
+            for pair in at[parent]:
+                child = pair.b if pair.a == parent else pair.a
+                if child not in self.bodies:
+                    move = self.step(pair) if pair.a == parent else inverse(self.step(pair))
+                    self.poses[child] = compose(self.poses[parent], move)
+                    self.bodies[child] = self.hung(Body(child, child, move), parent, pair)
+                    hung.add(pair.name)
+                    front.append(child)
+        for pair in m.pairs:
+            if pair.name not in hung:
+                self.close(pair)
         for coupling in m.couplings:
             self.couple(coupling.name, coupling.terms)
 
