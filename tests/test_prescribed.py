@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import pickle
 from functools import cache
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from strategies import motions, solvable
 
 import mechgraph as mg
+from mechgraph.closure.driver_motion import driven
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 WAYS = [(engine, method) for engine in ("dense", "sparse") for method in ("loop_wrench", "newton_euler", "printed")]
@@ -301,6 +304,23 @@ def test_cases_and_variants() -> None:
         np.testing.assert_allclose(study.outputs["lift.effort"][i], alone["lift"].effort[:, 0], rtol=1e-8)
 
 
+def test_variants_of_a_platform_that_goes_through_poses() -> None:
+    """Alone and together; sent to other processes; the sixth leg's foot varies."""
+    X4, V, A = poses(np.linspace(0, 1.5, 4))
+    drive = {"platform": mg.Motion(X4, V, A)}
+    legs = [f"leg{k}" for k in range(6)]
+    study = mg.study(
+        hexapod("U"), {"platform.mass": [50.0, 60.0], "S5.point.x": [TOP[5, 0], TOP[5, 0] + 0.02]}, ["leg5.effort", "leg5.position"],
+        n=2, sampling="grid", motions=drive, actuate=legs,
+    )  # fmt: skip
+    assert (study.status == "ok").all()
+    for i in range(4):
+        alone = mg.solve(study.variant(i), drive, actuate=legs)
+        np.testing.assert_allclose(study.outputs["leg5.effort"][i], alone["leg5"].effort[:, 0], rtol=1e-8)
+    motions = driven(hexapod("U"), drive)[1]
+    assert pickle.loads(pickle.dumps(motions)).free == motions.free != ()
+
+
 def test_out_of_reach_is_told_in_the_names_that_were_typed() -> None:
     with pytest.raises(mg.ReachError, match=r"bucket\.tip\.Tx = 9") as error:
         mg.solve(bent(), {"bucket.tip": [[6.0, -1.0, 0], [9.0, 0, 0]]})
@@ -332,8 +352,6 @@ def test_faults_are_told(motions: dict, words: str) -> None:
 
 
 def test_a_motion_of_vectors_is_kept_as_it_was_given() -> None:
-    import pickle
-
     t, points = tip_path()
     motion = mg.Motion(points, t=t)
     assert motion == motion
@@ -342,3 +360,57 @@ def test_a_motion_of_vectors_is_kept_as_it_was_given() -> None:
         motion.given[0][0] = 1.0
     with pytest.raises(mg.DeclarationError, match="do not broadcast"):
         mg.Motion(points, t=t[:-1])
+
+
+def with_points(m: mg.Mechanism, seed: int) -> mg.Mechanism:
+    """A random point on every moving link."""
+    rng = np.random.default_rng((seed, 8))
+    links = [k if k.name == m.frame else k.replace(points={"p": rng.normal(size=3)}) for k in m.links]
+    return m.replace(links=links)
+
+
+def senses(m: mg.Mechanism, s: mg.Solution, drives: list[str], names: list[tuple[str, int]]) -> np.ndarray:
+    """Determinant of the rates of points' coordinates for unit rates of the drives, at every position: zero where these stand still."""
+    q = {name: s[m.pairs[m.freedom(name)[0]].name].position[:, m.freedom(name)[1]] for name in drives}
+    rows = []
+    for one in drives:
+        x = mg.kinematics(m, {name: mg.Motion(at, float(name == one)) for name, at in q.items()})
+        rows.append([x.link(link).at("p").velocity[:, i] for link, i in names])
+    return np.linalg.det(np.moveaxis(np.array(rows), -1, 0))
+
+
+@pytest.mark.seeds(12)
+def test_random_mechanisms_moved_by_points_are_the_same(seed: int) -> None:
+    """Drives move it; then what points did is prescribed, with the efforts in the drives: all of it is the same.
+
+    And with the efforts at the points, or in other freedoms: the same power. Compared up to where the points stand still while the
+    drives go on, as what moves the points stays on its branch there.
+    """
+    made = solvable(seed)
+    if made is None or mg.check(made).passive:
+        return  # what passive bodies do depends on the path between positions
+    m, rng = with_points(made, seed), np.random.default_rng((seed, 9))
+    how: dict = dict(zip(("engine", "method"), WAYS[seed % 4], strict=True))
+    given = motions(m, seed, np.linspace(0, 1, 4), size=0.05)
+    moving = [k.name for k in m.links if k.name != m.frame]
+    names = [(str(rng.choice(moving)), int(rng.integers(3))) for _ in given]
+    singles = [n for p in m.pairs for n, able in zip(p.freedom_names, p.type.drivable, strict=True) if able]
+    others = [str(n) for n in rng.choice(singles, len(given), replace=False)]
+    try:
+        s = mg.solve(m, given, **how)
+        told = {f"{k}.p.{['Tx', 'Ty', 'Tz'][i]}": mg.Motion(*(v[:, i] for v in s.link(k).at("p"))) for k, i in names}
+        there = mg.solve(m, told, actuate=list(given), **how)
+        at_points, elsewhere = mg.solve(m, told, **how), mg.solve(m, told, actuate=others, **how)
+    except (mg.IndeterminateError, mg.DeadPointError, mg.ReachError):
+        return  # these do not move it all the way
+    sense = senses(m, s, list(given), names)
+    same = np.logical_and.accumulate(sense * sense[0] > 0)
+    for what in ("velocity", "acceleration", "effort", "reaction"):
+        largest = max(np.nanmax(np.abs(getattr(s[p.name], what)), initial=1.0) for p in m.pairs)
+        for pair in m.pairs:
+            one, two = (getattr(x[pair.name], what)[same] for x in (there, s))
+            np.testing.assert_allclose(one, two, rtol=0, atol=1e-9 * largest)
+    power = [[x[p.name].effort * x[p.name].velocity for p in x.whole.pairs] for x in (s, at_points, elsewhere)]
+    sums = np.array([sum(np.nansum(p, axis=-1) for p in of) for of in power])[:, same & (elsewhere.status == "ok")]
+    largest = max(np.nanmax(np.abs(p), initial=1.0) for of in power for p in of)
+    np.testing.assert_allclose(sums, sums[[0, 0, 0]], rtol=0, atol=1e-9 * largest)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -29,8 +29,16 @@ def _as_motion(m: Mechanism, value: Any, name: str, faults: list[str]) -> Motion
         return None
 
 
-def driven(m: Mechanism, motions: Mapping[str, Any] | None) -> tuple[Mechanism, dict[str, Motion], tuple[Pair, ...]]:
-    """The mechanism with its drives, the motion of each by full name, and the free pairs of points and links whose motion is prescribed.
+class Motions(dict[str, Motion]):
+    """Motions by full name, with the ``free`` pairs of points and links whose coordinates are among them."""
+
+    def __init__(self, motions: Mapping[str, Motion], free: Iterable[Pair] = ()) -> None:
+        super().__init__(motions)
+        self.free = tuple(free)
+
+
+def driven(m: Mechanism, motions: Mapping[str, Any] | None) -> tuple[Mechanism, Motions]:
+    """The mechanism with its drives, and all motions by full name.
 
     Motions given by name go to the declared drives; the others use the motion stored with them. Where a name is no declared drive, the
     names given are the drives of this call, in place of the declared ones.
@@ -41,7 +49,7 @@ def driven(m: Mechanism, motions: Mapping[str, Any] | None) -> tuple[Mechanism, 
             [f"motions = {type(motions).__name__}: expected a mapping driver -> motion, e.g. {{'A': angles}}"],
         )
     faults: list[str] = []
-    spatial = Prescription(m, faults)
+    spatial = Prescription(m, faults, motions.free if isinstance(motions, Motions) else ())
     given = {}
     for name, value in dict(motions or {}).items():
         why = m.freedom_fault(name, single=True)
@@ -70,7 +78,7 @@ def driven(m: Mechanism, motions: Mapping[str, Any] | None) -> tuple[Mechanism, 
             faults.append(f"drive {name!r} has no motion; give one: {{{name!r}: angles or mg.Motion(...)}}")
     if faults:
         raise DeclarationError(f"solve {m.name!r}", faults)
-    return m, {name: out[name] for name in known} | spatial.motions, tuple(spatial.free.values())
+    return m, Motions({name: out[name] for name in known} | spatial.motions, spatial.free.values())
 
 
 def _batch(m: Mechanism, motions: Mapping[str, Motion]) -> tuple[int, ...]:
@@ -111,7 +119,7 @@ class DriverMotion:
     """
 
     def __init__(self, m: Mechanism, motions: Mapping[str, Any] | None, actuate: Any = None) -> None:
-        self.m, self.motions, self.free = driven(m, motions)
+        self.m, self.motions = driven(m, motions)
         self.actuated = None if actuate is None else actuators(m, actuate)
         self.batch = _batch(self.m, self.motions)
         self.t = next((motion.t for motion in self.motions.values() if motion.t is not None), None)
@@ -142,7 +150,7 @@ class DriverMotion:
         poses[:, :3, :3] = R
         poses[:, :3, 3] = par.origin + par.L * X[:, 3].T - (R @ par.offset.T[:, :, None])[..., 0]
         q = start.system.coordinates_of(start.x, start.system.start_coordinates(self.m.start))[:, 0]
-        return with_free_pairs(self.m, self.free, self.names, poses, q)
+        return with_free_pairs(self.m, self.motions.free, self.names, poses, q)
 
     def values(self, kind: str, batch: tuple[int, ...]) -> Array:
         """Driver ``position``, ``velocity`` or ``acceleration`` ``(d, T)`` in the user's units, spread over a batch."""

@@ -139,17 +139,24 @@ def _axes(pair: Pair) -> Array:
 
 @dataclass
 class Prescription:
-    """What a call prescribes of points and links: ``free`` pairs and the motions of their freedoms; faults are collected."""
+    """What a call prescribes of points and links: ``free`` pairs and the motions of their freedoms; faults are collected.
+
+    ``known`` are free pairs that were made before, and motions of their freedoms are taken as they are.
+    """
 
     m: Mechanism
     faults: list[str]
+    known: tuple[Pair, ...] = ()
 
     def __post_init__(self) -> None:
-        self.free: dict[str, Pair] = {}
+        self.free: dict[str, Pair] = {pair.name: pair for pair in self.known}
         self.motions: dict[str, Motion] = {}
 
     def add(self, name: str, value: Any) -> None:
         """Take up the motion of a point, a link or one coordinate of these."""
+        if any(name in pair.freedom_names for pair in self.known):
+            self.motions[name] = value
+            return
         target = target_of(self.m, name)
         if isinstance(target, str):
             self.faults.append(f"motion of {name!r}: {target}")

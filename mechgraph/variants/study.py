@@ -12,7 +12,7 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.arguments import option_faults
-from mechgraph.closure.driver_motion import actuators, driven
+from mechgraph.closure.driver_motion import Motions, actuators, driven
 from mechgraph.closure.solver import ENGINES, EngineName
 from mechgraph.errors import DeclarationError
 from mechgraph.force.dalembert import METHODS, MethodName
@@ -116,7 +116,7 @@ def study(
     near = np.concatenate([np.zeros((len(steps), 1)), np.diag(steps), -np.diag(steps)], axis=1) + source.start[:, None]
 
     def task(part: Array, at: slice) -> Task:
-        own = {name: motion_of_case(motion, at) for name, motion in paths.items()}
+        own = Motions({name: motion_of_case(motion, at) for name, motion in paths.items()}, given.free)
         return Task(source, part, own, kept, method, redundant, engine, acting)
 
     size = max(1, min(MOST_TOGETHER, POSITIONS_TOGETHER // max(motion.shape[-1] for motion in paths.values())))
@@ -146,10 +146,10 @@ def _argument_faults(
 
 def _source(
     m: Mechanism | Callable[..., Mechanism], ways: Mapping[str, Any], motions: Mapping[str, Any] | None
-) -> tuple[Source, dict[str, Motion]]:
+) -> tuple[Source, Motions]:
     names = tuple(ways)
     if isinstance(m, Mechanism):
-        own, given, _ = driven(m, motions)
+        own, given = driven(m, motions)
         found = {name: find_field(own, name) for name in names}
         faults = [fault for fault in found.values() if isinstance(fault, str)]
         fields: dict[str, AnyField] = {name: f for name, f in found.items() if not isinstance(f, str)}
@@ -167,7 +167,7 @@ def _source(
         ) from error
     if not isinstance(first, Mechanism):
         raise DeclarationError("study", [f"the function gave {type(first).__name__}; expected a Mechanism"])
-    own, given, _ = driven(first, motions)
+    own, given = driven(first, motions)
     named = {own.full_name(key) for key in motions or {} if own.freedom_fault(key, single=True) is None}
     stored = tuple(name for name in given if name in own.freedom_names() and name not in named)
     return Source(own, names, middle, build=m, stored=stored, redriven=own is not first), given

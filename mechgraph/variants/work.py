@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.closure.driver_motion import Motions
 from mechgraph.closure.driver_path import Status
 from mechgraph.closure.solver import EngineName
 from mechgraph.errors import DeclarationError, MechgraphError
@@ -89,7 +90,7 @@ class Task:
 
     source: Source
     values: Array
-    motions: Mapping[str, Motion]
+    motions: Motions
     outputs: Mapping[str, Output]
     method: MethodName
     redundant: RedundantName
@@ -166,7 +167,7 @@ def _solved_alone(task: Task, i: int, start: Array) -> Solution:
         raise DeclarationError("study", [f"the function failed: {type(error).__name__}: {error}"]) from error
     if np.isfinite(start).all():
         m = m.replace(start=dict(zip(m.freedom_names(), start.tolist(), strict=True)))
-    motions = {name: motion_of_case(motion, i) for name, motion in task.motions.items()}
+    motions = Motions({name: motion_of_case(motion, i) for name, motion in task.motions.items()}, task.motions.free)
     own = {m.full_name(d.freedom): d.motion for d in m.drives if d.motion is not None}
     for name in task.source.stored:
         if own[name].shape[-1:] != motions[name].shape[-1:]:
