@@ -82,7 +82,7 @@ class Pipeline:
     def __init__(self, drive: DriverMotion, options: Options) -> None:
         self.drive, self.m, self.options = drive, drive.m, options
         self.start = closed_start(self.m, drive.first)
-        if drive.motions.free:
+        if drive.free:
             self.m = drive.whole(self.start)
             self.start = closed_start(self.m)
         self.system, self.x = self.start.system, self.start.x[:, 0]

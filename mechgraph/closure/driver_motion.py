@@ -125,6 +125,11 @@ class DriverMotion:
         self.t = next((motion.t for motion in self.motions.values() if motion.t is not None), None)
 
     @property
+    def free(self) -> tuple[Pair, ...]:
+        """The free pairs of points and links whose motion is prescribed."""
+        return self.motions.free
+
+    @property
     def shown(self) -> Mechanism:
         """The mechanism that a solution shows: its drives are the freedoms that take the unknown efforts."""
         return self.m if self.actuated is None else self.m.replace(drives=self.actuated)
@@ -150,7 +155,7 @@ class DriverMotion:
         poses[:, :3, :3] = R
         poses[:, :3, 3] = par.origin + par.L * X[:, 3].T - (R @ par.offset.T[:, :, None])[..., 0]
         q = start.system.coordinates_of(start.x, start.system.start_coordinates(self.m.start))[:, 0]
-        return with_free_pairs(self.m, self.motions.free, self.names, poses, q)
+        return with_free_pairs(self.m, self.free, self.names, poses, q)
 
     def values(self, kind: str, batch: tuple[int, ...]) -> Array:
         """Driver ``position``, ``velocity`` or ``acceleration`` ``(d, T)`` in the user's units, spread over a batch."""
