@@ -1,6 +1,6 @@
 """The closure equations of a large mechanism as one square sparse system: reduced loop by loop, bordered, factored.
 
-The six rows of a loop are taken about its own middle, with its own unit of length, and turned so that those without any pivot in that
+The six rows of a loop are taken with its own unit of length, and turned so that those without any pivot in that
 loop alone (its local redundancy) fall away. A motion within a single loop (the spin of a coupler between spheres) gets a row that
 holds it. A matching of the remaining rows to the free columns leaves some columns and rows unmatched; each is bordered by a random row
 or column, placed at the loop where it lies. What results,
@@ -53,14 +53,13 @@ class LoopSystem(ReducedRows):
 
     def __init__(self, rows: ClosureRows, fixed: Index) -> None:
         super().__init__(rows, fixed)
-        S = rows.S
         self._match()
         self.pattern, self._constant = self._border(beside=False)
-        self.first = self.factor(S)
+        self.first = self.factor(rows.S, rows.middles)
         if self.shared and not self.first.smallest_pivot > RETRY:
             own = self.first, self.pattern, self._constant
             self.pattern, self._constant = self._border(beside=True)
-            self.first = self.factor(S)
+            self.first = self.factor(rows.S, rows.middles)
             if own[0].smallest_pivot > self.first.smallest_pivot:
                 self.first, self.pattern, self._constant = own
         self.smallest = self.first.smallest_pivot
@@ -102,7 +101,7 @@ class LoopSystem(ReducedRows):
         return out
 
     def _motions_of_single_loops(self) -> list[tuple[Array, Index]]:
-        blocks = self._blocks(self.rows.S) * self._scale[self.entries.column]
+        blocks = self._blocks(self.rows.S, self.rows.middles) * self._scale[self.entries.column]
         shared = np.bincount(self.entries.column, minlength=len(self._free)) > 1
         if self.rows.more is not None:
             shared[self.rows.more.indices] = True
@@ -201,11 +200,11 @@ class LoopSystem(ReducedRows):
 
     # --- solving ---------------------------------------------------------------------------------------------------------
 
-    def factor(self, S: Array) -> SparseFactor:
-        """The system factored for the twists ``S (6, F)`` of one position."""
-        return self.pattern.factor(np.concatenate([self._turned_blocks(S)[self._live], self._constant]))
+    def factor(self, S: Array, middles: Array) -> SparseFactor:
+        """The system factored for the twists ``S (6, F)`` and middles ``(3, loops)`` of one position."""
+        return self.pattern.factor(np.concatenate([self._turned_blocks(S, middles)[self._live], self._constant]))
 
-    def turned_matrix(self, S: Array) -> scipy.sparse.csr_array:
+    def turned_matrix(self, S: Array, middles: Array) -> scipy.sparse.csr_array:
         """``J (rows, free columns)`` in turned rows and columns of unit size; rows behind those of the loops as they are."""
         e = self.entries
         place = np.cumsum(self._free) - 1
@@ -213,13 +212,13 @@ class LoopSystem(ReducedRows):
         rows = (6 * e.loop + np.arange(6)[:, None])[live]
         cols = np.broadcast_to(place[e.column], (6, len(e.loop)))[live]
         shape = (6 * len(self.kept), int(self._free.sum()))
-        J = scipy.sparse.csr_array((self._turned_blocks(S)[live], (rows, cols)), shape=shape)
+        J = scipy.sparse.csr_array((self._turned_blocks(S, middles)[live], (rows, cols)), shape=shape)
         return scipy.sparse.csr_array(scipy.sparse.vstack([J, self._more]))
 
     @property
     def unit(self) -> float:
         """A length in the middle of those of the loops."""
-        return float(np.median(self.measure.length)) if len(self.kept) else 1.0
+        return float(np.median(self.length)) if len(self.kept) else 1.0
 
     @property
     def turned_rows(self) -> scipy.sparse.csr_array:
@@ -256,14 +255,16 @@ class LoopSystem(ReducedRows):
             rhs[self._n :] = shares
         return factor.solve(rhs, transposed=True)[: self._m]
 
-    def random_stress(self, factor: SparseFactor, S: Array, rng: np.random.Generator, count: int) -> Array:
-        """Random self-stresses ``(rows, count)`` for twists ``S (6, F)``, of size one in the measure of their loops.
+    def random_stress(
+        self, factor: SparseFactor, S: Array, middles: Array, rng: np.random.Generator, count: int
+    ) -> Array:
+        """Random self-stresses ``(rows, count)`` for twists and middles of one position, of size one in the measure of their loops.
 
         In the rows that fell away they are random; what these bring to the free columns where they are not zero there (in the
         positions behind the first) the other rows take up.
         """
         e = self.entries
-        free = np.where(self._live, 0.0, self._turned_blocks(S))
+        free = np.where(self._live, 0.0, self._turned_blocks(S, middles))
         dropped = ~(np.arange(6) < self.kept[:, None])
         local = np.zeros((len(self.kept), 6, count))
         local[dropped] = rng.normal(size=(int(dropped.sum()), count))

@@ -21,6 +21,9 @@ from mechgraph.model import pair_kinematics as evaluation
 
 Value = TypeVar("Value")
 
+ROUNDINGS = 20
+"""Roundings of a position that add up in a closure residual."""
+
 
 class kept(Generic[Value]):
     """A ``cached_property`` without its lock, which takes longer than the arithmetic of one position."""
@@ -225,21 +228,47 @@ class Configuration:
 
     @kept
     def chord_errors(self) -> Array:
-        """Closure errors ``(6, chords, T)``: finite twist from marker B reached through b to that reached through a."""
+        """Closure errors ``(6, chords, T)``: finite twist from marker B reached through b to that reached through a, about the origin."""
         ends, links = self.system.chord_nodes
         reached, declared = self._nodes[:, :, ends], self._nodes[:, :, links]
         R = multiplied(reached[:, :3], declared[:, :3].swapaxes(0, 1))
         return finite_twist(R, reached[:, 3] - multiplied(R, declared[:, 3:])[:, 0])
 
     @property
+    def chord_gaps(self) -> Array:
+        """The same at the pair points of the chords, so that an angle does not count with the distance of the internal origin."""
+        e = self.chord_errors
+        return np.concatenate([e[:3], e[3:] + cross(e[:3], self.pair_points[:, self.system.chords])])
+
+    @property
     def loop_errors(self) -> Array:
-        """Closure errors of the loops, stacked ``(6 loops, T)``."""
+        """Closure errors of the loops about their middles, stacked ``(6 loops, T)``."""
         s = self.system
         if s.many_loops:
             per_pair = np.zeros((6, len(s.m.pairs), self.T), dtype=self.chord_errors.dtype)
             per_pair[:, s.chords] = self.chord_errors
             return self.loop_sums(per_pair)
-        return _combined(s.loops_of_chords, self.chord_errors)
+        return self._about_middles(_combined(s.loops_of_chords, self.chord_errors))
+
+    @kept
+    def middles(self) -> Array:
+        """Middle of the pair points of every loop, ``(3, loops, T)``."""
+        s = self.system
+        if s.many_loops:
+            flat = self.pair_points.transpose(1, 0, 2).reshape(len(s.m.pairs), 3 * self.T)
+            return np.asarray(s.graph.loop_averages @ flat).reshape(-1, 3, self.T).transpose(1, 0, 2)
+        if s.par.batch == 1:
+            return np.asarray(s.middle_numbers @ self._nodes.reshape(3, s.middle_numbers.shape[1], self.T))
+        return np.asarray(s.loop_averages @ self.pair_points)
+
+    def _about_middles(self, twists: Array) -> Array:
+        """Twists ``(6 loops, T)`` about the internal origin taken about the middle of their loop, in place.
+
+        So the rows of a loop are as good anywhere: about a fixed point their condition would grow with the square of its distance.
+        """
+        parts = twists.reshape(self.system.graph.n_loops, 2, 3, self.T).transpose(1, 2, 0, 3)
+        parts[1] += cross(parts[0], self.middles)
+        return twists
 
     @kept
     def closure(self) -> Array:
@@ -252,20 +281,25 @@ class Configuration:
         """What the closure rows leave open ``(n_rows, T)``: loops first, then the others."""
         return _stacked([part.residual(self) for part in self.system.rows])
 
+    @property
+    def rounding(self) -> Array:
+        """Rounding of the residual ``(T,)``: that of positions, which grows with their distance from the internal origin."""
+        return np.asarray(ROUNDINGS * np.finfo(float).eps * np.abs(self._nodes[:, 3]).max(axis=(0, 1), initial=1.0))
+
     @kept
     def J(self) -> Array:
         """Closure Jacobian ``(n_rows, F, T)``; of the loops ``J = (C x I6) diag(S_k)``."""
         return _stacked([part.jacobian(self) for part in self.system.rows])
 
     def stacked(self, S: Array) -> Array:
-        """Columns ``(6, F, T)`` placed with their signs into the rows of every loop."""
-        s = self.system
-        out = np.zeros((6 * len(s.loop_pieces), s.n_freedoms, S.shape[2]), dtype=S.dtype)
-        for i, pieces in enumerate(s.loop_pieces):
-            rows = out[6 * i : 6 * i + 6]
-            for at, signs in pieces:
-                np.multiply(S[:, at], signs, out=rows[:, at])
-        return out
+        """Columns ``(6, F, T)`` placed with their signs into the rows of every loop, about its middle."""
+        s, e = self.system, self.system.entries
+        parts = S.take(e.column, axis=1)
+        parts *= e.sign[:, None]
+        parts[3:] += cross(parts[:3], self.middles.take(e.loop, axis=1))
+        out = np.zeros((s.graph.n_loops, 6, s.n_freedoms, S.shape[2]), dtype=S.dtype)
+        out[e.loop, :, e.column] = parts.swapaxes(0, 1)
+        return out.reshape(-1, *out.shape[2:])
 
     def closure_rates(self, dq: Array) -> Array:
         """``J q' (n_rows, T)`` for rates ``dq (F, T)``, without forming ``J``."""
@@ -324,18 +358,21 @@ class Configuration:
         return carriers
 
     def loop_sums(self, per_pair: Array) -> Array:
-        """Signed sum of pair terms along every loop, stacked ``(6 loops, T)``."""
+        """Signed sum of pair terms along every loop, about its middle, stacked ``(6 loops, T)``."""
         s = self.system
         if s.many_loops:
             flat = per_pair.transpose(1, 0, 2).reshape(per_pair.shape[1], 6 * per_pair.shape[2])
-            return np.asarray(s.graph.sparse_loop_matrix @ flat).reshape(6 * s.graph.n_loops, per_pair.shape[2])
-        return _combined(s.loop_matrix, per_pair)
+            sums = np.asarray(s.graph.sparse_loop_matrix @ flat).reshape(6 * s.graph.n_loops, per_pair.shape[2])
+            return self._about_middles(sums)
+        return self._about_middles(_combined(s.loop_matrix, per_pair))
 
     def pair_wrenches(self, x: Array) -> Array:
-        """Pair wrenches ``(6, P, k, T)`` of the loop rows of ``x (n_rows, k, T)``: ``w = C^T x``."""
+        """Pair wrenches ``(6, P, k, T)`` of the loop rows of ``x (n_rows, k, T)``: ``w = C^T x``, taken about the internal origin."""
         s = self.system
         n = s.graph.n_loops
-        loops = x[: 6 * n].reshape(n, 6, *x.shape[1:])
+        loops = x[: 6 * n].reshape(n, 6, *x.shape[1:]).copy()
+        parts = loops.swapaxes(0, 1)
+        parts[:3] += cross(self.middles[:, :, None], parts[3:])
         if s.many_loops:
             flat = np.asarray(s.graph.sparse_loop_matrix.T @ loops.reshape(n, loops.size // n))
             return np.moveaxis(flat.reshape(len(s.m.pairs), 6, *x.shape[1:]), 1, 0)

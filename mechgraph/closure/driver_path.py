@@ -66,6 +66,7 @@ class DriverPath:
         self.columns = solver.fixed
         self.rows = system.single_rows[self.columns]
         self.size = (system.n_freedoms, len(self.columns))
+        self.paced = bool(system.is_length[self.columns].any())
         self._system_of, self._start = system_of, start
         self.variant_of: Index = np.zeros(0, dtype=np.intp)
 
@@ -100,6 +101,12 @@ class DriverPath:
     def tangent(self, dq: Array, rates: Array) -> Array:
         """See ``numerics.newton.Problem``."""
         return self.system.tangent(dq, rates)
+
+    def pace(self, rates: Array) -> Array:
+        """The largest rate, slides that stand in no closure row left out; 0 where nothing turns, so that bodies are displaced only."""
+        size = np.abs(rates)
+        turning = size[~self.system.is_length].max(axis=0, initial=0.0) > 0
+        return np.where(turning, np.minimum(size[~self.system.carrying].max(axis=0, initial=0.0), 1.0), 0.0)
 
     def corrigible(self, dq: Array, which: Index) -> Array:
         """See ``ClosureSolver.corrigible``."""

@@ -12,6 +12,7 @@ from itertools import pairwise, starmap
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.batches import Index as Index
@@ -20,6 +21,7 @@ from mechgraph.closure.rows import CouplingRows, LoopRows, Rows
 from mechgraph.closure.states import States
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import Parameters, parameters
+from mechgraph.numerics.linear import add_at
 from mechgraph.topology.linkgraph import LinkGraph, link_graph
 
 
@@ -79,6 +81,13 @@ class System(States):
         return np.flatnonzero(self.coupling_matrix.any(axis=0))
 
     @cached_property
+    def carrying(self) -> NDArray[np.bool_]:
+        """Which freedoms ``(F,)`` are slides that stand in no closure row: they carry what is behind them, and leave the rows alone."""
+        out = self.is_length.copy()
+        out[self.entries.column] = out[self.coupled_freedoms] = False
+        return out
+
+    @cached_property
     def row_places(self) -> list[slice]:
         """The rows of every contributor."""
         ends = np.cumsum([0, *(len(part.scale) for part in self.rows)]).tolist()
@@ -95,6 +104,15 @@ class System(States):
     def effort_numbers(self) -> Array:
         """The efforts of all freedoms in their nodes, moment and force ``(3, 2, F, B)``."""
         return self.numbers.components(self.effort_table)
+
+    @cached_property
+    def middle_numbers(self) -> Array:
+        """Middles of the loops ``(loops, 4 nodes)`` from the poses of the nodes, of one mechanism: means of its pair points."""
+        ends = np.concatenate([self.numbers.ends[:, 0, :, 0], np.ones((1, len(self.m.pairs)))])
+        terms = np.moveaxis(self.loop_averages[:, None] * ends, 1, 2)
+        out = np.zeros((len(terms), len(self.walk.parents) + 1, 4), dtype=terms.dtype)
+        add_at(out, self.walk.end_node, terms)
+        return np.moveaxis(out, 2, 1).reshape(len(out), 4 * out.shape[1])
 
     @cached_property
     def reaction_numbers(self) -> Array:

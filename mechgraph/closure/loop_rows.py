@@ -1,6 +1,6 @@
 """The rows of the closure equations by loops: entries, the measure of every loop, and the rows of a loop reduced to independent ones.
 
-The six rows of a loop are taken about its own middle, over its own length, columns of unit size, and turned by a singular value
+The six rows of a loop, about its own middle, are taken over its own length, columns of unit size, and turned by a singular value
 decomposition so that those that depend on the others (the redundancy of that loop alone) come last:
 
     U_l^T M_l J_l D = [K_l; 0].
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from mechgraph.algebra.se3 import Array, cross
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
+from mechgraph.closure.places import entries_of
 from mechgraph.numerics.least_norm import LeastNorm
 from mechgraph.numerics.tolerances import RANKS
 from mechgraph.topology.linkgraph import LinkGraph
@@ -27,56 +28,14 @@ from mechgraph.topology.linkgraph import LinkGraph
 Mask = NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
-class Entries:
-    """The nonzero 6-vectors of the closure Jacobian: loop, column and sign of each, loop by loop."""
-
-    loop: Index
-    column: Index
-    sign: Array
-    first: Index
-
-
-def entries_of(graph: LinkGraph, first_column: Index) -> Entries:
-    """All (loop, column) places of the closure Jacobian of a graph whose pairs have their freedoms from ``first_column`` on."""
-    loop, pair, sign = graph.loop_steps
-    width = np.diff(first_column)[pair]
-    step = np.repeat(np.arange(len(loop)), width)
-    within = np.arange(len(step)) - np.repeat(np.cumsum(width) - width, width)
-    first = np.searchsorted(loop[step], np.arange(graph.n_loops + 1))
-    return Entries(loop[step], first_column[pair[step]] + within, sign[step], first.astype(np.intp))
-
-
-@dataclass(frozen=True)
-class Measure:
-    """Middle ``(3, loops)`` and length ``(loops,)`` of every loop: rows of twists are taken about the one, over the other."""
-
-    middle: Array
-    length: Array
-
-    def rows(self, twists: Array, loop: Index) -> Array:
-        """Twists ``(6, n)`` about the internal origin in the measure of their loops."""
-        moment = cross(twists[:3], self.middle[:, loop])
-        return np.concatenate([twists[:3], (twists[3:] + moment) / self.length[loop]])
-
-    def wrenches(self, y: Array) -> Array:
-        """Loop wrenches ``(6, loops, k)`` about the internal origin from multipliers of those rows; the transpose."""
-        force = y[3:] / self.length[:, None]
-        return np.concatenate([y[:3] + cross(self.middle[:, :, None], force), force])
-
-
-def measure_of(graph: LinkGraph, pair_points: Array) -> Measure:
-    """Middle and size of the pair points ``(3, P)`` of every loop."""
+def lengths_of(graph: LinkGraph, pair_points: Array, middles: Array) -> Array:
+    """Root mean square distance ``(loops,)`` of the pair points ``(3, P)`` of every loop from its middle ``(3, loops)``."""
     loop, pair, _ = graph.loop_steps
-    n = graph.n_loops
-    points = pair_points[:, pair]
-    count = np.maximum(np.bincount(loop, minlength=n), 1)
-    middle = np.stack([np.bincount(loop, row, minlength=n) for row in points]) / count
-    off = points - middle[:, loop]
-    length = np.sqrt(np.bincount(loop, (off * off).sum(axis=0), minlength=n) / count)
+    off = pair_points[:, pair] - middles[:, loop]
+    length = np.sqrt(np.bincount(loop, (off * off).sum(axis=0), minlength=graph.n_loops) / np.bincount(loop))
     # points that coincide but for rounding make no length
-    rounding = 1e-13 * (1.0 + np.sqrt((middle * middle).sum(axis=0)))
-    return Measure(middle, np.where(length > rounding, length, 1.0))
+    rounding = 1e-13 * (1.0 + np.sqrt((middles * middles).sum(axis=0)))
+    return np.where(length > rounding, length, 1.0)
 
 
 @dataclass(frozen=True)
@@ -96,6 +55,11 @@ class ClosureRows:
         others = [scipy.sparse.csr_array(part.jacobian(here)[:, :, 0]) for part in s.rows[1:]]
         more = scipy.sparse.csr_array(scipy.sparse.vstack(others)) if others else None
         return cls(s.graph, s.first_column, here.S[:, :, 0], here.pair_points[:, :, 0], more)
+
+    @cached_property
+    def middles(self) -> Array:
+        """Middle of the pair points of every loop, ``(3, loops)``."""
+        return np.asarray((self.graph.loop_averages @ self.points.T).T)
 
     @property
     def further(self) -> int:
@@ -118,10 +82,10 @@ class ReducedRows:
     def __init__(self, rows: ClosureRows, fixed: Index, dense: bool = False) -> None:
         self.rows, self.fixed, self.dense = rows, fixed, dense
         self.entries = entries_of(rows.graph, rows.first_column)
-        self.measure = measure_of(rows.graph, rows.points)
+        self.length = lengths_of(rows.graph, rows.points, rows.middles)
         self._free = np.ones(rows.S.shape[1], dtype=bool)
         self._free[fixed] = False
-        blocks = self._blocks(rows.S)
+        blocks = self._blocks(rows.S, rows.middles)
         largest = np.zeros(rows.S.shape[1])
         np.maximum.at(largest, self.entries.column, np.abs(blocks).max(axis=0, initial=0.0))
         if rows.more is not None:
@@ -155,10 +119,13 @@ class ReducedRows:
         mine = np.repeat(np.arange(self.loops), self.kept)
         return np.concatenate([mine, self.loops + np.arange(self.rows.further)]).astype(np.intp)
 
-    def _blocks(self, S: Array) -> Array:
-        """Entries ``(6, entries)`` in the measure of their loops, zero in the fixed columns."""
+    def _blocks(self, S: Array, middles: Array) -> Array:
+        """Entries ``(6, entries)`` about the ``middles (3, loops)``, over the lengths of the loops; zero in the fixed columns."""
         e = self.entries
-        return self.measure.rows(S[:, e.column], e.loop) * (e.sign * self._free[e.column])
+        out = S[:, e.column]
+        out[3:] += cross(out[:3], middles[:, e.loop])
+        out[3:] /= self.length[e.loop]
+        return np.asarray(out * (e.sign * self._free[e.column]))
 
     @cached_property
     def _by_width(self) -> list[tuple[Index, Index]]:
@@ -188,9 +155,9 @@ class ReducedRows:
         e = self.entries
         return (np.arange(6)[:, None] < self.kept[e.loop][None]) & self._free[e.column][None]
 
-    def _turned_blocks(self, S: Array) -> Array:
+    def _turned_blocks(self, S: Array, middles: Array) -> Array:
         """Entries ``(6, entries)`` in the turned rows of their loops and columns of unit size."""
-        blocks = self._blocks(S) * self._scale[self.entries.column]
+        blocks = self._blocks(S, middles) * self._scale[self.entries.column]
         turned = np.empty_like(blocks)
         for loops, at in self._by_width:
             turned[:, at] = np.moveaxis(self._turn[loops] @ np.moveaxis(blocks[:, at], 0, 1), 0, 1)
@@ -205,7 +172,9 @@ class ReducedRows:
         rows = (starts[e.loop][None] + np.arange(6)[:, None])[self._live]
         cols = np.broadcast_to(place[e.column], (6, len(e.loop)))[self._live]
         shape = (int(starts[-1]), int(self._free.sum()))
-        K = scipy.sparse.csr_array((self._turned_blocks(self.rows.S)[self._live], (rows, cols)), shape=shape)
+        K = scipy.sparse.csr_array(
+            (self._turned_blocks(self.rows.S, self.rows.middles)[self._live], (rows, cols)), shape=shape
+        )
         if self.rows.more is None:
             return K
         more = self.rows.more[:, self._free] * self._scale[self._free]
@@ -216,7 +185,7 @@ class ReducedRows:
         """The same as a full matrix."""
         e, m = self.entries, int(self.kept.sum())
         whole = np.zeros((6 * self.loops, len(self._free)))
-        whole[6 * e.loop + np.arange(6)[:, None], e.column] = self._turned_blocks(self.rows.S)
+        whole[6 * e.loop + np.arange(6)[:, None], e.column] = self._turned_blocks(self.rows.S, self.rows.middles)
         K = np.zeros((self.height, int(self._free.sum())))
         K[:m] = whole[(np.arange(6) < self.kept[:, None]).ravel()][:, self._free]
         if self.rows.more is not None:
@@ -224,12 +193,9 @@ class ReducedRows:
         return K
 
     def _turned(self, b: Array) -> Array:
-        """Right sides ``(6 loops, k)`` about the internal origin as turned rows ``(loops, 6, k)``."""
-        rows = b.reshape(self.loops, 6, b.shape[1])
-        local = np.empty_like(rows)
-        local[:, :3] = rows[:, :3]
-        moment = cross(np.moveaxis(rows[:, :3], 1, 0), self.measure.middle[:, :, None])
-        local[:, 3:] = (rows[:, 3:] + np.moveaxis(moment, 0, 1)) / self.measure.length[:, None, None]
+        """Right sides ``(6 loops, k)`` as turned rows ``(loops, 6, k)``."""
+        local = b.reshape(self.loops, 6, b.shape[1]).copy()
+        local[:, 3:] /= self.length[:, None, None]
         return np.asarray(self._turn @ local)
 
     def open_part(self, residual: Array) -> float:
@@ -240,7 +206,7 @@ class ReducedRows:
     @property
     def rounding(self) -> float:
         """Rounding of a residual in the measure of the smallest loop, as positions are of size one."""
-        return 20 * np.finfo(float).eps / min(1.0, float(self.measure.length.min(initial=1.0)))
+        return 20 * np.finfo(float).eps / min(1.0, float(self.length.min(initial=1.0)))
 
     def kept_part(self, b: Array) -> Array:
         """Right sides ``(rows, k)`` in the kept and the further rows, ``(height, k)``."""
@@ -263,8 +229,11 @@ class ReducedRows:
         full = np.empty((self.loops, 6, kept.shape[1]))
         mask = np.arange(6) < self.kept[:, None]
         full[mask], full[~mask] = kept, dropped
-        rows = np.swapaxes(self._turn, 1, 2) @ full
-        return self.measure.wrenches(np.moveaxis(rows, 1, 0))
+        return self._unscaled(np.moveaxis(np.swapaxes(self._turn, 1, 2) @ full, 1, 0))
+
+    def _unscaled(self, y: Array) -> Array:
+        """Loop wrenches ``(6, loops, k)`` about the middles from multipliers of rows over the lengths."""
+        return np.concatenate([y[:3], y[3:] / self.length[:, None]])
 
     def multipliers(self, kept: Array, dropped: Array | None = None) -> Array:
         """Loop wrenches and multipliers of further rows ``(rows, k)`` from those of kept (and of dropped) rows."""
@@ -275,7 +244,7 @@ class ReducedRows:
 
     def unit_wrenches(self) -> Array:
         """Loop wrenches ``(6, 6, loops)`` of unit multipliers of the turned rows, one column a row."""
-        return self.measure.wrenches(self._turn.transpose(2, 0, 1)).transpose(0, 2, 1)
+        return self._unscaled(self._turn.transpose(2, 0, 1)).transpose(0, 2, 1)
 
     def local_stress(self) -> tuple[Index, Array]:
         """Loops with self-stresses of their own, and these as loop wrenches ``(6, 6, n)``, those of rows that were kept left out."""

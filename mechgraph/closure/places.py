@@ -8,6 +8,7 @@ are arrays, so that no kernel goes through pairs.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -57,6 +58,26 @@ class sized(shared[Value]):
 def _nothing_yet(m: Mechanism) -> dict[str, Any]:
     """What the systems of a mechanism share."""
     return {}
+
+
+@dataclass(frozen=True)
+class Entries:
+    """The nonzero 6-vectors of the closure Jacobian: loop, column and sign of each, loop by loop."""
+
+    loop: Index
+    column: Index
+    sign: Array
+    first: Index
+
+
+def entries_of(graph: LinkGraph, first_column: Index) -> Entries:
+    """All (loop, column) places of the closure Jacobian of a graph whose pairs have their freedoms from ``first_column`` on."""
+    loop, pair, sign = graph.loop_steps
+    width = np.diff(first_column)[pair]
+    step = np.repeat(np.arange(len(loop)), width)
+    within = np.arange(len(step)) - np.repeat(np.cumsum(width) - width, width)
+    first = np.searchsorted(loop[step], np.arange(graph.n_loops + 1))
+    return Entries(loop[step], first_column[pair[step]] + within, sign[step], first.astype(np.intp))
 
 
 class Places:
@@ -278,15 +299,14 @@ class Places:
         return self.graph.loop_matrix
 
     @shared
-    def loop_pieces(self) -> list[list[tuple[slice, Array]]]:
-        """For every loop the runs of its columns without a gap, with their signs ``(n, 1)``."""
-        out = []
-        for columns, signs in self.loop_columns:
-            order = np.argsort(columns)
-            breaks = np.flatnonzero(np.diff(columns[order]) != 1) + 1
-            runs = zip(np.split(columns[order], breaks), np.split(signs[order], breaks), strict=True)
-            out.append([(slice(int(c[0]), int(c[-1]) + 1), sign[:, None]) for c, sign in runs if len(c)])
-        return out
+    def loop_averages(self) -> Array:
+        """Means over the pairs of every loop, loops x pairs."""
+        return np.asarray(self.graph.loop_averages.toarray())
+
+    @shared
+    def entries(self) -> Entries:
+        """The freedoms along the loops."""
+        return entries_of(self.graph, self.first_column)
 
     @shared
     def loops_of_chords(self) -> Array:

@@ -25,15 +25,15 @@ class Evaluated(Protocol):
         """Twists of all freedoms ``(6, F, T)``."""
 
     @property
-    def chord_errors(self) -> Array:
-        """Closure errors of the chords ``(6, chords, T)``."""
+    def chord_gaps(self) -> Array:
+        """Closure errors of the chords at their pair points, ``(6, chords, T)``."""
 
     @property
     def loop_errors(self) -> Array:
-        """Closure errors of the loops, stacked ``(6 loops, T)``."""
+        """Closure errors of the loops about their middles, stacked ``(6 loops, T)``."""
 
     def stacked(self, S: Array) -> Array:
-        """Columns ``(6, F, T)`` in the rows of every loop."""
+        """Columns ``(6, F, T)`` in the rows of every loop, about its middle."""
 
     def pair_sums(self, terms: Array) -> Array:
         """``(6, F, T)`` -> ``(6, P, T)``."""
@@ -72,7 +72,10 @@ class Rows(Protocol):
 
 
 class LoopRows:
-    """Six rows a loop: the finite twist by which the loop is open."""
+    """Six rows a loop: the finite twist by which the loop is open, about its middle (the mean of its pair points), which moves with it.
+
+    ``J`` and ``bias`` are the derivatives where the loops are closed and rates meet the rows, as the middle moves otherwise.
+    """
 
     def __init__(self, n_loops: int) -> None:
         self.n_loops = n_loops
@@ -90,8 +93,8 @@ class LoopRows:
         """Largest of angle and length / L over all chords."""
         if not self.n_loops:
             return np.zeros(here.T)
-        e = here.chord_errors
-        angle, length = (np.sqrt(np.abs(part * part).sum(axis=0)).max(axis=0) for part in (e[:3], e[3:]))
+        gaps = here.chord_gaps
+        angle, length = (np.sqrt(np.abs(part * part).sum(axis=0)).max(axis=0) for part in (gaps[:3], gaps[3:]))
         return np.maximum(angle, length)
 
     def jacobian(self, here: Evaluated) -> Array:

@@ -16,7 +16,8 @@ def reaction_map(here: Configuration, t: int) -> scipy.sparse.csr_array:
     s = here.system
     loop, pair, sign = s.graph.loop_steps
     points = here.pair_points[:, :, t]
-    w = shift_wrench(np.einsum("ij,n->ijn", np.eye(6), sign), points[:, None, pair])
+    about = (points[:, pair] - here.middles[:, loop, t])[:, None]
+    w = shift_wrench(np.einsum("ij,n->ijn", np.eye(6), sign), about)
     owner = np.repeat(np.arange(len(s.m.pairs)), np.diff(s.first_column))
     E = shift_wrench(here.E[:, :, t], points[:, owner])
     S = here.S[:, :, t]
@@ -40,7 +41,9 @@ def effort_map(here: Configuration, t: int, acting: Index) -> scipy.sparse.csr_a
     s = here.system
     loop, pair, sign = s.graph.loop_steps
     step, place = np.nonzero(pair[:, None] == np.arange(len(s.m.pairs))[s.owners][acting])
-    values = sign[step] * here.S[:, acting[place], t]
+    values = here.S[:, acting[place], t]
+    values[3:] += cross(values[:3], here.middles[:, loop[step], t])
+    values *= sign[step]
     shape = (6, len(step))
     rows, cols = np.broadcast_to(place, shape), 6 * loop[step] + np.arange(6)[:, None]
     efforts = scipy.sparse.csr_array((values.ravel(), (rows.ravel(), cols.ravel())), shape=(len(acting), s.n_rows))

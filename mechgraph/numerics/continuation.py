@@ -143,6 +143,14 @@ class Follower:
             order[bent] = 3
         return self.problem.corrigible(dq, last.which), order
 
+    def _longest(self, last: Nodes, new: Nodes, drive: Array) -> Array:
+        """The longest next steps, by the pace of the tracks at both ends of the last one."""
+        if not self.problem.paced:
+            return np.full(len(new), PATH.longest)
+        change = (drive - last.drive) / np.maximum(new.place - last.place, PATH.shortest)
+        paces = [self.problem.pace((node.Z * change).sum(axis=1)) for node in (last, new)]
+        return PATH.longest / np.maximum(np.maximum(*paces), np.finfo(float).tiny)
+
     # --- the quick march -------------------------------------------------------------------------------------------------
 
     def _quick(self, start: Nodes, first: float) -> Nodes:
@@ -159,7 +167,7 @@ class Follower:
             found = self.newton.nodes(x, drive, last.track, last.which, PATH.quick)
             good = found.done & (found.correction <= PATH.correction) & (found.condition <= PATH.singular)
             new = Nodes.closed(found, drive, last.track, at, sure=False)
-            h = _next_step(at - last.place, found.correction, order, good)
+            h = _next_step(at - last.place, found.correction, order, good, self._longest(last, new, drive))
             if good.all():
                 out.append(new)
                 before, last = last, new
@@ -275,7 +283,8 @@ class Follower:
                 good = bool(ok[0])
             else:
                 good = False
-            h = float(_next_step(at - last.place, step.correction, order, np.array([good]))[0])
+            longest = self._longest(last, new, drive)
+            h = float(_next_step(at - last.place, step.correction, order, np.array([good]), longest)[0])
             if good and middle is not None:
                 self.work.careful += 1
                 found += [middle, new]
@@ -358,10 +367,10 @@ def _spread(places: Array, crossing: float, distance: float) -> Index:
     return np.unique(np.clip(np.searchsorted(places, wanted), 0, len(places) - 1))
 
 
-def _next_step(h: Array, correction: Array, order: Array, good: Mask) -> Array:
-    """The step that aims at the wanted correction; half of one that failed."""
+def _next_step(h: Array, correction: Array, order: Array, good: Mask, longest: Array) -> Array:
+    """The step that aims at the wanted correction, at most the ``longest``; half of one that failed."""
     grown = h * np.clip((PATH.aim / np.maximum(correction, 1e-9)) ** (1 / order), 0.5, 2.0)
-    return np.where(good, np.minimum(np.maximum(grown, 10 * PATH.shortest), PATH.longest), 0.5 * h)
+    return np.where(good, np.minimum(np.maximum(grown, 10 * PATH.shortest), longest), 0.5 * h)
 
 
 def _replaced(old: Nodes, new: Nodes, at: Index) -> Nodes:

@@ -43,6 +43,10 @@ class Point(Protocol):
     def residual(self) -> Array:
         """Residual of the equations, ``(m, n)``."""
 
+    @property
+    def rounding(self) -> Array:
+        """Rounding of the residual, ``(n,)``."""
+
     def part(self, at: Index) -> Any:
         """Some of the points."""
 
@@ -52,6 +56,8 @@ class Problem(Protocol):
 
     size: tuple[int, int]
     """Numbers of increments F and of path values d."""
+    paced: bool
+    """Whether the equations may change more slowly than the path values, see ``pace``."""
 
     def at(self, x: Array, drive: Array, tracks: Index) -> Any:
         """The equations at states, the path values put in."""
@@ -73,6 +79,9 @@ class Problem(Protocol):
 
     def tangent(self, dq: Array, rates: Array) -> Array:
         """Rates of increments from the rates at the states to which they lead."""
+
+    def pace(self, rates: Array) -> Array:
+        """How fast the equations change at the rates ``(F, n)``, at most one: 0 where steps may be as long as the certificate allows."""
 
     def corrigible(self, dq: Array, which: Index) -> Array:
         """Increments without the part that no correction can change (freedoms that are held)."""
@@ -162,7 +171,10 @@ class Newton:
             self._count(active.size, 1, 0)
             left = np.abs(point.residual).max(axis=0, initial=0.0)
             if goal > 0:
-                near = (left <= goal) | ((left <= PATH.accepted) & (left > 0.5 * before[mine]))
+                near = left <= goal
+                stalled = left > 0.5 * before[mine]
+                if stalled.any():
+                    near |= stalled & (left <= np.maximum(PATH.accepted, point.rounding))
                 x[:, active[near]] = point.x[:, near]
                 done[active[near]] = True
                 if near.all():

@@ -108,7 +108,7 @@ class PathTolerances:
     first: float = 0.05
     """First step of a path, where there are no earlier nodes to predict from."""
     longest: float = 0.35
-    """Longest step between nodes; longer ones would be refused by the certificate more often than not."""
+    """Longest step between nodes, unless tracks go straight on; longer ones would be refused by the certificate more often than not."""
     shortest_quick: float = 2e-3
     """Step at which the first march stops and the careful one takes over."""
     shortest: float = 1e-9

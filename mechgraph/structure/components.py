@@ -97,7 +97,7 @@ class Components:
         steps, loops = mine[order], number[loop[mine[order]]]
         width = np.diff(self.first)[pair[steps]]
         starts = np.concatenate([[0], np.cumsum(width)])
-        values = self._along(pair[steps], sign[steps] * wrenches[:, :, loops], starts[:-1])
+        values = self._along(pair[steps], sign[steps] * wrenches[:, :, loops], loop[steps], starts[:-1])
         within = np.arange(starts[-1]) - np.repeat(starts[:-1], width)
         places = np.repeat(self.first[pair[steps]], width) + within
         begin = starts[np.searchsorted(loops, np.arange(some.size + 1))]
@@ -109,11 +109,11 @@ class Components:
             out.append((some[mine], places[at], values[at][:, :, :s]))
         return out
 
-    def _along(self, pairs: Index, wrenches: Array, at: Index) -> Array:
-        """Parts ``(all places, 6)`` in wrenches ``(6, 6 states, steps)`` of pairs, each from its place ``at`` on."""
+    def _along(self, pairs: Index, wrenches: Array, loop: Index, at: Index) -> Array:
+        """Parts ``(all places, 6)`` in wrenches ``(6, 6 states, steps)`` of pairs in loops, each from its place ``at`` on."""
         s = self.system
         out = np.zeros((int(at[-1] + np.diff(self.first)[pairs[-1]]), 6))
-        points = self.configuration.pair_points[:, pairs, 0]
+        points = (self.configuration.pair_points[:, pairs] - self.configuration.middles[:, loop])[:, :, 0]
         local = wrenches.copy()
         local[:3] -= np.cross(points[:, None], wrenches[3:], axis=0)
         group = np.empty(len(s.m.pairs), dtype=np.intp)

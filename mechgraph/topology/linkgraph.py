@@ -84,6 +84,13 @@ class LinkGraph:
         loop, pair, sign = self.loop_steps
         return scipy.sparse.csr_array((sign, (loop, pair)), shape=(self.n_loops, len(self.a)))
 
+    @cached_property
+    def loop_averages(self) -> scipy.sparse.csr_array:
+        """Means over the pairs of every loop, loops x pairs."""
+        loop, pair, _ = self.loop_steps
+        share = 1.0 / np.bincount(loop, minlength=self.n_loops)[loop]
+        return scipy.sparse.csr_array((share, (loop, pair)), shape=(self.n_loops, len(self.a)))
+
     @property
     def loop_matrix(self) -> NDArray[np.float64]:
         """Loop matrix, loops x pairs: sign with which a loop runs through a pair, 0 elsewhere. A C^T = 0."""

@@ -39,7 +39,7 @@ class NumbersPath(DriverPath):
     def __init__(self, line: Pipeline, numbers_at: NumbersAt) -> None:
         solver = closure_solver(line.engine, line.leading, line.freedoms.hold if line.bodies else None)
         super().__init__(line.system, solver, line.system.cases)
-        self.size = (self.system.n_freedoms, 1)
+        self.size, self.paced = (self.system.n_freedoms, 1), False
         self._line, self._numbers_at = line, numbers_at
         self._known: tuple[bytes, System] | None = None
 

@@ -338,3 +338,34 @@ def test_a_narrow_gap_of_the_reach_is_not_leapt_over(short: float, begin: float)
         with pytest.raises(mg.ReachError) as caught:
             mg.kinematics(m, {"A": [0.0, limit + beyond]})
         assert caught.value.value["A.Rz"] == pytest.approx(limit, abs=1e-6)
+
+
+def gripper(on: str = "axis") -> mg.Mechanism:
+    """A four-bar of 30 mm carried along x by a slide, or by two parallel ones that close a loop of their own."""
+    points = [(0, 0), (0, 0.03), (0.036, 0.039), (0.033, 0)]
+    links = ["carriage", "crank", "coupler", "rocker"]
+    pairs = [mg.Pair("X", "P", "frame", "carriage", point=(0, 0, 0), axis=(1, 0, 0))]
+    if on == "gantry":
+        pairs.append(mg.Pair("Y", "P", "frame", "carriage", point=(0, 0.1, 0), axis=(1, 0, 0)))
+    for k, (name, (x, y)) in enumerate(zip("ABCD", points, strict=True)):
+        pairs.append(mg.Pair(name, "R", links[k], links[(k + 1) % 4], point=(x, y, 0), axis=(0, 0, 1)))
+    centers = dict(zip(links, points, strict=True))
+    bodies = [mg.Link("frame"), *(mg.Link(name, mass=1.0, center=(x, y, 0)) for name, (x, y) in centers.items())]
+    return mg.Mechanism(on, bodies, pairs, ["X", "A"], [mg.Gravity((0, -9.81, 0))])
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.parametrize("on", ["axis", "gantry"])
+def test_loops_are_closed_about_their_own_place(on, engine):
+    """Carried 500 m away a gripper has the angles and torques that it has at home, in as few nodes."""
+    m = gripper(on)
+    A = np.linspace(0, 0.5, 6)
+    home, away = (
+        mg.solve(m, {"X": np.concatenate([[0.0], np.full(6, x)]), "A": np.concatenate([[0.0], A])}, engine=engine)
+        for x in (0.0, 500.0)
+    )
+    noise = 500 / 0.03 * 1e-13  # rounding of positions, over the size of the gripper
+    for name in "BCD":
+        np.testing.assert_allclose(away[name].position, home[name].position, atol=noise)
+    np.testing.assert_allclose(away["A"].effort, home["A"].effort, rtol=10 * noise, atol=noise)
+    assert away.work.nodes < 100
