@@ -26,7 +26,7 @@ from mechgraph.document import Document, Table, to_text
 from mechgraph.errors import visible
 from mechgraph.exchange.comparison import compare
 from mechgraph.exchange.files import READERS
-from mechgraph.result.summary import driver_value, summary
+from mechgraph.result.summary import OK, driver_value, summary
 from mechgraph.starting import INTERRUPTED
 from mechgraph.typed import drives_of, duration, parse_at, refuse
 from mechgraph.writing import writable
@@ -159,6 +159,8 @@ def _fail(message: str, status: int) -> NoReturn:
 def _reached(error: mg.MechgraphError) -> str:
     """The driver values reached, in the words of the command line."""
     if not isinstance(error, mg.ReachError | mg.DeadPointError) or error.solution is None:
+        return ""
+    if not (np.asarray(error.solution.status) == OK).any():
         return ""
     m = error.solution.whole
     at = ", ".join(driver_value(m, name, value) for name, value in error.value.items())

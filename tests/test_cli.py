@@ -583,3 +583,16 @@ def test_respond_refuses_what_it_cannot_read(options, words):
     done = run("respond", "windows-2", *options)
     assert done.exit_code == 2
     assert words in done.output
+
+
+def test_a_drive_declared_at_its_dead_point_is_told_without_a_hint_that_does_not_help(tmp_path: Path) -> None:
+    z = (0, 0, 1)
+    gear = mg.Mechanism("gear", pairs=[
+        mg.Pair("A", "R", "frame", "leg", point=(0, 0, 0), axis=z), mg.Pair("B", "R", "leg", "lower", point=(0, -1, 0), axis=z),
+        mg.Pair("C", "R", "lower", "upper", point=(0.5, -0.5, 0), axis=z), mg.Pair("D", "R", "upper", "frame", point=(1, 0, 0), axis=z),
+    ], drives=["A"])  # fmt: skip
+    mg.save(gear, tmp_path / "gear.toml")
+    result = CliRunner().invoke(app, ["solve", str(tmp_path / "gear.toml"), "--drive", "A=0:10:5deg"])
+    assert result.exit_code == 1
+    assert "A.Rz stands still" in result.output
+    assert "--on-reach" not in result.output

@@ -118,6 +118,11 @@ def test_the_line_of_two_ball_joints() -> None:
     np.testing.assert_allclose(s[far.name].force, 0.0, atol=1e-8)
 
 
+def test_a_drive_of_a_rotation_is_told_what_to_add() -> None:
+    with pytest.raises(mg.DeclarationError, match=r"'A\.Rz' is part of a rotation.*a pair 'Fr' beside it"):
+        shaft(motor=False, drives=("A.Rz",))
+
+
 def test_rows_that_hold_nothing_are_no_advice() -> None:
     table = mg.pair_types()
     wider = {other.symbol for row in table.values() for other in wider_types(row)}

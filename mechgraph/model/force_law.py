@@ -41,11 +41,11 @@ class Law(BaseLoad):
 
     def act(self, site: LoadSite) -> None:
         """Add the effort, or the forces on both links."""
-        length, _, force = self.reading(site)
         if self.in_freedom is not None:
-            site.add_effort(self.in_freedom, force)
+            site.add_effort(self.in_freedom, self.force(site, *site.freedom(self.in_freedom)))
             return
-        p, q, _, u, _ = self._line(site)
+        p, q, length, u, rate = self._line(site)
+        force = self.force(site, length, rate)
         # between points that meet, a force has no direction
         push = np.where((length > 0) | (force == 0), force * u, np.nan)
         site.add_force(self.a, -push, p)

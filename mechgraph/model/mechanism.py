@@ -249,7 +249,10 @@ class Mechanism(Formatted):
             return found
         k, j = found
         if single and not self.pairs[k].type.drivable[j]:
-            return f"freedom {name!r} is part of a rotation; it takes an effort, not a drive, a start angle or a spring"
+            return (
+                f"freedom {name!r} is part of a rotation; it takes an effort, not a drive, a start angle or a spring (a pair 'Fr' "
+                "beside it, between the same links, has a turn Rz that takes all of these)"
+            )
         return None
 
     def freedom(self, name: str) -> tuple[int, int]:
