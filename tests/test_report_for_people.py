@@ -9,9 +9,11 @@ import mechanisms as known
 import numpy as np
 import pytest
 from lattices import ladder, parallelograms, scissors, spatial_ladder, tree_of_loops
+from typer.testing import CliRunner
 
 import mechgraph as mg
 from mechgraph.algebra.se3 import pose_exp
+from mechgraph.cli import app
 
 BUILDERS = (
     {n: (lambda n=n: mg.load(n)) for n in mg.library()}
@@ -181,6 +183,22 @@ def test_components_stand_beside_their_direction_in_words() -> None:
 def test_spins_explain_the_count() -> None:
     report = mg.check(machines.five_rods())
     assert "39 unknowns, 44 equations: 5 of them the spins of rod1, rod2, rod3, rod4 and rod5" in report.verdict
+
+
+def test_a_load_that_no_part_takes_is_what_to_do_first() -> None:
+    m = machines.five_rods()
+    links = [mg.Link(n, 1.0, (0.3, 0.5, 0.2)) if n == "rod1" else mg.Link(n) for n in m.link_names()]
+    text = " ".join(mg.check(m.replace(links=links, loads=[mg.Gravity((0, 0, -9.81))])).text().split())
+    assert "What to do: - Hold rod1 or balance the load on it: a couple of" in text
+    assert "Nothing" not in text
+
+
+def test_the_command_line_prints_the_page_and_the_whole() -> None:
+    runner = CliRunner()
+    page, whole = (runner.invoke(app, ["check", "four-bar", *more]).stdout for more in ([], ["--full"]))
+    assert "What to do:" in page
+    assert "Self-stresses" not in page
+    assert "Self-stresses" in whole
 
 
 # --- advice -----------------------------------------------------------------------------------------------------------------

@@ -43,11 +43,12 @@ def _to_do(r: Facts) -> Iterator[str]:
     yield from (a.text for a in r.advice if a.effect is None)
     if r.contradicting_drives and r.mobility and not r.suggested_drives:
         yield "the declared drivers depend on each other: take one away"
-    for p in r.passive:
-        if p.load_bearing:
-            yield f"hold {p.name}, or balance the load of {p.size} that turns it: no part does"
+    bearing = [p for p in r.passive if p.load_bearing]
+    for p in bearing:
+        what = "couple" if p.turns else "force"
+        yield f"hold {p.name} or balance the load on it: a {what} of {p.size} moves it, and no part takes that"
     yield from alternatives(r.advice)[:CHANGES]
-    if r.determinate and not r.near:
+    if r.determinate and not r.near and not bearing:
         yield "nothing: equilibrium alone gives every force"
 
 

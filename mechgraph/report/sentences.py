@@ -287,7 +287,9 @@ def _finite(r: Facts) -> list[str]:
     if _shaky(r):
         return ["Shaky: the mobility is infinitesimal only; the loops stay closed over no finite stroke."]
     if r.mobility and r.finite_mobility is not None and r.finite_mobility < r.mobility:
-        return [f"Of mobility {r.mobility} here, {r.finite_mobility} is finite; the rest is instantaneous."]
+        return [
+            f"Of mobility {r.mobility} here, {r.finite_mobility} is finite; the rest is instantaneous, in this position only."
+        ]
     return []
 
 
