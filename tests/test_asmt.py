@@ -498,6 +498,51 @@ def test_stored_results_stand_beside_ours(tmp_path, changed, found):
         assert off[0].relative == pytest.approx(0.01 / 1.01, rel=1e-6)
 
 
+def test_a_driven_slide_by_hand(tmp_path):
+    """A block of 2 kg on a rail along x, pushed with 0.5 m/s^2 against a field of -3 along it; results on the ground, about marker I."""
+    along = np.eye(4)
+    along[:3, :3] = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0.0]])  # z of the markers along x
+    stands = np.eye(4)
+    stands[0, 3] = 0.1
+    w = Writer()
+    w.part("block", stands, 2.0, (0, 0, 0), np.eye(3), (1, 1, 1))
+    w.joint("TranslationalJoint", "rail", "Assembly1", along, "block", stands @ along)
+    w.motion("TranslationalMotion", "push", "rail", "TranslationZ", "0.1+0.25*time^2")
+    w.gravity, w.simulation = np.array([-3.0, -9.81, 0]), (0.0, 2.0, 0.5)
+    t = np.arange(5) * 0.5
+    x, zero = 0.1 + 0.25 * t**2, 0 * t
+
+    def rows(**found):
+        labels = [f"{kind}{axis}onI" for kind in "FT" for axis in "XYZ"]
+        return ["\t".join([label, "0", *(f"{v:.17g}" for v in found.get(label[:2], zero))]) for label in labels]
+
+    w.results = ["TimeSeries", "\t".join(["Time", "Input", *map(str, t)]),
+        "TranslationalJointSeries\t/Assembly1/rail", *rows(FY=zero - 2 * 9.81, TZ=-2 * 9.81 * x),
+        "TranslationalMotionSeries\t/Assembly1/push", *rows(FX=zero - 2 * (0.5 + 3))]  # fmt: skip
+    file = tmp_path / "slide.asmt"
+    file.write_text(w.text())
+    got = compare(file)
+    assert {(d.of, d.quantity) for d in got.differences} == {
+        (n, q) for n in ("rail", "push") for q in ("force", "moment")
+    }
+    assert max(d.relative for d in got.differences) < 1e-10
+
+
+@pytest.mark.parametrize(("first", "second", "sign"), [(0, 1, 1.0), (1, 0, -1.0)])
+def test_a_motion_names_the_markers_of_its_joint_in_either_order(tmp_path, first, second, sign):
+    w = Writer()
+    w.part("arm", at(0.3, 0.4))
+    markers = w.joint("RevoluteJoint", "J", "Assembly1", at(1, 2), "arm", at(1, 2))
+    w.motions += [
+        "RotationalMotion",
+        ["Name", ["M"], "MarkerI", [markers[first]], "MarkerJ", [markers[second]], "RotationZ", ["0.2+time"]],
+    ]
+    made, notes = loaded(tmp_path, w.text())
+    (drive,) = made.drives
+    assert drive.freedom == "J.Rz"
+    assert drive.motion.position == pytest.approx(sign * (0.2 + drive.motion.t))
+
+
 def test_of_redundant_reactions_it_is_said_that_the_file_has_one_of_many(tmp_path):
     w = swing()
     w.joint("RevoluteJoint", "second", "Assembly1", at(0, 0, 1), "arm", at(0, 0, 1))

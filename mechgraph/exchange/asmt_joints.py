@@ -116,8 +116,10 @@ def at_angle(angle: float) -> PairType:
     return PairType("Angle", "z axes at a constant angle", freedoms=[*SLIDES, "Rz", axis])
 
 
-def motion_type(turns: str) -> PairType:
+def motion_type(turns: str) -> str | PairType:
     """A pair without any reaction, for a motion between markers that no joint connects: slides along the axes of I, then turns in order."""
+    if turns == "xyz":
+        return "Fr"
     names = [*SLIDES, *(f"R{axis}" for axis in turns)]
     return PairType(f"Motion{turns}", HELD_BY_MOTION, freedoms=names, reactions=[])
 
