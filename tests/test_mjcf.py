@@ -196,6 +196,14 @@ def test_names_are_escaped(tmp_path):
     assert [p.name for p in loaded(tmp_path / "m.xml")[0].pairs] == [p.name for p in odd.pairs]
 
 
+@pytest.mark.parametrize("name", ["a\tb", "a\nb", "a\x00b", "a\u202eb"])
+def test_names_that_xml_cannot_hold_are_refused(tmp_path, name):
+    m = MACHINES["gears"]
+    odd = m.replace(pairs=[m.pairs[0], m.pairs[1].replace(name=name)], couplings=[])
+    with pytest.raises(mg.FileError, match="characters that XML cannot hold"):
+        mg.save(odd, tmp_path / "m.xml")
+
+
 # --- MuJoCo's own word -------------------------------------------------------------------------------------------------------
 
 

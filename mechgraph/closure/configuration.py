@@ -299,7 +299,7 @@ class Configuration:
         parts[3:] += cross(parts[:3], self.middles.take(e.loop, axis=1))
         out = np.zeros((s.graph.n_loops, 6, s.n_freedoms, S.shape[2]), dtype=S.dtype)
         out[e.loop, :, e.column] = parts.swapaxes(0, 1)
-        return out.reshape(-1, *out.shape[2:])
+        return out.reshape(out.shape[0] * out.shape[1], *out.shape[2:])
 
     def closure_rates(self, dq: Array) -> Array:
         """``J q' (n_rows, T)`` for rates ``dq (F, T)``, without forming ``J``."""

@@ -8,12 +8,12 @@ stand in the frames of their links. Source: MuJoCo documentation, XML reference 
 
 from __future__ import annotations
 
+import html
 import os
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -214,9 +214,9 @@ class Writer:
         """One line of the file."""
         words = [tag]
         for key, value in attributes.items():
-            if isinstance(value, str) and HIDDEN.search(value):
+            if isinstance(value, str) and (HIDDEN.search(value) or not {"\t", "\n"}.isdisjoint(value)):
                 self.faults.append(f"{key} {shown(value)}: a name with characters that XML cannot hold")
-            words.append(f"{key}={quoteattr(value if isinstance(value, str) else _numbers(value))}")
+            words.append(f'{key}="{html.escape(value if isinstance(value, str) else _numbers(value))}"')
         return "  " * depth + "<" + " ".join(words) + end
 
     def tree(self) -> Iterator[str]:
