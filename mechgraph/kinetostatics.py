@@ -138,7 +138,10 @@ def solve(
     Parameters
     ----------
     motions : driver -> ``Motion``, or positions at zero rates; shapes broadcast, the last axis is followed as a path from
-        ``start``, other axes are independent cases. Left out where the drives carry their motion.
+        ``start``, other axes are independent cases. Left out where the drives carry their motion. Beside freedoms it may name a point
+        of a link (``"bucket.tip"``: positions ``(..., 3)``), a link (poses ``(..., 4, 4)``; rates: its twist and that one's rate
+        ``(..., 6)``) or one coordinate of these: ``"bucket.tip.Tz"``, ``"bucket.tip.T(1,0,1)"`` along a direction, ``"platform.Rz"``
+        of the turns about x, the new y and the new z.
     actuate : freedoms in which the unknown efforts stand, as many as independent motions are prescribed; left out, they stand where
         motion is prescribed. Where these freedoms rest while the mechanism moves, forces are NaN (status "actuators at dead point").
     method : ``"loop_wrench"`` (one unknown wrench a loop), ``"newton_euler"`` (all reaction components and efforts at once) or
