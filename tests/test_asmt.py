@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 import mechgraph as mg
 from mechgraph.cli import app
+from mechgraph.document import to_text
 from mechgraph.exchange.asmt_joints import JOINTS, REFUSED
 from mechgraph.exchange.comparison import compare
 from mechgraph.exchange.formula import FUNCTIONS, FormulaFault, evaluated
@@ -494,6 +495,8 @@ def test_stored_results_stand_beside_ours(tmp_path, changed, found):
     off = [d for d in got.differences if d.relative > 1e-9]
     assert [d.quantity for d in off] == found
     assert {d.of for d in got.differences} == {"arm", "J", "M"}
+    if found:
+        assert f"off by more than 0.0001: 1 of 6, {found[0]} of" in " ".join(to_text(got.document()).split())
     if "force" in changed:
         assert off[0].relative == pytest.approx(0.01 / 1.01, rel=1e-6)
 

@@ -55,7 +55,7 @@ class Difference:
         """The cells of the table."""
         remark = "not unique: the file has one of many" if self.missing else ""
         shown = ("", "") if np.isnan(self.largest) else (f"{self.largest:.3g}", f"{self.relative:.2g}")
-        return self.of, self.quantity, f"{self.size:.4g}", *shown, remark
+        return self.of, self.quantity, f"{self.size:.4g}" if self.size else "", *shown, remark
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Comparison:
         worst = max(off, key=lambda d: d.relative, default=None)
         verdict = f"All that is unique agrees to {AGREES:g}"
         if worst is not None:
-            count = f"{len(off)} of {len(self.differences)} quantities differ by more than {AGREES:g}"
+            count = f"Quantities off by more than {AGREES:g}: {len(off)} of {len(self.differences)}"
             verdict = f"{count}, {worst.quantity} of {worst.of} the most"
         head = ("of", "quantity", "greatest in the file", "difference", "relative", "")
         rows = tuple(d.cells() for d in self.differences)
@@ -135,7 +135,7 @@ class _Compared:
             if angles is not None:
                 rotation = scipy.spatial.transform.Rotation
                 turn = rotation.from_matrix(X[:, :3, :3]).inv() * rotation.from_euler("XYZ", angles)
-                yield difference(name, "turn [rad]", turn.as_rotvec(), np.zeros((len(X), 3)), 1.0)
+                yield difference(name, "turn [rad]", turn.as_rotvec(), np.zeros((len(X), 3)), 0.0)
 
     def wrenches(self) -> Iterator[tuple[str, Array, Array, Array, Array]]:
         """Name, force and moment on I of ours and theirs, for each joint and each motion of a single joint."""
