@@ -14,7 +14,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import CLOSED, closed_start, named_columns
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
-from mechgraph.closure.driver_path import BLOCK, DriverPath, Positions, Request, Status, in_blocks
+from mechgraph.closure.driver_path import BLOCK, FARTHEST, DriverPath, Positions, Request, Status, in_blocks
 from mechgraph.closure.following import follow
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.passive_rest import Idle, unspun
@@ -37,9 +37,6 @@ CONTRADICTION = 1e-6
 """Relative part of the closure rates that drivers may leave open before they count as contradicting each other."""
 NOISE = 1e-13
 """Part of the condition number within which a start is not told from a dead point: some hundred roundings of its closing."""
-FARTHEST = 1e6
-"""Longest way of a driver from its start (radians, or lengths / L)."""
-
 Mask = NDArray[np.bool_]
 
 

@@ -498,3 +498,11 @@ def test_a_fault_among_many_sound_items_is_told_alone(size):
     assert len(faults) == 2
     assert "no body has it" in faults[0]
     assert "three finite numbers" in faults[1]
+
+
+def test_a_start_is_not_sought_too_far_away():
+    """Freedoms moved together are followed whole; one that turns is not."""
+    axes = [mg.Pair(name, "R", a, b, point=(0, 0, 0), axis=(0, 0, 1)) for name, a, b in ("Afg", "Bgh")]
+    m = mg.Mechanism("arm", None, axes, ["A", "B"], frame="f")
+    with pytest.raises(mg.DeclarationError, match=r"A: comes 1e\+07 away from the start; expected at most 1e\+04"):
+        mg.assemble(m, {"A": 1e7, "B": 1.0})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array, rotate
 from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.driver_path import DriverPath, Request, Status
+from mechgraph.closure.driver_path import FARTHEST, DriverPath, Request, Status
 from mechgraph.closure.following import follow
 from mechgraph.closure.indexing import Index, System, indexed
 from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
@@ -37,6 +37,8 @@ ASKEW = 1.0
 """Closure error (radians) from which on a reversed marker axis is looked for."""
 MOST_REVERSED = 30
 """Pairs up to which that is done: every marker may cost an assembly."""
+FARTHEST_TOGETHER = 1e4
+"""Longest way of freedoms that are moved together, which is followed whole: some seconds."""
 FIRST = 8
 """How many of them are tried before the others; an even number, as they are of two kinds in turn."""
 
@@ -82,7 +84,8 @@ def scaled(here: Configuration) -> Configuration:
     centers = (rotate(X[:, :3], raw.par.center[:, massive]) + X[:, 3])[:, :, 0]
     distances = np.concatenate([points, centers], axis=1) - centroid[:, None]
     L = float(np.sqrt((distances**2).sum(axis=0).mean()))
-    L = 1.0 if 1e-12 * max(1.0, float(np.abs(points).max())) >= L else L
+    # points that coincide but for the error of closing make no length
+    L = 1.0 if CLOSED * max(1.0, float(np.abs(points).max())) >= L else L
     par = raw.par.rescaled(raw.par.origin + raw.par.L * centroid, L * raw.par.L)
     return here.rescaled(raw.with_parameters(par))
 
@@ -301,6 +304,8 @@ def assembled_at(
     ------
     AssemblyError
         where the values cannot be reached.
+    DeclarationError
+        where they are too far away to be followed.
     """
     if guess is not None:
         m = m.replace(start={**m.start, **{m.full_name(k): v for k, v in guess.items()}})
@@ -314,10 +319,25 @@ def assembled_at(
         return _state(scaled(Configuration(raw, x[:, None])))
     system, x = assembled(m, values)
     columns, goal = named_columns(m, system, values)
+    _refuse_far(
+        m, values, goal - x[system.single_rows[columns]], np.where(system.is_length[columns], system.par.L, 1.0)
+    )
     x, done = led(system, x, columns, goal)
     if not done:
         raise _not_reached(m, system, x, float(np.abs(x[system.single_rows[columns]] - goal).max()), values)
     return _state(scaled(Configuration(system, x[:, None])))
+
+
+def _refuse_far(m: Mechanism, names: Iterable[str], way: Array, unit: Array) -> None:
+    """Refuse a way that would be followed for minutes; that of one freedom that turns is cut where the motion repeats itself."""
+    most = FARTHEST if len(way) == 1 else FARTHEST_TOGETHER
+    faults = [
+        f"{name}: comes {size * one:.3g} away from the start; expected at most {most * one:.3g}. Give a nearer value, or a guess"
+        for name, size, one in zip(names, np.abs(way), unit, strict=True)
+        if size > most
+    ]
+    if faults:
+        raise DeclarationError(f"assemble {m.name!r}", faults)
 
 
 def _not_reached(m: Mechanism, system: System, x: Array, error: float, values: Mapping[str, float]) -> AssemblyError:

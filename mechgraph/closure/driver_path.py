@@ -28,6 +28,8 @@ from mechgraph.numerics.tracks import Nodes, Paths, places_of
 
 Mask = NDArray[np.bool_]
 
+FARTHEST = 1e6
+"""Longest way of a driver from its start (radians, or lengths / L)."""
 BLOCK = 1024
 """Positions evaluated together, so that what is computed on the way stays in the cache of a core (measured)."""
 
