@@ -60,9 +60,13 @@ def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exceptio
         )
         error.branches = ways
         return error
+    why = (
+        f"is within reach, but its loops could not be closed to rounding; the path was followed to {at}"
+        if status[first] == Status.NOT_CLOSED.value
+        else f"is out of reach; reached {at}"
+    )
     return ReachError(
-        f"mechanism {line.m.name!r}: position {first} ({wanted}) is out of reach; reached {at}. Use on_reach='flag' for the "
-        "positions that can be reached",
+        f"mechanism {line.m.name!r}: position {first} ({wanted}) {why}. Use on_reach='flag' for the positions that can be reached",
         reached,
         solution,
     )
@@ -76,6 +80,8 @@ def _check_drivers(line: Pipeline, outcome: Outcome) -> None:
     why = (
         f"the drivers {names} contradict each other: no position meets all their motions (mobility {mobility}, "
         f"{len(line.columns)} drivers). Remove a driver, or give motions that agree"
+        if len(line.columns) > 1
+        else f"the driver {names} is locked: no other position meets its motion (mobility {mobility}). Drive another freedom"
     )
     raise IndeterminateError(f"mechanism {line.m.name!r}: {why}", check(line.drive.m))
 

@@ -18,6 +18,7 @@ from strategies import (
 )
 
 import mechgraph as mg
+from mechgraph.closure import driver_path
 
 NODES = 20
 TYPES = [s for s, row in mg.pair_types().items() if row.f]
@@ -369,3 +370,41 @@ def test_loops_are_closed_about_their_own_place(on, engine):
         np.testing.assert_allclose(away[name].position, home[name].position, atol=noise)
     np.testing.assert_allclose(away["A"].effort, home["A"].effort, rtol=10 * noise, atol=noise)
     assert away.work.nodes < 100
+
+
+def five_bar():
+    """A planar five-bar with both cranks driven."""
+    points, links = [(0, 0), (0, 1), (0.9, 1.6), (1.6, 1), (1.6, 0)], ["f", "a", "b", "c", "d"]
+    pairs = [
+        mg.Pair(name, "R", links[k], links[(k + 1) % 5], point=(*points[k], 0), axis=(0, 0, 1))
+        for k, name in enumerate("ABCDE")
+    ]
+    return mg.Mechanism("five-bar", None, pairs, ["A", "E"], frame="f")
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+def test_a_first_position_beyond_the_reach_leaves_the_others(engine):
+    """B3 with two drivers: the others are solved as they are alone, and the error says how far the drivers came."""
+    values = {"A": [2.5, 0.1, 0.2], "E": [0.0, 0.05, 0.1]}
+    s = mg.kinematics(five_bar(), values, on_reach="flag", engine=engine)
+    assert s.status.tolist() == ["out of reach", "ok", "ok"]
+    alone = mg.kinematics(five_bar(), {name: v[1:] for name, v in values.items()}, engine=engine)
+    for name in "BCD":
+        np.testing.assert_allclose(s[name].position[1:], alone[name].position, atol=1e-10)
+    with pytest.raises(mg.ReachError, match=r"position 0 .* is out of reach; reached A\.Rz = 0\.41"):
+        mg.kinematics(five_bar(), values, engine=engine)
+
+
+def test_a_position_that_does_not_close_is_not_said_to_be_out_of_reach(monkeypatch):
+    """The driver came to its value: the error says that the loops are what fails."""
+    closed = driver_path.Legs._closed
+
+    def last_one_open(*args):
+        bad = closed(*args)
+        bad[-1] = True
+        return bad
+
+    monkeypatch.setattr(driver_path.Legs, "_closed", last_one_open)
+    with pytest.raises(mg.ReachError, match="is within reach, but its loops could not be closed") as error:
+        mg.kinematics(gripper(), {"X": [0.0, 0.1], "A": [0.0, 0.2]})
+    assert "out of reach" not in str(error.value)
