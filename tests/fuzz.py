@@ -69,7 +69,11 @@ def used(m: mg.Mechanism, rng: random.Random) -> None:
     """What a user does with a mechanism."""
     motions = {d.freedom: rng.choice([0.0, [0.0, 0.1, 0.2], [rng.uniform(-4, 4), 3.0]]) for d in m.drives}
     how = {"on_reach": rng.choice(["raise", "flag"]), "engine": rng.choice(["auto", "dense", "sparse"])}
-    options = {"method": rng.choice(["loop_wrench", "newton_euler"]), "redundant": rng.choice(["nan", "minimum_norm"])}
+    odd = len(m.pairs) % 2  # not drawn: what is drawn later stays as it was
+    options = {
+        "method": rng.choice(["loop_wrench", ("newton_euler", "printed")[odd]]),
+        "redundant": rng.choice(["nan", "minimum_norm"]),
+    }
     report = answered(lambda: mg.check(m, engine=how["engine"]), "check")
     if report is not None:
         answered(lambda: str(report), "report")
@@ -77,7 +81,12 @@ def used(m: mg.Mechanism, rng: random.Random) -> None:
     s = answered(lambda: mg.solve(m, motions or None, **how, **options), f"solve {motions} {how} {options}")
     if s is not None:
         answered(lambda: (s.columns(), str(s), s.state(0 if s.batch else ())), "columns")
-    answered(lambda: mg.formulate(m, rng.choice(["lee", "minimal"])).text(), "formulate")
+    sought = ("kinetostatics", "response")[odd]
+    f = answered(lambda: mg.formulate(m, rng.choice(["lee", "minimal"]), unknowns=sought), "formulate")
+    if f is not None:
+        answered(f.text, "equations")
+        if s is not None and len(f.unknowns) <= 400:
+            answered(lambda: f.coefficients(s.state(0 if s.batch else ())), "numbers of the equations")
     answered(lambda: toml.parse(toml.to_data(m), "again"), "to a file and back")
 
 
@@ -415,7 +424,7 @@ def _doors() -> list[tuple[str, Callable, tuple, dict]]:
         ("load", mg.load, ("four-bar",), {}),
         ("check", mg.check, (m, {"A": 0.1}), {"engine": "dense"}),
         ("assemble", mg.assemble, (m, {"A": 0.1}, {"B": 0.1}), {}),
-        ("formulate", mg.formulate, (m, "lee", ["A"]), {}),
+        ("formulate", mg.formulate, (m, "lee", ["A"]), {"unknowns": "kinetostatics"}),
         (
             "solve",
             mg.solve,

@@ -127,6 +127,25 @@ def test_equations() -> None:
     f = mg.formulate(mg.load("rcsr"))
     assert run("equations", "rcsr", "--coefficients").stdout == f.coefficients().text()
     assert run("equations", "rcsr", "--csv").stdout == f.coefficients().csv()
+    assert "alpha_1" in run("equations", "rcsr", "--unknowns", "response", "--blocks").stdout
+
+
+def test_equations_with_numbers() -> None:
+    """{Q}, {C} and {U} at a position with its rates are those of the solution there."""
+    shown = run("equations", "rcsr", "--at", "O1=160deg@0.1").stdout
+    m = mg.load("rcsr")
+    s = mg.solve(m, {"O1": mg.Motion(np.deg2rad(160), 0.1, 0.0)})
+    f = mg.formulate(m)
+    values = {key: float(value) for key, value in re.findall(r"^([QCu]\(.*\)) = (\S+)$", shown, re.MULTILINE)}
+    A, b = f.assemble(s.state())
+    Q, u = np.zeros(A.shape), np.array([values[f"u({j + 1})"] for j in range(24)])
+    for i, j in zip(*A.nonzero(), strict=True):
+        Q[i, j] = values[f"Q({i + 1}, {j + 1})"]
+    np.testing.assert_allclose(Q, A.toarray(), atol=1e-9)
+    np.testing.assert_allclose(Q @ u, [values.get(f"C({i + 1})", 0.0) for i in range(24)], atol=1e-6)
+    np.testing.assert_allclose(u[23], s["O1"].effort[0], rtol=1e-9)
+    assert "u(24): MA_IN" in shown
+    assert run("equations", "four-bar", "--at", "A=30deg", "--csv").stdout.count("u,0,") == 29
 
 
 def test_solve_prints_a_summary() -> None:
@@ -394,6 +413,8 @@ def _written(path: Path, content: str | bytes) -> Path:
         ("check", "rcsr", "--at", "Q=1"),
         ("check", "rcsr", "--at", "O1=1:2:1"),
         ("equations", "rcsr", "--bookkeeping", "other"),
+        ("equations", "rcsr", "--latex", "--at", "O1=160deg"),
+        ("equations", "rcsr", "--at", "O1=150:160:1deg"),
         ("equations", "rcsr", "--latex", "--csv"),
         ("solve", "rcsr", "--method", "guess"),
         ("solve", "rcsr", "--redundant", "maybe"),

@@ -31,6 +31,7 @@ WRONG = {
     "assemble from a list": (lambda: mg.assemble(M, {}, guess=["A"]), "guess = "),
     "formulate a name": (lambda: mg.formulate("four-bar"), "expected a Mechanism"),
     "formulate in a list": (lambda: mg.formulate(M, ["lee"]), "bookkeeping = "),
+    "formulate for something else": (lambda: mg.formulate(M, unknowns="all"), "unknowns = 'all'"),
     "formulate with one effort": (lambda: mg.formulate(M, efforts="A"), "efforts = 'A'"),
     "save a name": (lambda: mg.save("four-bar", "x.toml"), "expected a Mechanism"),
     "save to a number": (lambda: mg.save(M, 3), "path = 3"),

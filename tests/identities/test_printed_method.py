@@ -4,6 +4,7 @@ import mechanisms as known
 import numpy as np
 import pytest
 from attack import conditions, differences, solved
+from test_complex_step import Circle, Ellipse, ring_with
 from test_engines import drawn
 
 import mechgraph as mg
@@ -157,6 +158,68 @@ def test_a_response_obeys_its_printed_system():
             if unknown.group == "acceleration":
                 k, j = m.freedom(unknown.freedom)
                 np.testing.assert_allclose(value, r[m.pairs[k].name].acceleration[i, j], rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.seeds(16)
+def test_closure_and_response_of_random_mechanisms(seed):
+    """Rates, accelerations, reactions and efforts of a solution satisfy the systems that are assembled from the printed terms."""
+    m, given, how = drawn(seed)
+    s = solved(m, given, redundant="minimum_norm")
+    if isinstance(s, Exception) or s.status[0] != "ok" or not s.mechanism.drives:
+        pytest.skip("no solution")
+    m, state = s.mechanism, s.state(0)
+    held = max((float(np.abs(effort[0])) for effort in s.passive_effort.values()), default=0.0)
+    f = mg.formulate(m, "minimal", [d.freedom for d in m.drives], unknowns="response")
+    accelerations = state.accelerations[:, 0]
+    for system, values in ((f.closure.velocity, state.velocities[:, 0]), (f.closure.acceleration, accelerations)):
+        A, b = system.assemble(state)
+        assert np.abs(A @ values - b).max(initial=0.0) <= 1e-10 * (
+            1 + np.abs(A).max() * np.abs(values).max() + np.abs(b).max()
+        )
+    u = []
+    for unknown in f.unknowns:
+        if unknown.group == "acceleration":
+            u.append(accelerations[m.freedom_names().index(unknown.freedom)])
+        elif unknown.group == "driver":
+            k, j = m.freedom(unknown.freedom)
+            u.append(s[m.pairs[k].name].effort[0, j])
+        elif unknown.group == "coupling":
+            u.append(s.coupling(unknown.owner).effort[0])
+    components = [s[p.name].components[name][0] for p in m.pairs for name in p.type.component_names]
+    whole = np.array([*components, *u])
+    A, b = f.assemble(state)
+    size = np.abs(A).max() * np.abs(whole).max() + np.abs(b).max()
+    assert np.abs(A @ whole - b).max() <= 1e-10 * size + 10 * held
+
+
+@pytest.mark.parametrize("kind", [Circle(0.3, 0.2), Ellipse(0.3, 0.2)], ids=["circle", "ellipse"])
+def test_closure_with_screws_that_move_in_their_frames(kind):
+    row = mg.PairType("K", "guide", freedoms=[kind], reactions=None)
+    m = ring_with(row)
+    s = mg.solve(m, {"O1": mg.Motion([0.02, 0.03], 2.0, 3.0)})
+    f, state = mg.formulate(m), s.state(1)
+    for system, values in ((f.closure.velocity, state.velocities), (f.closure.acceleration, state.accelerations)):
+        A, b = system.assemble(state)
+        np.testing.assert_allclose(A @ values[:, 0], b, atol=1e-11 * (1 + np.abs(values).max()))
+    assert "own rate of a screw" in f.text()
+    assert f.closure.position[0].text.count("D_") + f.closure.position[0].text.count("D-1_") == 2
+
+
+def test_a_large_printed_system_goes_through_sparse_factors():
+    """A snake of 60 links, a motor in every pair: 480 unknowns, 480 equations."""
+    rng, names = np.random.default_rng(3), ["frame", *(f"link{k}" for k in range(60))]
+    links = [mg.Link("frame"), *(mg.Link(name, 1.0, rng.normal(size=3)) for name in names[1:])]
+    pairs = [
+        mg.Pair(f"P{k}", "R", names[k], names[k + 1], point=rng.normal(size=3), axis=rng.normal(size=3))
+        for k in range(60)
+    ]
+    m = mg.Mechanism("snake", links, pairs, drives=[p.name for p in pairs], loads=[mg.Gravity((1.0, 2.0, -9.81))])
+    s = mg.solve(m, {p.name: mg.Motion(0.1, 1.0, 0.5) for p in pairs})
+    f = mg.formulate(m)
+    u = f.solve(s.state())
+    assert f.assemble(s.state())[0].shape == (480, 480)
+    found = u[[unknown.group == "driver" for unknown in f.unknowns]]
+    np.testing.assert_allclose(found, [s[p.name].effort[0] for p in pairs], rtol=1e-8)
 
 
 def test_contradicting_equations_have_no_solution():
