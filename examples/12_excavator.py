@@ -133,11 +133,11 @@ def main() -> None:
         worst = int(np.argmax(np.linalg.norm(force, axis=1)))
         size, (fx, _, fz) = np.linalg.norm(force[worst]), force[worst]
         print(f"{name:<4}{size / 1e3:11.1f}{fx / 1e3:9.1f}{fz / 1e3:9.1f}{TIP[worst, 0]:14.1f}")
-        np.testing.assert_allclose(force[:, [0, 2]], [h[name] for h in hand], rtol=0, atol=1e-8 * size)
+        assert np.allclose(force[:, [0, 2]], [h[name] for h in hand], rtol=0, atol=1e-8 * size)
     for name in ("boom cyl", "stick cyl", "bucket cyl"):
         push = s[name].effort[:, m.freedom(f"{name}.Tz")[1]]
         print(f"{name}: {push.min() / 1e3:.1f} to {push.max() / 1e3:.1f} kN")
-        np.testing.assert_allclose(push, [h[name] for h in hand], rtol=1e-8)
+        assert np.allclose(push, [h[name] for h in hand], rtol=1e-8, atol=0)
 
 
 if __name__ == "__main__":
