@@ -115,6 +115,18 @@ def test_outside_of_a_table() -> None:
     np.testing.assert_allclose(-effort(held, [-1.0, 0.05, 0.1, 2.0]), [3, 4, 5, 5])
 
 
+def test_a_stroke_that_ends_with_its_table_is_within_it() -> None:
+    """A screw of 8 mm lead turned 2.5 times back: -0.02 but for rounding."""
+    screw = mg.Mechanism("screw", pairs=[
+        mg.Pair("nut", "H", "frame", "screw", point=(0, 0, 1), axis=(0, 0, 1), lead=0.008),
+        mg.Pair("collar", "R", "screw", "ram", point=(0, 0, 0.6), axis=(0, 0, 1)),
+        mg.Pair("guide", "P", "frame", "ram", point=(0.3, 0, 0.5), axis=(0, 0, 1)),
+    ], drives=["nut"], loads=[mg.ForceLaw("guide", law=mg.ForceTable(x=[-0.02, 0], force=[25e3, 0]))])  # fmt: skip
+    s = mg.solve(screw, {"nut": 2 * np.pi * np.array([0, -2.5])})
+    assert s["guide"].position[1, 0] != -0.02
+    np.testing.assert_allclose(s["nut"].effort[:, 0], [0, -25e3 * 0.008 / (2 * np.pi)], atol=1e-4)
+
+
 def test_time_and_what_a_function_may_give() -> None:
     t = np.linspace(0, 1, 5)
     found = effort(block(mg.ForceLaw("P", law=lambda x, v, t: 3 * np.sin(t) + x)), AT[0] + 0 * t, t=t)
