@@ -397,3 +397,202 @@ def test_scissor_lift() -> None:
     np.testing.assert_allclose(s["B"].force[:, 2], foot, rtol=1e-9)
     np.testing.assert_allclose(s["A"].force[:, 0], push, rtol=1e-9)
     np.testing.assert_allclose(s["A"].force[:, 2], (load + deck + 2 * stages * arm) * G - foot, rtol=1e-9)
+
+
+def test_excavator() -> None:
+    """In-plane pins and cylinders R-P-R, boom lifted and stick drawn in at once: cylinder forces by the work of each stroke."""
+    elbow, tip = flat(5.2, 2.6), flat(7.0, -1.0)
+    eyes = {"lift": (flat(0.5, -0.6), flat(2.4, 1.9)), "crowd": (flat(2.7, 2.9), flat(4.8, 3.4))}
+    bodies = {"boom": (2000.0, flat(2.7, 1.7)), "stick": (1100.0, flat(5.9, 1.2))}
+    pairs = [
+        mg.Pair("A", "R", "frame", "boom", point=(0, 0, 0), axis=-Y),
+        mg.Pair("B", "R", "boom", "stick", point=elbow, axis=-Y),
+    ]
+    for name, (a, b) in zip(eyes, [("frame", "boom"), ("boom", "stick")], strict=True):
+        foot, head = eyes[name]
+        pairs += [
+            mg.Pair(f"{name} foot", "R", a, f"{name} tube", point=foot, axis=-Y),
+            mg.Pair(name, "P", f"{name} tube", f"{name} rod", point=(foot + head) / 2, axis=head - foot),
+            mg.Pair(f"{name} head", "R", f"{name} rod", b, point=head, axis=-Y),
+        ]
+    heavy = [mg.Link("boom", *bodies["boom"]), mg.Link("stick", *bodies["stick"], points={"tip": tip})]
+    soil = np.array([30e3, 0, 8e3])
+    m = mg.Mechanism(
+        "excavator", links(*heavy, pairs=pairs), pairs, list(eyes),
+        [WEIGHT, mg.Wrench("stick", force=soil, point="tip")],
+    )  # fmt: skip
+    report = mg.check(m)
+    assert report.verdict.startswith("Moves with mobility 2, planar: all in-plane forces and driver efforts are unique")
+    assert report.redundancy == 6  # three for each of the two loops
+
+    def state(angles: Array) -> tuple[Array, float]:
+        """Strokes, and potential of weight and soil, for turns of boom and stick."""
+        r1, r2 = (turned(-Y, angle) for angle in (angles[0], angles[0] + angles[1]))
+
+        def on_stick(p: Array) -> Array:
+            return np.asarray(r1 @ elbow + r2 @ (p - elbow))
+
+        strokes = [
+            np.linalg.norm(r1 @ eyes["lift"][1] - eyes["lift"][0]),
+            np.linalg.norm(on_stick(eyes["crowd"][1]) - r1 @ eyes["crowd"][0]),
+        ]
+        heights = bodies["boom"][0] * (r1 @ bodies["boom"][1])[2] + bodies["stick"][0] * on_stick(bodies["stick"][1])[2]
+        return np.array(strokes), float(G * heights - soil @ on_stick(tip))
+
+    boom, stick = np.deg2rad([0, 10, 20, 25]), np.deg2rad([0, 15, 25, 40])
+    s = mg.solve(m, {"A": boom, "B": stick}, actuate=["lift", "crowd"])
+    home = state(np.zeros(2))[0]
+    step = 1e-5
+    for k, angles in enumerate(np.column_stack([boom, stick])):
+        moved = [(state(angles + step * e), state(angles - step * e)) for e in np.eye(2)]
+        slopes = np.array([(ahead[0] - back[0]) / (2 * step) for ahead, back in moved])
+        rise = np.array([(ahead[1] - back[1]) / (2 * step) for ahead, back in moved])
+        by_hand = np.linalg.solve(slopes, rise)
+        found = [s[name].effort[k, 0] for name in eyes]
+        np.testing.assert_allclose(found, by_hand, rtol=1e-6)
+        np.testing.assert_allclose([s[name].position[k, 0] for name in eyes], state(angles)[0] - home, atol=1e-10)
+    assert not np.isnan(s["A"].force[:, [0, 2]]).any()
+    assert np.isnan(s["A"].force[:, 1]).all()  # along the pins nothing decides
+
+
+def test_tailgate() -> None:
+    """One gas spring at the left of a lid: the couple that holds it and both hinges, by six balances."""
+    mass = 28.0
+    left, right = np.array([0, 0.6, 0]), np.array([0, -0.6, 0])
+    seat, eye = np.array([0.25, 0.55, -0.55]), np.array([0.45, 0.55, -0.05])
+    centre = np.array([0.55, 0.02, -0.1])
+    pairs = [
+        mg.Pair("left hinge", "S", "body", "lid", point=left),
+        mg.Pair("right hinge", "Sg", "body", "lid", point=right, axis=Y),
+        mg.Pair("opening", "Fr", "body", "lid", point=(0, 0, 0), axis=-Y),
+    ]
+    gas = mg.ForceTable(x=[0.5, 1.0], force=[343, 333])
+    heavy = mg.Link("lid", mass, centre, points={"eye": eye})
+    m = mg.Mechanism(
+        "tailgate", [mg.Link("body", points={"seat": seat}), heavy], pairs, ["opening.Rz"],
+        [WEIGHT, mg.ForceLaw(("body", "lid", "seat", "eye"), law=gas)],
+    )  # fmt: skip
+    assert mg.check(m).determinate
+    angles = np.deg2rad([0, 20, 40, 60, 75])
+    s = mg.solve(m, {"opening.Rz": angles})
+    for k, angle in enumerate(angles):
+        r = turned(-Y, angle)
+        length = np.linalg.norm(r @ eye - seat)
+        spring = (343 - 10 * (length - 0.5) / 0.5) * unit(r @ eye - seat)
+        weight = np.array([0, 0, -mass * G])
+        load = wrench(weight, r @ centre) + wrench(spring, r @ eye)
+        # left hinge x, y, z, right hinge x, z, and a couple about the hinge line
+        lines = (
+            [wrench(e, left) for e in (X, Y, Z)]
+            + [wrench(e, right) for e in (X, Z)]
+            + [np.array([0, 0, 0, 0, -1.0, 0])]
+        )
+        by_hand = np.linalg.solve(np.transpose(lines), -load)
+        assert s["opening"].effort[k, 5] == pytest.approx(by_hand[5], rel=1e-8)
+        np.testing.assert_allclose(s["left hinge"].force[k], by_hand[:3], rtol=1e-8, atol=1e-7)
+        np.testing.assert_allclose(s["right hinge"].force[k, [0, 2]], by_hand[3:5], rtol=1e-8, atol=1e-7)
+    assert s["opening"].effort[0, 5] > 0 > s["opening"].effort[-1, 5]  # lifted at first, held back when open
+
+
+def test_door() -> None:
+    """A door of 40 kg swung open: the lower hinge carries it, both pull sideways by its lever, and speed up its mass."""
+    mass, wide, apart, swing = 40.0, 0.9, 1.6, 0.25
+    low, high = np.array([0, 0, 0.2]), np.array([0, 0, 0.2 + apart])
+    middle = np.array([wide / 2, 0, 1.0])
+    inertia = mass / 12 * np.diag([2.0**2, 2.0**2 + wide**2, wide**2])
+    pairs = [
+        mg.Pair("lower hinge", "S", "wall", "door", point=low),
+        mg.Pair("upper hinge", "Sg", "wall", "door", point=high, axis=Z),
+        mg.Pair("swing", "Fr", "wall", "door", point=low, axis=Z),
+    ]
+    loads = [WEIGHT, mg.Damper("swing.Rz", coefficient=6.0)]
+    m = mg.Mechanism("door", [mg.Link("wall"), mg.Link("door", mass, middle, inertia)], pairs, ["swing.Rz"], loads)
+    q, rate, growth = np.deg2rad([0, 30, 90, 130]), 1.5, swing
+    s = mg.solve(m, {"swing.Rz": mg.Motion(q, velocity=rate, acceleration=growth)})
+    out = np.column_stack([np.cos(q), np.sin(q), np.zeros(4)])
+    ahead = np.column_stack([-np.sin(q), np.cos(q), np.zeros(4)])
+    np.testing.assert_allclose(s["swing"].effort[:, 5], mass * wide**2 / 3 * growth + 6 * rate, rtol=1e-10)
+    # sideways: the weight's lever over the distance; m a at mid-height 0.8 above the lower hinge, half to each
+    pull, thrust = -mass * rate**2 * wide / 2, mass * growth * wide / 2
+    lever = mass * G * wide / 2 / apart
+    share = (middle[2] - low[2]) / apart
+    np.testing.assert_allclose(s["upper hinge"].force, (share * pull - lever) * out + share * thrust * ahead, atol=1e-8)
+    lower = ((1 - share) * pull + lever) * out + (1 - share) * thrust * ahead + mass * G * Z
+    np.testing.assert_allclose(s["lower hinge"].force, lower, atol=1e-8)
+
+
+def test_coupled_rods() -> None:
+    """Two wheels of a locomotive, the rods of a piston and between them: the first wheel's pin feels both."""
+    crank, long, base, brake = 0.3, 1.8, 1.5, np.array([900.0, 1400.0])
+    start = np.deg2rad(35)
+    pin = crank * flat(np.cos(start), np.sin(start))
+    head = flat(-np.sqrt(long**2 - pin[2] ** 2) + pin[0], 0)
+    pairs = [
+        mg.Pair("axle1", "R", "frame", "wheel1", point=(0, 0, 0), axis=-Y),
+        mg.Pair("axle2", "R", "frame", "wheel2", point=base * X, axis=-Y),
+        mg.Pair("pin1", "R", "wheel1", "coupling rod", point=pin, axis=-Y),
+        mg.Pair("pin2", "R", "coupling rod", "wheel2", point=pin + base * X, axis=-Y),
+        mg.Pair("big end", "R", "wheel1", "piston rod", point=pin, axis=-Y),
+        mg.Pair("crosshead", "R", "piston rod", "piston", point=head, axis=-Y),
+        mg.Pair("piston", "P", "frame", "piston", point=head, axis=X),
+    ]
+    loads = [mg.Effort("axle1", -brake[0]), mg.Effort("axle2", -brake[1])]
+    m = mg.Mechanism("coupled rods", pairs=pairs, drives=["axle1"], loads=loads)
+    angles = np.deg2rad([35, 70, 100, 145, 220, 310])
+    s = mg.solve(m, {"axle1": angles - start}, actuate=["piston"])
+    np.testing.assert_allclose(s["axle2"].position[:, 0], angles - start, atol=1e-9)
+    for k, angle in enumerate(angles):
+        pin = crank * flat(np.cos(angle), np.sin(angle))
+        head = flat(pin[0] - np.sqrt(long**2 - pin[2] ** 2), 0)
+        pull = brake[1] / moment(pin, X)  # the coupling rod along x turns the second wheel against its brake
+        push = (brake[0] + brake[1]) / moment(pin, unit(pin - head))
+        np.testing.assert_allclose(s["pin2"].force[k, [0, 2]], [pull, 0], rtol=1e-8, atol=1e-6)
+        by_hand = -push * unit(pin - head)
+        np.testing.assert_allclose(s["big end"].force[k, [0, 2]], by_hand[[0, 2]], rtol=1e-8, atol=1e-6)
+        assert s["piston"].effort[k, 0] == pytest.approx(-by_hand[0], rel=1e-8)
+        np.testing.assert_allclose(s["axle1"].force[k, [0, 2]], (by_hand + pull * X)[[0, 2]], rtol=1e-8, atol=1e-6)
+
+
+def test_screw_press() -> None:
+    """A screw of 8 mm lead in a fixed nut on a ram between guides: 2 pi T = F lead, from either end."""
+    lead, force, mass = 0.008, 25e3, 60.0
+    pairs = [
+        mg.Pair("nut", "H", "frame", "screw", point=(0, 0, 1.0), axis=Z, lead=lead),
+        mg.Pair("collar", "R", "screw", "ram", point=(0, 0, 0.6), axis=Z),
+        mg.Pair("guide", "P", "frame", "ram", point=(0.3, 0, 0.5), axis=Z),
+    ]
+    loads = [WEIGHT, mg.ForceLaw("guide", law=mg.ForceTable(x=[-0.02, -0.01, 0], force=[force, 0, 0]))]
+    ram = mg.Link("ram", mass, (0, 0, 0.5))
+    m = mg.Mechanism("screw press", links(ram, pairs=pairs), pairs, ["nut"], loads)
+    turns = np.array([0.0, -1.0, -2.5])
+    s = mg.solve(m, {"nut": 2 * np.pi * turns})
+    np.testing.assert_allclose(s["guide"].position[:, 0], lead * turns, atol=1e-12)
+    axial = mass * G - np.array([0, 0, force])  # which lifts the ram, or presses it on
+    np.testing.assert_allclose(s["nut"].effort[:, 0], axial * lead / (2 * np.pi), rtol=1e-9)
+    np.testing.assert_allclose(s["collar"].components["Fz"], axial, rtol=1e-9)
+    stretched = mg.solve(m, {"guide": lead * turns})  # backwards: the ram pushed, a screw without friction spins
+    np.testing.assert_allclose(stretched["guide"].effort[:, 0], axial, rtol=1e-9)
+
+
+def test_bracket() -> None:
+    """A beam hinged to the wall, held by two ties from its end: a structure, forces by six balances."""
+    end, load = np.array([1.5, 0, 0]), np.array([300.0, 200, -5000])
+    walls = np.array([(0, 0.8, 0.9), (0, -0.8, 0.9)])
+    pairs = [
+        mg.Pair("wall", "S", "frame", "beam", point=(0, 0, 0)),
+        *rod("tie0", "frame", "beam", walls[0], end),
+        *rod("tie1", "frame", "beam", walls[1], end),
+    ]
+    beam = mg.Link("beam", 80.0, end / 2, points={"end": end})
+    m = mg.Mechanism(
+        "bracket", links(beam, pairs=pairs), pairs, [], [WEIGHT, mg.Wrench("beam", force=load, point="end")]
+    )
+    s = mg.solve(m)
+    pulls = unit(walls - end)
+    # moments about the wall: at the end the ties take the load and half the weight, but for a push along the beam
+    half = np.array([0, 0, -40 * G])
+    by_hand = np.linalg.solve(np.column_stack([*pulls, X]), -load - half)
+    for i in range(2):
+        np.testing.assert_allclose(s[f"tie{i}b"].force, by_hand[i] * pulls[i], rtol=1e-9, atol=1e-7)
+        np.testing.assert_allclose(s[f"tie{i}a"].force, by_hand[i] * pulls[i], rtol=1e-9, atol=1e-7)
+    np.testing.assert_allclose(s["wall"].force, by_hand[2] * X - half, rtol=1e-9, atol=1e-7)
