@@ -575,7 +575,7 @@ def test_screw_press() -> None:
 
 
 def test_bracket() -> None:
-    """A beam hinged to the wall, held by two ties from its end: a structure, forces by six balances."""
+    """A beam on a ball at the wall, held by two ties from its end, so that it may still spin: ties and push of the beam at its end."""
     end, load = np.array([1.5, 0, 0]), np.array([300.0, 200, -5000])
     walls = np.array([(0, 0.8, 0.9), (0, -0.8, 0.9)])
     pairs = [
