@@ -257,7 +257,7 @@ class Configuration:
         if s.many_loops:
             flat = self.pair_points.transpose(1, 0, 2).reshape(len(s.m.pairs), 3 * self.T)
             return np.asarray(s.graph.loop_averages @ flat).reshape(-1, 3, self.T).transpose(1, 0, 2)
-        if s.par.batch == 1:
+        if s.numbers.ends.shape[-1] == 1:
             return np.asarray(s.middle_numbers @ self._nodes.reshape(3, s.middle_numbers.shape[1], self.T))
         return np.asarray(s.loop_averages @ self.pair_points)
 
