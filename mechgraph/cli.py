@@ -58,6 +58,14 @@ Engine = Annotated[
     Literal["auto", "dense", "sparse"],
     typer.Option(help="Dense or sparse matrices, or the faster ones for the size; the results are the same."),
 ]
+Tolerance = Annotated[
+    float | None,
+    typer.Option(
+        "--tol",
+        metavar="TOL",
+        help="Accuracy to which directions (radians) and distances (over the mean radius L) are meant, e.g. 1e-4.",
+    ),
+]
 Bookkeeping = Annotated[Literal["lee", "minimal"], typer.Option(help="How the unknowns of a pair are written.")]
 Method = Annotated[Literal["loop_wrench", "newton_euler", "printed"], typer.Option(help="How the forces are solved.")]
 Redundant = Annotated[
@@ -308,6 +316,7 @@ def check(
     at: At = None,
     engine: Engine = "auto",
     compared: Compare = False,
+    tol: Tolerance = None,
 ) -> None:
     """Print the determinacy report: the verdict, what to do, and what may be trusted; with --full all of it.
 
@@ -320,7 +329,7 @@ def check(
     m = _loaded(mechanism)
     values = dict(parse_at(m, text) for text in at or ())
     with _working("checking"):
-        report = mg.check(m, at=values or None, engine=engine)
+        report = mg.check(m, at=values or None, engine=engine, tol=tol)
         text = report.to_json() if json else report.to_markdown(full) if markdown else ""
         document = report.document(full)
     not_closed = m.has_geometry and report.mobility is None
@@ -450,6 +459,7 @@ def solve(
     on_reach: OnReach = "raise",
     engine: Engine = "auto",
     compared: Compare = False,
+    tol: Tolerance = None,
 ) -> None:
     """Solve positions, efforts of the drivers and all reactions, print a summary and write a table.
 
@@ -465,7 +475,7 @@ def solve(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", mg.MechgraphWarning)  # the summary has them
             how: dict[str, Any] = {"method": method, "redundant": redundant, "on_reach": on_reach, "engine": engine}
-            s = mg.solve(m, motions or None, actuate=actuate, **how)
+            s = mg.solve(m, motions or None, actuate=actuate, tol=tol, **how)
         unique = mg.check(s.mechanism).unique if redundant == "minimum_norm" else None
         document = summary(s, unique)
         if out is not None:

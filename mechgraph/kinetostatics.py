@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -14,15 +15,23 @@ from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.closure.driver_path import Status
 from mechgraph.closure.solver import ENGINES, EngineName
-from mechgraph.errors import DeadPointError, DeclarationError, IndeterminateError, MechgraphWarning, ReachError
+from mechgraph.errors import (
+    AssemblyError,
+    DeadPointError,
+    DeclarationError,
+    IndeterminateError,
+    MechgraphWarning,
+    ReachError,
+)
 from mechgraph.force.dalembert import METHODS, MethodName
 from mechgraph.model.declaration import mapping_faults
 from mechgraph.model.load import Load
 from mechgraph.model.mechanism import Mechanism, check_mechanism
 from mechgraph.pipeline import Options, Outcome, Pipeline
-from mechgraph.report.report import check
+from mechgraph.report.report import check, hinted
 from mechgraph.result.solution import Solution
 from mechgraph.structure.branching import branches, branches_text
+from mechgraph.structure.snapping import SnappedMechanism, declared_closure, meant
 
 ReachName = Literal["raise", "flag"]
 RedundantName = Literal["nan", "minimum_norm"]
@@ -60,6 +69,14 @@ def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exceptio
         )
         error.branches = ways
         return error
+    if status[first] == Status.BEYOND_TOLERANCE.value:
+        misses = solution.checks.closure.reshape(-1)
+        return ReachError(
+            f"mechanism {line.m.name!r}: at position {first} ({wanted}) the loops of the declared geometry close to {misses[first]:.3g} "
+            f"only, beyond the tolerance; over all positions to {np.nanmax(misses):.3g}. Give a larger tol, or use on_reach='flag'",
+            reached,
+            solution,
+        )
     why = (
         f"is within reach, but its loops could not be closed to rounding; the path was followed to {at}"
         if status[first] == Status.NOT_CLOSED.value
@@ -99,14 +116,28 @@ def _solve(
     on_reach: str,
     options: Options,
     actuate: Iterable[str] | None = None,
+    tol: float | None = None,
+) -> Solution:
+    try:
+        return _solved(meant(m, tol, "solve"), motions, on_reach, options, actuate)
+    except (AssemblyError, DeadPointError, IndeterminateError, ReachError) as error:
+        if tol is None and m.tol is None:
+            hinted(m, error)
+        raise
+
+
+def _solved(
+    m: Mechanism, motions: Mapping[str, Any] | None, on_reach: str, options: Options, actuate: Iterable[str] | None
 ) -> Solution:
     line = Pipeline(DriverMotion(m, motions, actuate), options)
     outcome = line.run()
     _check_drivers(line, outcome)
     _check_actuators(line, outcome)
+    if isinstance(m, SnappedMechanism):
+        outcome.trajectory.as_declared(partial(declared_closure, m, line.system.par), m.changes.tol)
     solution = Solution(outcome.trajectory)
     for warning in solution.warnings:
-        warnings.warn(f"mechanism {m.name!r}: {warning}", MechgraphWarning, stacklevel=3)
+        warnings.warn(f"mechanism {m.name!r}: {warning}", MechgraphWarning, stacklevel=4)
     error = _unreached(line, outcome, solution) if on_reach == "raise" else None
     if error is not None:
         raise error
@@ -119,13 +150,14 @@ def kinematics(
     *,
     on_reach: ReachName = "raise",
     engine: EngineName = "auto",
+    tol: float | None = None,
 ) -> Solution:
     """Positions, velocities and accelerations of all pairs and links, without forces; see ``solve``."""
     check_mechanism(m, "kinematics")
     faults = option_faults({"on_reach": (on_reach, ON_REACH), "engine": (engine, ENGINES)})
     if faults:
         raise DeclarationError(f"kinematics of {m.name!r}", faults)
-    return _solve(m, motions, on_reach, Options(None, "nan", engine))
+    return _solve(m, motions, on_reach, Options(None, "nan", engine), tol=tol)
 
 
 def solve(
@@ -138,6 +170,7 @@ def solve(
     redundant: RedundantName = "nan",
     on_reach: ReachName = "raise",
     engine: EngineName = "auto",
+    tol: float | None = None,
 ) -> Solution:
     """Driver efforts and all reactions for given driver motion (kinetostatics; statics where the rates are zero).
 
@@ -158,6 +191,9 @@ def solve(
         other, links rigid, nothing strained at assembly. It is the same in any unit and frame.
     on_reach : ``"raise"`` or ``"flag"`` (NaN rows, see ``Solution.status``).
     engine : ``"dense"`` or ``"sparse"`` linear algebra, or ``"auto"``: the faster one for the size. The values are the same.
+    tol : accuracy to which directions (radians) and distances (over L, the mean radius) are meant; left out, that of the mechanism, or
+        exact. What is solved is ``m.snapped(tol)``; ``checks.closure`` is that of the geometry as declared, and a position at which it
+        exceeds ``tol`` is not solved (status "beyond tolerance").
 
     Raises
     ------
@@ -177,7 +213,7 @@ def solve(
         raise DeclarationError(f"solve {m.name!r}", faults)
     if loads is not None:
         m = m.replace(loads=given)
-    return _solve(m, motions, on_reach, Options(method, redundant, engine), actuate)
+    return _solve(m, motions, on_reach, Options(method, redundant, engine), actuate, tol)
 
 
 def assemble(

@@ -99,21 +99,25 @@ def at_position(m: Mechanism, system: System, x: Array) -> Mechanism:
     return m.replace(start=dict(zip(m.freedom_names(), q.tolist(), strict=True)))
 
 
-def close(system: System, x: Array, fixed: Index, iterations: int = 60, patience: int = 8) -> tuple[Array, float]:
+def close(
+    system: System, x: Array, fixed: Index, iterations: int = 60, patience: int = 8, tol: float = 0.0
+) -> tuple[Array, float]:
     """Close the loops from state ``x (nx,)`` with the coordinates in ``fixed`` kept; smallest change of the others."""
-    closed, error = close_all(system, x[:, None], fixed, iterations, patience)
+    closed, error = close_all(system, x[:, None], fixed, iterations, patience, tol)
     return closed[:, 0], float(error[0])
 
 
-def close_all(system: System, x: Array, fixed: Index, iterations: int = 60, patience: int = 8) -> tuple[Array, Array]:
-    """``close`` for states ``(nx, T)``; also the closure errors ``(T,)``."""
+def close_all(
+    system: System, x: Array, fixed: Index, iterations: int = 60, patience: int = 8, tol: float = 0.0
+) -> tuple[Array, Array]:
+    """``close`` for states ``(nx, T)``; also the closure errors ``(T,)``. Rows that depend on others to ``tol`` are left alone."""
     free = complement(fixed, system.n_freedoms)
 
     def least(here: Configuration) -> Array:
-        if here.T == 1 and system.n_rows >= SPARSE:
+        if here.T == 1 and system.n_rows >= SPARSE and not tol:
             return ReducedRows(ClosureRows.at(here), fixed).correction(here.residual[:, 0])[:, None]
         dq = np.zeros((system.n_freedoms, here.T))
-        dq[free] = least_norm_steps(here.J[:, free], here.residual, ASSEMBLY_RANK)
+        dq[free] = least_norm_steps(here.J[:, free], here.residual, max(ASSEMBLY_RANK, tol))
         return dq
 
     goal = CLOSURE_GOAL
@@ -179,8 +183,8 @@ def _state(here: Configuration) -> tuple[System, Array]:
     return here.system, here.x[:, 0]
 
 
-def closed_start(m: Mechanism, preferred: Mapping[str, float] | None = None) -> Configuration:
-    """A closed state near ``start``, of the scaled system.
+def closed_start(m: Mechanism, preferred: Mapping[str, float] | None = None, tol: float = 0.0) -> Configuration:
+    """A closed state near ``start``, of the scaled system; closed to ``tol`` (radians, or lengths / L) where that is given.
 
     Tried in this order: as it stands; drives kept at their start; drives at the ``preferred`` values; everything free;
     then guesses around the start, further and further away.
@@ -202,8 +206,8 @@ def closed_start(m: Mechanism, preferred: Mapping[str, float] | None = None) -> 
         return here
     if error <= CLOSED:
         return scaled(Configuration(system, close_all(system, here.x, np.arange(0))[0]))
-    x, error = _search(m, system, x, preferred or {})
-    if error > CLOSED:
+    x, error = _search(m, system, x, preferred or {}, tol)
+    if error > max(CLOSED, tol):
         turned = _opposite_axis(m, preferred or {}, error)
         best = dict(zip(m.freedom_names(), system.coordinates_of(x[:, None])[:, 0].tolist(), strict=True))
         raise AssemblyError(
@@ -256,22 +260,22 @@ def _attempts(m: Mechanism, system: System, x: Array, preferred: Mapping[str, fl
     )
 
 
-def _closed_nearby(system: System, attempts: Sequence[tuple[Array, Index]]) -> tuple[Array, float]:
+def _closed_nearby(system: System, attempts: Sequence[tuple[Array, Index]], tol: float = 0.0) -> tuple[Array, float]:
     """The state closed from the first guess that leads to one, else the best; its closure error."""
     best, best_error = attempts[0][0], np.inf
     for guess, fixed in attempts:
-        closed, error = close(system, guess, fixed)
+        closed, error = close(system, guess, fixed, tol=tol)
         if error < best_error:
             best, best_error = closed, error
-        if error <= CLOSED:
+        if error <= max(CLOSED, tol):
             break
     return best, best_error
 
 
-def _search(m: Mechanism, system: System, x: Array, preferred: Mapping[str, float]) -> tuple[Array, float]:
-    attempts = _attempts(m, system, x, preferred)
-    best, best_error = _closed_nearby(system, attempts)
-    if best_error <= CLOSED:
+def _search(m: Mechanism, system: System, x: Array, preferred: Mapping[str, float], tol: float) -> tuple[Array, float]:
+    attempts, goal = _attempts(m, system, x, preferred), max(CLOSED, tol)
+    best, best_error = _closed_nearby(system, attempts, tol)
+    if best_error <= goal:
         return best, best_error
     rng = np.random.default_rng(20231)
     guesses = []
@@ -284,11 +288,11 @@ def _search(m: Mechanism, system: System, x: Array, preferred: Mapping[str, floa
     for round_ in (slice(0, FIRST), slice(FIRST, RESTARTS)):
         states, errors = np.stack(guesses[round_], axis=1), np.empty(len(guesses[round_]))
         for kind, (_, fixed) in enumerate(attempts[:2]):
-            states[:, kind::2], errors[kind::2] = close_all(system, states[:, kind::2], fixed)
-        found = int(np.argmax(errors <= CLOSED)) if (errors <= CLOSED).any() else int(np.argmin(errors))
+            states[:, kind::2], errors[kind::2] = close_all(system, states[:, kind::2], fixed, tol=tol)
+        found = int(np.argmax(errors <= goal)) if (errors <= goal).any() else int(np.argmin(errors))
         if errors[found] < best_error:
             best, best_error = states[:, found], float(errors[found])
-        if best_error <= CLOSED:
+        if best_error <= goal:
             break
     return best, best_error
 

@@ -44,6 +44,7 @@ class Status(Enum):
     CHANGE_POINT = "change point"
     ACTUATORS_REST = "actuators at dead point"
     NOT_CLOSED = "loops not closed"
+    BEYOND_TOLERANCE = "beyond tolerance"
 
 
 def in_blocks(places: Index) -> list[Index]:

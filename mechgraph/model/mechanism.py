@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import itertools
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -17,10 +18,10 @@ from mechgraph.errors import DeclarationError
 from mechgraph.model.coupling import Coupling
 from mechgraph.model.declaration import declaration_faults, flat_start, item_faults, mapping_faults
 from mechgraph.model.drive import Drive
-from mechgraph.model.field_format import FACTS, OTHER, TABLE, TABLES, TEXT, Formatted
+from mechgraph.model.field_format import FACTS, NUMBER, OTHER, TABLE, TABLES, TEXT, Formatted
 from mechgraph.model.link import Link
 from mechgraph.model.load import Load
-from mechgraph.model.numeric import same_fields
+from mechgraph.model.numeric import plain, same_fields
 from mechgraph.model.pair import Pair
 from mechgraph.model.pair_type import PairType
 from mechgraph.quantities import is_numeric, shown, without_units, wrong
@@ -46,6 +47,7 @@ class Mechanism(Formatted):
     couplings : linear relations between freedoms, see ``Coupling``; kept with full freedom names, ``"A.Rz"``.
     start : pair coordinates near which to assemble, freedom -> value; picks the branch.
     units : names of the units of ``length``, ``mass`` and ``time`` in which the numbers are declared (a consistent set).
+    tol : accuracy to which directions (radians) and distances (over L) are meant, see ``snapped``; left out, they are exact.
     source, description, expected : where it comes from, what it is, and facts that a test checks.
 
     Raises
@@ -59,6 +61,13 @@ class Mechanism(Formatted):
     source: Annotated[str, TEXT("where it comes from", default="empty")]
     frame: Annotated[str, TEXT("the frame link", default="first link")]
     units: Annotated[Mapping[str, str], TABLE("names of the units of the numbers", table="units", default="no names")]
+    tol: Annotated[
+        float | None,
+        NUMBER(
+            "accuracy to which directions (radians) and distances (over L, the mean radius) are meant, as `tol=` of a call",
+            default="exact",
+        ),
+    ]
     links: Annotated[
         tuple[Link, ...], TABLES("links; left out, they follow from the pairs, massless", key="link", table="link")
     ]
@@ -92,6 +101,7 @@ class Mechanism(Formatted):
         frame: str | None = None,
         start: Mapping[str, Any] | None = None,
         units: Mapping[str, str] | None = None,
+        tol: float | None = None,
         source: str = "",
         description: str = "",
         expected: Mapping[str, Any] | None = None,
@@ -109,6 +119,7 @@ class Mechanism(Formatted):
             loads=items_of(loads, "loads", faults),
             frame=first if frame is None else frame,
             units=MappingProxyType(dict(units) if isinstance(units, Mapping) else {}),
+            tol=plain(tol),
             source=source,
             description=description,
             expected=MappingProxyType(dict(expected) if isinstance(expected, Mapping) else {}),
@@ -391,6 +402,23 @@ class Mechanism(Formatted):
             start={name: value if turns(name) else value * base[0] for name, value in self.start.items()},
             units={**self.units, **units},
         )
+
+    def snapped(self, tol: float) -> Mechanism:
+        """The mechanism with the smallest change that makes near-special geometry exact; ``changes`` of it prints what was moved.
+
+        Axes, directions, centres and lengths that miss being parallel, square, in one line or place, intersecting or equal by what
+        rounding to ``tol`` (radians, lengths / L) may make of them are made so, and what is left is fitted for the mechanism to move
+        (see ``structure.snapping``). The change is the smallest in the sum of ``angle^2 + (shift / L)^2`` over the pairs.
+        Relations that cannot hold together within ``tol`` are listed in ``changes.dropped`` and not applied.
+
+        Raises
+        ------
+        DeclarationError, AssemblyError
+            where the mechanism has no geometry, or its loops do not close to ``tol``.
+        """
+        # the only call up to a room above: a user looks for it here
+        made: Mechanism = importlib.import_module("mechgraph.structure.snapping").snapped(self, tol)
+        return made
 
     def moved(self, pose: Any) -> Mechanism:
         """The whole mechanism after a rigid motion: a 4 x 4 (or 3 x 4) pose. Coordinates of the pairs stay what they are."""

@@ -27,8 +27,8 @@ from mechgraph.model.pair_type import PairType
 from mechgraph.quantities import is_numeric, shown, wrong
 from mechgraph.units import LENGTH
 
-PERPENDICULAR = 1e-6
-"""Largest cosine between axis and second direction that counts as perpendicular where a pair type needs it."""
+PERPENDICULAR = 1e-2
+"""Largest cosine between axis and second direction that counts as perpendicular where a pair type needs it: numbers of two digits."""
 
 
 def second_direction(axis: Any) -> tuple[float, ...]:

@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from functools import cached_property
+from dataclasses import asdict, replace
+from functools import cached_property, partial
 from typing import Any, get_args
 
 from mechgraph.arguments import option_faults
 from mechgraph.closure.assembly import assembled, assembled_at, named_columns
 from mechgraph.closure.rank import EngineName
-from mechgraph.document import Document, to_html, to_markdown, to_text
-from mechgraph.errors import AssemblyError, DeclarationError
+from mechgraph.document import Document, Paragraph, to_html, to_markdown, to_text
+from mechgraph.errors import AssemblyError, DeclarationError, MechgraphError
 from mechgraph.model.declaration import mapping_faults
 from mechgraph.model.mechanism import Mechanism, check_mechanism
+from mechgraph.numerics.tolerances import RANKS
 from mechgraph.report import brief, sections, sentences
 from mechgraph.report.facts import Facts, Geometry
+from mechgraph.report.rounding import Rounding, rounding
 from mechgraph.structure.mobility import free_motion
+from mechgraph.structure.placed_pairs import EXACT
+from mechgraph.structure.snapping import meant
 from mechgraph.topology.linkgraph import link_graph
 
 
@@ -28,9 +33,15 @@ class DeterminacyReport(Facts):
         """The verdict in one sentence."""
         return sentences.verdict(self)
 
+    @cached_property
+    def rounding(self) -> Rounding | None:
+        """The smallest tolerance up to 1e-2 with which directions and distances are meant to say something else, where there is one."""
+        return rounding(self.mechanism, _verdict_of)
+
     def document(self, full: bool = False) -> Document:
-        """The report as a document: verdict, what to do and what may be trusted, or all of it."""
-        return sections.document(self) if full else brief.document(self)
+        """The report as a document: verdict, what to do and what may be trusted, or all of it; first what rounding does to it."""
+        made, found = sections.document(self) if full else brief.document(self), self.rounding
+        return made if found is None else replace(made, blocks=(Paragraph(found.text), *made.blocks))
 
     def text(self, full: bool = False) -> str:
         """The report as text, at most 25 lines of 80 columns, or all of it."""
@@ -42,7 +53,8 @@ class DeterminacyReport(Facts):
 
     def to_dict(self) -> dict[str, Any]:
         """All facts as plain data."""
-        return sections.to_dict(self)
+        facts = sections.to_dict(self)
+        return facts if self.rounding is None else {"rounding": asdict(self.rounding), **facts}
 
     def to_json(self) -> str:
         """All facts as JSON."""
@@ -55,13 +67,33 @@ class DeterminacyReport(Facts):
         return to_html(self.document())
 
 
-def check(m: Mechanism, at: Mapping[str, float] | None = None, *, engine: EngineName = "auto") -> DeterminacyReport:
+def _verdict_of(m: Mechanism, doubt: float = RANKS.doubt) -> tuple[Any, ...]:
+    """What a tolerance may change: mobility, redundancy, unique components, doubts about them; empty where the loops do not close."""
+    r = check(m)
+    if r.mobility is None or r.dropped is None:
+        return ()
+    return r.finite_mobility, r.mobility, r.redundancy, r.unique, r.dropped > doubt
+
+
+def hinted(m: Mechanism, error: MechgraphError) -> MechgraphError:
+    """An error that also says what tolerance would change the verdict, or make exact what is so to rounding only, where one would."""
+    found = rounding(m, partial(_verdict_of, doubt=EXACT))
+    if found is not None:
+        error.args = (f"{error.args[0]}. {found.text}", *error.args[1:])
+    return error
+
+
+def check(
+    m: Mechanism, at: Mapping[str, float] | None = None, *, engine: EngineName = "auto", tol: float | None = None
+) -> DeterminacyReport:
     """The determinacy report of a mechanism: of its graph, and where it has geometry of its closed position at ``start``.
 
     Parameters
     ----------
     at : values of freedoms at which to assemble first, e.g. ``{"A": 0.3}``.
     engine : which engine decides ranks, ``"dense"`` or ``"sparse"``; ``"auto"`` takes the faster one. The report is the same.
+    tol : accuracy to which directions (radians) and distances (over L) are meant; the report is that of ``m.snapped(tol)``. Left out:
+        that of the mechanism, or exact.
 
     Raises
     ------
@@ -76,6 +108,8 @@ def check(m: Mechanism, at: Mapping[str, float] | None = None, *, engine: Engine
     if not m.has_geometry:
         return DeterminacyReport(m, graph, "Topology only: no geometry is declared.", asked=engine)
     try:
+        m = meant(m, tol, "check")
+        graph = m.once(link_graph)
         system, x = assembled_at(m, at) if at else assembled(m)
     except AssemblyError as error:
         if at:

@@ -151,6 +151,21 @@ class Trajectory:
         """Say why positions are not solved."""
         self._status[places] = status
 
+    def as_declared(self, closure: Callable[[Array], Array], tol: float) -> None:
+        """Let ``checks`` give closure errors ``closure(x)`` of the declared geometry; positions beyond ``tol`` do not count as solved."""
+        places = np.flatnonzero(self._solved)
+        if not places.size:
+            return
+        error = np.full(self._count, np.nan)
+        error[places] = closure(self._of("x")[:, places])
+        beyond = error > tol
+        if beyond.any():
+            self._motions = []
+            self._solved &= ~beyond
+            self.mark(np.flatnonzero(beyond), Status.BEYOND_TOLERANCE.value)
+            self._kept = {name: np.where(beyond, np.nan, values) for name, values in self._kept.items()}
+        self._kept["closure"] = error
+
     def part(self, places: slice) -> Trajectory:
         """The values at a range of flat positions, as views."""
         out, which = copy(self), np.arange(self._count)[places]

@@ -20,6 +20,7 @@ from mechgraph.kinetostatics import REDUNDANT, RedundantName
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.quantities import wrong
+from mechgraph.structure.snapping import meant
 from mechgraph.variants.fields import AnyField, clashes, field_values, find_field
 from mechgraph.variants.outputs import named_outputs
 from mechgraph.variants.result import Study
@@ -55,6 +56,7 @@ def study(
     method: MethodName = "loop_wrench",
     redundant: RedundantName = "nan",
     engine: EngineName = "auto",
+    tol: float | None = None,
     progress: Progress | None = None,
 ) -> Study:
     """Solve many variants of one mechanism: how outputs vary with its numbers.
@@ -71,7 +73,7 @@ def study(
     motions : of the drivers as in ``solve``; a leading axis of length ``n`` gives every variant its own.
     sampling : ``"random"``, ``"latin"`` (Latin hypercube) or ``"grid"``.
     executor : any ``concurrent.futures`` Executor, e.g. that of a cluster; left out, the processors of this machine.
-    actuate, method, redundant, engine : as in ``solve``.
+    actuate, method, redundant, engine, tol : as in ``solve``; every variant is taken as it is meant with the tolerance.
     progress : called with the numbers of parts done and of all parts.
 
     Returns
@@ -100,7 +102,7 @@ def study(
         faults.append("parameters: none are named")
     if faults:
         raise DeclarationError("study", faults)
-    source, given = _source(m, ways, motions)
+    source, given = _source(m, ways, motions, tol)
     acting = None if actuate is None else actuators(source.mechanism, actuate)
     kept = named_outputs(source.mechanism, outputs, ways)
     if sampling == "grid" and (count := grid_size(list(ways.values()), int(n))) > MOST_VARIANTS:
@@ -145,7 +147,10 @@ def _argument_faults(
 
 
 def _source(
-    m: Mechanism | Callable[..., Mechanism], ways: Mapping[str, Any], motions: Mapping[str, Any] | None
+    m: Mechanism | Callable[..., Mechanism],
+    ways: Mapping[str, Any],
+    motions: Mapping[str, Any] | None,
+    tol: float | None,
 ) -> tuple[Source, Motions]:
     names = tuple(ways)
     if isinstance(m, Mechanism):
@@ -157,7 +162,9 @@ def _source(
         if faults:
             raise DeclarationError(f"study of {m.name!r}", faults)
         start = field_values(own, fields)
-        return Source(own, names, np.array([start[name] for name in names]), fields), given
+        tol = own.tol if tol is None else tol
+        begin = np.array([start[name] for name in names])
+        return Source(meant(own, tol, "study"), names, begin, fields, tol=tol), given
     middle = np.array([float(way.ppf(0.5)) for way in ways.values()])
     try:
         first = m(**dict(zip(names, middle.tolist(), strict=True)))
@@ -170,7 +177,9 @@ def _source(
     own, given = driven(first, motions)
     named = {own.full_name(key) for key in motions or {} if own.freedom_fault(key, single=True) is None}
     stored = tuple(name for name in given if name in own.freedom_names() and name not in named)
-    return Source(own, names, middle, build=m, stored=stored, redriven=own is not first), given
+    tol = own.tol if tol is None else tol
+    exact = meant(own, tol, "study")
+    return Source(exact, names, middle, build=m, stored=stored, redriven=own is not first, tol=tol), given
 
 
 def _rows_of(name: str, motion: Motion, count: int) -> Motion:

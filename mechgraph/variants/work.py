@@ -20,6 +20,7 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.pipeline import Options
 from mechgraph.result.solution import Solution
+from mechgraph.structure.snapping import SnappedMechanism, meant
 from mechgraph.variants.batch import solve_together
 from mechgraph.variants.fields import AnyField, Variants, stacked, topology_of, varied
 from mechgraph.variants.outputs import Output, quantity
@@ -35,6 +36,7 @@ STATUSES = np.array([*(status.value for status in Status), NOT_SOLVED])
 class Source:
     """Where variants come from: fields of a mechanism, or a function that builds one; ``start`` are its own values.
 
+    With a ``tol`` every mechanism is taken as it is meant with it, ``mechanism`` too (see ``Mechanism.snapped``).
     ``stored`` are the drivers whose motion is that stored with the mechanism; ``redriven`` whether the study has other drives than those
     declared.
     """
@@ -46,9 +48,13 @@ class Source:
     build: Build | None = None
     stored: tuple[str, ...] = ()
     redriven: bool = False
+    tol: float | None = None
 
     def one(self, values: Array) -> Mechanism:
-        """The mechanism for ``values (parameters,)``."""
+        """The mechanism for ``values (parameters,)``, as it is meant with the tolerance."""
+        return meant(self._declared(values), self.tol, "study")
+
+    def _declared(self, values: Array) -> Mechanism:
         if self.build is None:
             return self._varied(values[:, None]).one(0)
         made = self.build(**dict(zip(self.names, values.tolist(), strict=True)))
@@ -65,12 +71,13 @@ class Source:
 
     def _varied(self, values: Array) -> Variants:
         assert self.fields is not None
-        return varied(self.mechanism, self.fields, values)
+        m = self.mechanism.declared if isinstance(self.mechanism, SnappedMechanism) else self.mechanism
+        return varied(m, self.fields, values)
 
     def variants(self, values: Array, part: Array) -> Variants:
         """Variants at a ``part (count,)`` of the way from the mechanism itself (0) to ``values (parameters, count)`` (1, or a bit more)."""
         on_the_way = self.start[:, None] + part * (values - self.start[:, None])
-        if self.build is None:
+        if self.build is None and self.tol is None:
             return self._varied(on_the_way)
         made: list[Mechanism | None] = []
         for column, moved in zip(on_the_way.T, np.broadcast_to(part > 0, values.shape[1:]), strict=True):

@@ -1,0 +1,112 @@
+"""What rounded numbers do to a verdict: the smallest tolerance at which it changes, and what is then special about the mechanism."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.closure.assembly import closed_start
+from mechgraph.errors import MechgraphError
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.structure.kind import kind_of
+from mechgraph.structure.placed_pairs import EXACT
+from mechgraph.structure.snapping import SnappedMechanism, candidates, snapped
+
+WIDEST = 1e-2
+"""Largest tolerance that is tried."""
+LARGEST = 300
+"""Pairs up to which rounding is looked for without being asked."""
+SAFE = 4.0
+"""Tolerance that is advised, in largest changes of a pair: closure errors add up along a loop."""
+NAMED = 3
+"""Most pairs that are named."""
+
+
+@dataclass(frozen=True)
+class Rounding:
+    """A tolerance at which the verdict changes.
+
+    ``tol`` to pass on, ``angle`` (radians) and ``distance`` (unit of length) that directions and distances have to be meant to,
+    ``kind`` ("planar", "spherical" or ""), ``mobility`` then (finite), ``misses`` of pairs in words, and the ``text`` of it all.
+    """
+
+    tol: float
+    angle: float
+    distance: float
+    kind: str
+    mobility: int
+    misses: tuple[str, ...]
+    text: str
+
+    def __str__(self) -> str:
+        return self.text
+
+
+def rounding(m: Mechanism, verdict: Callable[[Mechanism], tuple[Any, ...]]) -> Rounding | None:
+    """The smallest tolerance (of decades up to 1e-2) that changes ``verdict(m)``, its mobility first; None where there is none.
+
+    The verdict is a tuple that begins with the finite mobility; empty where there is none.
+    """
+    if isinstance(m, SnappedMechanism) or not m.has_geometry or len(m.pairs) > LARGEST:
+        return None
+    own: tuple[Any, ...] | None = None
+    other: tuple[SnappedMechanism, float, tuple[Any, ...]] | None = None
+    try:
+        sizes = candidates(m, WIDEST)
+    except MechgraphError:  # the loops do not close to that either
+        return None
+    for tol in _decades(sizes):
+        try:
+            exact = snapped(m, tol)
+        except MechgraphError:
+            continue
+        if not exact.changes.moved and exact.changes.closure <= EXACT:
+            continue
+        own = verdict(m) if own is None else own
+        then = verdict(exact)
+        if then and (not own or then[0] != own[0]):
+            return _worded(exact, tol, then)
+        other = (exact, tol, then) if other is None and then and then != own else other
+    return _worded(*other) if other else None
+
+
+def _decades(sizes: Array) -> Iterator[float]:
+    """The powers of ten from the smallest of the sizes up."""
+    if (sizes > EXACT).any():
+        first = int(np.ceil(np.log10(np.clip(sizes[sizes > EXACT].min(), 1e-12, WIDEST))))
+        yield from (10.0**p for p in range(first, int(np.log10(WIDEST)) + 1))
+
+
+def _worded(exact: SnappedMechanism, tol: float, verdict: tuple[Any, ...]) -> Rounding:
+    moved, mobility = exact.changes.moved, int(verdict[0])
+    angle = max((c.angle for c in moved), default=0.0)
+    distance = max((c.shift for c in moved), default=0.0)
+    unit = exact.units.get("length", "")
+    meant = []
+    if angle > EXACT:
+        meant.append(f"directions taken as meant to {np.degrees(angle):.2g} deg")
+    if distance > EXACT * exact.changes.L:
+        meant.append(f"{'' if meant else 'taken as meant, '}distances to {distance:.2g} {unit}".rstrip())
+    kind = kind_of(closed_start(exact).S[:, :, 0]).name
+    moves = f"moves (mobility {mobility})" if mobility else "is a structure (mobility 0)"
+    off = {"planar": "off the normal", "spherical": "off the line through the centre"}.get(kind, "off")
+    misses = tuple(
+        f"Axis of {c.pair}: {np.degrees(c.angle):.2g} deg {off}"
+        if c.angle * exact.changes.L >= c.shift
+        else f"{c.pair}: {c.shift:.2g} {unit}".rstrip() + " off"
+        for c in sorted(moved, key=lambda c: -max(c.angle, c.shift / exact.changes.L))[:NAMED]
+    )
+    advised = _rounded_up(max(tol, SAFE * exact.changes.largest))
+    text = f"With {' and '.join(meant) or f'loops that close to {exact.changes.closure:.2g}'} the mechanism "
+    text += f"{f'is {kind} and ' if kind else ''}{moves}. {'. '.join(misses)}{'. ' if misses else ''}Pass tol={advised:g} to take it so"
+    return Rounding(advised, angle, distance, kind, mobility, misses, text + ".")
+
+
+def _rounded_up(value: float) -> float:
+    """The next of 1, 2, 5 times a power of ten."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(next(k * power for k in (1, 2, 5, 10) if k * power >= value * (1 - 1e-9)))

@@ -1,0 +1,220 @@
+"""Rounded numbers: special mechanisms declared with few digits, taken as they are meant with ``tol``, and hints where it is not given."""
+
+from __future__ import annotations
+
+import mechanisms
+import numpy as np
+import pytest
+import scipy.stats
+from scipy.spatial.transform import Rotation
+from typer.testing import CliRunner
+
+import mechgraph as mg
+from mechgraph.cli import app
+
+SPECIAL = {
+    **{name: getattr(mechanisms, name) for name in (
+        "planar", "spherical", "bennett", "goldberg", "myard", "bricard_line_symmetric", "bricard_cube", "bricard_trihedral",
+        "sarrus", "three_cranks", "three_upu", "prprrh_special",
+    )},
+    "slider-crank": lambda: mg.load("slider-crank"),
+    "spherical-four-bar": lambda: mg.load("spherical-four-bar"),
+    "parallelograms": lambda: mechanisms.windows(3, False),
+}  # fmt: skip
+POSITIONS = np.linspace(0, 0.8, 9)
+
+
+def rounded(m: mg.Mechanism, digits: int, seed: int = 0) -> mg.Mechanism:
+    """In a random place, with axes of random length, every number to so many digits behind the point."""
+    rng = np.random.default_rng(seed)
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = Rotation.random(rng=rng).as_matrix(), rng.normal(size=3)
+
+    def axis(v: tuple[float, ...]) -> tuple[float, ...]:
+        unit = np.asarray(v) / np.linalg.norm(v)
+        return tuple(np.round(rng.uniform(1, 1.6) * unit, digits).tolist())
+
+    def marker(k: mg.Marker | mg.Pair) -> dict[str, tuple[float, ...]]:
+        point = tuple(np.round(k.point, digits).tolist())
+        return {"point": point, "axis": axis(k.axis), "second": axis(k.second)}
+
+    pairs = []
+    for p in m.moved(pose).pairs:
+        sides = {"on_a": p.on_a, "on_b": p.on_b}
+        found = {k: mg.Marker(**marker(v)) for k, v in sides.items()} if p.on_a is not None else marker(p)
+        pairs.append(p.replace(**found))
+    return m.moved(pose).replace(pairs=pairs)
+
+
+def verdict(r: mg.DeterminacyReport) -> tuple[object, ...]:
+    return r.finite_mobility, r.redundancy, sum(all(unique.values()) for unique in r.unique.values())
+
+
+@pytest.mark.parametrize("name", SPECIAL)
+@pytest.mark.parametrize(("digits", "seed"), [(2, 1), (4, 2), (6, 3), (9, 4), (12, 5)])
+def test_rounded_special_mechanisms_are_what_they_are_meant_to_be(name: str, digits: int, seed: int) -> None:
+    m = SPECIAL[name]()
+    found = mg.check(rounded(m, digits, seed), tol=5 * 10.0**-digits)
+    assert verdict(found)[:2] == verdict(mg.check(m))[:2]
+
+
+@pytest.mark.parametrize("name", SPECIAL)
+@pytest.mark.parametrize(("digits", "seed"), [(3, 1), (5, 2), (7, 3)])
+def test_without_a_tolerance_the_report_says_which_would_change_the_verdict(name: str, digits: int, seed: int) -> None:
+    m = SPECIAL[name]()
+    exact, report = mg.check(m), mg.check(rounded(m, digits, seed))
+    if verdict(report)[:2] == verdict(exact)[:2]:
+        return
+    found = report.rounding
+    assert found is not None
+    assert found.mobility == exact.finite_mobility
+    assert max(found.angle, found.distance) < 30 * 10.0**-digits
+    first = str(report).split("\n\n")[1].replace("\n", " ")
+    assert first.startswith("With ")
+    assert f"(mobility {found.mobility})" in first
+    assert verdict(mg.check(report.mechanism, tol=found.tol))[:2] == verdict(exact)[:2]
+
+
+def test_the_sentence_names_plane_and_axes() -> None:
+    found = mg.check(rounded(mg.load("slider-crank"), 4)).rounding
+    assert found is not None
+    assert found.kind == "planar"
+    assert found.misses[0].endswith("deg off the normal")
+    assert "the mechanism is planar and moves (mobility 1). Axis of " in found.text
+
+
+@pytest.mark.parametrize("name", mg.library())
+def test_exact_mechanisms_have_no_hint(name: str) -> None:
+    m = mg.load(name)
+    if m.has_geometry and "printed" not in name:
+        assert mg.check(m).rounding is None
+
+
+@pytest.mark.parametrize("name", ["slider-crank", "bennett", "sarrus", "three_cranks", "spherical"])
+@pytest.mark.parametrize("digits", [3, 5, 8, 10])
+def test_solutions_of_rounded_mechanisms_differ_by_the_order_of_the_tolerance(name: str, digits: int) -> None:
+    m, tol = SPECIAL[name](), 10.0 ** (1 - digits)
+    declared, freedom = rounded(m, digits), m.freedom_names()[0]
+    with pytest.raises(mg.MechgraphError, match="Pass tol="):
+        mg.kinematics(declared, {freedom: POSITIONS})
+    exact = mg.kinematics(m, {freedom: POSITIONS})
+    for engine in ("dense", "sparse"):
+        s = mg.kinematics(declared, {freedom: POSITIONS}, tol=tol, engine=engine)
+        assert (s.status == "ok").all()
+        assert 0 < s.checks.closure.max() <= tol
+        for pair in m.pairs:
+            moved, meant = (np.abs(of[pair.name].position - of[pair.name].position[0]) for of in (s, exact))
+            np.testing.assert_allclose(moved, meant, atol=5 * tol)
+
+
+def test_forces_too() -> None:
+    m = mg.load("four-bar")
+    theta = np.linspace(0, 0.8, 5)
+    exact = mg.solve(m, {"A": mg.Motion(theta, 1.0, 0.0)}, loads=[mg.Effort("D", 1.0)])
+    s = mg.solve(rounded(m, 5), {"A": mg.Motion(theta, 1.0, 0.0)}, loads=[mg.Effort("D", 1.0)], tol=1e-4)
+    np.testing.assert_allclose(np.abs(s["A"].effort), np.abs(exact["A"].effort), atol=1e-3)
+
+
+def test_a_position_beyond_the_tolerance_is_not_solved() -> None:
+    m = rounded(mechanisms.bennett(), 3)
+    tol = m.snapped(5e-3).changes.largest
+    s = mg.kinematics(m, {"O1": np.linspace(0, 3, 40)}, tol=tol, on_reach="flag")
+    beyond = s.status == "beyond tolerance"
+    assert 0 < beyond.sum() < len(beyond)
+    np.testing.assert_array_equal(s.checks.closure > tol, beyond)
+    assert np.isnan(s["O2"].position[beyond]).all()
+    with pytest.raises(mg.ReachError, match="beyond the tolerance"):
+        mg.kinematics(m, {"O1": np.linspace(0, 3, 40)}, tol=tol)
+
+
+def test_markers_that_meet_to_1e_6() -> None:
+    lengths, z = {"frame": 3.0, "crank": 1.0, "coupler": 2.5, "rocker": 2.2}, (0, 0, 1)
+    tilt = [np.round(np.array(v) + d, 6) for v, d in ((z, (1e-6, 0, 0)), (z, (0, -1e-6, 0)), (z, (0, 0, 0)))]
+    links = list(lengths)
+    pairs = [
+        mg.Pair(name, "R", a, b, on_a=mg.Marker((0, 0, 0) if a == "frame" else (lengths[a], 0, 0), tilt[k % 3]),
+                on_b=mg.Marker((0, 0, 1e-6 * k) if b != "frame" else (lengths[b], 0, 0), z))
+        for k, (name, a, b) in enumerate(zip("ABCD", links, [*links[1:], "frame"], strict=True))
+    ]  # fmt: skip
+    m = mg.Mechanism("loose", pairs=pairs, drives=["A"], start={"A": 1.0, "B": -0.6})
+    with pytest.raises(mg.AssemblyError, match=r"Pass tol=\S+ to take it so"):
+        mg.kinematics(m, {"A": POSITIONS + 1})
+    s = mg.kinematics(m, {"A": POSITIONS + 1}, tol=1e-5)
+    assert s.checks.closure.max() < 1e-5
+    report = mg.check(m, tol=1e-5)
+    assert (report.mobility, report.redundancy) == (1, 3)
+    assert mg.check(m).rounding is not None
+
+
+@pytest.mark.parametrize("name", ["planar", "spherical", "sarrus", "bennett"])
+def test_the_change_is_the_smallest(name: str) -> None:
+    """The mechanism that was rounded is exact as well, and within the rounding: the one found is no farther away."""
+    exact = SPECIAL[name]()
+    declared = rounded(exact, 3, 7)
+    pose = np.eye(4)
+    rng = np.random.default_rng(7)
+    pose[:3, :3], pose[:3, 3] = Rotation.random(rng=rng).as_matrix(), rng.normal(size=3)
+    meant, found = exact.moved(pose), declared.snapped(3e-3)
+    L = found.changes.L
+
+    def distance(one: mg.Mechanism) -> float:
+        total = 0.0
+        for p, q in zip(one.pairs, declared.pairs, strict=True):
+            z, w = (np.asarray(k.axis) / np.linalg.norm(k.axis) for k in (p, q))
+            off = np.asarray(p.point) - np.asarray(q.point)
+            across = off - (off @ w) * w
+            total += float(np.linalg.norm(np.cross(z, w)) ** 2 + (np.linalg.norm(across) / L) ** 2)
+        return total
+
+    assert distance(found) <= distance(meant) * (1 + 1e-2)
+    assert mg.check(found).finite_mobility == 1
+    axes = np.array([np.asarray(p.axis) / np.linalg.norm(p.axis) for p in found.pairs])
+    if name == "planar":
+        assert np.abs(np.cross(axes, axes[0])).max() < 1e-14
+    text = str(found.changes)
+    assert "turned [deg]" in text
+    assert all(change.pair in text for change in found.changes.moved)
+
+
+def test_relations_that_cannot_hold_together_are_listed_and_not_applied() -> None:
+    a = 1e-3
+    feet, heads = [(2 * k, 0, 0) for k in range(5)], [(2 * k, 1 + 5 * a * k, 0) for k in range(5)]
+    found = mechanisms.cranks(feet, heads, "stairs").snapped(a)
+    assert found.changes.dropped
+    assert found.changes.largest <= 1.01 * a
+    assert all(r.text in str(found.changes) for r in found.changes.dropped)
+
+
+def test_an_exact_mechanism_is_left_alone() -> None:
+    m = mg.load("slider-crank")
+    assert m.snapped(1e-3).pairs == m.pairs
+    assert not m.snapped(1e-3).changes.moved
+
+
+def test_files_and_the_command_line(tmp_path) -> None:
+    m = rounded(mg.load("slider-crank"), 5)
+    path = tmp_path / "m.toml"
+    mg.save(m.replace(tol=1e-4), path)
+    assert mg.load(path).tol == 1e-4
+    assert mg.check(mg.load(path)).mobility == 1
+    mg.save(m, path)
+    run = CliRunner().invoke
+    assert run(app, ["solve", str(path), "--drive", "A=0:60:10deg"]).exit_code == 1
+    assert run(app, ["solve", str(path), "--drive", "A=0:60:10deg", "--tol", "1e-4"]).exit_code == 0
+    assert "mobility 1" in run(app, ["check", str(path), "--tol", "1e-4"]).output
+
+
+def test_a_study_takes_every_variant_as_meant() -> None:
+    exact, outputs = mg.load("slider-crank"), ["D.position"]
+    declared = rounded(exact, 5)
+    x = {"B.point.x": scipy.stats.uniform(declared.pair("B").point[0], 1e-3)}
+    study = mg.study(declared, x, outputs, n=3, motions={"A": POSITIONS}, tol=5e-3)
+    assert (study.status == "ok").all()
+
+
+@pytest.mark.parametrize("tol", [0, -1e-3, 0.5, "small", np.nan, True])
+def test_bad_tolerances(tol: object) -> None:
+    m = mg.load("four-bar")
+    for call in (lambda: mg.check(m, tol=tol), lambda: mg.kinematics(m, {"A": 0.1}, tol=tol), lambda: m.snapped(tol)):
+        with pytest.raises(mg.DeclarationError, match="tol"):
+            call()
