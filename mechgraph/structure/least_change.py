@@ -43,8 +43,10 @@ POSITIONS = 5
 """Positions along a motion each way."""
 DIRECTIONS = 4
 """Random motions that are followed, each both ways; one where there is but one."""
-LARGEST = 400
+LARGEST = 60
 """Closure rows up to which motions are followed: dense decompositions. Larger mechanisms are left to the relations."""
+DENSE = 1200
+"""Numbers to be changed from which on relations are met by an iterative least-norm solution."""
 SEED = 11
 """Seed of these motions."""
 
@@ -120,8 +122,12 @@ def _relation_rows(found: Relations, relations: tuple[Relation, ...], change: Ar
     return r, scipy.sparse.csr_array(entries, shape=(len(r), change.size))
 
 
-def _solved(placed: Placed, rows_at: Callable[[Array], Rows], begin: Array | None = None) -> tuple[Array, Array]:
+def _solved(
+    placed: Placed, rows_at: Callable[[Array], Rows], begin: Array | None = None, most: float = 1.0
+) -> tuple[Array, Array]:
     """The smallest change with residual zero, by least-norm linearizations from ``begin``; and what is left of the residuals.
+
+    Given up where a part of it exceeds ``most``: to first order no linearization is larger than what it leads to.
 
     Rows that depend on each other do so at the solution only: singular values of the size of the residual count as zero.
     """
@@ -136,14 +142,14 @@ def _solved(placed: Placed, rows_at: Callable[[Array], Rows], begin: Array | Non
         wanted = A @ change.T.ravel() - r
         cut = min(max(30.0 * float(np.abs(r).max()), 1e-8), 0.05)
         change = _least_norm(A, wanted, cut).reshape(-1, 6).T
-        if not np.isfinite(change).all() or np.abs(change).max() > 1.0:
+        if not np.isfinite(change).all() or np.abs(change).max() > most:
             break
     return best, least
 
 
 def _least_norm(A: scipy.sparse.csr_array, b: Array, cut: float) -> Array:
     """The smallest ``x`` with least ``|A x - b|``; singular values below ``cut`` times the largest are dropped."""
-    if A.shape[1] > 6 * LARGEST:
+    if A.shape[1] > DENSE:
         return np.asarray(
             scipy.sparse.linalg.lsmr(A, b, atol=1e-15, btol=1e-15, conlim=1 / cut, maxiter=20 * A.shape[0])[0]
         )
@@ -163,7 +169,7 @@ def _moving(
         states = _followed(placed.changed(change), placed.x, rank, step, 100.0 * tol if step == STEP else 10.0 * tol)
         if states is None:
             return None
-        change, rest = _solved(placed, partial(_rows_along, placed, found, relations, states, rank), change)
+        change, rest = _solved(placed, partial(_rows_along, placed, found, relations, states, rank), change, 2 * tol)
         if rest.max() > (LOOSE if step == STEP else EXACT) * 100 or np.max(placed.moved(change)) > SLACK * tol:
             return None
     return change
