@@ -20,7 +20,7 @@ from functools import partial
 import numpy as np
 import scipy
 
-from mechgraph.algebra.se3 import Array
+from mechgraph.algebra.se3 import Array, cross
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import System
 from mechgraph.numerics.linear import singular_values
@@ -32,7 +32,7 @@ SURE = (0.25, 0.0625)
 SLACK = 1.001
 """A tolerance is met up to this factor: it may be the printed size of the change itself."""
 MANY = 0.7
-"""Part of the worst miss from which relations that do not hold together are dropped at a time."""
+"""Part of the worst miss from which relations that do not hold together are dropped at a time: the least likely to be meant."""
 ROUNDS = 25
 """Most linearizations; each leaves a part of the size of the change."""
 STEP, FARTHER = 0.12, 0.3
@@ -45,6 +45,8 @@ DIRECTIONS = 4
 """Random motions that are followed, each both ways; one where there is but one."""
 LARGEST = 60
 """Closure rows up to which motions are followed: dense decompositions. Larger mechanisms are left to the relations."""
+FAR = 4.0
+"""Tolerances beyond which a change on the way is given up: the first linearizations overshoot."""
 DENSE = 1200
 """Numbers to be changed from which on relations are met by an iterative least-norm solution."""
 SEED = 11
@@ -92,7 +94,8 @@ def _meeting(
         if not near or (rest.max(initial=0.0) <= EXACT and size.max() <= SLACK * tol):
             return change, near, tuple(dropped)
         open_ = np.array([np.abs(row[0]).max() for row in found.rows(near, change)])
-        weight = open_ if open_.max() > EXACT else _weights(found, near, size, tol)
+        misses = np.array([r.miss for r in near])
+        weight = np.where(open_ > EXACT, misses, 0.0) if open_.max() > EXACT else _weights(found, near, size, tol)
         out = weight >= MANY * weight.max()
         dropped += [r for r, gone in zip(near, out, strict=True) if gone]
         near = tuple(r for r, gone in zip(near, out, strict=True) if not gone)
@@ -127,7 +130,7 @@ def _solved(
 ) -> tuple[Array, Array]:
     """The smallest change with residual zero, by least-norm linearizations from ``begin``; and what is left of the residuals.
 
-    Given up where a part of it exceeds ``most``: to first order no linearization is larger than what it leads to.
+    Given up where a part of it exceeds ``most``.
 
     Rows that depend on each other do so at the solution only: singular values of the size of the residual count as zero.
     """
@@ -169,7 +172,7 @@ def _moving(
         states = _followed(placed.changed(change), placed.x, rank, step, 100.0 * tol if step == STEP else 10.0 * tol)
         if states is None:
             return None
-        change, rest = _solved(placed, partial(_rows_along, placed, found, relations, states, rank), change, 2 * tol)
+        change, rest = _solved(placed, partial(_rows_along, placed, found, relations, states, rank), change, FAR * tol)
         if rest.max() > (LOOSE if step == STEP else EXACT) * 100 or np.max(placed.moved(change)) > SLACK * tol:
             return None
     return change
@@ -218,8 +221,9 @@ def _closing_rows(placed: Placed, change: Array, states: Array, rank: int) -> tu
     system = placed.changed(change)
     here = Configuration(system, _closed(system, states, rank))
     stress = np.linalg.svd(here.J.transpose(2, 0, 1))[0][:, :, rank:]
-    C = np.zeros((here.T, system.n_rows, change.size))
-    loops, n = system.loop_matrix, 6 * len(system.loop_matrix)
-    C[:, :n] = np.einsum("lp,ipct->tlipc", loops, placed.carried(change, here)).reshape(here.T, n, -1)
+    C, n = np.zeros((here.T, system.n_rows, change.size)), len(system.loop_matrix)
+    twists = np.einsum("lp,ipct->ilpct", system.loop_matrix, placed.carried(change, here))
+    twists[3:] += cross(twists[:3], np.broadcast_to(here.middles[:, :, None, None], twists[:3].shape))
+    C[:, : 6 * n] = twists.transpose(4, 1, 0, 2, 3).reshape(here.T, 6 * n, -1)
     r = np.einsum("tmk,mt->tk", stress, here.residual)
     return r.ravel(), np.einsum("tmk,tmn->tkn", stress, C).reshape(r.size, -1)
