@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from typing import TypeAlias
 
 import numpy as np
 import scipy
@@ -107,7 +108,7 @@ def _weights(found: Relations, near: tuple[Relation, ...], size: Array, tol: flo
     return np.array([r.miss if far & {int(found.owner[f]) for f in r.features} else 0.0 for r in near])
 
 
-Rows = tuple[Array, scipy.sparse.csr_array]
+Rows: TypeAlias = "tuple[Array, scipy.sparse.csr_array]"
 
 
 def _relation_rows(found: Relations, relations: tuple[Relation, ...], change: Array) -> Rows:
