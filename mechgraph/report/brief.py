@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from mechgraph.document import Bullets, Document, Paragraph, to_text
+from mechgraph.document import Block, Bullets, Document, Paragraph, to_text
 from mechgraph.report.advice import alternatives
 from mechgraph.report.facts import Facts
 from mechgraph.report.sentences import count_line, doubts, kind_line, motion_line, patterns, spins, verdict
@@ -20,14 +20,13 @@ HOW_MUCH = "What is not unique depends on fits, stiffness and temperature; how m
 MORE = "All the facts: report.text(full=True), mechgraph check --full."
 
 
-def document(r: Facts) -> Document:
-    """The page; what comes last in a list is left to the whole report where there is no room."""
+def document(r: Facts, first: tuple[Paragraph, ...] = ()) -> Document:
+    """The page, with what stands ``first`` on it; what comes last in a list is left to the whole report where there is no room."""
     parts = {title: [_sentence(line) for line in told(r)] for title, told in PARTS.items()}
     while True:
         items = [item for title, lines in parts.items() if lines for item in (title, lines)]
-        page = Document(
-            f"Determinacy of {r.mechanism.name}", (Paragraph(verdict(r)), *_note(r), Bullets(items), Paragraph(MORE))
-        )
+        blocks: list[Block] = [*first, Paragraph(verdict(r)), *_note(r), Bullets(items), Paragraph(MORE)]
+        page = Document(f"Determinacy of {r.mechanism.name}", tuple(blocks))
         longest = max(parts.values(), key=len)
         if len(to_text(page).splitlines()) <= LINES or len(longest) < 2:
             return page

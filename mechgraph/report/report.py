@@ -40,8 +40,11 @@ class DeterminacyReport(Facts):
 
     def document(self, full: bool = False) -> Document:
         """The report as a document: verdict, what to do and what may be trusted, or all of it; first what rounding does to it."""
-        made, found = sections.document(self) if full else brief.document(self), self.rounding
-        return made if found is None else replace(made, blocks=(Paragraph(found.text), *made.blocks))
+        first = () if self.rounding is None else (Paragraph(self.rounding.text),)
+        if not full:
+            return brief.document(self, first)
+        made = sections.document(self)
+        return replace(made, blocks=(*first, *made.blocks))
 
     def text(self, full: bool = False) -> str:
         """The report as text, at most 25 lines of 80 columns, or all of it."""
