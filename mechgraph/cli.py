@@ -154,13 +154,15 @@ def _show(document: Document, colour: str = "") -> None:
 
 
 def _fail(message: str, status: int) -> NoReturn:
-    with suppress(OSError):  # where messages cannot be written either, the status says it
+    try:
         if _is_terminal(sys.stderr):
             text = Text.assemble(("mechgraph: ", "bold red"), visible(message))
             Console(stderr=True, highlight=False).print(text, soft_wrap=True)
         elif sys.stderr is not None:
             sys.stderr.write(f"mechgraph: {visible(message)}\n")
             sys.stderr.flush()
+    except OSError:  # where messages cannot be written either, the status says it
+        _forget(sys.stderr)
     sys.exit(status)
 
 

@@ -225,6 +225,6 @@ def _closing_rows(placed: Placed, change: Array, states: Array, rank: int) -> tu
     C, n = np.zeros((here.T, system.n_rows, change.size)), len(system.loop_matrix)
     twists = np.einsum("lp,ipct->ilpct", system.loop_matrix, placed.carried(change, here))
     twists[3:] += cross(twists[:3], np.broadcast_to(here.middles[:, :, None, None], twists[:3].shape))
-    C[:, : 6 * n] = twists.transpose(4, 1, 0, 2, 3).reshape(here.T, 6 * n, -1)
+    C[:, : 6 * n] = twists.transpose(4, 1, 0, 2, 3).reshape(here.T, 6 * n, change.size)
     r = np.einsum("tmk,mt->tk", stress, here.residual)
     return r.ravel(), np.einsum("tmk,tmn->tkn", stress, C).reshape(r.size, -1)
