@@ -24,8 +24,11 @@ SPECIAL = {
 POSITIONS = np.linspace(0, 0.8, 9)
 
 
-def rounded(m: mg.Mechanism, digits: int, seed: int = 0) -> mg.Mechanism:
-    """In a random place, with axes of random length, every number to so many digits behind the point."""
+def rounded(m: mg.Mechanism, digits: int, seed: int = 0, tol: float | None = None) -> mg.Mechanism:
+    """In a random place, with axes of random length, every number to so many digits behind the point; declared with ``tol``.
+
+    Without it second directions that must be perpendicular to the axis are made so after the rounding.
+    """
     rng = np.random.default_rng(seed)
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = Rotation.random(rng=rng).as_matrix(), rng.normal(size=3)
@@ -34,16 +37,21 @@ def rounded(m: mg.Mechanism, digits: int, seed: int = 0) -> mg.Mechanism:
         unit = np.asarray(v) / np.linalg.norm(v)
         return tuple(np.round(rng.uniform(1, 1.6) * unit, digits).tolist())
 
-    def marker(k: mg.Marker | mg.Pair) -> dict[str, tuple[float, ...]]:
-        point = tuple(np.round(k.point, digits).tolist())
-        return {"point": point, "axis": axis(k.axis), "second": axis(k.second)}
+    def marker(k: mg.Marker | mg.Pair, square: bool) -> dict[str, tuple[float, ...]]:
+        point, z, x = tuple(np.round(k.point, digits).tolist()), axis(k.axis), axis(k.second)
+        if square and tol is None:
+            x = tuple((np.array(x) - np.dot(x, z) / np.dot(z, z) * np.array(z)).tolist())
+        return {"point": point, "axis": z, "second": x}
 
     pairs = []
     for p in m.moved(pose).pairs:
         sides = {"on_a": p.on_a, "on_b": p.on_b}
-        found = {k: mg.Marker(**marker(v)) for k, v in sides.items()} if p.on_a is not None else marker(p)
+        square = p.type.square_second
+        found = (
+            {k: mg.Marker(**marker(v, square)) for k, v in sides.items()} if p.on_a is not None else marker(p, square)
+        )
         pairs.append(p.replace(**found))
-    return m.moved(pose).replace(pairs=pairs)
+    return m.moved(pose).replace(pairs=pairs, tol=tol)
 
 
 def verdict(r: mg.DeterminacyReport) -> tuple[object, ...]:
@@ -53,8 +61,8 @@ def verdict(r: mg.DeterminacyReport) -> tuple[object, ...]:
 @pytest.mark.parametrize("name", SPECIAL)
 @pytest.mark.parametrize(("digits", "seed"), [(2, 1), (4, 2), (6, 3), (9, 4), (12, 5)])
 def test_rounded_special_mechanisms_are_what_they_are_meant_to_be(name: str, digits: int, seed: int) -> None:
-    m = SPECIAL[name]()
-    found = mg.check(rounded(m, digits, seed), tol=5 * 10.0**-digits)
+    m, tol = SPECIAL[name](), 5 * 10.0**-digits
+    found = mg.check(rounded(m, digits, seed, tol), tol=tol)
     assert verdict(found)[:2] == verdict(mg.check(m))[:2]
 
 
@@ -212,9 +220,37 @@ def test_a_study_takes_every_variant_as_meant() -> None:
     assert (study.status == "ok").all()
 
 
+@pytest.mark.parametrize("cosine", [-1e-3, 5e-4, 3e-6])
+def test_second_directions_are_perpendicular_to_the_tolerance_of_the_mechanism(cosine: float, tmp_path) -> None:
+    """Of types of which it is a true direction; taken as meant then, and refused without a tolerance or with a smaller one."""
+    z, x = (0.0, 0.0, 1.0), (1.0, 0.0, cosine)
+    marker = mg.Marker((0, 0, 0), z, x)
+    for kind in ("U", "Sc", "Cp"):
+        for place in ({"point": (0, 0, 0), "axis": z, "second": x}, {"on_a": marker, "on_b": marker}):
+            pairs = [mg.Pair("A", kind, "frame", "arm", **place)]
+            for tol in (None, abs(cosine) / 3):
+                with pytest.raises(mg.DeclarationError, match="not perpendicular .* pass tol= to Mechanism"):
+                    mg.Mechanism("joint", pairs=pairs, tol=tol)
+            m = mg.Mechanism("joint", pairs=pairs, tol=abs(cosine))
+            mg.save(m, tmp_path / "joint.toml")
+            assert mg.load(tmp_path / "joint.toml") == m
+            exact = mg.Mechanism(
+                "joint", pairs=[mg.Pair("A", kind, "frame", "arm", point=(0, 0, 0), axis=z, second=(1, 0, 0))]
+            )
+            row = m.pairs[0].type
+            at = {f"A.{f.name}": 0.1 for f, single in zip(row.freedoms, row.drivable, strict=True) if single}
+            poses = [mg.kinematics(one, at).link("arm").pose for one in (m, exact)]
+            np.testing.assert_allclose(*poses, atol=1e-15)
+
+
 @pytest.mark.parametrize("tol", [0, -1e-3, 0.5, "small", np.nan, True])
 def test_bad_tolerances(tol: object) -> None:
     m = mg.load("four-bar")
-    for call in (lambda: mg.check(m, tol=tol), lambda: mg.kinematics(m, {"A": 0.1}, tol=tol), lambda: m.snapped(tol)):
+    for call in (
+        lambda: m.replace(tol=tol),
+        lambda: mg.check(m, tol=tol),
+        lambda: mg.kinematics(m, {"A": 0.1}, tol=tol),
+        lambda: m.snapped(tol),
+    ):
         with pytest.raises(mg.DeclarationError, match="tol"):
             call()

@@ -14,11 +14,13 @@ import numpy as np
 import scipy
 
 from mechgraph.algebra.inertia import physical
+from mechgraph.algebra.se3 import Array
 from mechgraph.model.coupling import Coupling
 from mechgraph.model.drive import Drive
 from mechgraph.model.link import Link
 from mechgraph.model.load import LOADS
-from mechgraph.model.pair import PERPENDICULAR, Marker, Pair
+from mechgraph.model.numeric import tolerance_fault
+from mechgraph.model.pair import PARALLEL, Marker, Pair, largest_cosine
 from mechgraph.model.pair_type import PairType
 from mechgraph.quantities import column, is_numeric, shown, wrong
 from mechgraph.units import BASE_UNITS
@@ -45,8 +47,8 @@ def _kind_faults(m: Mechanism) -> list[str]:
     ):
         if set(map(type, items)) <= set(kind):
             continue
-        wrong = [item for item in items if not isinstance(item, kind)]
-        faults += [f"{what} {shown(item)}: is no {what}; use {_maker(what)}" for item in wrong]
+        strange = [item for item in items if not isinstance(item, kind)]
+        faults += [f"{what} {shown(item)}: is no {what}; use {_maker(what)}" for item in strange]
     return faults
 
 
@@ -72,12 +74,14 @@ def declaration_faults(m: Mechanism) -> list[str]:
     if not _links_are_sound(m.links):
         faults += [fault for link in m.links for fault in link.faults()]
     faults += _repeated(names, "link") + _repeated([p.name for p in m.pairs if isinstance(p.name, str)], "pair")
-    if not _pairs_are_sound(m.pairs):
-        faults += [fault for pair in m.pairs for fault in pair.faults()]
+    if not _pairs_are_sound(m.pairs, m.tol):
+        faults += [fault for pair in m.pairs for fault in pair.faults(m.tol)]
     faults += _end_faults(m, names)
     for key, value in m.units.items():
         if key not in BASE_UNITS or not isinstance(value, str) or not value:
             faults.append(wrong(value, f"units: {key}", f"names for {', '.join(BASE_UNITS)}"))
+    if m.tol is not None:
+        faults += filter(None, [tolerance_fault(m.tol)])
     faults += [
         wrong(value, what, "a text")
         for what, value in (("source", m.source), ("description", m.description))
@@ -158,7 +162,7 @@ def _links_are_sound(links: Sequence[Link]) -> bool:
     return bool(((A.swapaxes(0, 1) == A).all(axis=(0, 1)) & physical(A) | meant).all())
 
 
-def _pairs_are_sound(pairs: Sequence[Pair]) -> bool:
+def _pairs_are_sound(pairs: Sequence[Pair], tol: float | None) -> bool:
     """Whether every pair passes, checked in columns; False where it takes a closer look."""
     types = {id(p.type): p.type for p in pairs}.values()
     if not _are_names([p.name for p in pairs]) or not all(isinstance(t, PairType) for t in types):
@@ -168,7 +172,7 @@ def _pairs_are_sound(pairs: Sequence[Pair]) -> bool:
     if any(p.a == p.b or (p.on_a is None) != (p.on_b is None) for p in pairs):
         return False
     takers = {id(t) for t in types if t.takes_pitch}
-    if any(p.faults() for p in pairs if p.pitch is not None or p.lead is not None or id(p.type) in takers):
+    if any(p.faults(tol) for p in pairs if p.pitch is not None or p.lead is not None or id(p.type) in takers):
         return False
     by_point = [p for p in pairs if p.point is not None or p.axis is not None]
     by_markers = [p for p in pairs if p.on_a is not None]
@@ -177,11 +181,15 @@ def _pairs_are_sound(pairs: Sequence[Pair]) -> bool:
     if not all(isinstance(side, Marker) for p in by_markers for side in (p.on_a, p.on_b)):
         return False
     markers = [*by_point, *(p.on_a for p in by_markers), *(p.on_b for p in by_markers)]
-    return _markers_are_sound(markers, [p.type.square_second for p in (*by_point, *by_markers, *by_markers)])
+    square = np.array([p.type.square_second for p in (*by_point, *by_markers, *by_markers)], dtype=bool)
+    return _markers_are_sound(markers, np.where(square, largest_cosine(tol), PARALLEL))
 
 
-def _markers_are_sound(markers: Sequence[Any], square: Sequence[bool]) -> bool:
-    """Whether points, axes and second directions (of markers or of pairs placed by point and axis) are what they must be."""
+def _markers_are_sound(markers: Sequence[Any], most: Array) -> bool:
+    """Whether points, axes and second directions (of markers or of pairs placed by point and axis) are what they must be.
+
+    ``most`` are the largest cosines that axis and second direction may have.
+    """
     p, z, x = (column([getattr(marker, name) for marker in markers], (3,)) for name in ("point", "axis", "second"))
     if p is None or z is None or x is None:
         return False
@@ -189,7 +197,7 @@ def _markers_are_sound(markers: Sequence[Any], square: Sequence[bool]) -> bool:
     if not all((one > 1e-12).all() for one in length):
         return False
     cosine = np.abs((z * x).sum(axis=1)) / (length[0] * length[1])
-    return not (cosine > np.where(square, PERPENDICULAR, 1 - 1e-12)).any()
+    return not (cosine > most).any()
 
 
 def item_faults(m: Mechanism) -> list[str]:

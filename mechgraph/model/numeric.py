@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 
 from mechgraph.quantities import all_floats, is_numeric, real_array, wrong
 
+MOST_TOL = 0.1
+"""Largest tolerance: beyond, a change is no rounding."""
+
 
 @dataclass(frozen=True, eq=False)
 class PerCase:
@@ -50,6 +53,12 @@ def number_fault(value: Any, what: str, *, minimum: float | None = None) -> str 
     if minimum is not None and float(value) < minimum:
         return f"{what} = {value!r}: expected a number not below {minimum:g}"
     return None
+
+
+def tolerance_fault(tol: Any) -> str | None:
+    """The fault of a tolerance of a whole mechanism, or None."""
+    good = is_numeric(tol, ()) and 0 < tol <= MOST_TOL
+    return None if good else wrong(tol, "tol", f"radians and lengths / L, above 0 and at most {MOST_TOL:g}")
 
 
 def same(a: Any, b: Any) -> bool:

@@ -27,8 +27,15 @@ from mechgraph.model.pair_type import PairType
 from mechgraph.quantities import is_numeric, shown, wrong
 from mechgraph.units import LENGTH
 
-PERPENDICULAR = 1e-2
-"""Largest cosine between axis and second direction that counts as perpendicular where a pair type needs it: numbers of two digits."""
+PARALLEL = 1 - 1e-12
+"""Cosine above which a second direction is parallel to the axis."""
+PERPENDICULAR = 1e-6
+"""Largest cosine between axis and second direction that counts as perpendicular where a pair type needs it."""
+
+
+def largest_cosine(tol: Any) -> float:
+    """The same in a mechanism whose directions are meant to ``tol``: both directions may be off by so much."""
+    return max(PERPENDICULAR, 2.0 * tol) if is_numeric(tol, ()) else PERPENDICULAR
 
 
 def second_direction(axis: Any) -> tuple[float, ...]:
@@ -63,20 +70,20 @@ class Marker(Described):
         if self.second is None and is_numeric(self.axis, (3,)):
             object.__setattr__(self, "second", second_direction(self.axis))
 
-    def faults(self, where: str, square: bool) -> list[str]:
-        """What is wrong with this marker; ``square`` where the second direction must be perpendicular as given."""
+    def faults(self, where: str, most: float) -> list[str]:
+        """What is wrong with this marker; ``most`` is the largest cosine that its axis and second direction may have."""
         found = self.value_faults(where)
         if not found:
             along = sum(z * x for z, x in zip(self.axis, self.second, strict=True))
             cosine = along / (math.hypot(*self.axis) * math.hypot(*self.second))
-            if abs(cosine) > 1 - 1e-12:
+            if abs(cosine) > PARALLEL:
                 found.append(
                     f"{where}second = {self.second!r}: parallel to the axis {self.axis!r}; give another direction"
                 )
-            elif square and abs(cosine) > PERPENDICULAR:
+            elif abs(cosine) > most:
                 found.append(
                     f"{where}second = {self.second!r}: not perpendicular to the axis {self.axis!r} (cosine {cosine:.3g}); "
-                    "this pair type needs the true direction"
+                    "this pair type needs the true direction; where numbers are rounded, pass tol= to Mechanism (tol = ... in a file)"
                 )
         return found
 
@@ -188,8 +195,8 @@ class Pair(Described):
         """The same pair with its numbers, and the lengths in a type of its own, in other units (see ``Described``)."""
         return super().in_units(base, turns).replace(type=self.type.scaled(1 / base[0]))
 
-    def faults(self) -> list[str]:
-        """What is wrong with this pair alone, one line each."""
+    def faults(self, tol: float | None = None) -> list[str]:
+        """What is wrong with this pair alone, one line each, in a mechanism whose directions are meant to ``tol``."""
         where = f"pair {shown(self.name)}: "
         if not isinstance(self.name, str) or not self.name:
             return [f"{where}the name must be a non-empty text"]
@@ -203,6 +210,7 @@ class Pair(Described):
         if isinstance(self.a, str) and isinstance(self.b, str) and self.a == self.b:
             found.append(f"{where}joins link {self.a!r} to itself; a pair joins two links")
         found += list(self._pitch_faults(where))
+        most = largest_cosine(tol) if self.type.square_second else PARALLEL
         if (self.on_a is None) != (self.on_b is None):
             missing = "on_b" if self.on_b is None else "on_a"
             found.append(f"{where}{missing} is missing; a pair by markers needs one on each link")
@@ -211,7 +219,7 @@ class Pair(Described):
                 found.append(f"{where}has both point/axis and markers on_a/on_b; give one form")
             for side, marker in (("on_a", self.on_a), ("on_b", self.on_b)):
                 if isinstance(marker, Marker):
-                    found += marker.faults(f"{where}{side}.", self.type.square_second)
+                    found += marker.faults(f"{where}{side}.", most)
                 else:
                     found.append(wrong(marker, where + side, "a Marker, mg.Marker(point, axis)"))
         elif self.has_geometry:
@@ -220,7 +228,7 @@ class Pair(Described):
             if self.axis is None:
                 found.append(f"{where}has a point but no axis; type {self.type.symbol} needs axis=(x, y, z)")
             if self.point is not None and self.axis is not None:
-                found += Marker(self.point, self.axis, self.second).faults(where, self.type.square_second)
+                found += Marker(self.point, self.axis, self.second).faults(where, most)
         return [fault for fault in found if fault]
 
     def _pitch_faults(self, where: str) -> Iterator[str | None]:

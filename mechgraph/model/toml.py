@@ -235,8 +235,9 @@ def parse(data: Mapping[str, Any], subject: str) -> Mechanism:
         reader.faults.append("both [chain] and [[pair]]; give one form")
     chained = reader.fields("chain", top["chain"], "chain") if "chain" in top else {}
     if reader.left_out or ("chain" in top and "pairs" not in chained):
-        alone = (*arguments.get("links", ()), *arguments.get("pairs", ()))
-        raise DeclarationError(subject, [*reader.faults, *(fault for item in alone for fault in item.faults())])
+        found = [fault for link in arguments.get("links", ()) for fault in link.faults()]
+        found += [fault for pair in arguments.get("pairs", ()) for fault in pair.faults(arguments.get("tol"))]
+        raise DeclarationError(subject, reader.faults + found)
     arguments = {"name": "?", **arguments}
     try:
         if chained:

@@ -14,15 +14,12 @@ from mechgraph.closure.indexing import System
 from mechgraph.document import Document, Paragraph, Table, to_text
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.numeric import tolerance_fault
 from mechgraph.model.parameters import Parameters, parameters
 from mechgraph.numerics.linear import singular_values
-from mechgraph.quantities import is_numeric, wrong
 from mechgraph.structure.least_change import LARGEST, least_change, weakness
 from mechgraph.structure.near_relations import Relation, Relations
 from mechgraph.structure.placed_pairs import EXACT, Placed
-
-MOST = 0.1
-"""Largest tolerance: beyond, a change is no rounding."""
 
 
 @dataclass(frozen=True)
@@ -82,12 +79,6 @@ class SnappedMechanism(Mechanism):
 
     changes: Changes
     declared: Mechanism
-
-
-def tolerance_fault(tol: Any) -> str | None:
-    """What is wrong with a tolerance, or None."""
-    good = is_numeric(tol, ()) and not isinstance(tol, bool) and 0 < tol <= MOST
-    return None if good else wrong(tol, "tol", f"radians and lengths / L, above 0 and at most {MOST:g}")
 
 
 def snapped(m: Mechanism, tol: float) -> SnappedMechanism:
