@@ -229,7 +229,7 @@ def test_second_directions_are_perpendicular_to_the_tolerance_of_the_mechanism(c
         for place in ({"point": (0, 0, 0), "axis": z, "second": x}, {"on_a": marker, "on_b": marker}):
             pairs = [mg.Pair("A", kind, "frame", "arm", **place)]
             for tol in (None, abs(cosine) / 3):
-                with pytest.raises(mg.DeclarationError, match="not perpendicular .* pass tol= to Mechanism"):
+                with pytest.raises(mg.DeclarationError, match=r"not perpendicular .* pass tol= to Mechanism"):
                     mg.Mechanism("joint", pairs=pairs, tol=tol)
             m = mg.Mechanism("joint", pairs=pairs, tol=abs(cosine))
             mg.save(m, tmp_path / "joint.toml")

@@ -92,7 +92,7 @@ class Placed:
         return out
 
     def pairs(self, change: Array) -> list[Pair]:
-        """The declared pairs, those that move with other markers: in the form in which they are declared where that can say it."""
+        """The declared pairs, those that move with other markers: in the form in which they are declared where that can express it."""
         par, m = self.system.par, self.system.m
         sides = self._markers(change)
         ends = pair_ends(m)
@@ -100,7 +100,9 @@ class Placed:
         out = []
         for k, pair in enumerate(m.pairs):
             on = [_marker(X[:, :, k], par.L, par.offset[:, end[k]]) for X, end in zip(sides, ends, strict=True)]
-            if still[k]:
+            if (
+                still[k] and not pair.faults()
+            ):  # a second direction that is perpendicular to a tolerance alone is made so
                 out.append(pair)
             elif pair.on_a is None and _alike(*on):
                 out.append(pair.replace(point=on[1].point, axis=on[1].axis, second=on[1].second))
