@@ -17,7 +17,7 @@ TOP_LEVEL = {
     ".ci", ".git", ".gitignore", "LICENSE", "README.md",
     "examples", "library", "mechgraph", "pyproject.toml", "tests",
 }  # fmt: skip
-MAY_PRINT = {"cli.py", "__main__.py"}
+MAY_PRINT = {"__main__.py"}
 LONGEST_FILE = 600
 NOT_AT_IMPORT = (
     "matplotlib", "typer", "rich", "pandas", "xarray", "pint",

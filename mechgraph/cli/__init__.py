@@ -1,0 +1,15 @@
+"""The command line, for a mechanism of the library or a file: one module for each group of commands, here put together."""
+
+from mechgraph.cli.determinacy import check
+from mechgraph.cli.formulation import equations
+from mechgraph.cli.library import list_library
+from mechgraph.cli.motion import respond, solve
+from mechgraph.cli.program import app
+
+__all__ = ["app"]
+
+app.command("list")(list_library)
+app.command("check")(check)
+app.command("equations")(equations)
+app.command("solve")(solve)
+app.command("respond")(respond)

@@ -1,0 +1,61 @@
+"""``mechgraph equations``."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Annotated, Literal
+
+import numpy as np
+import typer
+
+import mechgraph as mg
+from mechgraph.cli.options import Bookkeeping, EquationsAt, Named
+from mechgraph.cli.output import show, working, write
+from mechgraph.cli.reading import loaded
+from mechgraph.typed import drives_of, refuse
+
+
+def solved_at(m: mg.Mechanism, at: list[str]) -> mg.Solution:
+    """The one position that is named, with its rates."""
+    motions = drives_of(m, at)
+    if any(np.ndim(motion.position) for motion in motions.values()):
+        refuse("--at", "expected one position, e.g. A=30deg@10")
+    with working("solving"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", mg.MechgraphWarning)
+        return mg.solve(m, motions)
+
+
+def equations(
+    mechanism: Named,
+    latex: Annotated[bool, typer.Option("--latex", help="As LaTeX.")] = False,
+    bookkeeping: Bookkeeping = "lee",
+    blocks: Annotated[bool, typer.Option("--blocks", help="Vector equations only, without their components.")] = False,
+    coefficients: Annotated[bool, typer.Option("--coefficients", help="The table of nonzero coefficients.")] = False,
+    csv: Annotated[bool, typer.Option("--csv", help="The table of nonzero coefficients as CSV.")] = False,
+    unknowns: Annotated[
+        Literal["kinetostatics", "response"],
+        typer.Option(help="What is sought: forces for a given motion, or accelerations beside the reactions."),
+    ] = "kinetostatics",
+    at: EquationsAt = None,
+) -> None:
+    """Print the closure equations, the d'Alembert equations of every link and the conditions of the pairs; needs no geometry.
+
+    With --at the coefficients {Q}, the right sides {C} and the unknowns {u} with numbers, at one position.
+
+    Exit status: 0 done; 1 the mechanism has no such position; 2 wrong usage or bad input.
+    """
+    if (latex or blocks) and (coefficients or csv):
+        refuse("equations", "--coefficients and --csv print a table, --latex and --blocks equations; take one of them")
+    if at and (latex or blocks):
+        refuse("equations", "--at prints a table of numbers, --latex and --blocks equations; take one of them")
+    m = loaded(mechanism)
+    s = solved_at(m, at) if at else None
+    f = mg.formulate(s.mechanism if s else m, bookkeeping, unknowns=unknowns)
+    if csv or coefficients or at:
+        table = f.coefficients(s.state() if s else None)
+        names = "" if csv or not at else "".join(f"u({i}): {u.name}\n" for i, u in enumerate(f.unknowns, 1))
+        write(names + (table.csv() if csv else table.text()))
+    elif latex:
+        write(f.latex(components=not blocks))
+    else:
+        show(f.document(components=not blocks))

@@ -1,0 +1,109 @@
+"""``mechgraph solve`` and ``mechgraph respond``."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import typer
+
+import mechgraph as mg
+from mechgraph.cli.options import Actuate, Compare, Drives, Engine, Method, Named, OnReach, Out, Redundant, Tolerance
+from mechgraph.cli.outcome import NO_ANSWER, fail
+from mechgraph.cli.output import progress, show, working, write
+from mechgraph.cli.reading import loaded, refuse_own_file, show_compared
+from mechgraph.result.summary import summary
+from mechgraph.typed import drives_of, duration, parse_at
+
+
+def solve(
+    mechanism: Named,
+    drive: Drives = None,
+    actuate: Actuate = None,
+    out: Out = None,
+    method: Method = "loop_wrench",
+    redundant: Redundant = "nan",
+    on_reach: OnReach = "raise",
+    engine: Engine = "auto",
+    compared: Compare = False,
+    tol: Tolerance = None,
+) -> None:
+    """Solve positions, efforts of the drivers and all reactions, print a summary and write a table.
+
+    Exit status: 0 done; 1 the loops cannot be closed, a position is out of reach or a dead point (unless flagged and others were
+    solved), a freedom is neither driven nor passive, or drivers contradict each other; 2 wrong usage or bad input. A file is
+    written whole or not at all.
+    """
+    refuse_own_file(out, mechanism)
+    m = loaded(mechanism)
+    motions = drives_of(m, drive or ())
+    with working(f"solving {m.name}"):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", mg.MechgraphWarning)  # the summary has them
+            how: dict[str, Any] = {"method": method, "redundant": redundant, "on_reach": on_reach, "engine": engine}
+            s = mg.solve(m, motions or None, actuate=actuate, tol=tol, **how)
+        unique = mg.check(s.mechanism).unique if redundant == "minimum_norm" else None
+        document = summary(s, unique)
+        if out is not None:
+            s.to_csv(out)
+    show(document)
+    if out is not None:
+        write(f"\nWrote {out}: {s.status.size} rows, {len(s.part(slice(1)).columns())} columns.\n")
+    if compared:
+        show_compared(mechanism)
+    if not (np.asarray(s.status) == "ok").any():
+        raise typer.Exit(NO_ANSWER)
+
+
+def respond(
+    mechanism: Named,
+    span: Annotated[str, typer.Option("--for", metavar="TIME", help="How long: 10s.")],
+    start: Annotated[
+        list[str] | None, typer.Option("--start", metavar="FREEDOM=VALUE", help="Coordinate at the beginning (repeat).")
+    ] = None,
+    rate: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--rate", metavar="FREEDOM=VALUE", help="Rate at the beginning: A=2, A=90deg a unit of time (repeat)."
+        ),
+    ] = None,
+    points: Annotated[
+        int | None,
+        typer.Option("--points", min=2, help="Number of output times, evenly spread; without it the steps taken."),
+    ] = None,
+    out: Out = None,
+    method: Annotated[
+        Literal["auto", "RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"],
+        typer.Option(help="Stepper of scipy; Radau for stiff loads."),
+    ] = "auto",
+    rtol: Annotated[float, typer.Option(help="Relative tolerance of a step.")] = 1e-8,
+    atol: Annotated[float, typer.Option(help="Absolute tolerance (radians, lengths / L, and their rates).")] = 1e-10,
+    engine: Engine = "auto",
+) -> None:
+    """Follow the motion that the loads produce, print a summary with the energy balance and write a table.
+
+    Exit status: 0 done; 1 the loops cannot be closed, or the motion cannot be followed to its end (what there is is written); 2 wrong
+    usage or bad input. Ctrl-C keeps what was computed. A file is written whole or not at all.
+    """
+    refuse_own_file(out, mechanism)
+    m, end = loaded(mechanism), duration(span)
+    begin = dict(parse_at(m, text, "--start") for text in start or ())
+    rates = dict(parse_at(m, text, "--rate") for text in rate or ())
+    t = np.linspace(0.0, end, points) if points else (0.0, end)
+    with progress(f"moving {m.name}", end) as moved:
+        r = mg.respond(
+            m, t, start=begin, rates=rates, rtol=rtol, atol=atol, method=method, engine=engine, on_stop="return",
+            progress=moved,
+        )  # fmt: skip
+        document = summary(r, None)
+        if out is not None:
+            r.to_csv(out)
+    show(document)
+    largest = float(np.abs(r.energy.kinetic).max())
+    off = float(np.abs(r.energy.balance).max()) / (largest or 1.0)
+    write(f"\nEnergy balance to {off:.0e} of the largest kinetic energy; {r.work}.\n")
+    if out is not None:
+        write(f"Wrote {out}: {r.status.size} rows, {len(r.part(slice(1)).columns())} columns.\n")
+    if r.stopped:
+        fail(r.stopped, NO_ANSWER)

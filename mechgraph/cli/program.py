@@ -1,0 +1,56 @@
+"""The program: its name, its help, its version."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import sys
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from mechgraph.cli.outcome import DONE, EXIT_STATUS, outcome
+from mechgraph.cli.output import write
+
+
+class Program(TyperGroup):
+    """The command line, all of which comes to an outcome: options and help as well as commands."""
+
+    def main(self, *arguments: Any, **options: Any) -> Any:
+        """Run it, with streams that show what they cannot encode; a stream may have been closed."""
+        for stream in (sys.stdout, sys.stderr):
+            if stream is not None and hasattr(stream, "reconfigure"):
+                stream.reconfigure(errors="backslashreplace")
+        with outcome():
+            return super().main(*arguments, **options)
+
+    def invoke(self, context: Any) -> Any:
+        """Run a command, before the errors that are left are taken for those of the command line itself."""
+        with outcome():
+            return super().invoke(context)
+
+
+app = typer.Typer(
+    name="mechgraph",
+    cls=Program,
+    help="Spatial mechanisms as graphs of links and pairs: determinacy, equations, motion, driver efforts and reactions.\n\n"
+    + EXIT_STATUS,
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+@app.callback(invoke_without_command=True)
+def _main(
+    context: typer.Context, version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False
+) -> None:
+    if version:
+        try:
+            number = importlib.metadata.version("mechgraph")
+        except importlib.metadata.PackageNotFoundError:
+            number = "(not installed)"
+        write(f"mechgraph {number}\n")
+        raise typer.Exit(DONE)

@@ -1,0 +1,52 @@
+"""Mechanisms by the name or file that was typed."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import sys
+import warnings
+from pathlib import Path
+
+import mechgraph as mg
+from mechgraph.cli.output import show, write
+from mechgraph.errors import visible
+from mechgraph.exchange.comparison import compare
+from mechgraph.exchange.files import READERS
+from mechgraph.typed import refuse
+from mechgraph.writing import writable
+
+LONGEST_NAME = 100
+"""Characters of a wrong name that are compared with those of the library."""
+
+
+def loaded(name: str) -> mg.Mechanism:
+    """A mechanism of the library, else of a file; an unknown name is answered with its near matches."""
+    known = mg.library()
+    if name in known:
+        return mg.load(name)
+    path = Path(name)
+    if os.path.lexists(path) or path.suffix.lower() in (".toml", *READERS) or len(path.parts) > 1:
+        with warnings.catch_warnings(record=True) as notes:
+            warnings.simplefilter("always", mg.MechgraphWarning)
+            made = mg.load(path)
+        if sys.stderr is not None:
+            sys.stderr.write("".join(f"mechgraph: {visible(str(note.message))}\n" for note in notes))
+        return made
+    near = difflib.get_close_matches(name.lower()[:LONGEST_NAME], known, n=4, cutoff=0.5)
+    hint = f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(known)}"
+    raise mg.FileError(name, f"no mechanism of that name in the library, and no such file; {hint}")
+
+
+def refuse_own_file(out: Path | None, mechanism: str) -> None:
+    """Let no output take the place of the file that the mechanism is read from."""
+    if out is not None and writable(out).exists() and os.path.lexists(mechanism) and out.samefile(mechanism):
+        refuse(f"--out {str(out)!r}", "is the file of the mechanism; name another")
+
+
+def show_compared(mechanism: str) -> None:
+    """What FreeCAD stored beside what comes out here, below a report or summary."""
+    if Path(mechanism).suffix.lower() != ".asmt":
+        refuse(f"--compare {mechanism!r}", "is no FreeCAD assembly (.asmt)")
+    write("\n")
+    show(compare(mechanism).document())
