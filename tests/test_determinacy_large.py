@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -25,6 +26,7 @@ from mechgraph.closure.rank import ClosureRank, closure_rank, rank_of_rows
 from mechgraph.numerics.tolerances import RANKS
 from mechgraph.report.facts import counted_ledger
 from mechgraph.structure.generic import random_rows
+from mechgraph.structure.kind import kind_of
 from mechgraph.structure.mobility import free_motion
 from mechgraph.structure.uniqueness import uniqueness
 from mechgraph.topology.linkgraph import link_graph
@@ -301,3 +303,28 @@ def test_all_self_stresses_are_listed(name: str, engine: Any) -> None:
 def test_an_unknown_engine_is_refused() -> None:
     with pytest.raises(mg.DeclarationError, match="expected one of 'auto', 'dense', 'sparse'"):
         mg.check(mg.load("four-bar"), engine="fast")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("kind", ["planar", "spherical", ""])
+def test_the_kind_of_many_pairs_takes_no_more_memory_than_their_twists(kind: str) -> None:
+    """A square matrix over the pairs (800 MB here) is never made."""
+    rng = np.random.default_rng(0)
+    n, (a, b) = 10_000, np.linalg.qr(rng.normal(size=(3, 3)))[0][:2]
+    w, p = rng.normal(size=(2, 3, n))
+    if kind == "planar":
+        w = np.outer(np.cross(a, b), rng.choice([-1.0, 1.0], n))
+    elif kind == "spherical":
+        p = np.repeat(rng.normal(size=(3, 1)), n, axis=1)
+    twists = np.concatenate([w, np.cross(p, w, axis=0)])
+    tracemalloc.start()
+    try:
+        found = kind_of(twists)
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert most < 40 * twists.nbytes
+    assert found.name == kind
+    if kind == "planar":
+        np.testing.assert_allclose(np.abs(found.place @ np.cross(a, b)), 1.0, atol=1e-12)
+    elif kind == "spherical":
+        np.testing.assert_allclose(found.place, p[:, 0], atol=1e-12)

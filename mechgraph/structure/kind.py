@@ -63,9 +63,9 @@ def planar(twists: Array) -> Kind:
     """The plane to which the turns ``(6, n)`` (without any: the slides) are parallel."""
     turning = np.linalg.norm(twists[:3], axis=0) > RANKS.position
     if turning.any():
-        normal = np.linalg.svd(twists[:3, turning])[0][:, 0]
+        normal = _principal(twists[:3, turning])[0][:, 0]
     else:
-        U, s, _ = np.linalg.svd(twists[3:])
+        U, s = _principal(twists[3:])
         if (s > RANKS.position).sum() != 2:
             return Kind()
         normal = U[:, 2]
@@ -80,12 +80,19 @@ def planar(twists: Array) -> Kind:
     )
 
 
+def _principal(vectors: Array) -> tuple[Array, Array]:
+    """Left singular vectors ``(3, 3)`` and singular values of vectors ``(3, n)``, by way of their triangular factor."""
+    triangular: Array = np.asarray(np.linalg.qr(vectors.T, mode="r"))
+    U, s, _ = np.linalg.svd(triangular.T)
+    return U, s
+
+
 def spherical(twists: Array) -> Kind:
     """The centre through which the turns ``(6, n)`` pass: of the least squares of ``v + w x O``."""
-    rows = np.concatenate([skew(w) for w in twists[:3].T])
+    rows = np.moveaxis(skew(twists[:3]), -1, 0).reshape(-1, 3)
     if np.linalg.matrix_rank(rows, tol=RANKS.position) < 3:
         return Kind()
-    centre = np.linalg.lstsq(rows, -twists[3:].T.ravel(), rcond=None)[0]
+    centre: Array = np.asarray(np.linalg.lstsq(rows, -twists[3:].T.ravel(), rcond=None)[0])
     return Kind("spherical", tuple(centre.tolist()), np.concatenate([-skew(centre), np.eye(3)], axis=1))
 
 
