@@ -1,19 +1,23 @@
-"""The one place that writes files: whole or not at all, and never in place of what is no file. Cells of tables for spreadsheets."""
+"""The one place that writes files: whole or not at all, and never in place of what is no file. Formats by suffix; cells of tables."""
 
 from __future__ import annotations
 
 import csv
+import importlib
 import io
 import os
 import re
+import shutil
 import stat
+import tempfile
 import uuid
-from collections.abc import Iterable
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mechgraph.errors import DeclarationError, FileError, visible
+from mechgraph.errors import DeclarationError, FileError, MissingExtraError, visible
 
 FORMULA = ("=", "+", "-", "@")
 """Beginnings of a cell that a spreadsheet takes for a formula."""
@@ -21,32 +25,62 @@ NUMBER = re.compile(r"[-+]?[\d.]+(?:e[-+]?\d+)?")
 
 
 def write_whole(path: str | os.PathLike[str], text: Iterable[str]) -> None:
-    """Write a text in UTF-8, piece by piece, into a temporary file beside the target that takes its place, owner and rights at the end.
+    """Write a text in UTF-8, piece by piece, whole or not at all (see ``whole_file``).
 
-    A link is followed. What is no regular file (a pipe, a device) is written straight into.
+    What is no regular file (a pipe, a device) is written straight into.
 
     Raises
     ------
     FileError
         where the file cannot be written.
     """
-    target, temporary = writable(path), None
-    try:
+    target = writable(path)
+    with _refused(path):
         if target.exists() and not target.is_file():
             with open(target, "w", encoding="utf-8", newline="", opener=_as_it_is) as handle:
                 handle.writelines(text)
             return
-        temporary = target.with_name(f".mechgraph-{uuid.uuid4().hex}")
-        with temporary.open("x", encoding="utf-8", newline="") as handle:
-            handle.writelines(text)
-        if target.exists():
-            _take_after(temporary, target.stat())
-        os.replace(temporary, target)
+    with whole_file(path) as temporary, temporary.open("x", encoding="utf-8", newline="") as handle:
+        handle.writelines(text)
+
+
+@contextmanager
+def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """The path of a temporary file, to be made in the block; at its end it takes the place, owner and rights of the target.
+
+    Where the block fails nothing is left and the target stays what it was. A link is followed; into what is no regular file (a pipe, a
+    device) the bytes of the temporary file are copied.
+
+    Raises
+    ------
+    FileError
+        where the file cannot be written.
+    """
+    target = writable(path)
+    regular = not target.exists() or target.is_file()
+    folder = target.parent if regular else Path(tempfile.gettempdir())
+    temporary = folder / f".mechgraph-{uuid.uuid4().hex}"
+    try:
+        with _refused(path):
+            yield temporary
+            if not regular:
+                with temporary.open("rb") as made, open(target, "wb", opener=_as_it_is) as handle:
+                    shutil.copyfileobj(made, handle)
+                return
+            if target.exists():
+                _take_after(temporary, target.stat())
+            os.replace(temporary, target)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def _refused(path: str | os.PathLike[str]) -> Iterator[None]:
+    """What the system says about a file as a FileError."""
+    try:
+        yield
     except (OSError, UnicodeEncodeError) as error:
         raise _cannot(path, error) from None
-    finally:
-        if temporary is not None:
-            temporary.unlink(missing_ok=True)
 
 
 def writable(path: str | os.PathLike[str]) -> Path:
@@ -91,6 +125,58 @@ def _take_after(made: Path, old: os.stat_result) -> None:
 
 def _cannot(path: str | os.PathLike[str], error: Exception) -> FileError:
     return FileError(path, f"cannot be written: {getattr(error, 'strerror', None) or error}")
+
+
+@dataclass(frozen=True)
+class Format:
+    """A kind of file that something can be written as: what it is called, the ``suffixes`` of its files, and ``write(thing, path, ...)``.
+
+    ``packages`` are needed for it and come with the ``extra`` of that name.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+    write: Callable[..., None]
+    packages: tuple[str, ...] = ()
+    extra: str = ""
+
+    def available(self) -> None:
+        """Raise MissingExtraError where a package is missing."""
+        for package in self.packages:
+            optional(package, self.extra)
+
+
+def format_of(path: str | os.PathLike[str], formats: Sequence[Format]) -> Format:
+    """The format that the suffix of a path says, whose packages are there.
+
+    Raises
+    ------
+    FileError
+        where no format has that suffix; MissingExtraError, DeclarationError where this is no path.
+    """
+    if not isinstance(path, str | os.PathLike):
+        raise DeclarationError("write", [f"path = {path!r}: expected a path, as a text or a Path"])
+    suffix = Path(os.fsdecode(path)).suffix.lower()
+    for one in formats:
+        if suffix in one.suffixes:
+            one.available()
+            return one
+    known = ", ".join(f"{' '.join(one.suffixes)} ({one.name})" for one in formats)
+    raise FileError(path, f"the suffix says how a file is written; known: {known}")
+
+
+def optional(package: str, extra: str) -> Any:
+    """A package that is not of the core.
+
+    Raises
+    ------
+    MissingExtraError
+        with the extra that it comes with.
+    """
+    try:
+        return importlib.import_module(package)
+    except ImportError:
+        raise MissingExtraError(package, extra) from None
 
 
 def csv_of(header: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:

@@ -123,7 +123,12 @@ def test_all_tables_take_it_and_know_the_units(tmp_path: Path) -> None:
     s = loaded(length="mm", mass="t", time="s")
     every = ["points", "links", "centers", "loads"]
     names = list(s.columns(every))
-    assert list(s.to_pandas(include=every)) == names == list(s.to_xarray(include=every))
+    assert list(s.to_pandas(include=every)) == names
+    data = s.to_xarray(include=every)
+    assert {
+        f"{name} [{x.attrs['units']}]" if "units" in x.attrs else name for name, x in data.variables.items()
+    } == set(names)
+    assert set(data.coords) == {"A.Rz"}
     for name in ("crank.tip velocity:x [mm/s]", "crank:Rxx", "loads[1] spring force [N]", "loads[1] spring x [mm]",
                  "loads[2] force_law x [rad]", "loads[4] wrench on crank:Mz [N mm]", "A.Rz effort [N mm]"):  # fmt: skip
         assert name in names

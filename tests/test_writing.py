@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
-from mechgraph.writing import cell, write_whole
+from mechgraph.writing import cell, whole_file, write_whole
 
 posix = pytest.mark.skipif(os.name == "nt", reason="links, pipes and rights of another kind")
 
@@ -167,6 +167,41 @@ def test_what_cannot_be_encoded_is_not_written(tmp_path: Path) -> None:
     with pytest.raises(mg.FileError, match="surrogates"):
         write_whole(tmp_path / "x", ["a", "\udcff"])
     assert not only(tmp_path)
+
+
+def made(path: Path, error: BaseException | None = None) -> None:
+    """A file that a library makes, of bytes that are no text; ``error`` comes when it is half done."""
+    with whole_file(path) as temporary, temporary.open("wb") as file:
+        file.write(b"\xff" * 100_000)
+        if error is not None:
+            raise error
+
+
+@pytest.mark.parametrize(
+    "error", [OSError(28, "No space left on device"), ValueError("no such type"), KeyboardInterrupt()]
+)
+def test_what_a_library_leaves_half_made(tmp_path: Path, error: BaseException) -> None:
+    (tmp_path / "x").write_text("old")
+    for name in ("x", "new"):
+        with pytest.raises(mg.FileError if isinstance(error, OSError) else type(error)):
+            made(tmp_path / name, error)
+    assert only(tmp_path) == {"x"}
+    assert (tmp_path / "x").read_text() == "old"
+
+
+@posix
+def test_what_a_library_makes_goes_into_pipes_and_devices_too(tmp_path: Path) -> None:
+    pipe, read = tmp_path / "pipe", list[bytes]()
+    os.mkfifo(pipe)
+    reader = threading.Thread(target=lambda: read.append(pipe.read_bytes()))
+    reader.start()
+    made(pipe)
+    reader.join(timeout=10)
+    assert read == [b"\xff" * 100_000]
+    with pytest.raises(mg.FileError, match="No space left"):
+        made(Path("/dev/full"))
+    assert Path("/dev/full").is_char_device()
+    assert only(tmp_path) == {"pipe"}
 
 
 # --- tables ------------------------------------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.newton import Work
 from mechgraph.quantities import wrong
 from mechgraph.result import export
+from mechgraph.result.table import Include, table_of
 from mechgraph.result.views import Checks, CouplingResult, LinkResult, LoadBearing, LoadResult, PairResult, Values
 
 if TYPE_CHECKING:
@@ -140,23 +141,40 @@ class Solution:
 
     # --- tables --------------------------------------------------------------------------------------------------------
 
-    def columns(self, include: Sequence[export.Include] = ()) -> Mapping[str, Array]:
+    def columns(self, include: Sequence[Include] = ()) -> Mapping[str, Array]:
         """All numbers of the table by column name with unit, ``(...)`` each.
 
         ``include`` adds the motion of named ``"points"``, the poses of ``"links"`` (origin x, y, z and rotation matrix Rxx, Rxy, ...) with
         angular rates, the motion of mass ``"centers"``, and what the ``"loads"`` do.
         """
-        return export.columns(self._values, include)
+        return {column.label: column.values for column in table_of(self._values, include)}
 
-    def to_pandas(self, include: Sequence[export.Include] = ()) -> pandas.DataFrame:
+    def to_pandas(self, include: Sequence[Include] = ()) -> pandas.DataFrame:
         """A DataFrame, one row a position (``pandas`` extra); ``include`` as in ``columns``."""
         return export.to_pandas(self._values, include)
 
-    def to_xarray(self, include: Sequence[export.Include] = ()) -> xarray.Dataset:
-        """A Dataset over the batch axes (``xarray`` extra); ``include`` as in ``columns``."""
+    def to_xarray(self, include: Sequence[Include] = ()) -> xarray.Dataset:
+        """A Dataset over the batch axes (``xarray`` extra); ``include`` as in ``columns``.
+
+        Names are those of ``columns`` without units, which stand in ``attrs["units"]``. Coordinates are the times and what was
+        prescribed; one row of rising times is the dimension ``t``, every other last axis is ``position``.
+        """
         return export.to_xarray(self._values, include)
 
-    def to_csv(self, path: str | os.PathLike[str], include: Sequence[export.Include] = ()) -> None:
+    def write(self, path: str | os.PathLike[str], include: Sequence[Include] = ()) -> None:
+        """Write the table, whole or not at all, as the suffix says; ``include`` as in ``columns``.
+
+        ``.csv``; ``.nc``, the Dataset as NetCDF 4 (``netcdf`` extra; slashes in names, and spaces in those of coordinates, are quoted:
+        ``%2F``); ``.parquet``, the DataFrame (``parquet`` extra).
+
+        Raises
+        ------
+        FileError
+            for another suffix, or where the file cannot be written; MissingExtraError.
+        """
+        export.write(self._values, path, include)
+
+    def to_csv(self, path: str | os.PathLike[str], include: Sequence[Include] = ()) -> None:
         """Write the table as CSV, whole or not at all; ``include`` as in ``columns``."""
         export.to_csv(self._values, path, include)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -11,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.errors import DeclarationError, MissingExtraError
+from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.variants.sampling import deviation, reach
 from mechgraph.variants.work import STATUSES, Part, Source
+from mechgraph.writing import optional
 
 if TYPE_CHECKING:
     import pandas
@@ -180,7 +180,7 @@ class Study:
 
     def to_xarray(self) -> xarray.Dataset:
         """A Dataset over variants and positions, parameters as coordinates of the variants (``xarray`` extra)."""
-        xr = _optional("xarray")
+        xr = optional("xarray", "xarray")
         N = self._outcomes.shape[1]
         data: dict[str, Any] = {}
         for name, values in self.outputs.items():
@@ -196,14 +196,7 @@ class Study:
 
     def to_pandas(self) -> pandas.DataFrame:
         """A DataFrame, one row a variant: parameters, outputs that are one number a variant, positions not solved (``pandas`` extra)."""
-        pd = _optional("pandas")
+        pd = optional("pandas", "pandas")
         single = {name: v.reshape(len(v)) for name, v in self.outputs.items() if v.size == len(v)}
         missing = (self._outcomes != 0).sum(axis=1)
         return pd.DataFrame({**self.parameters, **single, "positions not solved": missing})
-
-
-def _optional(module: str) -> Any:
-    try:
-        return importlib.import_module(module)
-    except ImportError:
-        raise MissingExtraError(module, module) from None
