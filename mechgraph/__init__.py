@@ -31,7 +31,8 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.pair_table import pair_types
-from mechgraph.model.pair_type import Bookkeeping, Component, Freedom, PairType
+from mechgraph.model.pair_type import PairType
+from mechgraph.model.row_parts import Bookkeeping, Component, Freedom
 from mechgraph.report.report import DeterminacyReport, check
 from mechgraph.response.events import Event
 from mechgraph.response.respond import Response, respond

@@ -71,7 +71,7 @@ WRONG = {
     "motions in a list": (lambda: mg.solve(M, [0.0]), "expected a mapping"),
     "motions of a number": (lambda: mg.solve(M, {3: 0.0}), "freedom 3"),
     "a pair type of a text": (lambda: mg.PairType("Q", freedoms="Rz"), "freedoms = 'Rz'"),
-    "a pair type of numbers": (lambda: mg.PairType("Q", freedoms=[3], reactions=[[4]]), "freedom = 3"),
+    "a pair type of numbers": (lambda: mg.PairType("Q", freedoms=[3], reactions=[[4]]), "freedom 3: unknown"),
     "a freedom without a name": (lambda: mg.PairType("Q", freedoms=[mg.Freedom(3, (0, 0, 1, 0, 0, 0))]), "freedom: name = 3"),
     "a bookkeeping that is none": (lambda: mg.PairType("Q", freedoms=["Rz"], bookkeeping=(7, 2)), "expected a Bookkeeping"),
     "a link by number": (lambda: M.link(0), "unknown link 0"),

@@ -19,8 +19,9 @@ from mechgraph.closure.batches import FactorBatch, Group, Index, ScrewTable, fac
 from mechgraph.closure.coefficients import MARKER_A, MARKER_B
 from mechgraph.closure.tree import Ranks, Tree, Walk, ranked
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair_type import Component, PairType
+from mechgraph.model.pair_type import PairType
 from mechgraph.model.parameters import Parameters
+from mechgraph.model.row_parts import Component
 from mechgraph.numerics.linear import Place, compact
 from mechgraph.topology.linkgraph import LinkGraph
 

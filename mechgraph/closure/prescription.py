@@ -21,7 +21,8 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.pair_table import TABLE
-from mechgraph.model.pair_type import UNIT_TWISTS, Freedom, PairType
+from mechgraph.model.pair_type import PairType
+from mechgraph.model.row_parts import UNIT_TWISTS, Freedom
 from mechgraph.quantities import has_quantity, is_numeric
 
 SLIDES, TURNS = ("Tx", "Ty", "Tz"), ("Rx", "Ry", "Rz")

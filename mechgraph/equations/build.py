@@ -27,7 +27,7 @@ from mechgraph.equations.terms import AXES, Block, Known, ScalarEquation, Screw,
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism, check_mechanism
 from mechgraph.model.pair import Pair
-from mechgraph.model.pair_type import Component, Freedom
+from mechgraph.model.row_parts import Component, Freedom
 
 
 @dataclass

@@ -9,7 +9,7 @@ from itertools import chain
 
 from mechgraph.document import latex_words
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair_type import Component, Freedom
+from mechgraph.model.row_parts import Component, Freedom
 
 LETTERS = {"x": "X", "y": "Y", "z": "A"}
 """Letter of a marker direction: A is the pair axis, as in Lee."""

@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, rotation_exp, rotation_log
-from mechgraph.model.pair_type import Freedom, PairType
+from mechgraph.model.pair_type import PairType
+from mechgraph.model.row_parts import Freedom
 
 
 class Directions(NamedTuple):

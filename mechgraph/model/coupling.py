@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from mechgraph.model.field_format import COEFFICIENTS, NUMBER, TEXT, Described
+from mechgraph.model.nameable import Nameable
 from mechgraph.model.numeric import number_fault, plain
 from mechgraph.quantities import is_numeric, shown, without_units, wrong
 from mechgraph.units import LENGTH, PURE
-
-if TYPE_CHECKING:
-    from mechgraph.model.mechanism import Mechanism
 
 Terms = tuple[tuple[str, float], ...]
 
@@ -60,7 +58,7 @@ class Coupling(Described):
         """The coefficients, in the order of the freedoms."""
         return tuple(coefficient for _, coefficient in self.terms)
 
-    def faults(self, m: Mechanism) -> list[str]:
+    def faults(self, m: Nameable) -> list[str]:
         """What is wrong with this coupling in a mechanism, one line each."""
         where = f"coupling {shown(self.name)}: "
         if not isinstance(self.name, str):

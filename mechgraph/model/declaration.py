@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy
@@ -22,11 +22,9 @@ from mechgraph.model.load import LOADS
 from mechgraph.model.numeric import tolerance_fault
 from mechgraph.model.pair import PARALLEL, Marker, Pair, largest_cosine
 from mechgraph.model.pair_type import PairType
+from mechgraph.model.parts import Parts
 from mechgraph.quantities import column, is_numeric, shown, wrong
 from mechgraph.units import BASE_UNITS
-
-if TYPE_CHECKING:
-    from mechgraph.model.mechanism import Mechanism
 
 
 def _repeated(names: Sequence[Any], what: str) -> list[str]:
@@ -35,7 +33,7 @@ def _repeated(names: Sequence[Any], what: str) -> list[str]:
     return [f"{what} {n!r} is declared {c} times; names must differ" for n, c in Counter(names).items() if c > 1]
 
 
-def _kind_faults(m: Mechanism) -> list[str]:
+def _kind_faults(m: Parts) -> list[str]:
     """Items that are no links, pairs, couplings, drives or loads at all."""
     faults = []
     for what, items, kind in (
@@ -61,7 +59,7 @@ def _maker(what: str) -> str:
     )
 
 
-def declaration_faults(m: Mechanism) -> list[str]:
+def declaration_faults(m: Parts) -> list[str]:
     """All that is wrong with a mechanism, one line each."""
     faults = _kind_faults(m)
     if not isinstance(m.name, str) or not m.name:
@@ -99,7 +97,7 @@ def mapping_faults(**given: Any) -> list[str]:
     ]
 
 
-def _end_faults(m: Mechanism, names: Sequence[str]) -> list[str]:
+def _end_faults(m: Parts, names: Sequence[str]) -> list[str]:
     """Ends of pairs and the frame that are no links; links that no pairs connect to the frame."""
     known = set(names)
     faults = []
@@ -119,7 +117,7 @@ def _end_faults(m: Mechanism, names: Sequence[str]) -> list[str]:
     return faults
 
 
-def _symbol_faults(m: Mechanism) -> list[str]:
+def _symbol_faults(m: Parts) -> list[str]:
     """Pair types that share a symbol and differ."""
     faults = []
     by_symbol: dict[str, PairType] = {}
@@ -200,13 +198,13 @@ def _markers_are_sound(markers: Sequence[Any], most: Array) -> bool:
     return not (cosine > most).any()
 
 
-def item_faults(m: Mechanism) -> list[str]:
+def item_faults(m: Parts) -> list[str]:
     """Faults of drives and loads alone, for links and pairs that were checked before."""
     faults = _kind_faults(m)
     return faults if faults else _reference_faults(m) + _coupling_faults(m)
 
 
-def _connection_faults(m: Mechanism) -> list[str]:
+def _connection_faults(m: Parts) -> list[str]:
     place, n = m.link_index, len(m.links)
     a, b = np.array([place[p.a] for p in m.pairs]), np.array([place[p.b] for p in m.pairs])
     graph = scipy.sparse.coo_array((np.ones(len(a), dtype=bool), (a, b)), shape=(n, n))
@@ -219,7 +217,7 @@ def _connection_faults(m: Mechanism) -> list[str]:
     ]
 
 
-def _reference_faults(m: Mechanism) -> list[str]:
+def _reference_faults(m: Parts) -> list[str]:
     faults = []
     drives = []
     for drive in m.drives:
@@ -235,7 +233,7 @@ def _reference_faults(m: Mechanism) -> list[str]:
     return faults
 
 
-def _coupling_faults(m: Mechanism) -> list[str]:
+def _coupling_faults(m: Parts) -> list[str]:
     faults = [fault for coupling in m.couplings for fault in coupling.faults(m)]
     names = [c.name for c in m.couplings if isinstance(c.name, str) and c.name]
     shared = [name for name in dict.fromkeys(names) if name in m.pair_index]
@@ -243,7 +241,7 @@ def _coupling_faults(m: Mechanism) -> list[str]:
     return faults + _repeated(names, "coupling")
 
 
-def flat_start(m: Mechanism, start: Mapping[str, Any]) -> tuple[dict[str, float], list[str]]:
+def flat_start(m: Parts, start: Mapping[str, Any]) -> tuple[dict[str, float], list[str]]:
     """Start values by full freedom name; a pair's name may carry one value for each of its freedoms."""
     flat: dict[str, float] = {}
     faults = []

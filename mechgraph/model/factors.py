@@ -14,15 +14,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array, homogeneous, inverse, quaternion_matrix, skew
-
-if TYPE_CHECKING:
-    from mechgraph.model.pair_type import Freedom
+from mechgraph.model.row_parts import Freedom
 
 Flags = NDArray[np.bool_]
 

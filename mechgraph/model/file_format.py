@@ -31,7 +31,8 @@ from mechgraph.model.load import LOADS
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.model.pair import Marker, Pair
-from mechgraph.model.pair_type import Bookkeeping, Component, Freedom, PairType
+from mechgraph.model.pair_type import PairType
+from mechgraph.model.row_parts import Bookkeeping, Component, Freedom
 from mechgraph.units import BASE_UNITS, LENGTH
 
 SCHEMA = 1

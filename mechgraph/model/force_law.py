@@ -16,7 +16,8 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
 from mechgraph.model.field_format import FREEDOM_NAME, LINK_NAME, NAMED_POINT, NUMBER, POSITION, TABLE
 from mechgraph.model.force_table import ForceTable
-from mechgraph.model.load_base import BaseLoad, LoadSite, Nameable
+from mechgraph.model.load_base import BaseLoad, LoadSite
+from mechgraph.model.nameable import Nameable
 from mechgraph.quantities import real_array, shown, wrong
 from mechgraph.units import FORCE_PER_LENGTH, FORCE_PER_VELOCITY, LENGTH, MOMENT, MOMENT_PER_RATE
 

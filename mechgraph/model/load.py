@@ -11,7 +11,8 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from mechgraph.algebra.se3 import rotate
 from mechgraph.model.field_format import FREEDOM_NAME, LINK_NAME, NAMED_POINT, SERIES, TEXT, VECTOR, VECTOR_SERIES
 from mechgraph.model.force_law import Damper, ForceLaw, Spring, TorsionSpring
-from mechgraph.model.load_base import BaseLoad, LoadSite, Nameable, Value
+from mechgraph.model.load_base import BaseLoad, LoadSite, Value
+from mechgraph.model.nameable import Nameable
 from mechgraph.units import ACCELERATION, FORCE, LENGTH, MOMENT
 
 

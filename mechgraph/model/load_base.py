@@ -1,14 +1,14 @@
-"""What all loads share: what they see of a mechanism (``LoadSite``), the names that they may refer to, and their checks."""
+"""What all loads share: what they see of a mechanism at a batch of positions (``LoadSite``), and their checks."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, Self
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.model.field_format import FREEDOM_NAME, LINK_NAME, Described
-from mechgraph.model.link import Link
+from mechgraph.model.nameable import Nameable
 from mechgraph.model.numeric import same_fields
 from mechgraph.quantities import shown
 
@@ -57,26 +57,6 @@ class LoadSite(Protocol):
 
     def weight_energy(self, acceleration: Any) -> Array:
         """Potential energy ``-sum m g . c`` of the weight of all links, ``(T,)``."""
-
-
-class Nameable(Protocol):
-    """The names that a load may refer to."""
-
-    @property
-    def link_index(self) -> Mapping[str, int]:
-        """Place of every link, by name."""
-
-    def freedom_fault(self, name: Any, *, single: bool) -> str | None:
-        """Why ``name`` is no freedom (with ``single``: no single freedom), or None."""
-
-    def massive_links(self) -> tuple[str, ...]:
-        """Links that have mass."""
-
-    def link(self, name: str) -> Link:
-        """The link of that name."""
-
-    def ends_of(self, freedom: str) -> tuple[str, str]:
-        """Links a and b of the pair of a freedom."""
 
 
 @dataclass(frozen=True, eq=False)

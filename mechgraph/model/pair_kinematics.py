@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import accumulate, pairwise, starmap
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
@@ -23,25 +23,51 @@ from mechgraph.algebra.se3 import (
     quaternion_log,
     quaternion_product,
 )
-
-if TYPE_CHECKING:
-    from mechgraph.model.factors import Factor
-    from mechgraph.model.pair_type import Component, Freedom, PairType
+from mechgraph.model.factors import Factor
+from mechgraph.model.row_parts import Component, Freedom
 
 
-def places(row: PairType) -> list[tuple[slice, slice]]:
+class Row(Protocol):
+    """What is evaluated of a pair type (see ``PairType``)."""
+
+    @property
+    def steps(self) -> tuple[Factor, ...]:
+        """Factors of the displacement, in order."""
+
+    @property
+    def f(self) -> int:
+        """Number of freedoms."""
+
+    @property
+    def nx(self) -> int:
+        """Number of state numbers."""
+
+    @property
+    def reactions(self) -> tuple[Component, ...] | None:
+        """Components that do no work; None for the null space of ``S^T``."""
+
+    @property
+    def efforts(self) -> tuple[Component, ...]:
+        """One for every freedom."""
+
+    @property
+    def computed_efforts(self) -> bool:
+        """Whether the efforts are combined to be dual to the freedoms."""
+
+
+def places(row: Row) -> list[tuple[slice, slice]]:
     """For every factor of a row the places of its freedoms and of its state numbers."""
     columns = accumulate((len(step.freedoms) for step in row.steps), initial=0)
     numbers = accumulate((step.n_state for step in row.steps), initial=0)
     return list(zip(starmap(slice, pairwise(columns)), starmap(slice, pairwise(numbers)), strict=True))
 
 
-def _placed(row: PairType) -> Iterator[tuple[Factor, slice, slice]]:
+def _placed(row: Row) -> Iterator[tuple[Factor, slice, slice]]:
     for step, (columns, numbers) in zip(row.steps, places(row), strict=True):
         yield step, columns, numbers
 
 
-def frames_of(row: PairType, pitch: Array, x: Array, base: Array | None = None) -> list[Array]:
+def frames_of(row: Row, pitch: Array, x: Array, base: Array | None = None) -> list[Array]:
     """Frames 0, 1, ... of the pair as poses ``(3, 4, n, T)``, in the frame of ``base`` (marker A where it is None).
 
     The list is indexed by the number of single freedoms before the frame; places inside a factor of several freedoms hold its
@@ -54,7 +80,7 @@ def frames_of(row: PairType, pitch: Array, x: Array, base: Array | None = None) 
     return frames
 
 
-def twists_of(row: PairType, pitch: Array, frames: Sequence[Array], x: Array | None = None) -> Array:
+def twists_of(row: Row, pitch: Array, frames: Sequence[Array], x: Array | None = None) -> Array:
     """Twists of the freedoms, ``(6, f, n, T)``, in the frame in which ``frames`` are given.
 
     The state ``x`` may be left out where all twists are constant in their frames.
@@ -107,7 +133,7 @@ def _moved(
     return np.stack(parts, axis=1)
 
 
-def efforts_of(row: PairType, pitch: Array, frames: Sequence[Array], x: Array | None = None) -> Array:
+def efforts_of(row: Row, pitch: Array, frames: Sequence[Array], x: Array | None = None) -> Array:
     """Effort wrenches ``E``, one a freedom, ``(6, f, n, T)``; combined to ``E (S^T E)^-1`` where the row asks for it."""
     E = components_of(row.efforts, pitch, frames)
     return dual(E, twists_of(row, pitch, frames, x)) if row.computed_efforts else E
@@ -119,7 +145,7 @@ def dual(E: Array, S: Array) -> Array:
     return np.asarray(np.einsum("ignt,ntgf->ifnt", E, np.linalg.inv(unit)))
 
 
-def reactions_of(row: PairType, pitch: Array, frames: Sequence[Array], x: Array | None = None) -> Array:
+def reactions_of(row: Row, pitch: Array, frames: Sequence[Array], x: Array | None = None) -> Array:
     """Reaction wrenches ``W``, ``(6, 6 - f, n, T)``: the row's components, or the null space of ``S^T``."""
     if row.reactions is not None:
         return components_of(row.reactions, pitch, frames)
@@ -159,7 +185,7 @@ def _null_of_transpose(S: Array) -> Array:
     return np.asarray(N - U @ np.linalg.solve(St @ U, St @ N))
 
 
-def coordinates_to_state(row: PairType, q: Array) -> Array:
+def coordinates_to_state(row: Row, q: Array) -> Array:
     """State numbers ``(nx, ...)`` from user coordinates ``(f, ...)`` (rotation vectors for rotations)."""
     parts = [quaternion_exp(q[columns]) if step.holds_rotation else q[columns] for step, columns, _ in _placed(row)]
     return np.concatenate(parts) if parts else np.empty((0, *q.shape[1:]))
@@ -188,7 +214,7 @@ def turn_tangent(v: Array, w: Array) -> Array:
     return np.asarray(w - 0.5 * once + factor * cross(v, once))
 
 
-def advance(row: PairType, x: Array, dq: Array) -> Array:
+def advance(row: Row, x: Array, dq: Array) -> Array:
     """State after the increments ``dq`` ``(f, ...)``: added for single freedoms, ``exp(dq) Q`` for rotations."""
     out = np.empty(np.broadcast_shapes(x.shape, (row.nx, *dq.shape[1:])), dtype=np.result_type(x, dq))
     for step, columns, rows in _placed(row):
@@ -199,7 +225,7 @@ def advance(row: PairType, x: Array, dq: Array) -> Array:
     return out
 
 
-def difference(row: PairType, x1: Array, x0: Array) -> Array:
+def difference(row: Row, x1: Array, x0: Array) -> Array:
     """Increments ``dq`` that lead from ``x0`` to ``x1``; the inverse of ``advance`` (rotations by the short way)."""
     out = np.empty((row.f, *np.broadcast_shapes(x1.shape[1:], x0.shape[1:])), dtype=np.result_type(x1, x0))
     for step, columns, rows in _placed(row):
@@ -210,7 +236,7 @@ def difference(row: PairType, x1: Array, x0: Array) -> Array:
     return out
 
 
-def tangent(row: PairType, dq: Array, rates: Array) -> Array:
+def tangent(row: Row, dq: Array, rates: Array) -> Array:
     """Rates of the increments ``dq`` at the state that they lead to, from the rates ``(f, ...)`` of the freedoms there.
 
     Unchanged for single freedoms; ``turn_tangent`` for a rotation.
@@ -222,7 +248,7 @@ def tangent(row: PairType, dq: Array, rates: Array) -> Array:
     return out
 
 
-def state_to_coordinates(row: PairType, x: Array, start: Array | None = None) -> Array:
+def state_to_coordinates(row: Row, x: Array, start: Array | None = None) -> Array:
     """User coordinates ``(f, n, ..., T)`` of n pairs from states, rotation vectors continued along the last axis.
 
     The rotation vector at the first position is the one nearest to ``start`` ``(f, n)`` (zero where it is None); at every
@@ -269,6 +295,6 @@ def _continued_paths(v: Array, first: Array) -> Array:
     return np.asarray(np.where(turned, moved, v))
 
 
-def random_coordinates(row: PairType, rng: np.random.Generator, n: int, T: int) -> Array:
+def random_coordinates(row: Row, rng: np.random.Generator, n: int, T: int) -> Array:
     """Random states ``(nx, n, T)`` with coordinates of size about one."""
     return coordinates_to_state(row, rng.uniform(-1.2, 1.2, (row.f, n, T)))

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from mechgraph.document import Document, Table, to_text
-from mechgraph.model.pair_type import UNIT_TWISTS, UNIT_WRENCHES, Bookkeeping, Component, Freedom, PairType, fill_row
+from mechgraph.model.pair_type import PairType, fill_row
+from mechgraph.model.row_parts import UNIT_TWISTS, UNIT_WRENCHES, Bookkeeping, Component, Freedom
 
 _AXIS = (Freedom("Tz", UNIT_TWISTS["Tz"]), Freedom("Rz", UNIT_TWISTS["Rz"]))
 _FZ = Component("Fz", UNIT_WRENCHES["Fz"])

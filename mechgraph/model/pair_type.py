@@ -9,10 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
-from typing import TypeVar
 
 import numpy as np
 
@@ -20,114 +19,19 @@ from mechgraph.arguments import items_of
 from mechgraph.errors import DeclarationError
 from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.model.factors import ConstantScrew, Factor, Rotation
-from mechgraph.quantities import is_numeric, shown, wrong
+from mechgraph.model.row_parts import (
+    UNIT_TWISTS,
+    Bookkeeping,
+    Component,
+    Freedom,
+    all_scaled,
+    bookkeeping_faults,
+    read_component,
+    read_freedom,
+)
+from mechgraph.quantities import shown, wrong
 
-Six = tuple[float, float, float, float, float, float]
-
-UNIT_TWISTS: dict[str, Six] = {
-    name: tuple(float(i == j) for j in range(6))  # type: ignore[misc]
-    for i, name in enumerate(("Rx", "Ry", "Rz", "Tx", "Ty", "Tz"))
-}
-UNIT_WRENCHES: dict[str, Six] = {
-    name: tuple(float(i == j) for j in range(6))  # type: ignore[misc]
-    for i, name in enumerate(("Mx", "My", "Mz", "Fx", "Fy", "Fz"))
-}
 ROTATION = ("Rx", "Ry", "Rz")
-
-
-def _six(value: object) -> Six:
-    array = np.asarray(value, dtype=float)
-    if array.shape != (6,) or not np.isfinite(array).all():
-        raise ValueError(f"expected six finite numbers, got {value!r}")
-    return tuple(array.tolist())
-
-
-@dataclass(frozen=True)
-class Freedom:
-    """One freedom: a constant unit twist ``twist + pitch * per_pitch``, angular part first.
-
-    The angular part has length one (a turn) or zero (a slide; then the linear part has length one). ``per_pitch`` is the
-    part that is multiplied by the pitch of the pair, as in a helical pair.
-    """
-
-    name: str
-    twist: Six
-    per_pitch: Six = (0.0,) * 6
-
-    @property
-    def label(self) -> str:
-        """The freedom as the table shows it: ``Rz``, or ``Rz+pitch*Tz`` where the pitch enters."""
-        moved = [name for name, unit in UNIT_TWISTS.items() if np.dot(unit, self.per_pitch)]
-        return "+".join([self.name, *(f"pitch*{name}" for name in moved)])
-
-    @property
-    def turns(self) -> bool:
-        """Whether the coordinate is an angle (radians) rather than a length."""
-        return any(self.twist[:3])
-
-    def scaled(self, L: float) -> Freedom:
-        """The freedom with its lengths divided by ``L``: the linear part of a turn; itself where it has none."""
-        if not self.turns or not any(self.twist[3:]):
-            return self
-        return replace(self, twist=_six((*self.twist[:3], *(v / L for v in self.twist[3:]))))
-
-
-@dataclass(frozen=True)
-class Component:
-    """One reaction component or effort: a constant wrench ``wrench + pitch * per_pitch`` in frame ``frame``.
-
-    Its origin is that of the frame, or of marker B where ``at_b``.
-    """
-
-    name: str
-    wrench: Six
-    frame: int = 0
-    per_pitch: Six = (0.0,) * 6
-    at_b: bool = False
-
-    @property
-    def is_couple(self) -> bool:
-        """Whether the component is a couple (unit of a moment) rather than a force."""
-        return not any(self.wrench[3:])
-
-    def scaled(self, L: float) -> Component:
-        """The component with its lengths divided by ``L``: the moment (an arm) of a force; itself where it has none."""
-        if self.is_couple or not any(self.wrench[:3]):
-            return self
-        return replace(self, wrench=_six((*(v / L for v in self.wrench[:3]), *self.wrench[3:])))
-
-
-@dataclass(frozen=True)
-class Bookkeeping:
-    """How a ledger in Lee's manner writes the pair: a free dual force plus parts along the axis, under conditions.
-
-    The dual force has six unknowns; ``conditions`` are unit twists of frame 0 to which it is reciprocal (equations) and
-    ``along`` the components that the pair does transmit along its axis (unknowns). Source: Lee 1977, section 3.3.
-    """
-
-    conditions: tuple[Freedom, ...]
-    along: tuple[Component, ...]
-
-    @property
-    def unknowns(self) -> int:
-        """Number of unknowns, ``6 + len(along)``."""
-        return 6 + len(self.along)
-
-    @property
-    def equations(self) -> int:
-        """Number of constraint equations, ``len(conditions)``."""
-        return len(self.conditions)
-
-    def scaled(self, L: float) -> Bookkeeping:
-        """The bookkeeping with its lengths divided by ``L``."""
-        return Bookkeeping(_all_scaled(self.conditions, L), _all_scaled(self.along, L))
-
-
-Scaled = TypeVar("Scaled", Freedom, Component)
-
-
-def _all_scaled(parts: Sequence[Scaled], L: float) -> tuple[Scaled, ...]:
-    return tuple(part.scaled(L) for part in parts)
 
 
 def _factors(given: Sequence[object], faults: list[str]) -> tuple[Factor, ...]:
@@ -139,65 +43,9 @@ def _factors(given: Sequence[object], faults: list[str]) -> tuple[Factor, ...]:
         elif isinstance(item, str) and item == "rotation":
             out.append(Rotation(tuple(Freedom(name, UNIT_TWISTS[name]) for name in ROTATION)))
         else:
-            freedom = _named_freedom(item, faults) if isinstance(item, str) else _given_freedom(item, faults)
-            out += [] if freedom is None else [ConstantScrew(freedom)]
+            read = read_freedom(item, faults)
+            out += [] if read is None else [ConstantScrew(read)]
     return tuple(out)
-
-
-def _named_freedom(item: str, faults: list[str]) -> Freedom | None:
-    head, _, tail = (part.strip() for part in item.replace("pitch*", "pitch ").partition("+"))
-    slide = tail.removeprefix("pitch").strip()
-    if head not in UNIT_TWISTS or (tail and slide not in UNIT_TWISTS):
-        faults.append(
-            f"freedom {shown(item)}: unknown; give one of {', '.join(UNIT_TWISTS)}, 'rotation', 'Rz + pitch Tz' or a Freedom"
-        )
-        return None
-    return Freedom(head, UNIT_TWISTS[head], UNIT_TWISTS[slide] if tail else (0.0,) * 6)
-
-
-def _given_freedom(item: object, faults: list[str]) -> Freedom | None:
-    if not isinstance(item, Freedom):
-        faults.append(wrong(item, "freedom", "a name, 'rotation' or a Freedom"))
-        return None
-    found = _name_fault(item.name, "freedom") + _six_faults(
-        item.twist, item.per_pitch, f"freedom {shown(item.name)}: twist"
-    )
-    faults += found
-    return None if found else item
-
-
-def _name_fault(name: object, what: str) -> list[str]:
-    return [] if isinstance(name, str) and name else [wrong(name, f"{what}: name", "a text")]
-
-
-def _six_faults(constant: object, per_pitch: object, what: str) -> list[str]:
-    order = "angular part first" if what.endswith("twist") else "moment part first"
-    return [
-        wrong(row, what, f"six finite numbers, {order}") for row in (constant, per_pitch) if not is_numeric(row, (6,))
-    ]
-
-
-def _component(item: object, faults: list[str], what: str) -> Component | None:
-    """A component from ``Component``, ``"Fz@2"`` or ``("Fz", 2)``."""
-    if isinstance(item, Component):
-        found = _name_fault(item.name, what) + _six_faults(
-            item.wrench, item.per_pitch, f"{what} {shown(item.name)}: wrench"
-        )
-        if not isinstance(item.at_b, bool):
-            found.append(wrong(item.at_b, f"{what} {shown(item.name)}: at_b", "true or false"))
-        if type(item.frame) is not int:
-            found.append(wrong(item.frame, f"{what} {shown(item.name)}: frame", "a whole number"))
-        faults += found
-        return None if found else item
-    name, frame = item if isinstance(item, tuple) and len(item) == 2 else (item, 0)
-    if isinstance(name, str) and "@" in name:
-        name, _, frame = name.partition("@")
-    if not isinstance(name, str) or name not in UNIT_WRENCHES or not (str(frame).isdecimal() and len(str(frame)) < 3):
-        faults.append(
-            f"{what} {shown(item)}: expected one of {', '.join(UNIT_WRENCHES)}, with '@k' for frame k, or a Component"
-        )
-        return None
-    return Component(name, UNIT_WRENCHES[name], int(frame))
 
 
 @dataclass(frozen=True, init=False)
@@ -273,8 +121,8 @@ class PairType:
         scaled = {
             "steps": steps,
             "freedoms": tuple(freedom for step in steps for freedom in step.freedoms),
-            "reactions": None if self.reactions is None else _all_scaled(self.reactions, L),
-            "efforts": _all_scaled(self.efforts, L),
+            "reactions": None if self.reactions is None else all_scaled(self.reactions, L),
+            "efforts": all_scaled(self.efforts, L),
             "bookkeeping": self.bookkeeping and self.bookkeeping.scaled(L),
         }
         out = copy(self)
@@ -362,7 +210,7 @@ def fill_row(
     if not isinstance(name, str):
         faults.append(wrong(name, "name", "a text"))
     if bookkeeping is not None:
-        faults += _bookkeeping_faults(bookkeeping)
+        faults += bookkeeping_faults(bookkeeping)
     flags = (("directed", directed), ("square_second", square_second))
     faults += [wrong(flag, what, "true or false") for what, flag in flags if not isinstance(flag, bool)]
     steps = _factors(items_of(freedoms, "freedoms", faults), faults)
@@ -373,14 +221,16 @@ def fill_row(
     if reactions is not None:
         parts = tuple(
             c
-            for c in (_component(r, faults, "reaction") for r in items_of(reactions, "reactions", faults))
+            for c in (read_component(r, faults, "reaction") for r in items_of(reactions, "reactions", faults))
             if c is not None
         )
     if efforts is None:
         work = tuple(_dual_effort(f, k) for f, k in zip(rows, before, strict=True))
     else:
         work = tuple(
-            c for c in (_component(e, faults, "effort") for e in items_of(efforts, "efforts", faults)) if c is not None
+            c
+            for c in (read_component(e, faults, "effort") for e in items_of(efforts, "efforts", faults))
+            if c is not None
         )
     fields = {
         "symbol": symbol,
@@ -397,20 +247,6 @@ def fill_row(
     }
     for key, value in fields.items():
         object.__setattr__(row, key, value)
-    return faults
-
-
-def _bookkeeping_faults(given: object) -> list[str]:
-    faults: list[str] = []
-    if not isinstance(given, Bookkeeping):
-        return [wrong(given, "bookkeeping", "a Bookkeeping")]
-    for condition in items_of(given.conditions, "bookkeeping: conditions", faults):
-        _given_freedom(condition, faults)
-    for part in items_of(given.along, "bookkeeping: along", faults):
-        if not isinstance(part, Component):
-            faults.append(wrong(part, "bookkeeping: along", "a Component"))
-        else:
-            _component(part, faults, "bookkeeping: along")
     return faults
 
 

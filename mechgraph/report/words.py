@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechgraph.model.pair_type import Component, PairType
+from mechgraph.model.pair_type import PairType
+from mechgraph.model.row_parts import Component
 
 NAMED = 8
 """Most names that a sentence lists."""

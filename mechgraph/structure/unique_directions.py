@@ -15,7 +15,7 @@ import numpy as np
 from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.indexing import Index
-from mechgraph.model.pair_type import Component
+from mechgraph.model.row_parts import Component
 from mechgraph.structure.components import Components
 from mechgraph.structure.reaction_split import UNIQUE
 
