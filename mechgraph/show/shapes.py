@@ -1,0 +1,185 @@
+"""Solids and lines of which drawings consist: vertices, polygons and polylines as plain arrays; they know no mechanism."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+
+ROUND = 16
+"""Corners of a round section."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Vertices ``(n, 3)``; polygons and polylines by their indices; polygons whose edges are drawn come first, ``rims`` of them."""
+
+    vertices: Array
+    faces: tuple[tuple[int, ...], ...] = ()
+    lines: tuple[tuple[int, ...], ...] = ()
+    rims: int = 0
+
+    def moved(self, A: Array, p: Array | Sequence[float] = (0.0, 0.0, 0.0)) -> Shape:
+        """The shape under ``x -> A x + p``."""
+        return replace(self, vertices=self.vertices @ np.asarray(A).T + np.asarray(p))
+
+    def along(self, z: Array, at: Array | Sequence[float] = (0.0, 0.0, 0.0)) -> Shape:
+        """The shape with its z turned into a direction, at a point."""
+        return self.moved(frame_along(np.asarray(z)), at)
+
+
+def frame_along(z: Array) -> Array:
+    """A rotation ``(..., 3, 3)`` whose third column is the direction of ``z (..., 3)``; that of the global z where it has no length."""
+    z = np.asarray(z, dtype=float)
+    length = np.linalg.norm(z, axis=-1, keepdims=True)
+    z = np.where(length > 0, z / np.where(length > 0, length, 1.0), [0.0, 0.0, 1.0])
+    least = np.eye(3)[np.argmin(np.abs(z), axis=-1)]
+    x = least - (least * z).sum(axis=-1, keepdims=True) * z
+    x /= np.linalg.norm(x, axis=-1, keepdims=True)
+    return np.stack([x, np.cross(z, x), z], axis=-1)
+
+
+def together(shapes: Sequence[Shape]) -> Shape:
+    """Several shapes as one."""
+    starts = np.cumsum([0, *(len(s.vertices) for s in shapes)])
+    faces = [
+        (k < s.rims, tuple(i + n for i in f))
+        for s, n in zip(shapes, starts, strict=False)
+        for k, f in enumerate(s.faces)
+    ]
+    lines = tuple(tuple(i + n for i in line) for s, n in zip(shapes, starts, strict=False) for line in s.lines)
+    rims = [f for rim, f in faces if rim]
+    return Shape(
+        np.concatenate([s.vertices for s in shapes]), (*rims, *(f for rim, f in faces if not rim)), lines, len(rims)
+    )
+
+
+def prism(corners: int, radius: float, low: float, high: float, pieces: int = 1) -> Shape:
+    """A prism about z with a regular section (four corners: a square of half side ``radius``), cut into pieces along its length."""
+    turn = np.arange(corners) * 2 * np.pi / corners + np.pi / corners
+    reach = radius / np.cos(np.pi / 4) if corners == 4 else radius
+    ring = reach * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    z = np.repeat(np.linspace(low, high, pieces + 1), corners)
+    vertices = np.column_stack([np.tile(ring, (pieces + 1, 1)), z])
+    n, last = corners, pieces * corners
+    ends = (tuple(range(n))[::-1], tuple(range(last, last + n)))
+    sides = tuple(
+        (k * n + i, k * n + (i + 1) % n, (k + 1) * n + (i + 1) % n, (k + 1) * n + i)
+        for k in range(pieces)
+        for i in range(n)
+    )
+    around = (*range(n), 0), (*range(last, last + n), last)
+    spars = tuple((i, last + i) for i in range(0, n, max(n // 4, 1)))
+    whole = corners == 4
+    return Shape(vertices, (*ends, *sides), (*around, *spars), len(ends) + (len(sides) if whole and pieces == 1 else 0))
+
+
+def ball(radius: float) -> Shape:
+    """A sphere about the origin; its lines are three great circles."""
+    rows, columns = 8, ROUND
+    u, v = np.meshgrid(np.linspace(0, np.pi, rows + 1), np.arange(columns) * 2 * np.pi / columns, indexing="ij")
+    grid = radius * np.stack([np.sin(u) * np.cos(v), np.sin(u) * np.sin(v), np.cos(u)], axis=-1).reshape(-1, 3)
+    faces = tuple(
+        (i * columns + j, (i + 1) * columns + j, (i + 1) * columns + (j + 1) % columns, i * columns + (j + 1) % columns)
+        for i in range(rows) for j in range(columns)
+    )  # fmt: skip
+    circle = ring(radius)
+    loops = [circle @ np.roll(np.eye(3), k, axis=0) for k in range(3)]
+    n, m = len(grid), len(circle)
+    return Shape(
+        np.concatenate([grid, *loops]), faces, tuple(tuple(range(n + k * m, n + (k + 1) * m)) for k in range(3))
+    )
+
+
+def ring(radius: float) -> Array:
+    """A closed circle about z, ``(n, 3)``."""
+    turn = np.linspace(0, 2 * np.pi, 2 * ROUND + 1)
+    return radius * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+
+
+def polyline(points: Array | Sequence[Any]) -> Shape:
+    """A line through points."""
+    return Shape(np.asarray(points, dtype=float), lines=(tuple(range(len(points))),))
+
+
+def thread(radius: float, low: float, high: float, hand: float, turns: int = 3) -> Shape:
+    """A ribbon that winds about z on a cylinder: the thread of a screw, right-hand for ``hand > 0``."""
+    n = turns * ROUND
+    angle = np.copysign(1.0, hand) * np.linspace(0, 2 * np.pi * turns, n + 1)
+    width = 0.35 * (high - low) / turns
+    z = np.linspace(low, high - width, n + 1)
+    lower = np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
+    vertices = np.concatenate([lower, lower + np.array([0, 0, width])])
+    return Shape(vertices, tuple((i, i + 1, n + 2 + i, n + 1 + i) for i in range(n)), (tuple(range(n + 1)),))
+
+
+def coil(turns: int = 7) -> Shape:
+    """A helical spring of radius one from z = 0 to z = 1."""
+    n = 14 * turns
+    u = np.linspace(0.0, 1.0, n + 1)
+    angle = 2 * np.pi * turns * u
+    wound = np.stack([np.cos(angle), np.sin(angle), 0.12 + 0.76 * u], axis=1)
+    ends = np.array([[0, 0, 0], [0, 0, 0.12]]), np.array([[0, 0, 0.88], [0, 0, 1.0]])
+    return polyline(np.concatenate([ends[0], wound, ends[1]]))
+
+
+def spiral() -> Shape:
+    """A flat spiral spring about z, from radius 0.3 to 1."""
+    angle = np.linspace(0, 5 * np.pi, 70)
+    radius = np.linspace(0.3, 1.0, 70)
+    return polyline(np.stack([radius * np.cos(angle), radius * np.sin(angle), 0 * angle], axis=1))
+
+
+def dashpot() -> Shape:
+    """A damper of half width one from z = 0 to z = 1: a pot, and a piston in it, seen from two sides."""
+    flat: list[list[tuple[float, float]]] = [
+        [(0, 0), (0, 0.35)], [(-1, 0.75), (-1, 0.35), (1, 0.35), (1, 0.75)], [(-0.8, 0.55), (0.8, 0.55)], [(0, 0.55), (0, 1)],
+    ]  # fmt: skip
+    runs = [np.array([[x, 0.0, z] for x, z in run]) for run in flat]
+    runs += [run[:, [1, 0, 2]] for run in runs[1:3]]
+    return together([polyline(run) for run in runs])
+
+
+def ram() -> Shape:
+    """A strut of half width one from z = 0 to z = 1 that pushes by some law: a round box on a line."""
+    box = prism(ROUND, 1.0, 0.3, 0.7)
+    return together([polyline([[0, 0, 0], [0, 0, 0.3]]), box, polyline([[0, 0, 0.7], [0, 0, 1.0]])])
+
+
+def arrow() -> Shape:
+    """An arrow along z from 0 to 1 with a head of radius one."""
+    rim = ring(1.0)[::4] + np.array([0, 0, 0.78])
+    n = len(rim) - 1
+    head = Shape(
+        np.concatenate([rim[:-1], [[0, 0, 1.0]]]), (tuple(range(n))[::-1], *((i, (i + 1) % n, n) for i in range(n)))
+    )
+    return together([polyline([[0, 0, 0], [0, 0, 0.8]]), head])
+
+
+def turn_arrow(hand: float = 1.0) -> Shape:
+    """An arrow of radius one about z, by the right hand for ``hand > 0``."""
+    sign = np.copysign(1.0, hand)
+    angle = sign * np.linspace(-0.75 * np.pi, 0.6 * np.pi, 28)
+    arc = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    tip, ahead = angle[-1], sign * np.array([-np.sin(angle[-1]), np.cos(angle[-1]), 0.0])
+    out = np.array([np.cos(tip), np.sin(tip), 0.0])
+    sides = 0.24 * np.array([out, [0, 0, 1.0], -out, [0, 0, -1.0]])
+    head = Shape(arc[-1] + np.array([*sides, 0.55 * ahead]), ((0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4), (0, 1, 2, 3)))
+    return together([polyline(arc), head])
+
+
+def foot() -> Shape:
+    """A support of height one below the origin, down along -z: a pyramid on hatched ground."""
+    base = np.array([[-0.6, -0.6, -1.0], [0.6, -0.6, -1.0], [0.6, 0.6, -1.0], [-0.6, 0.6, -1.0]])
+    body = Shape(np.concatenate([base, np.zeros((1, 3))]), tuple((i, (i + 1) % 4, 4) for i in range(4)), rims=4)
+    ground, strokes = [], []
+    for side in (np.eye(3)[0], np.eye(3)[1]):
+        ground.append(polyline([-1.05 * side - [0, 0, 1.0], 1.05 * side - [0, 0, 1.0]]))
+        strokes += [
+            polyline([x * side - [0, 0, 1.0], (x - 0.35) * side - [0, 0, 1.4]]) for x in np.linspace(-0.7, 1.05, 6)
+        ]
+    return together([body, *ground, *strokes])

@@ -1,0 +1,141 @@
+"""Scenes: what a picture of a mechanism shows, as arrays; checked against the motion of the links and the rows of the pair table."""
+
+import numpy as np
+import pytest
+
+import mechgraph as mg
+from mechgraph.show.scene import Part, Scene, scene
+from mechgraph.show.shapes import frame_along
+from mechgraph.show.symbols import symbol
+
+Z = (0.0, 0.0, 1.0)
+
+
+def solved(name: str) -> mg.Solution | mg.Mechanism:
+    try:
+        return mg.solve(mg.load(name))
+    except mg.MechgraphError:
+        return mg.load(name)
+
+
+def parts(found: Scene, role: str, owner: str = "") -> list[Part]:
+    return [p for p in found.parts if p.role == role and p.owner.startswith(owner)]
+
+
+@pytest.mark.parametrize("name", mg.library())
+def test_scenes_of_the_library(name: str) -> None:
+    """Every pair has a symbol, every moving link a body; polygons and lines name vertices that are there, and rigid frames are rigid."""
+    drawn = solved(name)
+    found = scene(drawn, forces=True)
+    m = found.mechanism
+    assert {p.owner for p in found.parts if p.role in ("body", "dark")} == {p.name for p in m.pairs}
+    ends = {
+        link: {tuple(np.round(x[0], 9)) for (_, end), x in found.points.items() if end == link}
+        for link in m.link_names()
+    }
+    apart = {link for link, points in ends.items() if link != m.frame and len(points) > 1}
+    assert {p.owner for p in parts(found, "link")} >= apart
+    for part in found.parts:
+        n = len(part.shape.vertices)
+        assert {i for row in (*part.shape.faces, *part.shape.lines) for i in row} <= set(range(n))
+        assert found.frames[part.frame].shape == (len(found.positions), 3, 4)
+    for key, X in found.frames.items():
+        if key.startswith(("link:", "pair:")):
+            R = X[:, :, :3]
+            assert np.allclose(np.swapaxes(R, 1, 2) @ R, np.eye(3), atol=1e-9)
+    if isinstance(drawn, mg.Solution):
+        for pair in m.pairs:
+            end = found.frames[f"pair:{pair.name}@{pair.type.f}"][:, :, 3]
+            there = drawn.link(pair.b).point(pair.markers[1].point).position.reshape(-1, 3)[found.positions]
+            assert np.allclose(end, there, atol=1e-8 * found.size)
+
+
+def test_links_are_what_they_join() -> None:
+    """A rod between two pair points; a plate between more, which holds the named points too; no plate of points on a line."""
+    corners = {"A": (0, 0, 0), "B": (1, 0, 0), "C": (3, 2, 0), "D": (3, 0, 0)}
+    links = [
+        mg.Link("frame"),
+        mg.Link("crank"),
+        mg.Link("coupler", points={"eye": (2, 3, 0)}),
+        mg.Link("rocker", points={"mid": (3, 1, 0)}),
+    ]
+    ends = {"A": ("frame", "crank"), "B": ("crank", "coupler"), "C": ("coupler", "rocker"), "D": ("frame", "rocker")}
+    m = mg.Mechanism("four-bar", links, [mg.Pair(k, "R", *ends[k], point=p, axis=Z) for k, p in corners.items()], ["A"])
+    found = scene(mg.kinematics(m, {"A": np.linspace(0, 0.4, 3)}))
+    (plate,) = parts(found, "plate")
+    assert plate.owner == "coupler"
+    assert np.allclose(sorted(found.vertices(plate, 0).tolist()), [[1, 0, 0], [2, 3, 0], [3, 2, 0]])
+    assert found.normal is not None
+    assert np.allclose(found.normal, Z)
+    assert {label.text for label in found.labels} >= {"A (R)", "coupler", "coupler.eye", "rocker.mid"}
+
+
+def test_a_plane_position_of_a_spatial_mechanism_is_no_plane_mechanism() -> None:
+    assert scene(mg.load("haug-slider-crank")).normal is None
+    assert scene(mg.load("slider-crank")).normal is not None
+
+
+def test_symbols_follow_from_the_rows() -> None:
+    """Guides where something slides, one drum a turn, balls where a rotation is kept, dashes where nothing touches: for every row alike."""
+    roles = {}
+    for key, row in mg.pair_types().items():
+        pieces = symbol(row, 0.1, 1.0, [(-0.5, 2.0)] * row.f)
+        assert pieces, key
+        roles[key] = [e.role for e in pieces]
+        assert all(e.dashed for e in pieces) == (sum(not f.turns for f in row.freedoms) == 3)
+        assert ("guide" in roles[key]) == (0 < sum(not f.turns for f in row.freedoms) < 3)
+    assert roles["R"] == ["body"]
+    assert roles["H"] == ["body", "dark"]
+    assert roles["S"] == ["dark"]
+    assert roles["U"] == ["dark", "body", "body"]
+    own = mg.PairType("Pin", "pin in a slot", freedoms=["Tx", "Rz"])
+    assert [e.role for e in symbol(own, 0.0, 1.0, [(0, 1), (0, 0)])] == ["guide", "body"]
+
+
+def test_a_guide_covers_the_stroke() -> None:
+    m = mg.load("slider-crank")
+    s = mg.kinematics(m)
+    found = scene(s)
+    pair = next(p for p in m.pairs if p.type.symbol == "P")
+    (guide,) = parts(found, "guide")
+    along = found.vertices(guide, 0) @ found.frames[guide.frame][0][:, 2]
+    block = found.points[pair.name, pair.b] @ found.frames[guide.frame][0][:, 2]
+    assert along.min() < block.min()
+    assert along.max() > block.max()
+
+
+def test_springs_reach_from_end_to_end_and_forces_end_where_they_act() -> None:
+    links = [
+        mg.Link("body", points={"seat": (0.1, -0.3, 0)}),
+        mg.Link("lid", 2.0, (0.5, 0, 0), points={"eye": (0.4, 0, 0)}),
+    ]
+    lid = mg.Mechanism("lid", links,
+        [mg.Pair("A", "R", "body", "lid", point=(0, 0, 0), axis=Z)], ["A"], [
+            mg.Spring("body", "lid", "seat", "eye", stiffness=100.0), mg.Wrench("lid", force=(0, -5, 0), point="eye", frame="link"),
+            mg.TorsionSpring("A", stiffness=2.0), mg.Damper("A", coefficient=1.0), mg.Effort("A", -3.0),
+            mg.ForceLaw(("body", "lid", "seat", "eye"), law=lambda x, v, t: 0 * x),
+        ])  # fmt: skip
+    s = mg.solve(lid, {"A": np.linspace(0, 1, 5)})
+    for found in (scene(s), scene(lid)):
+        T = len(found.positions)
+        eye = s.link("lid").at("eye").position[:T]
+        spring, force = found.frames["load:0"], found.frames["load:1:force"]
+        assert np.allclose(spring[:, :, 3] + spring[:, :, 2], eye)
+        assert np.allclose(force[:, :, 3] + force[:, :, 2], eye)
+        R = s.link("lid").pose[:T, :3, :3]
+        assert np.allclose(frame_along(force[:, :, 2])[..., 2], -R[:, :, 1])
+        assert np.allclose(frame_along(found.frames["load:4:moment"][:, :, 2])[..., 2], [0, 0, -1])
+        assert len(parts(found, "spring")) == 4
+
+
+def test_reactions_of_a_plane_mechanism_are_drawn_in_its_plane_and_others_only_where_unique() -> None:
+    """Along the axes of a four-bar nothing is unique, in its plane all is; a spherical one has no force that is known."""
+    s = mg.solve(mg.load("four-bar"))
+    found = scene(s, forces=True)
+    assert found.not_unique == ()
+    arrow = found.frames["reaction:A"][7]
+    assert np.allclose(arrow[:2, 2], found.reaction_scale * s["A"].force[7, :2])
+    assert arrow[2, 2] == pytest.approx(0.0, abs=1e-12)
+    spherical = scene(mg.solve(mg.load("spherical-four-bar")), forces=True)
+    assert spherical.not_unique == ("A", "B", "C", "D")
+    assert np.isnan(spherical.frames["reaction:A"]).any(axis=(1, 2)).all()
