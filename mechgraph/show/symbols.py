@@ -15,7 +15,8 @@ from typing import Literal
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.model.pair_type import Freedom, PairType
+from mechgraph.model.pair_type import PairType
+from mechgraph.model.row_parts import Freedom
 from mechgraph.show.shapes import ROUND, Shape, ball, frame_along, prism, thread
 
 GUIDE, BODY, PIN = 0.95, 0.62, 0.24
