@@ -34,9 +34,11 @@ from mechgraph.model.pair_table import pair_types
 from mechgraph.model.pair_type import PairType
 from mechgraph.model.row_parts import Bookkeeping, Component, Freedom
 from mechgraph.report.report import DeterminacyReport, check
+from mechgraph.response.course import Response
 from mechgraph.response.events import Event
-from mechgraph.response.respond import Response, respond
+from mechgraph.response.respond import respond
 from mechgraph.response.small_motion import equilibrium, linearize
+from mechgraph.response.stops import Stop
 from mechgraph.result.solution import Solution
 from mechgraph.variants.result import Study
 from mechgraph.variants.study import study
@@ -75,6 +77,7 @@ __all__ = [
     "ResponseError",
     "Solution",
     "Spring",
+    "Stop",
     "Study",
     "TorsionSpring",
     "Wrench",

@@ -121,3 +121,43 @@ def test_no_equilibrium_is_said():
         mg.equilibrium(spun)
     with pytest.raises(mg.DeclarationError, match="nothing can move"):
         mg.equilibrium(pendulum().replace(drives=["A"]))
+
+
+def test_statics_of_a_mechanism_without_mass_and_drives_that_stand_still():
+    """A massless lever between two springs stands in the middle, on two driven slides that are held; it has no frequency."""
+    links = [mg.Link("frame"), mg.Link("x"), mg.Link("y"), mg.Link("lever")]
+    pairs = [
+        mg.Pair("X", "P", "frame", "x", point=(0, 0, 0), axis=(1, 0, 0)),
+        mg.Pair("Y", "P", "x", "y", point=(0, 0, 0), axis=(0, 1, 0)),
+        mg.Pair("A", "R", "y", "lever", point=(0, 0, 0), axis=(0, 0, 1)),
+    ]
+    loads = [mg.TorsionSpring("A", stiffness=3.0), mg.Effort("A", 1.5)]
+    m = mg.Mechanism("lever", links, pairs, drives=["X", "Y"], loads=loads)
+    found = mg.equilibrium(m, {"X": 0.2})
+    assert found.start["A.Rz"] == pytest.approx(0.5, abs=1e-12)
+    assert found.start["X.Tz"] == pytest.approx(0.2, abs=1e-15)
+    assert found.stable
+    with pytest.raises(mg.DeclarationError, match="motion without inertia"):
+        mg.linearize(found)
+
+
+def test_bad_input_of_small_motions_is_named():
+    """One error each; a position that is none of equilibrium is linearized with a warning."""
+    links = [mg.Link("frame"), mg.Link("bob", mass=1.0, center=(-1, 0, 0))]
+    m = mg.Mechanism(
+        "pendulum",
+        links,
+        [mg.Pair("A", "R", "frame", "bob", point=(0, 0, 0), axis=(0, 0, 1))],
+        loads=[mg.Gravity((0, -9.81, 0))],
+    )
+    for call in (mg.equilibrium, mg.linearize):
+        with pytest.raises(mg.DeclarationError, match="expected a Mechanism"):
+            call("pendulum")
+        with pytest.raises(mg.DeclarationError, match="expected a mapping"):
+            call(m, 0.3)
+        with pytest.raises(mg.DeclarationError, match="engine = 'fast'"):
+            call(m, engine="fast")
+        with pytest.raises(mg.DeclarationError, match="array over positions"):
+            call(m.replace(loads=[mg.Effort("A", np.ones(5))]))
+    with pytest.warns(mg.MechgraphWarning, match="not in equilibrium"):
+        mg.linearize(m)

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, Self
 
+import numpy as np
+
 from mechgraph.algebra.se3 import Array
 from mechgraph.model.field_format import FREEDOM_NAME, LINK_NAME, Described
 from mechgraph.model.nameable import Nameable
@@ -108,6 +110,16 @@ class BaseLoad(Described):
     def by_position(self) -> bool:
         """Whether it can be evaluated some positions at a time: it holds values, no callables, which see the whole batch."""
         return not any(callable(getattr(self, name)) for name in self.formats)
+
+    @property
+    def over_positions(self) -> tuple[str, ...]:
+        """Names of its fields that hold an array over positions."""
+        given = {name: getattr(self, name) for name, about in self.formats.items() if about.kind.shape is not None}
+        return tuple(
+            name
+            for name, value in given.items()
+            if value is not None and not callable(value) and np.ndim(value) > len(self.formats[name].kind.shape or ())
+        )
 
     @property
     def smooth(self) -> bool:

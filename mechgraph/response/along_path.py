@@ -53,8 +53,10 @@ ROUNDING = 1e-14
 SHORTEST = 0.01
 """Shortest piece."""
 TURN = 2 * np.pi
+UNEVEN = 0.37
+"""Where in its part of a turn loads are compared with those a turn later: not at the quarters, where change points often are."""
 BACK = 1e-9
-"""Difference of poses after a turn of the coordinate up to which the path has come back."""
+"""Difference of poses (and part of the quotients) after a turn of the coordinate up to which the path has come back."""
 
 
 @dataclass(frozen=True)
@@ -145,16 +147,22 @@ class Arc:
             self._advance, self._sense = self._after_a_turn(sense), sense
 
     def _after_a_turn(self, sense: float) -> Array | None:
-        """How the state has advanced after a turn of the coordinate, where all links are back; None where they are not."""
+        """How the state has advanced after a turn of the coordinate, where all links and loads are back; None where they are not."""
         s = self.task.system
-        here = self.close(self.begin + np.array([0.0, sense * TURN])).here
-        if np.abs(here.poses[..., 1] - here.poses[..., 0]).max() > BACK:
+        ends = self.close(self.begin + sense * TURN * np.array([0.0, 1.0])).here
+        if np.abs(ends.poses[..., 1] - ends.poses[..., 0]).max() > BACK:
             return None
         out = np.zeros(s.n_state)
         rows = s.single_rows[self.singles]
-        turned = sense * (here.x[rows, 1] - here.x[rows, 0])
+        turned = sense * (ends.x[rows, 1] - ends.x[rows, 0])
         out[rows] = np.where(s.is_length[self.singles], 0.0, TURN * np.round(turned / TURN))
-        return out
+        # a load may count turns, as a spring in a freedom does that winds up: then nothing comes back
+        around = self.close(self.begin + sense * TURN * (np.arange(POINTS) + UNEVEN) / POINTS)
+        further = Configuration(s, around.here.x + sense * out[:, None])
+        loads, factored = self.task.loads, self.path.solver.factored(further, around.f.which)
+        now, then = along_one(around.here, around.f, loads), along_one(further, factored, loads)
+        same = all(np.abs(a - b).max() <= BACK * np.abs(a).max(initial=1.0) for a, b in zip(now, then, strict=True))
+        return out if same else None
 
 
 class _Chunk:
@@ -245,7 +253,7 @@ class PathStage:
     """Implements ``integration.Stage`` along an arc, from a place ``u`` with rate ``v``."""
 
     def __init__(self, arc: Arc, u: float, v: float) -> None:
-        self.arc, self._first = arc, np.array([u, v, 0.0])
+        self.arc, self.task, self._first = arc, arc.task, np.array([u, v, 0.0])
         self._piece: _Piece | None = None
         self._turns = 0.0
         here = arc.close(np.array([u])) if arc.piece(u) is not None else None

@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from functools import partial
+from typing import Any, Literal, Protocol
 
 import numpy as np
 import scipy
 
+from mechgraph.algebra.se3 import Array
+from mechgraph.arguments import items_of
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.quantities import is_numeric, real_array, shown, wrong
 from mechgraph.result.solution import Solution
 
 ACCURACY = 1e-12
 """Part of a step to which the time of an event is found."""
+LOOKS = 8
+"""Parts of a step at whose ends freedoms are looked at, so that one which passes its value and comes back is seen."""
+
+
+WHATS = ("position", "velocity", "acceleration")
 
 
 @dataclass(frozen=True)
@@ -48,22 +57,29 @@ class Event:
             found += [f"event: {fault}"] if fault else []
         elif not callable(self.of):
             found.append(f"event of {self.of!r}: expected the name of a freedom, or a function of a Solution")
-        if self.what not in ("position", "velocity", "acceleration"):
-            found.append(f"event {self.text}: what = {self.what!r}: expected 'position', 'velocity' or 'acceleration'")
+        if not is_numeric(self.value, ()):
+            return [*found, f"event of {self.of!r}: {wrong(self.value, 'value', 'a finite number')}"]
+        if self.what not in WHATS:
+            found.append(f"event {self.text}: {wrong(self.what, 'what', ', '.join(map(repr, WHATS)))}")
         if self.direction not in (-1, 0, 1):
-            found.append(f"event {self.text}: direction = {self.direction!r}: expected -1, 0 or 1")
-        if isinstance(self.value, bool) or not isinstance(self.value, int | float) or not np.isfinite(self.value):
-            found.append(f"event {self.text}: value = {self.value!r}: expected a finite number")
+            found.append(f"event {self.text}: {wrong(self.direction, 'direction', '-1, 0 or 1')}")
         return found
 
-    def height(self, s: Solution) -> float:
-        """How far the quantity is above the value, at one time."""
+    def looks(self, begin: float, end: float) -> Array:
+        """Times of a step at which to look: a function, which needs a whole Solution, is looked at where the step ends."""
+        return np.linspace(begin, end, LOOKS + 1) if isinstance(self.of, str) else np.array([begin, end])
+
+    def heights(self, motion: Watched, t: Array) -> Array:
+        """How far the quantity is above the value at times ``(T,)``."""
         if isinstance(self.of, str):
-            k, j = s.mechanism.freedom(self.of)
-            return float(getattr(s[s.mechanism.pairs[k].name], self.what)[..., j]) - self.value
-        height = np.asarray(self.of(s), dtype=float)
-        if height.size != 1 or not np.isfinite(height).all():
-            raise DeclarationError("respond", [f"event {self.text}: gave {height!r}; expected one finite number"])
+            return motion.freedom(self.of, t)[WHATS.index(self.what)] - self.value
+        return np.array([self._height(motion.response(float(one))) for one in t])
+
+    def _height(self, s: Solution) -> float:
+        assert callable(self.of)
+        height = real_array(self.of(s))
+        if height is None or height.size != 1 or not np.isfinite(height).all():
+            raise DeclarationError("respond", [f"event {self.text}: gave {shown(height)}; expected one finite number"])
         return float(height.reshape(())) - self.value
 
 
@@ -79,41 +95,51 @@ class Occurrence:
         return f"{self.event.text} at t = {self.t:.6g}"
 
 
+class Watched(Protocol):
+    """What events see of a motion."""
+
+    def freedom(self, name: str, t: Array) -> Array:
+        """Position, velocity and acceleration ``(3, T)`` of a freedom at times ``(T,)``."""
+
+    def response(self, t: float) -> Solution:
+        """Everything at one time."""
+
+
 @dataclass
 class Watch:
-    """Events watched along a motion; ``at(t)`` is the Solution at one time of what was followed so far."""
+    """Events watched along a motion."""
 
-    events: tuple[Event, ...]
-    at: Callable[[float], Solution]
-    _before: list[float] = field(default_factory=list)
+    events: Sequence[Event]
+    motion: Watched
+    _before: dict[int, float] = field(default_factory=dict)
 
     def passed(self, begin: float, end: float) -> Iterator[Occurrence]:
-        """What happens in a step, in the order of time; a step in which a quantity passes its value twice is not seen."""
-        if not self.events:
-            return
-        if not self._before:
-            first = self.at(begin)
-            self._before = [event.height(first) for event in self.events]
-        last = self.at(end)
-        after = [event.height(last) for event in self.events]
+        """What happens in a step, in the order of time."""
         found = []
-        for event, a, b in zip(self.events, self._before, after, strict=True):
-            if a != 0.0 and np.sign(a) != np.sign(b) and event.direction in (0, np.sign(b - a)):
-                root = scipy.optimize.brentq(
-                    lambda t, event=event: event.height(self.at(t)),
-                    begin,
-                    end,
-                    xtol=ACCURACY * (end - begin),
-                    rtol=1e-15,
-                )
-                found.append(Occurrence(event, float(root), bool(b > a)))
-        self._before = after
+        for which, event in enumerate(self.events):
+            t = event.looks(begin, end)
+            known = [self._before[which]] if which in self._before else []
+            h = np.concatenate([known, event.heights(self.motion, t[len(known) :])])
+            self._before[which] = float(h[-1])
+            turns = (h[:-1] != 0.0) & (np.sign(h[:-1]) != np.sign(h[1:]))
+            for i in np.flatnonzero(turns & ((event.direction == 0) | (np.sign(h[1:] - h[:-1]) == event.direction))):
+                root = first_root(partial(event.heights, self.motion), t[i], t[i + 1])
+                found.append(Occurrence(event, root, bool(h[i + 1] > h[i])))
         yield from sorted(found, key=lambda one: one.t)
 
 
-def read_events(m: Mechanism, events: Iterable[Any]) -> tuple[tuple[Event, ...], list[str]]:
-    """The events of a call, and what is wrong with them."""
-    given = (events,) if isinstance(events, Event) else tuple(events)
-    faults = [f"events: {one!r}: expected an mg.Event" for one in given if not isinstance(one, Event)]
+def first_root(height: Callable[[Array], Array], begin: float, end: float) -> float:
+    """The time between two at which a height of opposite signs there is zero."""
+    root = scipy.optimize.brentq(
+        lambda t: float(height(np.array([t]))[0]), begin, end, xtol=ACCURACY * (end - begin), rtol=1e-15
+    )
+    return float(root)
+
+
+def read_events(m: Mechanism, events: Any, faults: list[str]) -> tuple[Event, ...]:
+    """The events of a call; adds what is wrong with them to ``faults``."""
+    given = (events,) if isinstance(events, Event) else items_of(events, "events", faults)
+    faults += [wrong(one, "an item of events", "an mg.Event") for one in given if not isinstance(one, Event)]
     known = tuple(one for one in given if isinstance(one, Event))
-    return known, faults + [fault for one in known for fault in one.faults(m)]
+    faults += [fault for one in known for fault in one.faults(m)]
+    return known

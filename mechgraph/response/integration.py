@@ -8,7 +8,7 @@ stage's coordinates ``y = (u, v, work)``: independent coordinates, rates of inde
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -17,13 +17,15 @@ import scipy
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.indexing import Index
 from mechgraph.response.chart import Closed
-
-METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
+from mechgraph.response.charts import Task
+from mechgraph.response.motion_equations import Stopped
 
 
 class Stage(Protocol):
     """Coordinates that serve for a while."""
 
+    task: Task
+    """What moves."""
     energy: float
     """An energy of the size that moves here, against which work is measured."""
 
@@ -76,10 +78,6 @@ class Count:
         return (self.evaluations, "evaluation"), (self.steps, "step"), (self.stages, "stage")
 
 
-class Stopped(Exception):
-    """The integration cannot go on; the message says why."""
-
-
 @dataclass
 class Integration:
     """A motion followed by a stepper; ``run`` adds ``segments``."""
@@ -88,10 +86,12 @@ class Integration:
     rtol: float
     atol: float
     segments: list[Segment] = field(default_factory=list)
+    done: float = 0.0
+    """Work done since the start."""
     work: Count = field(default_factory=Count)
 
-    def run(self, stage: Stage, begin: float, end: float) -> Iterator[Segment]:
-        """Follow the motion from a stage; yields every accepted step.
+    def run(self, stage: Stage, begin: float, end: float, first: float | None = None) -> Iterator[Segment]:
+        """Follow the motion from a stage, behind what was followed before; yields every accepted step. ``first``: longest first step.
 
         Raises
         ------
@@ -99,31 +99,40 @@ class Integration:
             where steps become shorter than rounding.
         """
         make = getattr(scipy.integrate, self.method)
-        t, work, h = begin, 0.0, None
+        t, h = begin, first
         while t < end:
             self.work.stages += 1
-            y = stage.begin()
+            work, y = self.done, stage.begin()
             atol = np.full(len(y), self.atol)
             atol[-1] *= stage.energy
-            # the step goes on with its length, which a multistep method finds anew
-            first: dict[str, float] = (
-                {} if h is None or self.method in ("BDF", "LSODA") else {"first_step": min(h, end - t)}
-            )
-            stepper = make(stage.rates, t, y, end, rtol=self.rtol, atol=atol, **first)
+            more: dict[str, float] = {} if h is None else {"first_step": min(h, end - t)}
+            stepper = make(stage.rates, t, y, end, rtol=self.rtol, atol=atol, **more)
             serves = True
-            while stepper.status == "running" and serves:
-                message = stepper.step()
-                if stepper.status == "failed":
-                    raise Stopped(message)
-                self.work.steps += 1
-                self.segments.append(Segment(t, stepper.t, stage, stepper.dense_output(), work))
-                t, h = stepper.t, stepper.t - t
-                serves = stage.accepted(t, stepper.y)
-                yield self.segments[-1]
-            self.work.evaluations += stepper.nfev
+            try:
+                while stepper.status == "running" and serves:
+                    message = stepper.step()
+                    if stepper.status == "failed":
+                        raise Stopped(
+                            f"{message} Steps collapse where loads are stiff or jump, and at positions where the mechanism locks; for "
+                            "stiff loads use method='Radau'"
+                        )
+                    self.work.steps += 1
+                    self.segments.append(Segment(t, stepper.t, stage, stepper.dense_output(), work))
+                    # the step goes on with its length, which a multistep method finds anew
+                    h = None if self.method in ("BDF", "LSODA") else stepper.t - t
+                    t, self.done = stepper.t, work + float(stepper.y[-1])
+                    serves = stage.accepted(t, stepper.y)
+                    yield self.segments[-1]
+            finally:
+                self.work.evaluations += stepper.nfev
             if t < end:
-                work += float(stepper.y[-1])
                 stage = stage.following(t, stepper.y)
+
+    def cut(self, t: float) -> None:
+        """End the last step at a time within it."""
+        last = self.segments[-1]
+        self.segments[-1] = replace(last, end=t)
+        self.done = last.work + float(last.dense(t)[-1])
 
     def at(self, t: Array) -> Iterator[tuple[Index, Stage, Array, Array]]:
         """Times ``(T,)`` by stage: their places, the stage, coordinates ``y (k, n)`` and the work ``(n,)`` since the start."""

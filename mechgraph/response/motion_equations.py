@@ -12,6 +12,7 @@ the reactions. Source of the form: Kane and Levinson, Dynamics: Theory and Appli
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from types import SimpleNamespace
 
@@ -25,7 +26,9 @@ from mechgraph.force.applied_loads import Site, inertia_wrenches
 from mechgraph.model.load import Load
 
 MASSLESS = 1e-12
-"""Eigenvalue of the mass matrix, against the largest, below which a motion has no inertia."""
+"""Eigenvalue of the mass matrix, of which the diagonal is one, below which a motion has no inertia."""
+UNOPPOSED = 1e-9
+"""Part of the largest generalized force below which none acts along a motion without inertia."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +66,16 @@ def _inertia(here: Configuration, V: Array, A: Array) -> Array:
     return inertia_wrenches(here, SimpleNamespace(V=V, A=A))  # type: ignore[arg-type]
 
 
+class Stopped(Exception):
+    """The motion cannot be followed on; the message says why."""
+
+
+NO_INERTIA = (
+    "loads act along a motion that no inertia resists, so that its acceleration has no bound. Give mass or inertia to what moves "
+    "so, or prescribe its motion"
+)
+
+
 class Columns:
     """What the motions of unit rates do at closed states: ``Z (F, n, T)`` of the independent columns and ``Zp`` of the prescribed ones.
 
@@ -85,6 +98,11 @@ class Columns:
         return np.array(
             [(V * wrenches).sum(axis=(0, 1)) + (self.Z[:, k] * efforts).sum(axis=0) for k, V in enumerate(self.V)]
         ).reshape(self.n, self.here.T)
+
+    def largest(self, wrenches: Iterable[Array], efforts: Iterable[Array]) -> float:
+        """The largest part that a component of wrenches or of efforts has in a generalized force."""
+        parts = [np.abs(V * one).max(initial=0.0) for one in wrenches for V in self.V]
+        return float(max([*parts, *(np.abs(self.Z * one[:, None]).max(initial=0.0) for one in efforts)], default=0.0))
 
     def bound(self, dq: Array, ddq: Array | None = None) -> tuple[Velocities, Array, Array]:
         """At rates ``dq (F, T)``, the independent ones constant: velocities, accelerations ``ddq`` of all freedoms, and the inertia."""
@@ -116,7 +134,9 @@ def moved(here: Configuration, f: FactoredClosure, v: Array, p: Array, loads: Lo
     (stored, by_stored), (rest, by_rest) = (columns.applied(some, velocities, t) for some in (loads.stored, loads.rest))
     wrenches, efforts = stored + rest + inertia, by_stored + by_rest
     force = columns.force(wrenches, efforts)
-    a = accelerations(columns.mass, force)
+    a, unopposed = accelerations(columns.mass, force)
+    if np.abs(unopposed).max(initial=0.0) > UNOPPOSED * columns.largest((stored, rest, inertia), (by_stored, by_rest)):
+        raise Stopped(NO_INERTIA)
     for reluctance, one in zip(columns.reluctance, a, strict=True):
         wrenches = wrenches + reluctance * one
     power = (V * rest).sum(axis=(0, 1)) + (dq * by_rest).sum(axis=0)
@@ -131,6 +151,8 @@ def along_one(here: Configuration, f: FactoredClosure, loads: Loads) -> tuple[Ar
     ``P_1 u' + P_2 u'^2`` of loads without a potential energy, which may depend on rates linearly.
     """
     columns, t = Columns(here, f, 1), np.zeros(here.T)
+    if not (columns.mass > 0.0).all():
+        raise Stopped(NO_INERTIA)
     forward, _, inertia = columns.bound(columns.Z[:, 0])
     still, back = (Velocities(here, factor * columns.Z[:, 0]) for factor in (0.0, -1.0))
     nothing = np.zeros((here.system.n_freedoms, here.T))
@@ -146,16 +168,27 @@ def kinetic_energy(here: Configuration, V: Array) -> Array:
     return np.asarray(-0.5 * (V * _inertia(here, np.zeros_like(V), V)).sum(axis=(0, 1)))
 
 
-def accelerations(mass: Array, force: Array) -> Array:
-    """``v' (n, T)`` with ``M v' = Q``; zero along motions without inertia."""
-    M, Q = np.moveaxis(mass, -1, 0), force.T[..., None]
+def accelerations(mass: Array, force: Array) -> tuple[Array, Array]:
+    """``v' (n, T)`` with ``M v' = Q``, zero along motions without inertia; and the part of ``Q`` that acts along these, ``(n, T)``."""
     if mass.shape[0] == 1:
-        return np.divide(force, mass[0], out=np.zeros_like(force), where=mass[0] > 0)
-    size = np.sqrt(np.einsum("tii->ti", M))
-    size = np.where(size > 0, size, 1.0)
-    scaled = M / size[:, :, None] / size[:, None, :]
-    w, U = np.linalg.eigh(scaled)
-    kept = w > MASSLESS * w[:, -1:]
+        moves = mass[0] > 0.0
+        return np.divide(force, mass[0], out=np.zeros_like(force), where=moves), np.where(moves, 0.0, force)
+    M, Q = np.moveaxis(mass, -1, 0), force.T[..., None]
+    size = _sizes(M)
+    w, U = np.linalg.eigh(in_unit_inertias(M))
+    kept = (w > MASSLESS * w[:, -1:])[..., None]
     parts = np.swapaxes(U, 1, 2) @ (Q / size[..., None])
-    parts = np.where(kept[..., None], parts / np.where(kept, w, 1.0)[..., None], 0.0)
-    return ((U @ parts) / size[..., None])[..., 0].T
+    a = U @ np.where(kept, parts / np.where(kept, w[..., None], 1.0), 0.0)
+    left = U @ np.where(kept, 0.0, parts)
+    return (a / size[..., None])[..., 0].T, (left * size[..., None])[..., 0].T
+
+
+def _sizes(M: Array) -> Array:
+    size = np.sqrt(np.einsum("...ii->...i", M))
+    return np.where(size > 0, size, 1.0)
+
+
+def in_unit_inertias(M: Array) -> Array:
+    """Mass matrices ``(..., n, n)`` in coordinates of which each has inertia 1 (or none)."""
+    size = _sizes(M)
+    return np.asarray(M / size[..., :, None] / size[..., None, :])

@@ -13,6 +13,8 @@ from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 
+OVER_POSITIONS = "is an array over positions, which a motion in time does not have; give a number or a function"
+"""What is wrong with a load that holds such an array."""
 Law = Callable[[float], tuple[float, float, float]]
 
 
@@ -81,31 +83,10 @@ def law_of(name: str, motion: Any) -> Law | str:
 
 
 class Prescribed:
-    """The prescribed freedoms of a mechanism: names, and their values ``(p, 3)`` in the user's units at a time."""
+    """The prescribed freedoms of a mechanism: names, and their values ``(3, p)`` in the user's units at a time."""
 
-    def __init__(self, m: Mechanism, motions: Mapping[str, Any] | None) -> None:
-        faults: list[str] = []
-        given = {} if motions is None else motions
-        if not isinstance(given, Mapping):
-            raise DeclarationError("respond", [f"motions = {given!r}: expected a mapping freedom -> motion"])
-        laws: dict[str, Law] = {}
-        stored = {m.full_name(d.freedom): d.motion for d in m.drives if d.motion is not None}
-        named: dict[str, Any] = dict(stored)
-        for name, motion in given.items():
-            fault = m.freedom_fault(name, single=True)
-            if fault:
-                faults.append(f"motion of {name!r}: {fault}")
-            else:
-                named[m.full_name(name)] = motion
-        for name, motion in named.items():
-            law = law_of(name, motion)
-            if isinstance(law, str):
-                faults.append(law)
-            else:
-                laws[name] = law
-        if faults:
-            raise DeclarationError(f"respond {m.name!r}", faults)
-        self.laws = laws
+    def __init__(self, laws: Mapping[str, Law]) -> None:
+        self.laws = dict(laws)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -115,3 +96,17 @@ class Prescribed:
     def at(self, t: float) -> Array:
         """Positions, velocities and accelerations ``(3, p)``."""
         return np.array([law(t) for law in self.laws.values()], dtype=float).reshape(-1, 3).T
+
+
+def read_motions(m: Mechanism, motions: Mapping[str, Any], faults: list[str]) -> Prescribed:
+    """The motions of a call, and those that drives carry; adds what is wrong with them to ``faults``."""
+    named: dict[str, Any] = {m.full_name(d.freedom): d.motion for d in m.drives if d.motion is not None}
+    for name, motion in motions.items():
+        fault = m.freedom_fault(name, single=True)
+        if fault:
+            faults.append(f"motion of {name!r}: {fault}")
+        else:
+            named[m.full_name(name)] = motion
+    laws = {name: law_of(name, motion) for name, motion in named.items()}
+    faults += [law for law in laws.values() if isinstance(law, str)]
+    return Prescribed({name: law for name, law in laws.items() if not isinstance(law, str)})

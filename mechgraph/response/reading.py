@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -18,26 +19,33 @@ from mechgraph.response.charts import Task
 from mechgraph.response.motion_equations import kinetic_energy, moved
 from mechgraph.result.trajectory import BlockMotion, Trajectory
 
-Block = tuple[Index, Closed, Array]
-"""Places, closed states, and the rates ``v (n, T)`` of the independent columns of their factors."""
+Block = tuple[Index, Task, Closed, Array]
+"""Places, the task by which they were followed, closed states, and the rates ``v (n, T)`` of the independent columns of their factors."""
 
 
 def trajectory_of(task: Task, m: Mechanism, times: Array, blocks: Iterable[Block]) -> tuple[Trajectory, Array, Array]:
-    """The trajectory at times (a number or ``(T,)``) from blocks of states, with kinetic and potential energy ``(T,)``."""
+    """The trajectory at times (a number or ``(T,)``) from blocks of states, with kinetic and potential energy ``(T,)``.
+
+    The efforts of the prescribed freedoms of ``task`` are those of drives; what else holds the tasks of the blocks acts as a load.
+    """
     s, t, blocks = task.system, times.reshape(-1), list(blocks)
     x = np.full((s.n_state, t.size), np.nan)
-    for places, closed, _ in blocks:
+    for places, _, closed, _ in blocks:
         x[:, places] = closed.here.x
     coordinates = s.coordinates_of(x, s.start_coordinates(m.start))
     out = Trajectory(s, partial(_same, s), times.shape, times, task.columns, coordinates, True)
     out.engine, out.method = task.engine, "loop_wrench"
     kinetic, potential = np.zeros(t.size), np.zeros(t.size)
-    for places, closed, v in blocks:
+    for places, own, closed, v in blocks:
         # the batch of a block is its own: loads are functions of time here, not arrays over positions
         at, count, q = t[places], len(places), coordinates[:, places]
-        rates = moved(closed.here, closed.f, v, task.prescribed_at(at)[1:], task.loads, at).rates
-        forces = ForceTask(out.method, m.loads, task.columns, (), (count,), at, "nan")
-        out.put(BlockMotion(places, rates), forces_of_block(forces, rates, closed.f, q, np.arange(count)))
+        rates = moved(closed.here, closed.f, v, own.prescribed_at(at)[1:], own.loads, at).rates
+        force_task = ForceTask(out.method, m.loads, own.columns, (), (count,), at, "nan")
+        forces = forces_of_block(force_task, rates, closed.f, q, np.arange(count))
+        held = np.setdiff1d(own.columns, task.columns)
+        given = forces.given.copy()
+        given[held] = (forces.efforts - forces.coupled)[held]
+        out.put(BlockMotion(places, rates), replace(forces, given=given))
         kinetic[places] = kinetic_energy(closed.here, rates.V) * s.par.L**2
         site = Site(closed.here, rates, q, (count,), np.arange(count), at)
         for load in task.loads.stored:

@@ -7,23 +7,27 @@ in the independent freedoms of a chart (see ``response.chart``); drives of the m
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 import scipy
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.arguments import option_faults
 from mechgraph.closure.assembly import assembled_at, named_columns
-from mechgraph.closure.solver import engine_for
-from mechgraph.errors import DeclarationError, ResponseError
-from mechgraph.model.mechanism import Mechanism
+from mechgraph.closure.rates import Velocities
+from mechgraph.closure.solver import ENGINES, EngineName, engine_for
+from mechgraph.errors import DeclarationError, MechgraphWarning, ResponseError
+from mechgraph.model.declaration import mapping_faults
+from mechgraph.model.mechanism import Mechanism, check_mechanism
 from mechgraph.response.chart import Chart, Closed
 from mechgraph.response.charts import Task
-from mechgraph.response.motion_equations import Loads, moved
-from mechgraph.response.prescribed import Prescribed
+from mechgraph.response.motion_equations import MASSLESS, Columns, Loads, in_unit_inertias
+from mechgraph.response.prescribed import OVER_POSITIONS, Prescribed
 from mechgraph.response.reading import trajectory_of
 from mechgraph.result.solution import Solution
 
@@ -37,6 +41,8 @@ LONGEST = 0.3
 """Longest of them."""
 BALANCED = 1e-12
 """Generalized force, against the largest that a load exerts on the way, that counts as none."""
+UNBALANCED = 1e-6
+"""The same above which a position is said to be none of equilibrium."""
 STIFF = 1e-9
 """Eigenvalue of the stiffness, against the largest, that counts as none: neither stable nor unstable."""
 
@@ -44,13 +50,23 @@ STIFF = 1e-9
 class _Place:
     """Forces about a chart at rest."""
 
-    def __init__(self, m: Mechanism, start: Mapping[str, float] | None, engine: str) -> None:
+    def __init__(self, m: Mechanism, call: str, where: str, at: Mapping[str, float] | None, engine: EngineName) -> None:
+        check_mechanism(m, call)
+        faults = option_faults({"engine": (engine, ENGINES)}) + mapping_faults(**{where: at})
+        faults += [
+            f"{one.where}{', '.join(one.over_positions)}: {OVER_POSITIONS}" for one in m.loads if one.over_positions
+        ]
+        if faults:
+            raise DeclarationError(f"{call} {m.name!r}", faults)
         self.m = m
-        system, x = assembled_at(m, dict(start or {}))
+        system, x = assembled_at(m, dict(at or {}))
         columns, _ = named_columns(m, system, {d.freedom: 0.0 for d in m.drives})
-        nothing = Prescribed(m.replace(drives=[]), None)
-        self.task = Task(system, Loads.of(m.loads), nothing, columns, engine_for(system.n_rows, 1, engine))
+        q = system.coordinates_of(x[:, None])[columns, 0].tolist()
+        still = Prescribed({d.freedom: partial(_still, value) for d, value in zip(m.drives, q, strict=True)})
+        self.task = Task(system, Loads.of(m.loads), still, columns, engine_for(system.n_rows, 1, engine))
         self.go(x)
+        if not self.n:
+            raise DeclarationError(f"{call} {m.name!r}", ["nothing can move: it has no freedom that is not driven"])
 
     def go(self, x: Array) -> None:
         """Lay out a chart at a closed state."""
@@ -63,20 +79,24 @@ class _Place:
         guess = self.task.system.advance(self.chart.x0[:, None], self._motions @ u)
         return self.chart.close(guess, u, np.repeat(self.held, u.shape[1], axis=1))
 
-    @cached_property
-    def _still(self) -> Array:
-        return np.zeros((2, len(self.task.columns), 1))
-
     @property
     def _motions(self) -> Array:
         return self.chart.solver.factored(self.chart.start, self.chart.which).sensitivity()[:, : self.n, 0]
 
     def forces(self, closed: Closed, v: Array) -> tuple[Array, Array]:
-        """Generalized forces ``(n, T)`` and masses ``(n, n, T)`` at closed states with rates ``v (n, T)``."""
-        T = closed.here.T
-        still = np.repeat(self._still, T, axis=2)
-        found = moved(closed.here, closed.f, v, still, self.task.loads, np.zeros(T))
-        return found.force, found.mass
+        """Generalized forces ``(n, T)`` and masses ``(n, n, T)`` at closed states with rates ``v (n, T)``, the drives at rest."""
+        columns, loads = Columns(closed.here, closed.f, self.n), self.task.loads
+        velocities, _, inertia = columns.bound((columns.Z * v).sum(axis=1))
+        wrenches, efforts = columns.applied((*loads.stored, *loads.rest), velocities, np.zeros(closed.here.T))
+        return columns.force(wrenches + inertia, efforts), columns.mass
+
+    def largest(self) -> float:
+        """The largest part that a component of a load has in a generalized force, at rest."""
+        closed, loads = self.closed(np.zeros((self.n, 1))), self.task.loads
+        columns = Columns(closed.here, closed.f, self.n)
+        still = Velocities(closed.here, np.zeros((self.task.system.n_freedoms, 1)))
+        applied = [columns.applied(some, still, np.zeros(1)) for some in (loads.stored, loads.rest)]
+        return columns.largest(*zip(*applied, strict=True))
 
     def derivatives(self) -> tuple[Array, Array, Array, Array]:
         """Force ``(n,)``, mass, damping and stiffness ``(n, n)`` where the chart was laid out."""
@@ -102,7 +122,7 @@ class _Place:
         """Everything at rest where the chart was laid out."""
         closed = self.closed(np.zeros((self.n, 1)))
         trajectory, _, _ = trajectory_of(
-            self.task, self.m, np.zeros(()), [(np.zeros(1, dtype=np.intp), closed, np.zeros((self.n, 1)))]
+            self.task, self.m, np.zeros(()), [(np.zeros(1, dtype=np.intp), self.task, closed, np.zeros((self.n, 1)))]
         )
         return Solution(trajectory)
 
@@ -110,6 +130,10 @@ class _Place:
         """Coordinates of all freedoms where the chart was laid out."""
         q = self.task.system.coordinates_of(self.chart.x0[:, None])[:, 0]
         return dict(zip(self.m.freedom_names(), q.tolist(), strict=True))
+
+
+def _still(value: float, t: float) -> tuple[float, float, float]:
+    return value, 0.0, 0.0
 
 
 class Equilibrium(Mechanism):
@@ -128,7 +152,7 @@ class Equilibrium(Mechanism):
         return _balanced, (self._arguments(), self.stable, self.solution)
 
 
-def equilibrium(m: Mechanism, start: Mapping[str, float] | None = None, *, engine: str = "auto") -> Equilibrium:
+def equilibrium(m: Mechanism, start: Mapping[str, float] | None = None, *, engine: EngineName = "auto") -> Equilibrium:
     """A position in which the declared loads balance, with the declared drives at their place: Newton from ``start``.
 
     Parameters
@@ -142,9 +166,7 @@ def equilibrium(m: Mechanism, start: Mapping[str, float] | None = None, *, engin
     ResponseError
         where none is found.
     """
-    place = _Place(m, start, engine)
-    if not place.n:
-        raise DeclarationError(f"equilibrium of {m.name!r}", ["nothing can move: it has no freedom that is not driven"])
+    place = _Place(m, "equilibrium of", "start", start, engine)
     largest = 0.0
     for _ in range(ITERATIONS):
         Q, M, _, K = place.derivatives()
@@ -242,17 +264,27 @@ class Linearized:
         )
 
 
-def linearize(m: Mechanism, at: Mapping[str, float] | None = None, *, engine: str = "auto") -> Linearized:
+def linearize(m: Mechanism, at: Mapping[str, float] | None = None, *, engine: EngineName = "auto") -> Linearized:
     """Small motions about the declared ``start`` or the coordinates ``at``, the drives at rest; meant for an equilibrium.
 
     Raises
     ------
     DeclarationError, AssemblyError
     """
-    place = _Place(m, at, engine)
-    if not place.n:
-        raise DeclarationError(f"linearize {m.name!r}", ["nothing can move: it has no freedom that is not driven"])
+    place = _Place(m, "linearize", "at", at, engine)
     Q, M, C, K = place.derivatives()
+    if np.linalg.eigvalsh(in_unit_inertias(M)).min() <= MASSLESS:
+        raise DeclarationError(
+            f"linearize {m.name!r}", ["has a motion without inertia; give mass or inertia to what moves so"]
+        )
+    largest = max(place.largest(), float(np.abs(K).max()) * STEP)
+    if np.abs(Q).max() > UNBALANCED * largest:
+        warnings.warn(
+            f"mechanism {m.name!r}: is not in equilibrium there (generalized forces of {np.abs(Q).max() / largest:.2g} of "
+            "the largest that a load exerts); mg.equilibrium(m) finds a position that is",
+            MechgraphWarning,
+            stacklevel=2,
+        )
     s, free = place.task.system, place.chart.free
     L = s.par.L
     unit = np.where(s.is_length, L, 1.0)

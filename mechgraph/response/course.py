@@ -1,0 +1,158 @@
+"""The course of a motion: what was integrated, the Response that is read from it, and its energies."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.closure.assembly import CLOSED
+from mechgraph.closure.driver_path import in_blocks
+from mechgraph.closure.indexing import Index
+from mechgraph.errors import DeclarationError, ResponseError
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.quantities import real_array, wrong
+from mechgraph.response.chart import Closed
+from mechgraph.response.charts import Task
+from mechgraph.response.events import Occurrence
+from mechgraph.response.integration import Integration
+from mechgraph.response.motion_equations import moved
+from mechgraph.response.reading import trajectory_of
+from mechgraph.result.solution import Solution
+from mechgraph.result.trajectory import Trajectory
+from mechgraph.structure.snapping import SnappedMechanism, declared_closure
+
+
+@dataclass(frozen=True)
+class Energy:
+    """Energies over time ``(T,)`` in the user's units.
+
+    ``kinetic``; ``potential`` of gravity and springs; ``work`` done since the start by prescribed drivers and by loads without a potential
+    energy. ``kinetic + potential - work`` is constant.
+    """
+
+    kinetic: Array
+    potential: Array
+    work: Array
+
+    @property
+    def balance(self) -> Array:
+        """``kinetic + potential - work`` less its value at the start: zero for an exact solution."""
+        total = self.kinetic + self.potential - self.work
+        return np.asarray(total - total[..., :1])
+
+
+class Response(Solution):
+    """A Solution over time: positions, rates, accelerations, efforts of prescribed drivers and all reactions.
+
+    Attributes
+    ----------
+    energy : kinetic and potential energy, and the work done.
+    stopped : why the motion was not followed to its end; empty where it was.
+    events : what happened, in the order of time.
+    """
+
+    stopped = ""
+    events: tuple[Occurrence, ...] = ()
+
+    def __init__(self, trajectory: Trajectory, energy: Energy, course: Course) -> None:
+        super().__init__(trajectory)
+        self.energy, self._course = energy, course
+
+    def at(self, t: Any) -> Response:
+        """The response at other times within those that were integrated (dense output of the stepper, closed and with all forces).
+
+        At the time of an impact it is what was before.
+        """
+        return self._course.response(t)
+
+
+@dataclass(frozen=True)
+class Course:
+    """The integrated motion of a mechanism; ``task`` is that without stops, ``times`` those asked for, or begin and end."""
+
+    integration: Integration
+    task: Task
+    mechanism: Mechanism
+    times: Array
+
+    @property
+    def begin(self) -> float:
+        """The first time."""
+        return float(self.times[0])
+
+    @property
+    def reached(self) -> float:
+        """The last time that was reached."""
+        return self.integration.segments[-1].end if self.integration.segments else self.begin
+
+    def outputs(self, last: float | None = None) -> Response | None:
+        """The response at the times asked for, or else where steps end, up to where the motion was followed; with ``last`` there too.
+
+        None where no step was taken.
+        """
+        if not self.integration.segments:
+            return None
+        steps = [self.begin, *(segment.end for segment in self.integration.segments)]
+        times = np.unique(self.times if len(self.times) > 2 else steps)
+        times = times[times <= self.reached] if last is None else np.append(times[times < last], last)
+        return self.response(times)
+
+    def response(self, t: Any) -> Response:
+        """The response at times ``t``, a number or ``(T,)``."""
+        times = real_array(t)
+        if (
+            times is None
+            or times.ndim > 1
+            or not times.size
+            or not ((times >= self.begin) & (times <= self.reached)).all()
+        ):
+            what = f"times between {self.begin:g} and {self.reached:g}, one or one-dimensional"
+            raise DeclarationError("response", [wrong(t, "t", what)])
+        flat = times.reshape(-1)
+        works = np.zeros(flat.size)
+        blocks = []
+        for places, task, closed, v, work in self._states(flat):
+            works[places] = work
+            blocks.append((places, task, closed, v))
+        m, system = self.mechanism, self.task.system
+        trajectory, kinetic, potential = trajectory_of(self.task, m, times, blocks)
+        trajectory.work = self.integration.work
+        if isinstance(m, SnappedMechanism):
+            trajectory.as_declared(partial(declared_closure, m, system.par), m.changes.tol)
+        shape = times.shape
+        energy = Energy(kinetic.reshape(shape), potential.reshape(shape), (works * system.par.L**2).reshape(shape))
+        return Response(trajectory, energy, self)
+
+    def _states(self, flat: Array) -> Iterator[tuple[Index, Task, Closed, Array, Array]]:
+        """Closed states at times ``(T,)`` in blocks: places, task, states, rates of the independent columns, work done."""
+        for places, stage, y, work in self.integration.at(flat):
+            for part in in_blocks(np.arange(len(places))):
+                closed, v = stage.states(flat[places[part]], y[:, part])
+                if not closed.done.all() or float(closed.here.closure.max()) > CLOSED:
+                    raise ResponseError(
+                        f"mechanism {self.mechanism.name!r}: the loops do not close at some time of {flat[places[part]]}"
+                    )
+                yield places[part], stage.task, closed, v, work[part]
+
+    def states(self, t: Array) -> tuple[Array, Array]:
+        """Internal states ``(nx, T)``, and rates and accelerations ``(2, F, T)`` of all freedoms, at times ``(T,)``."""
+        s = self.task.system
+        x, out = np.empty((s.n_state, len(t))), np.empty((2, s.n_freedoms, len(t)))
+        for places, task, closed, v, _ in self._states(t):
+            rates = moved(closed.here, closed.f, v, task.prescribed_at(t[places])[1:], task.loads, t[places]).rates
+            x[:, places], out[0][:, places], out[1][:, places] = closed.here.x, rates.dq, rates.ddq
+        return x, out
+
+    def freedom(self, name: str, t: Array) -> Array:
+        """Position, velocity and acceleration ``(3, T)`` of a freedom at times ``(T,)``, user's units."""
+        s = self.task.system
+        k, j = self.mechanism.freedom(name)
+        column = int(s.first_column[k]) + j
+        x, rates = self.states(t)
+        unit = s.par.L if s.is_length[column] else 1.0
+        return unit * np.stack([x[s.single_rows[column]], rates[0, column], rates[1, column]])

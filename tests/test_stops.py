@@ -1,0 +1,144 @@
+"""Stops of freedoms in a motion: impacts, rests and releases against closed forms and the balance of energy."""
+
+import numpy as np
+import pytest
+
+import mechgraph as mg
+
+X, Y, Z = np.eye(3)
+G = 9.81
+
+
+def body(name, mass=1.0, center=(0, 0, 0)):
+    return mg.Link(name, mass=mass, center=center, inertia=0.01 * np.eye(3))
+
+
+def slide(loads=(), mass=1.0):
+    """A body on a vertical slide."""
+    pairs = [mg.Pair("A", "P", "frame", "ball", point=(0, 0, 0), axis=Y)]
+    return mg.Mechanism("slide", [mg.Link("frame"), body("ball", mass)], pairs, loads=[mg.Gravity((0, -G, 0)), *loads])
+
+
+def pushed(pose, twist, t):
+    """A function of time; the motion is then followed in charts, not along a path."""
+    return 0.0 * t
+
+
+def square(loads=()):
+    """A parallelogram of massive cranks of 1 m, coupler 2 m, in a level plane unless loaded."""
+    links = [
+        mg.Link("frame"),
+        body("a", center=(0, 0.5, 0)),
+        body("c", center=(1, 1, 0)),
+        body("b", center=(2, 0.5, 0)),
+    ]
+    ends = [
+        ("A", "frame", "a", (0, 0, 0)),
+        ("B", "a", "c", (0, 1, 0)),
+        ("C", "c", "b", (2, 1, 0)),
+        ("D", "frame", "b", (2, 0, 0)),
+    ]
+    return mg.Mechanism(
+        "parallelogram", links, [mg.Pair(n, "R", p, q, point=at, axis=Z) for n, p, q, at in ends], loads=list(loads)
+    )
+
+
+@pytest.mark.parametrize("loads", [(), (mg.Effort("A", pushed),)])
+def test_a_ball_bounces_less_and_less_and_comes_to_rest(loads):
+    """Dropped from h it strikes at sqrt(2 h / g) (1 + 2 e + 2 e^2 + ...) and rests from (1 + e) / (1 - e) times the first time on."""
+    h, e = 1.0, 0.5
+    first = np.sqrt(2 * h / G)
+    r = mg.respond(
+        slide(loads),
+        np.linspace(0, 3, 301),
+        start={"A": h},
+        rtol=1e-11,
+        atol=1e-13,
+        stops=mg.Stop("A", lower=0.0, restitution=e),
+    )
+    times = np.array([one.t for one in r.events])
+    exact = first * (1 + 2 * np.cumsum(e ** np.arange(1, 9)))
+    np.testing.assert_allclose(times[:9], [first, *exact], atol=1e-7)
+    assert times[-1] == pytest.approx(first * (1 + e) / (1 - e), abs=1e-3)
+    assert str(r.events[0]).startswith("A meets its lower stop at t = 0.45")
+    resting = r.t > times[-1]
+    assert resting.sum() > 100
+    np.testing.assert_allclose(r["A"].position[resting], 0.0, atol=1e-12)
+    np.testing.assert_allclose(r["A"].applied_effort[resting], G, rtol=1e-12)
+    assert np.abs(r["A"].applied_effort[~resting]).max() == 0.0
+    assert r["A"].position.min() > -1e-8
+    assert np.abs(r.energy.balance).max() < 1e-7
+    # all energy is lost: m g h
+    assert r.energy.work[-1] == pytest.approx(-G * h, rel=1e-9)
+
+
+def test_an_elastic_stop_keeps_the_energy_along_a_path():
+    """A crank of a parallelogram between two elastic stops strikes them at even times."""
+    r = mg.respond(
+        square(), (0, 10), start={"A": 0.0}, rates={"A": 0.7}, rtol=1e-11, atol=1e-13,
+        stops=[mg.Stop("A", lower=-0.5, upper=0.3, restitution=1.0)],
+    )  # fmt: skip
+    # the parallelogram's coupler translates: without gravity its speed is constant
+    times = np.array([one.t for one in r.events])
+    np.testing.assert_allclose(np.diff(times), 0.8 / 0.7, atol=1e-8)
+    assert [one.rising for one in r.events] == [i % 2 == 0 for i in range(len(times))]
+    assert np.abs(r.energy.balance).max() < 1e-9 * r.energy.kinetic.max()
+    assert r.work.coordinates == "along the path"
+
+
+def test_a_body_rests_on_its_stop_until_it_is_lifted():
+    """A force that grows as 4 t lifts 1 kg from its stop at t = g / 4; then x'' = 4 (t - t0)."""
+    lift = mg.Wrench("ball", force=lambda pose, twist, t: np.stack([0 * t, 4 * t, 0 * t], axis=-1), point=(0, 0, 0))
+    r = mg.respond(slide([lift]), np.linspace(0, 4, 41), rtol=1e-10, atol=1e-12, stops=[mg.Stop("A", lower=0.0)])
+    t0 = G / 4
+    assert [str(one).split(" at ")[0] for one in r.events] == ["A meets its lower stop", "A leaves its lower stop"]
+    assert r.events[1].t == pytest.approx(t0, abs=1e-9)
+    after = np.maximum(r.t - t0, 0.0)
+    np.testing.assert_allclose(r["A"].position[:, 0], 4 * after**3 / 6, atol=1e-9)
+    np.testing.assert_allclose(r["A"].applied_effort[:, 0], np.where(after > 0, 0.0, G - 4 * r.t), atol=1e-9)
+
+
+def test_two_bodies_strike_one_stop_and_pass_the_blow_on():
+    """The upper of two bodies in one slide falls on the lower one, which lies on the ground: the blow goes through, both rest."""
+    links = [mg.Link("frame"), body("lower"), body("upper", 2.0)]
+    pairs = [
+        mg.Pair("A", "P", "frame", "lower", point=(0, 0, 0), axis=Y),
+        mg.Pair("B", "P", "lower", "upper", point=(0, 0, 0), axis=Y),
+    ]
+    m = mg.Mechanism("pile", links, pairs, loads=[mg.Gravity((0, -G, 0))])
+    r = mg.respond(
+        m, np.linspace(0, 1, 11), start={"A": 0.0, "B": 0.2}, rtol=1e-10, atol=1e-12,
+        stops=[mg.Stop("A", lower=0.0), mg.Stop("B", lower=0.0)],
+    )  # fmt: skip
+    assert r.events[-1].t == pytest.approx(np.sqrt(0.4 / G), abs=1e-9)
+    np.testing.assert_allclose(r["A"].position[:, 0], 0.0, atol=1e-12)
+    np.testing.assert_allclose(r["A"].applied_effort[-1], 3 * G, rtol=1e-10)
+    np.testing.assert_allclose(r["B"].applied_effort[-1], 2 * G, rtol=1e-10)
+
+
+def test_two_stops_at_once_share_the_blow():
+    """Both cranks of a parallelogram have a stop at the same angle; what each exerts is not unique, what both do is."""
+    m = square([mg.Effort("A", -2.0)])
+    both = [mg.Stop("A", lower=-0.4), mg.Stop("D", lower=-0.4)]
+    r, one = (mg.respond(m, np.linspace(0, 4, 41), rtol=1e-10, atol=1e-12, stops=s) for s in (both, both[:1]))
+    np.testing.assert_allclose(r["A"].position, one["A"].position, atol=1e-8)
+    np.testing.assert_allclose(r["A"].position[-1], -0.4, atol=1e-10)
+    assert (r["A"].applied_effort + r["D"].applied_effort)[-1, 0] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("stops", "words"),
+    [
+        (3, "stops = 3: expected a list"),
+        ([3], "expected an mg.Stop"),
+        (mg.Stop("Q", lower=0.0), "unknown freedom"),
+        (mg.Stop("A"), "neither lower nor upper"),
+        (mg.Stop("A", lower=1.0, upper=0.0), "lower < upper"),
+        (mg.Stop("A", lower="low"), "lower = 'low'"),
+        (mg.Stop("A", lower=0.0, restitution=1.5), "from 0 to 1"),
+        (mg.Stop("A", lower=0.5), "start of 'A': is beyond its lower stop at 0.5"),
+    ],
+)
+def test_bad_stops_are_named(stops, words):
+    with pytest.raises(mg.DeclarationError, match=words):
+        mg.respond(slide(), (0, 1), stops=stops)
