@@ -53,7 +53,8 @@ def things() -> dict[str, Any]:
         "AssemblyError": mg.AssemblyError("open", 0.5, {"A": 1.0}), "MissingExtraError": mg.MissingExtraError("typer", "cli"),
         "DeadPointError": mg.DeadPointError("dead", {"A": 1.0}), "ReachError": mg.ReachError("far", {"A": 1.0}, s),
         "response": mg.respond(mg.load("windows-2"), (0, 0.2)), "response in charts": mg.respond(pushed, (0, 0.2)),
-        "ResponseError": mg.ResponseError("stopped", s), "event": mg.Event("A0", 0.1), "equilibrium": hanging,
+        "ResponseError": mg.ResponseError("stopped", s), "event": mg.Event("A0", 0.1),
+        "stop": mg.Stop("A0", lower=0.1), "equilibrium": hanging,
         "linearized": mg.linearize(hanging),
         "IndeterminateError": mg.IndeterminateError("free", report),
     }  # fmt: skip
