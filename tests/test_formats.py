@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from urllib.parse import unquote
 
+import networkx as nx
 import numpy as np
 import pytest
 from test_hostile_names import NAMES, named
@@ -129,3 +131,54 @@ def test_a_missing_package_names_its_extra(tmp_path: Path, monkeypatch: pytest.M
     pytest.importorskip("xarray")
     with pytest.raises(mg.MissingExtraError, match=r"h5netcdf: pip install 'mechgraph\[netcdf\]'"):
         crank().write(tmp_path / "x.nc")
+
+
+# --- the graph -----------------------------------------------------------------------------------------------------------
+
+
+def read_back(path: Path) -> nx.MultiGraph:
+    if path.suffix == ".graphml":
+        return nx.read_graphml(path, force_multigraph=True)
+    return nx.node_link_graph(json.loads(path.read_text(encoding="utf-8")), edges="edges")
+
+
+@pytest.mark.parametrize("suffix", [".graphml", ".json"])
+@pytest.mark.parametrize("name", ["rcsr-csr", "four-bar", "windows-2", "RPRHRRR"])
+def test_the_graph_comes_back(name: str, suffix: str, tmp_path: Path) -> None:
+    m = mg.load(name) if name in mg.library() else mg.chain(name)
+    mg.save(m, tmp_path / f"x{suffix}")
+    graph = read_back(tmp_path / f"x{suffix}")
+    assert graph.is_multigraph()
+    assert graph.graph["name"] == m.name
+    assert dict(graph.nodes(data="mass")) == {link.name: link.mass for link in m.links}
+    assert [n for n, frame in graph.nodes(data="frame") if frame] == [m.frame]
+    edges = {key: (ends, data) for *ends, key, data in graph.edges(keys=True, data=True)}
+    assert set(edges) == {p.name for p in m.pairs}
+    loops: dict[int, dict[str, int]] = {}
+    for pair in m.pairs:
+        ends, data = edges[pair.name]
+        assert set(ends) == {pair.a, pair.b}
+        assert (data["a"], data["b"], data["type"]) == (pair.a, pair.b, pair.type.symbol)
+        assert data["freedoms"].split() == [f.name for f in pair.type.freedoms]
+        if pair.point is not None:
+            assert [data[f"point_{x}"] for x in "xyz"] == list(pair.point)
+        for number in map(int, data["loops"].split()):
+            loops.setdefault(abs(number), {})[pair.name] = 1 if number > 0 else -1
+    assert [loops[n] for n in sorted(loops)] == [dict(loop) for loop in mg.check(m).loops]
+    driven = {f"{key}.{q}" for key, (_, data) in edges.items() for q in data["driven"].split()}
+    assert driven == {m.full_name(d.freedom) for d in m.drives}
+
+
+def test_pairs_that_join_the_same_links_stay_two(tmp_path: Path) -> None:
+    pairs = [mg.Pair(name, "R", "frame", "door", point=(0, 0, z), axis=(0, 0, 1)) for name, z in (("A", 0), ("B", 1))]
+    for suffix in (".graphml", ".json"):
+        mg.save(mg.Mechanism("door", pairs=pairs), tmp_path / f"x{suffix}")
+        assert {key for *_, key in read_back(tmp_path / f"x{suffix}").edges(keys=True)} == {"A", "B"}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_graphs_with_names_that_would_be_commands(name: str, tmp_path: Path) -> None:
+    for suffix in (".graphml", ".json"):
+        mg.save(named(name), tmp_path / f"x{suffix}")
+        assert len(read_back(tmp_path / f"x{suffix}")) == 4
+        assert set(read_back(tmp_path / f"x{suffix}").edges(keys=True)).__len__() == 4

@@ -51,8 +51,8 @@ def to_latex(document: Document) -> str:
     at 80 columns become paragraph columns of the same share of the line. No package beyond amsmath (for what
     equations use) is needed.
     """
-    parts = [_section(document.title, 0)]
-    parts += [_block_latex(block) for block in document.blocks]
+    parts = [section(document.title, 0)]
+    parts += [block_latex(block) for block in document.blocks]
     return joined(parts, "\n\n")
 
 
@@ -61,7 +61,7 @@ def latex_words(text: str) -> str:
     return re.sub("-(?=-)", "-{}", plain(text).translate(_LATEX_TABLE))
 
 
-def _section(text: str, level: int) -> str:
+def section(text: str, level: int) -> str:
     """Return the sectioning command of a level; nothing for an empty text."""
     return rf"\{_LATEX_SECTIONS[level]}{{{latex_words(text)}}}" if plain(text) else ""
 
@@ -74,11 +74,11 @@ def _verbatim(lines: list[str]) -> str:
     return "\n".join([r"\begin{verbatim}", *lines, r"\end{verbatim}"]) if lines else ""
 
 
-def _block_latex(block: Block) -> str:
+def block_latex(block: Block) -> str:
     """Render one block as LaTeX; empty where the block is."""
     match block:
         case Heading(text, level):
-            return _section(text, level)
+            return section(text, level)
         case Paragraph(text):
             return latex_words(text)
         case Bullets():
@@ -112,8 +112,19 @@ def _bullets_latex(block: Bullets) -> str:
 
 def _table_latex(table: Table) -> str:
     """Render a table as a tabular, in a float where it has a caption."""
-    if not table.rows or not table.align:
+    grid = tabular(table, "tabular")
+    if not grid:
         return ""
+    if plain(table.caption):
+        heads = [r"\begin{table}[htbp]", r"\centering", rf"\caption{{{latex_words(table.caption)}}}"]
+        return "\n".join([*heads, *grid, r"\end{table}"])
+    return "\n".join([r"\begin{center}", *grid, r"\end{center}"])
+
+
+def tabular(table: Table, environment: str) -> list[str]:
+    """The lines of a table in an environment that takes columns as ``tabular`` does; none where it has no rows."""
+    if not table.rows or not table.align:
+        return []
     lines = table.lines
     natural = [max(map(len, column)) for column in zip(*lines, strict=True)]
     fitted = column_widths(lines, WIDTH)
@@ -129,15 +140,4 @@ def _table_latex(table: Table) -> str:
     rows = [row(line) for line in lines]
     if table.header:
         rows.insert(1, r"\hline")
-    grid = [rf"\begin{{tabular}}{{{columns}}}", *rows, r"\end{tabular}"]
-    if plain(table.caption):
-        return "\n".join(
-            [
-                r"\begin{table}[htbp]",
-                r"\centering",
-                rf"\caption{{{latex_words(table.caption)}}}",
-                *grid,
-                r"\end{table}",
-            ]
-        )
-    return "\n".join([r"\begin{center}", *grid, r"\end{center}"])
+    return [rf"\begin{{{environment}}}{{{columns}}}", *rows, rf"\end{{{environment}}}"]

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
 from dataclasses import dataclass
 
-from mechgraph.document import Document, to_html, to_latex, to_text
+from mechgraph.document import Document, to_html, to_latex, to_latex_file, to_markdown, to_text
 from mechgraph.equations.printing import Printed, formulation_document
 from mechgraph.equations.state import State
 from mechgraph.equations.system import CoefficientTable
+from mechgraph.writing import Format, format_of, write_whole
 
 
 @dataclass(frozen=True)
@@ -30,6 +33,17 @@ class Formulation(Printed):
     def latex(self, components: bool = True) -> str:
         """Block-wise and component-wise equations as LaTeX."""
         return to_latex(self.document(components))
+
+    def write(self, path: str | os.PathLike[str], components: bool = True) -> None:
+        """Write it, whole or not at all, as the suffix says: ``.tex`` a LaTeX file that compiles, ``.txt`` text, ``.md`` Markdown, ``.csv``
+        the coefficients.
+
+        Raises
+        ------
+        FileError
+            for another suffix, or where the file cannot be written.
+        """
+        format_of(path, FORMATS).write(self, path, components)
 
     def coefficients(self, state: State | None = None) -> CoefficientTable:
         """The nonzero coefficients ``Q(row, column)`` and right sides ``C(row)``, as Lee's Table XIV lists them.
@@ -57,3 +71,17 @@ class Formulation(Printed):
 
     def _repr_html_(self) -> str:
         return to_html(self.document())
+
+
+def _as(text: Callable[[Document], str]) -> Callable[..., None]:
+    """The writer of a rendering of the document."""
+    return lambda f, path, components: write_whole(path, [text(f.document(components))])
+
+
+FORMATS = (
+    Format("LaTeX", (".tex",), _as(to_latex_file)),
+    Format("text", (".txt",), _as(to_text)),
+    Format("Markdown", (".md",), _as(to_markdown)),
+    Format("coefficients as CSV", (".csv",), lambda f, path, _: write_whole(path, [f.coefficients().csv()])),
+)
+"""What a formulation can be written as."""

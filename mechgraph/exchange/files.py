@@ -10,11 +10,13 @@ from pathlib import Path
 from mechgraph.errors import ContentError, DeclarationError, FileError, MechgraphWarning
 from mechgraph.exchange.asmt import Assembly, Reader
 from mechgraph.exchange.asmt_mechanism import mechanism_of
+from mechgraph.exchange.graph import save_graphml, save_node_link
 from mechgraph.exchange.mjcf_read import read_mjcf
 from mechgraph.exchange.mjcf_write import save_mjcf
 from mechgraph.exchange.urdf import read_urdf
 from mechgraph.model import toml
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.writing import Format
 
 Notes = tuple[str, ...]
 
@@ -61,14 +63,19 @@ def load(name: str | os.PathLike[str]) -> Mechanism:
     return made
 
 
-WRITERS: dict[str, Callable[[Mechanism, str | os.PathLike[str]], None]] = {".xml": save_mjcf, ".mjcf": save_mjcf}
-"""Writers by suffix; all other files are TOML."""
+WRITERS = (
+    Format("MJCF", (".xml", ".mjcf"), save_mjcf),
+    Format("GraphML", (".graphml",), save_graphml),
+    Format("node-link JSON", (".json",), save_node_link),
+)
+"""What a mechanism can be written as beside TOML, which all other suffixes are."""
 
 
 def save(m: Mechanism, path: str | os.PathLike[str]) -> None:
-    """Write a mechanism as TOML, or as MJCF where the path ends in ``.xml`` or ``.mjcf``; the file is written whole or not at all.
+    """Write a mechanism as TOML, or as the suffix says; the file is written whole or not at all.
 
-    TOML holds all of a mechanism: ``load`` gives back an equal one. MJCF holds it at its start, see ``save_mjcf``.
+    TOML holds all of a mechanism: ``load`` gives back an equal one. ``.xml`` and ``.mjcf`` hold it at its start, see ``save_mjcf``.
+    ``.graphml`` and ``.json`` (node-link JSON) are its graph: links as nodes, pairs as edges, for programs that know graphs.
 
     Raises
     ------
@@ -76,8 +83,9 @@ def save(m: Mechanism, path: str | os.PathLike[str]) -> None:
         where the format cannot say something, or the file cannot be written.
     """
     suffix = Path(os.fsdecode(path)).suffix.lower() if isinstance(path, str | os.PathLike) else ""
-    if suffix in READERS and suffix not in WRITERS:
+    writers = {known: one.write for one in WRITERS for known in one.suffixes}
+    if suffix in READERS and suffix not in writers:
         raise FileError(
-            path, f"files of this kind ({suffix}) are read, not written; write .toml or {', '.join(WRITERS)}"
+            path, f"files of this kind ({suffix}) are read, not written; write .toml or {', '.join(writers)}"
         )
-    WRITERS.get(suffix, toml.save)(m, path)
+    writers.get(suffix, toml.save)(m, path)
