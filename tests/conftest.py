@@ -1,7 +1,8 @@
 """Hypothesis profiles: ``dev`` at the desk, ``ci`` (more examples, always the same ones) where CI is set. Golden files."""
 
+import itertools
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,8 @@ settings.register_profile("ci", max_examples=60, deadline=None, derandomize=True
 settings.load_profile("ci" if os.environ.get("CI", "").lower() not in {"", "0", "false"} else "dev")
 
 GOLDEN = Path(__file__).parent / "golden"
+FURTHER = 10_000
+"""First seed of ``--attack``."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -24,15 +27,30 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Markers of these tests."""
-    config.addinivalue_line("markers", "seeds(n): a test for each of n seeds, and for as many more as --attack says")
+    config.addinivalue_line(
+        "markers",
+        "seeds(n, without=()): a test for each of n seeds, the first but those named, and for as many more as --attack says; "
+        "only these further ones may be skipped",
+    )
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Seeds of tests that are marked so: always the same ones, then the further ones of ``--attack``."""
     marker = metafunc.definition.get_closest_marker("seeds")
     if marker is not None:
+        without = marker.kwargs.get("without", ())
+        always = itertools.islice((seed for seed in itertools.count() if seed not in without), marker.args[0])
         more = metafunc.config.getoption("--attack")
-        metafunc.parametrize("seed", [*range(marker.args[0]), *range(10_000, 10_000 + more)])
+        metafunc.parametrize("seed", [*always, *range(FURTHER, FURTHER + more)])
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """A seed that is always drawn and then skipped checks nothing: it is a failure, and belongs among those left out."""
+    report = yield
+    if report.skipped and item.get_closest_marker("seeds") and item.callspec.params["seed"] < FURTHER:
+        report.outcome, report.longrepr = "failed", f"{report.longrepr[2]}: name the seed in without="
+    return report
 
 
 @pytest.fixture
