@@ -25,7 +25,7 @@ from mechgraph.errors import (
 )
 from mechgraph.force.dalembert import METHODS, MethodName
 from mechgraph.model.declaration import mapping_faults
-from mechgraph.model.load import Load
+from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism, check_mechanism
 from mechgraph.pipeline import Options, Outcome, Pipeline
 from mechgraph.report.report import check, hinted

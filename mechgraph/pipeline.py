@@ -22,7 +22,7 @@ from mechgraph.closure.rates import Rates, Velocities, distance_to_dead_point, r
 from mechgraph.closure.solver import ClosureSolver, FactoredClosure, closure_solver, engine_for
 from mechgraph.errors import DeadPointError, DeclarationError, IndeterminateError
 from mechgraph.force.block import BlockForces, ForceTask, forces_of_block
-from mechgraph.model.load import Load
+from mechgraph.model.load_base import Load
 from mechgraph.numerics.linear import independent_rows, rank_of, singular_values
 from mechgraph.numerics.tolerances import PATH
 from mechgraph.report.report import check

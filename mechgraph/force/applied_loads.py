@@ -11,8 +11,7 @@ from mechgraph.algebra.se3 import Array, cross, rotate, rotate_back, to_matrix
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.rates import Rates, Velocities
 from mechgraph.errors import DeclarationError
-from mechgraph.model.load import Load
-from mechgraph.model.load_base import Value
+from mechgraph.model.load_base import Load, Value
 from mechgraph.model.numeric import PerCase
 from mechgraph.quantities import real_array, wrong
 

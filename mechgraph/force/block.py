@@ -16,7 +16,7 @@ from mechgraph.force.applied_loads import Site, inertia_wrenches, kinetic_power
 from mechgraph.force.dalembert import METHODS, ForceProblem, Wrenches, row_efforts
 from mechgraph.force.passive_hold import hold
 from mechgraph.force.reaction_map import effort_map, reaction_map
-from mechgraph.model.load import Load
+from mechgraph.model.load_base import Load
 from mechgraph.numerics.linear import add_at
 from mechgraph.structure.passive import PassiveMotion
 from mechgraph.structure.reaction_split import (

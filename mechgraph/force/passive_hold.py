@@ -13,7 +13,7 @@ from mechgraph.closure.passive_rest import TURNING, Idle, passive_twists, rest_p
 from mechgraph.closure.rates import Rates, Velocities
 from mechgraph.errors import DeclarationError
 from mechgraph.force.applied_loads import Site
-from mechgraph.model.load import Load
+from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.tolerances import MOTIONS
 from mechgraph.structure.passive import PassiveMotion

@@ -16,13 +16,13 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
 from mechgraph.model.field_format import FREEDOM_NAME, LINK_NAME, NAMED_POINT, NUMBER, POSITION, TABLE
 from mechgraph.model.force_table import ForceTable
-from mechgraph.model.load_base import BaseLoad, LoadSite
+from mechgraph.model.load_base import Load, LoadSite
 from mechgraph.model.nameable import Nameable
 from mechgraph.quantities import real_array, shown, wrong
 from mechgraph.units import FORCE_PER_LENGTH, FORCE_PER_VELOCITY, LENGTH, MOMENT, MOMENT_PER_RATE
 
 
-class Law(BaseLoad):
+class Law(Load):
     """A force ``F(x, x', t)`` in the freedom that it names, or between the point ``p`` of link ``a`` and ``q`` of link ``b``."""
 
     if TYPE_CHECKING:  # fields of those that act between points; annotated here, they would come before all others
@@ -127,11 +127,15 @@ class TorsionSpring(Elastic):
     damping: Annotated[float, NUMBER("effort per rate", FORCE_PER_VELOCITY, MOMENT_PER_RATE)] = 0.0
 
 
+Place = str | tuple[str, str, Any, Any]
+"""A freedom, or two links with a point of each, ``(link a, link b, p, q)``."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Placed(Law):
     """A law placed by its first argument: the name of a freedom, or ``(link a, link b, p, q)``."""
 
-    freedom: Annotated[str | None, FREEDOM_NAME("a single turn or slide", default="this,")] = None
+    freedom: Annotated[Place | None, FREEDOM_NAME("a single turn or slide", default="this,")] = None
     a: Annotated[str | None, LINK_NAME("first link", default="or these four")] = None
     b: Annotated[str | None, LINK_NAME("second link", default="likewise")] = None
     p: Annotated[Any, NAMED_POINT("point of link a, or its name", LENGTH, of="a", default="likewise")] = None
@@ -199,12 +203,12 @@ class ForceLaw(_Placed):
 
     @property
     def by_position(self) -> bool:
-        """See ``BaseLoad``; functions are given arrays of positions, any of them."""
+        """See ``Load``; functions are given arrays of positions, any of them."""
         return True
 
     @property
     def smooth(self) -> bool:
-        """See ``BaseLoad``; a table is not where its points are."""
+        """See ``Load``; a table is not where its points are."""
         return False
 
     def force(self, site: LoadSite, x: Array, v: Array) -> Array:

@@ -11,13 +11,13 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from mechgraph.algebra.se3 import rotate
 from mechgraph.model.field_format import FREEDOM_NAME, LINK_NAME, NAMED_POINT, SERIES, TEXT, VECTOR, VECTOR_SERIES
 from mechgraph.model.force_law import Damper, ForceLaw, Spring, TorsionSpring
-from mechgraph.model.load_base import BaseLoad, LoadSite, Value
+from mechgraph.model.load_base import Load, LoadSite, Value
 from mechgraph.model.nameable import Nameable
 from mechgraph.units import ACCELERATION, FORCE, LENGTH, MOMENT
 
 
 @dataclass(frozen=True, eq=False)
-class Gravity(BaseLoad):
+class Gravity(Load):
     """Uniform gravity: force ``m g`` at the mass centre of every link; ``acceleration`` is the vector g."""
 
     kind: ClassVar[str] = "gravity"
@@ -33,7 +33,7 @@ class Gravity(BaseLoad):
         site.add_weight(site.number(self.acceleration))
 
     def parts(self) -> tuple[Self | None, Self | None]:
-        """See ``BaseLoad``; all of it."""
+        """See ``Load``; all of it."""
         return self, None
 
     def energy(self, site: LoadSite) -> Any:
@@ -42,7 +42,7 @@ class Gravity(BaseLoad):
 
 
 @dataclass(frozen=True, eq=False)
-class Wrench(BaseLoad):
+class Wrench(Load):
     """A force at a material point and a moment on one link.
 
     ``point`` is in the coordinates of the declared configuration, in which link frames stand on the global one (for a link
@@ -93,7 +93,7 @@ class Wrench(BaseLoad):
 
 
 @dataclass(frozen=True, eq=False)
-class Effort(BaseLoad):
+class Effort(Load):
     """A given effort in a freedom: couple about a turn, force along a slide; + on link b, - on link a.
 
     ``value`` may be an array over positions or a callable ``(pose, twist, t)`` of link b.
@@ -109,6 +109,5 @@ class Effort(BaseLoad):
         site.add_effort(self.freedom, site.values(self.value, site.second_link(self.freedom), 1)[0])
 
 
-Load = Gravity | Wrench | Effort | Spring | TorsionSpring | Damper | ForceLaw
 LOADS: dict[str, type[Load]] = {c.kind: c for c in (Gravity, Wrench, Effort, Spring, TorsionSpring, Damper, ForceLaw)}
 """Load classes by the name of their kind in files."""

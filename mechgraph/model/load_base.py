@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, Self
@@ -62,7 +63,7 @@ class LoadSite(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class BaseLoad(Described):
+class Load(Described, ABC):
     """What all loads share: equality that also holds for arrays, and checks of what their fields hold."""
 
     kind: ClassVar[str]
@@ -78,6 +79,10 @@ class BaseLoad(Described):
 
     def __hash__(self) -> int:
         return hash(type(self).__name__)
+
+    @abstractmethod
+    def act(self, site: LoadSite) -> None:
+        """Add the load's forces, couples and efforts at the positions of ``site``."""
 
     @property
     def where(self) -> str:

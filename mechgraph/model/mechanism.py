@@ -19,7 +19,7 @@ from mechgraph.model.coupling import Coupling
 from mechgraph.model.declaration import declaration_faults, flat_start, item_faults, mapping_faults
 from mechgraph.model.drive import Drive
 from mechgraph.model.link import Link
-from mechgraph.model.load import Load
+from mechgraph.model.load_base import Load
 from mechgraph.model.numeric import plain, same_fields
 from mechgraph.model.pair import Pair
 from mechgraph.model.pair_type import PairType

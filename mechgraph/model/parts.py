@@ -13,7 +13,7 @@ from mechgraph.model.coupling import Coupling
 from mechgraph.model.drive import Drive
 from mechgraph.model.field_format import FACTS, NUMBER, OTHER, TABLE, TABLES, TEXT, Formatted
 from mechgraph.model.link import Link
-from mechgraph.model.load import Load
+from mechgraph.model.load_base import Load
 from mechgraph.model.pair import Pair
 from mechgraph.model.pair_type import PairType
 from mechgraph.quantities import shown, without_units

@@ -23,7 +23,7 @@ from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.rates import Rates, Velocities
 from mechgraph.closure.solver import FactoredClosure
 from mechgraph.force.applied_loads import Site, inertia_wrenches
-from mechgraph.model.load import Load
+from mechgraph.model.load_base import Load
 
 MASSLESS = 1e-12
 """Eigenvalue of the mass matrix, of which the diagonal is one, below which a motion has no inertia."""

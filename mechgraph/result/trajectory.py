@@ -26,7 +26,7 @@ from mechgraph.force.block import BlockForces
 from mechgraph.force.dalembert import given_effort_loads
 from mechgraph.force.passive_hold import hold_names, is_idle, turns
 from mechgraph.model.force_law import Law
-from mechgraph.model.load import Load
+from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.newton import Work
 from mechgraph.numerics.tolerances import MOTIONS, PATH

@@ -8,7 +8,7 @@ from typing import Any, Literal, NamedTuple, Protocol
 from mechgraph.algebra.se3 import Array
 from mechgraph.equations.state import State
 from mechgraph.errors import DeclarationError
-from mechgraph.model.load import Load
+from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.numeric import vector_fault
 from mechgraph.numerics.newton import Work

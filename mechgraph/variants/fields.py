@@ -14,7 +14,7 @@ from mechgraph.algebra.inertia import physical
 from mechgraph.algebra.se3 import Array
 from mechgraph.model.chain import chain_numbers, markers_of_chain
 from mechgraph.model.coupling import Coupling
-from mechgraph.model.load import Load
+from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.numeric import PerCase
 from mechgraph.model.pair import Marker, Pair
