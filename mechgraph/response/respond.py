@@ -14,7 +14,7 @@ from mechgraph.closure.rank import closure_rank
 from mechgraph.closure.solver import ENGINES, EngineName, engine_for
 from mechgraph.errors import AssemblyError, DeclarationError, ResponseError
 from mechgraph.model.declaration import mapping_faults
-from mechgraph.model.load import Load
+from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism, check_mechanism
 from mechgraph.quantities import is_numeric, real_array, wrong
 from mechgraph.report.report import hinted
