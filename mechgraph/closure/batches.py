@@ -85,7 +85,7 @@ class ScrewTable:
         """The screws through the origin of marker B."""
         return np.flatnonzero(self.at_b)
 
-    def taken(self, order: Index) -> ScrewTable:
+    def taken(self, order: Place) -> ScrewTable:
         """Some of the screws, in that order."""
         return ScrewTable(*(getattr(self, part.name)[..., order] for part in fields(self)))
 

@@ -54,8 +54,7 @@ class Numbers:
         out: list[tuple[Array, tuple[Array, Array] | None]] = []
         for b in self.batches:
             if self.constants.shape[3] == 1 and self.par.pitch.shape[1] == 1:
-                parts = [self._folded(b.part(slice(i, i + CHUNK))) for i in range(0, len(b.pairs), CHUNK)]
-                out.append((np.concatenate(parts) if len(parts) > 1 else parts[0], None))
+                out.append((self._folded(b), None))
                 continue
             C, left, right = self._coefficients(b), *self._beside(b)
             C = C.reshape(16, *C.shape[2:])
@@ -68,6 +67,14 @@ class Numbers:
 
     def _folded(self, b: FactorBatch) -> Array:
         """The same with the markers beside them, ``(n, 16, m)``, of one mechanism."""
+        n = len(b.pairs)
+        if n > CHUNK:
+            first = self._folded(b.part(slice(0, CHUNK)))
+            out = np.empty((n, *first.shape[1:]), dtype=first.dtype)
+            out[:CHUNK] = first
+            for i in range(CHUNK, n, CHUNK):
+                out[i : i + CHUNK] = self._folded(b.part(slice(i, i + CHUNK)))
+            return out
         C = self._coefficients(b)[..., 0]
         left, right = self._beside(b)
         C = np.einsum("acmn,cdn->admn", np.einsum("abn,bcmn->acmn", left[..., 0], C), right[..., 0])
@@ -109,16 +116,18 @@ class Numbers:
 
     def components(self, table: ScrewTable) -> Array:
         """Wrenches of a table in their nodes, moment and force ``(3, 2, K, B)``; without arms where they act at markers B."""
+        batch = np.broadcast_shapes(self.constants.shape[3:], self.par.pitch.shape[1:])[0]
+        out = np.empty((3, 2, len(table.pairs), batch), dtype=np.result_type(self.constants, self.par.pitch))
+        for i in range(0, len(table.pairs), CHUNK):
+            self._place_components(table.taken(slice(i, i + CHUNK)), out[:, :, i : i + CHUNK])
+        return out
+
+    def _place_components(self, table: ScrewTable, out: Array) -> None:
         X = self.constants[:, :, table.const]
-        free = table.free[..., None]
-        if table.per_pitch.any():
-            free = free + table.per_pitch[..., None] * self.par.pitch[table.pairs]
-        batch = np.broadcast_shapes(X.shape[3:], free.shape[2:])[0]
-        out = np.empty((3, 2, X.shape[2], batch), dtype=np.result_type(X, free))
-        out[:, 0] = np.einsum("ijkt,jkt->ikt", X[:, :3], np.broadcast_to(free, (*free.shape[:2], batch)))
+        free = table.free[..., None] + table.per_pitch[..., None] * self.par.pitch[table.pairs]
+        out[:, 0] = np.einsum("ijkt,jkt->ikt", X[:, :3], free)
         out[:, 1] = np.einsum("ijkt,jk->ikt", X[:, :3], table.bound)
         out[:, 0] += np.where(table.at_b[:, None], 0.0, cross(X[:, 3], out[:, 1]))
-        return out
 
     @cached_property
     def ends(self) -> Array:

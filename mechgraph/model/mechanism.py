@@ -150,6 +150,10 @@ class Mechanism(Parts):
         out = {k: getattr(self, k) for k in self.formats}
         return {k: dict(v) if isinstance(v, Mapping) else v for k, v in out.items()}
 
+    def freedom_names(self) -> tuple[str, ...]:
+        """Full names of all freedoms, ``"B.Tz"``, in the order of the pairs."""
+        return self.once(Parts.freedom_names)
+
     def once(self, make: Callable[[Mechanism], Made]) -> Made:
         """``make(self)`` of a function of links, pairs, couplings and frame alone: made once and kept, for copies with other drives too."""
         if make not in self._kept:

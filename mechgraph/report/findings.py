@@ -211,7 +211,7 @@ def moves_nearby(null_nearby: Array | None, count: int) -> NDArray[np.bool_]:
 
 def left_free(freedoms: Freedoms) -> tuple[Finding, ...]:
     """Motions that are neither driven nor passive: the freedoms that move in each, those that could be driven first."""
-    single = {name for _, name in single_freedoms(freedoms.position.m)}
+    single = {name for _, name in single_freedoms(freedoms.position.m)} if freedoms.undriven else set()
     out = []
     for motion in freedoms.undriven:
         names = sorted(motion.names, key=lambda n: n not in single)

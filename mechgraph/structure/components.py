@@ -51,11 +51,16 @@ class Components:
     @cached_property
     def labels(self) -> list[Label]:
         """(pair, component) of all components."""
-        out: list[Label] = []
-        first = self.system.first_column
-        for k, pair in enumerate(self.system.m.pairs):
-            out += labels_of(pair, np.flatnonzero(self._driven[first[k] : first[k + 1]]))
-        return out
+        return [label for k in range(len(self.system.m.pairs)) for label in self._labels_of(k)]
+
+    def label(self, i: int) -> Label:
+        """(pair, component) of one of them."""
+        k = int(np.searchsorted(self.first, i, side="right")) - 1
+        return self._labels_of(k)[i - int(self.first[k])]
+
+    def _labels_of(self, k: int) -> list[Label]:
+        own = slice(*self.system.first_column[k : k + 2])
+        return labels_of(self.system.m.pairs[k], np.flatnonzero(self._driven[own]))
 
     @cached_property
     def _rows(self) -> list[Array]:

@@ -109,8 +109,10 @@ def kind_of(twists: Array) -> Kind:
 def kind_of_mechanism(freedoms: Freedoms, motion: FiniteMotion | None) -> Kind:
     """The kind of all pairs, else of the motions beside the passive ones at a position nearby."""
     rows = freedoms.position.rows
-    kind, nearby = kind_of(rows.S), motion.closure_nearby if motion else None
-    if kind.name or nearby is None or freedoms.mobility > MOST_MOTIONS:
+    kind = kind_of(rows.S)
+    look = motion and not kind.name and freedoms.mobility <= MOST_MOTIONS
+    nearby = motion.closure_nearby if motion and look else None
+    if nearby is None:
         return kind
     alone = rows.S[:, rows.first_column[:-1][np.diff(rows.first_column) == 1]]
     pins = alone[:, np.linalg.norm(alone[:3], axis=0) > 0.5]

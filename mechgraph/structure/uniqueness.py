@@ -92,11 +92,10 @@ class Uniqueness:
         """What has the part nearest to the limit (by ratio): its name, this part, and whether it is called unique."""
         size = np.maximum(self.sizes, np.finfo(float).tiny)
         i = int(np.argmin(np.abs(np.log(size / UNIQUE))))
-        names = [
-            *map(":".join, self.components.labels),
-            *(f"coupling {c.name}" for c in self.components.system.couplings),
-        ]
-        return names[i], float(self.sizes[i]), bool(self.sizes[i] <= UNIQUE)
+        known = self.components
+        behind = i - known.count
+        name = ":".join(known.label(i)) if behind < 0 else f"coupling {known.system.couplings[behind].name}"
+        return name, float(self.sizes[i]), bool(self.sizes[i] <= UNIQUE)
 
     @cached_property
     def unique(self) -> dict[str, dict[str, bool]]:
