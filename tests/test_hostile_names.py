@@ -45,7 +45,7 @@ class Tags(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.seen.add(tag)
-        assert {key for key, _ in attrs} <= {"style", "border", "data-latex", "class"}
+        assert {key for key, _ in attrs} <= {"style", "border", "data-latex", "class", "display", "accent", "width"}
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -62,6 +62,7 @@ def test_documents(name: str) -> None:
         assert Tags(shown[3]).seen <= {
             "h1", "h2", "h3", "h4", "p", "ul", "li", "table", "caption", "thead", "tbody", "tr", "th", "td", "pre",
             "dl", "dt", "dd", "code",
+            "div", "math", "mi", "mo", "mn", "mtext", "mspace", "mrow", "mover", "msub", "msup", "msubsup",
         }  # fmt: skip
         unfenced = re.sub(r"^(```+|\$\$)\n.*?^\1\n", "", shown[2], flags=re.DOTALL | re.MULTILINE)
         assert not re.search(r"(?<!\\)(<script|<img|\]\(|`rm)", unfenced)

@@ -26,7 +26,7 @@ from mechgraph.document.tree import (
 def to_html(document: Document) -> str:
     """Return the document as an HTML fragment, escaped, legible without a style sheet and without a script.
 
-    Equations appear in their text form; their LaTeX form is in the attribute ``data-latex``.
+    Equations appear as MathML where they have that form, else as text; their LaTeX form is in the attribute ``data-latex``.
     """
     parts = [_tagged("h1", document.title)]
     parts += [_block_html(block) for block in document.blocks]
@@ -55,15 +55,24 @@ def _block_html(block: Block) -> str:
             return _bullets_html(block)
         case Table():
             return _table_html(block)
-        case Legend():
-            return _bullets_html(block.bullets())
-        case Equation(text, latex):
+        case Legend(entries):
+            lines = [f"<li>{_inline(e)}: {html.escape(plain(meaning))}</li>" for e, meaning in entries]
+            return "\n".join(["<ul>", *lines, "</ul>"]) if lines else ""
+        case Equation(text, latex, mathml):
             source = html.escape(plain(latex))
-            return _preformatted(kept_lines(text) or kept_lines(latex), f' data-latex="{source}"' if source else "")
+            attributes = f' data-latex="{source}"' if source else ""
+            if mathml:
+                return f'<div class="equation"{attributes}><math display="block">{mathml}</math></div>'
+            return _preformatted(kept_lines(text) or kept_lines(latex), attributes)
         case Code(text):
             return _preformatted(kept_lines(text))
         case _:
             assert_never(block)
+
+
+def _inline(equation: Equation) -> str:
+    """An equation in running text."""
+    return f"<math>{equation.mathml}</math>" if equation.mathml else html.escape(plain(equation.text))
 
 
 def _bullets_html(block: Bullets) -> str:

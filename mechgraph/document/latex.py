@@ -88,7 +88,7 @@ def block_latex(block: Block) -> str:
         case Legend(entries):
             items = [rf"\item ${plain(e.latex)}$: {latex_words(meaning)}" for e, meaning in entries]
             return "\n".join(_itemize(items))
-        case Equation(text, latex):
+        case Equation(text=text, latex=latex):
             lines = [line for line in kept_lines(latex) if line]
             return "\n".join([r"\[", *lines, r"\]"]) if lines else _verbatim(kept_lines(text))
         case Code(text):

@@ -63,7 +63,7 @@ def _block_markdown(block: Block) -> str:
             return _table_markdown(block)
         case Legend(entries):
             return "\n".join(f"- ${plain(e.latex)}$: {_markdown(meaning)}" for e, meaning in entries)
-        case Equation(text, latex):
+        case Equation(text=text, latex=latex):
             lines = [line for line in kept_lines(latex) if line]
             return "\n".join(["$$", *lines, "$$"]) if lines else _fenced(kept_lines(text))
         case Code(text):

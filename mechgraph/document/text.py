@@ -61,7 +61,7 @@ def _block_text(block: Block, width: int) -> str:
             return _block_text(block.bullets(), width)
         case Table():
             return _table_text(block, width)
-        case Equation(text, latex):
+        case Equation(text=text, latex=latex):
             return "\n".join(_equation_line(line, width) for line in kept_lines(text) or kept_lines(latex))
         case Code(text):
             return "\n".join(kept_lines(text))

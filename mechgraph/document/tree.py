@@ -123,13 +123,15 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Equation:
-    r"""A displayed equation: `text` (may have several lines) and `latex`, valid inside ``\[ \]``.
+    r"""A displayed equation: `text` (may have several lines), `latex`, valid inside ``\[ \]``, and `mathml`, the content of a ``math``.
 
-    Text and HTML show `text`, Markdown and LaTeX show `latex`; where one form is empty the other serves.
+    Text shows `text`, Markdown and LaTeX show `latex`, HTML `mathml`; where one form is empty the text or the LaTeX form serves.
+    `mathml` is markup: whoever makes it escapes the names in it.
     """
 
     text: str
     latex: str = ""
+    mathml: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from mechgraph.document import Block as Piece
 from mechgraph.document import Bullets, Document, Equation, Heading, Legend, Paragraph, Table
+from mechgraph.equations.mathml import mathml
 from mechgraph.equations.motion import Closure, closure_of
 from mechgraph.equations.symbols import Symbol, Words, moment_of, names_of, written
 from mechgraph.equations.system import LinearSystem
@@ -79,7 +80,7 @@ def _dual(letter: str, place: str, name: str = "") -> Symbol:
 
 
 def _entry(*words: str | Symbol) -> Equation:
-    return Equation(written(words), written(words, latex=True))
+    return Equation(written(words), written(words, latex=True), mathml(words))
 
 
 A = Symbol("A", "k", "vector")
@@ -99,7 +100,7 @@ SYMBOLS = (
         "its moment about the global origin, P the origin of its frame, for an effort that of the marker on the second link",
     ),
     (
-        Equation("A_k + e A0_k", _entry(_dual("A", "k"), "=", A, "+", "e", A0).latex),
+        replace(_entry(_dual("A", "k"), "=", A, "+", "e", A0), text="A_k + e A0_k"),
         "the axis as a line, what A stands for among dual vectors",
     ),
     (
@@ -226,7 +227,7 @@ def formulation_document(f: Printed, components: bool) -> Document:
     ):
         if mine:
             blocks.append(Heading(title, 2))
-            blocks += [Equation(b.text, b.latex) for b in mine]
+            blocks += [Equation(b.text, b.latex, b.mathml) for b in mine]
     blocks.append(Heading("Unknowns (3.52)", 2))
     rows = tuple((str(i), u.name, u.meaning) for i, u in enumerate(f.unknowns, 1))
     blocks.append(Table(("column", "unknown", "meaning"), rows, align="rll"))
@@ -245,4 +246,5 @@ def _components(title: str, system: LinearSystem, mark: str) -> list[Piece]:
 
 
 def _numbered(number: str, words: Words) -> Equation:
-    return Equation(f"({number})  {written(words)}", rf"{written(words, latex=True)} \tag{{{number}}}")
+    shown = f'<mtext>({number})</mtext><mspace width="1em"/>{mathml(words)}'
+    return Equation(f"({number})  {written(words)}", rf"{written(words, latex=True)} \tag{{{number}}}", shown)

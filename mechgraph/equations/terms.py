@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from mechgraph.equations.mathml import mathml
 from mechgraph.equations.symbols import Symbol, Words, written
 
 AXES = ("x", "y", "z")
@@ -112,6 +113,11 @@ class Block:
     def latex(self) -> str:
         """In LaTeX."""
         return written(self.words, latex=True)
+
+    @property
+    def mathml(self) -> str:
+        """The content of a MathML element."""
+        return mathml(self.words)
 
 
 @dataclass(frozen=True)
