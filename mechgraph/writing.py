@@ -147,7 +147,7 @@ class Format:
 
 
 def format_of(path: str | os.PathLike[str], formats: Sequence[Format]) -> Format:
-    """The format that the suffix of a path says, whose packages are there.
+    """The format that the suffix of a path says, whose packages are there; the first where there is no suffix (a pipe, a device).
 
     Raises
     ------
@@ -158,11 +158,15 @@ def format_of(path: str | os.PathLike[str], formats: Sequence[Format]) -> Format
         raise DeclarationError("write", [f"path = {path!r}: expected a path, as a text or a Path"])
     suffix = Path(os.fsdecode(path)).suffix.lower()
     for one in formats:
-        if suffix in one.suffixes:
+        if not suffix or suffix in one.suffixes:
             one.available()
             return one
-    known = ", ".join(f"{' '.join(one.suffixes)} ({one.name})" for one in formats)
-    raise FileError(path, f"the suffix says how a file is written; known: {known}")
+    raise FileError(path, f"the suffix says how a file is written; known: {formats_text(formats)}")
+
+
+def formats_text(formats: Sequence[Format]) -> str:
+    """The suffixes and what they stand for."""
+    return ", ".join(f"{' '.join(one.suffixes)} ({one.name})" for one in formats)
 
 
 def optional(package: str, extra: str) -> Any:

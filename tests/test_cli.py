@@ -130,6 +130,36 @@ def test_equations() -> None:
     assert "alpha_1" in run("equations", "rcsr", "--unknowns", "response", "--blocks").stdout
 
 
+def test_files_as_the_suffix_says(tmp_path: Path) -> None:
+    pytest.importorskip("h5netcdf")
+    pytest.importorskip("pyarrow")
+    import pandas
+    import xarray
+
+    for name, read in (("x.csv", pandas.read_csv), ("x.parquet", pandas.read_parquet)):
+        assert (
+            f"Wrote {tmp_path / name}: 72 rows, 74 columns."
+            in run("solve", "7r", "--drive", "O1=0:360:5deg@10", "--out", tmp_path / name).stdout
+        )
+        assert read(tmp_path / name).shape == (72, 74)
+    assert run("respond", "windows-2", "--for", "1s", "--points", "5", "--out", tmp_path / "r.nc").exit_code == 0
+    with xarray.open_dataset(tmp_path / "r.nc", engine="h5netcdf") as data:
+        assert data["A0.Rz"].dims == ("t",)
+        assert data.t.values.tolist() == np.linspace(0, 1, 5).tolist()
+    for command in ("solve", "respond"):
+        assert ".csv (CSV), .nc (NetCDF), .parquet (Parquet)" in bad(
+            command, "7r", *(["--for", "1s"] * (command == "respond")), "--out", tmp_path / "x.xlsx"
+        )
+    assert "Wrote" in run("equations", "rcsr", "--blocks", "--out", tmp_path / "e.tex").stdout
+    assert (tmp_path / "e.tex").read_text().startswith(r"\documentclass")
+    assert "leave out" in bad("equations", "rcsr", "--csv", "--out", tmp_path / "e.csv")
+    for name in ("m.toml", "m.graphml", "m.json"):
+        assert run("save", "rcsr", "--out", tmp_path / name).exit_code == 0
+    assert mg.load(tmp_path / "m.toml") == mg.load("rcsr")
+    assert len(json.loads((tmp_path / "m.json").read_text())["nodes"]) == 4
+    assert "file of the mechanism" in bad("save", tmp_path / "m.toml", "--out", tmp_path / "m.toml")
+
+
 def test_equations_with_numbers() -> None:
     """{Q}, {C} and {U} at a position with its rates are those of the solution there."""
     shown = run("equations", "rcsr", "--at", "O1=160deg@0.1").stdout

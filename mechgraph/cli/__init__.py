@@ -2,7 +2,7 @@
 
 from mechgraph.cli.determinacy import check
 from mechgraph.cli.formulation import equations
-from mechgraph.cli.library import list_library
+from mechgraph.cli.library import list_library, save
 from mechgraph.cli.motion import respond, solve
 from mechgraph.cli.program import app
 
@@ -13,3 +13,4 @@ app.command("check")(check)
 app.command("equations")(equations)
 app.command("solve")(solve)
 app.command("respond")(respond)
+app.command("save")(save)

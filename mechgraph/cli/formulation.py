@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
@@ -11,8 +12,10 @@ import typer
 import mechgraph as mg
 from mechgraph.cli.options import Bookkeeping, EquationsAt, Named
 from mechgraph.cli.output import show, working, write
-from mechgraph.cli.reading import loaded
+from mechgraph.cli.reading import check_out, loaded
+from mechgraph.equations.formulation import FORMATS
 from mechgraph.typed import drives_of, refuse
+from mechgraph.writing import formats_text
 
 
 def solved_at(m: mg.Mechanism, at: list[str]) -> mg.Solution:
@@ -37,6 +40,14 @@ def equations(
         typer.Option(help="What is sought: forces for a given motion, or accelerations beside the reactions."),
     ] = "kinetostatics",
     at: EquationsAt = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            help=f"Write them; the suffix says how: {formats_text(FORMATS)}, the first compiles.",
+        ),
+    ] = None,
 ) -> None:
     """Print the closure equations, the d'Alembert equations of every link and the conditions of the pairs; needs no geometry.
 
@@ -48,10 +59,16 @@ def equations(
         refuse("equations", "--coefficients and --csv print a table, --latex and --blocks equations; take one of them")
     if at and (latex or blocks):
         refuse("equations", "--at prints a table of numbers, --latex and --blocks equations; take one of them")
+    if out and (latex or coefficients or csv or at):
+        refuse("equations", "--out writes what its suffix says; leave out --latex, --coefficients, --csv and --at")
+    check_out(out, mechanism, FORMATS)
     m = loaded(mechanism)
     s = solved_at(m, at) if at else None
     f = mg.formulate(s.mechanism if s else m, bookkeeping, unknowns=unknowns)
-    if csv or coefficients or at:
+    if out is not None:
+        f.write(out, components=not blocks)
+        write(f"Wrote {out}: {len(f.unknowns)} unknowns, {len(f.equations)} equations.\n")
+    elif csv or coefficients or at:
         table = f.coefficients(s.state() if s else None)
         names = "" if csv or not at else "".join(f"u({i}): {u.name}\n" for i, u in enumerate(f.unknowns, 1))
         write(names + (table.csv() if csv else table.text()))

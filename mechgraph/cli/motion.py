@@ -12,7 +12,8 @@ import mechgraph as mg
 from mechgraph.cli.options import Actuate, Compare, Drives, Engine, Method, Named, OnReach, Out, Redundant, Tolerance
 from mechgraph.cli.outcome import NO_ANSWER, fail
 from mechgraph.cli.output import progress, show, working, write
-from mechgraph.cli.reading import loaded, refuse_own_file, show_compared
+from mechgraph.cli.reading import check_out, loaded, show_compared
+from mechgraph.result.export import FORMATS
 from mechgraph.result.summary import summary
 from mechgraph.typed import drives_of, duration, parse_at
 
@@ -35,7 +36,7 @@ def solve(
     solved), a freedom is neither driven nor passive, or drivers contradict each other; 2 wrong usage or bad input. A file is
     written whole or not at all.
     """
-    refuse_own_file(out, mechanism)
+    check_out(out, mechanism, FORMATS)
     m = loaded(mechanism)
     motions = drives_of(m, drive or ())
     with working(f"solving {m.name}"):
@@ -46,7 +47,7 @@ def solve(
         unique = mg.check(s.mechanism).unique if redundant == "minimum_norm" else None
         document = summary(s, unique)
         if out is not None:
-            s.to_csv(out)
+            s.write(out)
     show(document)
     if out is not None:
         write(f"\nWrote {out}: {s.status.size} rows, {len(s.part(slice(1)).columns())} columns.\n")
@@ -86,7 +87,7 @@ def respond(
     Exit status: 0 done; 1 the loops cannot be closed, or the motion cannot be followed to its end (what there is is written); 2 wrong
     usage or bad input. Ctrl-C keeps what was computed. A file is written whole or not at all.
     """
-    refuse_own_file(out, mechanism)
+    check_out(out, mechanism, FORMATS)
     m, end = loaded(mechanism), duration(span)
     begin = dict(parse_at(m, text, "--start") for text in start or ())
     rates = dict(parse_at(m, text, "--rate") for text in rate or ())
@@ -98,7 +99,7 @@ def respond(
         )  # fmt: skip
         document = summary(r, None)
         if out is not None:
-            r.to_csv(out)
+            r.write(out)
     show(document)
     largest = float(np.abs(r.energy.kinetic).max())
     off = float(np.abs(r.energy.balance).max()) / (largest or 1.0)

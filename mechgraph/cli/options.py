@@ -8,6 +8,8 @@ from typing import Annotated, Literal
 import typer
 
 from mechgraph.exchange.files import READERS
+from mechgraph.result.export import FORMATS
+from mechgraph.writing import formats_text
 
 Named = Annotated[
     str,
@@ -71,7 +73,12 @@ Actuate = Annotated[
     ),
 ]
 Out = Annotated[
-    Path | None, typer.Option("--out", metavar="FILE.csv", help="Write everything as CSV, one row a position.")
+    Path | None,
+    typer.Option(
+        "--out",
+        metavar="FILE",
+        help=f"Write everything, one row a position; the suffix says how: {formats_text(FORMATS)}.",
+    ),
 ]
 
 Compare = Annotated[

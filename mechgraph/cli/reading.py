@@ -6,6 +6,7 @@ import difflib
 import os
 import sys
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 
 import mechgraph as mg
@@ -14,7 +15,7 @@ from mechgraph.errors import visible
 from mechgraph.exchange.comparison import compare
 from mechgraph.exchange.files import READERS
 from mechgraph.typed import refuse
-from mechgraph.writing import writable
+from mechgraph.writing import Format, format_of, writable
 
 LONGEST_NAME = 100
 """Characters of a wrong name that are compared with those of the library."""
@@ -38,10 +39,17 @@ def loaded(name: str) -> mg.Mechanism:
     raise mg.FileError(name, f"no mechanism of that name in the library, and no such file; {hint}")
 
 
-def refuse_own_file(out: Path | None, mechanism: str) -> None:
+def refuse_own_file(out: Path, mechanism: str) -> None:
     """Let no output take the place of the file that the mechanism is read from."""
-    if out is not None and writable(out).exists() and os.path.lexists(mechanism) and out.samefile(mechanism):
+    if writable(out).exists() and os.path.lexists(mechanism) and out.samefile(mechanism):
         refuse(f"--out {str(out)!r}", "is the file of the mechanism; name another")
+
+
+def check_out(out: Path | None, mechanism: str, formats: Sequence[Format]) -> None:
+    """Refuse an output that no format takes, or that is the file of the mechanism, before anything is computed."""
+    if out is not None:
+        refuse_own_file(out, mechanism)
+        format_of(out, formats)
 
 
 def show_compared(mechanism: str) -> None:
