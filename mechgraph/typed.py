@@ -12,7 +12,7 @@ from mechgraph.closure.prescription import coordinate
 from mechgraph.errors import MechgraphError, shortened
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
-from mechgraph.model.toml import MOST_POSITIONS
+from mechgraph.model.sweep import swept
 
 
 class UsageError(MechgraphError):
@@ -103,13 +103,10 @@ def parse_drive(m: Mechanism, text: str) -> tuple[str, Motion]:
     )[:2]
     if len(values) == 1:
         return name, Motion(values[0], velocity, acceleration)
-    start, stop, step = values
-    if step == 0 or (stop - start) / step <= 0:
-        refuse(where, f"a step of {parts[2]!r} does not go from {parts[0]!r} to {parts[1]!r}")
-    count = (stop - start) / step
-    if count > MOST_POSITIONS:
-        refuse(where, f"{count:.3g} positions: the command line takes at most {MOST_POSITIONS}")
-    return name, Motion(start + step * np.arange(int(np.ceil(count - 1e-9))), velocity, acceleration)
+    positions = swept(*values)
+    if isinstance(positions, str):
+        refuse(where, positions)
+    return name, Motion(positions, velocity, acceleration)
 
 
 def drives_of(m: Mechanism, texts: Sequence[str]) -> dict[str, Motion]:

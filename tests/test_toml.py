@@ -154,7 +154,8 @@ def test_degrees_are_radians_and_the_end_of_a_sweep_is_excluded() -> None:
         (30, 390, 1, 360),
         (0, -90, -0.3, 300),
         (0, 10, 3, 4),
-        (5, 5, 1, 0),
+        (0, 1e-10, 1, 1),
+        (1000.1, 1000.4, 0.1, 3),
     ):
         swept = (
             toml.parse(tomllib.loads(FOUR_BAR.replace("[0.0, 360.0, 1.0]", f"[{first}, {end}, {step}]")), "x")
@@ -281,7 +282,22 @@ def test_what_no_reader_can_hold_is_refused_with_its_place(tmp_path: Path, conte
 @pytest.mark.parametrize("sweep", ["[0, 1e9, 1]", "[0, 1e99, 1e-99]", "[0.0, -1e12, -0.1]"])
 def test_a_sweep_of_too_many_positions_is_refused(tmp_path: Path, sweep: str) -> None:
     path = written(tmp_path, FOUR_BAR.replace("[0.0, 360.0, 1.0]", sweep))
-    with pytest.raises(mg.FileError, match=r"drive 1\.motion\.sweep = .*at most 1000000 positions"):
+    with pytest.raises(mg.FileError, match=r"drive 1\.motion\.sweep = .* positions, at most 1000000 are taken"):
+        mg.load(path)
+
+
+@pytest.mark.parametrize(
+    ("sweep", "words"),
+    [
+        ("[6, 5, 0.5]", "leads away"),
+        ("[5.0, 6.0, -1.0]", "leads away"),
+        ("[5, 5, 1]", "the end"),
+        ("[0, 1, 0]", "is 0"),
+    ],
+)
+def test_a_sweep_without_positions_is_refused(tmp_path: Path, sweep: str, words: str) -> None:
+    path = written(tmp_path, FOUR_BAR.replace("[0.0, 360.0, 1.0]", sweep))
+    with pytest.raises(mg.FileError, match=rf"drive 1\.motion\.sweep = .*: no positions: .*{words}"):
         mg.load(path)
 
 

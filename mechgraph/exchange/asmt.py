@@ -18,7 +18,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array, compose
 from mechgraph.errors import DeclarationError, FileError
 from mechgraph.exchange.indented import Node, numbers_of, tree_of
-from mechgraph.model.toml import MOST_POSITIONS
+from mechgraph.model.sweep import MOST_POSITIONS
 from mechgraph.quantities import shown
 
 FIRST_LINES = ("OndselSolver", "freeCAD: 3D CAD with Motion Simulation  by  askoh.com")

@@ -28,13 +28,10 @@ from mechgraph.model.load import LOADS
 from mechgraph.model.mechanism import Mechanism, check_mechanism
 from mechgraph.model.pair_table import TABLE as PAIR_TABLE
 from mechgraph.model.pair_type import PairType
+from mechgraph.model.sweep import swept
 from mechgraph.quantities import is_numeric, real_array, shown, wrong
 from mechgraph.writing import write_whole
 
-SWEEP_ROUNDING = 1e-12
-"""Part of a sweep by which its end may come early and still be excluded (degrees turned into radians are rounded)."""
-MOST_POSITIONS = 1_000_000
-"""Longest sweep that a file or the command line may ask for."""
 LARGEST_FILE = 64 * 2**20
 """Bytes of the largest file that is read: some 200,000 links."""
 DEEPEST = 32
@@ -154,18 +151,12 @@ def _with_sweep(reader: _Reader, fields: dict[str, Any], where: str) -> None:
     if sweep is None:
         if "position" not in fields:
             reader.faults.append(f"{where}: position or sweep missing")
-    elif "position" in fields or not is_numeric(sweep, (3,)) or not sweep[2]:
+    elif "position" in fields or not is_numeric(sweep, (3,)):
         reader.faults.append(wrong(sweep, f"{where}.sweep", "[first, end (excluded), step], and no position beside it"))
-    elif (sweep[1] - sweep[0]) / sweep[2] > MOST_POSITIONS:
-        reader.faults.append(wrong(sweep, f"{where}.sweep", f"at most {MOST_POSITIONS} positions; take a larger step"))
+    elif isinstance(positions := swept(*sweep), str):
+        reader.faults.append(f"{where}.sweep = {shown(sweep)}: {positions}")
     else:
-        fields["position"] = _swept(*sweep)
-
-
-def _swept(first: float, end: float, step: float) -> np.ndarray:
-    """Positions ``first + k step`` before ``end``; an end that is a whole number of steps away is left out despite rounding."""
-    count = np.ceil((end - first) / step * (1.0 - SWEEP_ROUNDING))
-    return first + step * np.arange(max(int(count), 0))
+        fields["position"] = positions
 
 
 def _with_type(reader: _Reader, fields: dict[str, Any], where: str) -> None:

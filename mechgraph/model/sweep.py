@@ -1,0 +1,24 @@
+"""A sweep: positions in equal steps up to an end that is excluded, as files and the command line give it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+
+MOST_POSITIONS = 1_000_000
+"""Longest sweep that a file or the command line may ask for."""
+ROUNDING = 1e-9
+"""Part of a step by which the end may come late through rounding and still be excluded."""
+
+
+def swept(first: float, end: float, step: float) -> Array | str:
+    """Positions ``first + k step`` before ``end``, or why there are none."""
+    if step == 0 or first == end:
+        return "no positions: " + ("the step is 0" if step == 0 else "the end, which is excluded, is also the first")
+    count = (end - first) / step
+    if count < 0:
+        return "no positions: the step leads away from the end; change its sign, or exchange first and end"
+    if count > MOST_POSITIONS:
+        return f"{count:.3g} positions, at most {MOST_POSITIONS} are taken; take a larger step"
+    return np.asarray(first + step * np.arange(max(int(np.ceil(count - ROUNDING)), 1)), dtype=float)
