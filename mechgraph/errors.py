@@ -33,6 +33,12 @@ def listed(names: Iterable[object], most: int = MOST_NAMES) -> str:
     return ", ".join(shown[:most]) + (f" and {more} more" if more > 0 else "")
 
 
+def counted(number: int, name: str) -> str:
+    """``1 node of the path``, ``2 nodes of the path``."""
+    first, *rest = name.split(" ", 1)
+    return " ".join([str(number), first if number == 1 else f"{first}s", *rest])
+
+
 def shortened(text: str) -> str:
     """A text without its middle, where it is too long to be read."""
     half = LONGEST_FAULT // 2

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
-from mechgraph.document import to_text
-from mechgraph.result.summary import summary
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 WAYS = [(engine, method) for engine in ("dense", "sparse") for method in ("loop_wrench", "newton_euler", "printed")]
@@ -135,7 +133,7 @@ def test_where_the_actuators_rest_forces_have_no_value() -> None:
         assert (np.isnan(s["D"].effort[:, 0]) == rest).all()
         assert np.isfinite(s["D"].velocity).all()
         assert np.nanmax(s.checks.equilibrium) < 1e-12
-    text = to_text(summary(s))
+    text = s.summary()
     assert "position 0: actuators at dead point (before A.Rz = 30 deg)" in text
     assert "D.Tz" in text.partition("Efforts of the drivers")[2].partition("Applied")[0]
     assert "A.Rz" in text.partition("Efforts of the drivers")[0]

@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
-from mechgraph.document import to_text
-from mechgraph.result.summary import summary
 from mechgraph.units import FORCE, FORCE_PER_LENGTH, MOMENT, force_hint, unit_of
 
 
@@ -194,7 +192,7 @@ def test_units_and_the_hint(base: tuple[str, ...], force: str, moment: str, stif
         moment,
         stiffness,
     )
-    text = to_text(summary(loaded(**units)))
+    text = loaded(**units).summary()
     assert ("loads are read" in text) == bool(advice)
     assert advice in " ".join(text.split())
 

@@ -12,7 +12,6 @@ import pytest
 
 import mechgraph as mg
 from mechgraph.document import to_html, to_latex, to_markdown, to_text
-from mechgraph.result.summary import summary
 
 NAMES = [
     r"\input{secret}", r"$\write18{ls}$", "a%b&c#d_e^f~g", r"\end{verbatim}\input{x}", "=cmd|' /C calc'!A0", "+1+1", "-2-2", "@SUM(A1)",
@@ -52,7 +51,7 @@ class Tags(HTMLParser):
 def test_documents(name: str) -> None:
     m = named(name)
     s = mg.solve(m, {f"{name}p0": 0.1})
-    for document in (mg.check(m).document(), mg.formulate(m).document(), summary(s)):
+    for document in (mg.check(m).document(), mg.formulate(m).document(), s.document()):
         shown = to_text(document), to_latex(document), to_markdown(document), to_html(document)
         for text in shown:
             assert not HIDDEN.search(text)

@@ -14,7 +14,6 @@ from mechgraph.cli.outcome import NO_ANSWER, fail
 from mechgraph.cli.output import progress, show, working, write
 from mechgraph.cli.reading import check_out, loaded, show_compared
 from mechgraph.result.export import FORMATS
-from mechgraph.result.summary import summary
 from mechgraph.typed import drives_of, duration, parse_at
 
 
@@ -44,8 +43,7 @@ def solve(
             warnings.simplefilter("ignore", mg.MechgraphWarning)  # the summary has them
             how: dict[str, Any] = {"method": method, "redundant": redundant, "on_reach": on_reach, "engine": engine}
             s = mg.solve(m, motions or None, actuate=actuate, tol=tol, **how)
-        unique = mg.check(s.mechanism).unique if redundant == "minimum_norm" else None
-        document = summary(s, unique)
+        document = s.document(asked=True)
         if out is not None:
             s.write(out)
     show(document)
@@ -97,14 +95,11 @@ def respond(
             m, t, start=begin, rates=rates, rtol=rtol, atol=atol, method=method, engine=engine, on_stop="return",
             progress=moved,
         )  # fmt: skip
-        document = summary(r, None)
+        document = r.document(asked=True)
         if out is not None:
             r.write(out)
     show(document)
-    largest = float(np.abs(r.energy.kinetic).max())
-    off = float(np.abs(r.energy.balance).max()) / (largest or 1.0)
-    write(f"\nEnergy balance to {off:.0e} of the largest kinetic energy; {r.work}.\n")
     if out is not None:
-        write(f"Wrote {out}: {r.status.size} rows, {len(r.part(slice(1)).columns())} columns.\n")
+        write(f"\nWrote {out}: {r.status.size} rows, {len(r.part(slice(1)).columns())} columns.\n")
     if r.stopped:
         fail(r.stopped, NO_ANSWER)

@@ -16,7 +16,7 @@ from rich.text import Text
 import mechgraph as mg
 from mechgraph.cli.output import is_terminal
 from mechgraph.errors import visible
-from mechgraph.result.summary import OK, driver_value
+from mechgraph.result.places import OK, driver_value
 from mechgraph.starting import INTERRUPTED
 
 DONE, NO_ANSWER, BAD_INPUT = 0, 1, 2

@@ -13,6 +13,7 @@ from mechgraph.document.html import to_html
 from mechgraph.document.latex import latex_words, to_latex
 from mechgraph.document.latex_file import to_latex_file
 from mechgraph.document.markdown import to_markdown
+from mechgraph.document.shown import Shown
 from mechgraph.document.text import to_text
 from mechgraph.document.tree import Block, Bullets, Code, Document, Equation, Heading, Legend, Paragraph, Table
 
@@ -25,6 +26,7 @@ __all__ = [
     "Heading",
     "Legend",
     "Paragraph",
+    "Shown",
     "Table",
     "latex_words",
     "to_html",

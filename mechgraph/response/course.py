@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -13,6 +13,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import CLOSED
 from mechgraph.closure.driver_path import in_blocks
 from mechgraph.closure.indexing import Index
+from mechgraph.document import Bullets, Document, Heading, Paragraph
 from mechgraph.errors import DeclarationError, ResponseError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import real_array, wrong
@@ -23,6 +24,7 @@ from mechgraph.response.integration import Integration
 from mechgraph.response.motion_equations import moved
 from mechgraph.response.reading import trajectory_of
 from mechgraph.result.solution import Solution
+from mechgraph.result.summary import summary
 from mechgraph.result.trajectory import Trajectory
 from mechgraph.structure.snapping import SnappedMechanism, declared_closure
 
@@ -62,6 +64,14 @@ class Response(Solution):
     def __init__(self, trajectory: Trajectory, energy: Energy, course: Course) -> None:
         super().__init__(trajectory)
         self.energy, self._course = energy, course
+
+    def document(self, asked: bool = False) -> Document:
+        """The summary of a Solution, with the balance of energies, and what happened."""
+        largest = float(np.abs(self.energy.kinetic).max(initial=0.0)) or 1.0
+        balance = ("energy balance, of the largest kinetic energy", self.energy.balance / largest)
+        made = summary(self._values, asked, (balance,))
+        events = Heading("Events" if self.events else "", 2), Bullets([str(one) for one in self.events])
+        return replace(made, blocks=(Paragraph(self.stopped), *made.blocks, *events))
 
     def at(self, t: Any) -> Response:
         """The response at other times within those that were integrated (dense output of the stepper, closed and with all forces).

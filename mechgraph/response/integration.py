@@ -16,6 +16,7 @@ import scipy
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.indexing import Index
+from mechgraph.errors import counted
 from mechgraph.response.chart import Closed
 from mechgraph.response.charts import Task
 from mechgraph.response.motion_equations import Stopped
@@ -68,14 +69,13 @@ class Count:
     coordinates: str = ""
 
     def __str__(self) -> str:
-        return ", ".join(f"{number} {name}{'' if number == 1 else 's'}" for number, name in self.counts) + (
-            f" {self.coordinates}"
-        )
+        return ", ".join(counted(number, name) for number, name in self.counts)
 
     @property
     def counts(self) -> tuple[tuple[int, str], ...]:
-        """What a summary shows: numbers, and of what."""
-        return (self.evaluations, "evaluation"), (self.steps, "step"), (self.stages, "stage")
+        """Numbers, and of what."""
+        stage = f"stage {self.coordinates}".strip()
+        return (self.evaluations, "evaluation"), (self.steps, "step"), (self.stages, stage)
 
 
 @dataclass

@@ -12,7 +12,7 @@ import numpy as np
 
 from mechgraph.errors import visible
 from mechgraph.result.table import Include, table_of
-from mechgraph.result.views import Values
+from mechgraph.result.values import Values
 from mechgraph.units import BASE_UNITS
 from mechgraph.writing import Format, csv_of, format_of, optional, whole_file, write_whole
 

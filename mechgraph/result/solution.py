@@ -6,14 +6,18 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.document import Document, Shown, to_text
 from mechgraph.equations.state import State
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.newton import Work
 from mechgraph.quantities import wrong
 from mechgraph.result import export
+from mechgraph.result.places import OK
+from mechgraph.result.summary import summary
 from mechgraph.result.table import Include, table_of
-from mechgraph.result.views import Checks, CouplingResult, LinkResult, LoadBearing, LoadResult, PairResult, Values
+from mechgraph.result.values import Checks, LoadBearing, LoadResult, Values
+from mechgraph.result.views import CouplingResult, LinkResult, PairResult
 
 if TYPE_CHECKING:
     import os
@@ -22,7 +26,7 @@ if TYPE_CHECKING:
     import xarray
 
 
-class Solution:
+class Solution(Shown):
     """Motion and forces at a batch of positions, by name: ``s["D"].reaction``, ``s.link("coupler").pose``.
 
     It can be pickled where its loads can: those that hold numbers, or a function of a module.
@@ -131,6 +135,17 @@ class Solution:
         """What makes reactions doubtful: passive freedoms that carry load, with size, unit, links and pairs."""
         return self._values.load_bearing()
 
+    def document(self, asked: bool = False) -> Document:
+        """What ``print`` shows; ``asked`` as in ``summary()``, also what takes long."""
+        return summary(self._values, asked)
+
+    def summary(self) -> str:
+        """Positions, ranges of the drivers and of their efforts, greatest reactions and where, checks, engine and work, as text.
+
+        The text of the command line and of ``print``, which leaves out what takes long at many positions of many pairs.
+        """
+        return to_text(self.document(asked=True))
+
     def state(self, index: Any = ()) -> State:
         """Screws, loads and coordinates at one position, for ``Formulation.assemble``."""
         return self._values.state(index)
@@ -179,4 +194,6 @@ class Solution:
         export.to_csv(self._values, path, include)
 
     def __repr__(self) -> str:
-        return f"Solution({self.mechanism.name!r}, batch {self.batch})"
+        status = self.status
+        solved = f"{int((status == OK).sum())} of {status.size} solved"
+        return f"{type(self).__name__}({self.mechanism.name!r}, batch {self.batch}, {solved}; print it for its summary)"

@@ -2,29 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Table
-from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair import Pair
-from mechgraph.result.solution import Solution
+from mechgraph.errors import counted
+from mechgraph.result.extremes import Greatest, Range, Reactions, efforts, reactions
+from mechgraph.result.places import NOISE, OK, Places, bracket, number, with_unit
+from mechgraph.result.values import Values
 from mechgraph.units import force_hint, unit_of
 
-OK = "ok"
-"""Status of a solved position."""
+LISTED = 20
+"""Most rows of one table."""
+UNASKED = 1_000_000
+"""Reactions (pairs times positions) up to which the extremes are found without being asked for."""
+RATE = 1e6
+"""Reactions that are looked through in a second, about."""
 
-NOISE = 1e-11
-"""Part of the largest value of its kind below which a value is rounding noise and shown as 0."""
+LEAST_NORM = (
+    "Any self-stress can be added to these components; the values shown are those of least norm, an assumption: all pairs equally "
+    "stiff, links rigid, nothing strained at assembly."
+)
+NO_VALUE = (
+    "Any self-stress can be added to these components, so they have no value (NaN). The table above shows what is unique; where "
+    "components are missing, those that it contains are named in brackets."
+)
 
-TIE = 1e-9
-"""Relative difference below which two values share the extreme; the first position is named."""
 
-
-def summary(s: Solution, not_unique: Mapping[str, Mapping[str, bool]] | None = None) -> Document:
+def summary(values: Values, asked: bool = True, more_checks: tuple[tuple[str, Any], ...] = ()) -> Document:
     """Positions solved and not solved, ranges of the drivers' efforts, greatest reactions and where, checks, and the work.
 
     Angles of drivers are shown in degrees. Forces and moments are those of ``s[pair].force`` and ``s[pair].moment``: of the
@@ -32,110 +40,44 @@ def summary(s: Solution, not_unique: Mapping[str, Mapping[str, bool]] | None = N
 
     Parameters
     ----------
-    not_unique : ``report.unique`` of the mechanism, to name the reactions that are not unique where the solution holds those of
-        least norm. Left out, they are the NaN ones.
+    asked : whether the summary was asked for: unasked it leaves out what takes long, and says how long.
+    more_checks : names of further checks, and their values over the positions.
     """
-    view = _View(s)
+    view = _View(values)
     blocks: list[Block] = [*view.positions(), *view.driver_table()]
-    if s.has_forces and view.solved.any():
-        if view.loaded:
-            blocks += [*view.effort_tables(), *view.reaction_table()]
-        else:
-            blocks.append(
-                Paragraph("All efforts and reactions are zero: no link has a mass that moves and no load acts.")
-            )
-        blocks += [*view.redundant(not_unique), *view.passive()]
+    if values.has_forces and view.solved.any():
+        size = len(view.m.pairs) * view.status.size
+        blocks += view.forces() if asked or size <= UNASKED else [Paragraph(view.left_out(size))]
+        blocks += view.passive()
     if view.solved.any():
-        blocks += view.checks()
-    hint = force_hint(s.mechanism.units)
-    blocks += [view.work(), *([Paragraph(hint)] if hint and s.has_forces else [])]
-    return Document(f"Solution of {s.mechanism.name}", tuple(blocks))
+        blocks += view.checks(more_checks)
+    hint = force_hint(view.m.units)
+    blocks += [view.work(), *([Paragraph(hint)] if hint and values.has_forces else [])]
+    return Document(f"Solution of {view.m.name}", tuple(blocks))
 
 
-def driver_value(m: Mechanism, name: str, value: float) -> str:
-    """``A.Rz = 30 deg``: a driver's value with its unit, degrees for a turn."""
-    return f"{name} = {_shown_value(m, name, value)}"
+class _View(Places):
+    """One solution with its positions laid out flat, and what is told of it."""
 
-
-def _shown_value(m: Mechanism, name: str, value: float) -> str:
-    if m.turns(name):
-        return f"{_number(float(np.rad2deg(value)))} deg"
-    return _with_unit(_number(value), unit_of(m.units, (1, 0, 0)))
-
-
-class _View:
-    """One solution with its positions laid out flat."""
-
-    def __init__(self, s: Solution) -> None:
-        self.s = s
-        self.m: Mechanism = s.mechanism
-        self.status = np.asarray(s.status).reshape(-1)
-        self.solved = self.status == OK
-        self.drivers = s.prescribed
-        self.driver_values = [self.of_freedom(name, "position") for name in self.drivers]
+    def __init__(self, values: Values) -> None:
+        super().__init__(values)
         self.force_unit = unit_of(self.m.units, (1, 1, -2))
         self.moment_unit = unit_of(self.m.units, (2, 1, -2))
-        self.forces, self.moments = self._magnitudes() if s.has_forces else ([], [])
-        self.efforts = {name: self.of_freedom(name, "effort") for name in s.actuated} if s.has_forces else {}
-        self.applied = self._applied() if s.has_forces else {}
-        self.extent = self._extent()
-        every = (*self.forces, *self.moments, *self.efforts.values(), *self.applied.values())
-        # what is not unique has no value, and may be anything
-        self.loaded = _largest(every) > 0 or any(np.isnan(row[self.solved]).any() for row in every)
 
-    def flat(self, values: Any) -> Array:
-        """One value a position."""
-        return np.asarray(values, dtype=float).reshape(self.status.size)
+    @cached_property
+    def ranges(self) -> tuple[Range, Range]:
+        """Ranges of own and of applied efforts of all freedoms."""
+        return efforts(self.values)
 
-    def of_freedom(self, name: str, what: str) -> Array:
-        """A quantity of one freedom over the positions."""
-        k, j = self.s.whole.freedom(name)
-        return self.flat(getattr(self.s[self.s.whole.pairs[k].name], what)[..., j])
+    @cached_property
+    def reactions(self) -> Reactions:
+        """The greatest reactions."""
+        return reactions(self.values)
 
-    def _applied(self) -> dict[str, Array]:
-        """What loads do in freedoms, of those in which they do something."""
-        found = {name: self.of_freedom(name, "applied_effort") for name in self.m.freedom_names()}
-        return {name: values for name, values in found.items() if _largest([values]) > 0}
-
-    def _magnitudes(self) -> tuple[list[Array], list[Array]]:
-        rows = [self.s[p.name] for p in self.m.pairs]
-        return (
-            [self.flat(np.linalg.norm(r.force, axis=-1)) for r in rows],
-            [self.flat(np.linalg.norm(r.moment, axis=-1)) for r in rows],
-        )
-
-    def _extent(self) -> float:
-        """A length of the mechanism: the largest distance of pair points from their middle; 1 where all coincide."""
-        found = [self.s.link(p.b).point(p.markers[1].point).position.reshape(-1, 3) for p in self.m.pairs]
-        points = np.stack(found)[:, self.solved][:, :1].reshape(-1, 3)
-        return (
-            float(np.linalg.norm(points - points.mean(axis=0), axis=1).max(initial=0.0)) or 1.0 if points.size else 1.0
-        )
-
-    def turns(self, name: str) -> bool:
-        return self.s.whole.turns(name)
-
-    def shown_value(self, name: str, value: float) -> str:
-        """A driver's value with its unit: degrees for a turn."""
-        return _shown_value(self.s.whole, name, value)
-
-    def place(self, index: int) -> str:
-        """The driver values of a position; its number where the driver values are not known."""
-        values = [
-            self.shown_value(n, v[index])
-            for n, v in zip(self.drivers, self.driver_values, strict=True)
-            if np.isfinite(v[index])
-        ]
-        if not values and self.s.t is not None:
-            t, unit = np.asarray(self.s.t, dtype=float).reshape(-1)[index], unit_of(self.m.units, (0, 0, 1))
-            return f"t = {_with_unit(_number(t), unit)}"
-        return ", ".join(values) or f"position {index}"
-
-    def effort_unit(self, name: str) -> str:
-        k, j = self.s.whole.freedom(name)
-        return self.moment_unit if self.s.whole.pairs[k].type.efforts[j].is_couple else self.force_unit
-
-    # --- parts -------------------------------------------------------------------------------------------------------
+    @cached_property
+    def mark(self) -> str:
+        """What stands behind a value that is not unique; nothing where it has none."""
+        return " ~" if self.values.least_norm else ""
 
     def positions(self) -> Iterator[Block]:
         """How many positions were solved, and the ranges of those that were not, by reason."""
@@ -149,7 +91,7 @@ class _View:
             items.append(f"{count}: {self.status[first]}{self._beside(first, last)}")
         if items:
             yield Heading("Not solved", 2)
-            yield Bullets(tuple(items))
+            yield Bullets(_shortened(items))
 
     def _beside(self, first: int, last: int) -> str:
         """The solved positions on both sides of a range that is not solved."""
@@ -158,7 +100,7 @@ class _View:
             for word, i in (("after", first - 1), ("before", last + 1))
             if 0 <= i < self.status.size and self.solved[i]
         ]
-        text = ", ".join(f"{word} {' = '.join((', '.join(self.drivers), self.place(i)))}" for word, i in near)
+        text = ", ".join(f"{word} {' = '.join((', '.join(self.drivers), self.name(i)))}" for word, i in near)
         return f" ({text})" if text else ""
 
     def driver_table(self) -> Iterator[Block]:
@@ -167,140 +109,160 @@ class _View:
             return
         rows = []
         for name, values in zip(self.drivers, self.driver_values, strict=True):
-            rate = self.of_freedom(name, "velocity")
+            rate = self.coordinates(name)[1]
             low, high = np.nanmin(rate), np.nanmax(rate)
-            unit = unit_of(self.m.units, (0, 0, -1) if self.turns(name) else (1, 0, -1))
-            speed = _number(low) if np.isclose(low, high) else f"{_number(low)} to {_number(high)}"
-            rows.append(
-                (
-                    name,
-                    self.shown_value(name, np.nanmin(values)),
-                    self.shown_value(name, np.nanmax(values)),
-                    _with_unit(speed, unit),
-                )
-            )
+            unit = unit_of(self.m.units, (0, 0, -1) if self.values.whole.turns(name) else (1, 0, -1))
+            speed = number(low) if np.isclose(low, high) else f"{number(low)} to {number(high)}"
+            ends = (self.coordinate(name, np.nanmin(values)), self.coordinate(name, np.nanmax(values)))
+            rows.append((name, *ends, with_unit(speed, unit)))
         if rows:
             yield Table(("driver", "from", "to", "rate"), tuple(rows), align="lrrr")
 
+    # --- forces ------------------------------------------------------------------------------------------------------
+
+    def left_out(self, size: int) -> str:
+        """What is said in place of the extremes of ``size`` reactions."""
+        return (
+            f"The extremes of efforts and reactions ({len(self.m.pairs):,} pairs at {self.status.size:,} positions) were not looked for: "
+            f"s.summary() finds them, in about {max(1, round(size / RATE))} s."
+        )
+
+    def forces(self) -> Iterator[Block]:
+        """Efforts and reactions, or that there are none."""
+        found, (own, applied) = self.reactions, self.ranges
+        largest = max(
+            float(np.max(v, initial=0.0)) for v in (found.force.best, found.moment.best, own.size, applied.size)
+        )
+        # what is not unique has no value, and may be anything
+        if largest > 0 or found.loose.any() or own.loose.any():
+            yield from self.effort_tables()
+            yield from self.reaction_table()
+            yield from self.redundant()
+        else:
+            yield Paragraph("All efforts and reactions are zero: no link has a mass that moves and no load acts.")
+
     def effort_tables(self) -> Iterator[Block]:
         """Range of every driver's effort, and where; the same of what springs, dampers and given efforts do."""
-        largest = _largest([*self.efforts.values(), *self.applied.values()])
-        yield from self._ranges("Efforts of the drivers", "driver", self.efforts, largest)
-        yield from self._ranges("Applied efforts (springs, dampers, given efforts)", "freedom", self.applied, largest)
+        own, applied = self.ranges
+        names = self.values.whole.freedom_names()
+        driven = [names.index(name) for name in self.values.actuated]
+        loaded = np.flatnonzero(applied.size[: len(self.m.freedom_names())] > 0).tolist()
+        known = [k for k in driven if self.mark or not own.loose[k]]
+        largest = max([float(own.size[k]) for k in known] + [float(applied.size[k]) for k in loaded], default=0.0)
+        yield from self._ranges("Efforts of the drivers", "driver", own, driven, largest)
+        yield from self._ranges(
+            "Applied efforts (springs, dampers, given efforts)", "freedom", applied, loaded, largest
+        )
 
-    def _ranges(self, title: str, what: str, efforts: Mapping[str, Array], largest: float) -> Iterator[Block]:
-        rows = []
-        for name, effort in efforts.items():
-            head = _with_unit(name, f"[{self.effort_unit(name)}]" if self.effort_unit(name) else "")
-            if np.isnan(effort[self.solved]).any():
+    def _ranges(self, title: str, what: str, found: Range, columns: list[int], largest: float) -> Iterator[Block]:
+        names = self.values.whole.freedom_names()
+        rows: list[tuple[str, ...]] = []
+        for k in columns[:LISTED]:
+            head, mark = names[k] + bracket(self.effort_unit(names[k])), self.mark if found.loose[k] else ""
+            if found.loose[k] and not mark:
                 rows.append((head, "not unique", "", "", ""))
                 continue
-            low, high = _first_extreme(-effort), _first_extreme(effort)
-            rows.append(
-                (head, _number(effort[low], largest), self.place(low), _number(effort[high], largest), self.place(high))
-            )
+            low, high = -found.low.best[k], found.high.best[k]
+            ends = ((low, found.low.at[k]), (high, found.high.at[k]))
+            rows.append((head, *(cell for v, at in ends for cell in (number(v, largest) + mark, self.name(at)))))
+        if len(columns) > LISTED:
+            rows.append((f"... and {len(columns) - LISTED} more", "", "", "", ""))
         if rows:
             yield Heading(title, 2)
             yield Table((what, "least", "at", "greatest", "at"), tuple(rows), align="lrrrr")
 
+    def effort_unit(self, name: str) -> str:
+        """The unit of the effort in a freedom."""
+        k, j = self.values.whole.freedom(name)
+        return self.moment_unit if self.values.whole.pairs[k].type.efforts[j].is_couple else self.force_unit
+
     def reaction_table(self) -> Iterator[Block]:
         """Greatest force and moment of every pair's reaction, and where; of what is unique of it."""
-        forces, moments = _largest(self.forces), _largest(self.moments)
-        scales = (max(forces, moments / self.extent), max(moments, forces * self.extent))
-        rows = []
-        resting = {name for warning in self.s.warnings for name in warning.pairs}
-        for k, pair in enumerate(self.m.pairs):
+        found, P, L = self.reactions, len(self.m.pairs), self.values.radius
+        forces, moments = (float(np.max(one.best[:P], initial=0.0)) for one in (found.force, found.moment))
+        scales = (max(forces, moments / L), max(moments, forces * L))
+        every = np.arange(P)
+        if P > LISTED:
+            size = np.maximum(found.force.best[:P] / (scales[0] or 1.0), found.moment.best[:P] / (scales[1] or 1.0))
+            every = np.sort(np.argsort(-size, kind="stable")[:LISTED])
+        rows, marked = [], False
+        resting = {name for warning in self.values.load_bearing() for name in warning.pairs}
+        for k in every.tolist():
+            pair = self.m.pairs[k]
             cells = [f"{pair.name} *" if pair.name in resting else pair.name, pair.type.symbol, pair.a, pair.b]
-            for couple, values, scale in ((False, self.forces[k], scales[0]), (True, self.moments[k], scales[1])):
-                cells += self._greatest(pair, couple, values, scale)
+            names = pair.type.component_names
+            for one, loose, kept, scale in zip(
+                (found.force, found.moment), found.loose[:, k], found.kept[:, :, k], scales, strict=True
+            ):
+                parts = [names[c] for c in np.flatnonzero(kept)] if loose else []
+                cells += self._greatest(one, k, bool(loose), parts, scale)
+                marked |= bool(loose and self.mark)
             rows.append(tuple(cells))
-        head = (
-            "pair",
-            "type",
-            "from",
-            "on",
-            f"force{_bracket(self.force_unit)}",
-            "at",
-            f"moment{_bracket(self.moment_unit)}",
-            "at",
-        )
+        units = (f"force{bracket(self.force_unit)}", "at", f"moment{bracket(self.moment_unit)}", "at")
         yield Heading("Greatest reactions", 2)
-        yield Table(head, tuple(rows), align="llllrrrr")
+        yield Table(("pair", "type", "from", "on", *units), tuple(rows), align="llllrrrr")
+        if P > LISTED:
+            yield Paragraph(f"Those of the other {P - LISTED:,} pairs are smaller: s['name'].force, s.to_pandas().")
         of = f"; 'at' is the value of {', '.join(self.drivers)}" if self.drivers else ""
         held = " *: rests on an effort that no part supplies, see the passive freedoms." if resting else ""
-        yield Paragraph(f"Moments are about the pair's own point on link 'on'{of}.{held}")
+        least = " ~: some component of it is not unique, and taken to be that of least norm." if marked else ""
+        yield Paragraph(f"Moments are about the pair's own point on link 'on'{of}.{held}{least}")
 
-    def _greatest(self, pair: Pair, couple: bool, values: Array, scale: float) -> list[str]:
-        mark = ""
-        if np.isnan(values[self.solved]).any():
-            parts = {c.name for c in pair.type.reactions or () if c.is_couple == couple}
-            found = {name: self.flat(v) for name, v in self.s[pair.name].components.items() if name in parts}
-            unique = {name: v for name, v in found.items() if not np.isnan(v[self.solved]).any()}
-            if not unique:
-                return ["not unique", ""]
-            values = np.linalg.norm(list(unique.values()), axis=0)
-            mark = f" ({' '.join(unique)})"
-        i = _first_extreme(values)
-        if values[i] <= NOISE * scale:
+    def _greatest(self, found: Greatest, k: int, loose: bool, kept: list[str], scale: float) -> list[str]:
+        """Cells of one reaction: its value, of the components ``kept`` where it is not unique as a whole, and the place."""
+        if loose and not self.mark and not kept:
+            return ["not unique", ""]
+        mark = (self.mark or f" ({' '.join(kept)})") if loose else ""
+        if found.best[k] <= NOISE * scale:
             return ["0" + mark, ""]
-        return [_number(values[i]) + mark, self.place(i)]
+        return [number(found.best[k]) + mark, self.name(int(found.at[k]))]
 
-    def redundant(self, unique: Mapping[str, Mapping[str, bool]] | None) -> Iterator[Block]:
-        """Which reaction components are not unique."""
-        named = self._nan_components()
-        least_norm = not any(named.values()) and unique is not None
-        if least_norm and unique is not None:
-            named = {pair: [n for n, ok in row.items() if not ok] for pair, row in unique.items()}
-        items = tuple(f"{pair}: {', '.join(names)}" for pair, names in named.items() if names)
-        if not items:
-            return
-        yield Heading("Not unique", 2)
-        yield Paragraph(
-            "Any self-stress can be added to these components; the values shown are those of least norm, an assumption: all pairs "
-            "equally stiff, links rigid, nothing strained at assembly."
-            if least_norm
-            else "Any self-stress can be added to these components, so they have no value (NaN). The table above shows "
-            "what is unique; where components are missing, those that it contains are named in brackets."
-        )
-        yield Bullets(items)
+    def redundant(self) -> Iterator[Block]:
+        """Which reaction components and efforts are not unique."""
+        loose = np.flatnonzero(self.reactions.loose[:, : len(self.m.pairs)].any(axis=0))
+        columns = [self.values.whole.freedom(name)[0] for name in self.values.actuated]
+        loose = np.union1d(loose, [k for k in columns if k < len(self.m.pairs) and self._loose_drive(k)]).astype(int)
+        items = []
+        for k in loose[:LISTED].tolist():
+            parts = [n for n, ok in self.values.unique(k).items() if not np.asarray(ok).reshape(-1)[self.solved].all()]
+            if parts:
+                items.append(f"{self.m.pairs[k].name}: {', '.join(parts)}")
+        if items:
+            yield Heading("Not unique", 2)
+            yield Paragraph(LEAST_NORM if self.values.least_norm else NO_VALUE)
+            yield Bullets(_shortened(items, len(loose)))
 
-    def _nan_components(self) -> dict[str, list[str]]:
-        return {
-            pair.name: [
-                name
-                for name, value in self.s[pair.name].components.items()
-                if np.isnan(self.flat(value)[self.solved]).any()
-            ]
-            for pair in self.m.pairs
-        }
+    def _loose_drive(self, pair: int) -> bool:
+        first = sum(p.type.f for p in self.values.whole.pairs[:pair])
+        return bool(self.ranges[0].loose[first : first + self.values.whole.pairs[pair].type.f].any())
 
     def passive(self) -> Iterator[Block]:
         """The passive freedoms: idle ones, and those that only an effort that no part supplies holds against the loads."""
-        bearing = {warning.name: warning.text for warning in self.s.warnings}
-        items = tuple(bearing.get(name, f"{name}: idle, no effort is needed") for name in self.s.passive_effort)
+        bearing = {warning.name: warning.text for warning in self.values.load_bearing()}
+        names = list(self.values.passive_efforts())
+        items = [bearing.get(name, f"{name}: idle, no effort is needed") for name in names]
         if items:
             yield Heading("Passive freedoms", 2)
-            yield Bullets(items)
+            yield Bullets(_shortened(items))
 
-    def checks(self) -> Iterator[Block]:
+    # --- checks and work -----------------------------------------------------------------------------------------------
+
+    def checks(self, more: tuple[tuple[str, Any], ...]) -> Iterator[Block]:
         """The worst of every check."""
-        checks = self.s.checks
+        checks = self.values.checks()
         rows = [("closure error (angle, length / L)", checks.closure)]
-        if self.s.has_forces:
+        if self.values.has_forces:
             rows += [("equilibrium, relative", checks.equilibrium), ("power balance, relative", checks.power)]
+        worst = tuple((name, f"{np.nanmax(np.abs(value)):.0e}") for name, value in (*rows, *more))
         yield Heading("Checks", 2)
-        yield Table(
-            ("check", "worst"), tuple((name, f"{np.nanmax(np.abs(value)):.0e}") for name, value in rows), align="lr"
-        )
+        yield Table(("check", "worst"), worst, align="lr")
 
     def work(self) -> Paragraph:
         """Which engine and which force method ran, and how much they did, in one line."""
-        shown = [
-            f"{n} {name if n == 1 else name.replace(' ', 's ', 1) if ' ' in name else name + 's'}"
-            for n, name in self.s.work.counts
-        ]
-        method = f", method {self.s.method}" if self.s.method else ""
-        return Paragraph(f"Engine {self.s.engine}{method}: {', '.join(shown)}.")
+        method = f", method {self.values.method}" if self.values.method else ""
+        return Paragraph(
+            f"Engine {self.values.engine}{method}: {', '.join(counted(*one) for one in self.values.work.counts)}."
+        )
 
 
 def _runs(status: Any) -> list[tuple[int, int]]:
@@ -311,26 +273,7 @@ def _runs(status: Any) -> list[tuple[int, int]]:
     return list(zip(starts, ends, strict=True)) if len(status) else []
 
 
-def _largest(rows: Sequence[Array]) -> float:
-    return max((float(np.nanmax(np.abs(row), initial=0.0)) for row in rows if np.isfinite(row).any()), default=0.0)
-
-
-def _first_extreme(values: Array) -> int:
-    """The first position whose value equals the maximum but for rounding."""
-    best = float(np.nanmax(values))
-    room = TIE * float(np.nanmax(np.abs(values)))
-    return int(np.flatnonzero(values >= best - room)[0])
-
-
-def _number(value: float, scale: float = 0.0) -> str:
-    if abs(value) <= NOISE * scale or abs(value) < 1e-300:
-        return "0"
-    return f"{value:.5g}"
-
-
-def _with_unit(text: str, unit: str) -> str:
-    return f"{text} {unit}" if unit else text
-
-
-def _bracket(unit: str) -> str:
-    return f" [{unit}]" if unit else ""
+def _shortened(items: list[str], count: int | None = None) -> tuple[str, ...]:
+    """The first items of a list, and how many more there are."""
+    more = (len(items) if count is None else count) - LISTED
+    return (*items[:LISTED], *([f"... and {more} more"] if more > 0 else []))

@@ -12,7 +12,8 @@ from mechgraph.arguments import items_of
 from mechgraph.errors import DeclarationError
 from mechgraph.model.force_law import Law
 from mechgraph.quantities import wrong
-from mechgraph.result.views import MaterialPoint, PairResult, Values
+from mechgraph.result.values import MaterialPoint, Values
+from mechgraph.result.views import PairResult
 from mechgraph.units import unit_of
 
 

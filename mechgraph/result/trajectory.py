@@ -6,12 +6,13 @@ Component axes first, the flat batch of positions last, NaN where a position was
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from copy import copy
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mechgraph.algebra.screw import shift_wrench
 from mechgraph.algebra.se3 import Array, cross, rotate
@@ -28,10 +29,12 @@ from mechgraph.force.passive_hold import hold_names, is_idle, turns
 from mechgraph.model.force_law import Law
 from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.pair_type import PairType
 from mechgraph.numerics.newton import Work
 from mechgraph.numerics.tolerances import MOTIONS, PATH
 from mechgraph.result.states import flat_place, user_state, user_wrench
-from mechgraph.result.views import Checks, LoadBearing, LoadResult, MaterialPoint
+from mechgraph.result.values import Checks, LoadBearing, LoadResult, MaterialPoint
+from mechgraph.structure.components import labels_of
 from mechgraph.structure.passive import PassiveMotion
 from mechgraph.structure.reaction_split import UNIQUE, PairFrames
 from mechgraph.units import unit_of
@@ -64,8 +67,17 @@ RETAINED = 40_000
 """Links times positions up to which motions evaluated again are retained (some 30 MB), as readers ask for one pair after another."""
 
 
+TOGETHER = 300_000
+"""Wrenches that are looked at together where all pairs are."""
+
+
+def _touched(stress: Array, scale: float = 1.0) -> NDArray[np.bool_]:
+    """Where self-stresses have a part: ``stress (..., s, T)``."""
+    return np.asarray(np.sqrt((stress * stress).sum(axis=-2)) > UNIQUE * scale)
+
+
 class Trajectory:
-    """The values of a Solution (implements ``result.views.Values``).
+    """The values of a Solution (implements ``result.values.Values``).
 
     ``system_at(places)`` is the system with the numbers of the positions at flat places (they differ between variants); ``driven`` are the
     freedoms with an unknown effort, ``coordinates (F, T)`` the user's ones of all positions, ``mechanism`` and
@@ -91,8 +103,8 @@ class Trajectory:
         self.actuated = tuple(names[column] for column in driven)
         self.prescribed = self.actuated if prescribed is None else prescribed
         self.batch, self.t, self.driven, self._passive = batch, t, driven, passive
-        self._system, self._system_at, self._mask = system, system_at, mask_redundant
-        self._L = system.par.L
+        self._system, self._system_at, self.least_norm = system, system_at, not mask_redundant
+        self._L = self.radius = float(system.par.L)
         self._coordinates = coordinates
         self.loads: tuple[Load, ...] = self.whole.loads
         self._count = int(np.prod(batch))
@@ -309,11 +321,8 @@ class Trajectory:
     # --- forces --------------------------------------------------------------------------------------------------------
 
     def _masked(self, values: Array, stress: Array, scale: float = 1.0) -> Array:
-        """NaN where a self-stress has a part; ``stress`` has the stress index as its last but one axis."""
-        if not self._mask or not stress.shape[-2]:
-            return values
-        touched = np.sqrt((stress * stress).sum(axis=-2)) > UNIQUE * scale
-        return np.where(touched, np.nan, values)
+        """NaN where a self-stress has a part, unless values of least norm were asked for."""
+        return np.where(_touched(stress, scale), np.nan, values) if stress.shape[-2] and not self.least_norm else values
 
     def reaction(self, pair: int) -> Array:
         """Reaction about the global origin."""
@@ -347,6 +356,20 @@ class Trajectory:
 
     def components(self, pair: int) -> dict[str, Array]:
         """Reaction components by name."""
+        row, values, stress = self._components(pair)
+        masked = self._masked(values, stress)
+        return {name: self._out(part) for name, part in zip(row.component_names, masked, strict=True)}
+
+    def unique(self, pair: int) -> dict[str, Array]:
+        """Which reaction components and efforts are unique, also where values of least norm stand for them."""
+        columns = self._columns(pair)
+        driven = np.flatnonzero(self._driven(columns))
+        loose = _touched(np.concatenate([self._components(pair)[2], self._stress_of_drives(columns)[driven]]))
+        labels = labels_of(self.whole.pairs[pair], driven)
+        return {name: self._out(~part) for (_, name), part in zip(labels, loose, strict=True)}
+
+    def _components(self, pair: int) -> tuple[PairType, Array, Array]:
+        """The type of a pair, its components ``(6 - f, T)`` in the user's units and what self-stresses have in them ``(6 - f, s, T)``."""
         self._force("reactions")
         number, i = self._system.place_of(pair)
         row = self._system.groups[number].row
@@ -358,20 +381,61 @@ class Trajectory:
         found = self._evaluated(components)
         couples = [c.is_couple for c in row.reactions or ()] or [False] * (6 - row.f)
         unit = np.where(couples, self._L**2, self._L)[:, None]
-        masked = self._masked(unit * found[:, 0], found[:, 1:])
-        return {name: self._out(part) for name, part in zip(row.component_names, masked, strict=True)}
+        return row, unit * found[:, 0], found[:, 1:]
 
     def efforts(self, pair: int) -> tuple[Array, Array]:
         """What the drive supplies, and what loads do in the freedoms."""
         columns = self._columns(pair)
+        own, given = self._efforts(columns)
+        return self._out(self._masked(own, self._stress_of_drives(columns))), self._out(given)
+
+    def _efforts(self, columns: slice) -> tuple[Array, Array]:
+        """What drives supply in freedoms and what loads do there, ``(f, T)`` each, in the user's units."""
         total, given, coupled = (self._force(name)[columns] for name in ("efforts", "given", "coupled"))
-        driven = np.isin(np.arange(columns.start, columns.stop), self.driven)[:, None]
-        own = np.where(driven, total - given - coupled, np.where(np.isnan(given), np.nan, 0.0))
+        own = np.where(self._driven(columns), total - given - coupled, np.where(np.isnan(given), np.nan, 0.0))
         unit = np.where(self._system.is_length[columns], self._L, self._L**2)[:, None]
-        stress = np.where(
-            driven[:, None], self._of("stress_efforts")[columns] - self._of("coupled_stress")[columns], 0.0
-        )
-        return self._out(self._masked(unit * own, stress)), self._out(unit * given)
+        return unit * own, unit * given
+
+    def _driven(self, columns: slice) -> NDArray[np.bool_]:
+        return np.isin(np.arange(self._system.n_freedoms)[columns], self.driven)[:, None]
+
+    def _stress_of_drives(self, columns: slice) -> Array:
+        """What self-stresses have in the efforts of drives, ``(f, s, T)``."""
+        stress = self._of("stress_efforts")[columns] - self._of("coupled_stress")[columns]
+        return np.where(self._driven(columns)[:, None], stress, 0.0)
+
+    # --- all pairs at once -----------------------------------------------------------------------------------------------
+
+    def blocks(self) -> Iterator[Index]:
+        """The solved places in parts of so few that values of all pairs there are no burden."""
+        solved = np.flatnonzero(self._solved)
+        size = max(1, TOGETHER // (len(self.whole.pairs) * (1 + self._of("stress").shape[2])))
+        return (solved[i : i + size] for i in range(0, len(solved), size))
+
+    def reactions_at(self, places: Index) -> tuple[Array, NDArray[np.bool_]]:
+        """Reactions of all pairs about the origins of markers B ``(6, P, n)``, of least norm, and which numbers are not unique."""
+        points = self._of("points")[:, :, places]
+        scale = np.repeat([self._L**2, self._L], 3)[:, None, None]
+        loose = _touched(shift_wrench(self._of("stress")[..., places], points[:, :, None]))
+        return scale * shift_wrench(self._force("reactions")[..., places], points), loose
+
+    def components_at(self, places: Index) -> tuple[Array, NDArray[np.bool_]]:
+        """Components of all pairs ``(6, P, n)`` by the pair table, 0 beyond those of a pair, and which are not unique."""
+        states = np.concatenate([self._force("reactions")[:, :, None], self._of("stress")], axis=2)[..., places]
+        s, found = self._system, np.zeros((6, *states.shape[1:]))
+        here = Configuration(self._system_at(places), self._of("x")[:, places])
+        for group, part in zip(s.groups, PairFrames(here).components(states), strict=True):
+            couples = [c.is_couple for c in group.row.reactions or ()] or [False] * len(part)
+            unit = np.where(couples, self._L**2, self._L).reshape(-1, 1, 1, 1)
+            part[:, :, :1] *= unit
+            found[: len(part), group.pairs] = part
+        return found[:, :, 0], _touched(found[:, :, 1:])
+
+    def efforts_at(self, places: Index) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Own and applied efforts in all freedoms ``(F, n)``, and which of the former are not unique."""
+        every = slice(None)
+        own, given = (values[:, places] for values in self._efforts(every))
+        return own, given, _touched(self._stress_of_drives(every)[..., places])
 
     def multiplier(self, coupling: int) -> Array:
         """The multiplier of a coupling in the user's units: the effort ``c_i m`` in freedom i."""

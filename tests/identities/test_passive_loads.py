@@ -8,8 +8,6 @@ from typer.testing import CliRunner
 
 import mechgraph as mg
 from mechgraph.cli import app
-from mechgraph.document import to_text
-from mechgraph.result.summary import summary
 
 Z = (0, 0, 1)
 SI = {"length": "m", "mass": "kg", "time": "s"}
@@ -77,7 +75,7 @@ def test_a_torque_on_a_shaft_that_nothing_drives_is_named_everywhere(tmp_path) -
     assert "a couple of 19.51 N m" in seen[0]
     np.testing.assert_allclose(s["A"].force, [0, 0.7 * 2 * G, 0], atol=1e-12)
     np.testing.assert_allclose(s["B"].force, [0, 0.3 * 2 * G, 0], atol=1e-12)
-    text = to_text(summary(s))
+    text = s.summary()
     assert "A *" in text
     assert "a couple of 19.51 N m" in text
     mg.save(m, tmp_path / "shaft.toml")
@@ -95,7 +93,7 @@ def test_torques_in_balance_leave_the_shaft_idle() -> None:
     s, seen = solved(m)
     assert not s.warnings
     assert not seen
-    assert "idle" in to_text(summary(s))
+    assert "idle" in s.summary()
 
 
 def test_a_swing_that_nothing_loads_is_not_passive() -> None:

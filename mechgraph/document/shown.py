@@ -1,0 +1,35 @@
+"""The one way in which results show themselves: as text where they are printed, as HTML or LaTeX in a notebook."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+from mechgraph.document.html import to_html
+from mechgraph.document.latex import to_latex
+from mechgraph.document.text import to_text
+from mechgraph.document.tree import Document
+
+
+class Shown(ABC):
+    """Something that a document tells: ``print(x)`` shows it as text, a notebook as HTML, what a notebook exports as LaTeX.
+
+    At a prompt it shows the same text; a class whose document is long or takes time has a line of its own there (``__repr__``).
+    """
+
+    __slots__ = ()
+
+    @abstractmethod
+    def document(self) -> Document:
+        """What is to be read."""
+
+    def __str__(self) -> str:
+        return to_text(self.document())
+
+    def __repr__(self) -> str:
+        return str(self).rstrip("\n")
+
+    def _repr_html_(self) -> str:
+        return to_html(self.document())
+
+    def _repr_latex_(self) -> str:
+        return to_latex(self.document())

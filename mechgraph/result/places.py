@@ -1,0 +1,89 @@
+"""Positions as people call them, by the values of the drivers; and numbers with their units."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.result.values import Values
+from mechgraph.units import unit_of
+
+OK = "ok"
+"""Status of a solved position."""
+NOISE = 1e-11
+"""Part of the largest value of its kind below which a value is rounding noise and shown as 0."""
+
+
+def number(value: float, scale: float = 0.0) -> str:
+    """Five digits; 0 for what is noise beside ``scale``."""
+    if abs(value) <= NOISE * scale or abs(value) < 1e-300:
+        return "0"
+    return f"{value:.5g}"
+
+
+def with_unit(text: str, unit: str) -> str:
+    """A number or name and the unit behind it, where there is one."""
+    return f"{text} {unit}" if unit else text
+
+
+def bracket(unit: str) -> str:
+    """The unit in the head of a column."""
+    return f" [{unit}]" if unit else ""
+
+
+def coordinate(m: Mechanism, name: str, value: float) -> str:
+    """The value of a freedom with its unit: degrees for a turn."""
+    if m.turns(name):
+        return f"{number(float(np.rad2deg(value)))} deg"
+    return with_unit(number(value), unit_of(m.units, (1, 0, 0)))
+
+
+def driver_value(m: Mechanism, name: str, value: float) -> str:
+    """``A.Rz = 30 deg``: a driver's value with its unit."""
+    return f"{name} = {coordinate(m, name, value)}"
+
+
+class Places:
+    """The positions of a solution laid out flat."""
+
+    def __init__(self, values: Values) -> None:
+        self.values = values
+        self.m: Mechanism = values.mechanism
+        self.status = np.asarray(values.status()).reshape(-1)
+        self.solved = self.status == OK
+        self.drivers = values.prescribed
+
+    @cached_property
+    def driver_values(self) -> list[Array]:
+        """Coordinates of the drivers."""
+        return [self.coordinates(name)[0] for name in self.drivers]
+
+    def coordinates(self, name: str) -> tuple[Array, Array]:
+        """Coordinate and rate of a freedom, one value a position."""
+        k, j = self.values.whole.freedom(name)
+        position, velocity, _ = self.values.coordinates(k)
+        return self.flat(position[..., j]), self.flat(velocity[..., j])
+
+    def flat(self, values: Any) -> Array:
+        """One value a position."""
+        return np.asarray(values, dtype=float).reshape(self.status.size)
+
+    def coordinate(self, name: str, value: float) -> str:
+        """A driver's value with its unit."""
+        return coordinate(self.values.whole, name, value)
+
+    def name(self, index: int) -> str:
+        """The driver values of a position; where these are not known its time, or its number."""
+        found = [
+            self.coordinate(n, v[index])
+            for n, v in zip(self.drivers, self.driver_values, strict=True)
+            if np.isfinite(v[index])
+        ]
+        if not found and self.values.t is not None:
+            t = np.broadcast_to(np.asarray(self.values.t, dtype=float), self.values.batch).reshape(-1)[index]
+            return f"t = {with_unit(number(t), unit_of(self.m.units, (0, 0, 1)))}"
+        return ", ".join(found) or f"position {index}"

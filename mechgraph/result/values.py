@@ -1,0 +1,182 @@
+"""Where a solution takes its values from (``Values``), and the records among them: checks, points, loads, warnings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.closure.indexing import Index
+from mechgraph.equations.state import State
+from mechgraph.model.load_base import Load
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.numerics.newton import Work
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Checks:
+    """Every solution's own checks, arrays over positions.
+
+    closure : closure error, the largest of angle [rad] and length / L over the loops.
+    equilibrium : residual of the equilibrium of all links and of ``S^T w = effort`` in all undriven freedoms, relative to the
+        largest wrench in the batch (NaN without forces).
+    power : driver power + load power - rate of kinetic energy, relative to the largest term in the batch.
+    """
+
+    closure: Array
+    equilibrium: Array
+    power: Array
+
+
+class MaterialPoint(NamedTuple):
+    """Position, velocity and acceleration of a material point, ``(..., 3)`` each."""
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+
+class LoadResult(NamedTuple):
+    """What one load does, ``(...)`` each.
+
+    ``wrenches``: by the names of the links on which it acts (none for a load in a freedom), (M, F) about the global origin ``(..., 6)``;
+    ``power`` on all links; of a force law ``coordinate``, ``rate`` and ``force`` along the coordinate; of an effort the ``force`` is
+    the effort.
+    """
+
+    load: Load
+    wrenches: dict[str, Array]
+    power: Array
+    coordinate: Array
+    rate: Array
+    force: Array
+
+
+@dataclass(frozen=True)
+class LoadBearing:
+    """A passive freedom that the loads would move: only a couple or force that no part supplies holds it there.
+
+    ``name`` as in ``Solution.passive_effort`` and the report, whether it ``turns`` (held by a couple), the greatest ``effort`` with its
+    ``unit``, the ``links`` and ``freedoms`` that would move, and the ``pairs`` of these links, whose reactions rest on that effort.
+    """
+
+    name: str
+    turns: bool
+    effort: float
+    unit: str
+    links: tuple[str, ...]
+    pairs: tuple[str, ...]
+    freedoms: tuple[str, ...]
+
+    @property
+    def size(self) -> str:
+        """``a couple of 20.5 N m``."""
+        return f"a {'couple' if self.turns else 'force'} of {self.effort:.4g}" + (f" {self.unit}" if self.unit else "")
+
+    @property
+    def text(self) -> str:
+        """The warning in one sentence."""
+        return (
+            f"{self.name}: load-bearing passive freedom, held by {self.size} at most, which no part supplies: the real linkage would move "
+            f"({', '.join(self.freedoms)}), and the reactions of {', '.join(self.pairs)} rest on it"
+        )
+
+    def __str__(self) -> str:
+        return self.text
+
+
+class Values(Protocol):
+    """Where a Solution takes its values from (see ``result.trajectory``); every method returns batch-first arrays.
+
+    ``mechanism`` is the one that was solved, with the freedoms that take efforts as its drives; ``whole`` the same with the free pairs
+    through which the motion of points and links is prescribed, behind its own; ``prescribed`` and ``actuated`` are freedoms of that.
+    ``least_norm``: reactions that are not unique have the value of least norm, not NaN; ``radius``: the mean radius L.
+    """
+
+    mechanism: Mechanism
+    whole: Mechanism
+    prescribed: tuple[str, ...]
+    actuated: tuple[str, ...]
+    batch: tuple[int, ...]
+    t: Any
+    has_forces: bool
+    engine: Literal["dense", "sparse"]
+    method: str | None
+    work: Work
+    least_norm: bool
+    radius: float
+
+    def status(self) -> Any:
+        """Named outcomes, one a position."""
+
+    def checks(self) -> Checks:
+        """Closure, equilibrium and power."""
+
+    def coordinates(self, pair: int) -> tuple[Array, Array, Array]:
+        """Coordinates, rates and accelerations of the freedoms of a pair, ``(..., f)``."""
+
+    def reaction(self, pair: int) -> Array:
+        """Reaction of a pair about the global origin, ``(..., 6)``."""
+
+    def total(self, pair: int) -> Array:
+        """Total wrench of a pair about the global origin, ``(..., 6)``."""
+
+    def reaction_at_pair(self, pair: int) -> Array:
+        """Reaction about the origin of marker B, global directions, ``(..., 6)``."""
+
+    def components(self, pair: int) -> dict[str, Array]:
+        """Reaction components by name, ``(...)``."""
+
+    def unique(self, pair: int) -> dict[str, Array]:
+        """Which reaction components and efforts of drives are unique, by name, ``(...)``."""
+
+    def efforts(self, pair: int) -> tuple[Array, Array]:
+        """What the drive supplies, and what springs, dampers and given efforts do, ``(..., f)`` each."""
+
+    def multiplier(self, coupling: int) -> Array:
+        """Multiplier of a coupling, ``(...)``."""
+
+    def blocks(self) -> Iterator[Index]:
+        """The solved flat places in parts, for ``..._at``: all pairs at some places ``(n,)``, the batch last."""
+
+    def reactions_at(self, places: Index) -> tuple[Array, Mask]:
+        """Reactions about the origins of markers B ``(6, P, n)``, of least norm where redundant, and which numbers are not unique."""
+
+    def components_at(self, places: Index) -> tuple[Array, Mask]:
+        """Components ``(6, P, n)`` by the pair table, 0 beyond those of a pair, and which are not unique."""
+
+    def efforts_at(self, places: Index) -> tuple[Array, Array, Mask]:
+        """Own and applied efforts ``(F, n)``, and which of the former are not unique."""
+
+    def link(self, link: int) -> tuple[Array, Array, Array]:
+        """Pose ``(..., 4, 4)``, twist and its rate ``(..., 6)`` of a link."""
+
+    def link_hold(self, link: int) -> Array:
+        """Wrench that keeps a passive body at rest, about the global origin, ``(..., 6)``."""
+
+    def link_point(self, link: int, p: Any) -> MaterialPoint:
+        """A material point given in the link's frame; the mass centre where it is None."""
+
+    def shaking(self) -> Array:
+        """Wrench on the frame about the global origin, ``(..., 6)``."""
+
+    def load(self, index: int) -> LoadResult:
+        """What one load does."""
+
+    def passive_efforts(self) -> dict[str, Array]:
+        """What keeps passive bodies at rest, by name."""
+
+    def load_bearing(self) -> tuple[LoadBearing, ...]:
+        """Passive freedoms that the loads would move."""
+
+    def state(self, index: Any) -> State:
+        """Screws and loads at one position, in the declared units about the global origin."""
+
+    def part(self, places: slice) -> Values:
+        """The values at a range of flat positions."""
