@@ -85,7 +85,7 @@ def test_symbols_follow_from_the_rows() -> None:
         assert all(e.dashed for e in pieces) == (sum(not f.turns for f in row.freedoms) == 3)
         assert ("guide" in roles[key]) == (0 < sum(not f.turns for f in row.freedoms) < 3)
     assert roles["R"] == ["body"]
-    assert roles["H"] == ["body", "dark"]
+    assert roles["H"] == ["body", "dark", "body"]
     assert roles["S"] == ["dark"]
     assert roles["U"] == ["dark", "body", "body"]
     own = mg.PairType("Pin", "pin in a slot", freedoms=["Tx", "Rz"])

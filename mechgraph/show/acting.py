@@ -131,7 +131,7 @@ def reactions(stage: Stage, solution: Solution, positions: Any) -> tuple[list[Pa
     values = {p.name: _force(stage, solution, p, positions) for p in stage.m.pairs}
     lost = tuple(name for name, force in values.items() if np.isnan(force).any())
     longest = max((float(np.nanmax(np.linalg.norm(v, axis=1), initial=0.0)) for v in values.values()), default=0.0)
-    scale = LONGEST * stage.size / (longest or 1.0)
+    scale = LONGEST * stage.size / longest if longest else 0.0
     out = []
     for pair in stage.m.pairs:
         force = values[pair.name]

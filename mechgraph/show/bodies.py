@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -61,9 +62,10 @@ def _feet(stage: Stage) -> Iterator[Part]:
 
 
 def rod(p: Array, q: Array, radius: float) -> Shape:
-    """A thin round rod between two points, in pieces so that it can be sorted by depth."""
+    """A thin round rod between two points, in pieces so that it can be sorted by depth; its one line is its middle line."""
     length = float(np.linalg.norm(q - p))
-    return shapes.prism(6, radius, 0.0, length, int(np.clip(length / (12 * radius), 1, 12))).along(q - p, p)
+    solid = shapes.prism(6, radius, 0.0, length, int(np.clip(length / (12 * radius), 1, 12))).along(q - p, p)
+    return shapes.together([replace(solid, lines=(), rims=0), shapes.polyline([p, q])])
 
 
 def hull(points: Array) -> tuple[tuple[tuple[int, ...], ...], tuple[tuple[int, int], ...]]:

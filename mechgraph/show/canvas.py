@@ -1,4 +1,4 @@
-"""Figures and axes of matplotlib, asked for only when something is drawn."""
+"""Figures and axes of matplotlib, asked for only when something is drawn; colours, and how axes look."""
 
 from __future__ import annotations
 
@@ -10,12 +10,17 @@ from mechgraph.errors import MissingExtraError
 INK = "#1f2933"
 MUTED = "#7b8794"
 FAINT = "#c8d0d8"
-PALETTE = ("#0b6fa4", "#d1495b", "#2e8b57", "#e09f3e", "#6a4c93", "#00798c", "#8d5524", "#c2185b")
-"""Colours of moving links, in order and then again."""
+GRID = "#e4e7eb"
+PALETTE = ("#0b6fa4", "#d9730d", "#1a936f", "#7a4fa3", "#3fa7d6", "#8d5524", "#8a9a00", "#c25b8f")
+"""Colours of moving links and of curves, in order and then again; told apart by colour-blind readers too."""
+REACTION, LOAD = "#c1121f", "#a3006a"
+"""Colours of reaction forces and of loads."""
+HATCH = "/////"
+"""How what is not unique is filled: it has no value."""
 
 
-def new_axes(**options: Any) -> Any:
-    """Axes in a figure of their own, which pyplot does not keep: it goes when nobody holds it.
+def new_axes(size: tuple[float, float] | None = None, **options: Any) -> Any:
+    """Axes in a figure of their own (of a size in inches), which pyplot does not keep: it goes when nobody holds it.
 
     Raises
     ------
@@ -26,9 +31,26 @@ def new_axes(**options: Any) -> Any:
         from matplotlib.figure import Figure
     except ImportError:
         raise MissingExtraError("matplotlib", "plot") from None
-    return Figure(layout="constrained").add_subplot(**options)
+    return Figure(figsize=size, layout="constrained").add_subplot(**options)
 
 
 def toolkit(name: str) -> Any:
     """A module of matplotlib's three-dimensional toolkit, which has no types."""
     return importlib.import_module(f"mpl_toolkits.mplot3d.{name}")
+
+
+def bare(ax: Any) -> None:
+    """No frame, ticks or scales: a diagram."""
+    ax.set_axis_off()
+
+
+def plain(ax: Any) -> None:
+    """Axes of curves: two spines, a grid behind."""
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.grid(True, color=GRID, lw=0.8)
+    ax.set_axisbelow(True)
+
+
+def with_unit(text: str, unit: str) -> str:
+    """``force [N]``; the text alone where there is no unit."""
+    return f"{text} [{unit}]" if unit else text

@@ -167,8 +167,8 @@ def turn_arrow(hand: float = 1.0) -> Shape:
     arc = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     tip, ahead = angle[-1], sign * np.array([-np.sin(angle[-1]), np.cos(angle[-1]), 0.0])
     out = np.array([np.cos(tip), np.sin(tip), 0.0])
-    sides = 0.24 * np.array([out, [0, 0, 1.0], -out, [0, 0, -1.0]])
-    head = Shape(arc[-1] + np.array([*sides, 0.55 * ahead]), ((0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4), (0, 1, 2, 3)))
+    sides = 0.19 * np.array([out, [0, 0, 1.0], -out, [0, 0, -1.0]])
+    head = Shape(arc[-1] + np.array([*sides, 0.46 * ahead]), ((0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4), (0, 1, 2, 3)))
     return together([polyline(arc), head])
 
 

@@ -1,94 +1,42 @@
-"""The skeleton of a mechanism: links as lines and plates between their pair points, pairs as symbols, in space or in a plane."""
+"""The skeleton of a mechanism: links as rods and plates, pairs with the symbols of the field, what acts; in space or in its plane."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.assembly import assembled
-from mechgraph.closure.configuration import Configuration
 from mechgraph.errors import DeclarationError
-from mechgraph.force.applied_loads import user_poses
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.result.solution import Solution
-from mechgraph.show.canvas import FAINT, INK, MUTED, PALETTE, new_axes, toolkit
+from mechgraph.show.canvas import FAINT, HATCH, INK, LOAD, MUTED, PALETTE, REACTION, bare, new_axes
+from mechgraph.show.painting import FlatPainter, Painter, SpacePainter, edges_of, shaded
+from mechgraph.show.scene import Part, Scene, scene
+from mechgraph.units import unit_of
 
-FLAT = 1e-6
-"""Thickness over extent below which a mechanism is drawn as a plane one."""
-
-MARKS: dict[tuple[int, int], tuple[str, float]] = {
-    (1, 0): ("o", 60.0),
-    (0, 1): ("s", 58.0),
-    (1, 1): ("h", 90.0),
-    (2, 0): ("P", 85.0),
-    (3, 0): ("o", 95.0),
-    (0, 0): ("X", 60.0),
+MOST_NAMES = 12
+"""Pairs up to which all names stand in the drawing; beyond, numbers stand there and a legend beside it says what they are."""
+GHOST = 0.3
+"""Opacity of the other positions."""
+BODY = "#f2f4f7"
+LINES = {"axis": (0.9, (0, (8, 2, 1.5, 2))), "tie": (0.9, (0, (2, 2))), "spring": (1.3, "-"), "load": (2.2, "-"),
+         "drive": (1.8, "-"), "reaction": (2.4, "-"), "foot": (0.8, "-")}  # fmt: skip
+"""Width and style of the lines of parts by their role."""
+SOLID = {
+    "body": BODY,
+    "dark": "#52606d",
+    "spring": BODY,
+    "load": LOAD,
+    "drive": INK,
+    "reaction": REACTION,
+    "foot": "#d5dbe1",
 }
-"""Symbol and size of a pair by its numbers of turns and slides; the others are diamonds."""
-
-
-@dataclass(frozen=True)
-class _Shape:
-    """All that is drawn, over the positions drawn from.
-
-    ``ends[pair, link]``, mass ``centers[link]`` and named ``points[link, name]``, ``(T, 3)`` each.
-    """
-
-    m: Mechanism
-    good: Any
-    ends: dict[tuple[str, str], Array]
-    axes: dict[str, Array]
-    centers: dict[str, Array]
-    points: dict[tuple[str, str], Array]
-
-    @cached_property
-    def everything(self) -> Array:
-        """All points that are drawn."""
-        return np.concatenate([*self.ends.values(), *self.centers.values(), *self.points.values()])
-
-    @cached_property
-    def size(self) -> float:
-        """Diagonal of the box about all points."""
-        return float(np.linalg.norm(np.ptp(self.everything, axis=0))) or 1.0
-
-    def corners(self, link: str, t: int) -> Array:
-        """Pair points of a link at one position, ``(n, 3)``."""
-        return np.array([self.ends[p.name, link][t] for p in self.m.pairs if link in (p.a, p.b)])
-
-
-def _poses(drawn: Solution | Mechanism) -> tuple[Mechanism, dict[str, Array], Any, int]:
-    """Poses ``(T, 3, 4)`` of every link at the positions that can be drawn, which these are, and of how many."""
-    if isinstance(drawn, Mechanism):
-        system, x = assembled(drawn)
-        found = user_poses(Configuration(system, x[:, None]))
-        poses = {name: found[i, :, :3] for i, name in enumerate(drawn.link_names())}
-        return drawn, poses, np.zeros(1, dtype=np.intp), 1
-    m = drawn.mechanism
-    good = np.flatnonzero(np.asarray(drawn.status).reshape(-1) == "ok")
-    if not good.size:
-        raise DeclarationError(f"skeleton of {m.name!r}", ["the solution has no solved position"])
-    poses = {name: drawn.link(name).pose.reshape(-1, 4, 4)[good, :3] for name in m.link_names()}
-    return m, poses, good, int(np.asarray(drawn.status).size)
-
-
-def _shape(m: Mechanism, poses: dict[str, Array], good: Any) -> _Shape:
-    def moved(link: str, point: Any) -> Array:
-        return np.asarray(poses[link][:, :, :3] @ np.asarray(point, dtype=float) + poses[link][:, :, 3])
-
-    ends = {
-        (pair.name, link): moved(link, marker.point)
-        for pair in m.pairs
-        for link, marker in zip((pair.a, pair.b), pair.markers, strict=True)
-    }
-    axes = {pair.name: poses[pair.a][:, :, :3] @ pair.markers[0].pose()[:, 2] for pair in m.pairs}
-    centers = {k.name: moved(k.name, k.center) for k in m.links if k.mass > 0 and k.center is not None}
-    points = {(k.name, name): moved(k.name, p) for k in m.links for name, p in k.points.items()}
-    return _Shape(m, good, ends, axes, centers, points)
+"""Colours of the polygons of parts by their role; others have that of their link."""
+LINE_COLOUR = {"axis": INK, "spring": "#3e4c59", "load": LOAD, "drive": INK, "reaction": REACTION, "foot": MUTED}
+ABOVE = {"plate": 2.0, "foot": 2.1, "guide": 3.0, "spring": 5.0, "load": 6.0, "drive": 6.0, "reaction": 6.5}
+"""Height of roles over others; links and symbols lie together at 4, sorted by depth."""
 
 
 def draw_skeleton(
@@ -99,22 +47,27 @@ def draw_skeleton(
     ghosts: int = 5,
     traces: bool | Sequence[str] = True,
     labels: bool = True,
+    forces: bool = False,
     highlight: Sequence[str | tuple[str, int]] = (),
     view: tuple[float, float] = (24.0, -58.0),
 ) -> Any:
     """Draw the mechanism at one position, faint at others, with the paths of its pair points. Returns the axes.
 
-    The frame is grey and stands on hatched feet, other links have a colour each; a circle with a dot is a mass centre. A
-    mechanism all of whose points lie in a plane is drawn in that plane.
+    Links are drawn as what they join: rods between two pairs, plates between more, named points among them; a circle with a dot is a mass
+    centre, the frame stands on hatched feet. Symbols follow from the freedoms of a pair: a drum for a turn (with a thread for a screw), a
+    guide for a slide, a plate for two, a ball for a rotation, a cross of pins for two turns, a square for a weld. Driven freedoms have an
+    arrow; springs, dampers, given forces and moments are drawn where they act. A mechanism all of whose points move in a plane is drawn in
+    it, on axes of two dimensions. More than a dozen pairs are numbered, with a legend.
 
     Parameters
     ----------
-    s : a solution; or a mechanism with geometry, which is drawn where its loops are closed.
+    s : a solution or response; or a mechanism with geometry, which is drawn where its loops are closed.
     position : flat index of the position drawn in full.
-    ax : three-dimensional axes of matplotlib; new ones where left out, in a figure of their own: ``ax.figure.savefig(...)``.
+    ax : axes of matplotlib, of two or three dimensions; new ones where left out, in a figure of their own: ``ax.figure.savefig(...)``.
     ghosts : number of further positions, drawn faintly.
     traces : whether to draw the paths of pair points; or the names of the pairs whose paths are drawn.
     labels : names of pairs (with their type) and links.
+    forces : arrows of the reaction forces (what link a exerts on link b); hatched where the force is not unique.
     highlight : names of pairs, or a loop of the report (``report.loops[0]``): all other links are drawn in grey.
     view : elevation and azimuth in degrees of a spatial mechanism.
 
@@ -124,34 +77,59 @@ def draw_skeleton(
         where that position was not solved, or a pair to be highlighted is not there; AssemblyError where a mechanism cannot be
         closed; MissingExtraError without matplotlib.
     """
-    m, poses, good, size = _poses(s)
+    found = scene(s, forces=forces)
+    m, size = found.mechanism, 1 if isinstance(s, Mechanism) else int(np.asarray(s.status).size)
+    names = {p.name for p in m.pairs}
     chosen = [item if isinstance(item, str) else item[0] for item in highlight]
-    unknown = [name for name in chosen if name not in {p.name for p in m.pairs}]
-    faults = [f"highlight: there is no pair {name!r}; pairs: {', '.join(p.name for p in m.pairs)}" for name in unknown]
-    if not -size <= position < size or position % size not in good:
+    traced = [] if isinstance(traces, bool) else list(traces)
+    faults = [f"{what}: there is no pair {name!r}; pairs: {', '.join(p.name for p in m.pairs)}"
+              for what, given in (("highlight", chosen), ("traces", traced)) for name in given if name not in names]  # fmt: skip
+    if not -size <= position < size or position % size not in found.positions:
         faults.append(f"position {position} was not solved, or is none of {size}")
     if faults:
         raise DeclarationError(f"skeleton of {m.name!r}", faults)
-    shape = _shape(m, poses, good)
-    t = int(np.searchsorted(shape.good, position % size))
+    t = int(np.searchsorted(found.positions, position % size))
+    painter = painter_for(found, ax, view)
+    drawing = Drawing(found, painter, colours(m, chosen))
+    others = np.unique(np.linspace(0, len(found.positions) - 1, ghosts + 1).astype(int)) if ghosts else ()
+    drawing.ghosts([int(i) for i in others if i != t])
+    drawing.traces([p.name for p in m.pairs] if traces is True else traced)
+    drawing.position(t)
+    drawing.furniture(t, labels)
+    return painter.ax
+
+
+def painter_for(found: Scene, ax: Any, view: tuple[float, float]) -> Painter:
+    """A painter on given or new axes; a plane mechanism is seen along its normal, from where it stands upright."""
     if ax is None:
-        ax = new_axes(projection="3d")
-    names = [p.name for p in m.pairs] if traces is True else [] if traces is False else list(traces)
-    colours = _colours(m, chosen)
-    for i in np.unique(np.linspace(0, shape.good.size - 1, ghosts + 1).astype(int)) if ghosts else ():
-        if i != t:
-            _links(ax, shape, int(i), colours, ghost=True)
-    _traces(ax, shape, names, colours)
-    _feet(ax, shape, t)
-    _links(ax, shape, t, colours, ghost=False)
-    _pairs(ax, shape, t)
-    _set_view(ax, shape, view)
-    if labels:
-        _labels(ax, shape, t, colours)
-    return ax
+        ax = new_axes((7.2, 5.4)) if found.normal is not None else new_axes((7.2, 5.4), projection="3d")
+    if ax.name == "3d":
+        ax.set_proj_type("ortho")
+        ax.computed_zorder = False
+        toward = None if found.normal is None else -found.upright[:, 1]
+        if toward is None:
+            ax.view_init(*view)
+        else:
+            upright = abs(toward[2]) > 0.99
+            ax.view_init(
+                np.rad2deg(np.arcsin(np.clip(toward[2], -1, 1))),
+                -90.0 if upright else np.rad2deg(np.arctan2(toward[1], toward[0])),
+            )
+        return SpacePainter(ax)
+    if found.normal is not None:
+        return FlatPainter(ax, found.upright.T[[0, 2, 1]] * [[1], [1], [-1]])
+    return FlatPainter(ax, camera_of(*view))
 
 
-def _colours(m: Mechanism, highlight: Sequence[str]) -> dict[str, str]:
+def camera_of(elevation: float, azimuth: float) -> Array:
+    """Directions to the right, up and towards a viewer at some elevation and azimuth (degrees), ``(3, 3)``."""
+    el, az = np.deg2rad(elevation), np.deg2rad(azimuth)
+    right = np.array([-np.sin(az), np.cos(az), 0.0])
+    toward = np.array([np.cos(el) * np.cos(az), np.cos(el) * np.sin(az), np.sin(el)])
+    return np.stack([right, np.cross(toward, right), toward])
+
+
+def colours(m: Mechanism, highlight: Sequence[str] = ()) -> dict[str, str]:
     """A colour for every link; grey for the frame and, where pairs are highlighted, for links that lie at none or one of them."""
     moving = [k for k in m.link_names() if k != m.frame]
     out = {m.frame: MUTED} | {k: PALETTE[i % len(PALETTE)] for i, k in enumerate(moving)}
@@ -161,239 +139,173 @@ def _colours(m: Mechanism, highlight: Sequence[str]) -> dict[str, str]:
     return out
 
 
-def _ordered(points: Array) -> Array:
-    """Points of a plate in the order of their angle about the middle, in their best plane."""
-    middle = points - points.mean(axis=0)
-    _, _, Vt = np.linalg.svd(middle)
-    angle = np.arctan2(middle @ Vt[1], middle @ Vt[0])
-    return points[np.argsort(angle, kind="stable")]
+class Drawing:
+    """A scene that is painted, layer by layer."""
 
+    def __init__(self, found: Scene, painter: Painter, colour: dict[str, str]) -> None:
+        self.scene, self.painter, self.colour = found, painter, colour
+        self.ax = painter.ax
 
-def _links(ax: Any, shape: _Shape, t: int, colours: dict[str, str], *, ghost: bool) -> None:
-    Poly3DCollection = toolkit("art3d").Poly3DCollection
-    for link, colour in colours.items():
-        if link == shape.m.frame:
-            continue
-        points = shape.corners(link, t)
-        line = {
-            "color": colour,
-            "lw": 1.2 if ghost else 3.4,
-            "alpha": 0.28 if ghost else 1.0,
-            "zorder": 1 if ghost else 4,
-        }
-        if len(points) > 2:
-            plate = _ordered(points)
-            closed = np.concatenate([plate, plate[:1]])
-            ax.plot(*closed.T, solid_capstyle="round", solid_joinstyle="round", **line)
-            if not ghost:
-                ax.add_collection3d(Poly3DCollection([plate], facecolor=colour, alpha=0.16, edgecolor="none"))
-        else:
-            ax.plot(*points.T, solid_capstyle="round", **line)
-        if not ghost and link in shape.centers:
-            _center(ax, shape, link, t, colour)
-        for at in [at[t] for (owner, _), at in shape.points.items() if owner == link and not ghost]:
-            ax.plot(*np.array([points.mean(axis=0), at]).T, color=colour, lw=0.9, ls=(0, (2, 2)), zorder=3)
-            ax.scatter(*at, marker="x", s=40, color=colour, depthshade=False, zorder=7)
+    # --- layers --------------------------------------------------------------------------------------------------------
 
+    def ghosts(self, positions: Sequence[int]) -> None:
+        """The middle lines of links and edges of plates at other positions."""
+        for part in self.scene.parts:
+            if part.role == "link" and positions:
+                runs = [run for t in positions for run in _runs(part, self.scene.vertices(part, t))]
+                self.painter.lines(
+                    runs, colors=self.colour[part.link], linewidths=1.2, alpha=GHOST, zorder=1.0, gid="ghosts"
+                )
 
-def _center(ax: Any, shape: _Shape, link: str, t: int, colour: str) -> None:
-    """The mass centre, tied to the link where it lies off its line."""
-    at = shape.centers[link][t]
-    middle = shape.corners(link, t).mean(axis=0)
-    ax.plot(*np.array([middle, at]).T, color=colour, lw=0.9, ls=(0, (2, 2)), zorder=3)
-    ax.scatter(*at, s=46, facecolor="white", edgecolor=colour, linewidth=1.2, depthshade=False, zorder=6)
-    ax.scatter(*at, s=9, color=colour, depthshade=False, zorder=7)
+    def traces(self, names: Sequence[str]) -> None:
+        """Paths of pair points on link b, or on link a where b is the frame."""
+        m = self.scene.mechanism
+        for name in names:
+            pair = m.pair(name)
+            path = self.scene.points[name, pair.b]
+            if np.ptp(path, axis=0).max() > 1e-3 * self.scene.size:
+                mover = pair.b if pair.b != m.frame else pair.a
+                pieces = self._pieces(path)
+                style = {"linewidths": 0.9, "linestyles": [(0, (1, 1.6))], "alpha": 0.8, "zorder": 1.5}
+                self.painter.lines(pieces, colors=self.colour[mover], gid=f"trace of {name}", **style)
 
+    def _pieces(self, path: Array) -> list[Array]:
+        """A path cut where positions between were not solved."""
+        cuts = np.flatnonzero(np.diff(self.scene.positions) > 1) + 1
+        return [piece for piece in np.split(path, cuts) if len(piece) > 1]
 
-def _traces(ax: Any, shape: _Shape, names: Sequence[str], colours: dict[str, str]) -> None:
-    m = shape.m
-    for name in names:
-        pair = m.pair(name)
-        path = shape.ends[name, pair.b]
-        if np.ptp(path, axis=0).max() > 1e-3 * shape.size:
-            ax.plot(
-                *path.T,
-                color=colours[pair.b if pair.b != m.frame else pair.a],
-                lw=0.9,
-                ls=(0, (1, 1.6)),
-                alpha=0.8,
-                zorder=2,
+    def position(self, t: int) -> None:
+        """Everything at one position."""
+        heights: dict[float, list[tuple[Part, Array]]] = {}
+        for part in self.scene.parts:
+            vertices = self.scene.vertices(part, t)
+            if np.isnan(vertices).any():
+                continue
+            heights.setdefault(ABOVE.get(part.role, 4.0), []).append((part, vertices))
+            if part.role in ("center", "point"):
+                self._mark(part, vertices)
+            elif part.dashed or part.role in LINES:
+                self._outline(part, vertices)
+        for height, parts in sorted(heights.items()):
+            self._polygons(parts, height)
+        lost = [self.scene.points[name, self.scene.mechanism.pair(name).b][t] for name in self.scene.not_unique]
+        if lost:
+            style = {
+                "marker": "o",
+                "s": 520,
+                "facecolor": "none",
+                "edgecolor": REACTION,
+                "hatch": HATCH,
+                "linewidth": 1.0,
+            }
+            self.painter.marks(np.array(lost), zorder=6.4, gid="not unique", **style)
+
+    def _polygons(self, parts: list[tuple[Part, Array]], height: float) -> None:
+        corners, faces, edges = [], [], []
+        for part, vertices in parts:
+            if part.dashed or not part.shape.faces:
+                continue
+            own = [vertices[list(face)] for face in part.shape.faces]
+            alpha = {"plate": 0.2, "guide": 0.28}.get(part.role, 1.0)
+            colour = SOLID.get(part.role) or self.colour[part.link]
+            shade = shaded(colour, own, self.painter.camera, alpha)
+            rims = [i < part.shape.rims for i in range(len(own))]
+            corners += own
+            faces.append(shade)
+            edges.append(
+                edges_of(shade, rims if part.role != "plate" else [False] * len(own), 0.8 if alpha < 1 else 1.0)
             )
+        if corners:
+            self.painter.polygons(corners, np.concatenate(faces), np.concatenate(edges), height)
+
+    def _outline(self, part: Part, vertices: Array) -> None:
+        width, style = LINES.get(part.role, (1.0, "-"))
+        colour = LINE_COLOUR.get(part.role) or self.colour.get(part.link, INK)
+        self.painter.lines(
+            _runs(part, vertices), colors=colour, linewidths=width, linestyles=[(0, (3, 2)) if part.dashed else style],
+            zorder=ABOVE.get(part.role, 5.0) + 0.05, gid=f"{part.role} {part.owner}",
+        )  # fmt: skip
+
+    def _mark(self, part: Part, vertices: Array) -> None:
+        colour = self.colour[part.link]
+        if part.role == "point":
+            self.painter.marks(vertices, marker="x", s=40, color=colour, zorder=7, gid=f"point {part.owner}")
+            return
+        self.painter.marks(vertices, s=46, facecolor="white", edgecolor=colour, linewidth=1.2, zorder=6)
+        self.painter.marks(vertices, s=9, color=colour, zorder=6.1, gid=f"center {part.owner}")
+
+    # --- what stands beside it -----------------------------------------------------------------------------------------
+
+    def drawn(self, t: int) -> Array:
+        """All vertices at a position with all other places of points, ``(n, 3)``."""
+        parts = [self.scene.vertices(part, t) for part in self.scene.parts]
+        every = np.concatenate([*parts, self.scene.everything])
+        return every[np.isfinite(every).all(axis=1)]
+
+    def furniture(self, t: int, labels: bool) -> None:
+        """Equal scales, no frame; names, directions and a scale; where pairs are many, numbers and a legend."""
+        from mechgraph.show.arrangement import Arrangement, nice_length
+
+        painter, samples = self.painter, self._samples(t)
+        bare(self.ax)
+        arranged = Arrangement(
+            self.ax, painter.pixels, lambda: painter.pixels(samples), lambda: painter.camera, lambda: inside(self.ax), painter.fill,
+        )  # fmt: skip
+        axes = [(name, axis, MUTED) for name, axis in zip("xyz", np.eye(3), strict=True)]
+        if self.scene.gravity is not None:
+            axes.append(("g", self.scene.gravity / np.linalg.norm(self.scene.gravity), LOAD))
+        arranged.directions(axes)
+        units, scale = self.scene.mechanism.units, self.scene.reaction_scale
+        length = nice_length(self.scene.size)
+        arranged.scale(length, f"{length:g} {unit_of(units, (1, 0, 0))}".strip())
+        if scale:
+            force = nice_length(self.scene.size / scale)
+            arranged.scale(scale * force, f"{force:g} {unit_of(units, (1, 1, -2))}".strip(), REACTION)
+        if self.scene.not_unique:
+            arranged.scale(0.0, "hatched: not unique", REACTION)
+        if labels:
+            self._names(arranged, t)
+        painter.fit(self.drawn(t), arranged.room)
+        for artist in (*self.ax.lines, *self.ax.collections):
+            artist.set_clip_on(False)
+            artist.set_in_layout(False)
+
+    def _names(self, arranged: Any, t: int) -> None:
+        m, lines = self.scene.mechanism, []
+        numbered = len(m.pairs) > MOST_NAMES
+        for label in self.scene.labels:
+            text, colour = label.text, self.colour.get(label.link, INK)
+            if numbered and label.kind == "pair":
+                text = str(m.place_of_pair(label.owner) + 1)
+                lines.append((f"{text}  {label.text}", INK))
+            elif numbered and label.kind == "link":
+                lines.append((text, colour))
+                continue
+            style = {"fontsize": 9.5, "weight": "bold"} if label.kind == "pair" else {"fontsize": 9.0}
+            away = self.scene.symbol * (1.15 if label.kind == "pair" else 0.6)
+            arranged.name(text, self.scene.place(label, t), colour, away, **style)
+        arranged.legend(lines)
+
+    def _samples(self, t: int) -> Array:
+        """Points along what texts should not cover: middle lines of links, symbols, arrows and springs."""
+        out = []
+        for part in self.scene.parts:
+            vertices = self.scene.vertices(part, t)
+            if part.role in ("plate", "axis", "tie") or np.isnan(vertices).any():
+                continue
+            if part.role == "link":
+                u = np.linspace(0, 1, 25)[:, None]
+                out += [(1 - u) * run[0] + u * run[-1] for run in _runs(part, vertices)]
+            else:
+                out.append(vertices[:: max(len(vertices) // 40, 1)])
+        return np.concatenate(out)
 
 
-def _feet(ax: Any, shape: _Shape, t: int) -> None:
-    """A hatched foot under every pair point of the frame."""
-    for at in shape.corners(shape.m.frame, t):
-        ax.scatter(
-            *at, marker=_foot(), s=560, facecolor=MUTED, edgecolor=MUTED, linewidth=1.1, depthshade=False, zorder=3
-        )
+def _runs(part: Part, vertices: Array) -> list[Array]:
+    return [vertices[list(line)] for line in part.shape.lines]
 
 
-def _foot() -> Any:
-    """A marker: a triangle standing on a hatched line, its tip at the point."""
-    from matplotlib.path import Path
-
-    lines = [((0, 0), (-0.5, -0.8)), ((-0.5, -0.8), (0.5, -0.8)), ((0.5, -0.8), (0, 0)), ((-0.8, -0.8), (0.8, -0.8))]
-    lines += [((x, -0.8), (x - 0.25, -1.05)) for x in (-0.5, -0.2, 0.1, 0.4, 0.7)]
-    vertices = [v for line in lines for v in line]
-    return Path(vertices, [Path.MOVETO, Path.LINETO] * len(lines))
-
-
-def _pairs(ax: Any, shape: _Shape, t: int) -> None:
-    """Pairs: a symbol on link b, the axis as a fine line through both points; a plane pair shows a piece of its plane."""
-    Poly3DCollection = toolkit("art3d").Poly3DCollection
-    for pair in shape.m.pairs:
-        a, b = shape.ends[pair.name, pair.a][t], shape.ends[pair.name, pair.b][t]
-        turns = sum(f.turns for f in pair.type.freedoms)
-        axis = shape.axes[pair.name][t]
-        if pair.type.f - turns > 1:
-            across = np.linalg.svd(axis[None])[2][1:] * 0.06 * shape.size
-            corners = [b + i * across[0] + j * across[1] for i, j in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
-            ax.add_collection3d(
-                Poly3DCollection([corners], facecolor=MUTED, alpha=0.25, edgecolor=MUTED, linewidth=0.8)
-            )
-        elif pair.type.directed:
-            reach = 0.055 * shape.size * axis
-            first, last = sorted((a, b), key=lambda p: float(p @ axis))
-            ax.plot(*np.array([first - reach, last + reach]).T, color=INK, lw=1.0, ls=(0, (7, 2, 1.5, 2)), zorder=5)
-        marker, area = MARKS.get((turns, pair.type.f - turns), ("D", 62.0))
-        fill = INK if turns == 3 else "white"
-        ax.scatter(*b, marker=marker, s=area, facecolor=fill, edgecolor=INK, linewidth=1.5, depthshade=False, zorder=8)
-
-
-def _labels(ax: Any, shape: _Shape, t: int, colours: dict[str, str]) -> None:
-    """Names beside pairs and links, each where it covers least."""
-    m = shape.m
-    camera = _camera(ax)
-    moving = {link: shape.corners(link, t) @ camera.T for link in colours if link != m.frame}
-    marks = np.array(
-        [shape.ends[pair.name, pair.b][t] for pair in m.pairs]
-        + [at[t] for at in (*shape.centers.values(), *shape.points.values())]
-    )
-    room = _Room([_sides(corners) for corners in moving.values()] + [marks @ camera.T], _extent(shape, camera))
-    for pair in m.pairs:
-        at = camera @ shape.ends[pair.name, pair.b][t]
-        _label(ax, room, f"{pair.name} ({pair.type.symbol})", at, 0.05, camera, INK, "bold")
-    for (link, name), at in shape.points.items():
-        _label(ax, room, f"{link}.{name}", camera @ at[t], 0.04, camera, colours.get(link, INK), "normal")
-    for link, corners in moving.items():
-        at = corners.mean(axis=0)
-        _label(ax, room, link, at, 0.035, camera, colours[link], "normal")
-
-
-def _camera(ax: Any) -> Array:
-    """Directions to the right and up on the screen, ``(2, 3)``."""
-    el, az = np.deg2rad(ax.elev), np.deg2rad(ax.azim)
-    return np.array([[-np.sin(az), np.cos(az), 0.0], [-np.sin(el) * np.cos(az), -np.sin(el) * np.sin(az), np.cos(el)]])
-
-
-def _extent(shape: _Shape, camera: Array) -> float:
-    """Diagonal of what is seen: less than the size of a long mechanism that is seen along its length."""
-    seen = shape.everything @ camera.T
-    return float(np.linalg.norm(np.ptp(seen, axis=0))) or shape.size
-
-
-def _sides(corners: Array) -> Array:
-    """Points along the lines between the corners of a link, on the screen."""
-    u = np.linspace(0.0, 1.0, 13)[:, None]
-    return np.concatenate([(1 - u) * p + u * q for p, q in zip(corners, np.roll(corners, -1, axis=0), strict=True)])
-
-
-class _Room:
-    """What is already drawn on the screen; a text is put where it covers least of it."""
-
-    def __init__(self, drawn: list[Array], size: float) -> None:
-        self.taken = np.concatenate(drawn)
-        self.size = size
-
-    def cells(self, text: str, corner: Array, side: float) -> Array:
-        """Points that a text covers, ``side`` -1, 0, 1 for text to the left of, about, to the right of a point."""
-        width = 0.0155 * self.size * len(text)
-        x = corner[0] + width * (np.linspace(0.0, 1.0, 7) - 0.5 + 0.5 * side)
-        return np.stack([np.tile(x, 2), corner[1] + 0.012 * self.size * np.repeat([-1.0, 1.0], 7)], axis=1)
-
-    def place(self, text: str, at: Array, distance: float) -> tuple[Array, float]:
-        """Where a text covers least, and on which side of that point it stands."""
-        best: tuple[float, Array, float] | None = None
-        for reach in (1.0, 1.5):
-            for angle in np.linspace(0.0, 2 * np.pi, 16, endpoint=False) + 0.5 * np.pi:
-                d = np.array([np.cos(angle), np.sin(angle)])
-                side = float(np.sign(np.round(d[0], 1)) if abs(d[0]) > 0.3 else 0.0)
-                corner = at + reach * distance * self.size * d
-                gap = np.linalg.norm(self.cells(text, corner, side)[:, None] - self.taken, axis=2).min(axis=0)
-                cost = float(np.exp(-((gap / (0.022 * self.size)) ** 2)).sum()) + 0.4 * (reach - 1.0)
-                if best is None or cost < best[0] - 1e-9:
-                    best = (cost, corner, side)
-        assert best is not None
-        self.taken = np.concatenate([self.taken, *[self.cells(text, best[1], best[2])] * 3])
-        return best[1], best[2]
-
-
-def _label(
-    ax: Any, room: _Room, text: str, at: Array, distance: float, camera: Array, colour: str, weight: str
-) -> None:
-    """Text beside a point of the screen."""
-    import matplotlib.patheffects as effects
-
-    corner, side = room.place(text, at, distance)
-    ax.text(
-        *(corner @ camera),
-        text,
-        color=colour,
-        weight=weight,
-        fontsize=9.5,
-        zorder=20,
-        va="center",
-        ha="left" if side > 0 else "right" if side < 0 else "center",
-        path_effects=[effects.withStroke(linewidth=3.0, foreground="white")],
-    )
-
-
-def _plane_normal(points: Array) -> Array | None:
-    _, spread, Vt = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
-    return None if spread[2] > FLAT * spread[0] else np.asarray(Vt[2] * np.sign(Vt[2][np.argmax(np.abs(Vt[2]))]))
-
-
-def _set_view(ax: Any, shape: _Shape, view: tuple[float, float]) -> None:
-    """Equal scales, no box, a small tripod of the global directions; a plane mechanism is seen along its normal."""
-    points = shape.everything
-    low, high = points.min(axis=0), points.max(axis=0)
-    room, middle = np.maximum(high - low, 0.12 * shape.size), (low + high) / 2
-    normal = _plane_normal(points)
-    ax.set_proj_type("ortho")
-    ax.set_axis_off()
-    ax.computed_zorder = False
-    if normal is None:
-        ax.view_init(*view)
-    else:
-        upright = abs(normal[2]) > 0.99
-        ax.view_init(
-            np.rad2deg(np.arcsin(np.clip(normal[2], -1, 1))),
-            -90.0 if upright else np.rad2deg(np.arctan2(normal[1], normal[0])),
-        )
-    right, up = camera = _camera(ax)
-    extent = _extent(shape, camera)
-    corner = middle + right * ((points - middle) @ right).min() + up * (((points - middle) @ up).min() - 0.04 * extent)
-    _tripod(ax, corner, 0.06 * extent, normal)
-    for setter, c, r in zip((ax.set_xlim, ax.set_ylim, ax.set_zlim), middle, room, strict=True):
-        setter(c - r / 2, c + r / 2)
-    ax.set_box_aspect(room)
-    _fill(ax, points, room)
-    for artist in (*ax.lines, *ax.collections, *ax.texts):
-        artist.set_clip_on(False)
-        artist.set_in_layout(False)
-
-
-def _fill(ax: Any, points: Array, room: Array) -> None:
-    """Zoom so that the mechanism fills its axes."""
-    x, y, _ = toolkit("proj3d").proj_transform(*points.T, ax.get_proj())
-    (x0, y0), (x1, y1) = ax.transData.inverted().transform(ax.bbox.get_points())
-    ax.set_box_aspect(room, zoom=float(0.88 * min((x1 - x0) / max(np.ptp(x), 1e-9), (y1 - y0) / max(np.ptp(y), 1e-9))))
-
-
-def _tripod(ax: Any, at: Array, length: float, normal: Array | None) -> None:
-    for axis, name in zip(np.eye(3), "xyz", strict=True):
-        if normal is not None and abs(normal @ axis) > 0.99:
-            continue
-        ax.plot(*np.array([at, at + length * axis]).T, color=MUTED, lw=1.2)
-        ax.text(*(at + 1.4 * length * axis), name, color=MUTED, fontsize=8.5, ha="center", va="center")
+def inside(ax: Any) -> Array:
+    """The place of axes on the screen as their figure gives it, ``[[left, bottom], [right, top]]`` in pixels."""
+    place = ax.get_position(original=True).transformed(ax.figure.transSubfigure)
+    return np.array(place.get_points())

@@ -11,10 +11,11 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.model import pair_kinematics
+from mechgraph.model.force_law import Law
 from mechgraph.model.load import Gravity
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
-from mechgraph.show.shapes import Shape, frame_along
+from mechgraph.show.shapes import Shape
 from mechgraph.show.symbols import Line, lines_of
 
 FLAT = 1e-6
@@ -135,13 +136,21 @@ class Stage:
     def on(self, link: str, point: Any) -> Array:
         """A point of a link, given in its frame or by its name, in the global frame, ``(T, 3)``."""
         X = self.place.poses[link][:, :3]
-        at = np.asarray(self.m.link(link).point(point) if isinstance(point, str) else point, dtype=float)
-        return np.asarray(X[:, :, :3] @ at + X[:, :, 3])
+        return np.asarray(X[:, :, :3] @ self.local(link, point) + X[:, :, 3])
+
+    def local(self, link: str, point: Any) -> Array:
+        """A point of a link, given by its coordinates or its name, in the link's frame."""
+        return np.asarray(self.m.link(link).point(point) if isinstance(point, str) else point, dtype=float)
 
     def corners(self, link: str) -> list[Array]:
-        """Points of the pairs that bear a link, in its own frame."""
+        """What a link joins, in its own frame: points of the pairs that bear it, and where springs and other laws hold it."""
         ends = (end for p in self.m.pairs if p.type.bears for end in zip((p.a, p.b), p.markers, strict=True))
-        return [np.asarray(marker.point, dtype=float) for name, marker in ends if name == link]
+        laws = (load for load in self.m.loads if isinstance(load, Law) and load.between_links)
+        held = ((end, p) for load in laws for end, p in ((load.a, load.p), (load.b, load.q)) if end == link)
+        return [
+            *(np.asarray(marker.point, dtype=float) for name, marker in ends if name == link),
+            *(self.local(link, p) for _, p in held),
+        ]
 
     def symbol_size(self, pair: Pair) -> float:
         """Half width of a symbol: less where another pair is near."""
@@ -159,13 +168,15 @@ class Stage:
 
     @cached_property
     def upright(self) -> Array:
-        """Axes of what stands upright, as columns: two level ones, and up (against gravity, else z, or y of a plane mechanism)."""
-        up = np.array([0.0, 0.0, 1.0]) if self.gravity is None else -self.gravity / np.linalg.norm(self.gravity)
+        """Axes of what stands upright, as columns: two level ones, and up: z, or y of a mechanism in a plane that has no z."""
         if self.normal is None:
-            return frame_along(up)
-        inside = (v - (v @ self.normal) * self.normal for v in (up, np.eye(3)[1], np.eye(3)[2]))
+            return np.eye(3)
+        n = self.normal
+        inside = (v - (v @ n) * n for v in (np.eye(3)[2], np.eye(3)[1]))
         up = next(v / np.linalg.norm(v) for v in inside if np.linalg.norm(v) > 0.1)
-        return np.column_stack([np.cross(up, self.normal), self.normal, up])
+        right = np.cross(up, n)
+        right *= np.sign(right[np.argmax(np.abs(right))])  # seen from where x points to the right
+        return np.column_stack([right, np.cross(up, right), up])
 
 
 def distinct(points: Iterable[Array], tolerance: float) -> Array:

@@ -77,7 +77,9 @@ def symbol(row: PairType, pitch: float, size: float, strokes: Sequence[tuple[flo
                 _slide_elements([lines[j] for j in part], [strokes[j] for j in part], size, len(slides) == row.f, row.f)
             )
         else:
-            out += list(_turn_elements([lines[j] for j in part], [lines[j] for j in slides], size, row.f))
+            out += list(
+                _turn_elements([lines[j] for j in part], strokes[part[0]], [lines[j] for j in slides], size, row.f)
+            )
     if not row.f:
         out.append(Element("dark", 0, prism(4, 0.5 * size, -0.5 * size, 0.5 * size)))
     return [Element(e.role, e.frame, e.shape, not touches) for e in out]
@@ -95,7 +97,7 @@ def _slide_elements(
     elif len(lines) == 2:
         yield Element("guide", frame, _plate(directions, low, high, size))
     if square and len(lines) < 3:
-        block = prism(4, BODY * size, -0.8 * size, 0.8 * size)
+        block = prism(4, BODY * size, -1.3 * size, 1.3 * size)
         yield Element("body", last, block.along(directions[0]))
 
 
@@ -110,36 +112,40 @@ def _plate(directions: list[Array], low: Array, high: Array, size: float) -> Sha
     return Shape(vertices, ((3, 2, 1, 0), (4, 5, 6, 7), *sides), ((0, 1, 2, 3, 0), (4, 5, 6, 7, 4)), 6)
 
 
-def _turn_elements(lines: list[Line], slides: list[Line], size: float, last: int) -> Iterator[Element]:
+def _turn_elements(
+    lines: list[Line], stroke: tuple[float, float], slides: list[Line], size: float, last: int
+) -> Iterator[Element]:
     """A drum, a ball with two pins, or a ball; in or on a guide of its own size."""
     normal = np.cross(slides[0].direction, slides[1].direction) if len(slides) == 2 else None
     borne = [line for line in lines if normal is None or not _parallel(line.direction, normal)]
-    if not borne:
+    if len(lines) > 2:
+        yield Element("dark", last, ball((BODY if slides else 0.8) * size))
+    elif not borne:
         drum = prism(ROUND, 1.05 * size, -BODY * size, 0.5 * size)
         yield Element("body", last, drum.along(lines[0].direction, lines[0].point))
     elif len(borne) == 1:
-        yield from _drum(borne[0], slides, size, last)
+        yield from _drum(borne[0], stroke, slides, size, last)
     elif len(borne) == 2:
         yield Element("dark", borne[1].frame, ball(BODY * size))
         for line in borne:
             yield Element(
                 "body", line.frame, prism(8, PIN * size, -1.3 * size, 1.3 * size).along(line.direction, line.point)
             )
-    else:
-        yield Element("dark", last, ball((BODY if slides else 0.8) * size))
 
 
-def _drum(line: Line, slides: list[Line], size: float, last: int) -> Iterator[Element]:
-    """A drum about its axis: a piston in a guide along it, a roller on a plate, or a bearing by itself, with a thread if it advances."""
+def _drum(line: Line, stroke: tuple[float, float], slides: list[Line], size: float, last: int) -> Iterator[Element]:
+    """A drum about its axis: a bearing by itself, a piston in a guide along it, a roller on a plate, or a nut on a threaded spindle."""
     coaxial = any(_parallel(line.direction, slide.direction) for slide in slides)
     radius, half = (BODY, 0.8) if coaxial else (BODY, 1.3) if len(slides) == 2 else (0.8, 1.15)
-    turn = frame_along(line.direction)
-    drum = prism(ROUND, radius * size, -half * size, half * size)
-    frame = last if coaxial else line.frame
-    yield Element("body", frame, drum.moved(turn, line.point))
+    turn, frame = frame_along(line.direction), last if coaxial else line.frame
     if line.advance:
-        wound = thread(1.04 * radius * size, -half * size, half * size, line.advance)
-        yield Element("dark", frame, wound.moved(turn, line.point))
+        low, high = sorted(line.advance * q for q in stroke)
+        low, high = low - PAD * size, high + PAD * size
+        yield Element("body", frame, prism(8, 0.36 * size, low, high).moved(turn, line.point))
+        turns = int(np.clip((high - low) / (0.7 * size), 3, 24))
+        yield Element("dark", frame, thread(0.42 * size, low, high, line.advance, turns).moved(turn, line.point))
+        half, frame = 0.6, last
+    yield Element("body", frame, prism(ROUND, radius * size, -half * size, half * size).moved(turn, line.point))
 
 
 def _parallel(u: Array, v: Array) -> bool:
