@@ -142,7 +142,8 @@ class Arrangement(Artist):
         length, room = 19.0 * unit, 17.0 * unit
         origin = box[0] + np.array([1.0, 1.0]) * (length + room)
         flat = self._camera()[:2]
-        out, right = [], origin[0]
+        out: list[Array] = []
+        right = float(origin[0])
         for line, text, direction in self._corner:
             seen = flat @ direction
             shown = float(np.linalg.norm(seen)) > 0.15
