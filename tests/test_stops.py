@@ -142,3 +142,37 @@ def test_two_stops_at_once_share_the_blow():
 def test_bad_stops_are_named(stops, words):
     with pytest.raises(mg.DeclarationError, match=words):
         mg.respond(slide(), (0, 1), stops=stops)
+
+
+def chain(n):
+    links = [
+        mg.Link("frame"),
+        *(mg.Link(f"l{i}", mass=1.0, center=(i + 0.5, 0, 0), inertia=0.1 * np.eye(3)) for i in range(n)),
+    ]
+    pairs = [
+        mg.Pair(f"P{i}", "R", f"l{i - 1}" if i else "frame", f"l{i}", point=(i, 0, 0), axis=(0, 0, 1)) for i in range(n)
+    ]
+    return mg.Mechanism("chain", links, pairs, loads=[mg.Gravity((0, -G, 0))])
+
+
+@pytest.mark.seeds(3)
+def test_random_pendulums_between_stops(seed):
+    """No stop is passed, none pulls, and energy is lost at impacts alone."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(1, 4))
+    stops = [
+        mg.Stop(f"P{i}", -rng.uniform(0.2, 1.5), rng.uniform(0.2, 1.0), float(rng.choice([0.0, 0.3, 0.7, 1.0])))
+        for i in range(n)
+    ]
+    r = mg.respond(chain(n), (0, 2), rtol=1e-9, atol=1e-11, stops=stops)
+    assert r.events
+    assert np.abs(r.energy.balance).max() < 1e-6
+    assert (np.diff(r.energy.work) < 1e-12).all()
+    for stop in stops:
+        q, push = r[stop.freedom].position[:, 0], r[stop.freedom].applied_effort[:, 0]
+        assert stop.lower - 1e-8 < q.min()
+        assert q.max() < stop.upper + 1e-8
+        low, high = np.abs(q - stop.lower) < 1e-8, np.abs(q - stop.upper) < 1e-8
+        assert (push[low] > -1e-5).all()
+        assert (push[high] < 1e-5).all()
+        assert (push[~low & ~high] == 0.0).all()

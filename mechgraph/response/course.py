@@ -149,20 +149,26 @@ class Course:
                     )
                 yield places[part], stage.task, closed, v, work[part]
 
-    def states(self, t: Array) -> tuple[Array, Array]:
-        """Internal states ``(nx, T)``, and rates and accelerations ``(2, F, T)`` of all freedoms, at times ``(T,)``."""
-        s = self.task.system
-        x, out = np.empty((s.n_state, len(t))), np.empty((2, s.n_freedoms, len(t)))
+    def positions(self, t: Array) -> Array:
+        """Internal states ``(nx, T)`` at times ``(T,)``."""
+        x = np.empty((self.task.system.n_state, len(t)))
+        for places, _, closed, _, _ in self._states(t):
+            x[:, places] = closed.here.x
+        return x
+
+    def rates(self, t: Array) -> Array:
+        """Rates and accelerations ``(2, F, T)`` of all freedoms at times ``(T,)``, internal units."""
+        out = np.empty((2, self.task.system.n_freedoms, len(t)))
         for places, task, closed, v, _ in self._states(t):
-            rates = moved(closed.here, closed.f, v, task.prescribed_at(t[places])[1:], task.loads, t[places]).rates
-            x[:, places], out[0][:, places], out[1][:, places] = closed.here.x, rates.dq, rates.ddq
-        return x, out
+            at = t[places]
+            rates = moved(closed.here, closed.f, v, task.prescribed_at(at)[1:], task.loads, at).rates
+            out[0][:, places], out[1][:, places] = rates.dq, rates.ddq
+        return out
 
     def freedom(self, name: str, t: Array) -> Array:
         """Position, velocity and acceleration ``(3, T)`` of a freedom at times ``(T,)``, user's units."""
         s = self.task.system
         k, j = self.mechanism.freedom(name)
         column = int(s.first_column[k]) + j
-        x, rates = self.states(t)
         unit = s.par.L if s.is_length[column] else 1.0
-        return unit * np.stack([x[s.single_rows[column]], rates[0, column], rates[1, column]])
+        return unit * np.stack([self.positions(t)[s.single_rows[column]], *self.rates(t)[:, column]])

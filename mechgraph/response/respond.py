@@ -32,7 +32,9 @@ from mechgraph.structure.snapping import meant
 MethodName = Literal["auto", "RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"]
 OnStopName = Literal["raise", "return"]
 CROWDED = 1000
-"""Impacts and releases within a step after which the motion is given up."""
+"""Impacts and releases, each ``SOON`` after the one before, after which the motion is given up."""
+SOON = 1e-9
+"""The same as a part of the time that is left."""
 
 
 def respond(
@@ -187,9 +189,9 @@ def _occurrences(
         ):
             if progress is not None:
                 progress(segment.end)
-            met = stops.met(course.states, segment.begin, segment.end) if stops.limits else None
+            met = stops.met(course, segment.begin, segment.end) if stops.limits else None
             if met is not None:
-                crowd = crowd + 1 if met == segment.begin else 0
+                crowd = crowd + 1 if met - segment.begin < SOON * (end - t) else 0
                 it.cut(met)
             yield from watch.passed(segment.begin, segment.end if met is None else met)
             if met is not None:
@@ -198,10 +200,9 @@ def _occurrences(
             return
         if crowd > CROWDED:
             raise Stopped("impacts and releases of stops follow each other without end")
-        t = met
-        state, rates = course.states(np.array([t]))
-        x = state[:, 0]
-        dq, lost, first, found = stops.after(t, x, rates[0][:, 0])
+        at = np.array([met])
+        t, x, dq = met, course.positions(at)[:, 0], course.rates(at)[0, :, 0]
+        dq, lost, first, found = stops.after(t, x, dq)
         it.done -= lost
         yield from found
 

@@ -11,10 +11,10 @@ with ``G`` the rows ``g_i`` of independent rates. Stops that are closed at rest 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import scipy
@@ -32,6 +32,9 @@ from mechgraph.response.prescribed import Prescribed
 
 TOUCHING = 1e-9
 """Gap (radians, lengths / L) up to which a stop counts as closed."""
+LOOKS = np.unique(np.append(np.linspace(0.125, 1.0, 8), 0.5 ** np.arange(3, 20)))
+"""Parts of a step at which gaps are looked at: closely behind its beginning, where a freedom may have just left its stop. The beginning
+itself is that of the step before, whose rates an impact may have changed."""
 LOWEST = 1e-9
 """Height (radians, lengths / L) of a rebound below which the freedom rests on its stop; what it loses is of that order."""
 
@@ -93,12 +96,18 @@ class _Limit:
         return Occurrence(event, t, (self.sign > 0) != meets)
 
 
-Motion = Callable[[Array], tuple[Array, Array]]
-"""States ``(nx, T)``, and rates and accelerations ``(2, F, T)``, at times ``(T,)``."""
+class Moving(Protocol):
+    """What stops see of a motion."""
+
+    def positions(self, t: Array) -> Array:
+        """Internal states ``(nx, T)`` at times ``(T,)``."""
+
+    def rates(self, t: Array) -> Array:
+        """Rates and accelerations ``(2, F, T)`` of all freedoms at times ``(T,)``."""
 
 
-def _gap(motion: Motion, limit: _Limit, t: Array) -> Array:
-    return np.asarray(limit.sign * (motion(t)[0][limit.row] - limit.value))
+def _gap(motion: Moving, limit: _Limit, t: Array) -> Array:
+    return np.asarray(limit.sign * (motion.positions(t)[limit.row] - limit.value))
 
 
 @dataclass(frozen=True)
@@ -157,29 +166,29 @@ class Stops:
         held: Any = _Held(self.task.prescribed, tuple(limit.user for limit in self.held))
         return replace(self.task, prescribed=held, columns=columns)
 
-    def met(self, motion: Motion, begin: float, end: float) -> float | None:
-        """The first time in a step at which a free limit is passed, or a held one no longer presses; ``motion(t)``: states and rates."""
+    def met(self, motion: Moving, begin: float, end: float) -> float | None:
+        """The first time in a step at which a free limit is passed, or a held one no longer presses."""
         times: list[float] = []
-        looks = np.linspace(begin, end, 9)
+        looks = begin + (end - begin) * LOOKS
         free = [limit for limit in self.limits if limit not in self.held]
         if free:
-            x, _ = motion(looks)
+            x = motion.positions(looks)
             for limit in free:
                 gap = limit.sign * (x[limit.row] - limit.value)
                 deep = np.flatnonzero(gap < -TOUCHING)
                 if deep.size:
                     before = np.flatnonzero(gap[: deep[0]] > 0.0)
                     height = partial(_gap, motion, limit)
-                    times.append(first_root(height, looks[before[-1]], looks[deep[0]]) if before.size else begin)
+                    times.append(first_root(height, looks[before[-1]], looks[deep[0]]) if before.size else looks[0])
         if self.held:
             push = partial(self._pressing, motion)
             if push(looks[-1:])[0] < 0.0:
-                times.append(first_root(push, begin, end) if push(looks[:1])[0] > 0.0 else begin)
+                times.append(first_root(push, looks[0], end) if push(looks[:1])[0] > 0.0 else looks[0])
         return min(times, default=None)
 
-    def _pressing(self, motion: Motion, times: Array) -> Array:
+    def _pressing(self, motion: Moving, times: Array) -> Array:
         """The least of the efforts with which the held limits press: negative where one would have to pull."""
-        states, rates = motion(times)
+        states, rates = motion.positions(times), motion.rates(times)
         out = []
         for t, x, dq in zip(times.tolist(), states.T, rates[0].T, strict=True):
             free = _Free(self.task, t, x, dq, self.held)
@@ -202,8 +211,9 @@ class Stops:
         if (free.still & (free.w > 0.0)).any():
             after, lost = before.struck(np.where(free.still, 0.0, e))
             free = _Free(self.task, t, x, after, closed)
-        now = tuple(closed[i] for i in free.pressing())
-        hops = 2.0 * free.w / np.where(free.falls & ~free.still & (free.w > 0.0), -free.w_rate, np.inf)
+        pressing, w_rate = free.pressing()
+        now = tuple(closed[i] for i in pressing)
+        hops = 2.0 * free.w / np.where((w_rate < 0.0) & ~free.still & (free.w > 0.0), -w_rate, np.inf)
         hit = (before.w < 0.0) & ~before.still
         found = [
             one.occurrence(t, True) for i, one in enumerate(closed) if hit[i] or (one in now and one not in self.held)
@@ -236,11 +246,6 @@ class _Free:
         self.w, self.w_rate = self.sign * dq[self.columns], self.sign * found.rates.ddq[self.columns, 0]
 
     @property
-    def falls(self) -> NDArray[np.bool_]:
-        """Which limits close faster and faster."""
-        return np.asarray(self.w_rate < 0.0, dtype=bool)
-
-    @property
     def still(self) -> NDArray[np.bool_]:
         """Which limits are closed at rest: they would open by next to nothing before they close again."""
         return np.asarray(self.w**2 <= 2.0 * LOWEST * np.maximum(np.abs(self.w_rate), LOWEST), dtype=bool)
@@ -260,8 +265,10 @@ class _Free:
         before, behind = (float(kinetic_energy(here, here.link_twists(dq[:, None]))[0]) for dq in (self.dq, after))
         return after, before - behind
 
-    def pressing(self) -> list[int]:
-        """Which of the limits that are closed at rest press, so that they hold: independent ones."""
+    def pressing(self) -> tuple[list[int], Array]:
+        """Which of the limits that are closed at rest press, so that they hold: independent ones; and the accelerations then."""
         rest = np.flatnonzero(self.still)
-        p = self._least(self.D[np.ix_(rest, rest)], self.w_rate[rest]) if len(rest) else np.zeros(0)
-        return [int(i) for i in rest[p > 0.0]]
+        p = np.zeros(len(self.w))
+        if len(rest):
+            p[rest] = self._least(self.D[np.ix_(rest, rest)], self.w_rate[rest])
+        return np.flatnonzero(p > 0.0).tolist(), self.w_rate + self.D @ p
