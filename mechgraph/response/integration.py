@@ -110,7 +110,9 @@ class Integration:
             serves = True
             try:
                 while stepper.status == "running" and serves:
-                    message = stepper.step()
+                    # trial steps may be far too long; what overflows there is taken back
+                    with np.errstate(over="ignore", invalid="ignore"):
+                        message = stepper.step()
                     if stepper.status == "failed":
                         raise Stopped(
                             f"{message} Steps collapse where loads are stiff or jump, and at positions where the mechanism locks; for "
