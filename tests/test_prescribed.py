@@ -354,7 +354,10 @@ def test_faults_are_told(motions: dict, words: str) -> None:
 def test_a_motion_of_vectors_is_kept_as_it_was_given() -> None:
     t, points = tip_path()
     motion = mg.Motion(points, t=t)
-    assert motion == motion
+    assert motion == mg.Motion(points.copy(), t=t)
+    assert hash(motion) == hash(mg.Motion(points.copy(), t=t))
+    assert motion != mg.Motion(points + 1e-12, t=t)
+    assert repr(motion).startswith(f"Motion(shape={points.shape}, position=")
     assert pickle.loads(pickle.dumps(motion)).given[0].tolist() == points.tolist()
     with pytest.raises(ValueError, match="read-only"):
         motion.given[0][0] = 1.0
@@ -379,7 +382,7 @@ def senses(m: mg.Mechanism, s: mg.Solution, drives: list[str], names: list[tuple
     return np.linalg.det(np.moveaxis(np.array(rows), -1, 0))
 
 
-@pytest.mark.seeds(12)
+@pytest.mark.seeds(12, without=(0, 1, 5, 6, 7, 9, 10, 11, 12, 13, 15, 16, 18, 22, 24, 25, 26, 27, 28, 29, 30, 32))
 def test_random_mechanisms_moved_by_points_are_the_same(seed: int) -> None:
     """Drives move it; then what points did is prescribed, with the efforts in the drives: all of it is the same.
 
@@ -388,7 +391,7 @@ def test_random_mechanisms_moved_by_points_are_the_same(seed: int) -> None:
     """
     made = solvable(seed)
     if made is None or mg.check(made).passive:
-        return  # what passive bodies do depends on the path between positions
+        pytest.skip("none, or passive bodies: what they do depends on the path between positions")
     m, rng = with_points(made, seed), np.random.default_rng((seed, 9))
     how: dict = dict(zip(("engine", "method"), WAYS[seed % 4], strict=True))
     given = motions(m, seed, np.linspace(0, 1, 4), size=0.05)
@@ -402,7 +405,7 @@ def test_random_mechanisms_moved_by_points_are_the_same(seed: int) -> None:
         there = mg.solve(m, told, actuate=list(given), **how)
         at_points, elsewhere = mg.solve(m, told, **how), mg.solve(m, told, actuate=others, **how)
     except (mg.IndeterminateError, mg.DeadPointError, mg.ReachError):
-        return  # these do not move it all the way
+        pytest.skip("these do not move it all the way")
     sense = senses(m, s, list(given), names)
     same = np.logical_and.accumulate(sense * sense[0] > 0)
     for what in ("velocity", "acceleration", "effort", "reaction"):

@@ -256,9 +256,10 @@ def test_a_part_of_a_solution_is_that_part() -> None:
     assert part.batch == (4,)
     for name, values in part.columns().items():
         whole = s.columns()[name][10:14]
-        assert (
-            np.allclose(values, whole, rtol=1e-12, atol=1e-14) if values.dtype.kind == "f" else (values == whole).all()
-        )
+        if values.dtype.kind == "f":
+            np.testing.assert_allclose(values, whole, rtol=1e-12, atol=1e-14)
+        else:
+            assert (values == whole).all()
     assert np.allclose(part.link("coupler").pose, s.link("coupler").pose[10:14], rtol=1e-12)
     assert np.array_equal(part.passive_effort["coupler"], s.passive_effort["coupler"][10:14])
     assert np.array_equal(part.state(1).loads, s.state(11).loads)

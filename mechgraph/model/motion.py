@@ -105,9 +105,14 @@ class Motion(Described):
             object.__setattr__(self, name, value)
         object.__setattr__(self, "given", given)
 
+    @property
+    def _quantities(self) -> dict[str, Any]:
+        """What holds quantities that are not converted to plain numbers yet."""
+        return {name: value for name in self.formats if has_quantity(value := getattr(self, name))}
+
     def faults(self, where: str = "") -> list[str]:
         """Quantities that are not converted to plain numbers yet, one line each."""
-        left = {name: value for name in self.formats if has_quantity(value := getattr(self, name))}
+        left = self._quantities
         if not left and self.velocity is None:
             return [f"{where}holds points or poses, shape {self.shape}; expected one number a position"]
         return [wrong(value, where + name, "plain numbers") for name, value in left.items()]
@@ -126,7 +131,7 @@ class Motion(Described):
         """Compare all arrays exactly; a motion without times differs from one with."""
         if not isinstance(other, Motion):
             return NotImplemented
-        if self.faults() or other.faults():
+        if self._quantities or other._quantities:
             return self is other
         return all(
             (mine is None) == (theirs is None) and (mine is None or theirs is None or np.array_equal(mine, theirs))
@@ -135,13 +140,13 @@ class Motion(Described):
 
     def __hash__(self) -> int:
         """Return a hash of shapes and values; 0.0 and -0.0 hash alike since they compare equal."""
-        if self.faults():
+        if self._quantities:
             return id(self)
         return hash((self.shape, *((array + 0.0).tobytes() for array in self._arrays if array is not None)))
 
     def __repr__(self) -> str:
         """Return the shape and the range of every quantity."""
-        if self.faults():
+        if self._quantities:
             return f"Motion({', '.join(f'{name}={shown(getattr(self, name))}' for name in self.formats)})"
         parts = [f"shape={self.shape}"] if self.shape else []
         for name, array in zip(self.formats, self._arrays, strict=True):
