@@ -17,6 +17,7 @@ from strategies import closed_mechanism, with_drives, with_loads
 import mechgraph as mg
 from mechgraph.model.parameters import declared
 from mechgraph.variants import study as module
+from mechgraph.variants import work
 from mechgraph.variants.fields import Variants, field_values, find_field, varied
 
 ANGLES = np.deg2rad(np.arange(150.0, 190.0, 5.0))
@@ -58,7 +59,42 @@ def sprung() -> mg.Mechanism:
     return mg.Mechanism("sprung", links, pairs, ["A"], loads)  # fmt: skip
 
 
+def geared() -> mg.Mechanism:
+    """A five-bar whose cranks are geared, and a slide that follows one of them by a rack."""
+    z = (0, 0, 1)
+    pairs = [
+        mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=z),
+        mg.Pair("B", "R", "crank", "rod", point=(0.3, 0.9, 0), axis=z),
+        mg.Pair("C", "R", "rod", "link", point=(1.6, 2.0, 0), axis=z),
+        mg.Pair("D", "R", "link", "arm", point=(2.8, 1.0, 0), axis=z),
+        mg.Pair("E", "R", "frame", "arm", point=(3, 0, 0), axis=z),
+        mg.Pair("X", "P", "frame", "slide", point=(5, 0, 0), axis=(1, 0, 0)),
+    ]
+    couplings = [
+        mg.Coupling({"A": 1.0, "E": -2.0}, name="g", constant=0.0),
+        mg.Coupling({"E": 1.0, "X": -8.0}, name="rack"),
+    ]
+    links = [
+        mg.Link("frame"),
+        mg.Link("crank", 1.0, (0.1, 0.4, 0)),
+        mg.Link("rod", 2.0, (1, 1.5, 0)),
+        mg.Link("link", 1.0, (2, 1.5, 0)),
+        mg.Link("arm"),
+    ]
+    links.append(mg.Link("slide", 0.5, (5, 0, 0)))
+    return mg.Mechanism(
+        "geared five-bar",
+        links,
+        pairs,
+        ["A"],
+        [mg.Gravity((0, -9.81, 0)), mg.Effort("X", 2.0)],
+        couplings=couplings,
+        start={"A": 0.02, "E": 0.01, "X": 0.1},
+    )
+
+
 FIELDS = {
+    "geared": ["g.A", "g.E", "g.constant", "rack.X", "B.point.x", "rod.mass"],
     "rcsr": ["length[2]", "twist[0]", "offset[3]", "twist[3]", "link1.mass", "link2.center.x", "link3.inertia.xy", "loads[0].value"],
     "sprung": [
         "crank.mass", "coupler.center.y", "crank.inertia.yy", "B.point.x", "D.axis.x", "loads[0].acceleration.y",
@@ -67,8 +103,9 @@ FIELDS = {
     ],
     "rchch": ["O3.pitch", "O2.on_a.point.x", "link2.mass"],
 }  # fmt: skip
-MECHANISMS = {"rcsr": lambda: mg.load("rcsr"), "sprung": sprung, "rchch": lambda: mg.load("rchch")}
+MECHANISMS = {"geared": geared, "rcsr": lambda: mg.load("rcsr"), "sprung": sprung, "rchch": lambda: mg.load("rchch")}
 MOTIONS = {
+    "geared": {"A": mg.Motion(np.linspace(0.02, 1.0, 9), 2.0, 1.0)},
     "rcsr": RCSR,
     "sprung": {"A": mg.Motion(np.linspace(0, 6.0, 25), 2.0, 1.0)},
     "rchch": {"O1": mg.Motion(np.deg2rad(np.arange(-60.0, 60.0, 10.0)), 0.1, 0.1)},
@@ -540,6 +577,52 @@ def test_coefficients_of_a_coupling_vary() -> None:
     m = mg.Mechanism("gears", pairs=pairs, couplings=[mg.Coupling({"A": 2.0, "B": -3.0}, name="g")], drives=["A"])
     s = mg.study(m, {"g.B": [-3.0, -2.0, -1.0]}, ["B.position"], n=3, motions={"A": [0.0, 1.0]})
     np.testing.assert_allclose(s.outputs["B.position"][:, 1].ravel(), -2.0 / s.parameters["g.B"], rtol=1e-12)
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.parametrize("number", ["g.E", "g.constant", "rack.X", "rod.mass"])
+def test_couplings_of_variants_are_solved_together(number: str, engine: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Positions, efforts and multipliers are those of every variant by itself, and none is solved by itself."""
+    m = geared()
+    (value,) = field_values(m, {number: find_field(m, number)}).values()  # type: ignore[dict-item]
+    motions = {"A": mg.Motion(np.linspace(0.02, 0.8, 5), 2.0, 1.0)}
+    outputs: dict[str, Any] = {"A": "A.effort", "B": "B.reaction", "X": "X.position"}
+    outputs |= {name: lambda s, name=name: s.coupling(name).effort for name in ("g", "rack")}
+    monkeypatch.setattr(work, "_solved_alone", None)
+    study = mg.study(m, {number: value + np.array([0.0, 0.02, -0.03])}, outputs, n=3, motions=motions, engine=engine)
+    assert not study.failed.any(), study.messages
+    for i in range(3):
+        s = mg.solve(study.variant(i), motions, engine=engine)
+        expected = [
+            s["A"].effort[:, 0],
+            s["B"].reaction,
+            s["X"].position[:, 0],
+            s.coupling("g").effort,
+            s.coupling("rack").effort,
+        ]
+        for name, value in zip(outputs, expected, strict=True):
+            np.testing.assert_allclose(study.outputs[name][i], value, rtol=1e-9, atol=1e-9)
+
+
+def test_shares_of_couplings_that_say_the_same_are_those_of_every_variant() -> None:
+    """Of two couplings ``c A - B`` of which one is ``k`` times the other, the least norm is that of their own scales."""
+    z = {"axis": (0, 0, 1)}
+
+    def build(c: float = 2.0, k: float = 2.0) -> mg.Mechanism:
+        pairs = [mg.Pair("A", "R", "f", "a", point=(0, 0, 0), **z), mg.Pair("B", "R", "f", "b", point=(1, 0, 0), **z)]
+        couplings = [mg.Coupling({"A": c, "B": -1.0}, name="g1"), mg.Coupling({"A": k * c, "B": -k}, name="g2")]
+        return mg.Mechanism("wheels", None, pairs, ["A"], [mg.Effort("B", 3.0)], couplings=couplings)
+
+    shares = {name: lambda s, name=name: s.coupling(name).effort for name in ("g1", "g2")}
+    ways = {"c": [1.5, 2.5], "k": [2.0, 5.0]}
+    study = mg.study(build, ways, shares, sampling="grid", motions={"A": [0.0, 0.3]}, redundant="minimum_norm")  # type: ignore[arg-type]
+    for i in range(4):
+        s = mg.solve(study.variant(i), {"A": [0.0, 0.3]}, redundant="minimum_norm")
+        for name in shares:
+            np.testing.assert_allclose(study.outputs[name][i], s.coupling(name).effort, rtol=1e-10)
+        np.testing.assert_allclose(
+            s.coupling("g1").effort, study.parameters["k"][i] * s.coupling("g2").effort, rtol=1e-10
+        )
 
 
 @pytest.mark.parametrize("number", ["coupler.mass", "B.point.x"])

@@ -55,11 +55,11 @@ class LoopSystem(ReducedRows):
         super().__init__(rows, fixed)
         self._match()
         self.pattern, self._constant = self._border(beside=False)
-        self.first = self.factor(rows.S, rows.middles)
+        self.first = self.factor(rows)
         if self.shared and not self.first.smallest_pivot > RETRY:
             own = self.first, self.pattern, self._constant
             self.pattern, self._constant = self._border(beside=True)
-            self.first = self.factor(rows.S, rows.middles)
+            self.first = self.factor(rows)
             if own[0].smallest_pivot > self.first.smallest_pivot:
                 self.first, self.pattern, self._constant = own
         self.smallest = self.first.smallest_pivot
@@ -118,10 +118,10 @@ class LoopSystem(ReducedRows):
         starts = np.concatenate([[0], np.cumsum(self.kept)])
         self._m, self._n = self.height, int(self._free.sum())
         place = np.cumsum(self._free) - 1
-        more = scipy.sparse.coo_array(self._more)
+        more = scipy.sparse.coo_array(self._more(self.rows))
         rows = [(starts[e.loop][None] + np.arange(6)[:, None])[self._live], int(starts[-1]) + more.row.astype(np.intp)]
         cols = [np.broadcast_to(place[e.column], (6, len(e.loop)))[self._live], more.col.astype(np.intp)]
-        data = [more.data]
+        data = [np.zeros(0)]
         self._motions = 0
         for null, columns in self._motions_of_single_loops():
             keep = np.abs(null) > 0
@@ -130,7 +130,7 @@ class LoopSystem(ReducedRows):
             cols.append(place[columns[keep]])
             data.append(null[keep])
             self._motions += len(null)
-        self._inner = (np.concatenate(rows), np.concatenate(cols), np.concatenate([*data, np.zeros(0)]))
+        self._inner = (np.concatenate(rows), np.concatenate(cols), np.concatenate(data))
         shape = (self._m + self._motions, self._n)
         self._touch = scipy.sparse.csr_array((np.ones(len(self._inner[0])), self._inner[:2]), shape=shape)
         match = scipy.sparse.csgraph.maximum_bipartite_matching(self._touch, perm_type="column")
@@ -144,12 +144,13 @@ class LoopSystem(ReducedRows):
         owner = np.concatenate([self.owners, np.zeros(self._motions, dtype=np.intp)])
         self.shared_in = owner[self._left_rows]
 
-    @cached_property
-    def _more(self) -> scipy.sparse.csr_array:
-        """The rows behind those of the loops in the free columns, of unit size; they are the same everywhere."""
-        if self.rows.more is None:
+    def _more(self, rows: ClosureRows) -> scipy.sparse.csr_array:
+        """The rows behind those of the loops at any position in the free columns, of unit size; entries always at the same places."""
+        if rows.more is None:
             return scipy.sparse.csr_array((0, int(self._free.sum())))
-        return scipy.sparse.csr_array(self.rows.more[:, self._free] * self._scale[self._free])
+        out = rows.more[:, self._free]
+        out.data *= self._scale[self._free][out.indices]
+        return scipy.sparse.csr_array(out)
 
     def _border(self, beside: bool) -> tuple[Pattern, Array]:
         """The pattern of the square system and its constant values.
@@ -181,7 +182,7 @@ class LoopSystem(ReducedRows):
     def holding(self) -> scipy.sparse.csr_array:
         """The rows ``G (held, free columns)`` that hold the motions left free."""
         at, to = self.pattern.places
-        values = np.concatenate([np.zeros(int(self._live.sum())), self._constant])
+        values = np.concatenate([np.zeros(len(at) - len(self._constant)), self._constant])
         mine = (at >= self._m) & (to < self._n)
         return scipy.sparse.csr_array((values[mine], (at[mine] - self._m, to[mine])), shape=(self.held, self._n))
 
@@ -200,11 +201,12 @@ class LoopSystem(ReducedRows):
 
     # --- solving ---------------------------------------------------------------------------------------------------------
 
-    def factor(self, S: Array, middles: Array) -> SparseFactor:
-        """The system factored for the twists ``S (6, F)`` and middles ``(3, loops)`` of one position."""
-        return self.pattern.factor(np.concatenate([self._turned_blocks(S, middles)[self._live], self._constant]))
+    def factor(self, rows: ClosureRows) -> SparseFactor:
+        """The system factored for the rows at one position."""
+        values = (self._turned_blocks(rows)[self._live], self._more(rows).data, self._constant)
+        return self.pattern.factor(np.concatenate(values))
 
-    def turned_matrix(self, S: Array, middles: Array) -> scipy.sparse.csr_array:
+    def turned_matrix(self, there: ClosureRows) -> scipy.sparse.csr_array:
         """``J (rows, free columns)`` in turned rows and columns of unit size; rows behind those of the loops as they are."""
         e = self.entries
         place = np.cumsum(self._free) - 1
@@ -212,8 +214,8 @@ class LoopSystem(ReducedRows):
         rows = (6 * e.loop + np.arange(6)[:, None])[live]
         cols = np.broadcast_to(place[e.column], (6, len(e.loop)))[live]
         shape = (6 * len(self.kept), int(self._free.sum()))
-        J = scipy.sparse.csr_array((self._turned_blocks(S, middles)[live], (rows, cols)), shape=shape)
-        return scipy.sparse.csr_array(scipy.sparse.vstack([J, self._more]))
+        J = scipy.sparse.csr_array((self._turned_blocks(there)[live], (rows, cols)), shape=shape)
+        return scipy.sparse.csr_array(scipy.sparse.vstack([J, self._more(there)]))
 
     @property
     def unit(self) -> float:
@@ -255,16 +257,14 @@ class LoopSystem(ReducedRows):
             rhs[self._n :] = shares
         return factor.solve(rhs, transposed=True)[: self._m]
 
-    def random_stress(
-        self, factor: SparseFactor, S: Array, middles: Array, rng: np.random.Generator, count: int
-    ) -> Array:
-        """Random self-stresses ``(rows, count)`` for twists and middles of one position, of size one in the measure of their loops.
+    def random_stress(self, factor: SparseFactor, rows: ClosureRows, rng: np.random.Generator, count: int) -> Array:
+        """Random self-stresses ``(rows, count)`` for the rows at one position, of size one in the measure of their loops.
 
         In the rows that fell away they are random; what these bring to the free columns where they are not zero there (in the
         positions behind the first) the other rows take up.
         """
         e = self.entries
-        free = np.where(self._live, 0.0, self._turned_blocks(S, middles))
+        free = np.where(self._live, 0.0, self._turned_blocks(rows))
         dropped = ~(np.arange(6) < self.kept[:, None])
         local = np.zeros((len(self.kept), 6, count))
         local[dropped] = rng.normal(size=(int(dropped.sum()), count))

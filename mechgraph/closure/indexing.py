@@ -6,7 +6,6 @@ What follows from links, pairs and frame is in ``closure.places`` and is made on
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
 from itertools import pairwise, starmap
 from typing import Any
@@ -20,7 +19,7 @@ from mechgraph.closure.coefficients import Numbers
 from mechgraph.closure.rows import CouplingRows, LoopRows, Rows
 from mechgraph.closure.states import States
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.parameters import Parameters, parameters
+from mechgraph.model.parameters import Parameters, coupling_places, parameters
 from mechgraph.numerics.linear import add_at
 from mechgraph.topology.linkgraph import LinkGraph, link_graph
 
@@ -28,15 +27,8 @@ from mechgraph.topology.linkgraph import LinkGraph, link_graph
 class System(States):
     """A mechanism with geometry, indexed for the kernels, with the numbers ``par`` (the declared ones where left out)."""
 
-    def __init__(
-        self,
-        m: Mechanism,
-        graph: LinkGraph | None = None,
-        par: Parameters | None = None,
-        couplings: Sequence[Any] | None = None,
-    ) -> None:
+    def __init__(self, m: Mechanism, graph: LinkGraph | None = None, par: Parameters | None = None) -> None:
         super().__init__(m, graph or m.once(link_graph), par or m.once(parameters))
-        self.couplings = m.couplings if couplings is None else couplings
 
     # --- rows --------------------------------------------------------------------------------------------------------
 
@@ -44,20 +36,24 @@ class System(States):
     def rows(self) -> list[Rows]:
         """The contributors of closure rows: the loops, then the couplings."""
         loops: list[Rows] = [LoopRows(self.graph.n_loops)]
-        return loops + ([self._coupling_rows()] if self.couplings else [])
+        return loops + ([self._coupling_rows()] if self.m.couplings else [])
 
     def _coupling_rows(self) -> CouplingRows:
-        """The rows of couplings with ``terms`` (freedom, coefficient) and a ``constant`` (None: its value at the start), user's units."""
-        matrix = np.zeros((len(self.couplings), self.n_freedoms))
-        for row, coupling in zip(matrix, self.couplings, strict=True):
-            for name, coefficient in coupling.terms:
-                pair, freedom = self.m.freedom(name)
-                row[self.first_column[pair] + freedom] += coefficient
-        at_start = matrix @ self.start_coordinates(self.m.start)
-        given = [value if c.constant is None else c.constant for c, value in zip(self.couplings, at_start, strict=True)]
-        matrix[:, self.is_length] *= self.par.L
-        scale = 1.0 / np.abs(matrix).max(axis=1)
-        return CouplingRows(matrix * scale[:, None], np.array(given) * scale, scale, self.single_rows)
+        """The rows of the couplings; one without a constant keeps the value that it has at the start."""
+        couplings, numbers, places = self.m.couplings, self.par.couplings, coupling_places(self.m)
+        found = [self.m.freedom(name) for c in couplings for name in c.freedoms]
+        columns = np.array([self.first_column[pair] + freedom for pair, freedom in found])
+        rows = np.repeat(np.arange(len(couplings)), [len(c.terms) for c in couplings])
+        first = np.searchsorted(rows, np.arange(len(couplings)))
+        coefficients = np.concatenate([numbers[own] for own in places])
+        start = self.start_coordinates(self.m.start)[columns, None]
+        free = np.array([c.constant is None for c in couplings])[:, None]
+        at_start = np.add.reduceat(coefficients * start, first, axis=0)
+        constant = np.where(free, at_start, numbers[[own.stop for own in places]])
+        coefficients = coefficients * np.where(self.is_length[columns], self.par.L, 1.0)[:, None]
+        largest = np.maximum.reduceat(np.abs(coefficients), first, axis=0)
+        scale = 1.0 / np.where(largest > 0, largest, 1.0)
+        return CouplingRows(coefficients * scale[rows], rows, columns, constant * scale, scale, self.single_rows)
 
     @cached_property
     def n_rows(self) -> int:
@@ -66,19 +62,20 @@ class System(States):
 
     @cached_property
     def row_scale(self) -> Array:
-        """Factor ``(n_rows,)`` of every row over the user's relation: its multiplier in the user's units is ``scale * x``."""
-        return np.concatenate([part.scale for part in self.rows])
+        """Factors ``(n_rows, B)`` of every row over the user's relation: its multiplier in the user's units is ``scale * x``."""
+        B = self.par.couplings.shape[1]
+        return np.concatenate([np.broadcast_to(part.scale, (len(part.scale), B)) for part in self.rows])
 
     @property
     def coupling_matrix(self) -> Array:
-        """Coefficients ``(couplings, F)`` of the rows behind those of the loops, internal units."""
+        """Coefficients ``(couplings, F, B)`` of the rows behind those of the loops, internal units."""
         parts = [part.matrix for part in self.rows[1:] if isinstance(part, CouplingRows)]
-        return np.concatenate([np.zeros((0, self.n_freedoms)), *parts])
+        return parts[0] if parts else np.zeros((0, self.n_freedoms, 1))
 
     @property
     def coupled_freedoms(self) -> Index:
         """Freedoms into which rows other than those of loops bring efforts."""
-        return np.flatnonzero(self.coupling_matrix.any(axis=0))
+        return np.flatnonzero(self.coupling_matrix.any(axis=(0, 2)))
 
     @cached_property
     def carrying(self) -> NDArray[np.bool_]:
@@ -125,19 +122,19 @@ class System(States):
 
     def with_parameters(self, par: Parameters) -> System:
         """The same mechanism with other numbers."""
-        return System(self.m, self.graph, par, self.couplings)
+        return System(self.m, self.graph, par)
 
     # --- kept with the mechanism -------------------------------------------------------------------------------------
 
     def known(self) -> dict[str, Any]:
         """All that is known of the system beside the mechanism itself, see ``remembered``."""
-        return {name: value for name, value in vars(self).items() if name not in ("m", "couplings")}
+        return {name: value for name, value in vars(self).items() if name != "m"}
 
     @classmethod
     def remembered(cls, m: Mechanism, known: dict[str, Any]) -> System:
         """A system of a mechanism of which links, pairs, couplings and start are those of another one, all that is known taken over."""
         out = cls.__new__(cls)
-        vars(out).update(known, m=m, couplings=m.couplings)
+        vars(out).update(known, m=m)
         return out
 
 

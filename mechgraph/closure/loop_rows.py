@@ -49,12 +49,12 @@ class ClosureRows:
     more: scipy.sparse.csr_array | None = None
 
     @classmethod
-    def at(cls, here: Configuration) -> ClosureRows:
-        """The rows at the first position of a configuration; rows of couplings stand behind those of the loops."""
+    def at(cls, here: Configuration, t: int = 0) -> ClosureRows:
+        """The rows at one position of a configuration; rows of couplings stand behind those of the loops."""
         s = here.system
-        others = [scipy.sparse.csr_array(part.jacobian(here)[:, :, 0]) for part in s.rows[1:]]
+        others = [more for part in s.rows if (more := part.sparse_jacobian(t)) is not None]
         more = scipy.sparse.csr_array(scipy.sparse.vstack(others)) if others else None
-        return cls(s.graph, s.first_column, here.S[:, :, 0], here.pair_points[:, :, 0], more)
+        return cls(s.graph, s.first_column, here.S[:, :, t], here.pair_points[:, :, t], more)
 
     @cached_property
     def middles(self) -> Array:
@@ -155,9 +155,9 @@ class ReducedRows:
         e = self.entries
         return (np.arange(6)[:, None] < self.kept[e.loop][None]) & self._free[e.column][None]
 
-    def _turned_blocks(self, S: Array, middles: Array) -> Array:
-        """Entries ``(6, entries)`` in the turned rows of their loops and columns of unit size."""
-        blocks = self._blocks(S, middles) * self._scale[self.entries.column]
+    def _turned_blocks(self, rows: ClosureRows) -> Array:
+        """Entries ``(6, entries)`` of rows at any position in the turned rows of their loops and columns of unit size."""
+        blocks = self._blocks(rows.S, rows.middles) * self._scale[self.entries.column]
         turned = np.empty_like(blocks)
         for loops, at in self._by_width:
             turned[:, at] = np.moveaxis(self._turn[loops] @ np.moveaxis(blocks[:, at], 0, 1), 0, 1)
@@ -172,9 +172,7 @@ class ReducedRows:
         rows = (starts[e.loop][None] + np.arange(6)[:, None])[self._live]
         cols = np.broadcast_to(place[e.column], (6, len(e.loop)))[self._live]
         shape = (int(starts[-1]), int(self._free.sum()))
-        K = scipy.sparse.csr_array(
-            (self._turned_blocks(self.rows.S, self.rows.middles)[self._live], (rows, cols)), shape=shape
-        )
+        K = scipy.sparse.csr_array((self._turned_blocks(self.rows)[self._live], (rows, cols)), shape=shape)
         if self.rows.more is None:
             return K
         more = self.rows.more[:, self._free] * self._scale[self._free]
@@ -185,7 +183,7 @@ class ReducedRows:
         """The same as a full matrix."""
         e, m = self.entries, int(self.kept.sum())
         whole = np.zeros((6 * self.loops, len(self._free)))
-        whole[6 * e.loop + np.arange(6)[:, None], e.column] = self._turned_blocks(self.rows.S, self.rows.middles)
+        whole[6 * e.loop + np.arange(6)[:, None], e.column] = self._turned_blocks(self.rows)
         K = np.zeros((self.height, int(self._free.sum())))
         K[:m] = whole[(np.arange(6) < self.kept[:, None]).ravel()][:, self._free]
         if self.rows.more is not None:

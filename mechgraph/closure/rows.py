@@ -6,12 +6,16 @@ implements the protocol ``Rows``; nothing else in the package knows how many row
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
+
+Index = NDArray[np.intp]
 
 
 class Evaluated(Protocol):
@@ -50,7 +54,7 @@ class Rows(Protocol):
 
     @property
     def scale(self) -> Array:
-        """Factor ``(n,)`` by which each row was multiplied, from the user's relation in the user's units."""
+        """Factors ``(n, 1)`` or one a position by which each row was multiplied, from the user's relation in the user's units."""
 
     def residual(self, here: Evaluated) -> Array:
         """``phi (n, T)``."""
@@ -60,6 +64,9 @@ class Rows(Protocol):
 
     def jacobian(self, here: Evaluated) -> Array:
         """``J (n, F, T)`` with ``d phi/dt = J q'``."""
+
+    def sparse_jacobian(self, t: int) -> scipy.sparse.csr_array | None:
+        """``J (n, F)`` at one position, entries at the same places at all of them; None for loops (see ``closure.loop_rows``)."""
 
     def rates(self, here: Evaluated, dq: Array) -> Array:
         """``J q' (n, T)`` for rates ``dq (F, T)``."""
@@ -83,7 +90,7 @@ class LoopRows:
     @property
     def scale(self) -> Array:
         """Ones."""
-        return np.ones(6 * self.n_loops)
+        return np.ones((6 * self.n_loops, 1))
 
     def residual(self, here: Evaluated) -> Array:
         """Closure errors of the loops."""
@@ -101,6 +108,9 @@ class LoopRows:
         """``(C x I6) diag(S_k)``."""
         return here.stacked(here.S)
 
+    def sparse_jacobian(self, t: int) -> None:
+        """None: ``closure.loop_rows`` makes it."""
+
     def rates(self, here: Evaluated, dq: Array) -> Array:
         """``sum_k C_lk S_k q'_k``."""
         return here.loop_sums(here.pair_sums(here.S * dq))
@@ -116,19 +126,32 @@ class LoopRows:
 class CouplingRows:
     """One row a coupling: a linear relation ``sum_j c_j q_j = constant`` between single freedoms.
 
-    ``matrix (n, F)`` and ``constant (n,)`` are in internal coordinates (lengths over L), each row scaled so that its largest
-    coefficient is one. Coordinates are those of the state: turns count on, they are not wrapped.
+    ``coefficients (K, B)`` of all terms stand in ``rows (K,)``, one after the other, and ``columns (K,)`` of the matrix; with ``constant
+    (n, B)`` they are in internal coordinates (lengths over L), every row scaled so that its largest coefficient is one. B is 1, or one a
+    position. Coordinates are those of the state (rows ``state_rows (F,)``): turns count on, they are not wrapped.
     """
 
-    def __init__(self, matrix: Array, constant: Array, scale: Array, state_rows: NDArray[np.intp]) -> None:
-        self.matrix, self.constant, self.scale = matrix, constant, scale
-        self._used = np.flatnonzero(matrix.any(axis=0))
-        self._state_rows = state_rows[self._used]
-        self._part = matrix[:, self._used]
+    def __init__(
+        self, coefficients: Array, rows: Index, columns: Index, constant: Array, scale: Array, state_rows: Index
+    ) -> None:
+        self.coefficients, self.constant, self.scale = coefficients, constant, scale
+        self._rows, self._columns, self._state_rows = rows, columns, state_rows
+        self._first = np.searchsorted(rows, np.arange(len(constant)))
+
+    @cached_property
+    def matrix(self) -> Array:
+        """The coefficients ``(n, F, B)``."""
+        out = np.zeros((len(self.constant), len(self._state_rows), self.coefficients.shape[1]))
+        out[self._rows, self._columns] = self.coefficients
+        return out
+
+    def _sums(self, values: Array) -> Array:
+        """``sum_j c_j v_j (n, T)`` of values ``(K, T)``, one a term."""
+        return np.asarray(np.add.reduceat(self.coefficients * values, self._first, axis=0))
 
     def residual(self, here: Evaluated) -> Array:
         """``sum_j c_j q_j - constant``."""
-        return np.asarray(self._part @ here.x[self._state_rows] - self.constant[:, None])
+        return self._sums(here.x[self._state_rows[self._columns]]) - self.constant
 
     def error(self, here: Evaluated) -> Array:
         """The largest of them."""
@@ -136,16 +159,21 @@ class CouplingRows:
 
     def jacobian(self, here: Evaluated) -> Array:
         """The coefficients."""
-        return np.broadcast_to(self.matrix[:, :, None], (*self.matrix.shape, here.T))
+        return np.broadcast_to(self.matrix, (*self.matrix.shape[:2], here.T))
+
+    def sparse_jacobian(self, t: int) -> scipy.sparse.csr_array:
+        """The coefficients ``(n, F)`` at one position, entries at the same places at all of them."""
+        values = self.coefficients[:, t if self.coefficients.shape[1] > 1 else 0]
+        return scipy.sparse.csr_array((values, (self._rows, self._columns)), shape=self.matrix.shape[:2])
 
     def rates(self, here: Evaluated, dq: Array) -> Array:
         """``sum_j c_j q'_j``."""
-        return np.asarray(self._part @ dq[self._used])
+        return self._sums(dq[self._columns])
 
     def bias(self, here: Evaluated, dq: Array, V: Array) -> Array:
         """Zero: the relation is linear."""
-        return np.zeros((len(self.matrix), here.T), dtype=dq.dtype)
+        return np.zeros((len(self.constant), here.T), dtype=dq.dtype)
 
     def efforts(self, here: Evaluated, x: Array) -> Array:
         """``c_j x`` in every freedom."""
-        return np.asarray(np.einsum("rf,rkt->fkt", self.matrix, x))
+        return np.asarray(np.einsum("rft,rkt->fkt", self.matrix, x))

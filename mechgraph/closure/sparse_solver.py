@@ -14,6 +14,7 @@ from mechgraph.closure.bordering import LoopSystem
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.dense_solver import independent
 from mechgraph.closure.indexing import Index
+from mechgraph.closure.loop_rows import ClosureRows
 from mechgraph.numerics.sparse import Pattern, SparseFactor
 from mechgraph.numerics.tolerances import PATH
 
@@ -22,11 +23,6 @@ PROBES = 6
 SEED = 5
 POWERS = 5
 """Steps of the power iteration that estimates a spectral radius."""
-
-
-def _at(here: Configuration, t: int) -> tuple[Array, Array]:
-    """Twists ``(6, F)`` and middles of the loops ``(3, loops)`` of one position."""
-    return here.S[:, :, t], here.middles[:, :, t]
 
 
 class SparseFactored:
@@ -92,7 +88,7 @@ class SparseFactored:
         for t, (form, factor) in enumerate(zip(self._forms, self._factors, strict=True)):
             if count and form.redundant:
                 rng = np.random.default_rng(SEED)
-                out[:, :, t] = form.random_stress(factor, *_at(self.here, t), rng, count)
+                out[:, :, t] = form.random_stress(factor, ClosureRows.at(self.here, t), rng, count)
         return out
 
     def least(self, R: Sequence[scipy.sparse.csr_array], r0: Array) -> Array:
@@ -105,7 +101,9 @@ class SparseFactored:
             turned = form.turned_rows
             part = R[t] @ turned
             H = scipy.sparse.coo_array(part.T @ part)
-            J = scipy.sparse.coo_array(scipy.sparse.vstack([form.turned_matrix(*_at(self.here, t)), form.holding]))
+            J = scipy.sparse.coo_array(
+                scipy.sparse.vstack([form.turned_matrix(ClosureRows.at(self.here, t)), form.holding])
+            )
             rows, size = J.shape[0], sum(J.shape)
             pattern = Pattern(
                 np.concatenate([H.row, J.row, rows + J.col]).astype(np.intp),
@@ -167,7 +165,7 @@ class SparseSolver:
         """A position factored in a form; what is known of the last positions is kept for who asks next."""
         known = self._known(here)
         if (t, number) not in known:
-            known[t, number] = self.forms[number].factor(*_at(here, t))
+            known[t, number] = self.forms[number].factor(ClosureRows.at(here, t))
         return known[t, number]
 
     def _known(self, here: Configuration) -> dict[tuple[int, int], SparseFactor]:

@@ -229,11 +229,10 @@ def internal_state(here: Configuration, loads: Array) -> State:
         for i, k in enumerate(g.pairs):
             reactions[k] = W[:, :, i]
             efforts[k] = here.E[:, g.columns[:, i]]
-    J = here.system.coupling_matrix
     coefficients = []
-    for row, coupling in zip(J, s.m.couplings, strict=True):
+    for row, coupling in zip(s.coupling_matrix, s.m.couplings, strict=True):
         places = [s.m.freedom(freedom) for freedom in coupling.freedoms]
-        coefficients.append(np.array([row[s.first_column[k] + j] for k, j in places])[:, None])
+        coefficients.append(np.array([row[s.first_column[k] + j] for k, j in places]))
     along, conditions = here.lee_screws
     nothing = np.zeros((s.n_freedoms, here.T))
     return State(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from itertools import chain
+from itertools import accumulate, chain, pairwise
 from operator import attrgetter
 from typing import Any
 
@@ -27,8 +27,8 @@ class Parameters:
     """Arrays of one mechanism (or of many variants of it).
 
     ``marker_a, marker_b (3, 4, P, B)``, ``pitch (P, B)``, ``mass (N, B)``, ``center (3, N, B)``, ``inertia (3, 3, N, B)``,
-    ``offset (3, N)`` origin of the internal link frame in the declared one, ``frame (3, 4, 1)`` pose of the frame link;
-    ``origin (3,)`` global position of the internal origin, ``L`` its unit of length.
+    ``couplings (K, B)`` as in ``Declared``, ``offset (3, N)`` origin of the internal link frame in the declared one,
+    ``frame (3, 4, 1)`` pose of the frame link; ``origin (3,)`` global position of the internal origin, ``L`` its unit of length.
     """
 
     marker_a: Array
@@ -37,6 +37,7 @@ class Parameters:
     mass: Array
     center: Array
     inertia: Array
+    couplings: Array
     offset: Array
     frame: Array
     origin: Array
@@ -45,17 +46,11 @@ class Parameters:
     @property
     def batch(self) -> int:
         """Number of variants."""
-        return max(
-            self.marker_a.shape[-1],
-            self.marker_b.shape[-1],
-            self.pitch.shape[-1],
-            self.mass.shape[-1],
-            self.center.shape[-1],
-        )
+        return max(getattr(self, name).shape[-1] for name in BATCHED)
 
     def taken(self, cases: Index) -> Parameters:
         """The numbers of some variants of a batch, in that order (one may stand several times); of a batch of one, itself."""
-        arrays = {name: getattr(self, name) for name in ("marker_a", "marker_b", "pitch", "mass", "center", "inertia")}
+        arrays = {name: getattr(self, name) for name in BATCHED}
         return replace(self, **{k: v[..., cases] if v.shape[-1] > 1 else v for k, v in arrays.items()})
 
     def rescaled(self, origin: Array, L: float) -> Parameters:
@@ -77,12 +72,17 @@ class Parameters:
         )
 
 
+BATCHED = ("marker_a", "marker_b", "pitch", "mass", "center", "inertia", "couplings")
+"""The arrays that differ between variants."""
+
+
 @dataclass(frozen=True)
 class Declared:
     """The numbers of a mechanism as they are declared, in its units; the batch axis of variants is last, of length 1 or B.
 
     ``point, axis, second (2, 3, P, B)`` of the markers on ``a`` and ``b`` in the frames of their links, ``pitch (P, B)`` per
-    radian, ``mass (N, B)``, ``center (3, N, B)``, ``inertia (3, 3, N, B)``; zeros where nothing is declared.
+    radian, ``mass (N, B)``, ``center (3, N, B)``, ``inertia (3, 3, N, B)``, ``couplings (K, B)`` (see ``coupling_places``); zeros
+    where nothing is declared.
     """
 
     point: Array
@@ -92,6 +92,7 @@ class Declared:
     mass: Array
     center: Array
     inertia: Array
+    couplings: Array
 
     def offset(self, m: Mechanism) -> Array:
         """Middle of the markers of every link in its frame, ``(3, N)``: of the first variant."""
@@ -116,6 +117,7 @@ class Declared:
             mass=self.mass,
             center=center / L,
             inertia=self.inertia / L**2,
+            couplings=self.couplings,
             offset=offset,
             frame=frame,
             origin=np.asarray(origin, dtype=float),
@@ -138,6 +140,12 @@ def pair_ends(m: Mechanism) -> tuple[Index, Index]:
     return np.fromiter((place[p.a] for p in m.pairs), np.intp, n), np.fromiter(
         (place[p.b] for p in m.pairs), np.intp, n
     )
+
+
+def coupling_places(m: Mechanism) -> list[slice]:
+    """For every coupling the places of its coefficients among the numbers of all; behind the last one stands its constant."""
+    ends = accumulate((len(c.terms) + 1 for c in m.couplings), initial=0)
+    return [slice(begin, end - 1) for begin, end in pairwise(ends)]
 
 
 def _rows(vectors: Iterable[Any], count: int) -> Array:
@@ -175,6 +183,7 @@ def declared(m: Mechanism) -> Declared:
         np.fromiter((link.mass for link in m.links), float, n)[:, None],
         np.ascontiguousarray(center)[..., None],
         np.ascontiguousarray(inertia)[..., None],
+        np.array([x for c in m.couplings for x in (*c.coefficients, c.constant or 0.0)], dtype=float)[:, None],
     )
 
 

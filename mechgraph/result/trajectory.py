@@ -439,10 +439,10 @@ class Trajectory:
 
     def multiplier(self, coupling: int) -> Array:
         """The multiplier of a coupling in the user's units: the effort ``c_i m`` in freedom i."""
-        unit = self._L**2 * self._system.row_scale[6 * self._system.graph.n_loops + coupling]
-        return self._out(
-            self._masked(unit * self._force("multipliers")[coupling], self._of("multiplier_stress")[coupling])
-        )
+        row, blocks = 6 * self._system.graph.n_loops + coupling, in_blocks(np.arange(self._count))
+        scales = [np.broadcast_to(self._system_at(block).row_scale[row], len(block)) for block in blocks]
+        total = self._L**2 * np.concatenate(scales) * self._force("multipliers")[coupling]
+        return self._out(self._masked(total, self._of("multiplier_stress")[coupling]))
 
     def shaking(self) -> Array:
         """Wrench on the frame: loads and inertia of all moving links, and what springs do to the frame."""

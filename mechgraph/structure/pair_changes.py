@@ -132,7 +132,7 @@ def changes_of(freedoms: Freedoms) -> list[Change]:
     system = here.system
     states = stresses_of(freedoms)
     stress = np.moveaxis(pair_states(here, states)[..., 0], 1, 0)
-    tied = [d.freedom for d in system.m.drives] + [name for c in system.couplings for name, _ in c.terms]
+    tied = [d.freedom for d in system.m.drives] + [name for c in system.m.couplings for name, _ in c.terms]
     needed: dict[int, set[str]] = {}
     for k, j in map(system.m.freedom, tied):
         needed.setdefault(k, set()).add(system.m.pairs[k].type.freedoms[j].name)
@@ -220,7 +220,7 @@ def best_turns(frames: Array, wrenches: Array) -> Array:
 def effect(before: Freedoms, driven: Index, changes: tuple[Change, ...], engine: EngineName = "auto") -> Effect:
     """The effect of changes, computed from the changed rows at the same position."""
     position = before.position
-    pairs, couplings = position.m.pairs, position.declared.system.couplings
+    pairs, couplings = position.m.pairs, position.m.couplings
     dropped = np.array([c.item - len(pairs) for c in changes if c.pair is None], dtype=np.intp)
     after_changes, column = position.with_changes({c.item: c.pair for c in changes if c.pair is not None}, dropped)
     after = freedoms_at(after_changes, column[driven], engine)

@@ -94,7 +94,7 @@ class Uniqueness:
         i = int(np.argmin(np.abs(np.log(size / UNIQUE))))
         known = self.components
         behind = i - known.count
-        name = ":".join(known.label(i)) if behind < 0 else f"coupling {known.system.couplings[behind].name}"
+        name = ":".join(known.label(i)) if behind < 0 else f"coupling {known.system.m.couplings[behind].name}"
         return name, float(self.sizes[i]), bool(self.sizes[i] <= UNIQUE)
 
     @cached_property
@@ -103,7 +103,7 @@ class Uniqueness:
         out: dict[str, dict[str, bool]] = {pair.name: {} for pair in self.components.system.m.pairs}
         for (pair, name), ok in zip(self.components.labels, self.is_unique.tolist(), strict=True):
             out[pair][name] = ok
-        for coupling, ok in zip(self.components.system.couplings, self.coupling_is_unique.tolist(), strict=True):
+        for coupling, ok in zip(self.components.system.m.couplings, self.coupling_is_unique.tolist(), strict=True):
             out[coupling.name] = {"effort": ok}
         return out
 
@@ -189,7 +189,7 @@ def uniqueness(
     closure = closure or closure_rank(here, driven, engine)
     few = closure.count - closure.rank <= BASIS
     probes = closure.orthonormal_stress() if few else closure.random_stress(np.random.default_rng(SEED), PROBES)
-    coefficients = np.abs(here.system.coupling_matrix).max(axis=1, initial=0.0)
+    coefficients = np.abs(here.system.coupling_matrix[:, :, 0]).max(axis=1, initial=0.0)
     multipliers = probes[6 * here.system.graph.n_loops :]
     table = components.table(pair_states(here, probes))
     return Uniqueness(components, closure, table, coefficients[:, None] * multipliers, probes)

@@ -110,9 +110,7 @@ def solve_together(
     path = NumbersPath(line, numbers_at)
     valid = variants.valid()
     good = np.flatnonzero(valid)
-    # the rows of couplings have one set of numbers for all tracks
-    coupled = any(np.ptp(np.nan_to_num(rows), axis=1).any() for rows in variants.couplings)
-    if not good.size or coupled:
+    if not good.size:
         return Together(None, np.ones(V, dtype=bool), nothing)
     itself, systems = (path.system_at(np.full(V, part), every) for part in (0.0, 1.0))
     one_motion = int(np.prod(line.drive.batch[:-1])) == 1
@@ -132,7 +130,7 @@ def solve_together(
 
 def _move_alike(itself: Parameters, varied: Parameters) -> bool:
     """Whether variants differ from the mechanism itself in masses alone."""
-    names = ("marker_a", "marker_b", "pitch")
+    names = ("marker_a", "marker_b", "pitch", "couplings")
     return all(bool((getattr(itself, name) == getattr(varied, name)).all()) for name in names)
 
 

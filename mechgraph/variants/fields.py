@@ -18,9 +18,9 @@ from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.numeric import PerCase
 from mechgraph.model.pair import Marker, Pair
-from mechgraph.model.parameters import Declared, declared
+from mechgraph.model.parameters import Declared, coupling_places, declared
 from mechgraph.quantities import is_numeric
-from mechgraph.variants.number_names import MARKER, AnyField, ChainField, CouplingField, Field, LoadField, find_field
+from mechgraph.variants.number_names import MARKER, AnyField, ChainField, Field, LoadField, find_field
 
 __all__ = ["AnyField", "Variants", "clashes", "field_values", "find_field", "stacked", "topology_of", "varied"]
 
@@ -29,8 +29,7 @@ __all__ = ["AnyField", "Variants", "clashes", "field_values", "find_field", "sta
 class Variants:
     """``count`` variants of one mechanism: declared numbers and loads with a batch axis (``PerCase`` where a load varies).
 
-    ``couplings`` hold the coefficients of every coupling and behind them its constant, ``(terms + 1, 1 or count)``; NaN for a constant
-    that is not declared. Those ``missing`` could not be built; the numbers of the mechanism itself stand in their places.
+    Those ``missing`` could not be built; the numbers of the mechanism itself stand in their places.
     """
 
     mechanism: Mechanism
@@ -38,7 +37,6 @@ class Variants:
     loads: tuple[Load, ...]
     count: int
     missing: tuple[int, ...] = ()
-    couplings: tuple[Array, ...] = ()
 
     def valid(self) -> NDArray[np.bool_]:
         """Which variants are physical: finite numbers, no negative mass, axes of some length, possible inertias, ``(count,)``."""
@@ -53,9 +51,8 @@ class Variants:
         if n.inertia.shape[-1] > 1:
             free = np.array([link.unphysical for link in self.mechanism.links])
             ok &= (physical(np.nan_to_num(n.inertia)) | free[:, None]).all(axis=0)
-        for c, rows in zip(self.mechanism.couplings, self.couplings, strict=True):
-            used = rows if c.constant is not None else rows[:-1]
-            ok &= np.isfinite(used).all(axis=0) & (rows[:-1] != 0).all(axis=0)
+        for own in coupling_places(self.mechanism):
+            ok &= (n.couplings[own] != 0).all(axis=0)
         for load in self.loads:
             if _varies(load):
                 ok &= np.array([not _load_of(load, i).faults(self.mechanism) for i in range(self.count)])
@@ -90,7 +87,7 @@ class Variants:
             for k, link in enumerate(m.links)
         ]
         pairs = [_placed(pair, n, k) for k, pair in enumerate(m.pairs)]
-        couplings = [_coupled(*one, i) for one in zip(m.couplings, self.couplings, strict=True)]
+        couplings = [_coupled(c, n.couplings, own) for c, own in zip(m.couplings, coupling_places(m), strict=True)]
         loads = [_load_of(load, i) for load in self.loads]
         return m.replace(links=links, pairs=pairs, couplings=couplings, loads=loads)
 
@@ -111,16 +108,10 @@ def _placed(pair: Pair, n: Declared, k: int) -> Pair:
     return pair.replace(point=markers[0].point, axis=markers[0].axis, second=markers[0].second, **changes)
 
 
-def _coupled(c: Coupling, rows: Array, i: int) -> Coupling:
-    """A coupling with the numbers of one variant."""
-    *coefficients, constant = rows[:, i if rows.shape[1] > 1 else 0].tolist()
-    terms = zip(c.freedoms, coefficients, strict=True)
-    return c.replace(terms=terms, constant=None if c.constant is None else constant)
-
-
-def _declared_coupling(c: Coupling) -> Array:
-    """Coefficients and constant of a coupling, ``(terms + 1, 1)``; NaN for a constant that is not declared."""
-    return np.array([*c.coefficients, np.nan if c.constant is None else c.constant])[:, None]
+def _coupled(c: Coupling, numbers: Array, own: slice) -> Coupling:
+    """A coupling with its ``own`` ones among the numbers of one variant."""
+    terms = zip(c.freedoms, numbers[own].tolist(), strict=True)
+    return c.replace(terms=terms, constant=None if c.constant is None else float(numbers[own.stop]))
 
 
 def _varies(load: Load) -> bool:
@@ -143,8 +134,6 @@ def field_values(m: Mechanism, fields: Mapping[str, AnyField]) -> dict[str, floa
         elif isinstance(field, ChainField):
             assert chained is not None
             out[name] = float(chained[field.kind, field.index])
-        elif isinstance(field, CouplingField):
-            out[name] = float(_declared_coupling(m.couplings[field.index])[field.term, 0])
         else:
             value = np.asarray(getattr(m.loads[field.index], field.name), dtype=float)
             out[name] = float(value if field.component is None else value[field.component])
@@ -154,7 +143,7 @@ def field_values(m: Mechanism, fields: Mapping[str, AnyField]) -> dict[str, floa
 def varied(m: Mechanism, fields: Mapping[str, AnyField], values: Array) -> Variants:
     """Variants of a mechanism in which the fields take ``values (fields, count)``."""
     count = values.shape[1]
-    start, loads, couplings = declared(m), list(m.loads), [_declared_coupling(c) for c in m.couplings]
+    start, loads = declared(m), list(m.loads)
     arrays = {f.name: getattr(start, f.name) for f in dataclasses.fields(start)}
     rows = list(zip(fields.values(), values, strict=True))
     chained = [(field, row) for field, row in rows if isinstance(field, ChainField)]
@@ -169,10 +158,7 @@ def varied(m: Mechanism, fields: Mapping[str, AnyField], values: Array) -> Varia
                 arrays[field.array][place] = field.scale * row
         elif isinstance(field, LoadField):
             loads[field.index] = _varied_load(loads[field.index], field, row)
-        elif isinstance(field, CouplingField):
-            couplings[field.index] = couplings[field.index] * np.ones(count)
-            couplings[field.index][field.term] = row
-    return Variants(m, Declared(**arrays), tuple(loads), count, couplings=tuple(couplings))
+    return Variants(m, Declared(**arrays), tuple(loads), count)
 
 
 def _chain_markers(
@@ -204,8 +190,8 @@ def clashes(m: Mechanism, fields: Mapping[str, AnyField]) -> list[str]:
     out = []
     for name, field in fields.items():
         mine: list[Any] = [("load", field.index, field.name, field.component)] if isinstance(field, LoadField) else []
-        if isinstance(field, ChainField | CouplingField):
-            mine = [(type(field).__name__, *dataclasses.astuple(field))]
+        if isinstance(field, ChainField):
+            mine = [("chain", field.kind, field.index)]
         if isinstance(field, Field):
             mine = [(field.array, str(field.places[0]))]
             sides = (0, 1) if field.places[0][0] == slice(None) else (field.places[0][0],)
@@ -240,10 +226,7 @@ def stacked(m: Mechanism, mechanisms: Sequence[Mechanism | None]) -> Variants:
         **{f.name: np.concatenate([getattr(n, f.name) for n in every], axis=-1) for f in dataclasses.fields(Declared)}
     )
     loads = tuple(_stacked_loads(group) for group in zip(*(other.loads for other in used), strict=True))
-    couplings = tuple(
-        np.hstack([_declared_coupling(c) for c in group]) for group in zip(*(o.couplings for o in used), strict=True)
-    )
-    return Variants(m, numbers, loads, len(used), tuple(i for i, ok in enumerate(same) if not ok), couplings)
+    return Variants(m, numbers, loads, len(used), tuple(i for i, ok in enumerate(same) if not ok))
 
 
 def topology_of(m: Mechanism) -> tuple[Any, ...]:

@@ -19,7 +19,7 @@ from mechgraph.model.field_format import Described, FieldFormat
 from mechgraph.model.link import Link
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker, Pair
-from mechgraph.model.parameters import Declared
+from mechgraph.model.parameters import Declared, coupling_places
 from mechgraph.quantities import is_numeric
 
 MARKER = tuple(Marker.formats)
@@ -61,15 +61,7 @@ class LoadField:
     component: int | None
 
 
-@dataclass(frozen=True)
-class CouplingField:
-    """The ``term``-th coefficient of the ``index``-th coupling; behind the last coefficient stands the constant."""
-
-    index: int
-    term: int
-
-
-AnyField = Field | ChainField | LoadField | CouplingField
+AnyField = Field | ChainField | LoadField
 Finder = Callable[[Mechanism, int, str], AnyField | str | None]
 """Finds the number of the i-th link, pair, ... by the rest of its name; or says what is wrong with it."""
 
@@ -155,14 +147,14 @@ def _load_field(m: Mechanism, index: int, rest: str) -> LoadField | str:
     return f"'loads[{index}].{rest}': no number of that name in load {index} ({load.kind}: {known}; vectors with .x, .y, .z)"
 
 
-def _coupling_field(m: Mechanism, index: int, rest: str) -> CouplingField | str:
-    c = m.couplings[index]
+def _coupling_field(m: Mechanism, index: int, rest: str) -> Field | str:
+    c, own = m.couplings[index], coupling_places(m)[index]
     if rest == "constant" and c.constant is not None:
-        return CouplingField(index, len(c.terms))
+        return Field("couplings", ((own.stop,),))
     if rest == "constant":
         return f"'{c.name}.constant': coupling {c.name!r} keeps the value that it has at the start; declare constant="
     if m.freedom_fault(rest, single=True) is None and m.full_name(rest) in c.freedoms:
-        return CouplingField(index, c.freedoms.index(m.full_name(rest)))
+        return Field("couplings", ((own.start + c.freedoms.index(m.full_name(rest)),),))
     return f"'{c.name}.{rest}': coupling {c.name!r} has the numbers {', '.join(c.freedoms)} and constant"
 
 
