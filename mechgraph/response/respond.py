@@ -209,6 +209,10 @@ def _occurrences(
 
 def _first_stage(it: Integration, task: Task, begin: float, x: Array, dq: Array) -> Stage:
     """Along the path where there is one path and loads that depend on the place on it, and linearly on the rate; charts otherwise."""
+    last = it.segments[-1] if it.segments else None
+    if last is not None and isinstance(last.stage, PathStage) and last.stage.task is task:
+        arc = last.stage.arc
+        return PathStage(arc, float(last.dense(begin)[0]), float(dq[arc.column]))
     motions = closure_rank(Configuration(task.system, x[:, None]), engine=task.engine).motions
     if (
         motions.shape[1] == 1
