@@ -11,10 +11,7 @@ with certificates. Between pieces of the path the quotients ``Q_i / M`` are Cheb
 
 from __future__ import annotations
 
-from bisect import bisect_right
-from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -22,54 +19,21 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_path import DriverPath
-from mechgraph.closure.indexing import Index, System
+from mechgraph.closure.indexing import System
 from mechgraph.closure.rank import closure_rank
 from mechgraph.closure.solver import closure_solver
-from mechgraph.numerics.continuation import Follower
-from mechgraph.numerics.crossings import WINDOW, Crossing, passed
-from mechgraph.numerics.hermite import Interpolation
-from mechgraph.numerics.tracks import Paths
 from mechgraph.response.chart import Closed
 from mechgraph.response.charts import Task
 from mechgraph.response.motion_equations import along_one, kinetic_energy
+from mechgraph.response.way import POINTS, Piece, Way
 
-CHUNK = 0.8
-"""Length of path that is followed at a time (radians, or lengths / L)."""
-PIECE = 0.32
-"""Longest piece of one series (radians, or lengths / L)."""
-POINTS = 16
-"""Points of a series; even, so that none lies in the middle."""
 FAST = 2.0
 """Rate of another freedom against that of the coordinate above which it becomes the coordinate."""
-FASTEST = 6.0
-"""The same at which the table of a coordinate ends."""
-AROUND = 0.32
-"""Length of the piece with a change point in its middle: the accelerations of states beside it lose rounding over the cube of the
-distance, 4e-11 at the nearest point of the series."""
-TAIL = 1e-12
-"""Part of the largest coefficient that the last two of a series may have; what a smooth series leaves out behind them is far smaller."""
-ROUNDING = 1e-14
-"""Rounding of what a series is made of, times the square of the condition."""
-SHORTEST = 0.01
-"""Shortest piece."""
 TURN = 2 * np.pi
 UNEVEN = 0.37
 """Where in its part of a turn loads are compared with those a turn later: not at the quarters, where change points often are."""
 BACK = 1e-9
 """Difference of poses (and part of the quotients) after a turn of the coordinate up to which the path has come back."""
-
-
-@dataclass(frozen=True)
-class _Piece:
-    """The path between two places: Chebyshev series ``(POINTS, 5)`` of ``Q_0/M, Q_1/M, Q_2/M`` and of the power ``P_1, P_2``.
-
-    ``steepness``: the largest rate of another freedom for a unit rate of the coordinate.
-    """
-
-    begin: float
-    end: float
-    series: Array
-    steepness: float
 
 
 class Arc:
@@ -79,34 +43,26 @@ class Arc:
         self.task = task
         s = task.system
         motion = closure_rank(Configuration(s, x[:, None]), engine=task.engine).motions[:, 0]
-        self.singles = np.flatnonzero(s.single_rows >= 0)
-        self.column = int(self.singles[np.argmax(np.abs(motion[self.singles]))])
-        self.row = int(s.single_rows[self.column])
+        singles = np.flatnonzero(s.single_rows >= 0)
+        self.column = int(singles[np.argmax(np.abs(motion[singles]))])
         columns = np.array([self.column], dtype=np.intp)
         self.path = DriverPath(s, closure_solver(task.engine, columns), partial(_same, s))
-        self.begin = float(x[self.row])
-        self._pieces: dict[float, list[_Piece]] = {1.0: [], -1.0: []}
-        self._ends = {1.0: x, -1.0: x}
-        self._reach = {1.0: self.begin, -1.0: self.begin}
-        self._closed = {1.0: False, -1.0: False}
-        self._chunks: dict[float, list[_Chunk]] = {1.0: [], -1.0: []}
+        self.begin = float(x[s.single_rows[self.column]])
+        self._ways = {sense: Way(self.path, task.loads, x, sense) for sense in (1.0, -1.0)}
         self._advance: Array | None = None
         self._sense = 1.0
 
-    def piece(self, u: float) -> tuple[_Piece, float] | None:
+    def piece(self, u: float) -> tuple[Piece, float] | None:
         """The piece in which a place lies, and the whole turns by which the place is further on; None where the table ends before."""
         turns = float(self._turns(np.array([u]))[0])
         u -= TURN * turns
-        sense = 1.0 if u >= self.begin else -1.0
-        pieces = self._pieces[sense]
-        while (not pieces or sense * u > sense * self._reach[sense]) and not self._closed[sense]:
-            self._extend(sense)
+        way = self._ways[1.0 if u >= self.begin else -1.0]
+        at = way.sense * (u - self.begin)
+        while (at > way.length or not way.length) and not way.closed:
+            self._extend(way)
             if self._advance is not None and not turns:
                 return self.piece(u)
-        if not pieces or sense * u > sense * self._reach[sense]:
-            return None
-        starts = [sense * p.begin for p in pieces]
-        return pieces[max(0, bisect_right(starts, sense * u) - 1)], turns
+        return None if at > way.length or not way.length else (way.piece(at), turns)
 
     def _turns(self, u: Array) -> Array:
         """Whole turns by which places ``u (T,)`` are further on than where they are tabulated."""
@@ -120,31 +76,23 @@ class Arc:
         turns = self._turns(u)
         home = u - TURN * turns
         x, which = np.empty((s.n_state, len(u))), np.empty(len(u), dtype=np.intp)
-        for sense, mine in ((1.0, home >= self.begin), (-1.0, home < self.begin)):
-            chunks = self._chunks[sense]
-            if mine.any() and not chunks:
-                self._extend(sense)
-            of = np.searchsorted([sense * c.end for c in chunks], sense * home)
-            for i in np.unique(of[mine]):
-                some = mine & (of == i)
-                x[:, some], which[some] = chunks[min(int(i), len(chunks) - 1)].states(home[some])
+        for way in self._ways.values():
+            mine = (home >= self.begin) == (way.sense > 0)
+            if mine.any():
+                if not way.length:
+                    self._extend(way)
+                x[:, mine], which[mine] = way.states(way.sense * (home[mine] - self.begin))
         if self._advance is not None:
             x += self._advance[:, None] * turns
         here = Configuration(s, x)
         return Closed(here, self.path.solver.factored(here, which), np.ones(len(u), dtype=bool))
 
-    def _extend(self, sense: float) -> None:
-        """Follow the path a chunk further and tabulate it, up to where another freedom moves much faster, or until it comes back."""
-        chunk = _Chunk(self, self._ends[sense], sense)
-        if chunk.end == self._reach[sense]:
-            self._closed[sense] = True
-            return
-        self._chunks[sense].append(chunk)
-        self._pieces[sense] += chunk.pieces()
-        self._ends[sense], self._reach[sense], self._closed[sense] = chunk.last, chunk.end, chunk.closed
-        whole = sense * (chunk.end - self.begin) >= TURN and not self.task.system.is_length[self.column]
-        if whole and self._advance is None:
-            self._advance, self._sense = self._after_a_turn(sense), sense
+    def _extend(self, way: Way) -> None:
+        """Tabulate the path further, up to where another freedom moves much faster, or until it comes back."""
+        turning = not self.task.system.is_length[self.column]
+        way.extend(TURN if turning and way.length < TURN else np.inf)
+        if turning and way.length >= TURN and self._advance is None:
+            self._advance, self._sense = self._after_a_turn(way.sense), way.sense
 
     def _after_a_turn(self, sense: float) -> Array | None:
         """How the state has advanced after a turn of the coordinate, where all links and loads are back; None where they are not."""
@@ -153,9 +101,10 @@ class Arc:
         if np.abs(ends.poses[..., 1] - ends.poses[..., 0]).max() > BACK:
             return None
         out = np.zeros(s.n_state)
-        rows = s.single_rows[self.singles]
+        singles = np.flatnonzero(s.single_rows >= 0)
+        rows = s.single_rows[singles]
         turned = sense * (ends.x[rows, 1] - ends.x[rows, 0])
-        out[rows] = np.where(s.is_length[self.singles], 0.0, TURN * np.round(turned / TURN))
+        out[rows] = np.where(s.is_length[singles], 0.0, TURN * np.round(turned / TURN))
         # a load may count turns, as a spring in a freedom does that winds up: then nothing comes back
         around = self.close(self.begin + sense * TURN * (np.arange(POINTS) + UNEVEN) / POINTS)
         further = Configuration(s, around.here.x + sense * out[:, None])
@@ -165,96 +114,12 @@ class Arc:
         return out if same else None
 
 
-class _Chunk:
-    """A chunk of path from a state on, one way."""
-
-    def __init__(self, arc: Arc, x: Array, sense: float) -> None:
-        self.arc, self.sense, self.begin = arc, sense, float(x[arc.row])
-        arc.path.variant_of = np.zeros(1, dtype=np.intp)
-        self.follower = Follower(arc.path)
-        points = np.array([[self.begin, self.begin + sense * (CHUNK + 2 * AROUND)]])
-        tracks = self.follower.follow(x[:, None], Paths([points]))
-        nodes = tracks.nodes
-        near = np.array([np.abs(nodes.place - place) < SHORTEST for _, place in tracks.crossings]).any(axis=0)
-        steep = (np.abs(nodes.Z[arc.singles]).max(axis=(0, 1)) > FASTEST) & ~near
-        place = float(nodes.place[-1]) if not steep.any() else float(nodes.place[max(int(np.argmax(steep)) - 1, 0)])
-        place = min(place, CHUNK)
-        found = [passed(self.follower, nodes, 0, at) for _, at in tracks.crossings if at < place + AROUND / 2]
-        self.crossings: list[Crossing] = [c for c in found if c is not None]
-        self.closed = place < CHUNK
-        # a chunk does not end beside a change point, so that the next one starts at a regular state
-        for c in self.crossings:
-            if abs(place - c.place) < AROUND:
-                place = c.place + AROUND
-        self.length = place
-        self.end = self.begin + sense * place
-        self.interpolation = Interpolation(arc.path, nodes)
-        self.last = self.states(np.array([self.end]))[0][:, 0] if place > 0 else x
-
-    def states(self, u: Array) -> tuple[Array, Index]:
-        """Closed states ``(nx, T)`` at places ``(T,)``, and their forms."""
-        at = self.sense * (u - self.begin)
-        track = np.zeros(len(u), dtype=np.intp)
-        step = self.interpolation.find(track, at)
-        x = self.interpolation(step, at, u[None])
-        found = self.follower.newton.close(
-            x, u[None], track, self.interpolation.nodes.which[self.interpolation.left[step]]
-        )
-        x, which = found.x.copy(), found.which
-        for c in self.crossings:
-            near = np.abs(at - c.place) < WINDOW
-            x[:, near] = c.states(at[near])
-        return x, which
-
-    def pieces(self) -> list[_Piece]:
-        """Pieces with their series, halved until these have converged."""
-        middles = np.array([c.place for c in self.crossings])
-        cuts = np.array([0.0, self.length])
-        for c in self.crossings:
-            cuts = np.append(cuts, [c.place - AROUND / 2, c.place + AROUND / 2])
-        cuts = np.unique(np.clip(cuts, 0.0, self.length))
-        spans = []
-        for a, b in pairwise(cuts.tolist()):
-            around = (np.abs(middles - 0.5 * (a + b)) < 1e-9).any()
-            n = 1 if around else max(1, int(np.ceil((b - a) / PIECE - 1e-9)))
-            edges = np.linspace(a, b, n + 1)
-            spans += list(pairwise(edges.tolist()))
-        out: list[_Piece] = []
-        while spans:
-            again = []
-            for (a, b), c, steepness, noise in zip(spans, *self._series(spans), strict=True):
-                tail, size = np.abs(c[-2:]).max(axis=0), np.abs(c).max(axis=0)
-                coarse = (tail > max(TAIL, noise) * np.maximum(size, 1e-3 * size[:3].max())).any()
-                if coarse and b - a > SHORTEST and not (np.abs(middles - 0.5 * (a + b)) < 0.25 * (b - a)).any():
-                    again += [(a, 0.5 * (a + b)), (0.5 * (a + b), b)]
-                else:
-                    out.append(_Piece(self.begin + self.sense * a, self.begin + self.sense * b, c, float(steepness)))
-            spans = again
-        return sorted(out, key=lambda p: self.sense * p.begin)
-
-    def _series(self, spans: list[tuple[float, float]]) -> tuple[Array, Array, Array]:
-        """Series ``(spans, POINTS, 5)`` over spans of places, how steep the path is in each, and the noise of the series."""
-        nodes = np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS)
-        u = np.concatenate([self.begin + self.sense * (0.5 * (a + b) + 0.5 * (b - a) * nodes) for a, b in spans])
-        x, which = self.states(u)
-        here = Configuration(self.arc.task.system, x)
-        f = self.arc.path.solver.factored(here, which)
-        quotients, powers = along_one(here, f, self.arc.task.loads)
-        values = np.concatenate([quotients, powers]).T.reshape(len(spans), POINTS, 5)
-        T = np.polynomial.chebyshev.chebvander(nodes, POINTS - 1) * (2.0 / POINTS)
-        T[:, 0] *= 0.5
-        steepness = np.abs(f.sensitivity()[self.arc.singles, 0]).max(axis=0).reshape(len(spans), POINTS).max(axis=1)
-        # rounding over the square of the distance from a singular position, which the condition measures
-        noise = ROUNDING * (f.condition**2).reshape(len(spans), POINTS).max(axis=1)
-        return np.einsum("pk,spq->skq", T, values), steepness, noise
-
-
 class PathStage:
     """Implements ``integration.Stage`` along an arc, from a place ``u`` with rate ``v``."""
 
     def __init__(self, arc: Arc, u: float, v: float) -> None:
         self.arc, self.task, self._first = arc, arc.task, np.array([u, v, 0.0])
-        self._piece: _Piece | None = None
+        self._piece: Piece | None = None
         self._turns = 0.0
         here = arc.close(np.array([u])) if arc.piece(u) is not None else None
         self.energy = 1.0

@@ -1,0 +1,86 @@
+"""Passing a crossing of branches in one leap: extrapolated across, and proved by states on both sides.
+
+Where the inverse of the condition falls in proportion to the distance from a place ahead, branches cross there (or the path turns back).
+The branch of continuous rates is extrapolated from nodes well before that place to nodes as far behind it, which must close with a
+correction that is small against the distance to any other branch. That it is one branch which passes a true crossing is then asked of
+the states in between: interpolated between both sides they must close, too. Where two branches pass each other at a distance ``g`` (a
+crossing that a small change of the dimensions has opened), they leave ``g^2``; the careful march tells distances as small from none.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechgraph.numerics.continuation import Follower
+from mechgraph.numerics.crossings import Crossing, passed
+from mechgraph.numerics.hermite import divided_differences, newton_form
+from mechgraph.numerics.tolerances import PATH
+from mechgraph.numerics.tracks import Nodes
+
+Array = NDArray[np.float64]
+
+NODES = 5
+"""Nodes from which the branch is extrapolated."""
+FARTHEST = 0.2
+"""Distance of a crossing behind the last node up to which it is leapt at."""
+BEHIND = np.array([0.02, 0.05, 0.09])
+"""Distances of the nodes behind a crossing."""
+OFF = 1e-2
+"""Correction of a node behind, against its distance from the crossing, from which on it may be on another branch."""
+BETWEEN = np.linspace(-1.0, 1.0, 9)
+"""Places between the nearest sides at which interpolated states must close."""
+CLOSES = 1e-13
+"""Residual up to which they do: some hundred roundings."""
+
+
+def leapt(follower: Follower, nodes: Nodes) -> tuple[Crossing, Nodes] | None:
+    """The crossing ahead of the last of the nodes of one track, and nodes behind it; None where the branch does not lead to any."""
+    last = nodes.take(np.unique(nodes.place, return_index=True)[1])
+    last = last.take(np.arange(max(0, len(last) - NODES), len(last)))
+    if len(last) < 3:
+        return None
+    inverse, place = 1.0 / last.condition[-3:], last.place[-3:]
+    fall = np.diff(inverse) / np.diff(place)
+    if not (fall < 0).all():
+        return None
+    ahead = -inverse[-1] / fall[-1]
+    crossing = float(place[-1] + ahead)
+    if not ahead < FARTHEST:
+        return None
+    behind = _behind(follower, last, crossing)
+    if behind is None:
+        return None
+    found = passed(follower, Nodes.join([nodes, behind]), int(last.track[0]), crossing)
+    if found is None or not _closes(found):
+        return None
+    return found, behind
+
+
+def _behind(follower: Follower, last: Nodes, crossing: float) -> Nodes | None:
+    """Nodes behind a crossing, on the branch of continuous rates."""
+    problem, n = follower.problem, len(BEHIND)
+    base = last.take(np.full(n, len(last) - 1))
+    at = crossing + BEHIND
+    drive = follower.paths.drive(base.track, at)
+    direction = (drive[:, :1] - base.drive[:, :1]) / (at[0] - base.place[0])
+    dq = problem.difference(last.x, np.repeat(base.x[:, :1], len(last), axis=1))
+    rates = problem.tangent(dq, (last.Z * direction).sum(axis=1))
+    form = divided_differences((last.place - base.place[0])[:, None], dq.T[:, :, None], rates.T[:, :, None])
+    coefficients, places = (np.repeat(values, n, axis=-1) for values in form)
+    ahead = problem.corrigible(newton_form(coefficients, places, at - base.place), base.which)
+    x = problem.advance(base.x, ahead, base.track)
+    found = follower.newton.nodes(x, drive, base.track, base.which, PATH.node)
+    if not found.done.all() or (found.correction > OFF * BEHIND).any():
+        return None
+    return Nodes.closed(found, drive, base.track, at, sure=True)
+
+
+def _closes(crossing: Crossing) -> bool:
+    """Whether the states between the nearest sides close."""
+    nearest = float(np.abs(crossing.sides.place - crossing.place).min())
+    at = crossing.place + nearest * BETWEEN
+    x, tracks = crossing.states(at), np.full(len(at), crossing.track)
+    point = crossing.problem.at(x, crossing.drives(at), tracks)
+    limit = np.maximum(CLOSES, point.rounding)
+    return bool((np.abs(point.residual).max(axis=0, initial=0.0) <= limit).all())

@@ -1,0 +1,211 @@
+"""A path followed one way from a closed state and tabulated: closed states and the terms of its equation of motion, place by place.
+
+Places are distances of the coordinate from the start. Change points are leapt over where that can be proved (see ``numerics.leap``), and
+otherwise passed by the careful march, or the table ends.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.driver_path import DriverPath
+from mechgraph.closure.indexing import Index
+from mechgraph.numerics.continuation import End, Follower
+from mechgraph.numerics.crossings import WINDOW, Crossing, passed
+from mechgraph.numerics.hermite import Interpolation
+from mechgraph.numerics.leap import leapt
+from mechgraph.numerics.tolerances import PATH
+from mechgraph.numerics.tracks import Nodes, Paths
+from mechgraph.response.motion_equations import Loads, along_one
+
+CHUNK = 0.8
+"""Length of path that is tabulated first (radians, or lengths / L); every further part is twice as long as the one before."""
+AGAIN = 0.1
+"""First step where the path is taken up again."""
+PIECE = 0.64
+"""Longest piece of one series (radians, or lengths / L)."""
+POINTS = 16
+"""Points of a series; even, so that none lies in the middle."""
+FASTEST = 6.0
+"""Rate of another freedom against that of the coordinate at which the table ends."""
+AROUND = 0.32
+"""Length of the piece with a change point in its middle: the accelerations of states beside it lose rounding over the cube of the
+distance, 4e-11 at the nearest point of the series."""
+TAIL = 1e-12
+"""Part of the largest coefficient that the last two of a series may have; what a smooth series leaves out behind them is far smaller."""
+ROUNDING = 1e-14
+"""Rounding of what a series is made of, times the square of the condition."""
+SHORTEST = 0.01
+"""Shortest piece."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """The path between two values of its coordinate: Chebyshev series ``(POINTS, 5)`` of ``Q_0/M, Q_1/M, Q_2/M`` and ``P_1, P_2``.
+
+    ``steepness``: the largest rate of another freedom for a unit rate of the coordinate.
+    """
+
+    begin: float
+    end: float
+    series: Array
+    steepness: float
+
+
+class Way:
+    """The path from a closed state ``x (nx,)`` on; tabulated up to ``length``, and no further where it is ``closed``."""
+
+    def __init__(self, path: DriverPath, loads: Loads, x: Array, sense: float) -> None:
+        self.path, self.loads, self.sense = path, loads, sense
+        self.begin = float(x[path.rows[0]])
+        path.variant_of = np.zeros(1, dtype=np.intp)
+        self.follower = Follower(path)
+        self.length, self.closed = 0.0, False
+        self.crossings: list[Crossing] = []
+        self._next, self._ended = CHUNK, False
+        self._pieces: list[Piece] = []
+        self._starts: list[float] = []
+        here = Paths([self._drives(np.zeros(2))])
+        self._nodes = self.follower.follow(x[:, None], here).nodes
+
+    def piece(self, at: float) -> Piece:
+        """The piece in which a place lies."""
+        return self._pieces[max(0, bisect_right(self._starts, at) - 1)]
+
+    def extend(self, most: float) -> None:
+        """Tabulate the next part, up to ``most`` at first."""
+        place = min(self.length + self._next, most)
+        self._next *= 2.0
+        self._follow(place + AROUND)
+        # a part does not end beside a change point
+        while near := [c.place for c in self.crossings if abs(place - c.place) < AROUND]:
+            place = max(near) + AROUND
+            self._follow(place + AROUND)
+        known = self._known()
+        self.closed = place > known
+        place = min(place, known)
+        self._interpolation = Interpolation(self.path, self._nodes)
+        if place > self.length:
+            pieces = self._tabulated(self.length, place)
+            self._pieces += pieces
+            self._starts += [self.sense * (p.begin - self.begin) for p in pieces]
+            self.length = place
+
+    # --- following -------------------------------------------------------------------------------------------------------
+
+    def _follow(self, goal: float) -> None:
+        """Follow the path to a place, or to where it cannot be followed on."""
+        while not self._ended and self._reached < goal:
+            self._take(self._march(goal, careful=False), [])
+            if self._reached >= goal or self._known() < self._reached:
+                return
+            self.follower.paths = Paths([self._drives(np.array([0.0, goal]))])
+            found = leapt(self.follower, self._nodes)
+            if found is not None:
+                self._take(found[1], [found[0]])
+                continue
+            start = self._reached
+            nodes = self._march(goal, careful=True)
+            places = [start + at for _, at in self.follower.crossings]
+            self._ended = self.follower.ends[0] is not End.REACHED
+            self._take(nodes, [])
+            self.follower.paths = Paths([self._drives(np.array([0.0, goal]))])
+            across = [passed(self.follower, self._nodes, 0, at) for at in places]
+            self.crossings += [crossing for crossing in across if crossing is not None]
+
+    def _march(self, goal: float, careful: bool) -> Nodes:
+        """Nodes from the last one on."""
+        last = self._nodes.take(np.array([-1]))
+        start, first = float(last.place[0]), AGAIN if len(self._nodes) > 1 else PATH.first
+        paths = Paths([self._drives(np.array([start, goal]))])
+        found = self.follower.follow(last.x, paths, first, last.which, careful).nodes
+        return replace(found, place=start + found.place)
+
+    def _take(self, nodes: Nodes, crossings: list[Crossing]) -> None:
+        """Add nodes, without another one of the form and place of the last, and crossings."""
+        last = self._nodes.take(np.array([-1]))
+        new = (nodes.place > last.place) | (nodes.which != last.which)
+        self._nodes = Nodes.join([self._nodes, nodes.take(new)])
+        self.crossings += crossings
+
+    def _drives(self, at: Array) -> Array:
+        """Values ``(1, n)`` of the coordinate at places."""
+        return np.asarray(self.begin + self.sense * at[None])
+
+    @property
+    def _reached(self) -> float:
+        return float(self._nodes.place[-1])
+
+    def _known(self) -> float:
+        """How far the coordinate serves: to before the first node at which another freedom moves much faster."""
+        nodes, singles = self._nodes, self.path.system.single_rows >= 0
+        near = np.array([np.abs(nodes.place - c.place) < SHORTEST for c in self.crossings]).any(axis=0)
+        steep = np.flatnonzero((np.abs(nodes.Z[singles]).max(axis=(0, 1)) > FASTEST) & ~near)
+        return float(nodes.place[max(int(steep[0]) - 1, 0)]) if steep.size else self._reached
+
+    # --- tabulating ------------------------------------------------------------------------------------------------------
+
+    def states(self, at: Array) -> tuple[Array, Index]:
+        """Closed states ``(nx, T)`` at places ``(T,)``, and their forms."""
+        u, track = self._drives(at), np.zeros(len(at), dtype=np.intp)
+        step = self._interpolation.find(track, at)
+        x = self._interpolation(step, at, u)
+        found = self.follower.newton.close(x, u, track, self._nodes.which[self._interpolation.left[step]])
+        x = found.x.copy()
+        for c in self.crossings:
+            near = np.abs(at - c.place) < WINDOW
+            x[:, near] = c.states(at[near])
+        return x, found.which
+
+    def _tabulated(self, begin: float, end: float) -> list[Piece]:
+        """Pieces between two places with their series, halved until these have converged."""
+        spans, out = self._spans(begin, end), []
+        middles = np.array([c.place for c in self.crossings])
+        while spans:
+            again = []
+            for (a, b), c, steepness, noise in zip(spans, *self._series(spans), strict=True):
+                tail, size = np.abs(c[-2:]).max(axis=0), np.abs(c).max(axis=0)
+                coarse = (tail > max(TAIL, noise) * np.maximum(size, 1e-3 * size[:3].max())).any()
+                if coarse and b - a > SHORTEST and not (np.abs(middles - 0.5 * (a + b)) < 0.25 * (b - a)).any():
+                    again += [(a, 0.5 * (a + b)), (0.5 * (a + b), b)]
+                else:
+                    begin, end = self._drives(np.array([a, b]))[0].tolist()
+                    out.append(Piece(begin, end, c, float(steepness)))
+            spans = again
+        return sorted(out, key=lambda piece: self.sense * piece.begin)
+
+    def _spans(self, begin: float, end: float) -> list[tuple[float, float]]:
+        """Places between which pieces are tried first: change points in the middle of theirs."""
+        places = sorted(c.place for c in self.crossings if begin < c.place < end)
+        cuts = [begin, end]
+        for i, place in enumerate(places):
+            room = min(place - begin, end - place, *np.abs(np.delete(places, i) - place) / 2, AROUND / 2)
+            cuts += [place - room, place + room]
+        out = []
+        for a, b in pairwise(np.unique(cuts).tolist()):
+            whole = any(a < place < b for place in places)
+            edges = np.linspace(a, b, 1 + (1 if whole else max(1, int(np.ceil((b - a) / PIECE - 1e-9)))))
+            out += list(pairwise(edges.tolist()))
+        return out
+
+    def _series(self, spans: list[tuple[float, float]]) -> tuple[Array, Array, Array]:
+        """Series ``(spans, POINTS, 5)`` over spans of places, how steep the path is in each, and the noise of the series."""
+        nodes = np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS)
+        at = np.concatenate([0.5 * (a + b) + 0.5 * (b - a) * nodes for a, b in spans])
+        x, which = self.states(at)
+        here = Configuration(self.path.system, x)
+        f = self.path.solver.factored(here, which)
+        values = np.concatenate(along_one(here, f, self.loads)).T.reshape(len(spans), POINTS, 5)
+        T = np.polynomial.chebyshev.chebvander(nodes, POINTS - 1) * (2.0 / POINTS)
+        T[:, 0] *= 0.5
+        singles = self.path.system.single_rows >= 0
+        steepness = np.abs(f.sensitivity()[singles, 0]).max(axis=0).reshape(len(spans), POINTS).max(axis=1)
+        # rounding over the square of the distance from a singular position, which the condition measures
+        noise = ROUNDING * (f.condition**2).reshape(len(spans), POINTS).max(axis=1)
+        return np.einsum("pk,spq->skq", T, values), steepness, noise

@@ -1,0 +1,58 @@
+"""Change points leapt over: only true ones, and onto the branch that goes on."""
+
+import numpy as np
+import pytest
+
+import mechgraph as mg
+from mechgraph.closure.assembly import assembled_at
+from mechgraph.response.along_path import Arc
+from mechgraph.response.charts import Task
+from mechgraph.response.motion_equations import Loads
+from mechgraph.response.prescribed import Prescribed
+from mechgraph.response.way import Way
+
+Z = np.eye(3)[2]
+
+
+def way(lower, engine="dense", bars=1):
+    """Half a turn of ``bars`` parallelograms in a row, the last foot lower; they are flat after a right angle."""
+    links = [mg.Link("frame"), *(mg.Link(f"c{i}", mass=1.0, center=(i, 0.5, 0)) for i in range(bars + 1))]
+    links += [mg.Link(f"r{i}", mass=1.0, center=(i + 0.5, 1, 0)) for i in range(bars)]
+    pairs = [
+        mg.Pair(f"A{i}", "R", "frame", f"c{i}", point=(i, -lower if i == bars else 0, 0), axis=Z)
+        for i in range(bars + 1)
+    ]
+    for i in range(bars):
+        pairs.append(mg.Pair(f"B{i}", "R", f"c{i}", f"r{i}", point=(i, 1, 0), axis=Z))
+        pairs.append(mg.Pair(f"C{i}", "R", f"r{i}", f"c{i + 1}", point=(i + 1, 1, 0), axis=Z))
+    m = mg.Mechanism("parallelograms", links, pairs)
+    system, x = assembled_at(m, {})
+    task = Task(system, Loads((), ()), Prescribed({}), np.zeros(0, dtype=np.intp), engine)
+    arc = Arc(task, x)
+    out = Way(arc.path, task.loads, x, -1.0)
+    out.extend(2.0)
+    out.extend(2.5)
+    return out
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.parametrize("bars", [1, 3])
+def test_a_change_point_is_leapt_over(engine, bars):
+    """The cranks stay parallel behind it, and no step was taken with care."""
+    w = way(0.0, engine, bars)
+    assert [c.place for c in w.crossings] == pytest.approx([np.pi / 2], abs=1e-3)
+    assert w.follower.work.careful == 0
+    assert w.length > 2.0
+    at = np.array([1.0, np.pi / 2 - 1e-4, np.pi / 2, 1.6, 2.0])
+    x, _ = w.states(at)
+    cranks = x[w.path.system.single_rows[: bars + 1]]
+    np.testing.assert_allclose(np.abs(cranks), np.broadcast_to(at, (bars + 1, 5)), atol=1e-12)
+
+
+@pytest.mark.parametrize("lower", [1e-3, 1e-6, 1e-9, 1e-11])
+def test_what_is_no_change_point_is_not_leapt_over(lower):
+    """One foot off the line by a little opens the crossing: the branches turn back before it, at a distance of the root of that."""
+    w = way(lower)
+    assert not w.crossings
+    assert w.follower.work.careful > 0
+    assert w.closed
