@@ -6,15 +6,18 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from mechgraph.document import Document, to_html, to_latex, to_latex_file, to_markdown, to_text
+from mechgraph.document import Document, Shown, to_html, to_latex, to_latex_file, to_markdown, to_text
 from mechgraph.equations.printing import Printed, formulation_document
 from mechgraph.equations.state import State
 from mechgraph.equations.system import CoefficientTable
 from mechgraph.writing import Format, format_of, write_whole
 
+IN_COMPONENTS = 200
+"""Unknowns up to which a notebook shows the equations in components too."""
+
 
 @dataclass(frozen=True)
-class Formulation(Printed):
+class Formulation(Printed, Shown):
     """The equations of a mechanism: what is printed is what is assembled.
 
     ``unknowns`` and ``equations`` are the scalar force equations (in a response with the accelerations and their closure), ``blocks``
@@ -60,9 +63,6 @@ class Formulation(Printed):
         """The same of the closure: ``N(row, column)`` of the rates and accelerations (2.47, 2.60), right sides ``B(row)`` of the latter."""
         return CoefficientTable(tuple(self.closure.acceleration.coefficient_rows("N", "B")))
 
-    def __str__(self) -> str:
-        return self.text()
-
     def __repr__(self) -> str:
         return (
             f"Formulation({self.mechanism.name!r}, {self.bookkeeping!r}, {len(self.equations)} equations, "
@@ -70,7 +70,10 @@ class Formulation(Printed):
         )
 
     def _repr_html_(self) -> str:
-        return to_html(self.document())
+        return to_html(self.document(components=len(self.unknowns) <= IN_COMPONENTS))
+
+    def _repr_latex_(self) -> str:
+        return self.latex(components=len(self.unknowns) <= IN_COMPONENTS)
 
 
 def _as(text: Callable[[Document], str]) -> Callable[..., None]:

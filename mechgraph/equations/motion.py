@@ -9,9 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+from mechgraph.document import Document, Shown
 from mechgraph.equations.symbols import LeeNames, Symbol, Words, direction, factor, moment_of, names_of, summed
 from mechgraph.equations.system import LinearSystem
 from mechgraph.equations.terms import AXES, Block, Known, ScalarEquation, Screw, Term, Unknown
+from mechgraph.errors import counted
 from mechgraph.model.factors import ConstantScrew
 from mechgraph.model.link import Link
 from mechgraph.model.mechanism import Mechanism
@@ -324,8 +326,8 @@ def _bracketed(terms: list[Signed]) -> Words:
     return words if len(terms) == 1 else ("(", *words, ")")
 
 
-@dataclass(frozen=True)
-class Closure:
+@dataclass(frozen=True, repr=False)
+class Closure(Shown):
     """The closure equations: ``position`` as printed, ``velocity`` and ``acceleration`` as linear systems in the rates and accelerations.
 
     ``motion`` and ``inertia`` say what the symbols of twists and inertia forces are.
@@ -336,6 +338,14 @@ class Closure:
     acceleration: LinearSystem
     motion: tuple[Block, ...]
     inertia: tuple[Block, ...]
+
+    def document(self) -> Document:
+        """The closure in displacement, velocity and acceleration, block-wise."""
+        blocks = (*self.position, *self.velocity.blocks, *self.acceleration.blocks)
+        return Document(f"Closure of {self.velocity.mechanism.name}", [b.equation for b in blocks])
+
+    def __repr__(self) -> str:
+        return f"Closure({self.velocity.mechanism.name!r}, {counted(len(self.position), 'loop')}; print it)"
 
 
 def closure_of(m: Mechanism) -> Closure:

@@ -26,7 +26,7 @@ SECTIONS = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Printed(LinearSystem):
     """What a formulation is printed from: its equations and its closure, and how they are counted.
 
@@ -198,14 +198,10 @@ def formulation_document(f: Printed, components: bool) -> Document:
     """All equations of a formulation, with what the symbols mean: closure, motion, forces, then the components and the unknowns."""
     m = f.mechanism
     numbers = names_of(m).link_number
-    ledger = f.ledger()
     count = f"{len(f.unknowns)} unknowns, {len(f.equations)} equations"
     blocks: list[Piece] = [
         Paragraph(f"Bookkeeping {f.bookkeeping}, {f.sought}: {count}. Numbers in brackets are those of Lee (1977)."),
-        Table(
-            ("kind", "count", "unknowns", "equations"),
-            tuple((k, str(r.count), str(r.unknowns), str(r.equations)) for k, r in ledger.by_kind.items()),
-        ),
+        f.ledger().table("llll"),
         Heading("Symbols", 2),
         Bullets(
             (
@@ -227,7 +223,7 @@ def formulation_document(f: Printed, components: bool) -> Document:
     ):
         if mine:
             blocks.append(Heading(title, 2))
-            blocks += [Equation(b.text, b.latex, b.mathml) for b in mine]
+            blocks += [b.equation for b in mine]
     blocks.append(Heading("Unknowns (3.52)", 2))
     rows = tuple((str(i), u.name, u.meaning) for i, u in enumerate(f.unknowns, 1))
     blocks.append(Table(("column", "unknown", "meaning"), rows, align="rll"))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from mechgraph.algebra.se3 import Array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class State:
     """A batch of ``T`` positions (no batch axis is ever dropped here).
 
@@ -32,13 +32,17 @@ class State:
     loads: Array
     coefficients: tuple[Array, ...] = ()
 
+    def __repr__(self) -> str:
+        freedoms, positions = self.coordinates.shape
+        return f"{type(self).__name__}({self.loads.shape[1]} links, {freedoms} freedoms, {positions} positions)"
+
     def of_first(self, pairs: int, freedoms: int) -> State:
         """The same of the first pairs alone, which have so many freedoms."""
         by_pair = {name: getattr(self, name)[:pairs] for name in ("reactions", "efforts", "along", "conditions")}
         return replace(self, coordinates=self.coordinates[:freedoms], velocities=self.velocities[:freedoms], **by_pair)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class MovingState(State):
     """A batch of positions with rates: what the closure equations and the equations of motion are assembled from, too.
 

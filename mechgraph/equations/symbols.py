@@ -22,7 +22,7 @@ LATEX_LETTERS = {
 """Letters that are not the same in LaTeX; a bar marks a vector of a link, as in Lee."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Symbol:
     r"""One symbol of the equations, the same thing in text and in LaTeX.
 
@@ -46,6 +46,9 @@ class Symbol:
     name: str = ""
     moment: bool = False
     axis: str = ""
+
+    def __repr__(self) -> str:
+        return f"Symbol({self.text!r})"
 
     @property
     def text(self) -> str:

@@ -11,6 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.document import Document, Shown, Table
 from mechgraph.equations.state import State
 from mechgraph.equations.symbols import Words, factor, summed, written
 from mechgraph.equations.terms import Block, ScalarEquation, Screw, Term, Unknown
@@ -21,7 +22,7 @@ from mechgraph.quantities import wrong
 from mechgraph.writing import cell, csv_of
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class LinearSystem:
     """Linear equations of a mechanism: what is printed is what is assembled.
 
@@ -34,6 +35,10 @@ class LinearSystem:
     equations: tuple[ScalarEquation, ...]
     blocks: tuple[Block, ...]
     screws: tuple[Screw, ...]
+
+    def __repr__(self) -> str:
+        size = f"{len(self.equations)} equations, {len(self.unknowns)} unknowns"
+        return f"{type(self).__name__}({self.mechanism.name!r}, {size})"
 
     # --- numbers -------------------------------------------------------------------------------------------------------
 
@@ -165,8 +170,8 @@ class LinearSystem:
                 yield f"{matrix}({i}, {unknown + 1})", i, unknown + 1, written(summed(terms))
 
 
-@dataclass(frozen=True)
-class CoefficientTable:
+@dataclass(frozen=True, repr=False)
+class CoefficientTable(Shown):
     """Nonzero coefficients: rows ``(entry, row, column, value)``; right sides have column 0."""
 
     rows: tuple[tuple[str, int, int, str], ...]
@@ -183,5 +188,12 @@ class CoefficientTable:
     def __len__(self) -> int:
         return len(self.rows)
 
+    def document(self) -> Document:
+        """The table as a document."""
+        return Document("", (Table(("entry", "value"), [(entry, value) for entry, _, _, value in self.rows]),))
+
     def __str__(self) -> str:
         return self.text()
+
+    def __repr__(self) -> str:
+        return f"CoefficientTable({len(self)} entries; print it)"

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from mechgraph.document import Document, Equation, Paragraph, Shown, Table
 from mechgraph.equations.mathml import mathml
 from mechgraph.equations.symbols import Symbol, Words, written
+from mechgraph.errors import counted
 
 AXES = ("x", "y", "z")
 
@@ -33,7 +35,7 @@ class Screw:
         return tuple(w.component(AXES[part % 3]) if isinstance(w, Symbol) else w for w in words)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Unknown:
     """An unknown number: a component of a reaction, an effort, or the rate or acceleration of a freedom.
 
@@ -52,6 +54,9 @@ class Unknown:
     def name(self) -> str:
         """Its symbol in plain text, ``FA_1``."""
         return self.symbol.text
+
+    def __repr__(self) -> str:
+        return f"Unknown({self.name!r}, {self.meaning!r})"
 
 
 @dataclass(frozen=True)
@@ -79,7 +84,7 @@ class Known:
     sign: float = 1.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ScalarEquation:
     """One scalar equation ``sum of terms + known = 0``; ``link`` and ``part`` of the wrench that it balances, in one of a link."""
 
@@ -91,9 +96,12 @@ class ScalarEquation:
     part: int = 0
     known: tuple[Known, ...] = ()
 
+    def __repr__(self) -> str:
+        return f"ScalarEquation({self.name!r}, {counted(len(self.terms), 'term')})"
 
-@dataclass(frozen=True)
-class Block:
+
+@dataclass(frozen=True, repr=False)
+class Block(Shown):
     """A vector equation as it is printed block-wise: equilibrium of a link, condition of a pair, a closure, or a definition.
 
     ``kind`` is ``"link"``, ``"condition"``, ``"reaction"``, ``"effort"`` or ``"coupling"`` of the force equations; ``"position"``,
@@ -114,6 +122,18 @@ class Block:
         """In LaTeX."""
         return written(self.words, latex=True)
 
+    def __repr__(self) -> str:
+        return f"Block({self.kind!r}, {self.text!r})"
+
+    @property
+    def equation(self) -> Equation:
+        """In all forms."""
+        return Equation(self.text, self.latex, self.mathml)
+
+    def document(self) -> Document:
+        """The equation."""
+        return Document("", (self.equation,))
+
     @property
     def mathml(self) -> str:
         """The content of a MathML element."""
@@ -129,8 +149,8 @@ class LedgerRow:
     equations: int
 
 
-@dataclass(frozen=True)
-class Ledger:
+@dataclass(frozen=True, repr=False)
+class Ledger(Shown):
     """Unknowns against equations by kind: pair symbols, ``coupling``, ``driver``, ``link`` (moving), and of a response ``acceleration``
     and ``closure``; read off the registry.
 
@@ -155,3 +175,13 @@ class Ledger:
     def balance(self) -> int:
         """Equations minus unknowns."""
         return self.equations - self.unknowns
+
+    def table(self, align: str = "lrrr") -> Table:
+        """The kinds as a table."""
+        rows = [(kind, *map(str, (row.count, row.unknowns, row.equations))) for kind, row in self.by_kind.items()]
+        return Table(("kind", "count", "unknowns", "equations"), rows, align)
+
+    def document(self) -> Document:
+        """The kinds and the balance."""
+        total = f"{self.unknowns} unknowns, {self.equations} equations, balance {self.balance}."
+        return Document(f"Ledger in the bookkeeping {self.bookkeeping}", (self.table(), Paragraph(total)))

@@ -18,7 +18,7 @@ import numpy as np
 import scipy
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.document import Document, Paragraph, Table
+from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import ContentError, DeclarationError, FileError, MechgraphWarning
 from mechgraph.exchange.asmt import Assembly, Connection, Results, results_of
 from mechgraph.exchange.asmt_mechanism import mechanism_of
@@ -58,8 +58,8 @@ class Difference:
         return self.of, self.quantity, f"{self.size:.4g}" if self.size else "", *shown, remark
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class Comparison(Shown):
     """All differences between a file's results and mechgraph's."""
 
     name: str

@@ -58,6 +58,12 @@ class Coupling(Described):
         """The coefficients, in the order of the freedoms."""
         return tuple(coefficient for _, coefficient in self.terms)
 
+    @property
+    def text(self) -> str:
+        """``2 A.Rz - 3 B.Tz = constant``."""
+        terms = " ".join(f"{'-' if c < 0 else '+'} {abs(c):.6g} {name}" for name, c in self.terms).removeprefix("+ ")
+        return f"{terms} = {'its value at start' if self.constant is None else f'{self.constant:.6g}'}"
+
     def faults(self, m: Nameable) -> list[str]:
         """What is wrong with this coupling in a mechanism, one line each."""
         where = f"coupling {shown(self.name)}: "

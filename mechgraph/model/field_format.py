@@ -19,7 +19,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
 from mechgraph.model.numeric import number_fault, plain, vector_fault
-from mechgraph.quantities import has_quantity, is_numeric, real_array, without_units, wrong
+from mechgraph.quantities import has_quantity, is_numeric, real_array, shown, without_units, wrong
 from mechgraph.units import LENGTH, PURE, Dimension, factor_of, symbol_of
 
 XYZ = "xyz"
@@ -118,11 +118,33 @@ class Formatted:
     _optional: ClassVar[frozenset[str]] = frozenset()
 
     def __init_subclass__(cls) -> None:
+        if cls.__repr__ is Formatted.__repr__:
+            cls.__repr__ = Formatted.__repr__  # type: ignore[method-assign]  # dataclass leaves alone what stands in the class itself
         hints = get_type_hints(cls, include_extras=True)
         found = {name: getattr(hint, "__metadata__", (None,))[0] for name, hint in hints.items()}
         cls.formats = {name: about for name, about in found.items() if isinstance(about, FieldFormat)}
         cls._numeric = tuple(name for name, about in cls.formats.items() if about.kind.numeric)
         cls._optional = frozenset(name for name in cls.formats if getattr(cls, name, ...) is None)
+
+    def __repr__(self) -> str:
+        """The fields that differ from what they are where they are left out."""
+        given = {name: getattr(self, name) for name in self.formats}
+        told = [
+            f"{name}={dict(value) if isinstance(value, Mapping) else repr(value) if isinstance(value, Formatted) else shown(value)}"
+            for name, value in given.items()
+            if not _is_default(type(self), name, value)
+        ]
+        return f"{type(self).__name__}({', '.join(told)})"
+
+
+def _is_default(cls: type, name: str, value: Any) -> bool:
+    """Whether a value says nothing: that of a field that was left out, or an empty table."""
+    default = getattr(cls, name, ...)
+    return (
+        value is default
+        or (isinstance(value, bool | float | tuple) and value == default)
+        or (isinstance(value, Mapping) and not value)
+    )
 
 
 class Described(Formatted):

@@ -14,9 +14,11 @@ from typing import Any, TypeVar
 import numpy as np
 
 from mechgraph.arguments import items_of
+from mechgraph.document import Document, Shown
 from mechgraph.errors import DeclarationError
 from mechgraph.model.coupling import Coupling
 from mechgraph.model.declaration import declaration_faults, flat_start, item_faults, mapping_faults
+from mechgraph.model.describe import mechanism_document
 from mechgraph.model.drive import Drive
 from mechgraph.model.link import Link
 from mechgraph.model.load_base import Load
@@ -31,7 +33,7 @@ Made = TypeVar("Made")
 
 
 @dataclass(frozen=True, eq=False)
-class Mechanism(Parts):
+class Mechanism(Parts, Shown):
     """A mechanism: a graph whose nodes are links and whose edges are kinematic pairs.
 
     Parameters
@@ -141,7 +143,11 @@ class Mechanism(Parts):
         return hash((self.name, tuple(p.name for p in self.pairs)))
 
     def __repr__(self) -> str:
-        return f"Mechanism({self.name!r}, {len(self.links)} links, {len(self.pairs)} pairs)"
+        return f"{type(self).__name__}({self.name!r}, {len(self.links)} links, {len(self.pairs)} pairs)"
+
+    def document(self) -> Document:
+        """Links, pairs, drivers, couplings and loads as tables."""
+        return mechanism_document(self)
 
     def __reduce__(self) -> tuple[Callable[..., Mechanism], tuple[dict[str, Any]]]:
         return _rebuilt, (self._arguments(),)

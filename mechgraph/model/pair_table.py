@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from mechgraph.document import Document, Table, to_text
+from mechgraph.document import Document, Shown, Table
 from mechgraph.model.pair_type import PairType, fill_row
 from mechgraph.model.row_parts import UNIT_TWISTS, UNIT_WRENCHES, Bookkeeping, Component, Freedom
 
@@ -15,7 +15,7 @@ _MZ = Component("Mz", UNIT_WRENCHES["Mz"])
 _SCREW_FZ = Component("Fz", UNIT_WRENCHES["Fz"], 0, (0.0, 0.0, -1.0, 0.0, 0.0, 0.0))
 
 
-class PairTable(Mapping[str, PairType]):
+class PairTable(Mapping[str, PairType], Shown):
     """The pair table: symbol -> PairType; prints as a table."""
 
     def __init__(self, rows: Sequence[PairType]) -> None:
@@ -30,7 +30,8 @@ class PairTable(Mapping[str, PairType]):
     def __len__(self) -> int:
         return len(self._rows)
 
-    def __str__(self) -> str:
+    def document(self) -> Document:
+        """The table as a document."""
         rows = []
         for row in self.values():
             reactions = " ".join(f"{c.name}@{c.frame}" for c in row.reactions or ()) or " ".join(row.component_names)
@@ -46,7 +47,7 @@ class PairTable(Mapping[str, PairType]):
                 )
             )
         header = ("symbol", "name", "f", "freedoms in order", "reactions @ frame", "Lee's ledger")
-        return to_text(Document("Pair types", (Table(header, tuple(rows)),)))
+        return Document("Pair types", (Table(header, tuple(rows)),))
 
 
 def _row(

@@ -18,7 +18,7 @@ from mechgraph.structure.pair_changes import LEFT_OUT, RIGID, WHOLE, Effect
 from mechgraph.structure.splines import with_spline
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Advice(Finding):
     """What would help, in words (``text``; ``brief`` with parts that can be bought or made), and as a changed mechanism: ``apply()``.
 

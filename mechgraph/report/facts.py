@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -30,7 +30,7 @@ from mechgraph.topology.linkgraph import LinkGraph
 from mechgraph.topology.matching import Parts, parts_of
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Geometry:
     """A closed position: the scaled system, its state, the driven columns and what can move."""
 
@@ -39,8 +39,11 @@ class Geometry:
     driven: Index
     freedoms: Freedoms
 
+    def __repr__(self) -> str:
+        return f"Geometry({len(self.x)} numbers of a closed position)"
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Facts:
     """What the graph alone and the graph with its geometry say about a mechanism.
 
@@ -51,8 +54,8 @@ class Facts:
     mechanism: Mechanism
     graph: LinkGraph
     note: str = ""
-    geometry: Geometry | None = field(default=None, repr=False)
-    asked: EngineName = field(default="auto", repr=False)
+    geometry: Geometry | None = None
+    asked: EngineName = "auto"
 
     # --- the graph alone -----------------------------------------------------------------------------------------------
 

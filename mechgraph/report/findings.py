@@ -25,7 +25,7 @@ MOST_INPUTS = 200
 """Number of input freedoms above which freedoms that move in proportion are not sought."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Finding:
     """One finding, in words and by name; ``axis`` is (point, direction) in the global frame where there is one."""
 
@@ -37,8 +37,11 @@ class Finding:
     def __str__(self) -> str:
         return self.text
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.text!r})"
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class PassiveFinding(Finding):
     """A passive freedom by ``name``: idle under the declared loads at rest here, or load-bearing (None: a load varies over positions).
 

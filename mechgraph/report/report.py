@@ -11,7 +11,7 @@ from typing import Any, get_args
 from mechgraph.arguments import option_faults
 from mechgraph.closure.assembly import assembled, assembled_at, named_columns
 from mechgraph.closure.rank import EngineName
-from mechgraph.document import Document, Paragraph, to_html, to_markdown, to_text
+from mechgraph.document import Document, Paragraph, Shown, to_markdown, to_text
 from mechgraph.errors import AssemblyError, DeclarationError, MechgraphError
 from mechgraph.model.declaration import mapping_faults
 from mechgraph.model.mechanism import Mechanism, check_mechanism
@@ -25,7 +25,7 @@ from mechgraph.structure.snapping import meant
 from mechgraph.topology.linkgraph import link_graph
 
 
-class DeterminacyReport(Facts):
+class DeterminacyReport(Facts, Shown):
     """The facts about a mechanism; prints as a report."""
 
     @cached_property
@@ -63,11 +63,9 @@ class DeterminacyReport(Facts):
         """All facts as JSON."""
         return json.dumps(self.to_dict(), indent=2) + "\n"
 
-    def __str__(self) -> str:
-        return self.text()
-
-    def _repr_html_(self) -> str:
-        return to_html(self.document())
+    def __repr__(self) -> str:
+        known = f", mobility {self.mobility}, redundancy {self.redundancy}" if self.geometry else ""
+        return f"DeterminacyReport({self.mechanism.name!r}{known}; print it)"
 
 
 def _verdict_of(m: Mechanism, doubt: float = RANKS.doubt) -> tuple[Any, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import CLOSED
 from mechgraph.closure.driver_path import in_blocks
 from mechgraph.closure.indexing import Index
-from mechgraph.document import Bullets, Document, Heading, Paragraph
+from mechgraph.document import Bullets, Document, Heading, Paragraph, Shown
 from mechgraph.errors import DeclarationError, ResponseError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import real_array, wrong
@@ -23,29 +23,35 @@ from mechgraph.response.events import Occurrence
 from mechgraph.response.integration import Integration
 from mechgraph.response.motion_equations import moved
 from mechgraph.response.reading import trajectory_of
+from mechgraph.result.numbers import ranges
 from mechgraph.result.solution import Solution
 from mechgraph.result.summary import summary
 from mechgraph.result.trajectory import Trajectory
 from mechgraph.structure.snapping import SnappedMechanism, declared_closure
 
 
-@dataclass(frozen=True)
-class Energy:
+@dataclass(frozen=True, repr=False)
+class Energy(Shown):
     """Energies over time ``(T,)`` in the user's units.
 
     ``kinetic``; ``potential`` of gravity and springs; ``work`` done since the start by prescribed drivers and by loads without a potential
-    energy. ``kinetic + potential - work`` is constant.
+    energy. ``kinetic + potential - work`` is constant; ``start`` is its value at the start.
     """
 
     kinetic: Array
     potential: Array
     work: Array
+    start: float
 
     @property
     def balance(self) -> Array:
         """``kinetic + potential - work`` less its value at the start: zero for an exact solution."""
-        total = self.kinetic + self.potential - self.work
-        return np.asarray(total - total[..., :1])
+        return np.asarray(self.kinetic + self.potential - self.work - self.start)
+
+    def document(self) -> Document:
+        """Ranges over the output times."""
+        rows = [(name, getattr(self, name)) for name in ("kinetic", "potential", "work", "balance")]
+        return Document("Energies", (ranges(rows, "time {}".format),))
 
 
 class Response(Solution):
@@ -123,6 +129,17 @@ class Course:
         ):
             what = f"times between {self.begin:g} and {self.reached:g}, one or one-dimensional"
             raise DeclarationError("response", [wrong(t, "t", what)])
+        trajectory, *parts = self._read(times)
+        kinetic, potential, work = (part.reshape(times.shape) for part in parts)
+        return Response(trajectory, Energy(kinetic, potential, work, self._energy_at_start), self)
+
+    @cached_property
+    def _energy_at_start(self) -> float:
+        _, kinetic, potential, work = self._read(np.array(self.begin))
+        return float((kinetic + potential - work)[0])
+
+    def _read(self, times: Array) -> tuple[Trajectory, Array, Array, Array]:
+        """The trajectory at times, with kinetic and potential energy and work, flat."""
         flat = times.reshape(-1)
         works = np.zeros(flat.size)
         blocks = []
@@ -134,9 +151,7 @@ class Course:
         trajectory.work = self.integration.work
         if isinstance(m, SnappedMechanism):
             trajectory.as_declared(partial(declared_closure, m, system.par), m.changes.tol)
-        shape = times.shape
-        energy = Energy(kinetic.reshape(shape), potential.reshape(shape), (works * system.par.L**2).reshape(shape))
-        return Response(trajectory, energy, self)
+        return trajectory, kinetic, potential, works * system.par.L**2
 
     def _states(self, flat: Array) -> Iterator[tuple[Index, Task, Closed, Array, Array]]:
         """Closed states at times ``(T,)`` in blocks: places, task, states, rates of the independent columns, work done."""

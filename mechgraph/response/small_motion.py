@@ -21,7 +21,8 @@ from mechgraph.arguments import option_faults
 from mechgraph.closure.assembly import assembled_at, named_columns
 from mechgraph.closure.rates import Velocities
 from mechgraph.closure.solver import ENGINES, EngineName, engine_for
-from mechgraph.errors import DeclarationError, MechgraphWarning, ResponseError
+from mechgraph.document import Document, Paragraph, Shown, Table
+from mechgraph.errors import DeclarationError, MechgraphWarning, ResponseError, counted, listed
 from mechgraph.model.declaration import mapping_faults
 from mechgraph.model.mechanism import Mechanism, check_mechanism
 from mechgraph.response.chart import Chart, Closed
@@ -29,7 +30,9 @@ from mechgraph.response.charts import Task
 from mechgraph.response.motion_equations import MASSLESS, Columns, Loads, in_unit_inertias
 from mechgraph.response.prescribed import OVER_POSITIONS, Prescribed
 from mechgraph.response.reading import trajectory_of
+from mechgraph.result.numbers import bracket, number
 from mechgraph.result.solution import Solution
+from mechgraph.units import unit_of
 
 STEP = 0.004
 """Step of the differences (radians, lengths / L); their error and rounding are both near 1e-13 where forces bend within 0.3."""
@@ -45,6 +48,11 @@ UNBALANCED = 1e-6
 """The same above which a position is said to be none of equilibrium."""
 STIFF = 1e-9
 """Eigenvalue of the stiffness, against the largest, that counts as none: neither stable nor unstable."""
+
+STABLE = {True: "stable", False: "unstable", None: "neither stable nor unstable to second order"}
+"""How a position of equilibrium is called."""
+NAMED = 8
+"""Most motions or coordinates that are shown."""
 
 
 class _Place:
@@ -148,6 +156,16 @@ class Equilibrium(Mechanism):
     stable: bool | None
     solution: Solution
 
+    def document(self) -> Document:
+        """The position found, its kind, and the mechanism."""
+        m = super().document()
+        return Document(f"Equilibrium of {self.name}", (Paragraph(f"{STABLE[self.stable].capitalize()}."), *m.blocks))
+
+    def __repr__(self) -> str:
+        start = ", ".join(f"{name} = {value:.6g}" for name, value in list(self.start.items())[:NAMED])
+        more = ", ..." if len(self.start) > NAMED else ""
+        return f"Equilibrium({self.name!r}, {STABLE[self.stable]}, at {start or 'the declared configuration'}{more})"
+
     def __reduce__(self) -> tuple[Any, ...]:
         return _balanced, (self._arguments(), self.stable, self.solution)
 
@@ -202,8 +220,8 @@ def _balanced(arguments: dict[str, Any], stable: bool | None, solution: Solution
     return out
 
 
-@dataclass(frozen=True)
-class Linearized:
+@dataclass(frozen=True, repr=False)
+class Linearized(Shown):
     """Small motions about a position of equilibrium.
 
     ``freedoms``: names of the independent ones ``(n,)``; ``M, C, K (n, n)`` in the user's units (coordinates of these freedoms);
@@ -219,6 +237,24 @@ class Linearized:
     force: Array
     motions: Array
     solution: Solution
+
+    def document(self) -> Document:
+        """Frequencies, damping and shapes of the motions."""
+        time = self.mechanism.units.get("time", "")
+        per = unit_of(self.mechanism.units, (0, 0, -1))
+        rows = []
+        for w, ratio, shape in zip(self.frequencies[:NAMED], self.damping[:NAMED], self.modes[:NAMED], strict=False):
+            largest = sorted(shape, key=lambda name: -abs(shape[name]))[:4]
+            swings = (number(w), number(w / (2 * np.pi))) if np.isfinite(w) else ("none", "")
+            rows.append((*swings, number(ratio), " ".join(f"{name} {abs(shape[name]):.3g}" for name in largest)))
+        head = (
+            f"frequency{bracket(per)}",
+            f"cycles{bracket(f'1/{time}' if time else '')}",
+            "damping",
+            "greatest amplitudes",
+        )
+        count = f"{counted(len(self.freedoms), 'independent freedom')}: {listed(self.freedoms)}"
+        return Document(f"Small motions of {self.mechanism.name}", (Paragraph(f"{count}."), Table(head, rows, "rrrl")))
 
     @cached_property
     def A(self) -> Array:

@@ -1,4 +1,4 @@
-"""Positions as people call them, by the values of the drivers; and numbers with their units."""
+"""Positions as people call them, by the values of the drivers."""
 
 from __future__ import annotations
 
@@ -9,30 +9,12 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.result.numbers import number, with_unit
 from mechgraph.result.values import Values
 from mechgraph.units import unit_of
 
 OK = "ok"
 """Status of a solved position."""
-NOISE = 1e-11
-"""Part of the largest value of its kind below which a value is rounding noise and shown as 0."""
-
-
-def number(value: float, scale: float = 0.0) -> str:
-    """Five digits; 0 for what is noise beside ``scale``."""
-    if abs(value) <= NOISE * scale or abs(value) < 1e-300:
-        return "0"
-    return f"{value:.5g}"
-
-
-def with_unit(text: str, unit: str) -> str:
-    """A number or name and the unit behind it, where there is one."""
-    return f"{text} {unit}" if unit else text
-
-
-def bracket(unit: str) -> str:
-    """The unit in the head of a column."""
-    return f" [{unit}]" if unit else ""
 
 
 def coordinate(m: Mechanism, name: str, value: float) -> str:

@@ -11,7 +11,8 @@ import numpy as np
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Table
 from mechgraph.errors import counted
 from mechgraph.result.extremes import Greatest, Range, Reactions, efforts, reactions
-from mechgraph.result.places import NOISE, OK, Places, bracket, number, with_unit
+from mechgraph.result.numbers import NOISE, bracket, number, with_unit
+from mechgraph.result.places import OK, Places
 from mechgraph.result.values import Values
 from mechgraph.units import force_hint, unit_of
 

@@ -11,16 +11,18 @@ from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.indexing import Index
+from mechgraph.document import Document, Shown, Table
 from mechgraph.equations.state import State
 from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.newton import Work
+from mechgraph.result.numbers import ranges
 
 Mask = NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
-class Checks:
+@dataclass(frozen=True, repr=False)
+class Checks(Shown):
     """Every solution's own checks, arrays over positions.
 
     closure : closure error, the largest of angle [rad] and length / L over the loops.
@@ -33,16 +35,52 @@ class Checks:
     equilibrium: Array
     power: Array
 
+    def document(self) -> Document:
+        """The worst of every check, and where."""
+        rows = {
+            "closure error (angle, length / L)": self.closure,
+            "equilibrium, relative": self.equilibrium,
+            "power balance, relative": self.power,
+        }
+        worst = [
+            (name, f"{np.nanmax(np.abs(of)):.0e}", f"position {np.nanargmax(np.abs(of))}")
+            for name, of in rows.items()
+            if np.isfinite(of).any()
+        ]
+        return Document("Checks", (Table(("check", "worst", "at"), worst, "lrr"),))
 
-class MaterialPoint(NamedTuple):
-    """Position, velocity and acceleration of a material point, ``(..., 3)`` each."""
 
+class _Point(NamedTuple):
     position: Array
     velocity: Array
     acceleration: Array
 
 
-class LoadResult(NamedTuple):
+class MaterialPoint(Shown, _Point):
+    """Position, velocity and acceleration of a material point, ``(..., 3)`` each."""
+
+    __slots__ = ()
+
+    def document(self) -> Document:
+        """Ranges of the components over the positions."""
+        rows = (
+            (f"{what} {axis}", of[..., i])
+            for what, of in zip(self._fields, self, strict=True)
+            for i, axis in enumerate("xyz")
+        )
+        return Document("Material point", (ranges(rows),))
+
+
+class _Load(NamedTuple):
+    load: Load
+    wrenches: dict[str, Array]
+    power: Array
+    coordinate: Array
+    rate: Array
+    force: Array
+
+
+class LoadResult(Shown, _Load):
     """What one load does, ``(...)`` each.
 
     ``wrenches``: by the names of the links on which it acts (none for a load in a freedom), (M, F) about the global origin ``(..., 6)``;
@@ -50,12 +88,13 @@ class LoadResult(NamedTuple):
     the effort.
     """
 
-    load: Load
-    wrenches: dict[str, Array]
-    power: Array
-    coordinate: Array
-    rate: Array
-    force: Array
+    __slots__ = ()
+
+    def document(self) -> Document:
+        """Ranges over the positions of the force along the coordinate, the power, and the sizes of the wrenches."""
+        rows = [(name, getattr(self, name)) for name in ("coordinate", "rate", "force", "power")]
+        rows += [(f"force on {link}", np.linalg.norm(w[..., 3:], axis=-1)) for link, w in self.wrenches.items()]
+        return Document(f"What {self.load!r} does", (ranges((name, of) for name, of in rows if np.isfinite(of).any()),))
 
 
 @dataclass(frozen=True)

@@ -5,17 +5,23 @@ from __future__ import annotations
 from typing import Any
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.document import Document, Shown
 from mechgraph.errors import DeclarationError
 from mechgraph.model.numeric import vector_fault
+from mechgraph.result.describe import coupling_document, link_document, pair_document
 from mechgraph.result.values import MaterialPoint, Values
 from mechgraph.units import unit_of
 
 
-class PairResult:
+class PairResult(Shown):
     """Values of one pair; see the properties."""
 
     def __init__(self, values: Values, index: int) -> None:
         self._values, self._index = values, index
+
+    def document(self) -> Document:
+        """Ranges of the values over the positions, and where they are reached."""
+        return pair_document(self._values, self._index)
 
     @property
     def position(self) -> Array:
@@ -103,11 +109,15 @@ class PairResult:
         }
 
 
-class CouplingResult:
+class CouplingResult(Shown):
     """Values of one coupling ``sum c_i q_i = constant``."""
 
     def __init__(self, values: Values, index: int) -> None:
         self._values, self._index = values, index
+
+    def document(self) -> Document:
+        """Ranges of the values over the positions, and where they are reached."""
+        return coupling_document(self._values, self._index)
 
     @property
     def effort(self) -> Array:
@@ -118,11 +128,15 @@ class CouplingResult:
         return self._values.multiplier(self._index)
 
 
-class LinkResult:
+class LinkResult(Shown):
     """Motion of one link in the global frame."""
 
     def __init__(self, values: Values, index: int) -> None:
         self._values, self._index = values, index
+
+    def document(self) -> Document:
+        """Ranges of the values over the positions, and where they are reached."""
+        return link_document(self._values, self._index)
 
     @property
     def pose(self) -> Array:

@@ -12,7 +12,7 @@ Source: Herve, The Lie group of rigid body displacements, Mechanism and Machine 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -37,7 +37,7 @@ class Kind:
 
     name: str = ""
     place: tuple[float, ...] = ()
-    outside: Array | None = None
+    outside: Array | None = field(default=None, repr=False)
     is_direction: bool = False
     by_pairs: bool = True
 

@@ -23,7 +23,7 @@ COMBINED = 300
 """Number of components of a group up to which combinations across pairs are computed."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SelfStress:
     """A reaction state without load: coefficients by ``pair:component``, the largest 1, moments divided by L so that they compare."""
 
@@ -39,6 +39,9 @@ class SelfStress:
             f"{'-' if v < 0 else '+'} {'' if abs(abs(v) - 1) < 5e-4 else f'{abs(v):.3g} '}{name}" for name, v in parts
         )
         return line.removeprefix("+ ")
+
+    def __repr__(self) -> str:
+        return f"SelfStress({self.text!r})"
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import closed_start
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import System
-from mechgraph.document import Document, Paragraph, Table, to_text
+from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.numeric import tolerance_fault
@@ -31,8 +31,8 @@ class Change:
     shift: float
 
 
-@dataclass(frozen=True)
-class Changes:
+@dataclass(frozen=True, repr=False)
+class Changes(Shown):
     """What ``Mechanism.snapped`` changed; prints as a table.
 
     ``moved`` what it moved, ``met`` the relations that are exact now, ``dropped`` those that cannot hold together with them within ``tol``
@@ -69,9 +69,6 @@ class Changes:
         head = f"With a tolerance of {self.tol:.3g} (radians, lengths / L) "
         head += f"the largest change is {self.largest:.3g}." if rows else "nothing is changed."
         return Document("", (Paragraph(head), *blocks))
-
-    def __str__(self) -> str:
-        return to_text(self.document())
 
 
 class SnappedMechanism(Mechanism):

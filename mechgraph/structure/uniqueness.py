@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -25,7 +25,7 @@ CONNECTING = 200
 """Number of self-stresses that connect loops up to which they are computed; their echelon form is dense, of that width."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Uniqueness:
     """The verdict on reactions at one position; what is expensive is computed when first asked for.
 
@@ -39,7 +39,10 @@ class Uniqueness:
     closure: ClosureRank
     table: Array
     coupled: Array
-    probes: Array = field(repr=False)
+    probes: Array
+
+    def __repr__(self) -> str:
+        return f"Uniqueness({int(self.is_unique.sum())} of {len(self.is_unique)} components unique, {self.count} self-stresses)"
 
     @property
     def count(self) -> int:

@@ -12,6 +12,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from mechgraph.errors import counted
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import pair_ends
 
@@ -24,7 +25,7 @@ Loop = tuple[tuple[int, int], ...]
 """A loop as (pair index, sign) in the order in which it is run through."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class LinkGraph:
     """The graph of a mechanism: links are nodes, pairs are edges; several pairs may join the same two links.
 
@@ -45,6 +46,9 @@ class LinkGraph:
     steps: Index
     chords: Index
     loop_steps: tuple[Index, Index, NDArray[np.float64]]
+
+    def __repr__(self) -> str:
+        return f"LinkGraph({self.n_links} links, {len(self.a)} pairs, {counted(self.n_loops, 'loop')})"
 
     @property
     def n_loops(self) -> int:

@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.errors import DeclarationError
+from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Shown, Table
+from mechgraph.errors import DeclarationError, counted
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
+from mechgraph.result.numbers import number
 from mechgraph.variants.sampling import deviation, reach
 from mechgraph.variants.work import STATUSES, Part, Source
 from mechgraph.writing import optional
@@ -21,8 +23,11 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
+LISTED = 10
+"""Most variants that are named with the reason why they were not solved."""
 
-class Study:
+
+class Study(Shown):
     """Results of ``study``; arrays have the variants first, then the positions, then components.
 
     Attributes
@@ -68,6 +73,39 @@ class Study:
     def __repr__(self) -> str:
         count, bad = len(self._outcomes), int(self.failed.sum())
         return f"Study({self._source.mechanism.name!r}, {count} variants, {bad} not solved, outputs {', '.join(self.outputs)})"
+
+    def document(self) -> Document:
+        """Ranges of the parameters and outputs, and why variants were not solved."""
+        n, bad = len(self._outcomes), int(self.failed.sum())
+        names, values = list(self.parameters), list(self.parameters.values())
+        rows = [
+            (name, *map(number, (at, v.min(), v.max())))
+            for name, at, v in zip(names, self._source.start, values, strict=True)
+        ]
+        blocks: list[Block] = [
+            Paragraph(
+                f"{counted(n, 'variant')} at {counted(self._outcomes.shape[1], 'position')}, {bad} not solved at all positions."
+            ),
+            Heading("Parameters", 2),
+            Table(("parameter", "mechanism itself", "least", "greatest"), rows, "lrrr"),
+            Heading("Outputs, over variants and positions", 2),
+            Table(
+                ("output", "mechanism itself", "least", "mean", "greatest"), list(map(self._row, self.outputs)), "lrrrr"
+            ),
+        ]
+        if self.messages:
+            told = [f"variant {i}: {text}" for i, text in list(self.messages.items())[:LISTED]]
+            more = [f"... and {len(self.messages) - LISTED} more (messages)"] if len(self.messages) > LISTED else []
+            blocks += [Heading("Not solved", 2), Bullets([*told, *more])]
+        return Document(f"Study of {self.mechanism.name}", blocks)
+
+    def _row(self, name: str) -> tuple[str, ...]:
+        """The range of an output; that of the mechanism itself where it has several values."""
+        values, own = (v[np.isfinite(v)] for v in (self.outputs[name], self.nominal[name]))
+        if not values.size:
+            return name, "", "no value", "", ""
+        ends = list(dict.fromkeys(map(number, (own.min(), own.max())))) if own.size else ["no value"]
+        return name, " to ".join(ends), *map(number, (values.min(), values.mean(), values.max()))
 
     @property
     def mechanism(self) -> Mechanism:
