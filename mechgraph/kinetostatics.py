@@ -39,54 +39,55 @@ ON_REACH: tuple[ReachName, ...] = ("raise", "flag")
 REDUNDANT: tuple[RedundantName, ...] = ("nan", "minimum_norm")
 
 
+SOLVED = (Status.OK.value, Status.CHANGE_POINT.value, Status.ACTUATORS_REST.value)
+"""Outcomes that are no reason to raise."""
+DEAD = "At a dead point the drivers do not determine the motion; drive another freedom, leave the position out, or use on_reach='flag'"
+FLAG = "Use on_reach='flag' for the positions that can be reached"
+REFUSED = {
+    Status.DEAD_POINT: f"is a dead point{{meet}}. {DEAD}",
+    Status.BEYOND_DEAD_POINT: f"is beyond a dead point; reached {{at}}{{meet}}. {DEAD}",
+    Status.OUT_OF_REACH: f"is out of reach; reached {{at}}. {FLAG}",
+    Status.NOT_CLOSED: f"is within reach, but its loops could not be closed to rounding; the path was followed to {{at}}. {FLAG}",
+    Status.NOT_FOLLOWED: "was not reached: the path to it takes more steps than are made; it was followed to {at}. Start nearer to it, "
+    "or use on_reach='flag'",
+    Status.BEYOND_TOLERANCE: "is beyond the tolerance: there the loops of the declared geometry close to {miss:.3g} only, over all "
+    "positions to {most:.3g}. Give a larger tol, or use on_reach='flag'",
+}
+"""Why a position was not solved, by its outcome."""
+
+
 def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exception | None:
     """The named error for the first position that was not solved, with the solution so far."""
-    status = solution.status.reshape(-1)
-    moved = (Status.OK.value, Status.CHANGE_POINT.value, Status.ACTUATORS_REST.value)
-    bad = np.flatnonzero(~np.isin(status, moved))
+    bad = np.flatnonzero(~np.isin(solution.status.reshape(-1), SOLVED))
     if not bad.size:
         return None
     first = int(bad[0])
+    status = Status(solution.status.reshape(-1)[first])
     last = outcome.found.reached[:, first] * line.unit[line.lead]
     reached = dict(zip([line.drive.names[i] for i in line.lead], last.tolist(), strict=True))
-    asked = dict(
-        zip(line.drive.names, (line.values("position", outcome.batch)[:, first] * line.unit).tolist(), strict=True)
+    wanted = (line.values("position", outcome.batch)[:, first] * line.unit).tolist()
+    dead = status in (Status.DEAD_POINT, Status.BEYOND_DEAD_POINT)
+    nodes = outcome.found.nodes_of(int(outcome.found.track[first]))
+    meets = dead and len(nodes)
+    ways = branches(line.system, nodes.x[:, np.argmax(nodes.place)], line.leading) if meets else ()
+    misses = solution.checks.closure.reshape(-1)
+    why = REFUSED[status].format(
+        at=_listed(reached.items()),
+        meet=f" ({branches_text(ways, line.drive.names[line.lead[0]])})" if ways else "",
+        miss=misses[first],
+        most=np.max(misses, where=np.isfinite(misses), initial=0.0),
     )
-    at = ", ".join(f"{name} = {value:.6g}" for name, value in reached.items())
-    wanted = ", ".join(f"{name} = {value:.6g}" for name, value in asked.items())
-    if status[first] in (Status.DEAD_POINT.value, Status.BEYOND_DEAD_POINT.value):
-        where = (
-            "is a dead point" if status[first] == Status.DEAD_POINT.value else f"is beyond a dead point; reached {at}"
-        )
-        nodes = outcome.found.nodes_of(int(outcome.found.track[first]))
-        ways = branches(line.system, nodes.x[:, np.argmax(nodes.place)], line.leading) if len(nodes) else ()
-        meet = f" ({branches_text(ways, line.drive.names[line.lead[0]])})" if ways else ""
-        error = DeadPointError(
-            f"mechanism {line.m.name!r}: position {first} ({wanted}) {where}{meet}. At a dead point the drivers do not determine the "
-            "motion; drive another freedom, leave the position out, or use on_reach='flag'",
-            reached,
-            solution,
-        )
-        error.branches = ways
-        return error
-    if status[first] == Status.BEYOND_TOLERANCE.value:
-        misses = solution.checks.closure.reshape(-1)
-        return ReachError(
-            f"mechanism {line.m.name!r}: at position {first} ({wanted}) the loops of the declared geometry close to {misses[first]:.3g} "
-            f"only, beyond the tolerance; over all positions to {np.nanmax(misses):.3g}. Give a larger tol, or use on_reach='flag'",
-            reached,
-            solution,
-        )
-    why = (
-        f"is within reach, but its loops could not be closed to rounding; the path was followed to {at}"
-        if status[first] == Status.NOT_CLOSED.value
-        else f"is out of reach; reached {at}"
-    )
-    return ReachError(
-        f"mechanism {line.m.name!r}: position {first} ({wanted}) {why}. Use on_reach='flag' for the positions that can be reached",
-        reached,
-        solution,
-    )
+    asked = _listed(zip(line.drive.names, wanted, strict=True))
+    text = f"mechanism {line.m.name!r}: position {first} ({asked}) {why}"
+    if not dead:
+        return ReachError(text, reached, solution)
+    error = DeadPointError(text, reached, solution)
+    error.branches = ways
+    return error
+
+
+def _listed(values: Iterable[tuple[str, float]]) -> str:
+    return ", ".join(f"{name} = {value:.6g}" for name, value in values)
 
 
 def _check_drivers(line: Pipeline, outcome: Outcome) -> None:

@@ -97,6 +97,7 @@ class Pipeline:
             self._check_determinate()
             self.passive, self.bodies, self.hold = self.freedoms.passive, self.freedoms.bodies, self.freedoms.hold
             self.solver = closure_solver(self.engine, self.leading, self.hold)
+            self._check_passive()
         self.acting = self._acting() if options.method else self.columns
 
     @cached_property
@@ -162,6 +163,16 @@ class Pipeline:
             )
             raise IndeterminateError(
                 f"mechanism {self.m.name!r}: {count} neither driven nor passive (moving: {names}); add {more}, or change a pair",
+                check(self.drive.m),
+            )
+
+    def _check_passive(self) -> None:
+        """Rows as they are solved and rows over their own lengths, by which the rank is decided, leave the same motions free."""
+        free = self.solver.factored(self.start, self.solver.chosen(self.start, np.full(1, -1))).motions().shape[1]
+        if free != len(self.passive):
+            raise IndeterminateError(
+                f"mechanism {self.m.name!r}: where it was assembled it is so nearly singular that rounding decides whether "
+                f"{len(self.passive)} freedoms or {free} are passive. Start at another position, or check the dimensions",
                 check(self.drive.m),
             )
 

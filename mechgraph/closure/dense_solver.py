@@ -161,6 +161,12 @@ def _independent_rows(matrices: list[Array], choice: Choice) -> list[Array]:
     return [np.moveaxis(np.swapaxes(Q, 1, 2) @ matrix, 0, -1) for matrix in columns]
 
 
+def _fits(form: Form, J: Array) -> bool:
+    """Whether the turned rows of a form are as independent at a matrix ``(m, F)`` as they should be."""
+    system = ChosenSystem(form.rows(J[:, :, None]), [form.choice], np.zeros(1, dtype=np.intp))
+    return bool(system.condition[0] <= PATH.fair)
+
+
 def _at(values: Array, at: Index) -> Array:
     """Some of the positions, without a copy where these are all."""
     return values if len(at) == values.shape[-1] else values[..., at]
@@ -230,10 +236,11 @@ class DenseSolver:
         return which
 
     def _fitting(self, J: Array) -> int:
-        """The number of a form for one matrix: the last one where that fits as well, or one made there."""
+        """The number of a form for one matrix: one of the last where that fits as well, or one made there."""
         made = form_at(J, self.fixed, self.keep)
-        for i in range(len(self.forms) - 1, -1, -1):
-            if self.forms[i].choice.same(made.choice) and self.forms[i].turn is None:
+        for i in range(len(self.forms) - 1, max(-1, len(self.forms) - 1 - TRIES), -1):
+            known = self.forms[i]
+            if known.choice.same(made.choice) and (known.turn is None or _fits(known, J)):
                 return i
         self.forms.append(made)
         return len(self.forms) - 1

@@ -44,6 +44,7 @@ class Status(Enum):
     CHANGE_POINT = "change point"
     ACTUATORS_REST = "actuators at dead point"
     NOT_CLOSED = "loops not closed"
+    NOT_FOLLOWED = "not followed"
     BEYOND_TOLERANCE = "beyond tolerance"
 
 
@@ -105,11 +106,15 @@ class DriverPath:
         """See ``numerics.newton.Problem``."""
         return self.system.tangent(dq, rates)
 
-    def pace(self, rates: Array) -> Array:
-        """The largest rate, slides that stand in no closure row left out; 0 where nothing turns, so that bodies are displaced only."""
-        size = np.abs(rates)
-        turning = size[~self.system.is_length].max(axis=0, initial=0.0) > 0
-        return np.where(turning, np.minimum(size[~self.system.carrying].max(axis=0, initial=0.0), 1.0), 0.0)
+    def pace(self, x: Array, rates: Array) -> Array:
+        """The largest rate, slides that stand in no closure row left out; 0 where nothing turns, so that bodies are displaced only.
+
+        A slide that is out by more than L counts by its rate over how far it is out: so the equations change.
+        """
+        s, size = self.system, np.abs(rates)
+        turning = size[~s.is_length].max(axis=0, initial=0.0) > 0
+        size[s.is_length] /= np.maximum(np.abs(x[s.single_rows[s.is_length]]), 1.0)
+        return np.where(turning, np.minimum(size[~s.carrying].max(axis=0, initial=0.0), 1.0), 0.0)
 
     def corrigible(self, dq: Array, which: Index) -> Array:
         """See ``ClosureSolver.corrigible``."""
@@ -267,19 +272,37 @@ class Legs:
         return self._read(follower, tracks)
 
     def _read(self, follower: Follower, tracks: Tracks) -> _Found:
-        path, nodes = self.path, tracks.nodes
-        last = np.zeros(len(self.points), dtype=np.intp)
-        last[nodes.track] = np.arange(len(nodes))
-        ended = np.array([end is not End.REACHED for end in tracks.end])
-        reach = np.where(ended, nodes.place[last], np.inf)
+        reach = self._reach(tracks)
+        out = self._unread(follower, tracks)
+        self._beside_crossings(out)
+        inside = np.flatnonzero(self.asked & (self.place <= reach[self.track]) & (out.near < 0))
+        wrong = self._read_off(out, inside)
+        out.status[wrong] = Status.NOT_CLOSED
+        out.x[:, wrong] = np.nan
+        self._say_why_not(out, reach)
+        return _Found(out, wrong)
+
+    def _reach(self, tracks: Tracks) -> Array:
+        """The place up to which the positions of every track may be read off."""
+        last = np.zeros(len(self.points))
+        np.maximum.at(last, tracks.nodes.track, tracks.nodes.place)
+        reach = np.where([end is not End.REACHED for end in tracks.end], last, np.inf)
         for track, crossing in tracks.crossings:
             # up to the crossing the branch is known, also where it is not passed
             reach[track] = max(reach[track], crossing - PATH.dead_zone)
+        return reach
+
+    def _unread(self, follower: Follower, tracks: Tracks) -> Positions:
+        """All positions with their places; nothing read off yet."""
+        nodes = tracks.nodes
+        # the last node before every position
+        span = float(max(nodes.place.max(), self.place.max(initial=0.0))) + 1.0
+        before = np.searchsorted(nodes.track * span + nodes.place, self.track * span + self.place) - 1
         out = Positions(
-            np.full((path.system.n_state, self.total), np.nan),
+            np.full((self.path.system.n_state, self.total), np.nan),
             np.full(self.total, Status.OK, dtype=object),
             np.zeros(self.total, dtype=np.intp),
-            nodes.drive[:, last][:, self.track],
+            nodes.drive[:, np.maximum(before, np.searchsorted(nodes.track, self.track))],
             self.track,
             self.place,
             tracks,
@@ -288,32 +311,23 @@ class Legs:
             [],
         )
         out.status[~self.asked] = Status.NOT_CLOSED
-        self._beside_crossings(out)
-        inside = np.flatnonzero(self.asked & (self.place <= reach[self.track]) & (out.near < 0))
-        bad = []
+        return out
+
+    def _read_off(self, out: Positions, inside: Index) -> Index:
+        """The positions ``inside`` closed from interpolation, with more nodes where that does not do; those that did not come out."""
         for _ in range(FINER):
-            interpolation = Interpolation(path, nodes)
+            interpolation = Interpolation(self.path, out.tracks.nodes)
             bad = [
                 part[self._closed(out, interpolation, part, inside.size == self.total)] for part in in_blocks(inside)
             ]
             wrong = np.concatenate(bad)
-            if not wrong.size or path.size[1] > 1:
+            if not wrong.size or self.path.size[1] > 1:
                 break
-            more = self._halved(follower, interpolation, wrong)
+            more = self._halved(out.follower, interpolation, wrong)
             if not len(more):
                 break
-            nodes = Nodes.join([nodes, more])
-        out.tracks = replace(tracks, nodes=nodes)
-        wrong = np.concatenate(bad)
-        out.status[wrong] = Status.NOT_CLOSED
-        out.x[:, wrong] = np.nan
-        self._say_why_not(out, tracks, reach)
-        for track, crossing in tracks.crossings:
-            there = self.asked & (self.track == track) & (np.abs(self.place - crossing) < PATH.dead_zone)
-            out.status[there & (out.near < 0)] = Status.DEAD_POINT
-            out.status[there & (out.near >= 0)] = Status.CHANGE_POINT
-            out.reached[:, there] = follower.paths.drive(np.array([track]), np.array([crossing]))
-        return _Found(out, wrong)
+            out.tracks = replace(out.tracks, nodes=Nodes.join([out.tracks.nodes, more]))
+        return wrong
 
     def _beside_crossings(self, out: Positions) -> None:
         """Positions beside change points that were passed are taken from the branch itself."""
@@ -369,17 +383,21 @@ class Legs:
         )
         return Nodes.closed(found, drive, nodes.track[a], place, sure=True).take(found.done)
 
-    def _say_why_not(self, out: Positions, tracks: Tracks, reach: Array) -> None:
-        """Statuses of the positions behind the end of their track."""
+    def _say_why_not(self, out: Positions, reach: Array) -> None:
+        """Statuses of the positions behind the end of their track, and at crossings."""
         for i in np.flatnonzero(self.asked & (self.place > reach[self.track])):
-            end = tracks.end[self.track[i]]
             near = self.place[i] - reach[self.track[i]] < PATH.dead_zone
-            if end is End.FOLD:
-                out.status[i] = Status.OUT_OF_REACH
-            else:
-                out.status[i] = Status.DEAD_POINT if near else Status.BEYOND_DEAD_POINT
+            crossed = Status.DEAD_POINT if near else Status.BEYOND_DEAD_POINT
+            out.status[i] = BEYOND.get(out.tracks.end[self.track[i]], crossed)
+        for track, crossing in out.tracks.crossings:
+            there = self.asked & (self.track == track) & (np.abs(self.place - crossing) < PATH.dead_zone)
+            out.status[there & (out.near < 0)] = Status.DEAD_POINT
+            out.status[there & (out.near >= 0)] = Status.CHANGE_POINT
+            out.reached[:, there] = out.follower.paths.drive(np.array([track]), np.array([crossing]))
 
 
+BEYOND = {End.FOLD: Status.OUT_OF_REACH, End.GIVEN_UP: Status.NOT_FOLLOWED}
+"""Outcome behind the end of a track."""
 FINER = 4
 """Times that nodes are put where positions did not come out as predicted."""
 

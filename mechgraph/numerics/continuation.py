@@ -36,6 +36,7 @@ class End(Enum):
     REACHED = "reached"
     FOLD = "fold"
     CROSSING = "crossing"
+    GIVEN_UP = "given up"
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,7 @@ class Follower:
         start = self._start(x, np.full(V, -1) if which is None else which)
         self.stuck = stuck = ~(start.condition <= PATH.singular) & (paths.end > 0)
         self.ends = [End.CROSSING if here else End.REACHED for here in stuck]
+        self.steps, self.given_up = np.zeros(V, dtype=np.intp), np.zeros(V, dtype=bool)
         open_ = np.flatnonzero(~stuck & (paths.end > 0))
         if not open_.size:
             return Tracks(start, self.ends, self.crossings, self.work)
@@ -77,8 +79,11 @@ class Follower:
         nodes = self._cut(self._certified_all(nodes))
         reached = np.zeros(V)
         np.maximum.at(reached, nodes.track, nodes.place)
-        for v in np.flatnonzero((reached < paths.end) & ~stuck & careful):
-            nodes = self._careful(nodes, int(v))
+        left = np.flatnonzero((reached < paths.end) & ~stuck & ~self.given_up & careful)
+        if left.size:
+            nodes = self._careful(nodes, left)
+        for v in np.flatnonzero(self.given_up):
+            self.ends[v] = End.GIVEN_UP
         return Tracks(nodes, self.ends, self.crossings, self.work)
 
     # --- nodes -----------------------------------------------------------------------------------------------------------
@@ -148,7 +153,7 @@ class Follower:
         if not self.problem.paced:
             return np.full(len(new), PATH.longest)
         change = (drive - last.drive) / np.maximum(new.place - last.place, PATH.shortest)
-        paces = [self.problem.pace((node.Z * change).sum(axis=1)) for node in (last, new)]
+        paces = [self.problem.pace(node.x, (node.Z * change).sum(axis=1)) for node in (last, new)]
         return PATH.longest / np.maximum(np.maximum(*paces), np.finfo(float).tiny)
 
     # --- the quick march -------------------------------------------------------------------------------------------------
@@ -156,39 +161,41 @@ class Follower:
     def _quick(self, start: Nodes, first: float) -> Nodes:
         """Nodes behind the starts, most of them closed by one Newton step only; ends early where that does not do."""
         out: list[Nodes] = []
-        last = before = start
-        known = np.zeros(len(start), dtype=bool)
-        h = np.full(len(start), first)
-        while len(last):
-            at = self.paths.step(last.track, last.place, h)
-            drive = self.paths.drive(last.track, at)
-            dq, order = self._ahead(last, before, known, at, drive)
-            x = self.problem.advance(last.x, dq, last.track)
+        march = _March(start, start, np.zeros(len(start), dtype=bool), np.full(len(start), first))
+        while len(march.last):
+            last = march.last
+            at, drive, x, order = self._predicted(march)
             found = self.newton.nodes(x, drive, last.track, last.which, PATH.quick)
             good = found.done & (found.correction <= PATH.correction) & (found.condition <= PATH.singular)
             new = Nodes.closed(found, drive, last.track, at, sure=False)
-            h = _next_step(at - last.place, found.correction, order, good, self._longest(last, new, drive))
-            if good.all():
-                out.append(new)
-                before, last = last, new
-                known = np.ones(len(new), dtype=bool)
-            else:
-                kept = np.flatnonzero(good)
-                out.append(new.take(kept))
-                before, last = _replaced(before, last, kept), _replaced(last, new, kept)
-                known[kept] = True
-            poor = last.condition > PATH.fair
-            if poor.any():
-                renewed = self._renewed(last)
-                changed = np.flatnonzero(renewed.which != last.which)
-                out.append(renewed.take(changed))
-                known[changed] = False
-                last = renewed
-            going = (last.place < self.paths.end[last.track]) & (h >= PATH.shortest_quick)
-            if not going.all():
-                on = np.flatnonzero(going)
-                last, before, known, h = last.take(on), before.take(on), known[on], h[on]
+            march.h = _next_step(at - last.place, found.correction, order, good, self._longest(last, new, drive))
+            kept = np.flatnonzero(good)
+            out += self._moved(march, new.take(kept), last.take(kept), kept)
+            self._spend(march.last.track, PATH.quick_steps)
+            going = (march.last.place < self.paths.end[march.last.track]) & (march.h >= PATH.shortest_quick)
+            march.keep(going & ~self.given_up[march.last.track])
         return Nodes.join(out) if out else start.take(np.zeros(0, dtype=np.intp))
+
+    def _predicted(self, march: _March) -> tuple[Array, Array, Array, Array]:
+        """Where the next steps lead: places, path values, states predicted there, and the order of their error in the step."""
+        last = march.last
+        at = self.paths.step(last.track, last.place, march.h)
+        drive = self.paths.drive(last.track, at)
+        dq, order = self._ahead(last, march.before, march.known, at, drive)
+        return at, drive, self.problem.advance(last.x, dq, last.track), order
+
+    def _moved(self, march: _March, new: Nodes, before: Nodes, at: Index) -> list[Nodes]:
+        """The tracks ``at`` of a march moved on to new nodes, each in a better form where its own is poor; the nodes made."""
+        renewed = self._renewed(new)
+        changed = np.flatnonzero(renewed.which != new.which)
+        march.move(renewed, before, at)
+        march.known[at[changed]] = False
+        return [new, renewed.take(changed)] if changed.size else [new]
+
+    def _spend(self, tracks: Index, most: int) -> None:
+        """Count a step of tracks, and give up those that have taken more than ``most`` of a march."""
+        self.steps[tracks] += 1
+        self.given_up[tracks] |= self.steps[tracks] > most + PATH.steps_a_point * self.paths.count[tracks]
 
     def _settled(self, nodes: Nodes) -> Nodes:
         """All nodes closed in one batch; those that do not stay where they were marked by a condition without end."""
@@ -258,57 +265,67 @@ class Follower:
 
     # --- the careful march -----------------------------------------------------------------------------------------------
 
-    def _careful(self, nodes: Nodes, track: int) -> Nodes:
-        """One track taken up at its last node, every step closed and certified by itself, to its end or to what ends it."""
-        mine = nodes.take(nodes.track == track)
-        others = nodes.take(nodes.track != track)
-        found = [mine]
-        last, before = mine.take(np.array([-1])), mine.take(np.array([-2 if len(mine) > 1 else -1]))
-        known = len(mine) > 1 and before.place[0] < last.place[0]
-        h, end = PATH.shortest_quick, self.paths.end[track]
+    def _careful(self, nodes: Nodes, tracks: Index) -> Nodes:
+        """Tracks taken up at their last nodes, every step closed and certified by itself, to their ends or to what ends them."""
+        first, end = (np.searchsorted(nodes.track, tracks, side=side) for side in ("left", "right"))
+        last, before = nodes.take(end - 1), nodes.take(np.maximum(end - 2, first))
+        march = _March(last, before, before.place < last.place, np.full(len(tracks), PATH.shortest_quick))
         # beyond this condition rounding moves a state by as much as branches that cross are apart (a fold is far beyond its limit there)
-        worst = max(PATH.crossing, 1e3 * float(mine.condition[0]))
-        while last.place[0] < end:
-            at = self.paths.step(last.track, last.place, np.array([h]))
-            drive = self.paths.drive(last.track, at)
-            dq, order = self._ahead(last, before, np.array([known]), at, drive)
-            x = self.problem.advance(last.x, dq, last.track)
-            step = self.newton.nodes(x, drive, last.track, last.which, PATH.node)
-            new = Nodes.closed(step, drive, last.track, at, sure=True)
-            good = bool(step.done[0]) and step.correction[0] <= PATH.correction and step.condition[0] <= worst
-            middle = None
-            if good and step.which[0] == last.which[0]:
-                pair = Nodes.join([last, new])
-                ok, middle = self._certified(pair, np.array([0]), np.array([1]))
-                good = bool(ok[0])
-            else:
-                good = False
-            longest = self._longest(last, new, drive)
-            h = float(_next_step(at - last.place, step.correction, order, np.array([good]), longest)[0])
-            if good and middle is not None:
-                self.work.careful += 1
-                found += [middle, new]
-                before, known = middle, True
-                # where the condition grows as towards a fold, as |s* - s|^-1/2: no further than half of what is left
-                grown = float((new.condition[0] / middle.condition[0]) ** 2 - 1.0)
-                if grown > 0:
-                    h = max(min(h, 0.5 * float(new.place[0] - middle.place[0]) / grown), PATH.shortest)
-                last = self._renewed(new)
-                if last.which[0] != new.which[0]:
-                    found.append(last)
-                    known = False
-            elif h < PATH.shortest:
-                whole = Nodes.join(found)
-                beyond = self._passed(whole, track)
-                if beyond is None:
-                    break
-                # the branch is smooth there: it is interpolated from where its nodes are not noise
-                clear = 2.0 * self.crossings[-1][1] - beyond.place[0]
-                found = [whole.take(whole.place <= clear), beyond]
-                last, known, h = beyond, False, 0.5 * PATH.shortest_quick
-        return Nodes.join([others, *found])
+        worst = np.zeros(len(self.paths.end))
+        worst[tracks] = np.maximum(PATH.crossing, 1e3 * nodes.condition[first])
+        self.steps[:] = 0
+        found = [nodes]
+        while len(march.last):
+            stuck = ~self._careful_step(march, worst, found) & (march.h < PATH.shortest)
+            if stuck.any():
+                nodes = Nodes.join(found)
+                for i in np.flatnonzero(stuck):
+                    nodes = self._passed(nodes, march, int(i))
+                found = [nodes]
+            self._spend(march.last.track, PATH.careful_steps)
+            ended = self.given_up | np.array([end is not End.REACHED for end in self.ends])
+            march.keep((march.last.place < self.paths.end[march.last.track]) & ~ended[march.last.track])
+        return Nodes.join(found)
 
-    def _passed(self, nodes: Nodes, track: int) -> Nodes | None:
+    def _careful_step(self, march: _March, worst: Array, found: list[Nodes]) -> Mask:
+        """One step of every track that is on its way, put to the nodes ``found`` where it is certified; which are."""
+        last = march.last
+        at, drive, x, order = self._predicted(march)
+        step = self.newton.nodes(x, drive, last.track, last.which, PATH.node)
+        new = Nodes.closed(step, drive, last.track, at, sure=True)
+        good = step.done & (step.correction <= PATH.correction) & (step.condition <= worst[last.track])
+        good &= step.which == last.which
+        trial = np.flatnonzero(good)
+        if trial.size:
+            pairs, left = Nodes.join([last.take(trial), new.take(trial)]), 2 * np.arange(trial.size)
+            ok, middle = self._certified(pairs, left, left + 1)
+            good[trial], middle = ok, middle.take(ok)
+        march.h = _next_step(at - last.place, step.correction, order, good, self._longest(last, new, drive))
+        kept = np.flatnonzero(good)
+        if kept.size:
+            self.work.careful += kept.size
+            new = new.take(kept)
+            # where the condition grows as towards a fold, as |s* - s|^-1/2: no further than half of what is left
+            grown = (new.condition / middle.condition) ** 2 - 1.0
+            left_over = 0.5 * (new.place - middle.place) / np.where(grown > 0, grown, 1.0)
+            h = np.where(grown > 0, np.maximum(np.minimum(march.h[kept], left_over), PATH.shortest), march.h[kept])
+            march.h[kept] = h
+            found += [middle, *self._moved(march, new, middle, kept)]
+        return good
+
+    def _passed(self, nodes: Nodes, march: _March, i: int) -> Nodes:
+        """All nodes, with the one behind the crossing where the track ``i`` of a march is stuck; as they are where it does not go on."""
+        track = int(march.last.track[i])
+        beyond = self._beyond(nodes.take(nodes.track == track), track)
+        if beyond is None:
+            return nodes
+        march.move(beyond, beyond, np.array([i]))
+        march.known[i], march.h[i] = False, 0.5 * PATH.shortest_quick
+        # the branch is smooth there: it is interpolated from where its nodes are not noise
+        clear = 2.0 * self.crossings[-1][1] - beyond.place[0]
+        return Nodes.join([nodes.take((nodes.track != track) | (nodes.place <= clear)), beyond])
+
+    def _beyond(self, nodes: Nodes, track: int) -> Nodes | None:
         """The node behind a crossing of branches, on the branch of continuous velocity; None at a fold (and the end is named).
 
         Towards a fold at ``s*`` rates grow as the inverse of the closure matrix, both as ``|s* - s|^-1/2``; towards a crossing they
@@ -373,11 +390,24 @@ def _next_step(h: Array, correction: Array, order: Array, good: Mask, longest: A
     return np.where(good, np.minimum(np.maximum(grown, 10 * PATH.shortest), longest), 0.5 * h)
 
 
-def _replaced(old: Nodes, new: Nodes, at: Index) -> Nodes:
-    """Nodes with some of them replaced."""
-    values = {}
-    for name in old.__dataclass_fields__:
-        column = getattr(old, name).copy()
-        column[..., at] = getattr(new, name)[..., at]
-        values[name] = column
-    return Nodes(**values)
+@dataclass
+class _March:
+    """Tracks on their way: the last node of each, the one ``before`` (``known`` where the last came straight from it), the next step."""
+
+    last: Nodes
+    before: Nodes
+    known: Mask
+    h: Array
+
+    def move(self, new: Nodes, before: Nodes, at: Index) -> None:
+        """Go on to new nodes of the tracks ``at``."""
+        every = len(at) == len(self.last)
+        self.last = new if every else self.last.replaced(new, at)
+        self.before = before if every else self.before.replaced(before, at)
+        self.known[at] = True
+
+    def keep(self, going: Mask) -> None:
+        """Go on with some of the tracks."""
+        if not going.all():
+            self.last, self.before = self.last.take(going), self.before.take(going)
+            self.known, self.h = self.known[going], self.h[going]

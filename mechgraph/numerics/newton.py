@@ -16,6 +16,9 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
+UNMET = 30.0
+"""Residual over the step that takes it away from which on it is asked whether it does: rows are of size one, a few freedoms each."""
+
 
 class Factored(Protocol):
     """The linearized equations at a batch of points, factored."""
@@ -46,6 +49,9 @@ class Point(Protocol):
     @property
     def rounding(self) -> Array:
         """Rounding of the residual, ``(n,)``."""
+
+    def closure_rates(self, dq: Array) -> Array:
+        """Rates of the residual ``(m, n)`` for rates of the increments ``(F, n)``."""
 
     def part(self, at: Index) -> Any:
         """Some of the points."""
@@ -80,8 +86,8 @@ class Problem(Protocol):
     def tangent(self, dq: Array, rates: Array) -> Array:
         """Rates of increments from the rates at the states to which they lead."""
 
-    def pace(self, rates: Array) -> Array:
-        """How fast the equations change at the rates ``(F, n)``, at most one: 0 where steps may be as long as the certificate allows."""
+    def pace(self, x: Array, rates: Array) -> Array:
+        """How fast the equations change at rates ``(F, n)``, at most one: 0 where steps may be as long as the certificate allows."""
 
     def corrigible(self, dq: Array, which: Index) -> Array:
         """Increments without the part that no correction can change (freedoms that are held)."""
@@ -157,76 +163,104 @@ class Newton:
         return self._run(x, drive, tracks, which, 0.0, PATH.closed)
 
     def _run(self, x: Array, drive: Array, tracks: Index, which: Index, step_goal: Any, goal: float) -> Closed:
-        F, d = self.problem.size
-        n = x.shape[1]
-        x, which = x.copy(), which.copy()
-        total, Z, condition = np.zeros((F, n)), np.zeros((F, d, n)), np.full(n, np.inf)
-        done, before = np.zeros(n, dtype=bool), np.full(n, np.inf)
-        step_goal = np.broadcast_to(step_goal, n)
-        fresh = np.ones(n, dtype=bool)
-        active, point = np.arange(n), None
+        run = _Run(self, x.copy(), drive, tracks, which.copy(), np.broadcast_to(step_goal, x.shape[1]), goal)
         for _ in range(PATH.iterations):
-            mine = slice(None) if active.size == n else active
-            point = self.problem.at(x[:, mine].copy(), drive[:, mine], tracks[mine])
-            self._count(active.size, 1, 0)
-            left = np.abs(point.residual).max(axis=0, initial=0.0)
-            if goal > 0:
-                near = left <= goal
-                stalled = left > 0.5 * before[mine]
-                if stalled.any():
-                    near |= stalled & (left <= np.maximum(PATH.accepted, point.rounding))
-                x[:, active[near]] = point.x[:, near]
-                done[active[near]] = True
-                if near.all():
-                    break
-                if near.any():
-                    keep = np.flatnonzero(~near)
-                    active, point, left = active[keep], point.part(keep), left[keep]
-                    mine = active
-            f = self.problem.factored(point, which[mine])
-            self._count(0, 0, active.size)
-            step = f.solve(-point.residual[:, None])[:, 0]
-            size = np.abs(step).max(axis=0, initial=0.0)
-            finite = np.isfinite(size)
-            if not finite.all() or (size > 0.5).any():
-                step = np.where(finite, step, 0.0) * np.minimum(1.0, 0.5 / np.maximum(size, 0.5))
-            x[:, mine] = self.problem.advance(point.x, step, tracks[mine])
-            total[:, mine] += step
-            before[mine] = left
-            small = finite & (size <= step_goal[mine])
-            if small.any() and step_goal[0] <= PATH.node:
-                # the rates of a node err by the last step times the condition: poor ones are closed further, down to rounding
-                condition_here = np.maximum(f.condition, 1.0)
-                small &= size <= np.maximum(PATH.rates / condition_here, PATH.rounding * condition_here)
-            # rows that were left out as dependent must be met as well: where they are not, another form is tried once
-            unmet = small & (left > np.maximum(1e3 * step_goal[mine], 1e-9))
-            if unmet.any():
-                retry = np.flatnonzero(unmet & fresh[mine])
-                if retry.size:
-                    which[active[retry]] = self.problem.chosen(point.part(retry), np.full(retry.size, -1))
-                    fresh[active[retry]] = False
-                finite &= ~unmet
-                finite[retry] = True
-                small &= ~unmet
-            if small.all():
-                Z[:, :, mine], condition[mine], done[mine] = self.problem.sensitivity(point, f), f.condition, True
-                active, point = active[:0], None
+            run.evaluate()
+            if run.closed_all:
+                return Closed(run.x, run.total, run.Z, run.condition, run.which, run.done, run.whole)
+            run.correct()
+            if not run.active.size:
                 break
-            if small.any():
-                Z[:, :, active[small]] = self.problem.sensitivity(point, f)[:, :, small]
-                condition[active[small]] = f.condition[small]
-                done[active[small]] = True
-            lost = np.abs(total[:, mine]).max(axis=0, initial=0.0) > PATH.lost
-            active, point = active[finite & ~small & ~lost], None
-            if not active.size:
-                break
-        whole = point is not None and active.size == n
-        return Closed(x, total, Z, condition, which, done, point if whole else None)
+        return Closed(run.x, run.total, run.Z, run.condition, run.which, run.done)
 
-    def _count(self, evaluations: int, calls: int, factorizations: int) -> None:
-        self.work.evaluations += evaluations
-        self.work.calls += calls
-        self.work.factorizations += factorizations
+
+class _Run:
+    """States ``x (nx, n)`` on their way to zeros; ``active`` are those that are corrected further, evaluated at ``point``."""
+
+    def __init__(
+        self, newton: Newton, x: Array, drive: Array, tracks: Index, which: Index, step_goal: Array, goal: float
+    ) -> None:
+        (F, d), n = newton.problem.size, x.shape[1]
+        self.problem, self.work = newton.problem, newton.work
+        self.x, self.drive, self.tracks, self.which = x, drive, tracks, which
+        self.step_goal, self.goal = step_goal, goal
+        self.total, self.Z, self.condition = np.zeros((F, n)), np.zeros((F, d, n)), np.full(n, np.inf)
+        self.done, self.before, self.fresh = np.zeros(n, dtype=bool), np.full(n, np.inf), np.ones(n, dtype=bool)
+        self.active, self.closed_all = np.arange(n), False
+
+    @property
+    def _mine(self) -> Index | slice:
+        return slice(None) if self.active.size == len(self.done) else self.active
+
+    @property
+    def whole(self) -> Any:
+        """The evaluation of all states, where they were closed by it together."""
+        return self.point if self.active.size == len(self.done) else None
+
+    def evaluate(self) -> None:
+        """Evaluate the active states; where the residual is at its goal, or at rounding and no longer falls, they are done."""
+        mine = self._mine
+        self.point = self.problem.at(self.x[:, mine].copy(), self.drive[:, mine], self.tracks[mine])
+        self.work.evaluations += self.active.size
+        self.work.calls += 1
+        self.left = np.abs(self.point.residual).max(axis=0, initial=0.0)
+        if self.goal == 0:
+            return
+        near = self.left <= self.goal
+        stalled = self.left > 0.5 * self.before[mine]
+        if stalled.any():
+            near |= stalled & (self.left <= np.maximum(PATH.accepted, self.point.rounding))
+        self.x[:, self.active[near]] = self.point.x[:, near]
+        self.done[self.active[near]] = True
+        self.closed_all = bool(near.all())
+        if near.any() and not self.closed_all:
+            keep = np.flatnonzero(~near)
+            self.active, self.point, self.left = self.active[keep], self.point.part(keep), self.left[keep]
+
+    def correct(self) -> None:
+        """Take one step; where it is at its goal the state is done, where it leads too far away it is left."""
+        mine = self._mine
+        f = self.problem.factored(self.point, self.which[mine])
+        self.work.factorizations += self.active.size
+        step = f.solve(-self.point.residual[:, None])[:, 0]
+        size = np.abs(step).max(axis=0, initial=0.0)
+        finite = np.isfinite(size)
+        if not finite.all() or (size > 0.5).any():
+            step = np.where(finite, step, 0.0) * np.minimum(1.0, 0.5 / np.maximum(size, 0.5))
+        self.x[:, mine] = self.problem.advance(self.point.x, step, self.tracks[mine])
+        self.total[:, mine] += step
+        self.before[mine] = self.left
+        small = finite & (size <= self.step_goal[mine])
+        if small.any() and self.step_goal[0] <= PATH.node:
+            # the rates of a node err by the last step times the condition: poor ones are closed further, down to rounding
+            condition_here = np.maximum(f.condition, 1.0)
+            small &= size <= np.maximum(PATH.rates / condition_here, PATH.rounding * condition_here)
+        unmet = self._unmet(small, step, size)
+        if unmet.any():
+            again = unmet & self.fresh[mine]
+            self._choose_again(np.flatnonzero(again))
+            small, finite = small & ~unmet, (finite & ~unmet) | again
+        if small.any():
+            at = mine if small.all() else self.active[small]
+            self.Z[:, :, at] = self.problem.sensitivity(self.point, f)[:, :, small]
+            self.condition[at], self.done[at] = f.condition[small], True
+        lost = np.abs(self.total[:, mine]).max(axis=0, initial=0.0) > PATH.lost
+        self.active = self.active[finite & ~small & ~lost]
+
+    def _unmet(self, small: Mask, step: Array, size: Array) -> Mask:
+        """Where a last step leaves the residual of rows that were left out as dependent as large as it is: they are not."""
+        doubt = small & (self.left > np.maximum(UNMET * size, 1e3 * np.minimum(self.step_goal[self._mine], PATH.node)))
+        if not doubt.any():
+            return doubt
+        rest = np.abs(self.point.residual + self.point.closure_rates(step)).max(axis=0, initial=0.0)
+        return np.asarray(doubt & (rest > 0.5 * self.left))
+
+    def _choose_again(self, again: Index) -> None:
+        """Another form, tried once."""
+        if again.size:
+            at = self.active[again]
+            self.which[at] = self.problem.chosen(self.point.part(again), np.full(again.size, -1))
+            self.fresh[at] = False
 
 
 def least_norm_steps(J: Array, r: Array, tolerance: float) -> Array:

@@ -113,6 +113,12 @@ class PathTolerances:
     """Step at which the first march stops and the careful one takes over."""
     shortest: float = 1e-9
     """Step at which the careful march stops; the end of the reach is known to this, far above the rounding of a driver value."""
+    quick_steps: int = 30_000
+    """Most steps of a track in the first march (a thousand turns and more that do not repeat themselves): half a minute."""
+    careful_steps: int = 4_000
+    """The same in the careful march; past a crossing it takes some sixty."""
+    steps_a_point: int = 20
+    """Further steps of both for every point of the polyline that is followed."""
     straight: float = 0.98
     """Smallest ratio of chord to path between two nodes; a path that bends or turns back gets a node there."""
     departure: float = 0.7

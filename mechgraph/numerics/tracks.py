@@ -31,7 +31,7 @@ class Paths:
         self.stops = stops or [np.zeros(p.shape[1], dtype=bool) for p in points]
         self.length = [places_of(p) for p in points]
         self.end = np.array([length[-1] for length in self.length])
-        count = np.array([len(length) for length in self.length])
+        self.count = count = np.array([len(length) for length in self.length])
         self._last = np.cumsum(count) - 1
         self._first = self._last - count + 1
         # one rising key for all tracks: place on the track plus the lengths of the tracks before it
@@ -100,6 +100,13 @@ class Nodes:
     def take(self, at: Index | Mask) -> Nodes:
         """Some of the nodes."""
         return Nodes(*[getattr(self, name)[..., at] for name in self.__dataclass_fields__])
+
+    def replaced(self, new: Nodes, at: Index) -> Nodes:
+        """The nodes with those ``at`` replaced."""
+        values = {f.name: getattr(self, f.name).copy() for f in fields(Nodes)}
+        for name, column in values.items():
+            column[..., at] = getattr(new, name)
+        return Nodes(**values)
 
     def moved_by(self, tracks: int) -> Nodes:
         """The same on tracks that are numbered higher."""

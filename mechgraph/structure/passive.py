@@ -142,9 +142,11 @@ def _of_border(search: _Search, links: tuple[int, ...], border: tuple[int, ...])
     moves = np.zeros((position.n_freedoms, common.shape[1]))
     moves[every] = common
     twists = first @ common[: len(columns[0])]
-    leaving = np.concatenate([_leaving(position, k, links, moves, twists) for k in border])
+    leaving = [_leaving(position, k, links, moves, twists) for k in border]
+    if position.rows.more is not None:  # couplings hold as well
+        leaving.append(position.rows.more @ moves)
     out = []
-    for mix in _turns_and_slides(twists, small_combinations(leaving, MOTIONS.in_place)).T:
+    for mix in _turns_and_slides(twists, small_combinations(np.concatenate(leaving), MOTIONS.in_place)).T:
         rates, twist = moves @ mix, twists @ mix
         scale = np.abs(rates).max()
         scale *= np.sign(rates[np.argmax(np.abs(rates) > (1 - 1e-9) * scale)])

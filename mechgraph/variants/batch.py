@@ -22,7 +22,7 @@ from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.model.parameters import Declared, Parameters, declared
-from mechgraph.numerics.continuation import End, Follower
+from mechgraph.numerics.continuation import End, Follower, Tracks
 from mechgraph.numerics.tracks import Paths
 from mechgraph.pipeline import Options, Pipeline, Starts
 from mechgraph.result.solution import Solution
@@ -63,12 +63,23 @@ class NumbersPath(DriverPath):
     def sensitivity(self, point: Configuration, factored: FactoredClosure) -> Array:
         """Rates with the part of the way, by a forward difference: the numbers come from a function or a table of any kind."""
         drive, tracks = self._last
-        ahead = Configuration(self.system_at(drive[0] + NUMBERS_STEP, tracks), point.x).residual - point.residual
-        return factored.solve(-ahead[:, None] / NUMBERS_STEP)
+        step = self._step[tracks]
+        ahead = Configuration(self.system_at(drive[0] + step, tracks), point.x).residual - point.residual
+        return factored.solve(-ahead[:, None] / step)
+
+    def lead(self, x: Array, valid: Mask) -> Tracks:
+        """The ``valid`` variants from states ``x (nx, V)`` of the mechanism itself, in one step where the numbers change by little."""
+        V = x.shape[1]
+        begin, end = (Configuration(self.system_at(np.full(V, part), np.arange(V)), x).residual for part in (0.0, 1.0))
+        way = np.nan_to_num(np.abs(end - begin).max(axis=0, initial=0.0))
+        self._step = NUMBERS_STEP / np.where(way > 0, np.clip(way, NUMBERS_STEP / LONGEST_STEP, 1.0), 1.0)
+        return Follower(self).follow(x, Paths([np.array([[0.0, float(ok)]]) for ok in valid]), first=1.0)
 
 
 NUMBERS_STEP = 1e-7
-"""Step of that difference, in parts of the way: half the digits are left, which a prediction does not miss."""
+"""What the numbers change by in that difference (radians, lengths / L): half the digits are left, which a prediction does not miss."""
+LONGEST_STEP = 1e-3
+"""The longest step for that, in parts of the way, where the numbers change by less on the whole of it."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -137,8 +148,7 @@ def _move_alike(itself: Parameters, varied: Parameters) -> bool:
 def _led(line: Pipeline, path: NumbersPath, valid: Mask) -> tuple[Mask, Array]:
     """Which variants could be led from the mechanism itself, and where they begin ``(nx, V)``, NaN for the others."""
     V = len(valid)
-    line_of = Paths([np.array([[0.0, float(ok)]]) for ok in valid])
-    tracks = Follower(path).follow(np.repeat(line.x[:, None], V, axis=1), line_of, first=1.0)
+    tracks = path.lead(np.repeat(line.x[:, None], V, axis=1), valid)
     last = np.zeros(V, dtype=np.intp)
     last[tracks.nodes.track] = np.arange(len(tracks.nodes))
     begun = valid & np.array([end is End.REACHED for end in tracks.end])
