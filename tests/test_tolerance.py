@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 import scipy.stats
 from scipy.spatial.transform import Rotation
+from strategies import closed_mechanism
 from typer.testing import CliRunner
 
 import mechgraph as mg
 from mechgraph.cli import app
+from mechgraph.report.rounding import plausible
 
 SPECIAL = {
     **{name: getattr(mechanisms, name) for name in (
@@ -66,13 +68,12 @@ def test_rounded_special_mechanisms_are_what_they_are_meant_to_be(name: str, dig
     assert verdict(found)[:2] == verdict(mg.check(m))[:2]
 
 
-@pytest.mark.parametrize("name", SPECIAL)
+@pytest.mark.parametrize("name", [name for name in SPECIAL if name != "three_upu"])
 @pytest.mark.parametrize(("digits", "seed"), [(3, 1), (5, 2), (7, 3)])
 def test_without_a_tolerance_the_report_says_which_would_change_the_verdict(name: str, digits: int, seed: int) -> None:
     m = SPECIAL[name]()
     exact, report = mg.check(m), mg.check(rounded(m, digits, seed))
-    if verdict(report)[:2] == verdict(exact)[:2]:
-        return
+    assert verdict(report)[:2] != verdict(exact)[:2]
     found = report.rounding
     assert found is not None
     assert found.mobility == exact.finite_mobility
@@ -89,6 +90,52 @@ def test_the_sentence_names_plane_and_axes() -> None:
     assert found.kind == "planar"
     assert found.misses[0].endswith("deg off the normal")
     assert "the mechanism is planar and moves (mobility 1). Axis of " in found.text
+
+
+def bent(m: mg.Mechanism, size: float, seed: int) -> mg.Mechanism:
+    """Every axis and point off by so much in a random direction, numbers with all digits."""
+    rng = np.random.default_rng(seed)
+
+    def off(v: object, by: float) -> np.ndarray:
+        d = rng.normal(size=3)
+        return np.asarray(v) + by * d / np.linalg.norm(d)
+
+    m = rounded(m, 15, seed)
+    return m.replace(
+        pairs=[p.replace(point=off(p.point, size), axis=off(p.axis, size * np.linalg.norm(p.axis))) for p in m.pairs]
+    )
+
+
+@pytest.mark.parametrize("name", ["planar", "bennett", "sarrus", "spherical"])
+def test_a_hint_agrees_with_the_digits(name: str) -> None:
+    """A miss of some 5e-3 is explained by two digits behind the point and by no more; one below 1e-3 always."""
+    wide = bent(SPECIAL[name](), 5e-3, 4)
+    assert 1e-3 < wide.snapped(1e-2).changes.largest < 1e-2
+    assert mg.check(wide).rounding is None
+    with pytest.raises(mg.MechgraphError) as caught:
+        mg.kinematics(wide, {wide.freedom_names()[0]: POSITIONS})
+    assert "tol=" not in str(caught.value)
+    assert mg.check(rounded(wide, 2)).rounding is not None
+    assert mg.check(bent(SPECIAL[name](), 5e-4, 4)).rounding is not None
+
+
+@pytest.mark.parametrize(
+    ("point", "axis", "allowed"),
+    [((0, 0, 0), (0, 0, 1), 1e-3), ((0, 0, 0), (0.37, 0.56, 0.74), 2e-2), ((0.5, 0, 0), (0, 0.6, 0.8), 1e-3),
+     ((1 / 3, 0, 0), (2**0.5, 0, 1), 1e-3), ((123, 40, 0), (0, 0, 1), 0.02), ((1.25, 0, 0), (3, 4, 0), 0.02),
+     ((1.251, 0, 0), (371, 557, 743), 0.002 / 0.9997)],
+)  # fmt: skip
+def test_what_rounding_explains(point: tuple[float, ...], axis: tuple[float, ...], allowed: float) -> None:
+    """Four half units of the last digit, over L or over the length of the axis; whole directions are exact."""
+    pairs = [mg.Pair("A", "R", "frame", "arm", point=point, axis=axis, second=(0, 0, 1) if axis[2] == 0 else (1, 0, 0))]
+    m, L = mg.Mechanism("m", pairs=pairs), 100.0 if point[0] > 100 else 1.0
+    assert plausible(m, L) == pytest.approx(allowed, rel=1e-2)
+
+
+@pytest.mark.seeds(20)
+def test_random_mechanisms_have_no_hint(seed: int) -> None:
+    """Numbers with all digits, spatial; the second one comes within 0.0086 of a special one by chance."""
+    assert mg.check(closed_mechanism(seed)).rounding is None
 
 
 @pytest.mark.parametrize("name", mg.library())

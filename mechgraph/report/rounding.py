@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from decimal import Decimal
 from typing import Any
 
 import numpy as np
@@ -18,6 +20,8 @@ from mechgraph.structure.snapping import SnappedMechanism, candidates, snapped
 
 WIDEST = 1e-2
 """Largest tolerance that is tried."""
+CLOSE = 1e-3
+"""Change of a pair up to which numbers of any number of digits are taken for rounded: of random mechanisms hardly one comes so near."""
 LARGEST = 300
 """Pairs up to which rounding is looked for without being asked."""
 SAFE = 4.0
@@ -49,7 +53,8 @@ class Rounding:
 def rounding(m: Mechanism, verdict: Callable[[Mechanism], tuple[Any, ...]]) -> Rounding | None:
     """The smallest tolerance (of decades up to 1e-2) that changes ``verdict(m)``, its mobility first; None where there is none.
 
-    The verdict is a tuple that begins with the finite mobility; empty where there is none.
+    The verdict is a tuple that begins with the finite mobility; empty where there is none. Changes of pairs beyond what ``plausible``
+    says are no rounding: a mechanism may come near a special one by chance.
     """
     if isinstance(m, SnappedMechanism) or not m.has_geometry or len(m.pairs) > LARGEST:
         return None
@@ -64,7 +69,9 @@ def rounding(m: Mechanism, verdict: Callable[[Mechanism], tuple[Any, ...]]) -> R
             exact = snapped(m, tol)
         except MechgraphError:
             continue
-        if not exact.changes.moved and exact.changes.closure <= EXACT:
+        if (not exact.changes.moved and exact.changes.closure <= EXACT) or exact.changes.largest > plausible(
+            m, exact.changes.L
+        ):
             continue
         own = verdict(m) if own is None else own
         then = verdict(exact)
@@ -72,6 +79,27 @@ def rounding(m: Mechanism, verdict: Callable[[Mechanism], tuple[Any, ...]]) -> R
             return _worded(exact, tol, then)
         other = (exact, tol, then) if other is None and then and then != own else other
     return _worded(*other) if other else None
+
+
+def plausible(m: Mechanism, L: float) -> float:
+    """Largest change (radians, or length / ``L``) that rounding explains: some half units of the last digit in which points and axes are
+    written, at least ``CLOSE``.
+
+    A last digit so coarse that half a unit exceeds ``WIDEST``, as in (0, 0, 1), was not rounded to: such numbers are exact.
+    """
+    units = []
+    for pair in m.pairs:
+        for place in (pair,) if pair.on_a is None or pair.on_b is None else (pair.on_a, pair.on_b):
+            sizes = L, math.hypot(*place.axis), math.hypot(*place.second)
+            vectors = zip((place.point, place.axis, place.second), sizes, strict=True)
+            units += [0.5 * 10.0 ** -max(map(_decimals, vector)) / size for vector, size in vectors]
+    return max(CLOSE, SAFE * max((unit for unit in units if unit <= WIDEST), default=0.0))
+
+
+def _decimals(value: float) -> int:
+    """Digits behind the point in the shortest decimal that is this number."""
+    exponent = Decimal(repr(value)).normalize().as_tuple().exponent
+    return max(-exponent, 0) if isinstance(exponent, int) else 0
 
 
 def _decades(sizes: Array) -> Iterator[float]:
