@@ -9,7 +9,7 @@ from mechgraph.response.along_path import Arc
 from mechgraph.response.charts import Task
 from mechgraph.response.motion_equations import Loads
 from mechgraph.response.prescribed import Prescribed
-from mechgraph.response.way import Way
+from mechgraph.response.way import POINTS, Way, _coarse
 
 Z = np.eye(3)[2]
 
@@ -56,3 +56,17 @@ def test_what_is_no_change_point_is_not_leapt_over(lower):
     assert not w.crossings
     assert w.follower.work.careful > 0
     assert w.closed
+
+
+def test_pieces_are_halved_for_what_they_leave_out_and_not_for_rounding():
+    """A series of noise stays noise however short its piece is; one that has not converged does not."""
+    rng = np.random.default_rng(1)
+    smooth = np.outer(0.05 ** np.arange(POINTS), [1.0, 0.3, 0.0, 0.0, 0.0])
+    rounding = np.zeros((POINTS, 5))
+    rounding[:, 2] = 1e-13 * rng.normal(size=POINTS)
+    slow = smooth.copy()
+    slow[:, 2] = 1e-3 * 0.6 ** np.arange(POINTS)
+    assert not _coarse(smooth, 0.0)
+    assert not _coarse(smooth + rounding, 0.0)
+    assert _coarse(slow, 0.0)
+    assert _coarse(smooth + 1e6 * rounding, 0.0)

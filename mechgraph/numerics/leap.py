@@ -30,8 +30,8 @@ OFF = 1e-2
 """Correction of a node behind, against its distance from the crossing, from which on it may be on another branch."""
 BETWEEN = np.linspace(-1.0, 1.0, 9)
 """Places between the nearest sides at which interpolated states must close."""
-CLOSES = 1e-13
-"""Residual up to which they do: some hundred roundings."""
+CLOSES = 1e-12
+"""Residual up to which they do: the roundings of a thousand loops add up in it."""
 
 
 def leapt(follower: Follower, nodes: Nodes) -> tuple[Crossing, Nodes] | None:

@@ -43,6 +43,10 @@ ROUNDING = 1e-14
 """Rounding of what a series is made of, times the square of the condition."""
 SHORTEST = 0.01
 """Shortest piece."""
+FLAT = 0.3
+"""Part of the coefficients before them that the last ones of a series have where they are noise: those of a smooth series of that size
+(``NOISE``, against the largest term) fall by a hundred from four to four."""
+NOISE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -170,9 +174,11 @@ class Way:
         while spans:
             again = []
             for (a, b), c, steepness, noise in zip(spans, *self._series(spans), strict=True):
-                tail, size = np.abs(c[-2:]).max(axis=0), np.abs(c).max(axis=0)
-                coarse = (tail > max(TAIL, noise) * np.maximum(size, 1e-3 * size[:3].max())).any()
-                if coarse and b - a > SHORTEST and not (np.abs(middles - 0.5 * (a + b)) < 0.25 * (b - a)).any():
+                if (
+                    _coarse(c, noise)
+                    and b - a > SHORTEST
+                    and not (np.abs(middles - 0.5 * (a + b)) < 0.25 * (b - a)).any()
+                ):
                     again += [(a, 0.5 * (a + b)), (0.5 * (a + b), b)]
                 else:
                     begin, end = self._drives(np.array([a, b]))[0].tolist()
@@ -209,3 +215,12 @@ class Way:
         # rounding over the square of the distance from a singular position, which the condition measures
         noise = ROUNDING * (f.condition**2).reshape(len(spans), POINTS).max(axis=1)
         return np.einsum("pk,spq->skq", T, values), steepness, noise
+
+
+def _coarse(c: Array, noise: float) -> bool:
+    """Whether series ``(POINTS, 5)`` leave more out than rounding, which stays however short the piece is."""
+    late, last = np.abs(c[-8:-4]).max(axis=0), np.abs(c[-4:]).max(axis=0)
+    tail, size = np.abs(c[-2:]).max(axis=0), np.abs(c).max(axis=0)
+    rounding = (last > FLAT * late) & (last < NOISE * size[:3].max())
+    small = tail <= max(TAIL, noise) * np.maximum(size, 1e-3 * size[:3].max())
+    return bool(not (small | rounding).all())
