@@ -30,6 +30,11 @@ from mechgraph.topology.linkgraph import LinkGraph
 from mechgraph.topology.matching import Parts, parts_of
 
 
+def nearly_singular(loops: int) -> float:
+    """Margin below which a position is called nearly singular; of a regular chain of n loops it goes as 1 / (n + 1)."""
+    return 2.0 * RANKS.near / (1 + max(loops, 1))
+
+
 @dataclass(frozen=True, repr=False)
 class Geometry:
     """A closed position: the scaled system, its state, the driven columns and what can move."""
@@ -209,8 +214,8 @@ class Facts:
 
     @property
     def near_below(self) -> float:
-        """Margin below which a position is called nearly singular; of a regular chain of n loops it goes as 1 / (n + 1)."""
-        return 2.0 * RANKS.near / (1 + max(self.graph.n_loops, 1))
+        """Margin below which a position is called nearly singular."""
+        return nearly_singular(self.graph.n_loops)
 
     @property
     def dead_point(self) -> bool:

@@ -1,6 +1,21 @@
-"""Pictures of solutions; matplotlib (the ``plot`` extra) is imported only when one is drawn."""
+"""Pictures of mechanisms, solutions, formulations and studies; matplotlib (the ``plot`` extra) is imported only when one is drawn."""
 
-from mechgraph.show.curves import effort_curve
+from mechgraph.show.curves import effort_curve, margin_curve, reaction_curve
+from mechgraph.show.diagrams import draw_graph, draw_sparsity, draw_structure
+from mechgraph.show.forces import polar_force, reaction_ranges
+from mechgraph.show.paths import hodograph, point_path
 from mechgraph.show.skeleton import draw_skeleton
 
-__all__ = ["draw_skeleton", "effort_curve"]
+__all__ = [
+    "draw_graph",
+    "draw_skeleton",
+    "draw_sparsity",
+    "draw_structure",
+    "effort_curve",
+    "hodograph",
+    "margin_curve",
+    "point_path",
+    "polar_force",
+    "reaction_curve",
+    "reaction_ranges",
+]

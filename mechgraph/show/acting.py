@@ -128,7 +128,7 @@ def _law(stage: Stage, i: int, load: Law) -> Part:
 
 def reactions(stage: Stage, solution: Solution, positions: Any) -> tuple[list[Part], tuple[str, ...], float]:
     """Reaction forces on links b as arrows at their markers, pairs whose force is not unique, and the length of a unit of force."""
-    values = {p.name: _force(stage, solution, p, positions) for p in stage.m.pairs}
+    values = {p.name: known_force(stage, solution, p, positions, stage.normal) for p in stage.m.pairs}
     lost = tuple(name for name, force in values.items() if np.isnan(force).any())
     longest = max((float(np.nanmax(np.linalg.norm(v, axis=1), initial=0.0)) for v in values.values()), default=0.0)
     scale = LONGEST * stage.size / longest if longest else 0.0
@@ -144,16 +144,26 @@ def reactions(stage: Stage, solution: Solution, positions: Any) -> tuple[list[Pa
     return out, lost, scale
 
 
-def _force(stage: Stage, solution: Solution, pair: Pair, positions: Any) -> Array:
-    """Reaction force ``(T, 3)``, NaN where it is not unique; of a plane mechanism the part in its plane, which may be unique alone."""
-    force = solution[pair.name].force.reshape(-1, 3)[positions]
-    if stage.normal is None or pair.type.reactions is None or not np.isnan(force).any():
-        return force
+def known_force(stage: Stage, solution: Solution, pair: Pair, positions: Any, along: Array | None) -> Array:
+    """Reaction force ``(T, 3)``, NaN where it is not unique (also where values of least norm stand for it).
+
+    With a direction ``along (3,)`` or ``(T, 3)`` the part across it, which may be unique alone: in the plane of a plane mechanism, across
+    the axis of a bearing.
+    """
+    result, row = solution[pair.name], pair.type
+    unique = {name: np.asarray(flags).reshape(-1)[positions] for name, flags in result.unique.items()}
+    force = result.force.reshape(-1, 3)[positions]
+    parts = [part for part in row.reactions or () if not part.is_couple]
+    if along is None or row.reactions is None:
+        names = [part.name for part in parts] if row.reactions is not None else list(row.component_names)
+        known = np.all([unique[name] for name in names], axis=0) if names else np.ones(len(force), dtype=bool)
+        out = np.where(known[:, None], force, np.nan)
+        return out if along is None else out - (out * along).sum(axis=1, keepdims=True) * along
     out = np.zeros_like(force)
-    for part in pair.type.reactions:
-        if not part.is_couple:
-            direction = stage.frames[f"pair:{pair.name}@{part.frame}"][:, :, :3] @ np.array(part.wrench[3:])
-            if not np.allclose(np.abs(direction @ stage.normal), 1.0, atol=FLAT):
-                value = solution[pair.name].components[part.name].reshape(-1)[positions]
-                out = out + direction * value[:, None]
-    return out - (out @ stage.normal)[:, None] * stage.normal
+    for part in parts:
+        direction = stage.frames[f"pair:{pair.name}@{part.frame}"][:, :, :3] @ np.array(part.wrench[3:])
+        across = direction - (direction * along).sum(axis=1, keepdims=True) * along
+        value = np.where(unique[part.name], result.components[part.name].reshape(-1)[positions], np.nan)
+        bears = np.linalg.norm(across, axis=1, keepdims=True) > FLAT
+        out = out + np.where(bears, across * value[:, None], 0.0)
+    return out

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Sequence
 from typing import Any
 
 from mechgraph.errors import MissingExtraError
+from mechgraph.model.mechanism import Mechanism
 
 INK = "#1f2933"
 MUTED = "#7b8794"
@@ -54,3 +56,13 @@ def plain(ax: Any) -> None:
 def with_unit(text: str, unit: str) -> str:
     """``force [N]``; the text alone where there is no unit."""
     return f"{text} [{unit}]" if unit else text
+
+
+def colours(m: Mechanism, highlight: Sequence[str] = ()) -> dict[str, str]:
+    """A colour for every link; grey for the frame and, where pairs are highlighted, for links that lie at none or one of them."""
+    moving = [k for k in m.link_names() if k != m.frame]
+    out = {m.frame: MUTED} | {k: PALETTE[i % len(PALETTE)] for i, k in enumerate(moving)}
+    if highlight:
+        ends = [link for p in m.pairs if p.name in highlight for link in (p.a, p.b)]
+        out |= {k: FAINT for k in moving if ends.count(k) < min(2, len(highlight))}
+    return out

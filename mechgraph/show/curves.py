@@ -1,80 +1,297 @@
-"""Curves over the driver: efforts."""
+"""Curves over the drivers, time or any freedom: efforts, reactions, the margin to a singular position.
+
+Positions that were not solved leave gaps. What is not unique has no curve: a hatched strip says where.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
+from mechgraph.quantities import shown
+from mechgraph.response.course import Response
 from mechgraph.result.solution import Solution
-from mechgraph.show.canvas import INK, MUTED, PALETTE, new_axes
+from mechgraph.show.canvas import HATCH, INK, MUTED, PALETTE, new_axes, plain, with_unit
+from mechgraph.show.margins import margins
 from mechgraph.units import unit_of
 
+STEPS = (10, 15, 30, 45, 60, 90, 180, 360)
+"""Distances of ticks of angles, degrees."""
+STRIP = 0.07
+"""Height of a hatched strip over that of the axes."""
 
-def effort_curve(s: Solution, freedom: str | None = None, *, ax: Any = None, marked: int | None = None) -> Any:
-    """Draw what a driver supplies over its position (a turn in degrees), and where loads act in its freedom what they do. Returns the axes.
+
+@dataclass(frozen=True)
+class Abscissa:
+    """What curves are drawn over: values ``(cases, T)``, the label of the axis, and whether they are degrees."""
+
+    values: Array
+    label: str
+    degrees: bool = False
+
+
+def abscissa(s: Solution, over: str | None = None) -> Abscissa:
+    """Values over which a solution is drawn, one for every position.
+
+    ``over``: a freedom, ``"t"`` for time or ``"position"`` for the number of the position; left out, time of a response, else the first
+    freedom that moves as prescribed.
+    """
+    m, status = s.whole, np.asarray(s.status)
+    rows = (-1, status.shape[-1] if status.ndim else 1)
+    if over is None:
+        timed = isinstance(s, Response) or (not s.prescribed and s.t is not None)
+        moving = (name for name in s.prescribed if np.nanmax(_coordinates(s, name)) > np.nanmin(_coordinates(s, name)))
+        over = "t" if timed else next(moving, "position")
+    if over == "t":
+        if s.t is None:
+            raise DeclarationError(
+                f"curve of {m.name!r}", ["over='t': this motion has no times; name a freedom, or 'position'"]
+            )
+        t = np.broadcast_to(np.asarray(s.t, dtype=float), s.batch).reshape(rows)
+        return Abscissa(t, with_unit("t", unit_of(m.units, (0, 0, 1))))
+    if over == "position":
+        return Abscissa(np.tile(np.arange(rows[1], dtype=float), (status.size // rows[1], 1)), "position")
+    values, name = _coordinates(s, over).reshape(rows), m.full_name(over)
+    if m.turns(name):
+        return Abscissa(np.rad2deg(values), with_unit(name, "deg"), True)
+    return Abscissa(values, with_unit(name, unit_of(m.units, (1, 0, 0))))
+
+
+def _coordinates(s: Solution, freedom: str) -> Array:
+    k, j = s.whole.freedom(freedom)
+    return np.asarray(s[s.whole.pairs[k].name].position[..., j])
+
+
+def lay_out(ax: Any, x: Abscissa, label: str) -> None:
+    """Labels, grid, and ticks of angles at round ones."""
+    ax.set_xlabel(x.label, color=INK)
+    ax.set_ylabel(label, color=INK)
+    plain(ax)
+    known = x.values[np.isfinite(x.values)]
+    if known.size and np.ptp(known) > 0:
+        room = 0.01 * np.ptp(known)
+        ax.set_xlim(known.min() - room, known.max() + room)
+    if x.degrees and known.size and np.ptp(known) > 60:
+        from matplotlib.ticker import MultipleLocator
+
+        step = next((d for d in STEPS if np.ptp(known) / d <= 8), 360)
+        ax.xaxis.set_major_locator(MultipleLocator(step))
+
+
+def draw_curve(ax: Any, x: Abscissa, y: Array, label: str, **style: Any) -> None:
+    """One curve a case; positions between others that were not solved are dots."""
+    for i, (xs, ys) in enumerate(zip(x.values, np.reshape(y, x.values.shape), strict=True)):
+        there = np.isfinite(xs) & np.isfinite(ys)
+        ys = np.where(there, ys, np.nan)
+        beside = np.concatenate([[False], there, [False]])
+        alone = there & ~beside[:-2] & ~beside[2:]
+        (line,) = ax.plot(xs, ys, label="_" * bool(i) + label, **{"lw": 2.0, "solid_capstyle": "round", **style})
+        if alone.any():
+            ax.plot(xs[alone], ys[alone], "o", ms=4.5, color=line.get_color(), label="_")
+
+
+def hatched_strips(ax: Any, x: Abscissa, lost: Sequence[tuple[str, Array, str]]) -> None:
+    """Along the upper edge one strip for each ``(name, where (positions), colour)`` that is not unique somewhere."""
+    from matplotlib.patches import Rectangle
+
+    if not lost:
+        return
+    low, high = ax.get_ylim()
+    ax.set_ylim(low, high + (high - low) * STRIP * len(lost) / (1 - STRIP * len(lost)))
+    for i, (name, where, colour) in enumerate(lost):
+        there = x.values[np.reshape(where, x.values.shape) & np.isfinite(x.values)]
+        begin, end = (there.min(), there.max()) if there.size else ax.get_xlim()
+        if begin == end:
+            begin, end = ax.get_xlim()
+        strip = Rectangle(
+            (begin, 1 - STRIP * (i + 0.92)), end - begin, 0.84 * STRIP, transform=ax.get_xaxis_transform(),
+            facecolor="white", edgecolor=colour, hatch=HATCH, lw=0.8, label=f"{name}: not unique", gid=f"not unique {name}", zorder=3,
+        )  # fmt: skip
+        ax.add_patch(strip)
+
+
+def effort_curve(
+    s: Solution,
+    freedom: str | Iterable[str] | None = None,
+    *,
+    over: str | None = None,
+    ax: Any = None,
+    marked: int | None = None,
+) -> Any:
+    """Draw what drivers supply, and where loads act in their freedoms what these do. Returns the axes.
+
+    Couples are read on the left, forces on the right where there are both. What the driver supplies is drawn full, what loads do in its
+    freedom dashed.
 
     Parameters
     ----------
-    freedom : a driven freedom; the first driver where it is left out.
+    s : a solution with forces, or a response.
+    freedom : a driven freedom or several; all of them where it is left out.
+    over : a freedom, ``"t"`` or ``"position"``; left out, time of a response, else the first freedom that was prescribed.
     ax : axes of matplotlib to draw on; new ones where left out.
-    marked : a position to mark on the curve, e.g. the one that a skeleton shows.
+    marked : flat index of a position to mark on the curves, e.g. the one that a skeleton shows.
 
     Raises
     ------
     DeclarationError
         where the solution has no forces or no such driver; MissingExtraError without matplotlib.
     """
-    m = s.mechanism
-    drivers = [m.full_name(d.freedom) for d in m.drives]
-    if not s.has_forces or not drivers:
+    m = s.whole
+    if not s.has_forces or not s.actuated:
         raise DeclarationError(
             f"effort curve of {m.name!r}", ["the solution has no driver effort: use solve() with a driver"]
         )
-    name = drivers[0] if freedom is None else m.full_name(freedom)
-    if name not in drivers:
-        raise DeclarationError(f"effort curve of {m.name!r}", [f"{name!r} is no driver; drivers: {', '.join(drivers)}"])
-    k, j = m.freedom(name)
-    pair = m.pairs[k]
-    turns, couple = pair.type.freedoms[j].turns, pair.type.efforts[j].is_couple
-    result = s[pair.name]
-    order = np.atleast_1d(np.rad2deg(result.position[..., j]) if turns else result.position[..., j])
-    efforts = {"driver": np.atleast_1d(result.effort[..., j]), "applied": np.atleast_1d(result.applied_effort[..., j])}
-    if not np.nan_to_num(efforts["applied"]).any():
-        efforts.pop("applied")
-
+    asked = s.actuated if freedom is None else [freedom] if isinstance(freedom, str) else list(freedom)
+    names = [m.full_name(name) for name in asked]
+    faults = [f"{name!r} is no driver; drivers: {', '.join(s.actuated)}" for name in names if name not in s.actuated]
+    if faults or not names:
+        raise DeclarationError(f"effort curve of {m.name!r}", faults or ["no driver is named"])
+    x = abscissa(s, over)
     ax = new_axes() if ax is None else ax
-    unit = unit_of(m.units, (2, 1, -2) if couple else (1, 1, -2))
-    length = unit_of(m.units, (1, 0, 0))
-    marker, rows = "o" if order.shape[-1] == 1 else "", order.reshape(-1, order.shape[-1])
-    for (label, effort), colour in zip(efforts.items(), (PALETTE[0], MUTED), strict=False):
-        for i, (x, y) in enumerate(zip(rows, effort.reshape(rows.shape), strict=True)):
-            ax.plot(x, y, color=colour, lw=2.0, solid_capstyle="round", marker=marker, label="_" * bool(i) + label)
-    if len(efforts) > 1:
-        ax.legend(frameon=False)
-    ax.axhline(0.0, color=MUTED, lw=0.8, zorder=0)
-    ax.set_xlabel(f"{name} [deg]" if turns else f"{name} [{length}]" if length else name, color=INK)
-    who = f"of the driver {name}" if len(efforts) == 1 else f"in {name}"
-    ax.set_ylabel(f"{'torque' if couple else 'force'} {who}" + (f" [{unit}]" if unit else ""), color=INK)
-    if turns and np.nanmax(order) - np.nanmin(order) > 90:
-        step = next(d for d in (30, 45, 60, 90, 180, 360, 1e9) if (np.nanmax(order) - np.nanmin(order)) / d <= 8)
-        from matplotlib.ticker import MultipleLocator
-
-        ax.xaxis.set_major_locator(MultipleLocator(step))
-    ax.spines[["top", "right"]].set_visible(False)
-    ax.grid(True, color="#e4e7eb", lw=0.8)
-    ax.set_axisbelow(True)
-    ax.margins(x=0.01)
-    if marked is not None:
-        ax.plot(
-            order.reshape(-1)[marked],
-            efforts["driver"].reshape(-1)[marked],
-            "o",
-            ms=8,
-            mfc="white",
-            mec=PALETTE[1],
-            mew=2.2,
-            zorder=5,
+    couples = {name: m.pairs[m.freedom(name)[0]].type.efforts[m.freedom(name)[1]].is_couple for name in names}
+    sides = dict.fromkeys(couples.values(), ax)
+    if len(sides) == 2:
+        sides[False] = ax.twinx()
+    curves, lost = 0, []
+    for i, name in enumerate(names):
+        k, j = m.freedom(name)
+        result, colour, side = s[m.pairs[k].name], PALETTE[i % len(PALETTE)], sides[couples[name]]
+        unique = _effort_is_unique(result, m.pairs[k].type.f, m.pairs[k].type.freedoms[j].name)
+        effort, applied = (np.asarray(v[..., j]) for v in (result.effort, result.applied_effort))
+        known = np.where(unique, effort, np.nan)
+        solved = np.asarray(s.status) == "ok"
+        if (solved & ~np.isfinite(known)).any():
+            lost.append((name, solved & ~np.isfinite(known), colour))
+        loaded = bool(np.nan_to_num(applied).any())
+        several = len(names) > 1
+        draw_curve(side, x, known, name if several else "driver", color=colour)
+        if loaded:
+            label = f"applied in {name}" if several else "applied"
+            draw_curve(side, x, applied, label, color=colour if several else MUTED, ls=(0, (4, 2)))
+        curves += 1 + loaded
+        if marked is not None:
+            at = x.values.reshape(-1)[marked], known.reshape(-1)[marked]
+            side.plot(*at, "o", ms=8, mfc="white", mec=PALETTE[1], mew=2.2, zorder=5, label="_")
+    for kind, side in sides.items():
+        side.axhline(0.0, color=MUTED, lw=0.8, zorder=0)
+        own = [name for name in names if couples[name] == kind]
+        what = "torque" if kind else "force"
+        who = (
+            f"of the driver {own[0]}"
+            if len(own) == 1 and curves == 1
+            else f"in {own[0]}"
+            if len(own) == 1
+            else "of the drivers"
         )
+        lay_out(side, x, with_unit(f"{what} {who}", unit_of(m.units, (2 if kind else 1, 1, -2))))
+    if len(sides) == 2:
+        sides[False].spines["right"].set_visible(True)
+        sides[False].grid(False)
+    hatched_strips(ax, x, lost)
+    _legend(ax, [side for side in sides.values() if side is not ax], curves + len(lost))
     return ax
+
+
+def _effort_is_unique(result: Any, freedoms: int, name: str) -> Array:
+    unique = result.unique
+    return np.asarray(unique.get("effort", unique.get(f"effort {name}", True)))
+
+
+def _legend(ax: Any, others: Sequence[Any], entries: int) -> None:
+    """A legend of all curves, those read on the right among them, where there is more than one."""
+    if entries < 2:
+        return
+    found = [pair for side in (ax, *others) for pair in zip(*side.get_legend_handles_labels(), strict=True)]
+    ax.legend([handle for handle, _ in found], [label for _, label in found], frameon=False)
+
+
+def reaction_curve(
+    s: Solution, pair: str, *, moment: bool = False, over: str | None = None, ax: Any = None, marked: int | None = None
+) -> Any:
+    """Draw the components of a pair's reaction in its own frame, with their ranges in the legend. Returns the axes.
+
+    A component that is not unique has no curve but a hatched strip, also where the solution holds the one of least norm.
+
+    Parameters
+    ----------
+    moment : the couples rather than the forces.
+    over, ax, marked : as in ``effort_curve``.
+
+    Raises
+    ------
+    DeclarationError
+        where the solution has no forces, no such pair, or the pair transmits no such component.
+    """
+    m = s.whole
+    if not s.has_forces:
+        raise DeclarationError(f"reaction of {m.name!r}", ["the solution has no forces: use solve()"])
+    result, row = s[pair], m.pair(pair).type
+    kinds = {c.name: c.is_couple for c in row.reactions or ()} or dict.fromkeys(row.component_names, False)
+    names = [name for name, couple in kinds.items() if couple == moment]
+    if not names:
+        raise DeclarationError(
+            f"reaction of {m.name!r}",
+            [
+                f"pair {pair!r} ({row.symbol}) transmits no {'moment' if moment else 'force'}; its components: {', '.join(kinds) or 'none'}"
+            ],
+        )
+    x = abscissa(s, over)
+    ax = new_axes() if ax is None else ax
+    solved, lost = np.asarray(s.status) == "ok", []
+    values, unique = result.components, result.unique
+    unit = result.units["components"][names[0]]
+    for i, name in enumerate(names):
+        known = np.where(np.asarray(unique.get(name, True)), values[name], np.nan)
+        colour = PALETTE[i % len(PALETTE)]
+        unknown = solved & ~np.isfinite(known)
+        if unknown.any():
+            lost.append((name, unknown, colour))
+        if np.isfinite(known).any():
+            span = f"{np.nanmin(known):.4g} to {np.nanmax(known):.4g}"
+            draw_curve(ax, x, known, f"{name}: {span} {unit}".rstrip(), color=colour)
+            if marked is not None:
+                ax.plot(
+                    x.values.reshape(-1)[marked], known.reshape(-1)[marked], "o", ms=7, mfc="white", mec=colour, mew=2
+                )
+    ax.axhline(0.0, color=MUTED, lw=0.8, zorder=0)
+    owner = m.pair(pair)
+    what = "moment" if moment else "force"
+    lay_out(ax, x, with_unit(f"{what} of {owner.a} on {owner.b} in {pair}", unit))
+    hatched_strips(ax, x, lost)
+    ax.legend(frameon=False)
+    return ax
+
+
+def margin_curve(s: Solution, *, over: str | None = None, ax: Any = None) -> Any:
+    """Draw over the positions how far they are from singular ones. Returns the axes.
+
+    The smallest singular value of the scaled closure equations that was kept, over the largest, with the drivers free (a change point
+    of the mechanism where it falls to zero) and at rest (a dead point of the drivers): of ``mg.check`` there. Below the dashed line a
+    report calls a position nearly singular.
+    """
+    x = abscissa(s, over)
+    found = margins(s)
+    ax = new_axes() if ax is None else ax
+    draw_curve(ax, x, found.free, "drivers free", color=PALETTE[0])
+    if found.driven is not None:
+        draw_curve(ax, x, found.driven, "drivers at rest", color=PALETTE[1])
+    ax.axhline(found.near_below, color=MUTED, lw=1.0, ls=(0, (5, 3)), label="nearly singular below")
+    ax.set_yscale("log")
+    lay_out(ax, x, "margin (smallest singular value over largest)")
+    ax.legend(frameon=False)
+    return ax
+
+
+def known_pair(s: Solution, pair: str) -> str:
+    """The name of a pair, or an error that names those there are."""
+    names = [p.name for p in s.mechanism.pairs]
+    if pair not in names:
+        raise DeclarationError(
+            f"picture of {s.mechanism.name!r}", [f"there is no pair {shown(pair)}; pairs: {', '.join(names)}"]
+        )
+    return pair

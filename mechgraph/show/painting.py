@@ -194,3 +194,9 @@ def edges_of(faces: Array, rims: Sequence[bool], alpha: float = 1.0) -> Array:
     from matplotlib.colors import to_rgba
 
     return np.where(np.asarray(rims, dtype=bool)[:, None], to_rgba(INK, alpha), faces)
+
+
+def inside(ax: Any) -> Array:
+    """The place of axes on the screen as their figure gives it, ``[[left, bottom], [right, top]]`` in pixels."""
+    place = ax.get_position(original=True).transformed(ax.figure.transSubfigure)
+    return np.array(place.get_points())

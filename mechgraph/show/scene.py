@@ -90,15 +90,20 @@ def scene(drawn: Solution | Mechanism, *, forces: bool = False) -> Scene:
     if isinstance(drawn, Mechanism):
         system, x = assembled(drawn)
         return scene_at(drawn, place_of_states(system, x[:, None]), np.zeros(1, dtype=np.intp))
-    m = drawn.mechanism
-    good = np.flatnonzero(np.asarray(drawn.status).reshape(-1) == "ok")
+    good, place = place_of(drawn)
+    return scene_at(drawn.mechanism, place, good, drawn, forces=forces)
+
+
+def place_of(s: Solution) -> tuple[Any, Place]:
+    """Flat indices of the solved positions of a solution, and where its mechanism stands there."""
+    m = s.mechanism
+    good = np.flatnonzero(np.asarray(s.status).reshape(-1) == "ok")
     if not good.size:
         raise DeclarationError(f"picture of {m.name!r}", ["the solution has no solved position"])
-    place = Place(
-        {name: drawn.link(name).pose.reshape(-1, 4, 4)[good] for name in m.link_names()},
-        {p.name: drawn[p.name].position.reshape(-1, p.type.f)[good].T for p in m.pairs},
+    return good, Place(
+        {name: s.link(name).pose.reshape(-1, 4, 4)[good] for name in m.link_names()},
+        {p.name: s[p.name].position.reshape(-1, p.type.f)[good].T for p in m.pairs},
     )
-    return scene_at(m, place, good, drawn, forces=forces)
 
 
 def place_of_states(system: System, x: Array) -> Place:

@@ -11,8 +11,8 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.result.solution import Solution
-from mechgraph.show.canvas import FAINT, HATCH, INK, LOAD, MUTED, PALETTE, REACTION, bare, new_axes
-from mechgraph.show.painting import FlatPainter, Painter, SpacePainter, edges_of, shaded
+from mechgraph.show.canvas import HATCH, INK, LOAD, MUTED, REACTION, bare, colours, new_axes
+from mechgraph.show.painting import FlatPainter, Painter, SpacePainter, edges_of, inside, shaded
 from mechgraph.show.scene import Part, Scene, scene
 from mechgraph.units import unit_of
 
@@ -127,16 +127,6 @@ def camera_of(elevation: float, azimuth: float) -> Array:
     right = np.array([-np.sin(az), np.cos(az), 0.0])
     toward = np.array([np.cos(el) * np.cos(az), np.cos(el) * np.sin(az), np.sin(el)])
     return np.stack([right, np.cross(toward, right), toward])
-
-
-def colours(m: Mechanism, highlight: Sequence[str] = ()) -> dict[str, str]:
-    """A colour for every link; grey for the frame and, where pairs are highlighted, for links that lie at none or one of them."""
-    moving = [k for k in m.link_names() if k != m.frame]
-    out = {m.frame: MUTED} | {k: PALETTE[i % len(PALETTE)] for i, k in enumerate(moving)}
-    if highlight:
-        ends = [link for p in m.pairs if p.name in highlight for link in (p.a, p.b)]
-        out |= {k: FAINT for k in moving if ends.count(k) < min(2, len(highlight))}
-    return out
 
 
 class Drawing:
@@ -303,9 +293,3 @@ class Drawing:
 
 def _runs(part: Part, vertices: Array) -> list[Array]:
     return [vertices[list(line)] for line in part.shape.lines]
-
-
-def inside(ax: Any) -> Array:
-    """The place of axes on the screen as their figure gives it, ``[[left, bottom], [right, top]]`` in pixels."""
-    place = ax.get_position(original=True).transformed(ax.figure.transSubfigure)
-    return np.array(place.get_points())

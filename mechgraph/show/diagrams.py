@@ -1,0 +1,292 @@
+"""Diagrams of what is connected with what: the link-pair graph, the structural diagram, the pattern of the equations."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations, pairwise
+from textwrap import wrap
+from typing import Any
+
+import networkx as nx
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.equations.formulation import Formulation
+from mechgraph.model.mechanism import Mechanism, check_mechanism
+from mechgraph.show.canvas import FAINT, HATCH, INK, MUTED, PALETTE, bare, colours, new_axes
+from mechgraph.show.painting import FlatPainter, inside
+from mechgraph.topology.linkgraph import link_graph
+
+STRAND = 0.035
+"""Distance of the strands of an edge that lies in several loops, and"""
+BULGE = 0.22
+"""of edges between the same two links, over the distance of neighbours."""
+LARGE = 80
+"""Nodes from which on places are found by springs, which is faster than by distances."""
+CLEAR = 0.15
+"""Distance of a line from a node that is not its end, over that of neighbours, below which they clash."""
+WIDE = 34
+"""Letters of a line of the legend."""
+LABELLED = 64
+"""Equations and unknowns up to which each is named beside the pattern; beyond, their owners are."""
+
+
+def draw_graph(m: Mechanism, *, ax: Any = None) -> Any:
+    """Draw the link-pair graph: links as dots, pairs as lines between them, coloured by the loops that they lie in. Returns the axes.
+
+    A pair in several loops has a strand for each; one in no loop is grey. The frame is a square.
+    """
+    check_mechanism(m, "draw_graph")
+    graph: nx.Graph[str] = nx.Graph()
+    graph.add_nodes_from(m.link_names())
+    graph.add_edges_from((p.a, p.b) for p in m.pairs)
+    loops = [tuple(m.pairs[k].name for k, _ in loop) for loop in m.once(link_graph).loops]
+    at = _places(graph)
+    canvas = _Canvas(ax, np.array(list(at.values())))
+    middles = {}
+    for pair, curve in _edges(m, at):
+        within = [i for i, loop in enumerate(loops) if pair in loop]
+        tangents = np.gradient(curve, axis=0)
+        across = np.stack([-tangents[:, 1], tangents[:, 0]], axis=1) / np.linalg.norm(tangents, axis=1, keepdims=True)
+        for place, i in enumerate(within or [-1]):
+            shift = STRAND * (place - 0.5 * (max(len(within), 1) - 1))
+            colour = PALETTE[i % len(PALETTE)] if i >= 0 else FAINT
+            canvas.line(curve + shift * across, colour, f"pair {pair}")
+        middles[pair] = curve[len(curve) // 2]
+        canvas.keep_free(curve)
+    for name, (x, y) in at.items():
+        frame = name == m.frame
+        canvas.ax.scatter(
+            x,
+            y,
+            marker="s" if frame else "o",
+            s=150,
+            facecolor=MUTED if frame else "white",
+            edgecolor=INK,
+            linewidth=1.4,
+            zorder=4,
+        )
+        canvas.name(name, at[name], INK, weight="bold")
+    for pair, middle in middles.items():
+        canvas.name(f"{pair} ({m.pair(pair).type.symbol})", middle, INK)
+    words = ((f"loop {i + 1}: {', '.join(loop)}", PALETTE[i % len(PALETTE)]) for i, loop in enumerate(loops))
+    canvas.finish([(line, colour) for text, colour in words for line in wrap(text, WIDE, subsequent_indent="    ")])
+    return canvas.ax
+
+
+def _edges(m: Mechanism, at: dict[str, Array]) -> Iterator[tuple[str, Array]]:
+    """Curves ``(n, 2)`` of the pairs, bulging apart between the same two links."""
+    between: dict[frozenset[str], list[str]] = {}
+    for pair in m.pairs:
+        between.setdefault(frozenset((pair.a, pair.b)), []).append(pair.name)
+    u = np.linspace(0.0, 1.0, 41)[:, None]
+    for pair in m.pairs:
+        same = between[frozenset((pair.a, pair.b))]
+        p, q = (at[name] for name in sorted((pair.a, pair.b)))
+        side = same.index(pair.name) - 0.5 * (len(same) - 1)
+        across = np.array([p[1] - q[1], q[0] - p[0]])
+        yield pair.name, (1 - u) * p + u * q + 4 * u * (1 - u) * BULGE * side * across
+
+
+def draw_structure(m: Mechanism, *, ax: Any = None) -> Any:
+    """Draw the structural diagram: links as lines between two pairs and as polygons between more, pairs as circles. Returns the axes.
+
+    The frame is hatched. Nothing is to scale: it is the graph alone.
+    """
+    check_mechanism(m, "draw_structure")
+    graph: nx.Graph[str] = nx.Graph()
+    graph.add_nodes_from(p.name for p in m.pairs)
+    of_link = {name: [p.name for p in m.pairs if name in (p.a, p.b)] for name in m.link_names()}
+    for names in of_link.values():
+        graph.add_edges_from(combinations(names, 2))
+    at = _places(graph)
+    canvas = _Canvas(ax, np.array(list(at.values())))
+    colour = colours(m)
+    for link, names in of_link.items():
+        corners = np.array([at[name] for name in names]).reshape(-1, 2)
+        if not len(corners):
+            continue
+        middle = _draw_link(canvas, link, corners, colour[link], link == m.frame)
+        canvas.name(link, middle, colour[link] if link != m.frame else INK)
+    for pair in m.pairs:
+        x, y = at[pair.name]
+        canvas.ax.scatter(x, y, s=130, facecolor="white", edgecolor=INK, linewidth=1.5, zorder=4)
+        canvas.name(f"{pair.name} ({pair.type.symbol})", at[pair.name], INK, weight="bold")
+    canvas.finish([])
+    return canvas.ax
+
+
+def _draw_link(canvas: _Canvas, link: str, corners: Array, colour: str, frame: bool) -> Array:
+    """A link at its pairs; where its name belongs."""
+    from matplotlib.patches import Polygon
+
+    middle = corners.mean(axis=0)
+    if len(corners) == 1:
+        # a link with one pair ends free, away from all others
+        out = corners[0] - canvas.middle
+        end = corners[0] + 0.35 * out / (float(np.linalg.norm(out)) or 1.0)
+        corners = np.stack([corners[0], end])
+        middle = corners.mean(axis=0)
+    if len(corners) > 2:
+        order = np.argsort(np.arctan2(*(corners - middle).T[::-1]), kind="stable")
+        corners = corners[order]
+        canvas.ax.add_patch(
+            Polygon(corners, facecolor="none" if frame else colour, edgecolor=MUTED if frame else "none", alpha=1.0 if frame else 0.18,
+                    hatch=HATCH if frame else None, lw=0.0, zorder=1, gid=f"link {link}")
+        )  # fmt: skip
+        corners = np.concatenate([corners, corners[:1]])
+    for p, q in pairwise(corners):
+        canvas.line(np.stack([p, q]), MUTED if frame else colour, f"link {link}", lw=3.4)
+        canvas.keep_free(p + np.linspace(0, 1, 25)[:, None] * (q - p))
+        if frame:
+            canvas.hatch(p, q)
+    return np.asarray(middle)
+
+
+class _Canvas:
+    """Axes without scales, on which names are arranged beside points of a plane."""
+
+    def __init__(self, ax: Any, points: Array) -> None:
+        self.ax = new_axes((6.4, 5.2)) if ax is None else ax
+        self.points = points
+        self.middle = points.mean(axis=0)
+        bare(self.ax)
+        self._names: list[tuple[str, Array, str, dict[str, Any]]] = []
+        self._taken: list[Array] = [points]
+
+    def line(self, points: Array, colour: str, gid: str, lw: float = 2.4) -> None:
+        self.ax.plot(*points.T, color=colour, lw=lw, solid_capstyle="round", zorder=2, gid=gid)
+
+    def hatch(self, p: Array, q: Array) -> None:
+        """Strokes beside a line: it is fixed."""
+        along = (q - p) / (float(np.linalg.norm(q - p)) or 1.0)
+        across = np.array([along[1], -along[0]])
+        across *= -1.0 if (0.5 * (p + q) - self.middle) @ across < 0 else 1.0
+        for u in np.linspace(0.12, 0.88, 9):
+            begin = p + u * (q - p)
+            self.line(np.stack([begin, begin + 0.07 * (across + along)]), MUTED, "frame", lw=1.0)
+
+    def keep_free(self, points: Array) -> None:
+        self._taken.append(points)
+
+    def name(self, text: str, at: Array, colour: str, **style: Any) -> None:
+        self._names.append((text, np.append(at, 0.0), colour, {"fontsize": 9.5, **style}))
+
+    def finish(self, legend: Sequence[tuple[str, str]]) -> None:
+        """Put everything in its place."""
+        from mechgraph.show.arrangement import Arrangement
+
+        painter = FlatPainter(self.ax, np.eye(3))
+        taken = np.concatenate(self._taken)
+        free = np.column_stack([taken, np.zeros(len(taken))])
+        arranged = Arrangement(
+            self.ax,
+            painter.pixels,
+            lambda: painter.pixels(free),
+            lambda: painter.camera,
+            lambda: inside(self.ax),
+            painter.fill,
+        )
+        for text, at, colour, style in self._names:
+            arranged.name(text, at, colour, 0.07, **style)
+        arranged.legend(legend)
+        painter.fit(free, arranged.room)
+
+
+def _places(graph: nx.Graph[str]) -> dict[str, Array]:
+    """Where nodes are drawn, neighbours at a distance of about one; the same each time."""
+    begin: dict[str, Any]
+    if len(graph) < 3:
+        begin = {name: (float(i), 0.0) for i, name in enumerate(graph)}
+    elif max(degree for _, degree in graph.degree) == 2:
+        turn = 2 * np.pi * np.arange(len(graph)) / len(graph)
+        begin = {name: (np.cos(a), np.sin(a)) for name, a in zip(_cycle_order(graph), turn, strict=True)}
+    else:
+        begin = _clearest(graph)
+    return _scaled(graph, begin)
+
+
+def _clearest(graph: nx.Graph[str]) -> dict[str, Any]:
+    """Of several layouts that give distances their due, the one in which the fewest lines cross each other or run over nodes."""
+    if len(graph) > LARGE:
+        return nx.spring_layout(graph, seed=0)
+    first = [nx.planar_layout(graph)] if nx.is_planar(graph) else []
+    first += [nx.circular_layout(graph), *(nx.spring_layout(graph, seed=seed) for seed in range(3))]
+    found = [_scaled(graph, nx.kamada_kawai_layout(graph, pos=pos)) for pos in first]
+    return min(found, key=lambda at: _clashes(graph, at))
+
+
+def _clashes(graph: nx.Graph[str], at: dict[str, Array]) -> int:
+    """Pairs of lines that cross, and lines that nearly run over a node that is not their end."""
+    count = 0
+    for (a, b), (c, d) in combinations(graph.edges, 2):
+        if len({a, b, c, d}) == 4:
+            p, q, r, s = at[a], at[b], at[c], at[d]
+            count += _side(p, q, r) != _side(p, q, s) and _side(r, s, p) != _side(r, s, q)
+    for a, b in graph.edges:
+        for name in graph:
+            if name not in (a, b):
+                along = at[b] - at[a]
+                u = np.clip((at[name] - at[a]) @ along / (along @ along), 0.0, 1.0)
+                count += bool(np.linalg.norm(at[a] + u * along - at[name]) < CLEAR)
+    return count
+
+
+def _side(p: Array, q: Array, r: Array) -> bool:
+    return bool((q[0] - p[0]) * (r[1] - p[1]) > (q[1] - p[1]) * (r[0] - p[0]))
+
+
+def _scaled(graph: nx.Graph[str], begin: dict[str, Any]) -> dict[str, Array]:
+    at = {name: np.asarray(begin[name], dtype=float) for name in graph}
+    lengths = [float(np.linalg.norm(at[a] - at[b])) for a, b in graph.edges]
+    unit = float(np.median(lengths)) if lengths else 1.0
+    return {name: p / unit for name, p in at.items()}
+
+
+def _cycle_order(graph: nx.Graph[str]) -> list[str]:
+    """Nodes of a cycle or path, one after the other."""
+    ends = [name for name, degree in graph.degree if degree < 2]
+    return list(nx.dfs_preorder_nodes(graph, source=(ends or list(graph))[0]))
+
+
+def draw_sparsity(f: Formulation, *, ax: Any = None) -> Any:
+    """Draw which unknown appears in which equation, with their names; equations of one owner have one colour. Returns the axes.
+
+    Up to 64 equations each is named, beyond that their owners are. Lines separate the equations of links, pairs and couplings.
+    """
+    rows, columns, _, _ = f.pattern
+    owners = list(dict.fromkeys(e.owner for e in f.equations))
+    n, k = len(f.equations), len(f.unknowns)
+    size = (max(4.5, 2.4 + 0.145 * min(k, LABELLED)), max(4.0, 1.6 + 0.145 * min(n, LABELLED)))
+    ax = new_axes(size) if ax is None else ax
+    from matplotlib.colors import ListedColormap
+
+    image = np.full((n, k), np.nan)
+    image[rows, columns] = [owners.index(f.equations[i].owner) % len(PALETTE) for i in rows]
+    ax.imshow(
+        image,
+        cmap=ListedColormap(list(PALETTE)),
+        vmin=-0.5,
+        vmax=len(PALETTE) - 0.5,
+        aspect="auto",
+        interpolation="none",
+    )
+    for axis, items, put in ((ax.yaxis, f.equations, ax.axhline), (ax.xaxis, f.unknowns, ax.axvline)):
+        groups = [item.owner for item in items]
+        starts = [i for i in range(len(groups)) if i == 0 or groups[i] != groups[i - 1]]
+        for i in starts[1:]:
+            put(i - 0.5, color=FAINT, lw=0.8, zorder=0.5)
+        if len(items) <= LABELLED:
+            axis.set_ticks(range(len(items)), [item.name for item in items])
+        else:
+            ends = [*starts[1:], len(items)]
+            every = -(-len(starts) // LABELLED)
+            middles = [0.5 * (a + b - 1) for a, b in zip(starts, ends, strict=True)]
+            axis.set_ticks(middles[::every], [groups[a] for a in starts[::every]])
+    ax.xaxis.tick_top()
+    ax.tick_params(axis="x", rotation=90, labelsize=7, length=0)
+    ax.tick_params(axis="y", labelsize=7, length=0)
+    ax.xaxis.set_label_position("top")
+    ax.set_xlabel(f"{k} unknowns", color=INK)
+    ax.set_ylabel(f"{n} equations", color=INK)
+    return ax
