@@ -46,19 +46,18 @@ THETA = np.linspace(0, 2 * np.pi, 37)
 def texts_of(ax: Any) -> dict[str, Any]:
     """Visible texts of axes with their boxes on the screen, once everything is drawn."""
     ax.figure.draw_without_rendering()
-    ticks = [
-        text
-        for a in ax.figure.axes
-        if not a.axison
-        for axis in a._axis_map.values()
-        for text in axis.findobj(matplotlib.text.Text)
-    ]
-    every = {id(text): text for text in ax.figure.findobj(matplotlib.text.Text)}
-    found = [
-        text
-        for key, text in every.items()
-        if key not in set(map(id, ticks)) and text.get_visible() and text.get_text().strip()
-    ]
+    ticks, there = set(), set()
+    for axis in (axis for a in ax.figure.axes for axis in a._axis_map.values()):
+        ticks |= {id(text) for text in axis.findobj(matplotlib.text.Text)}
+        low, high = sorted(axis.get_view_interval())
+        inside = [t for t in axis.get_major_ticks() if low - 1e-9 <= t.get_loc() <= high + 1e-9]
+        there |= (
+            {id(text) for t in inside for text in (t.label1, t.label2)} | {id(axis.label)}
+            if axis.axes.axison and axis.get_visible()
+            else set()
+        )
+    every = {id(text): text for text in ax.figure.findobj(matplotlib.text.Text) if id(text) not in ticks - there}
+    found = [text for text in every.values() if text.get_visible() and text.get_text().strip()]
     return {f"{i}: {text.get_text()}": text.get_window_extent() for i, text in enumerate(found)}
 
 

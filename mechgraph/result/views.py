@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.document import Document, Shown
 from mechgraph.errors import DeclarationError
 from mechgraph.model.numeric import vector_fault
+from mechgraph.model.pair_type import PairType
 from mechgraph.result.describe import coupling_document, link_document, pair_document
 from mechgraph.result.values import MaterialPoint, Values
 from mechgraph.units import unit_of
@@ -89,24 +91,28 @@ class PairResult(Shown):
     def units(self) -> dict[str, Any]:
         """Units of the properties in the declared units: a tuple over freedoms, a dict over components, or one text."""
         m = self._values.whole
-        row = m.pairs[self._index].type
-        lengths = [0 if f.turns else 1 for f in row.freedoms]
-        efforts = tuple(unit_of(m.units, (2 if c.is_couple else 1, 1, -2)) for c in row.efforts)
-        force, moment = (unit_of(m.units, (power, 1, -2)) for power in (1, 2))
-        return {
-            "position": tuple(unit_of(m.units, (n, 0, 0)) for n in lengths),
-            "velocity": tuple(unit_of(m.units, (n, 0, -1)) for n in lengths),
-            "acceleration": tuple(unit_of(m.units, (n, 0, -2)) for n in lengths),
-            "effort": efforts,
-            "applied_effort": efforts,
-            "force": force,
-            "moment": moment,
-            "reaction": (moment,) * 3 + (force,) * 3,
-            "total": (moment,) * 3 + (force,) * 3,
-            "components": {c.name: moment if c.is_couple else force for c in row.reactions}
-            if row.reactions is not None
-            else dict.fromkeys(row.component_names, force and f"{force}, M/L"),
-        }
+        return pair_units(m.units, m.pairs[self._index].type)
+
+
+def pair_units(units: Mapping[str, str], row: PairType) -> dict[str, Any]:
+    """Units of what a solution says of a pair: a tuple over freedoms, a dict over components, or one text."""
+    lengths = [0 if f.turns else 1 for f in row.freedoms]
+    efforts = tuple(unit_of(units, (2 if c.is_couple else 1, 1, -2)) for c in row.efforts)
+    force, moment = (unit_of(units, (power, 1, -2)) for power in (1, 2))
+    return {
+        "position": tuple(unit_of(units, (n, 0, 0)) for n in lengths),
+        "velocity": tuple(unit_of(units, (n, 0, -1)) for n in lengths),
+        "acceleration": tuple(unit_of(units, (n, 0, -2)) for n in lengths),
+        "effort": efforts,
+        "applied_effort": efforts,
+        "force": force,
+        "moment": moment,
+        "reaction": (moment,) * 3 + (force,) * 3,
+        "total": (moment,) * 3 + (force,) * 3,
+        "components": {c.name: moment if c.is_couple else force for c in row.reactions}
+        if row.reactions is not None
+        else dict.fromkeys(row.component_names, force and f"{force}, M/L"),
+    }
 
 
 class CouplingResult(Shown):
@@ -183,19 +189,7 @@ class LinkResult(Shown):
     @property
     def units(self) -> dict[str, Any]:
         """Units of the properties in the declared units; of twists angular part first."""
-        m = self._values.mechanism
-        length, speed, rate = (unit_of(m.units, (1, 0, -n)) for n in range(3))
-        angular = tuple(unit_of(m.units, (0, 0, -n)) for n in range(3))
-        return {
-            "pose": length,
-            "twist": (angular[1],) * 3 + (speed,) * 3,
-            "acceleration": (angular[2],) * 3 + (rate,) * 3,
-            "center": length,
-            "center_velocity": speed,
-            "center_acceleration": rate,
-            "angular_velocity": angular[1],
-            "angular_acceleration": angular[2],
-        }
+        return link_units(self._values.mechanism.units)
 
     def _center(self) -> MaterialPoint:
         link = self._values.mechanism.links[self._index]
@@ -217,3 +211,21 @@ class LinkResult(Shown):
     def center_acceleration(self) -> Array:
         """Acceleration of the mass centre ``(..., 3)``."""
         return self._center().acceleration
+
+
+def link_units(units: Mapping[str, str]) -> dict[str, Any]:
+    """Units of what a solution says of a link; of twists angular part first."""
+    length, speed, rate = (unit_of(units, (1, 0, -n)) for n in range(3))
+    angular = tuple(unit_of(units, (0, 0, -n)) for n in range(3))
+    force, moment = (unit_of(units, (power, 1, -2)) for power in (1, 2))
+    return {
+        "pose": length,
+        "twist": (angular[1],) * 3 + (speed,) * 3,
+        "acceleration": (angular[2],) * 3 + (rate,) * 3,
+        "center": length,
+        "center_velocity": speed,
+        "center_acceleration": rate,
+        "angular_velocity": angular[1],
+        "angular_acceleration": angular[2],
+        "hold": (moment,) * 3 + (force,) * 3,
+    }

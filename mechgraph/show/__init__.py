@@ -5,6 +5,7 @@ from mechgraph.show.diagrams import draw_graph, draw_sparsity, draw_structure
 from mechgraph.show.forces import polar_force, reaction_ranges
 from mechgraph.show.paths import hodograph, point_path
 from mechgraph.show.skeleton import draw_skeleton
+from mechgraph.show.studies import study_bands, study_histogram, study_tornado
 
 __all__ = [
     "draw_graph",
@@ -18,4 +19,7 @@ __all__ = [
     "polar_force",
     "reaction_curve",
     "reaction_ranges",
+    "study_bands",
+    "study_histogram",
+    "study_tornado",
 ]

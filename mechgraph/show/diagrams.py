@@ -147,7 +147,8 @@ class _Canvas:
     """Axes without scales, on which names are arranged beside points of a plane."""
 
     def __init__(self, ax: Any, points: Array) -> None:
-        self.ax = new_axes((6.4, 5.2)) if ax is None else ax
+        more = float(np.clip(len(points) - 8, 0, 30))  # inches
+        self.ax = new_axes((6.4 + 0.25 * more, 5.2 + 0.2 * more)) if ax is None else ax
         self.points = points
         self.middle = points.mean(axis=0)
         bare(self.ax)

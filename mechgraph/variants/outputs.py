@@ -12,7 +12,8 @@ from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import shown, wrong
 from mechgraph.result.solution import Solution
-from mechgraph.result.views import LinkResult, PairResult
+from mechgraph.result.views import LinkResult, PairResult, link_units, pair_units
+from mechgraph.units import unit_of
 
 Output = str | Callable[[Solution], Any]
 
@@ -92,6 +93,26 @@ def _found(m: Mechanism, text: str) -> Callable[[Solution], Any] | None:
             return None
         return lambda s: getattr(s.link(owner), part)
     return None
+
+
+def unit_of_output(m: Mechanism, what: Output) -> str | tuple[str, ...]:
+    """The unit of a quantity in the declared units, or one for every entry of its last axis; empty where it is not known."""
+    if not isinstance(what, str):
+        return ""
+    if what in m.freedom_names():
+        return unit_of(m.units, (0 if m.turns(what) else 1, 0, 0))
+    owner, colon, part = what.partition(":")
+    if colon and owner in m.pair_index:
+        return str(pair_units(m.units, m.pair(owner).type)["components"][part])
+    owner, _, part = what.rpartition(".")
+    found: Any = ""
+    if owner in m.pair_index and part in OF_PAIR:
+        found = pair_units(m.units, m.pair(owner).type).get(part, "")
+    elif owner in m.link_index:
+        found = link_units(m.units).get(part, "")
+    elif what == "shaking":
+        found = pair_units(m.units, m.pairs[0].type)["reaction"]
+    return found[0] if isinstance(found, tuple) and len(set(found)) == 1 else found
 
 
 def quantity(s: Solution, name: str, what: Output) -> Array:

@@ -15,6 +15,7 @@ from mechgraph.errors import DeclarationError, counted
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.result.numbers import number
+from mechgraph.variants.outputs import Output, unit_of_output
 from mechgraph.variants.sampling import deviation, reach
 from mechgraph.variants.work import STATUSES, Part, Source
 from mechgraph.writing import optional
@@ -35,6 +36,7 @@ class Study(Shown):
     parameters : name -> values ``(n,)``.
     outputs : name -> array ``(n, ...)``, NaN where a variant or position was not solved.
     nominal : name -> array ``(...)`` of the mechanism itself (with the motion of the first variant, where each has its own).
+    units : name -> unit of an output, one for every entry of its last axis where they differ; empty where it is not known.
     messages : variant -> why it could not be solved.
     """
 
@@ -44,7 +46,7 @@ class Study(Shown):
         ways: Mapping[str, Any],
         values: Array,
         steps: Array,
-        names: Sequence[str],
+        names: Mapping[str, Output],
         motions: Mapping[str, Motion],
         near: Part,
         parts: Sequence[Part],
@@ -63,6 +65,9 @@ class Study(Shown):
                 ]
             )
             for name in names
+        }
+        self.units: Mapping[str, str | tuple[str, ...]] = {
+            name: unit_of_output(source.mechanism, what) for name, what in names.items()
         }
         self.messages: dict[int, str] = {}
         first = 0
@@ -188,17 +193,20 @@ class Study(Shown):
         """Furthest departures of every parameter from the mechanism itself, ``(parameters, 2)``."""
         return np.array([reach(way) for way in self._ways.values()]) - self._source.start[:, None]
 
+    def moves(self, name: str) -> dict[str, Array]:
+        """What every parameter alone changes of an output, to first order, at its two ends (see ``worst_case``), ``(2, ...)``."""
+        return {
+            parameter: np.stack([g * end for end in ends])
+            for (parameter, g), ends in zip(self.sensitivities(name).items(), self._ends, strict=True)
+        }
+
     def worst_case(self, name: str) -> tuple[Array, Array]:
         """Smallest and largest value of an output, to first order, with every parameter at its worse end.
 
         ``f_0 + sum_j min(or max)(df/dp_j low_j, df/dp_j high_j)``; a distribution without end ends at three standard deviations (of a
         normal one). Compare with the extremes of the sample: the mechanism may be far from linear.
         """
-        middle = self._near_output(name)[0]
-        moves = [
-            np.stack([g * end for end in ends])
-            for g, ends in zip(self.sensitivities(name).values(), self._ends, strict=True)
-        ]
+        middle, moves = self._near_output(name)[0], self.moves(name).values()
         low, high = (
             middle + sum((pick(move, axis=0) for move in moves), np.zeros_like(middle)) for pick in (np.min, np.max)
         )

@@ -125,7 +125,7 @@ def study(
     tasks = [task(near, slice(0, 1))]
     tasks += [task(values[:, i : i + size], slice(i, i + size)) for i in range(0, values.shape[1], size)]
     parts = _all_solved(tasks, executor, progress)
-    return Study(source, ways, values, steps, tuple(kept), paths, parts[0], parts[1:])
+    return Study(source, ways, values, steps, kept, paths, parts[0], parts[1:])
 
 
 def _argument_faults(
