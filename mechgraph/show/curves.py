@@ -45,8 +45,8 @@ def abscissa(s: Solution, over: str | None = None) -> Abscissa:
     rows = (-1, status.shape[-1] if status.ndim else 1)
     if over is None:
         timed = isinstance(s, Response) or (not s.prescribed and s.t is not None)
-        moving = (name for name in s.prescribed if np.nanmax(_coordinates(s, name)) > np.nanmin(_coordinates(s, name)))
-        over = "t" if timed else next(moving, "position")
+        still = s.prescribed[0] if s.prescribed and rows[1] == 1 else "position"
+        over = "t" if timed else next((name for name in s.prescribed if _stroke(s, name) > 0), still)
     if over == "t":
         if s.t is None:
             raise DeclarationError(
@@ -65,6 +65,12 @@ def abscissa(s: Solution, over: str | None = None) -> Abscissa:
 def _coordinates(s: Solution, freedom: str) -> Array:
     k, j = s.whole.freedom(freedom)
     return np.asarray(s[s.whole.pairs[k].name].position[..., j])
+
+
+def _stroke(s: Solution, freedom: str) -> float:
+    values = _coordinates(s, freedom)
+    known = values[np.isfinite(values)]
+    return float(np.ptp(known)) if known.size else 0.0
 
 
 def lay_out(ax: Any, x: Abscissa, label: str) -> None:
