@@ -39,6 +39,7 @@ from mechgraph.response.events import Event
 from mechgraph.response.respond import respond
 from mechgraph.response.small_motion import equilibrium, linearize
 from mechgraph.response.stops import Stop
+from mechgraph.result.free_body import FreeBody, free_body
 from mechgraph.result.solution import Solution
 from mechgraph.variants.result import Study
 from mechgraph.variants.study import study
@@ -60,6 +61,7 @@ __all__ = [
     "ForceLaw",
     "ForceTable",
     "Formulation",
+    "FreeBody",
     "Freedom",
     "Gravity",
     "IndeterminateError",
@@ -86,6 +88,7 @@ __all__ = [
     "check",
     "equilibrium",
     "formulate",
+    "free_body",
     "inertia",
     "kinematics",
     "library",

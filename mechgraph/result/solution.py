@@ -16,7 +16,7 @@ from mechgraph.result import export
 from mechgraph.result.places import OK
 from mechgraph.result.summary import summary
 from mechgraph.result.table import Include, table_of
-from mechgraph.result.values import Checks, LoadBearing, LoadResult, Values
+from mechgraph.result.values import Checks, LoadBearing, LoadResult, Mask, Values
 from mechgraph.result.views import CouplingResult, LinkResult, PairResult
 
 if TYPE_CHECKING:
@@ -66,6 +66,30 @@ class Solution(Shown):
     def link(self, name: str) -> LinkResult:
         """Motion of a link."""
         return LinkResult(self._values, self.mechanism.place_of_link(name))
+
+    def on_link(self, pair: str, link: str) -> tuple[Array, Mask]:
+        """All that a pair transmits to one of its links, ``(..., 6)``, (M, F) in the link's frame about the pair's marker on that link.
+
+        With it ``(..., 6)`` truth values: which of these numbers are unique. The others are NaN unless the solution is of least norm.
+
+        Raises
+        ------
+        DeclarationError
+            where the pair does not join that link.
+        """
+        k, i = self.whole.place_of_pair(pair), self.whole.place_of_link(link)
+        if link not in (self.whole.pairs[k].a, self.whole.pairs[k].b):
+            raise DeclarationError(
+                f"pair {pair!r}",
+                [
+                    wrong(
+                        link,
+                        "link",
+                        f"one of the links that it joins, {self.whole.pairs[k].a!r} and {self.whole.pairs[k].b!r}",
+                    )
+                ],
+            )
+        return self._values.on_link(k, i)
 
     def coupling(self, name: str) -> CouplingResult:
         """Values of a coupling."""

@@ -12,10 +12,9 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechgraph.algebra.screw import shift_wrench
-from mechgraph.algebra.se3 import Array, cross, rotate
+from mechgraph.algebra.se3 import Array, cross, rotate, rotate_back
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_path import Status, in_blocks
 from mechgraph.closure.indexing import Index, System
@@ -33,7 +32,7 @@ from mechgraph.model.pair_type import PairType
 from mechgraph.numerics.newton import Work
 from mechgraph.numerics.tolerances import MOTIONS, PATH
 from mechgraph.result.states import flat_place, user_state, user_wrench
-from mechgraph.result.values import Checks, LoadBearing, LoadResult, MaterialPoint
+from mechgraph.result.values import Checks, LoadBearing, LoadResult, Mask, MaterialPoint
 from mechgraph.structure.components import labels_of
 from mechgraph.structure.passive import PassiveMotion
 from mechgraph.structure.reaction_split import UNIQUE, PairFrames
@@ -71,7 +70,7 @@ TOGETHER = 300_000
 """Wrenches that are looked at together where all pairs are."""
 
 
-def _touched(stress: Array, scale: float = 1.0) -> NDArray[np.bool_]:
+def _touched(stress: Array, scale: float = 1.0) -> Mask:
     """Where self-stresses have a part: ``stress (..., s, T)``."""
     return np.asarray(np.sqrt((stress * stress).sum(axis=-2)) > UNIQUE * scale)
 
@@ -330,13 +329,36 @@ class Trajectory:
 
     def total(self, pair: int) -> Array:
         """Total wrench about the global origin."""
+        states = self._transmitted(pair)
+        return self._about_origin(states[:, 0], states[:, 1:])
+
+    def _transmitted(self, pair: int) -> Array:
+        """What a pair transmits, reaction and efforts, and in every self-stress, ``(6, 1 + s, T)``, internal units."""
         columns = self._columns(pair)
         efforts, stress = self._force("efforts")[columns], self._of("stress_efforts")[columns]
         states = np.concatenate([efforts[:, None], stress], axis=1)
         E = self._evaluated(lambda block: block.here.E[:, columns])
-        work = np.einsum("cft,fst->cst", E, states)
-        stress_total = self._of("stress")[:, pair] + work[:, 1:]
-        return self._about_origin(self._of("reactions")[:, pair] + work[:, 0], stress_total)
+        reactions = np.concatenate([self._of("reactions")[:, pair][:, None], self._of("stress")[:, pair]], axis=1)
+        return np.asarray(reactions + np.einsum("cft,fst->cst", E, states))
+
+    def on_link(self, pair: int, link: int) -> tuple[Array, Mask]:
+        """What a pair transmits to one of its links, in the link's frame about its marker there; and what of it is unique."""
+        s, states = self._system, self._transmitted(pair)
+        sign, side = (1.0, 1) if s.b[pair] == link else (-1.0, 0)
+        p = np.asarray(self.whole.pairs[pair].markers[side].point, dtype=float)
+
+        def seen(block: BlockMotion) -> Array:
+            par, X = block.here.system.par, block.here.poses[:, :, link]
+            R = X[:, :3]
+            at = rotate(R, ((p - par.offset[:, link]) / par.L)[:, None]) + X[:, 3]
+            wrench = shift_wrench(states[..., block.places], at[:, None])
+            return np.concatenate([rotate_back(R, wrench[:3]), rotate_back(R, wrench[3:])])
+
+        found = self._evaluated(seen)
+        unit = np.repeat([self._L**2, self._L], 3)[:, None]
+        return self._out(self._masked(sign * unit * found[:, 0], found[:, 1:])), self._out(
+            unique & self._solved
+        ).astype(bool)
 
     def _about_origin(self, value: Array, stress: Array) -> Array:
         """Wrench ``(6, T)`` in the user's units about the global origin, NaN where ``stress (6, s, T)`` has a part."""
@@ -396,7 +418,7 @@ class Trajectory:
         unit = np.where(self._system.is_length[columns], self._L, self._L**2)[:, None]
         return unit * own, unit * given
 
-    def _driven(self, columns: slice) -> NDArray[np.bool_]:
+    def _driven(self, columns: slice) -> Mask:
         return np.isin(np.arange(self._system.n_freedoms)[columns], self.driven)[:, None]
 
     def _stress_of_drives(self, columns: slice) -> Array:
@@ -412,14 +434,14 @@ class Trajectory:
         size = max(1, TOGETHER // (len(self.whole.pairs) * (1 + self._of("stress").shape[2])))
         return (solved[i : i + size] for i in range(0, len(solved), size))
 
-    def reactions_at(self, places: Index) -> tuple[Array, NDArray[np.bool_]]:
+    def reactions_at(self, places: Index) -> tuple[Array, Mask]:
         """Reactions of all pairs about the origins of markers B ``(6, P, n)``, of least norm, and which numbers are not unique."""
         points = self._of("points")[:, :, places]
         scale = np.repeat([self._L**2, self._L], 3)[:, None, None]
         loose = _touched(shift_wrench(self._of("stress")[..., places], points[:, :, None]))
         return scale * shift_wrench(self._force("reactions")[..., places], points), loose
 
-    def components_at(self, places: Index) -> tuple[Array, NDArray[np.bool_]]:
+    def components_at(self, places: Index) -> tuple[Array, Mask]:
         """Components of all pairs ``(6, P, n)`` by the pair table, 0 beyond those of a pair, and which are not unique."""
         states = np.concatenate([self._force("reactions")[:, :, None], self._of("stress")], axis=2)[..., places]
         s, found = self._system, np.zeros((6, *states.shape[1:]))
@@ -431,7 +453,7 @@ class Trajectory:
             found[: len(part), group.pairs] = part
         return found[:, :, 0], _touched(found[:, :, 1:])
 
-    def efforts_at(self, places: Index) -> tuple[Array, Array, NDArray[np.bool_]]:
+    def efforts_at(self, places: Index) -> tuple[Array, Array, Mask]:
         """Own and applied efforts in all freedoms ``(F, n)``, and which of the former are not unique."""
         every = slice(None)
         own, given = (values[:, places] for values in self._efforts(every))

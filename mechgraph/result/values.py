@@ -166,6 +166,9 @@ class Values(Protocol):
     def total(self, pair: int) -> Array:
         """Total wrench of a pair about the global origin, ``(..., 6)``."""
 
+    def on_link(self, pair: int, link: int) -> tuple[Array, Mask]:
+        """What a pair transmits to one of its links, (M, F) in its frame about the marker there, and whether unique, ``(..., 6)``."""
+
     def reaction_at_pair(self, pair: int) -> Array:
         """Reaction about the origin of marker B, global directions, ``(..., 6)``."""
 
