@@ -160,6 +160,31 @@ def test_files_as_the_suffix_says(tmp_path: Path) -> None:
     assert "file of the mechanism" in bad("save", tmp_path / "m.toml", "--out", tmp_path / "m.toml")
 
 
+def test_loads_on_a_link(tmp_path: Path) -> None:
+    deck = tmp_path / "rod.inp"
+    shown = run("loads", "haug-slider-crank", "rod", "--drive", "A=0:360:5deg@30", "--out", deck, "--held", "B")
+    assert "Loads on link rod of haug-slider-crank" in shown.stdout
+    assert "the sum of all is zero to" in shown.stdout
+    assert "greatest force of C" in shown.stdout
+    assert "** held: 900001, 1, " in deck.read_text()
+    assert deck.read_text().count("*STEP") == int(re.search(r"rod.inp: (\d+) positions", shown.stdout)[1])
+    assert (
+        "1 positions"
+        in run(
+            "loads", "haug-slider-crank", "rod", "--drive", "A=30deg", "--at", "0", "--out", tmp_path / "r.csv"
+        ).stdout
+    )
+    assert "not unique" in run("loads", "four-bar", "coupler").stdout
+    assert "not unique, first at position" in run("loads", "four-bar", "coupler", "--out", tmp_path / "x.inp").stderr
+    assert (
+        run("loads", "four-bar", "coupler", "--redundant", "minimum_norm", "--out", tmp_path / "x.inp").exit_code == 0
+    )
+    assert "NOT UNIQUE" in (tmp_path / "x.inp").read_text()
+    assert "unknown link 'no'" in bad("loads", "four-bar", "no")
+    assert "held: for a load deck" in bad("loads", "rcsr", "link1", "--held", "O1", "--out", tmp_path / "y.csv")
+    assert "expected worst, all" in bad("loads", "rcsr", "link1", "--at", "30deg")
+
+
 def test_equations_with_numbers() -> None:
     """{Q}, {C} and {U} at a position with its rates are those of the solution there."""
     shown = run("equations", "rcsr", "--at", "O1=160deg@0.1").stdout

@@ -247,6 +247,8 @@ def test_options_of_the_deck(tmp_path: Path) -> None:
     assert len(found.value.faults) == 4
     with pytest.raises(mg.FileError, match=r"known: .csv \(table\), .inp \(CalculiX or Abaqus\)"):
         body.write(tmp_path / "x.txt")
+    with pytest.raises(mg.DeclarationError, match=r"held, couples: for a load deck \(.inp\) alone"):
+        body.write(tmp_path / "x.csv", held="B", couples=0.1)
     body.write(tmp_path / "x.inp", model="rod_mesh.inp", first_node=500, at=2)
     text = (tmp_path / "x.inp").read_text()
     assert "\n*INCLUDE, INPUT=rod_mesh.inp\n" in text

@@ -5,6 +5,7 @@ from mechgraph.cli.formulation import equations
 from mechgraph.cli.library import list_library, save
 from mechgraph.cli.motion import respond, solve
 from mechgraph.cli.program import app
+from mechgraph.cli.strength import loads
 
 __all__ = ["app"]
 
@@ -14,3 +15,4 @@ app.command("equations")(equations)
 app.command("solve")(solve)
 app.command("respond")(respond)
 app.command("save")(save)
+app.command("loads")(loads)

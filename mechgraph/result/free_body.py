@@ -11,6 +11,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.document import Bullets, Document, Heading, Paragraph, Table, to_text
 from mechgraph.errors import DeclarationError
 from mechgraph.model.field_format import NAMED_POINT
 from mechgraph.model.link import Link
@@ -19,10 +20,10 @@ from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import wrong
 from mechgraph.result.load_files import COMPONENTS, FORMATS
-from mechgraph.result.places import OK, driver_value
+from mechgraph.result.places import OK, bracket, driver_value, number
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import Mask
-from mechgraph.units import TIME, unit_of
+from mechgraph.units import FORCE, LENGTH, MOMENT, TIME, unit_of
 from mechgraph.writing import format_of
 
 SMALL = 1e-9
@@ -236,6 +237,37 @@ class FreeBody:
         """
         format_of(path, FORMATS).write(self, path, at, **options)
 
+    def document(self, at: At = "worst") -> Document:
+        """What acts with its greatest force and moment, and the load cases at positions."""
+        ranges = {(r.name, r.component): r for r in self.envelope()}
+        most = {
+            size: np.nanmax([r.greatest for r in ranges.values() if r.component == size], initial=0.0)
+            for size in ("|F|", "|M|")
+        }
+        rows = []
+        for one in self.acting:
+            row = [one.name, one.kind, ", ".join(f"{x + 0.0:.6g}" for x in one.point)]
+            for size, largest in most.items():
+                r = ranges[one.name, size]
+                row += (
+                    [number(r.greatest, largest), self.place(r.at_greatest)]
+                    if r.at_greatest >= 0
+                    else ["not unique", ""]
+                )
+            rows.append(row)
+        units = [bracket(unit_of(self.mechanism.units, powers)) for powers in (LENGTH, FORCE, MOMENT)]
+        head = ("what", "kind", f"point{units[0]}", f"force{units[1]}", "at", f"moment{units[2]}", "at")
+        cases = [f"{case.place}{': ' if case.why else ''}{', '.join(case.why)}" for case in self.cases(at)]
+        words = "Greatest force and moment of each, in the frame of the link, moments about its point"
+        found = "" if np.isnan(self.balance) else f"; the sum of all is zero to {self.balance:.0e} of the largest"
+        return Document(
+            f"Loads on link {self.link.name} of {self.mechanism.name}",
+            (Paragraph(f"{words}{found}."), Table(head, rows, "lllrlrl"), Heading("Positions", 2), Bullets(cases)),
+        )
+
+    def __str__(self) -> str:
+        return to_text(self.document())
+
     def __repr__(self) -> str:
         names = ", ".join(one.name for one in self.acting)
         return f"FreeBody({self.link.name!r}, {np.size(self._solved)} positions, {names})"
@@ -278,13 +310,11 @@ def free_body(s: Solution, link: str) -> FreeBody:
         local = np.concatenate([_turned_back(R, v) for v in (moment, wrench[..., 3:])], axis=-1)
         acting.append(PointLoad(name, kind, p, local, _every(local), about, distributed))
 
-    for number, load in enumerate(m.loads):
-        found = s.load(number).wrenches
+    for place, load in enumerate(m.loads):
+        found = s.load(place).wrenches
         if load.in_freedom is None and link in found:
             about = load.where.removesuffix(": ")
-            add(
-                f"loads[{number}] {load.kind}", "load", _place(load, one), found[link], about, isinstance(load, Gravity)
-            )
+            add(f"loads[{place}] {load.kind}", "load", _place(load, one), found[link], about, isinstance(load, Gravity))
     hold = motion.hold
     if np.nan_to_num(hold).any():
         add("hold", "hold", one.center, hold, "keeps the passive body at rest; no part supplies it")

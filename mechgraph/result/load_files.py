@@ -14,8 +14,9 @@ import numpy as np
 from mechgraph.document.tree import plain
 from mechgraph.errors import DeclarationError
 from mechgraph.quantities import wrong
-from mechgraph.units import BASE_UNITS, unit_of
-from mechgraph.writing import Format, csv_of, write_whole
+from mechgraph.result.places import bracket
+from mechgraph.units import BASE_UNITS, FORCE, LENGTH, MOMENT, unit_of
+from mechgraph.writing import Format, cell, csv_of, write_whole
 
 if TYPE_CHECKING:
     from mechgraph.result.free_body import Case, FreeBody, PointLoad
@@ -29,24 +30,16 @@ LONGEST_LINE = 120
 Path = str | os.PathLike[str]
 
 
-def write_table(body: FreeBody, path: Path, at: Any = "worst") -> None:
+def write_table(body: FreeBody, path: Path, at: Any = "worst", **options: Any) -> None:
     """Write one row for each of what acts at each position; components that are not unique are left empty unless they are of least norm,
-    and are named in the last column.
+    and are named in the last but one column.
     """
-    units = {
-        letter: unit_of(body.mechanism.units, (power, mass, 2 * -mass))
-        for letter, power, mass in (("x", 1, 0), ("F", 1, 1), ("M", 2, 1))
-    }
-    heads = [
-        f"{name} [{unit}]" if (unit := units["x" if name in "xyz" else name[0]]) else name
-        for name in ("x", "y", "z", *_FORCE_FIRST)
-    ]
-    write_whole(
-        path, [csv_of(("position", "at", "name", "kind", *heads, "not unique", "about"), _rows(body, body.cases(at)))]
-    )
-
-
-_FORCE_FIRST = (*COMPONENTS[3:], *COMPONENTS[:3])
+    if options:
+        raise DeclarationError(f"loads on {body.link.name!r}", [f"{', '.join(options)}: for a load deck (.inp) alone"])
+    length, force, moment = (bracket(unit_of(body.mechanism.units, powers)) for powers in (LENGTH, FORCE, MOMENT))
+    columns = [*(f"{x}{length}" for x in "xyz"), *(f"F{x}{force}" for x in "xyz"), *(f"M{x}{moment}" for x in "xyz")]
+    heads = ("position", "at", "name", "kind", *columns, "not unique", "about")
+    write_whole(path, [csv_of(heads, _rows(body, body.cases(at)))])
 
 
 def _rows(body: FreeBody, cases: Sequence[Case]) -> Iterator[list[Any]]:
@@ -55,8 +48,16 @@ def _rows(body: FreeBody, cases: Sequence[Case]) -> Iterator[list[Any]]:
         for one in body.acting:
             wrench = _at(one, case)
             numbers = ["" if np.isnan(v) else float(v) for v in (*wrench[3:], *wrench[:3])]
-            texts = (" ".join(unknown.get(one.name, ())), plain(one.about))
-            yield [case.position, plain(case.place), plain(one.name), one.kind, *one.point, *numbers, *texts]
+            texts = (" ".join(unknown.get(one.name, ())), cell(plain(one.about)))
+            yield [
+                case.position,
+                cell(plain(case.place)),
+                cell(plain(one.name)),
+                one.kind,
+                *one.point,
+                *numbers,
+                *texts,
+            ]
 
 
 def _at(one: PointLoad, case: Case) -> Any:
@@ -169,9 +170,7 @@ class _Deck:
     def _head(self) -> Iterator[str]:
         m = self.body.mechanism
         bases = [f"{base} {m.units[base]}" for base in BASE_UNITS if base in m.units]
-        names = [
-            f"{what} {unit_of(m.units, powers)}" for what, powers in (("force", (1, 1, -2)), ("moment", (2, 1, -2)))
-        ]
+        names = [f"{what} {unit_of(m.units, powers)}" for what, powers in (("force", FORCE), ("moment", MOMENT))]
         units = (
             ", ".join(bases + names)
             if len(bases) == len(BASE_UNITS)

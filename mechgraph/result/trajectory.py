@@ -356,9 +356,8 @@ class Trajectory:
 
         found = self._evaluated(seen)
         unit = np.repeat([self._L**2, self._L], 3)[:, None]
-        return self._out(self._masked(sign * unit * found[:, 0], found[:, 1:])), self._out(
-            unique & self._solved
-        ).astype(bool)
+        unique = (~_touched(found[:, 1:]) & self._solved).astype(float)
+        return self._out(self._masked(sign * unit * found[:, 0], found[:, 1:])), self._out(unique).astype(bool)
 
     def _about_origin(self, value: Array, stress: Array) -> Array:
         """Wrench ``(6, T)`` in the user's units about the global origin, NaN where ``stress (6, s, T)`` has a part."""
