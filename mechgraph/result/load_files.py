@@ -7,22 +7,18 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from mechgraph.document.tree import plain
 from mechgraph.errors import DeclarationError
 from mechgraph.quantities import wrong
+from mechgraph.result.balanced_loads import BalancedLoads, Case, PointLoad
 from mechgraph.result.places import bracket
 from mechgraph.units import BASE_UNITS, FORCE, LENGTH, MOMENT, unit_of
 from mechgraph.writing import Format, cell, csv_of, write_whole
 
-if TYPE_CHECKING:
-    from mechgraph.result.free_body import Case, FreeBody, PointLoad
-
-COMPONENTS = ("Mx", "My", "Mz", "Fx", "Fy", "Fz")
-"""Names of the components of a wrench."""
 FIRST_NODE = 900_001
 """Number of the first node of a deck: beyond those of a mesh."""
 LONGEST_LINE = 120
@@ -30,7 +26,7 @@ LONGEST_LINE = 120
 Path = str | os.PathLike[str]
 
 
-def write_table(body: FreeBody, path: Path, at: Any = "worst", **options: Any) -> None:
+def write_table(body: BalancedLoads, path: Path, at: Any = "worst", **options: Any) -> None:
     """Write one row for each of what acts at each position; components that are not unique are left empty unless they are of least norm,
     and are named in the last but one column.
     """
@@ -42,7 +38,7 @@ def write_table(body: FreeBody, path: Path, at: Any = "worst", **options: Any) -
     write_whole(path, [csv_of(heads, _rows(body, body.cases(at)))])
 
 
-def _rows(body: FreeBody, cases: Sequence[Case]) -> Iterator[list[Any]]:
+def _rows(body: BalancedLoads, cases: Sequence[Case]) -> Iterator[list[Any]]:
     for case in cases:
         unknown = body.not_unique(case.position)
         for one in body.acting:
@@ -69,7 +65,7 @@ def _at(one: PointLoad, case: Case) -> Any:
 
 
 def load_deck(
-    body: FreeBody,
+    body: BalancedLoads,
     path: Path,
     at: Any = "worst",
     *,
@@ -121,7 +117,7 @@ def load_deck(
     write_whole(path, (f"{line}\n" for line in deck.lines()))
 
 
-def _option_faults(body: FreeBody, held: str, inertia: str, couples: Any, first_node: Any) -> list[str]:
+def _option_faults(body: BalancedLoads, held: str, inertia: str, couples: Any, first_node: Any) -> list[str]:
     names = [one.name for one in body.acting]
     checks = (
         (held == "" or held in names, held, "held", f"one of {', '.join(names)}"),
@@ -136,7 +132,7 @@ def _option_faults(body: FreeBody, held: str, inertia: str, couples: Any, first_
 class _Deck:
     """The lines of a deck; see ``load_deck``."""
 
-    body: FreeBody
+    body: BalancedLoads
     cases: Sequence[Case]
     model: str
     held: str
@@ -272,7 +268,7 @@ def _line(*values: float) -> str:
     return ", ".join(str(v) if isinstance(v, int) else f"{v + 0.0:.12e}" for v in values)
 
 
-def _named(body: FreeBody, case: Case) -> str:
+def _named(body: BalancedLoads, case: Case) -> str:
     """The accelerations of a case in words."""
     units = [unit_of(body.mechanism.units, powers) for powers in ((1, 0, -2), (0, 0, -1), (0, 0, -2))]
     parts = body.acceleration.reshape(-1, 3, 3)[case.position]
