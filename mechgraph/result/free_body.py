@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.document import Bullets, Document, Heading, Paragraph, Table, to_text
+from mechgraph.document import Bullets, Document, Heading, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError
 from mechgraph.model.field_format import NAMED_POINT
 from mechgraph.model.link import Link
@@ -16,14 +16,14 @@ from mechgraph.model.load import Gravity
 from mechgraph.model.load_base import Load
 from mechgraph.result.balanced_loads import At, BalancedLoads, PointLoad, about_origin
 from mechgraph.result.load_files import FORMATS
-from mechgraph.result.places import bracket, number
+from mechgraph.result.numbers import bracket, number
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import Mask
 from mechgraph.units import FORCE, LENGTH, MOMENT, unit_of
 from mechgraph.writing import format_of
 
 
-class FreeBody(BalancedLoads):
+class FreeBody(BalancedLoads, Shown):
     """A link with all that acts on it; see ``free_body``."""
 
     def write(self, path: str | os.PathLike[str], at: At = "worst", **options: Any) -> None:
@@ -66,9 +66,6 @@ class FreeBody(BalancedLoads):
             f"Loads on link {self.link.name} of {self.mechanism.name}",
             (Paragraph(f"{words}{found}."), Table(head, rows, "lllrlrl"), Heading("Positions", 2), Bullets(cases)),
         )
-
-    def __str__(self) -> str:
-        return to_text(self.document())
 
     def __repr__(self) -> str:
         names = ", ".join(one.name for one in self.acting)

@@ -15,7 +15,7 @@ from mechgraph.document.tree import plain
 from mechgraph.errors import DeclarationError
 from mechgraph.quantities import wrong
 from mechgraph.result.balanced_loads import BalancedLoads, Case, PointLoad
-from mechgraph.result.places import bracket
+from mechgraph.result.numbers import bracket
 from mechgraph.units import BASE_UNITS, FORCE, LENGTH, MOMENT, unit_of
 from mechgraph.writing import Format, cell, csv_of, write_whole
 
