@@ -10,10 +10,12 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError
 from mechgraph.model.link import Link
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import wrong
+from mechgraph.result.numbers import number
 from mechgraph.result.places import OK, driver_value
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import Mask
@@ -27,8 +29,8 @@ At = Literal["worst", "all"] | int | slice | Sequence[int]
 """Positions: the worst ones, all, or those that an index of the flat batch picks."""
 
 
-@dataclass(frozen=True, eq=False)
-class PointLoad:
+@dataclass(frozen=True, eq=False, repr=False)
+class PointLoad(Shown):
     """What one thing does to the link at one point of it.
 
     ``kind``: ``"pair"`` (all that the pair transmits: reaction and efforts), ``"load"``, ``"inertia"`` (at the mass centre), ``"hold"``
@@ -55,6 +57,18 @@ class PointLoad:
     def moment(self) -> Array:
         """Moment about the point ``(..., 3)``."""
         return self.wrench[..., :3]
+
+    def document(self) -> Document:
+        """Least and greatest of its components; what is not unique has none."""
+        rows = []
+        for name, values in zip(COMPONENTS, self.wrench.reshape(-1, 6).T, strict=True):
+            known = values[np.isfinite(values)]
+            rows.append(
+                (name, *(number(float(v)) for v in (known.min(), known.max()))) if known.size else (name, "", "")
+            )
+        at = ", ".join(f"{x + 0.0:.6g}" for x in self.point)
+        about = Paragraph(f"{self.kind} at ({at}) in the frame of the link: {self.about}.")
+        return Document(self.name, (about, Table(("component", "least", "greatest"), rows, "lrr")))
 
 
 class Case(NamedTuple):
