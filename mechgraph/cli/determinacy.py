@@ -7,16 +7,17 @@ from typing import Annotated
 import typer
 
 import mechgraph as mg
-from mechgraph.cli.options import At, Compare, Engine, Named, Tolerance
+from mechgraph.cli.options import AsJson, At, Compare, Engine, Named, Tolerance
 from mechgraph.cli.outcome import NO_ANSWER
 from mechgraph.cli.output import show, working, write
 from mechgraph.cli.reading import loaded, show_compared
+from mechgraph.cli.records import check_data, write_json
 from mechgraph.typed import parse_at, refuse
 
 
 def check(
     mechanism: Named,
-    json: Annotated[bool, typer.Option("--json", help="All facts as JSON.")] = False,
+    json: AsJson = False,
     markdown: Annotated[bool, typer.Option("--markdown", help="The report as Markdown.")] = False,
     full: Annotated[
         bool, typer.Option("--full", help="The whole report: every pair, self-stress, loop and count.")
@@ -38,13 +39,16 @@ def check(
     values = dict(parse_at(m, text) for text in at or ())
     with working("checking"):
         report = mg.check(m, at=values or None, engine=engine, tol=tol)
-        text = report.to_json() if json else report.to_markdown(full) if markdown else ""
+        data = check_data(m, report) if json else {}
+        text = report.to_markdown(full) if markdown else ""
         document = report.document(full)
     not_closed = m.has_geometry and report.mobility is None
     bearing = any(p.load_bearing for p in report.passive)
     unsolvable = not_closed or report.undriven or report.contradicting_drives
     doubtful = report.near or bearing or not report.determinate
-    if text:
+    if json:
+        write_json("check", data)
+    elif text:
         write(text)
     else:
         show(document, "red" if unsolvable else "yellow" if doubtful else "green")

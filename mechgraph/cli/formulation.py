@@ -10,9 +10,10 @@ import numpy as np
 import typer
 
 import mechgraph as mg
-from mechgraph.cli.options import Bookkeeping, EquationsAt, Named
+from mechgraph.cli.options import AsJson, Bookkeeping, EquationsAt, Named
 from mechgraph.cli.output import show, working, write
 from mechgraph.cli.reading import check_out, loaded
+from mechgraph.cli.records import equations_data, write_json
 from mechgraph.equations.formulation import FORMATS
 from mechgraph.typed import drives_of, refuse
 from mechgraph.writing import formats_text
@@ -48,6 +49,7 @@ def equations(
             help=f"Write them; the suffix says how: {formats_text(FORMATS)}, the first compiles.",
         ),
     ] = None,
+    json: AsJson = False,
 ) -> None:
     """Print the closure equations, the d'Alembert equations of every link and the conditions of the pairs; needs no geometry.
 
@@ -59,13 +61,17 @@ def equations(
         refuse("equations", "--coefficients and --csv print a table, --latex and --blocks equations; take one of them")
     if at and (latex or blocks):
         refuse("equations", "--at prints a table of numbers, --latex and --blocks equations; take one of them")
+    if json and (latex or blocks or coefficients or csv or out):
+        refuse("equations", "--json prints all; leave out --latex, --blocks, --coefficients, --csv and --out")
     if out and (latex or coefficients or csv or at):
         refuse("equations", "--out writes what its suffix says; leave out --latex, --coefficients, --csv and --at")
     check_out(out, mechanism, FORMATS)
     m = loaded(mechanism)
     s = solved_at(m, at) if at else None
     f = mg.formulate(s.mechanism if s else m, bookkeeping, unknowns=unknowns)
-    if out is not None:
+    if json:
+        write_json("equations", equations_data(f, s))
+    elif out is not None:
         f.write(out, components=not blocks)
         write(f"Wrote {out}: {len(f.unknowns)} unknowns, {len(f.equations)} equations.\n")
     elif csv or coefficients or at:

@@ -3,18 +3,33 @@
 from __future__ import annotations
 
 import warnings
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
 import typer
 
 import mechgraph as mg
-from mechgraph.cli.options import Actuate, Compare, Drives, Engine, Method, Named, OnReach, Out, Redundant, Tolerance
+from mechgraph.cli.options import (
+    Actuate,
+    AsJson,
+    Compare,
+    Drives,
+    Engine,
+    Method,
+    Named,
+    OnReach,
+    Out,
+    Redundant,
+    Tolerance,
+)
 from mechgraph.cli.outcome import NO_ANSWER, fail
 from mechgraph.cli.output import progress, show, working, write
 from mechgraph.cli.reading import check_out, loaded, show_compared
+from mechgraph.cli.records import Written, write_json
+from mechgraph.document import Document
 from mechgraph.result.export import FORMATS
-from mechgraph.typed import drives_of, duration, parse_at
+from mechgraph.typed import drives_of, duration, parse_at, refuse
 
 
 def solve(
@@ -28,6 +43,7 @@ def solve(
     engine: Engine = "auto",
     compared: Compare = False,
     tol: Tolerance = None,
+    json: AsJson = False,
 ) -> None:
     """Solve positions, efforts of the drivers and all reactions, print a summary and write a table.
 
@@ -35,6 +51,8 @@ def solve(
     solved), a freedom is neither driven nor passive, or drivers contradict each other; 2 wrong usage or bad input. A file is
     written whole or not at all.
     """
+    if json and compared:
+        refuse("solve", "--json and --compare exclude each other")
     check_out(out, mechanism, FORMATS)
     m = loaded(mechanism)
     motions = drives_of(m, drive or ())
@@ -43,16 +61,30 @@ def solve(
             warnings.simplefilter("ignore", mg.MechgraphWarning)  # the summary has them
             how: dict[str, Any] = {"method": method, "redundant": redundant, "on_reach": on_reach, "engine": engine}
             s = mg.solve(m, motions or None, actuate=actuate, tol=tol, **how)
-        document = s.document(asked=True)
-        if out is not None:
-            s.write(out)
-    show(document)
-    if out is not None:
-        write(f"\nWrote {out}: {s.status.size} rows, {len(s.part(slice(1)).columns())} columns.\n")
+        told = _told(s, out, json)
+    _tell("solve", *told)
     if compared:
         show_compared(mechanism)
     if not (np.asarray(s.status) == "ok").any():
         raise typer.Exit(NO_ANSWER)
+
+
+def _told(s: mg.Solution, out: Path | None, json: bool) -> tuple[Document | dict[str, Any], Written | None]:
+    """What is told of a solution, and the file that was written."""
+    told = s.to_dict() if json else s.document(asked=True)
+    if out is None:
+        return told, None
+    s.write(out)
+    return told, Written(str(out), s.status.size, len(s.part(slice(1)).columns()))
+
+
+def _tell(command: str, told: Document | dict[str, Any], written: Written | None) -> None:
+    if isinstance(told, dict):
+        write_json(command, told, written=written)
+        return
+    show(told)
+    if written is not None:
+        write(f"\nWrote {written.file}: {written.rows} rows, {written.columns} columns.\n")
 
 
 def respond(
@@ -79,6 +111,7 @@ def respond(
     rtol: Annotated[float, typer.Option(help="Relative tolerance of a step.")] = 1e-8,
     atol: Annotated[float, typer.Option(help="Absolute tolerance (radians, lengths / L, and their rates).")] = 1e-10,
     engine: Engine = "auto",
+    json: AsJson = False,
 ) -> None:
     """Follow the motion that the loads produce, print a summary with the energy balance and write a table.
 
@@ -95,11 +128,7 @@ def respond(
             m, t, start=begin, rates=rates, rtol=rtol, atol=atol, method=method, engine=engine, on_stop="return",
             progress=moved,
         )  # fmt: skip
-        document = r.document(asked=True)
-        if out is not None:
-            r.write(out)
-    show(document)
-    if out is not None:
-        write(f"\nWrote {out}: {r.status.size} rows, {len(r.part(slice(1)).columns())} columns.\n")
+        told = _told(r, out, json)
+    _tell("respond", *told)
     if r.stopped:
         fail(r.stopped, NO_ANSWER)

@@ -18,6 +18,9 @@ Named = Annotated[
         help=f"A mechanism of the library (see 'list'), a TOML file, or one of another program ({', '.join(READERS)}).",
     ),
 ]
+AsJson = Annotated[
+    bool, typer.Option("--json", help="As JSON for scripts; output.schema.json beside the library describes it.")
+]
 Engine = Annotated[
     Literal["auto", "dense", "sparse"],
     typer.Option(help="Dense or sparse matrices, or the faster ones for the size; the results are the same."),

@@ -48,18 +48,18 @@ def json_schema() -> dict[str, Any]:
 
 def schema_text() -> str:
     """The JSON Schema as the library stores it."""
-    return _laid_out(json_schema(), 0) + "\n"
+    return laid_out(json_schema()) + "\n"
 
 
-def _laid_out(value: Any, depth: int) -> str:
+def laid_out(value: Any, depth: int = 0) -> str:
     """JSON in which what fits in a line stands in one."""
     line = json.dumps(value, ensure_ascii=False)
     if (depth + len(line) <= SCHEMA_WIDTH and depth > 0) or not isinstance(value, dict | list):
         return line
     inner, outer = "\n" + "  " * (depth + 1), "\n" + "  " * depth
     if isinstance(value, list):
-        return f"[{inner}{f',{inner}'.join(_laid_out(v, depth + 1) for v in value)}{outer}]"
-    entries = (f"{json.dumps(key)}: {_laid_out(v, depth + 1)}" for key, v in value.items())
+        return f"[{inner}{f',{inner}'.join(laid_out(v, depth + 1) for v in value)}{outer}]"
+    entries = (f"{json.dumps(key)}: {laid_out(v, depth + 1)}" for key, v in value.items())
     return f"{{{inner}{f',{inner}'.join(entries)}{outer}}}"
 
 

@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, rotation_exp
+from mechgraph.data import patch
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.pair_table import TABLE
+from mechgraph.model.toml import to_data
 from mechgraph.report.findings import Finding
 from mechgraph.report.words import exchange, joined
 from mechgraph.structure.pair_changes import LEFT_OUT, RIGID, WHOLE, Effect
@@ -34,6 +36,10 @@ class Advice(Finding):
     def brief(self) -> str:
         """The advice in the words of a workshop, with what it does."""
         return self.text if self.effect is None else f"{exchanges(self.effect)}: {consequence(self.effect)}"
+
+    def patch(self) -> list[dict[str, Any]]:
+        """The change as a JSON Patch (RFC 6902) of what a file holds, ``mechgraph.load`` of which gives the same as ``apply()``."""
+        return patch(to_data(self.mechanism), to_data(self.apply()))
 
     def apply(self) -> Mechanism:
         """The changed mechanism, at the position of the report."""

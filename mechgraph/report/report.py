@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any, get_args
 
 from mechgraph.arguments import option_faults
 from mechgraph.closure.assembly import assembled, assembled_at, named_columns
 from mechgraph.closure.rank import EngineName
+from mechgraph.data import json_text, plain
 from mechgraph.document import Document, Paragraph, Shown, to_markdown, to_text
 from mechgraph.errors import AssemblyError, DeclarationError, MechgraphError
 from mechgraph.model.declaration import mapping_faults
 from mechgraph.model.mechanism import Mechanism, check_mechanism
 from mechgraph.numerics.tolerances import RANKS
-from mechgraph.report import brief, sections, sentences
+from mechgraph.report import brief, data, sections, sentences
 from mechgraph.report.facts import Facts, Geometry
 from mechgraph.report.rounding import Rounding, rounding
 from mechgraph.structure.mobility import free_motion
@@ -56,12 +56,12 @@ class DeterminacyReport(Facts, Shown):
 
     def to_dict(self) -> dict[str, Any]:
         """All facts as plain data."""
-        facts = sections.to_dict(self)
-        return facts if self.rounding is None else {"rounding": asdict(self.rounding), **facts}
+        facts = data.to_dict(self, sections.KEYS)
+        return facts if self.rounding is None else {"rounding": plain(self.rounding), **facts}
 
     def to_json(self) -> str:
         """All facts as JSON."""
-        return json.dumps(self.to_dict(), indent=2) + "\n"
+        return json_text(self.to_dict())
 
     def __repr__(self) -> str:
         known = f", mobility {self.mobility}, redundancy {self.redundancy}" if self.geometry else ""

@@ -5,12 +5,11 @@ Text, Markdown and HTML follow from the list through a document, JSON through pl
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass, is_dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Table
-from mechgraph.equations.terms import Ledger
 from mechgraph.model.pair_table import TABLE
 from mechgraph.numerics.tolerances import RANKS
 from mechgraph.report.facts import Facts
@@ -48,47 +47,6 @@ def document(r: Facts) -> Document:
         printed = list(section.printed(r))
         blocks += [Heading(section.title, 2), *printed] if section.title and printed else printed
     return Document(f"Determinacy of {r.mechanism.name}", tuple(blocks))
-
-
-def to_dict(r: Facts) -> dict[str, Any]:
-    """All facts as plain data, by key."""
-    return {key: _VALUES[key](r) if key in _VALUES else _plain(getattr(r, key)) for s in SECTIONS for key in s.keys}
-
-
-def _plain(value: Any) -> Any:
-    """Dataclasses and mappings as dictionaries, sequences as lists."""
-    if isinstance(value, Mapping):
-        return {key: _plain(of) for key, of in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(of) for of in value]
-    return _plain(asdict(value)) if is_dataclass(value) and not isinstance(value, type) else value
-
-
-def _ledger_data(book: Ledger) -> dict[str, Any]:
-    kinds = {kind: [row.count, row.unknowns, row.equations] for kind, row in book.by_kind.items()}
-    return {"unknowns": book.unknowns, "equations": book.equations, "balance": book.balance, "by_kind": kinds}
-
-
-_VALUES: dict[str, Callable[[Facts], Any]] = {
-    "mechanism": lambda r: r.mechanism.name,
-    "verdict": verdict,
-    "loops": lambda r: [
-        {"steps": _plain(loop), **_plain(fact)} for loop, fact in zip(r.loops, r.loop_facts, strict=True)
-    ],
-    "ledger": lambda r: {name: _ledger_data(r.ledger(name)) for name in ("lee", "minimal")},
-    "kind": lambda r: {key: _plain(getattr(r.kind, key)) for key in ("name", "is_direction", "place", "by_pairs")},
-    "loop_kinds": lambda r: [kind.name for kind in r.loop_kinds],
-    "advice": lambda r: [
-        {key: _plain(getattr(a, key)) for key in ("text", "freedoms", "links", "axis", "brief")} for a in r.advice
-    ],
-    "self_stress_count": lambda r: r.reactions.count if r.reactions else None,
-    "unique_directions": lambda r: (
-        [{"text": d.text, **_plain(d)} for d in r.reactions.unique_directions] if r.reactions else []
-    ),
-    "combinations": lambda r: _plain(r.reactions.combinations) if r.reactions else [],
-    "groups_without_combinations": lambda r: r.reactions.unsought if r.reactions else 0,
-}
-"""Facts whose plain data are not those of the attribute of that name."""
 
 
 def _listed(items: Iterable[str]) -> Iterator[Block]:
@@ -281,3 +239,5 @@ SECTIONS = (
     Section("Checks", ("engine", "dropped"), _checks),
 )
 """All facts in the order of the report."""
+KEYS = tuple(key for section in SECTIONS for key in section.keys)
+"""Their names in the data."""

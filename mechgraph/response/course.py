@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import CLOSED
 from mechgraph.closure.driver_path import in_blocks
 from mechgraph.closure.indexing import Index
+from mechgraph.data import plain
 from mechgraph.document import Bullets, Document, Heading, Paragraph, Shown
 from mechgraph.errors import DeclarationError, ResponseError
 from mechgraph.model.mechanism import Mechanism
@@ -24,6 +25,7 @@ from mechgraph.response.integration import Integration
 from mechgraph.response.motion_equations import moved
 from mechgraph.response.reading import trajectory_of
 from mechgraph.result.numbers import ranges
+from mechgraph.result.record import SolutionData, solution_data
 from mechgraph.result.solution import Solution
 from mechgraph.result.summary import summary
 from mechgraph.result.trajectory import Trajectory
@@ -78,6 +80,10 @@ class Response(Solution):
         made = summary(self._values, asked, (balance,))
         events = Heading("Events" if self.events else "", 2), Bullets([str(one) for one in self.events])
         return replace(made, blocks=(Paragraph(self.stopped), *made.blocks, *events))
+
+    def to_dict(self) -> dict[str, Any]:
+        """What the summary tells as plain data."""
+        return dict(plain(response_data(self)))
 
     def at(self, t: Any) -> Response:
         """The response at other times within those that were integrated (dense output of the stepper, closed and with all forces).
@@ -187,3 +193,39 @@ class Course:
         column = int(s.first_column[k]) + j
         unit = s.par.L if s.is_length[column] else 1.0
         return unit * np.stack([self.positions(t)[s.single_rows[column]], *self.rates(t)[:, column]])
+
+
+@dataclass(frozen=True)
+class EventData:
+    """Something that happened, in words, and when."""
+
+    text: str
+    t: float
+
+
+@dataclass(frozen=True)
+class ResponseData(SolutionData):
+    """What the summary of a response tells, of all pairs."""
+
+    begin: Annotated[float, "the first output time, in the declared unit"]
+    reached: Annotated[float, "the last output time"]
+    stopped: Annotated[str, "why the motion was not followed to its end; empty where it was"]
+    kinetic_energy: Annotated[float, "its greatest value"]
+    energy_balance: Annotated[float, "greatest error of the balance of energies, of the greatest kinetic energy"]
+    events: tuple[EventData, ...]
+
+
+def response_data(r: Response) -> ResponseData:
+    """All that a summary tells."""
+    t, kinetic = np.atleast_1d(r.t), float(np.abs(r.energy.kinetic).max(initial=0.0))
+    off = float(np.abs(r.energy.balance).max(initial=0.0)) / (kinetic or 1.0)
+    events = tuple(EventData(str(one), float(one.t)) for one in r.events)
+    return ResponseData(
+        **vars(solution_data(r._values)),
+        begin=float(t[0]),
+        reached=float(t[-1]),
+        stopped=r.stopped,
+        kinetic_energy=kinetic,
+        energy_balance=off,
+        events=events,
+    )

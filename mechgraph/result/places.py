@@ -54,6 +54,13 @@ class Places:
         """One value a position."""
         return np.asarray(values, dtype=float).reshape(self.status.size)
 
+    def runs(self) -> list[tuple[int, int]]:
+        """First and last index of every run of equal statuses."""
+        cuts = np.flatnonzero(self.status[1:] != self.status[:-1])
+        starts = [0, *(int(c) + 1 for c in cuts)]
+        ends = [*(int(c) for c in cuts), self.status.size - 1]
+        return list(zip(starts, ends, strict=True)) if self.status.size else []
+
     def coordinate(self, name: str, value: float) -> str:
         """A driver's value with its unit."""
         return coordinate(self.values.whole, name, value)

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.data import json_text, plain
 from mechgraph.document import Document, Shown, to_text
 from mechgraph.equations.state import State
 from mechgraph.errors import DeclarationError
@@ -14,6 +15,7 @@ from mechgraph.numerics.newton import Work
 from mechgraph.quantities import wrong
 from mechgraph.result import export
 from mechgraph.result.places import OK
+from mechgraph.result.record import solution_data
 from mechgraph.result.summary import summary
 from mechgraph.result.table import Include, table_of
 from mechgraph.result.values import Checks, LoadBearing, LoadResult, Mask, Values
@@ -169,6 +171,14 @@ class Solution(Shown):
         The text of the command line and of ``print``, which leaves out what takes long at many positions of many pairs.
         """
         return to_text(self.document(asked=True))
+
+    def to_dict(self) -> dict[str, Any]:
+        """What the summary tells as plain data, of all pairs."""
+        return dict(plain(solution_data(self._values)))
+
+    def to_json(self) -> str:
+        """The same as JSON."""
+        return json_text(self.to_dict())
 
     def state(self, index: Any = ()) -> State:
         """Screws, loads and coordinates at one position, for ``Formulation.assemble``."""

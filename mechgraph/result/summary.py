@@ -85,7 +85,7 @@ class _View(Places):
         done, of = int(self.solved.sum()), self.status.size
         yield Paragraph(f"Solved {done} of {of} position{'s' if of != 1 else ''}.")
         items = []
-        for first, last in _runs(self.status):
+        for first, last in self.runs():
             if self.status[first] == OK:
                 continue
             count = f"position {first}" if first == last else f"positions {first} to {last}"
@@ -264,14 +264,6 @@ class _View(Places):
         return Paragraph(
             f"Engine {self.values.engine}{method}: {', '.join(counted(*one) for one in self.values.work.counts)}."
         )
-
-
-def _runs(status: Any) -> list[tuple[int, int]]:
-    """First and last index of every run of equal statuses."""
-    cuts = np.flatnonzero(status[1:] != status[:-1])
-    starts = [0, *(int(c) + 1 for c in cuts)]
-    ends = [*(int(c) for c in cuts), len(status) - 1]
-    return list(zip(starts, ends, strict=True)) if len(status) else []
 
 
 def _shortened(items: list[str], count: int | None = None) -> tuple[str, ...]:

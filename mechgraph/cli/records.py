@@ -1,0 +1,207 @@
+"""What the commands print with ``--json``, as records, and the JSON Schema of all of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import mechgraph as mg
+from mechgraph.cli.output import write
+from mechgraph.data import VERSION, Json, json_text, object_schema, patch, plain, schema_of
+from mechgraph.equations.symbols import written
+from mechgraph.model.toml import to_data
+from mechgraph.report.data import AdviceData, schemas
+from mechgraph.report.rounding import Rounding
+from mechgraph.report.sections import KEYS
+from mechgraph.response.course import ResponseData
+from mechgraph.result.record import SolutionData
+
+
+@dataclass(frozen=True)
+class LibraryItem:
+    """A mechanism of the library."""
+
+    name: str
+    description: str
+    links: tuple[str, ...]
+    pairs: Annotated[Mapping[str, str], "symbols of the pair types by the names of the pairs"]
+
+
+@dataclass(frozen=True)
+class ListData:
+    """The mechanisms of the library."""
+
+    mechanisms: tuple[LibraryItem, ...]
+
+
+@dataclass(frozen=True)
+class PatchStep:
+    """One step of a JSON Patch (RFC 6902)."""
+
+    op: str
+    path: str
+    value: Any
+
+
+@dataclass(frozen=True)
+class Applicable(AdviceData):
+    """An advice, and the change to ``declaration`` that it advises; ``mechgraph save --advice`` makes it, by its number from 0."""
+
+    patch: tuple[PatchStep, ...]
+
+
+@dataclass(frozen=True)
+class UnknownData:
+    """An unknown of the force equations; its value at the position asked for, none where it is not unique."""
+
+    name: str
+    latex: str
+    owner: Annotated[str, "pair or coupling"]
+    group: str
+    meaning: str
+    value: float | None
+
+
+@dataclass(frozen=True)
+class EquationData:
+    """One scalar equation."""
+
+    name: str
+    owner: str
+    text: str
+    latex: str
+
+
+@dataclass(frozen=True)
+class BlockData:
+    """One vector equation; ``kind``: that of a link, a condition of a pair, a closure, or what it defines."""
+
+    kind: str
+    owner: str
+    text: str
+    latex: str
+
+
+@dataclass(frozen=True)
+class CoefficientData:
+    """An entry of the matrix {Q} or of the right side {C} (column 0), in symbols, or as a number at the position asked for."""
+
+    entry: str
+    row: int
+    column: int
+    value: str
+
+
+@dataclass(frozen=True)
+class EquationsData:
+    """The equations of a mechanism; with ``--at`` their numbers."""
+
+    mechanism: str
+    bookkeeping: str
+    sought: str
+    unknowns: tuple[UnknownData, ...]
+    equations: tuple[EquationData, ...]
+    blocks: Annotated[tuple[BlockData, ...], "closure and force equations block by block"]
+    coefficients: tuple[CoefficientData, ...]
+
+
+@dataclass(frozen=True)
+class Written:
+    """A file that was written."""
+
+    file: str
+    rows: int
+    columns: int
+
+
+@dataclass(frozen=True)
+class SaveData:
+    """A mechanism that was written as a file."""
+
+    mechanism: str
+    file: str
+
+
+def check_data(m: mg.Mechanism, report: mg.DeterminacyReport) -> Json:
+    """The facts of a report, each advice with the change to the declaration that it advises."""
+    facts, declared = report.to_dict(), to_data(m)
+    for advice, data in zip(report.advice, facts["advice"], strict=True):
+        steps = patch(declared, to_data(advice.apply()))
+        data["patch"] = [{"op": step["op"], "path": step["path"], "value": step.get("value")} for step in steps]
+    return {"rounding": None, **facts, "declaration": declared}
+
+
+def equations_data(f: mg.Formulation, s: mg.Solution | None) -> EquationsData:
+    """Unknowns, equations and coefficients, with numbers where a position is asked for."""
+    state = s.state() if s else None
+    values = f.solve(state).tolist() if state else [None] * len(f.unknowns)
+    rows = f.number_rows(state) if state else f.coefficient_rows()
+    blocks = (*f.closure.position, *f.closure.velocity.blocks, *f.closure.acceleration.blocks, *f.blocks)
+    return EquationsData(
+        f.mechanism.name,
+        f.bookkeeping,
+        f.sought,
+        tuple(
+            UnknownData(u.name, u.symbol.latex, u.owner, u.group, u.meaning, value)
+            for u, value in zip(f.unknowns, values, strict=True)
+        ),
+        tuple(
+            EquationData(e.name, e.owner, written(f.scalar(e)), written(f.scalar(e), latex=True)) for e in f.equations
+        ),
+        tuple(BlockData(b.kind, b.owner, b.text, b.latex) for b in blocks),
+        tuple(CoefficientData(*row) for row in rows),
+    )
+
+
+def write_json(command: str, data: Any, **more: Any) -> None:
+    """The record of a command on standard output."""
+    write(json_text({"schema": VERSION, "command": command, **plain(data), **more}))
+
+
+def _record(kind: type, **more: Any) -> Callable[[Json], Json]:
+    """The schema of a record, with more fields."""
+
+    def schema(defs: Json) -> Json:
+        schema_of(kind, defs)
+        made = defs.pop(kind.__name__)
+        return object_schema(made["description"], made["properties"] | {k: schema_of(h, defs) for k, h in more.items()})
+
+    return schema
+
+
+def _check(defs: Json) -> Json:
+    properties = {"rounding": schema_of(Annotated[Rounding | None, "a tolerance that would change the verdict"], defs)}
+    properties |= schemas(KEYS, defs)
+    properties["advice"] = schema_of(Annotated[tuple[Applicable, ...], "what would help, the best first"], defs)
+    words = "the mechanism as its file holds it (see mechanism.schema.json), which the patches of the advice change"
+    properties["declaration"] = {"description": words, "type": "object"}
+    return object_schema("The facts of the determinacy report.", properties)
+
+
+COMMANDS: dict[str, Callable[[Json], Json]] = {
+    "list": _record(ListData),
+    "check": _check,
+    "equations": _record(EquationsData),
+    "solve": _record(SolutionData, written=Written | None),
+    "respond": _record(ResponseData, written=Written | None),
+    "save": _record(SaveData),
+}
+"""The schema of what every command prints."""
+
+
+def output_schema() -> Json:
+    """The JSON Schema (draft 2020-12) of all that is printed with ``--json``."""
+    defs: Json = {}
+    kinds = {}
+    for name, make in COMMANDS.items():
+        made = make(defs)
+        first = {"schema": {"const": VERSION}, "command": {"const": name}}
+        kinds[f"command {name}"] = object_schema(made["description"], first | made["properties"])
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": "output.schema.json",
+        "title": "what mechgraph prints with --json",
+        "oneOf": [{"$ref": f"#/$defs/{kind.replace(' ', '%20')}"} for kind in kinds],
+        "$defs": kinds | defs,
+    }

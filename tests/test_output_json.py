@@ -1,0 +1,152 @@
+"""``--json`` of every command: valid by the stored schema, true to the results, and advice that scripts can apply."""
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+import tomli_w
+from typer.testing import CliRunner
+
+import mechgraph as mg
+from mechgraph.cli import app
+from mechgraph.cli.records import COMMANDS, output_schema
+from mechgraph.data import json_text, patch, plain, schema_of
+from mechgraph.model.schema import laid_out
+from mechgraph.model.toml import to_data
+
+CALLS = [
+    ("list",), ("check", "four-bar"), ("check", "rssr"), ("check", "rcsr"), ("check", "bricard-cube"), ("check", "windows-2"),
+    ("check", "four-bar", "--at", "A=30deg"), ("equations", "rcsr"), ("equations", "rcsr", "--at", "O1=160deg@0.1"),
+    ("equations", "rcsr", "--unknowns", "response"), ("solve", "four-bar"), ("solve", "four-bar", "--redundant", "minimum_norm"),
+    ("solve", "rcsr", "--drive", "O1=150:220:1deg", "--on-reach", "flag"), ("solve", "rssr", "--drive", "A=30deg"),
+    ("respond", "haug-slider-crank", "--for", "100ms", "--rate", "A=6"),
+]  # fmt: skip
+
+
+def run(*arguments: str | Path, status: int = 0) -> Any:
+    result = CliRunner().invoke(app, [*map(str, arguments), "--json"])
+    assert result.exit_code == status, result.output
+    return json.loads(result.stdout, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+
+
+@pytest.fixture(scope="module")
+def schema() -> jsonschema.protocols.Validator:
+    made = output_schema()
+    jsonschema.Draft202012Validator.check_schema(made)
+    return jsonschema.Draft202012Validator(made)
+
+
+def test_the_stored_schema_is_current(golden: Callable[[str, str], None]) -> None:
+    golden("../../library/output.schema.json", laid_out(output_schema()) + "\n")
+
+
+def test_every_command_has_a_schema() -> None:
+    commands = {command.name for command in app.registered_commands}
+    takes = {c.name for c in app.registered_commands if "json" in c.callback.__annotations__}
+    assert takes == set(COMMANDS)
+    assert takes <= commands
+
+
+@pytest.mark.parametrize("call", CALLS, ids=" ".join)
+def test_output_is_valid(call: tuple[str, ...], schema: jsonschema.protocols.Validator) -> None:
+    data = run(*call)
+    schema.validate(data)
+    assert (data["schema"], data["command"]) == (1, call[0])
+    wrong = {**data, "more": 1}
+    assert not schema.is_valid(wrong)
+    del data["schema"]
+    assert not schema.is_valid(data)
+
+
+def test_everything_in_the_schema_is_described(schema: jsonschema.protocols.Validator) -> None:
+    for name, of in schema.schema["$defs"].items():
+        assert of["description"], name
+    check = schema.schema["$defs"]["command check"]["properties"]
+    assert all("description" in of for key, of in check.items() if key not in ("schema", "command"))
+
+
+def applied(document: Any, steps: list[dict[str, Any]]) -> Any:
+    """A JSON Patch applied, by RFC 6902."""
+    document = json.loads(json.dumps(document))
+    for step in steps:
+        *way, last = [part.replace("~1", "/").replace("~0", "~") for part in step["path"].split("/")[1:]]
+        at = document
+        for part in way:
+            at = at[int(part)] if isinstance(at, list) else at[part]
+        if isinstance(at, list):
+            if last == "-":
+                at.append(step["value"])
+            else:
+                at[int(last)] = step["value"]
+        elif step["op"] == "remove":
+            del at[last]
+        else:
+            at[last] = step["value"]
+    return document
+
+
+@pytest.mark.parametrize("name", ["four-bar", "rssr", "windows-2", "bennett", "rprhrrr", "slider-crank"])
+def test_each_advice_can_be_applied(name: str, tmp_path: Path) -> None:
+    data = run("check", name)
+    report = mg.check(mg.load(name))
+    assert len(data["advice"]) == len(report.advice)
+    for number, (told, advice) in enumerate(zip(data["advice"], report.advice, strict=True)):
+        new = applied(data["declaration"], told["patch"])
+        file = tmp_path / f"{number}.toml"
+        file.write_text(tomli_w.dumps(new), encoding="utf-8")
+        assert mg.load(file) == advice.apply()
+        assert advice.patch() == patch(to_data(report.mechanism), to_data(advice.apply()))
+        if advice.effect is not None:
+            assert mg.check(mg.load(file)).redundancy == advice.effect.redundancy[1]
+
+
+def test_an_advice_is_saved_by_its_number(tmp_path: Path) -> None:
+    told = run("save", "four-bar", "--advice", "1", "--out", tmp_path / "better.toml")
+    assert told == {"schema": 1, "command": "save", "mechanism": "four-bar", "file": str(tmp_path / "better.toml")}
+    assert mg.load(tmp_path / "better.toml") == mg.check(mg.load("four-bar")).advice[1].apply()
+    result = CliRunner().invoke(app, ["save", "four-bar", "--advice", "99", "--out", str(tmp_path / "x.toml")])
+    assert result.exit_code == 2
+    assert "counted from 0" in result.stderr
+
+
+def test_solve_tells_the_results(tmp_path: Path) -> None:
+    data = run("solve", "four-bar", "--out", tmp_path / "x.csv")
+    s = mg.solve(mg.load("four-bar"))
+    assert data["written"] == {"file": str(tmp_path / "x.csv"), "rows": 360, "columns": len(s.columns())}
+    assert data["efforts"][0]["greatest"]["value"] == s["A"].effort.max()
+    assert data["efforts"][0]["greatest"]["position"] == s["A"].effort.argmax()
+    assert data["efforts"][0]["greatest"]["drivers"] == {"A.Rz": s["A"].position[s["A"].effort.argmax(), 0]}
+    for told in data["reactions"]:
+        parts = [s[told["pair"]].components[name] for name in told["force"]["parts"]]
+        assert math.isclose(told["force"]["greatest"]["value"], np.linalg.norm(parts, axis=0).max())
+        assert told["moment"]["greatest"] is None
+        assert told["not_unique"] == ["Fz", "Mx", "My"]
+    assert data["checks"]["closure"] == s.checks.closure.max()
+    assert mg.kinematics(mg.load("four-bar"), {"A": [0.1]}).to_dict()["reactions"] == []
+
+
+def test_a_failure_leaves_no_output() -> None:
+    result = CliRunner().invoke(app, ["solve", "rcsr", "--drive", "O1=150:220:1deg", "--json"])
+    assert (result.exit_code, result.stdout) == (1, "")
+    assert "out of reach" in result.stderr
+
+
+@pytest.mark.parametrize(
+    "call",
+    [("check", "rcsr", "--markdown"), ("solve", "rcsr", "--compare"), ("equations", "rcsr", "--latex")],
+    ids=" ".join,
+)
+def test_what_excludes_it(call: tuple[str, ...]) -> None:
+    assert CliRunner().invoke(app, [*call, "--json"]).exit_code == 2
+
+
+def test_numbers_that_json_has_not() -> None:
+    assert plain({"a": [math.nan, math.inf, 1.0]}) == {"a": [None, None, 1.0]}
+    assert json.loads(json_text({"a": math.nan})) == {"a": None}
+    with pytest.raises(TypeError, match="no JSON Schema"):
+        schema_of(np.ndarray, {})
