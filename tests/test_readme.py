@@ -17,10 +17,14 @@ import matplotlib.pyplot as plt
 import pytest
 from typer.testing import CliRunner
 
+import mechgraph as mg
 from mechgraph.cli import app
+from mechgraph.closure.driver_path import Status
 
 ROOT = Path(__file__).resolve().parents[1]
 README = ROOT / "README.md"
+EQUATIONS = ROOT / "examples" / "rcsr_equations.txt"
+"""What the README calls the page of all equations."""
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 ROUNDING = re.compile(r"\b\d(?:\.\d+)?e-1[0-9]\b")
 WORK = re.compile(r"\d+ (?=nodes|careful|evaluations|calls|factorizations)")
@@ -76,6 +80,24 @@ def test_what_the_readme_shows_is_what_comes_out() -> None:
             assert comparable(shown) == comparable(found)
 
 
+def test_every_outcome_and_every_error_stands_in_its_table() -> None:
+    """And nothing else; warnings and the common base have no row."""
+    section = README.read_text(encoding="utf-8").partition("### Outcomes and errors")[2].partition("\n### ")[0]
+    first = [row.split("|")[1].strip().split(", ") for row in section.splitlines() if row.startswith("| ")]
+    names = [name.strip("`") for row in first for name in row if name not in ("status", "error")]
+    errors = {name for name in mg.__all__ if name.endswith("Error")} - {"MechgraphError"}
+    assert sorted(names) == sorted([*(status.value for status in Status), *errors])
+
+
+def equations() -> str:
+    """The page of all equations, as it is printed."""
+    return run_command("$ mechgraph equations rcsr --blocks").partition("\n")[2]
+
+
+def test_the_page_of_equations_is_what_is_printed() -> None:
+    assert EQUATIONS.read_text(encoding="utf-8") == equations()
+
+
 def test_first_block_is_the_new_topology_of_the_examples() -> None:
     namespace: dict[str, object] = {}
     blocks = [body for kind, body in BLOCK.findall(README.read_text(encoding="utf-8")) if kind == "python"]
@@ -116,6 +138,7 @@ def update() -> None:
         return f"```{match[1]}\n{next(new)}```" if match[1] in ("text", "console") else match[0]
 
     README.write_text(BLOCK.sub(replaced, text), encoding="utf-8")
+    EQUATIONS.write_text(equations(), encoding="utf-8")
 
 
 if __name__ == "__main__":
