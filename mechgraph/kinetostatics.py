@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from typing import Any, Literal
 
@@ -28,6 +28,7 @@ from mechgraph.model.declaration import mapping_faults
 from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism, check_mechanism
 from mechgraph.pipeline import Options, Outcome, Pipeline
+from mechgraph.quantities import wrong
 from mechgraph.report.report import check, hinted
 from mechgraph.result.solution import Solution
 from mechgraph.structure.branching import branches, branches_text
@@ -172,6 +173,7 @@ def solve(
     on_reach: ReachName = "raise",
     engine: EngineName = "auto",
     tol: float | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Solution:
     """Driver efforts and all reactions for given driver motion (kinetostatics; statics where the rates are zero).
 
@@ -195,6 +197,7 @@ def solve(
     tol : accuracy to which directions (radians) and distances (over L, the mean radius) are meant; left out, that of the mechanism, or
         exact. What is solved is ``m.snapped(tol)``; ``checks.closure`` is that of the geometry as declared, and a position at which it
         exceeds ``tol`` is not solved (status "beyond tolerance").
+    progress : called with the numbers of positions done and of all, block by block, once the motion was followed.
 
     Raises
     ------
@@ -209,12 +212,14 @@ def solve(
             "engine": (engine, ENGINES),
         }
     )
+    if progress is not None and not callable(progress):
+        faults.append(wrong(progress, "progress", "a function of the positions done and of all"))
     given = () if loads is None else items_of(loads, "loads", faults)
     if faults:
         raise DeclarationError(f"solve {m.name!r}", faults)
     if loads is not None:
         m = m.replace(loads=given)
-    return _solve(m, motions, on_reach, Options(method, redundant, engine), actuate, tol)
+    return _solve(m, motions, on_reach, Options(method, redundant, engine, progress), actuate, tol)
 
 
 def assemble(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 
 import numpy as np
@@ -42,11 +42,15 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Options:
-    """How to solve: force ``method`` (None: motion alone), what becomes of ``redundant`` reactions, and the ``engine``."""
+    """How to solve: force ``method`` (None: motion alone), what becomes of ``redundant`` reactions, and the ``engine``.
+
+    ``progress`` is called with the numbers of positions done and of all that were reached, block by block.
+    """
 
     method: str | None = "loop_wrench"
     redundant: str = "nan"
     engine: str = "auto"
+    progress: Callable[[int, int], None] | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True)
@@ -314,10 +318,14 @@ class Outcome:
             self._fill_shared(good, whole)
             return
         self.trajectory.mark(bad, [status.value for status in found.status[bad]])
+        done, progress = 0, self.line.options.progress
         for places in [good] if whole else in_blocks(good):
             moved = self._moved(places)
             if moved is not None:
                 self._put(*moved)
+            done += len(places)
+            if progress is not None:
+                progress(done, len(good))
         for motion, f in self._beside_change_points():
             self._put(motion, f)
 

@@ -29,6 +29,8 @@ def check(
 ) -> None:
     """Print the determinacy report: the verdict, what to do, and what may be trusted; with --full all of it.
 
+    Example: mechgraph check four-bar --at A=30deg --full
+
     Exit status: 0 where forces can be solved; 1 where the loops cannot be closed, drivers depend on each other or have nothing
     to move, or a freedom is neither driven nor passive. Redundancy is information: a mechanism some of whose reactions are not
     unique has exit status 0, and so has a topology without geometry. 2 wrong usage or bad input.
@@ -37,8 +39,9 @@ def check(
         refuse("check", "--json, --markdown and --compare exclude each other")
     m = loaded(mechanism)
     values = dict(parse_at(m, text) for text in at or ())
-    with working("checking"):
+    with working(f"checking {m.name}: what can move"):
         report = mg.check(m, at=values or None, engine=engine, tol=tol)
+    with working(f"checking {m.name}: what is unique, what to do"):
         data = check_data(m, report) if json else {}
         text = report.to_markdown(full) if markdown else ""
         document = report.document(full)

@@ -55,6 +55,8 @@ def equations(
 
     With --at the coefficients {Q}, the right sides {C} and the unknowns {u} with numbers, at one position.
 
+    Example: mechgraph equations rcsr --at O1=160deg@0.1
+
     Exit status: 0 done; 1 the mechanism has no such position; 2 wrong usage or bad input.
     """
     if (latex or blocks) and (coefficients or csv):

@@ -19,7 +19,10 @@ from mechgraph.writing import formats_text
 
 
 def list_library(json: AsJson = False) -> None:
-    """Name the mechanisms of the library, with what they are."""
+    """Name the mechanisms of the library, with what they are.
+
+    Example: mechgraph list --json
+    """
     found = {name: mg.load(name) for name in mg.library()}
     if json:
         items = [
@@ -51,6 +54,8 @@ def save(
     json: AsJson = False,
 ) -> None:
     """Write a mechanism as another file: TOML, which holds all of it, or what other programs read.
+
+    Example: mechgraph save four-bar --advice 0 --out better.toml
 
     Exit status: 0 done; 1 it cannot be assembled, where the file holds it at its start; 2 wrong usage or bad input.
     """

@@ -47,6 +47,8 @@ def solve(
 ) -> None:
     """Solve positions, efforts of the drivers and all reactions, print a summary and write a table.
 
+    Example: mechgraph solve 7r --drive O1=0:360:5deg@10 --out 7r.csv
+
     Exit status: 0 done; 1 the loops cannot be closed, a position is out of reach or a dead point (unless flagged and others were
     solved), a freedom is neither driven nor passive, or drivers contradict each other; 2 wrong usage or bad input. A file is
     written whole or not at all.
@@ -56,11 +58,11 @@ def solve(
     check_out(out, mechanism, FORMATS)
     m = loaded(mechanism)
     motions = drives_of(m, drive or ())
-    with working(f"solving {m.name}"):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", mg.MechgraphWarning)  # the summary has them
-            how: dict[str, Any] = {"method": method, "redundant": redundant, "on_reach": on_reach, "engine": engine}
-            s = mg.solve(m, motions or None, actuate=actuate, tol=tol, **how)
+    with progress(f"solving {m.name}") as moved, warnings.catch_warnings():
+        warnings.simplefilter("ignore", mg.MechgraphWarning)  # the summary has them
+        how: dict[str, Any] = {"method": method, "redundant": redundant, "on_reach": on_reach, "engine": engine}
+        s = mg.solve(m, motions or None, actuate=actuate, tol=tol, progress=moved, **how)
+    with working(f"summary of {m.name}"):
         told = _told(s, out, json)
     _tell("solve", *told)
     if compared:
@@ -115,6 +117,8 @@ def respond(
 ) -> None:
     """Follow the motion that the loads produce, print a summary with the energy balance and write a table.
 
+    Example: mechgraph respond windows-2 --for 500ms --rate A0=-1
+
     Exit status: 0 done; 1 the loops cannot be closed, or the motion cannot be followed to its end (what there is is written); 2 wrong
     usage or bad input. Ctrl-C keeps what was computed. A file is written whole or not at all.
     """
@@ -128,6 +132,7 @@ def respond(
             m, t, start=begin, rates=rates, rtol=rtol, atol=atol, method=method, engine=engine, on_stop="return",
             progress=moved,
         )  # fmt: skip
+    with working(f"summary of {m.name}"):
         told = _told(r, out, json)
     _tell("respond", *told)
     if r.stopped:

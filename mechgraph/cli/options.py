@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from mechgraph.cli.completion import freedom_names, freedoms, library_names
 from mechgraph.exchange.files import READERS
 from mechgraph.result.export import FORMATS
 from mechgraph.writing import formats_text
@@ -15,6 +16,7 @@ Named = Annotated[
     str,
     typer.Argument(
         metavar="NAME_OR_FILE",
+        autocompletion=library_names,
         help=f"A mechanism of the library (see 'list'), a TOML file, or one of another program ({', '.join(READERS)}).",
     ),
 ]
@@ -47,18 +49,27 @@ OnReach = Annotated[
 ]
 At = Annotated[
     list[str] | None,
-    typer.Option("--at", metavar="FREEDOM=VALUE", help="Assemble there first: A=30deg, B.Tz=0.02 (repeat)."),
+    typer.Option(
+        "--at",
+        metavar="FREEDOM=VALUE",
+        autocompletion=freedoms,
+        help="Assemble there first: A=30deg, B.Tz=0.02 (repeat).",
+    ),
 ]
 EquationsAt = Annotated[
     list[str] | None,
     typer.Option(
-        "--at", metavar="FREEDOM=VALUE[@RATE[@ACCELERATION]]", help="Numbers at this position: A=30deg@10 (repeat)."
+        "--at",
+        metavar="FREEDOM=VALUE[@RATE[@ACCELERATION]]",
+        autocompletion=freedoms,
+        help="Numbers at this position: A=30deg@10 (repeat).",
     ),
 ]
 Drives = Annotated[
     list[str] | None,
     typer.Option(
         "--drive",
+        autocompletion=freedoms,
         metavar="FREEDOM=START:STOP:STEP[@RATE[@ACCELERATION]]",
         help="Motion of a driver, the end excluded: A=0:360:1deg@10, B.Tz=0:0.1:0.01, or one value A=30deg. Angles in rad, "
         "or in deg where the suffix says so; lengths, rates and accelerations in the declared units (rates of turns in "
@@ -72,6 +83,7 @@ Actuate = Annotated[
     typer.Option(
         "--actuate",
         metavar="FREEDOM",
+        autocompletion=freedom_names,
         help="A freedom in which an unknown effort stands, in place of those that are moved (repeat: as many as these).",
     ),
 ]

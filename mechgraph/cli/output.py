@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from rich.console import Console
-from rich.progress import Progress
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
 from mechgraph.document import Document, to_text
@@ -56,20 +56,26 @@ def show(document: Document, colour: str = "") -> None:
 
 @contextmanager
 def working(what: str) -> Iterator[None]:
-    """A spinner on stderr, where that is a terminal."""
+    """A spinner with the time passed on stderr, where that is a terminal."""
     if not is_terminal(sys.stderr):
         yield
         return
-    with Console(stderr=True).status(what):
+    columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
+    with Progress(*columns, console=Console(stderr=True), transient=True) as spinner:
+        spinner.add_task(what)
         yield
 
 
 @contextmanager
-def progress(what: str, end: float) -> Iterator[Callable[[float], None] | None]:
-    """A bar on stderr over a time span, where that is a terminal."""
+def progress(what: str, end: float | None = None) -> Iterator[Callable[..., None] | None]:
+    """A bar on stderr, where that is a terminal; ``moved(reached, of=end)``. Without an end it runs to and fro until there is one."""
     if not is_terminal(sys.stderr):
         yield None
         return
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(what, total=end)
-        yield lambda reached: bar.update(task, completed=reached)
+
+        def moved(reached: float, of: float | None = end) -> None:
+            bar.update(task, completed=reached, total=of)
+
+        yield moved

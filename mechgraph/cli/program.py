@@ -36,7 +36,6 @@ app = typer.Typer(
     help="Spatial mechanisms as graphs of links and pairs: determinacy, equations, motion, driver efforts and reactions.\n\n"
     + EXIT_STATUS,
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},

@@ -46,6 +46,8 @@ def loads(
 ) -> None:
     """Print what acts on a link over the positions, in its own frame and in balance, and write it as a table or a load deck.
 
+    Example: mechgraph loads 7r link3 --drive O1=0:360:5deg@10 --at all
+
     Exit status: 0 done; 1 as for solve; 2 wrong usage or bad input, or something that is not unique would have to be written as known.
     """
     check_out(out, mechanism, FORMATS)
