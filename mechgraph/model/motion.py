@@ -13,9 +13,10 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
 from mechgraph.model.field_format import SERIES, Described
-from mechgraph.model.motion_law import LAWS, Array, Law, LawFault, Smooth, rates_of_samples, read_series
+from mechgraph.model.motion_law import LAWS, Law, LawFault, Smooth, rates_of_samples, read_series
 from mechgraph.quantities import has_quantity, shown, wrong
 from mechgraph.units import LENGTH, PURE, TIME
 
