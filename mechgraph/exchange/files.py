@@ -16,6 +16,7 @@ from mechgraph.exchange.mjcf_write import save_mjcf
 from mechgraph.exchange.urdf import read_urdf
 from mechgraph.model import toml
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.reading import text_of
 from mechgraph.writing import Format
 
 Notes = tuple[str, ...]
@@ -23,7 +24,7 @@ Notes = tuple[str, ...]
 
 def assembly_of(path: Path) -> Assembly:
     """A FreeCAD assembly as its file holds it."""
-    return Reader(path, toml.text_of(path, "FreeCAD assembly")).read()
+    return Reader(path, text_of(path, "FreeCAD assembly")).read()
 
 
 def _from_asmt(path: Path) -> tuple[Mechanism, Notes]:

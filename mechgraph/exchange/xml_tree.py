@@ -1,7 +1,7 @@
 """XML from strangers: elements with their lines, read by the parser of the standard library without anything that a text could make it do.
 
 A document type declaration, by which entities multiply and other files are read, is refused; the size of a file is limited by
-``model.toml.text_of``.
+``reading.text_of``.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import FileError
 from mechgraph.exchange.indented import numbers_of
-from mechgraph.model.toml import text_of
 from mechgraph.quantities import shown
+from mechgraph.reading import text_of
 
 
 @dataclass
