@@ -116,6 +116,49 @@ class Written:
 
 
 @dataclass(frozen=True)
+class ActingData:
+    """Something that acts on a link at a point of it, in the frame of the link."""
+
+    name: str
+    kind: Annotated[str, "pair, load, inertia, hold (of a passive body) or support (of the frame)"]
+    about: str
+    point: tuple[float, float, float]
+    distributed: Annotated[bool, "whether it acts on all of the mass, at whose centre it stands"]
+
+
+@dataclass(frozen=True)
+class WrenchData:
+    """Moment about the point and force, in the frame of the link; no number where it is not unique, unless that of least norm."""
+
+    moment: tuple[float | None, float | None, float | None]
+    force: tuple[float | None, float | None, float | None]
+    unique: Annotated[tuple[bool, ...], "of the three numbers of the moment, then of the force"]
+
+
+@dataclass(frozen=True)
+class CaseData:
+    """All that acts on a link at one position."""
+
+    position: int
+    place: Annotated[str, "the values of the drivers"]
+    why: Annotated[tuple[str, ...], "what is greatest there"]
+    wrenches: Annotated[Mapping[str, WrenchData], "by the name of what acts"]
+
+
+@dataclass(frozen=True)
+class LoadsData:
+    """What acts on a link, in balance at every position."""
+
+    mechanism: str
+    link: str
+    units: Annotated[Mapping[str, str], "names of the units of length, mass and time, where they are declared"]
+    balance: Annotated[float | None, "the sum of all, of the largest; none where something is not unique"]
+    acting: tuple[ActingData, ...]
+    cases: tuple[CaseData, ...]
+    written: Annotated[str | None, "the file that was written"]
+
+
+@dataclass(frozen=True)
 class SaveData:
     """A mechanism that was written as a file."""
 
@@ -154,6 +197,25 @@ def equations_data(f: mg.Formulation, s: mg.Solution | None) -> EquationsData:
     )
 
 
+def loads_data(body: mg.FreeBody, at: Any, written: str | None) -> LoadsData:
+    """What acts on a link at positions."""
+    flat = {one.name: (one.wrench.reshape(-1, 6), one.unique.reshape(-1, 6)) for one in body.acting}
+
+    def wrench(name: str, position: int) -> WrenchData:
+        values, unique = (part[position].tolist() for part in flat[name])
+        return WrenchData(tuple(values[:3]), tuple(values[3:]), tuple(unique))
+
+    return LoadsData(
+        body.mechanism.name,
+        body.link.name,
+        dict(body.mechanism.units),
+        body.balance,
+        tuple(ActingData(one.name, one.kind, one.about, one.point, one.distributed) for one in body.acting),
+        tuple(CaseData(*case, {name: wrench(name, case.position) for name in flat}) for case in body.cases(at)),
+        written,
+    )
+
+
 def write_json(command: str, data: Any, **more: Any) -> None:
     """The record of a command on standard output."""
     write(json_text({"schema": VERSION, "command": command, **plain(data), **more}))
@@ -186,6 +248,7 @@ COMMANDS: dict[str, Callable[[Json], Json]] = {
     "solve": _record(SolutionData, written=Written | None),
     "respond": _record(ResponseData, written=Written | None),
     "save": _record(SaveData),
+    "loads": _record(LoadsData),
 }
 """The schema of what every command prints."""
 

@@ -10,9 +10,10 @@ from typing import Annotated, Any, Literal
 import typer
 
 import mechgraph as mg
-from mechgraph.cli.options import Actuate, Drives, Engine, Named, OnReach, Redundant, Tolerance
+from mechgraph.cli.options import Actuate, AsJson, Drives, Engine, Named, OnReach, Redundant, Tolerance
 from mechgraph.cli.output import show, working, write
 from mechgraph.cli.reading import check_out, loaded
+from mechgraph.cli.records import loads_data, write_json
 from mechgraph.result.load_files import FORMATS
 from mechgraph.typed import drives_of, refuse
 from mechgraph.writing import formats_text
@@ -43,6 +44,7 @@ def loads(
     on_reach: OnReach = "raise",
     engine: Engine = "auto",
     tol: Tolerance = None,
+    json: AsJson = False,
 ) -> None:
     """Print what acts on a link over the positions, in its own frame and in balance, and write it as a table or a load deck.
 
@@ -65,6 +67,9 @@ def loads(
         document = body.document(places)
         if out is not None:
             body.write(out, places, **{name: value for name, value in options.items() if value})
+    if json:
+        write_json("loads", loads_data(body, places, None if out is None else str(out)))
+        return
     show(document)
     if out is not None:
         write(f"\nWrote {out}: {len(body.cases(places))} positions.\n")
