@@ -325,6 +325,22 @@ def _type_data(row: PairType, path: str) -> dict[str, Any]:
     return {key: value for key, value in data.items() if value is not None}
 
 
+def written(m: Mechanism, path: str | os.PathLike[str] = "") -> str:
+    """A mechanism as TOML; ``path`` is that of errors.
+
+    Raises
+    ------
+    FileError
+        where a load is a callable.
+    """
+    try:
+        text = tomli_w.dumps(to_data(m, str(path)))
+        text.encode("utf-8")
+    except (TypeError, ValueError, RecursionError) as error:
+        raise FileError(path, f"mechanism {m.name!r} cannot be written as TOML: {error}") from None
+    return text
+
+
 def save(m: Mechanism, path: str | os.PathLike[str]) -> None:
     """Write a mechanism as TOML; ``load`` gives back an equal one. The file is written whole or not at all.
 
@@ -334,9 +350,4 @@ def save(m: Mechanism, path: str | os.PathLike[str]) -> None:
         where a load is a callable, or the file cannot be written.
     """
     check_mechanism(m, "save")
-    try:
-        text = tomli_w.dumps(to_data(m, str(path)))
-        text.encode("utf-8")
-    except (TypeError, ValueError, RecursionError) as error:
-        raise FileError(path, f"mechanism {m.name!r} cannot be written as TOML: {error}") from None
-    write_whole(path, [text])
+    write_whole(path, [written(m, path)])

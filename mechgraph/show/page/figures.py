@@ -1,0 +1,132 @@
+"""A scene as the page draws it: pieces in frames, of which those of rigid pair markers are left to their links."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.document.tree import plain
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.pair import Pair
+from mechgraph.show.canvas import MUTED, PALETTE
+from mechgraph.show.page.packing import packed, rounded
+from mechgraph.show.scene import Scene
+from mechgraph.show.shapes import Shape
+from mechgraph.show.stage import Part
+
+OBLIQUE = (0.6, -1.0, 0.55)
+"""Direction from which a spatial mechanism is seen, in upright axes."""
+ROOM = 7.0
+"""Room about what is drawn, for names and arrows, over the half width of a symbol."""
+LEFT_OUT = {"reaction"}
+"""Parts that the page draws itself, from numbers."""
+
+
+class Figure:
+    """What is drawn of a scene; ``names`` are the frames that are handed over, in order."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene, self.m = scene, scene.mechanism
+        self.home = {f"pair:{p.name}@0": (p.a, p.markers[0].pose()) for p in self.m.pairs}
+        self.home |= {f"pair:{p.name}@{p.type.f}": (p.b, p.markers[1].pose()) for p in self.m.pairs}
+        self.parts = [part for part in scene.parts if part.role not in LEFT_OUT]
+        used = [self.placed(part.frame)[0] for part in self.parts]
+        links = [f"link:{name}" for name in self.m.link_names()]
+        self.names = list(dict.fromkeys([*links, *used]))
+        self.number = {name: i for i, name in enumerate(self.names)}
+
+    def placed(self, frame: str) -> tuple[str, Array]:
+        """The frame that is handed over for a frame, and its pose in that."""
+        if frame in self.home:
+            link, pose = self.home[frame]
+            return f"link:{link}", pose
+        return frame, np.eye(3, 4)
+
+    def data(self, frames: Mapping[str, Array], rows: Mapping[str, list[list[str]]]) -> dict[str, Any]:
+        """The figure where it stands at the first of ``frames``; ``rows`` are facts of the pairs."""
+        scene, colours = self.scene, colours_of(self.m)
+        points = (
+            np.concatenate([at[:1] for at in scene.points.values()]) if scene.positions.size == 1 else scene.everything
+        )
+        look = scene.normal if scene.normal is not None else scene.upright @ np.array(OBLIQUE) / np.linalg.norm(OBLIQUE)
+        screen = np.stack([np.cross(scene.upright[:, 2], look), scene.upright[:, 2], look])
+        screen[0] /= np.linalg.norm(screen[0])
+        screen[1] = np.cross(look, screen[0])
+        seen = points @ screen.T
+        low, high = seen.min(axis=0), seen.max(axis=0)
+        return {
+            "name": plain(self.m.name),
+            "size": float(scene.size),
+            "span": rounded(high[:2] - low[:2] + ROOM * scene.symbol),
+            "symbol": float(scene.symbol),
+            "center": rounded(screen.T @ (low + high) / 2),
+            "up": rounded(scene.upright[:, 2]),
+            "look": rounded(look),
+            "links": [{"name": plain(name), "colour": colours[name]} for name in self.m.link_names()],
+            "pairs": [self._pair(pair, rows.get(pair.name, [])) for pair in self.m.pairs],
+            "pieces": [self.piece(part) for part in self.parts],
+            "labels": [self._label(label) for label in scene.labels],
+            "frames": packed(self.of(frames, self.names)[0]),
+        }
+
+    def of(self, frames: Mapping[str, Array], names: list[str]) -> Array:
+        """Affine maps ``(T, n, 12)`` of some frames, row by row."""
+        return np.stack([np.asarray(frames[name]).reshape(-1, 12) for name in names], axis=1)
+
+    def motion(self, frames: Mapping[str, Array], kind: str) -> dict[str, Any]:
+        """How the figure moves: the frames that do not stand still, over ``T``."""
+        still = 1e-7 * self.scene.size
+        moving = [n for n in self.names if np.nanmax(np.ptp(frames[n], axis=0), initial=0.0) > still]
+        values = self.of(frames, moving) if moving else np.zeros((len(next(iter(frames.values()))), 0, 12))
+        return {"frames": [self.number[name] for name in moving], "values": packed(values), "kind": kind}
+
+    def _pair(self, pair: Pair, rows: list[list[str]]) -> dict[str, Any]:
+        return {
+            "name": plain(pair.name), "type": pair.type.symbol, "title": plain(pair.type.name), "a": plain(pair.a), "b": plain(pair.b),
+            "frame": self.number[f"link:{pair.b}"], "at": rounded(np.asarray(pair.markers[1].point)), "rows": rows,
+        }  # fmt: skip
+
+    def piece(self, part: Part) -> dict[str, Any]:
+        """A part in the frame that is handed over."""
+        colours = colours_of(self.m)
+        frame, X = self.placed(part.frame)
+        shape = part.shape.moved(X[:, :3], X[:, 3])
+        names = [p.name for p in self.m.pairs]
+        return {
+            "frame": self.number[frame], "role": part.role, "colour": colours.get(part.link, ""), "dashed": part.dashed,
+            "pair": names.index(part.owner) if part.owner in names else -1,
+            "vertices": packed(shape.vertices), "triangles": triangles(shape), "lines": segments(shape),
+        }  # fmt: skip
+
+    def _label(self, label: Any) -> dict[str, Any]:
+        frame, X = self.placed(label.frame)
+        names = [p.name for p in self.m.pairs]
+        pair = names.index(label.owner) if label.kind == "pair" else -1
+        at = X[:, :3] @ label.at + X[:, 3]
+        return {
+            "text": plain(label.text),
+            "kind": label.kind,
+            "frame": self.number[frame],
+            "pair": pair,
+            "at": rounded(at),
+        }
+
+
+def colours_of(m: Mechanism) -> dict[str, str]:
+    """A colour for every link; grey for the frame."""
+    moving = [name for name in m.link_names() if name != m.frame]
+    return {m.frame: MUTED} | {name: PALETTE[i % len(PALETTE)] for i, name in enumerate(moving)}
+
+
+def triangles(shape: Shape) -> list[int]:
+    """The polygons of a shape, all convex, as triangles."""
+    return [int(i) for face in shape.faces for k in range(1, len(face) - 1) for i in (face[0], face[k], face[k + 1])]
+
+
+def segments(shape: Shape) -> list[int]:
+    """Its lines, and the edges of its rims, as segments."""
+    rims = [(*face, face[0]) for face in shape.faces[: shape.rims]]
+    return [int(i) for line in (*shape.lines, *rims) for k in range(len(line) - 1) for i in line[k : k + 2]]
