@@ -1,5 +1,8 @@
 """mechgraph: spatial mechanisms as graphs of links and pairs; determinacy, equations, motion, drivers and reactions."""
 
+import importlib
+from typing import TYPE_CHECKING, Any
+
 from mechgraph import starting  # noqa: F401  # isort: skip  # before all that takes time to load
 from mechgraph.algebra import inertia
 from mechgraph.equations.build import formulate
@@ -43,6 +46,9 @@ from mechgraph.result.free_body import FreeBody, free_body
 from mechgraph.result.solution import Solution
 from mechgraph.variants.result import Study
 from mechgraph.variants.study import study
+
+if TYPE_CHECKING:
+    from mechgraph.show.page.write import write_report
 
 __all__ = [
     "AssemblyError",
@@ -99,4 +105,12 @@ __all__ = [
     "save",
     "solve",
     "study",
+    "write_report",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """What takes time to load, and few calls need."""
+    if name == "write_report":
+        return importlib.import_module("mechgraph.show.page.write").write_report
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -4,6 +4,7 @@ from mechgraph.cli.determinacy import check
 from mechgraph.cli.formulation import equations
 from mechgraph.cli.library import list_library, save
 from mechgraph.cli.motion import respond, solve
+from mechgraph.cli.page import report
 from mechgraph.cli.program import app
 from mechgraph.cli.strength import loads
 
@@ -16,3 +17,4 @@ app.command("solve")(solve)
 app.command("respond")(respond)
 app.command("save")(save)
 app.command("loads")(loads)
+app.command("report")(report)

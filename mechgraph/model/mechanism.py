@@ -258,9 +258,21 @@ class Mechanism(Parts, Shown):
         DeclarationError, AssemblyError
             where the mechanism has no geometry, or its loops do not close to ``tol``.
         """
-        # the only call up to a room above: a user looks for it here
+        # this and view() call up to a room above: a user looks for them here
         made: Mechanism = importlib.import_module("mechgraph.structure.snapping").snapped(self, tol)
         return made
+
+    def view(self) -> Any:
+        """The mechanism in a notebook, in space, with every freedom, self-stress and advice (``notebook`` extra).
+
+        It moves as its drivers' stored motions say, where they all store one.
+
+        Raises
+        ------
+        DeclarationError
+            where it cannot be drawn; MissingExtraError without anywidget.
+        """
+        return importlib.import_module("mechgraph.show.page.widget").view(self)
 
     def moved(self, pose: Any) -> Mechanism:
         """The whole mechanism after a rigid motion: a 4 x 4 (or 3 x 4) pose. Coordinates of the pairs stay what they are."""

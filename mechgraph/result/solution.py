@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -179,6 +180,17 @@ class Solution(Shown):
     def to_json(self) -> str:
         """The same as JSON."""
         return json_text(self.to_dict())
+
+    def view(self) -> Any:
+        """The solution in a notebook: the mechanism in space, its forces and curves (``notebook`` extra).
+
+        Raises
+        ------
+        MissingExtraError
+            without anywidget.
+        """
+        # up to a room above: a user looks for it here
+        return importlib.import_module("mechgraph.show.page.widget").view(self)
 
     def state(self, index: Any = ()) -> State:
         """Screws, loads and coordinates at one position, for ``Formulation.assemble``."""

@@ -11,6 +11,7 @@ from mechgraph.document.tree import plain
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.report.report import DeterminacyReport, check
 from mechgraph.report.words import component_words
+from mechgraph.result.places import with_unit
 from mechgraph.result.solution import Solution
 from mechgraph.show.page.changes import compared, stress_arrows
 from mechgraph.show.page.cycle import Cycle
@@ -30,6 +31,11 @@ LONGEST_TITLE = 48
 """Letters of a self-stress by which it is chosen; all of it stands below the picture."""
 MOST_POSITIONS = 1500
 """Positions of a cycle that are shown; of more, so many evenly spread."""
+
+ARROWS = (
+    "Arrows: force (one head) and moment (two heads) that the first link of a pair exerts on the second; striped where part of the "
+    "reaction is not unique and left out"
+)
 
 Data = dict[str, Any]
 
@@ -72,7 +78,7 @@ class _View:
             *self.limited("self-stresses", self.stresses()),
         ]
         items += self.limited("advice", self.advice())
-        cycle = Cycle(self.s_shown, self.scene, self.report.unique).data() if self.s is not None else None
+        cycle = Cycle(self.s_shown, self.scene).data() if self.s is not None else None
         return {"figures": self.figures, "items": items, "cycle": cycle, "note": " ".join(self.notes)}
 
     @property
@@ -94,7 +100,7 @@ class _View:
 
     def item(self, group: str, title: str, text: str, **more: Any) -> Data:
         """Something to show."""
-        made = {"figure": 0, "motion": None, "arrows": [], "marked": [], "axes": [], "pieces": [], "after": None}
+        made: Data = {"figure": 0, "motion": None, "arrows": [], "marked": [], "axes": [], "pieces": [], "after": None}
         return {
             "group": group,
             "title": plain(title).replace("->", "→"),
@@ -109,13 +115,13 @@ class _View:
             yield self.item("The mechanism", "as it stands", f"{plain(self.m.name)} where its loops are closed.")
             return
         s = self.s_shown
-        kind = "cycle" if Cycle(s, self.scene, {}).returns else "swing"
+        kind = "cycle" if Cycle(s, self.scene).returns else "swing"
         count = len(self.scene.positions)
         status = np.asarray(self.s.status).size
         lost = int(np.count_nonzero(np.asarray(self.s.status) != "ok"))
         text = f"{status - lost} of {status} positions" if lost else f"{count} position{'s' * (count != 1)}"
         if s.has_forces:
-            text += ". Arrows: force (one head) and moment (two heads) that the first link of a pair exerts on the second; striped where part of the reaction is not unique and left out"
+            text += f". {ARROWS}"
         yield self.item("The motion", "solved motion", f"{text}.", motion=self.figure.motion(self.scene.frames, kind))
 
     def freedoms(self) -> Iterator[Data]:
@@ -201,8 +207,8 @@ def _title(stress: SelfStress, number: int) -> str:
 
 
 def _told(m: Mechanism, stress: SelfStress, L: float) -> str:
+    length = with_unit(f"{L:.4g}", m.units.get("length", ""))
     return (
         f"Reactions that balance each other without any load; assembly can lock in any multiple: {stress.text or 'efforts of couplings'}. "
-        f"Arrows: on the second link of each pair, the first takes the opposite; moments (two heads) divided by {L:.4g} {m.units.get('length', '')}".rstrip()
-        + "."
+        f"Arrows: on the second link of each pair, the first takes the opposite; moments (two heads) divided by {length}."
     )

@@ -10,8 +10,8 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.document.tree import plain
 from mechgraph.model.pair import Pair
+from mechgraph.result.places import NOISE, driver_value
 from mechgraph.result.solution import Solution
-from mechgraph.result.summary import NOISE, driver_value
 from mechgraph.show.page.forces import components_of, wrench_of
 from mechgraph.show.page.packing import packed
 from mechgraph.show.scene import Scene
@@ -19,15 +19,14 @@ from mechgraph.units import unit_of
 
 FORCE, MOMENT, LENGTH, TIME = (1, 1, -2), (2, 1, -2), (1, 0, 0), (0, 0, 1)
 
-Unique = Mapping[str, Mapping[str, bool]]
 Data = dict[str, Any]
 
 
 class Cycle:
-    """A solution at the positions of its scene; ``unique`` says what of the reactions is, where it holds those of least norm."""
+    """A solution at the positions of its scene."""
 
-    def __init__(self, s: Solution, scene: Scene, unique: Unique) -> None:
-        self.s, self.scene, self.unique = s, scene, unique
+    def __init__(self, s: Solution, scene: Scene) -> None:
+        self.s, self.scene = s, scene
         self.m = s.mechanism
         self.drivers = {name: self.of_freedom(name, "position") for name in s.prescribed}
         forces = [self.at(s[p.name].force) for p in self.m.pairs] if s.has_forces else []
@@ -46,6 +45,10 @@ class Cycle:
         """A quantity of one freedom, ``(T,)``."""
         k, j = self.s.whole.freedom(name)
         return self.at(getattr(self.s[self.s.whole.pairs[k].name], what)[..., j])
+
+    def unique(self, pair: Pair) -> dict[str, bool]:
+        """Which components of a reaction are unique at every position, also where those of least norm stand for them; and efforts."""
+        return {name: bool(np.all(self.at(found))) for name, found in self.s[pair.name].unique.items()}
 
     def unit(self, dimension: tuple[int, int, int]) -> str:
         """A unit, as declared."""
@@ -109,7 +112,13 @@ class Cycle:
             for couple, dimension in ((True, MOMENT), (False, FORCE)):
                 mine = {n: v for n, v in rows.items() if self._is_couple(n) is couple}
                 if mine:
-                    yield self.chart(title, dimension, mine, {})
+                    yield self.chart(title, dimension, mine, {n: self._effort_is_unique(n) for n in mine})
+
+    def _effort_is_unique(self, freedom: str) -> bool:
+        k, j = self.s.whole.freedom(freedom)
+        pair = self.s.whole.pairs[k]
+        found = self.unique(pair)
+        return found.get(f"effort {pair.type.freedoms[j].name}", found.get("effort", True))
 
     def _is_couple(self, freedom: str) -> bool:
         k, j = self.s.whole.freedom(freedom)
@@ -121,15 +130,20 @@ class Cycle:
         """Curves of one unit; what is not known at some position is named, not drawn."""
         floor = self.noise * (1.0 if dimension == FORCE else self.scene.size)
         series = [
-            {"name": plain(name), "values": packed(np.where(np.abs(v) <= floor, 0.0, v)), "known": "unique" if unique.get(name, True) else "least norm"}
-            for name, v in rows.items() if not np.isnan(v).any()
-        ]  # fmt: skip
+            {
+                "name": plain(name),
+                "values": packed(np.where(np.abs(v) <= floor, 0.0, v)),
+                "known": "unique" if unique.get(name, True) else "least norm",
+            }
+            for name, v in rows.items()
+            if not np.isnan(v).any()
+        ]
         lost = [plain(name) for name, v in rows.items() if np.isnan(v).any()]
         return {"title": title, "unit": self.unit(dimension), "series": series, "open": lost}
 
     def reaction(self, pair: Pair) -> Iterable[Data]:
         """Components of a reaction in the pair's own frames, forces and moments apart, with the size of each where all of it is known."""
-        unique = self.unique.get(pair.name, {})
+        unique = self.unique(pair)
         found = {name: self.at(v) for name, v in self.s[pair.name].components.items()}
         own = components_of(pair)
         for couple, dimension, size, what in ((False, FORCE, "force", "F"), (True, MOMENT, "moment", "M")):
@@ -163,7 +177,7 @@ class Cycle:
 
     def arrows(self, i: int, pair: Pair) -> Data:
         """Force and moment on link b at its marker: of what has a value; ``open`` names what is not unique."""
-        own, unique, frames = components_of(pair), self.unique.get(pair.name, {}), self.scene.frames
+        own, unique, frames = components_of(pair), self.unique(pair), self.scene.frames
         found = {name: self.at(v) for name, v in self.s[pair.name].components.items()}
         lost = [plain(n) for n, v in found.items() if np.isnan(v).any() or not unique.get(n, True)]
         if own:

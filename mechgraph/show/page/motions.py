@@ -29,7 +29,10 @@ TURN = 48
 
 @dataclass(frozen=True)
 class Wiggle:
-    """One freedom: states ``x (nx, T)`` in the order in which they are passed, a ``title`` and what it is in words; of a turn its ``axis`` and ``links``."""
+    """One freedom: states ``x (nx, T)`` in the order in which they are passed, a ``title`` and what it is in words.
+
+    Of a passive turn also its ``axis`` and the ``links`` that turn.
+    """
 
     group: str
     title: str

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import base64
 import io
 from collections.abc import Iterator
 from typing import Any
+from urllib.parse import quote
 
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.result.solution import Solution
@@ -27,4 +27,4 @@ def _picture(ax: Any) -> str:
     buffer = io.BytesIO()
     with rc_context({"svg.hashsalt": "mechgraph"}):
         ax.figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    return f"data:image/svg+xml;base64,{base64.b64encode(buffer.getvalue()).decode()}"
+    return f"data:image/svg+xml,{quote(buffer.getvalue().decode(), safe=' =:/,.;()-')}"

@@ -18,7 +18,6 @@ from mechgraph.model.mechanism import Mechanism, check_mechanism
 from mechgraph.quantities import wrong
 from mechgraph.report.report import DeterminacyReport, check
 from mechgraph.result.solution import Solution
-from mechgraph.result.summary import summary
 from mechgraph.show.page import made
 from mechgraph.show.page.content import view_data
 from mechgraph.show.page.packing import json_for_script
@@ -112,7 +111,7 @@ def _content(m: Mechanism, report: DeterminacyReport, s: Solution | None, study:
         "report": _html(Document("", report.document(full=True).blocks)),
         "data": json_for_script(data) if data is not None else "",
         "stills": list(stills(m if s is None else s.mechanism, s)) if drawn else [],
-        "results": [(title, _html(document)) for title, document in _results(report, s, study)],
+        "results": [(title, _html(document)) for title, document in _results(s, study)],
         "equations": _html(Document("", formulate(report.mechanism).document().blocks)),
         "provenance": _html(provenance(m, report, s, study)), "declaration": declaration(m),
         "version": version(), "libraries": made.libraries(),
@@ -144,10 +143,9 @@ def _numbers(r: DeterminacyReport, s: Solution | None) -> Iterator[tuple[str, st
         yield "positions solved", f"{int((status == 'ok').sum())} of {status.size}"
 
 
-def _results(r: DeterminacyReport, s: Solution | None, study: Study | None) -> Iterator[tuple[str, Document]]:
+def _results(s: Solution | None, study: Study | None) -> Iterator[tuple[str, Document]]:
     if s is not None:
-        unique = r.unique if s.has_forces else None
-        yield "Results", Document("", summary(s, unique).blocks)
+        yield "Results", Document("", s.document(asked=True).blocks)
     if study is not None:
         yield "Study", study_document(study)
 
