@@ -33,7 +33,8 @@ def report(
     Without --drive the stored motion is solved, where all drivers store one; else the page shows the mechanism as it stands.
 
     Exit status: 0 done; 1 the loops cannot be closed for a motion, a freedom is neither driven nor passive, drivers contradict each
-    other, or a position cannot be reached (the page says what there is); 2 wrong usage or bad input. The file is written whole or not at all.
+    other, or a position cannot be reached (the page says what there is); 2 wrong usage or bad input. The file is written whole or not
+    at all.
 
     Example: mechgraph report four-bar -o four-bar.html
     """

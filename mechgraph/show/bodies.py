@@ -10,6 +10,7 @@ import numpy as np
 import scipy
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.document.tree import plain
 from mechgraph.model.pair import Pair
 from mechgraph.show import shapes
 from mechgraph.show.shapes import Shape, frame_along
@@ -136,12 +137,12 @@ def freedom_arrow(line: Line, size: float, sign: float = 1.0) -> Shape:
 def labels(stage: Stage) -> Iterator[Label]:
     """Names of pairs with their types, of points, and of moving links."""
     for pair in stage.m.pairs:
-        text = f"{pair.name} ({pair.type.symbol})"
+        text = plain(f"{pair.name} ({pair.type.symbol})")
         yield Label("pair", text, pair.name, "", f"pair:{pair.name}@{pair.type.f}", np.zeros(3))
     for link in stage.m.links:
         frame, corners = f"link:{link.name}", stage.corners(link.name)
         for name, p in link.points.items():
             text = f"{link.name}.{name}"
-            yield Label("point", text, text, link.name, frame, np.asarray(p, dtype=float))
+            yield Label("point", plain(text), text, link.name, frame, np.asarray(p, dtype=float))
         if link.name != stage.m.frame and corners:
-            yield Label("link", link.name, link.name, link.name, frame, np.mean(corners, axis=0))
+            yield Label("link", plain(link.name), link.name, link.name, frame, np.mean(corners, axis=0))

@@ -22,7 +22,7 @@ export function made(tag, properties = {}, ...children) {
  */
 function button(text, said) {
   const node = made("button", { type: "button", textContent: text, title: said });
-  if (said) node.setAttribute("aria-label", said);
+  if (text.length === 1) node.setAttribute("aria-label", said);
   return node;
 }
 
@@ -57,7 +57,6 @@ export function elements(root) {
     facts: made("dl", { className: "facts" }),
     charts: made("div", { className: "charts" }),
   };
-  ui.fit.textContent = "Fit";
   ui.caption.setAttribute("aria-live", "polite");
   ui.choices.setAttribute("role", "group");
   ui.choices.setAttribute("aria-label", "what is shown");

@@ -10,6 +10,16 @@ export function start() {
   const data = document.getElementById("data")?.textContent;
   if (root && data) mount(root, JSON.parse(data));
   for (const table of document.querySelectorAll("main table")) enhance(/** @type {HTMLTableElement} */ (table));
+  const reach = () => {
+    // what scrolls can be reached and scrolled by keyboard
+    for (const part of document.querySelectorAll("main pre, main .equation")) {
+      if (part.scrollWidth > part.clientWidth) part.setAttribute("tabindex", "0");
+      else part.removeAttribute("tabindex");
+    }
+  };
+  reach();
+  window.addEventListener("resize", reach);
+  for (const part of document.querySelectorAll("details")) part.addEventListener("toggle", reach);
   /** @type {HTMLDetailsElement[]} */
   let opened = [];
   window.addEventListener("beforeprint", () => {

@@ -1,0 +1,665 @@
+"""The page that is passed on: what stands in it, and what it does in Chromium."""
+
+import base64
+import json
+import os
+import re
+import shutil
+import subprocess
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from functools import cache
+from hashlib import sha256
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+from xml.etree import ElementTree
+
+import machines
+import mechanisms
+import numpy as np
+import pytest
+from chromium import DRAWS_NOT, Reader, chromium
+from test_cli import run
+from test_hostile_names import NAMES, named
+
+import mechgraph as mg
+from mechgraph.show.page import made
+from mechgraph.show.page.packing import json_for_script, packed
+from mechgraph.show.page.write import report_page
+
+pytestmark = pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
+
+WEB = Path(made.__file__).parent / "web"
+SHOWN = ("four-bar", "rssr", "bricard-cube", "rcsr")
+"""Redundant; with a passive freedom; without a stored motion; determinate."""
+SVG = {"svg", "metadata", "RDF", "Work", "type", "format", "title", "creator", "Agent", "defs", "style", "g", "path", "use", "text",
+       "clipPath", "rect", "tspan"}  # fmt: skip
+"""Elements of the still pictures."""
+LARGEST_PAGE = 1_000_000
+"""Bytes of a page without its data."""
+MODULES = Path(os.environ.get("PAGE_NODE_MODULES", WEB / "node_modules"))
+"""What npm installed for the scripts of the page."""
+AXE = MODULES / "axe-core" / "axe.min.js"
+
+
+@cache
+def page_of(name: str) -> str:
+    """The page of a mechanism of the library, made once."""
+    return report_page(mg.load(name))
+
+
+def numbers(packed: dict[str, Any]) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(packed["f32"]), "<f4").reshape(packed["shape"])
+
+
+def data_of(page: str) -> dict[str, Any]:
+    return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page)[1])  # type: ignore[index]
+
+
+class Shape(HTMLParser):
+    """Elements and attributes of a page."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.tags: list[str] = []
+        self.attributes: set[str] = set()
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.attributes |= {key for key, _ in attrs}
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("pages")
+    out = {}
+    for name in SHOWN:
+        out[name] = folder / f"{name}.html"
+        out[name].write_text(page_of(name), encoding="utf-8")
+    return out
+
+
+@pytest.fixture(scope="module")
+def reader(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Reader]:
+    with chromium(tmp_path_factory.mktemp("browser")) as found:
+        yield found
+
+
+# --- what stands in it -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", mg.library())
+def test_a_page_for_every_mechanism(name: str) -> None:
+    """One file that asks nothing of the network; what is not data fits into a megabyte."""
+    page = page_of(name)
+    pictures = re.findall(r'src="(data:image/svg[^"]*)"', page)
+    data = re.search(r'id="data">(.*?)</script>', page)
+    tables = re.search(r"<main>.*</main>", page, re.DOTALL)
+    assert len(page) - sum(map(len, pictures)) - len(data[1]) - len(tables[0]) < LARGEST_PAGE  # type: ignore[index]
+    outside = re.sub(r"<script>.*?</script>|<style>.*?</style>|<pre>.*?</pre>", "", page, flags=re.DOTALL)
+    assert not re.search(r"""(?:src|href)=["'](?!data:)""", outside)
+    assert not re.search(r"url\((?!['\"]?data:)", "".join(re.findall(r"<style>(.*?)</style>", page, re.DOTALL)))
+
+
+def test_a_page_is_the_same_at_every_call(tmp_path: Path) -> None:
+    mg.write_report(mg.load("four-bar"), path=tmp_path / "x.html")
+    assert (tmp_path / "x.html").read_text(encoding="utf-8") == page_of("four-bar")
+
+
+OTHERS = [
+    machines.excavator, machines.five_rods, machines.double_cardan, mechanisms.hexapod, mechanisms.three_upu, mechanisms.sarrus,
+    mechanisms.three_cranks, mechanisms.folded_bars, mechanisms.bricard_trihedral, mechanisms.door,
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("build", OTHERS, ids=lambda build: build.__name__)
+def test_a_page_for_other_mechanisms(build: Callable[[], mg.Mechanism]) -> None:
+    m = build()
+    page, report = report_page(m), mg.check(m)
+    assert data_of(page)["figures"][0]["name"] == m.name
+    assert len(items_of(page, "Freedoms")) + len(items_of(page, "Passive freedoms")) == report.mobility
+
+
+def test_the_policy_allows_what_is_there_and_nothing_else() -> None:
+    page = page_of("four-bar")
+    policy = re.search(r'Content-Security-Policy" content="([^"]*)"', page)[1].replace("&#39;", "'")  # type: ignore[index]
+    rules = dict(rule.strip().split(" ", 1) for rule in policy.split(";"))
+    assert rules.pop("default-src") == rules.pop("base-uri") == rules.pop("form-action") == "'none'"
+    assert rules.pop("img-src") == "data:"
+    for directive, tag in (("script-src", "script"), ("style-src", "style")):
+        hashes = [
+            base64.b64encode(sha256(text.encode()).digest()).decode()
+            for text in re.findall(f"<{tag}>(.*?)</{tag}>", page, re.DOTALL)
+        ]
+        assert hashes
+        assert rules.pop(directive).split() == [f"'sha256-{digest}'" for digest in hashes]
+    assert not rules
+    assert "unsafe" not in policy
+    assert not [name for name in Shape(page).attributes if name == "style" or name.startswith("on")]
+
+
+def test_what_was_built_is_what_is_recorded() -> None:
+    """Versions, licences and hashes of the bundled libraries; and nothing in the sources changed since they were built."""
+    built = json.loads((WEB / "built.json").read_text(encoding="utf-8"))
+    assert {p["name"]: p["license"] for p in built["packages"]} == {"three": "MIT", "uplot": "MIT"}
+    lock = json.loads((WEB / "package-lock.json").read_text(encoding="utf-8"))["packages"]
+    vendor = (WEB / "vendor.js").read_text(encoding="utf-8")
+    for package in built["packages"]:
+        assert lock[f"node_modules/{package['name']}"]["version"] == package["version"]
+        assert f"/*! {package['name']} {package['version']} (MIT)" in vendor
+    assert vendor.count("Permission is hereby granted") == 2
+    for name, digest in {**built["files"], **built["sources"]}.items():
+        assert sha256((WEB / name).read_bytes()).hexdigest() == digest, f"{name}: npm run build in {WEB.name}"
+    assert {f"src/{file.name}" for file in (WEB / "src").iterdir()} < set(built["sources"])
+    assert not [entry for entry in lock.values() if "resolved" in entry]
+
+
+@cache
+def tame_shape() -> Shape:
+    m = named("a")
+    return Shape(report_page(m, mg.solve(m, {m.drives[0].freedom: np.array([0.1, 0.2])})))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_name_becomes_markup(name: str) -> None:
+    m = named(name)
+    page = report_page(m, mg.solve(m, {m.drives[0].freedom: np.array([0.1, 0.2])}))
+    tame, wild = tame_shape(), Shape(page)
+    assert sorted(set(wild.tags)) == sorted(set(tame.tags))
+    assert wild.tags.count("script") == tame.tags.count("script")
+    assert wild.attributes == tame.attributes
+    for picture in re.findall(r'src="data:image/svg\+xml,([^"]*)"', page):
+        assert {node.tag.rpartition("}")[2] for node in ElementTree.fromstring(unquote(picture)).iter()} <= SVG
+
+
+def test_json_ends_no_script() -> None:
+    text = json_for_script({"a": "</script><!--<script>&\u2028"})
+    assert not set(text) & set("<>&\u2028")
+    assert json.loads(text) == {"a": "</script><!--<script>&\u2028"}
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        json_for_script({"a": float("nan")})
+
+
+def test_numbers_are_packed() -> None:
+    values = np.array([[1.5, -2.0, np.nan]])
+    np.testing.assert_array_equal(numbers(packed(values)), values)
+
+
+def test_wrong_arguments_are_named(tmp_path: Path) -> None:
+    m = mg.load("four-bar")
+    other = mg.solve(mg.load("r-sg-c"), {"A": 0.1})
+    with pytest.raises(mg.DeclarationError, match="belongs to the mechanism 'r-sg-c'"):
+        mg.write_report(m, other, path=tmp_path / "x.html")
+    with pytest.raises(mg.DeclarationError, match="solution = 3: expected a Solution"):
+        mg.write_report(m, 3, path=tmp_path / "x.html")  # type: ignore[arg-type]
+    with pytest.raises(mg.DeclarationError, match="expected a Mechanism"):
+        mg.write_report("four-bar", path=tmp_path / "x.html")  # type: ignore[arg-type]
+    with pytest.raises(mg.FileError, match="there is no folder"):
+        mg.write_report(m, path=tmp_path / "none" / "x.html")
+    assert not list(tmp_path.iterdir())
+
+
+# --- what it shows -----------------------------------------------------------------------------------------------------
+
+
+def items_of(page: str, group: str) -> list[dict[str, Any]]:
+    return [item for item in data_of(page)["items"] if item["group"] == group]
+
+
+@pytest.mark.parametrize("name", mg.library())
+def test_everything_there_is_is_shown(name: str) -> None:
+    m = mg.load(name)
+    page, report = page_of(name), mg.check(m)
+    assert len(items_of(page, "Freedoms")) + len(items_of(page, "Passive freedoms")) == report.mobility
+    assert len(items_of(page, "Passive freedoms")) == len(report.passive)
+    assert len(items_of(page, "Self-stresses")) == len(report.self_stresses)
+    assert len(items_of(page, "Advice")) == len(report.advice)
+    for item, advice in zip(items_of(page, "Advice"), report.advice, strict=True):
+        after = mg.check(advice.apply())
+        assert item["after"]["verdict"] == after.verdict
+        assert ["redundancy", str(report.redundancy), str(after.redundancy)] in item["after"]["rows"]
+
+
+@pytest.mark.parametrize(
+    "name", ["four-bar", "bricard-cube", "andrews", "slider-crank", "bennett", "spherical-four-bar", "windows-2"]
+)
+def test_self_stresses_balance_every_link(name: str) -> None:
+    """The arrows drawn: on every link that moves their forces, and their moments about any point, add up to nothing."""
+    m = mg.load(name)
+    L = float(re.search(r"divided by ([\d.e-]+)", items_of(page_of(name), "Self-stresses")[0]["text"])[1])  # type: ignore[index]
+    for item in items_of(page_of(name), "Self-stresses"):
+        sums = {link: np.zeros(6) for link in m.link_names()}
+        most = 0.0
+        for arrow in item["arrows"]:
+            pair, at = m.pairs[arrow["pair"]], np.array(arrow["at"])
+            force, moment = np.array(arrow["force"]), L * np.array(arrow["moment"])
+            wrench = np.concatenate([moment + np.cross(at, force), force])
+            most = max(most, float(np.abs(wrench).max()))
+            sums[pair.a] -= wrench
+            sums[pair.b] += wrench
+        for link, wrench in sums.items():
+            if link != m.frame:
+                np.testing.assert_allclose(wrench, 0, atol=2e-3 * most)  # L is printed to four digits
+
+
+@pytest.mark.parametrize("name", ["four-bar", "rssr", "bricard-cube", "7r", "andrews"])
+def test_freedoms_move_with_the_loops_closed(name: str) -> None:
+    """Both sides of every pair stay together through every wiggle, and something moves."""
+    m = mg.load(name)
+    data = data_of(page_of(name))
+    figure = data["figures"][0]
+    links, base = m.link_names(), numbers(figure["frames"])
+    for item in data["items"]:
+        if item["group"] not in ("Freedoms", "Passive freedoms"):
+            continue
+        values = numbers(item["motion"]["values"])
+        frames = np.repeat(base[None], len(values), axis=0)
+        frames[:, item["motion"]["frames"]] = values
+        X = frames.reshape(*frames.shape[:2], 3, 4)
+        assert np.ptp(X, axis=0).max() > 0.02
+        for pair in m.pairs:
+            a, b = (X[:, links.index(link)] for link in (pair.a, pair.b))
+            ends = [
+                x[:, :, :3] @ marker.pose()[:, 3] + x[:, :, 3] for x, marker in zip((a, b), pair.markers, strict=True)
+            ]
+            if not any(not f.turns for f in pair.type.freedoms):
+                np.testing.assert_allclose(*ends, atol=1e-5 * figure["size"])
+
+
+def test_passive_spin_moves_its_link_alone() -> None:
+    m = mg.load("rssr")
+    data = data_of(page_of("rssr"))
+    (item,) = [item for item in data["items"] if item["group"] == "Passive freedoms"]
+    moved = [m.link_names()[i] for i in item["motion"]["frames"] if i < len(m.links)]
+    assert moved == ["coupler"]
+    assert item["motion"]["kind"] == "spin"
+    values = numbers(item["motion"]["values"])
+    np.testing.assert_allclose(values[0], values[-1], atol=1e-6)  # a whole turn
+
+
+def test_curves_are_those_of_the_solution() -> None:
+    m = mg.load("rcsr")
+    s = mg.solve(m, {"O1": mg.Motion(np.deg2rad(np.arange(150.0, 200.0, 5.0)), 0.1)})
+    cycle = data_of(report_page(m, s))["cycle"]
+    np.testing.assert_allclose(numbers(cycle["x"]), np.arange(150, 200, 5), rtol=1e-6)
+    np.testing.assert_allclose(numbers(cycle["efforts"][0]["series"][0]["values"]), s["O1"].effort[:, 0], rtol=1e-6)
+    for k, pair in enumerate(m.pairs):
+        np.testing.assert_allclose(
+            numbers(cycle["forces"][k]["force"]), s[pair.name].force, atol=1e-5 * np.abs(s["O1"].force).max()
+        )
+        np.testing.assert_allclose(
+            numbers(cycle["forces"][k]["moment"]), s[pair.name].moment, atol=1e-5 * np.abs(s["O1"].moment).max()
+        )
+        names = [row["name"] for chart in cycle["pairs"][k] for row in chart["series"]]
+        assert set(pair.type.component_names) | {"|F|"} <= set(names)
+    assert cycle["places"][1] == "O1.Rz = 155 deg"
+
+
+@pytest.mark.parametrize("redundant", ["nan", "minimum_norm"])
+def test_what_is_not_unique_is_never_drawn_as_known(redundant: Any) -> None:
+    m = mg.load("four-bar")
+    page = report_page(m, mg.solve(m, {"A": np.linspace(0, 1, 5)}, redundant=redundant))
+    cycle = data_of(page)["cycle"]
+    for k, pair in enumerate(m.pairs):
+        loose = {name for name, ok in mg.check(m).unique[pair.name].items() if not ok}
+        assert loose == {"Fz", "Mx", "My"}
+        assert set(cycle["forces"][k]["open"]) == loose
+        sure = {row["name"] for chart in cycle["pairs"][k] for row in chart["series"] if row["known"] == "unique"}
+        assert not sure & (loose | {"|F|", "|M|"})
+        named = {name for chart in cycle["pairs"][k] for name in chart["open"]}
+        assert named == (loose if redundant == "nan" else set())
+
+
+def test_declaration_and_its_hash_stand_in_the_page(tmp_path: Path) -> None:
+    m = mg.load("four-bar")
+    mg.save(m, tmp_path / "m.toml")
+    page = report_page(m)
+    assert sha256((tmp_path / "m.toml").read_bytes()).hexdigest() in page
+    assert "[[pair]]" in page
+    held = m.replace(loads=[mg.Effort("D", lambda pose, twist, t: 1.0 + 0 * pose[:, 0, 0])])
+    assert "none: it holds functions" in report_page(held, mg.solve(held, {"A": np.array([0.0, 0.1])}))
+
+
+def test_without_geometry_and_without_closed_loops() -> None:
+    page = report_page(mg.chain("RPRHRRR"))
+    assert 'id="data"' not in page
+    assert "determinate for general geometry" in page
+    assert "<math" in page
+    open_loop = mg.load("rcsr").replace(start={})
+    open_loop = open_loop.replace(
+        pairs=[p if p.name != "O4" else p.replace(on_a=mg.Marker((50, 0, 0), (0, 0, 1))) for p in open_loop.pairs]
+    )
+    page = report_page(open_loop)
+    assert "No answer as it stands" in page
+
+
+def test_a_response_and_a_study_have_pages() -> None:
+    scipy_stats = pytest.importorskip("scipy.stats")
+    m = mg.load("windows-2")
+    r = mg.respond(m, np.linspace(0, 1, 21), rates={"A0": -1.0})
+    cycle = data_of(report_page(m, r))["cycle"]
+    assert cycle["label"] == "time [s]"
+    m = mg.load("rcsr")
+    ways = {"length[2]": scipy_stats.norm(0.4, 0.001)}
+    from concurrent.futures import ThreadPoolExecutor
+
+    with ThreadPoolExecutor(1) as executor:
+        study = mg.study(
+            m,
+            ways,
+            {"torque": "O1.effort"},
+            n=20,
+            seed=1,
+            motions={"O1": mg.Motion(np.deg2rad([150, 170]), 0.1)},
+            executor=executor,
+        )
+    page = report_page(m, study=study)
+    assert f"{float(study.mean('torque').max()):.5g}" in page
+    assert "Sensitivities" in page
+
+
+# --- on the command line -----------------------------------------------------------------------------------------------
+
+
+def test_the_command_writes_a_page(tmp_path: Path) -> None:
+    assert run("report", "rcsr", "--drive", "O1=150:200:10deg@0.1", "-o", tmp_path / "x.html").exit_code == 0
+    assert data_of((tmp_path / "x.html").read_text(encoding="utf-8"))["cycle"]["places"][-1] == "O1.Rz = 190 deg"
+    assert run("report", "four-bar", "--out", tmp_path / "y.html").stdout.startswith("Wrote ")
+    assert (tmp_path / "y.html").read_text(encoding="utf-8") == page_of("four-bar")
+    assert run("report", "haug-slider-crank", "-o", tmp_path / "z.html").exit_code == 0
+
+
+def test_a_mechanism_without_an_answer_has_a_page_that_says_so(tmp_path: Path) -> None:
+    m = mg.load("rssr")
+    free = m.replace(loads=[], pairs=[p.replace(type="C") if p.name == "D" else p for p in m.pairs])
+    mg.save(free, tmp_path / "m.toml")
+    result = run("report", tmp_path / "m.toml", "-o", tmp_path / "x.html")
+    assert result.exit_code == 1
+    assert "neither driven nor passive" in result.stderr
+    assert "No answer as it stands" in (tmp_path / "x.html").read_text(encoding="utf-8")
+    assert (
+        run("report", "rcsr", "--drive", "O1=150:220:5deg", "--on-reach", "raise", "-o", tmp_path / "y.html").exit_code
+        == 1
+    )
+    assert len(data_of((tmp_path / "y.html").read_text(encoding="utf-8"))["cycle"]["places"]) == 12
+    result = run("report", tmp_path / "m.toml", "-o", tmp_path / "m.toml")
+    assert result.exit_code == 2
+    assert "is the file of the mechanism" in result.stderr
+
+
+# --- what it does in Chromium --------------------------------------------------------------------------------------------
+
+
+def labels(reader: Reader) -> dict[str, str]:
+    code = "return Object.fromEntries([...document.querySelectorAll('.label')].map((l) => [l.textContent, l.style.transform]))"
+    return dict(reader.js(code))
+
+
+def at_slider(reader: Reader, value: int) -> None:
+    code = "const s = document.querySelector('.bar input'); s.value = arguments[0]; s.dispatchEvent(new Event('input', { bubbles: true }))"
+    reader.js(code, value)
+    reader.settled()
+
+
+@pytest.mark.parametrize("name", SHOWN)
+def test_nothing_goes_wrong_and_nothing_leaves(reader: Reader, pages: dict[str, Path], name: str) -> None:
+    """Everything that can be chosen is chosen: the console stays silent, and nothing is asked of the network."""
+    reader.open(pages[name])
+    for button in reader.all(".choices button"):
+        reader.js("arguments[0].click()", button)
+        reader.settled()
+        for side in reader.all(".switch button"):
+            reader.js("arguments[0].click()", side)
+            reader.settled()
+    for option in range(len(reader.all(".panel select option"))):
+        reader.js(
+            "const s = document.querySelector('.panel select'); s.value = arguments[0]; s.dispatchEvent(new Event('change'))",
+            option,
+        )
+    for part in reader.all("details"):
+        reader.js("arguments[0].open = true", part)
+    for button in reader.all(".copy, .sort, .tools button"):
+        reader.js("arguments[0].click()", button)
+    reader.settled()
+    assert reader.complaints() == []
+    assert reader.requests() == []
+    assert "NaN" not in reader.js("return document.getElementById('view').innerText")
+
+
+def test_the_slider_moves_the_mechanism_and_the_curves_follow(reader: Reader, pages: dict[str, Path]) -> None:
+    reader.open(pages["four-bar"])
+    effort = mg.solve(mg.load("four-bar"))["A"].effort[:, 0]
+    before = labels(reader)
+    for frame in (90, 200):
+        at_slider(reader, frame)
+        assert labels(reader)["B (R)"] != before["B (R)"]
+        assert reader.text(".bar output") == f"A.Rz = {frame} deg"
+        shown = float(reader.text(".charts .legend output").split()[0])
+        assert shown == pytest.approx(effort[frame], rel=1e-3)
+        before = labels(reader)
+
+
+def test_a_curve_sets_the_position(reader: Reader, pages: dict[str, Path]) -> None:
+    reader.open(pages["four-bar"])
+    actions = pytest.importorskip("selenium.webdriver").ActionChains(reader.driver)
+    actions.move_to_element(reader.one(".charts .u-over")).click().perform()
+    reader.settled()
+    assert 170 < int(reader.js("return document.querySelector('.bar input').value")) < 190
+
+
+def test_a_click_on_a_pair_shows_its_numbers(reader: Reader, pages: dict[str, Path]) -> None:
+    """Where a pair is seen follows from the figure: the projection of the page is tested with it."""
+    reader.open(pages["four-bar"])
+    data = data_of(pages["four-bar"].read_text(encoding="utf-8"))
+    figure = data["figures"][0]
+    canvas = reader.one(".stage canvas")
+    reader.js("arguments[0].scrollIntoView({ block: 'center' })", canvas)
+    width, height = canvas.size["width"], canvas.size["height"]
+    look, up = np.array(figure["look"]), np.array(figure["up"])
+    right = np.cross(up, look)
+    over = max(figure["span"][1], figure["span"][0] * height / width)
+    s = mg.solve(mg.load("four-bar"))
+    for number, pair in enumerate(mg.load("four-bar").pairs):
+        at = s.link(pair.b).point(pair.markers[1].point).position[0] - np.array(figure["center"])
+        x, y = (float(at @ d) / over * height for d in (right, np.cross(look, right)))
+        actions = pytest.importorskip("selenium.webdriver").ActionChains(reader.driver)
+        actions.move_to_element_with_offset(canvas, round(x), round(-y)).click().perform()
+        reader.settled()
+        assert reader.js("return document.querySelector('.panel select').value") == str(number)
+        assert pair.b in reader.text(".facts")
+
+
+def test_play_and_pause(reader: Reader, pages: dict[str, Path]) -> None:
+    reader.open(pages["rcsr"])
+    play = reader.one(".play")
+    reader.js("arguments[0].click()", play)
+    reader.wait(lambda: int(reader.js("return document.querySelector('.bar input').value")) > 2)
+    reader.js("arguments[0].click()", play)
+    stands = reader.js("return document.querySelector('.bar input').value")
+    time.sleep(0.2)
+    assert reader.js("return document.querySelector('.bar input').value") == stands
+    assert reader.text(".play") == "Play"
+
+
+def test_nothing_moves_by_itself_for_those_who_want_that(reader: Reader, pages: dict[str, Path]) -> None:
+    reader.open(pages["rssr"], prefers_reduced_motion="reduce")
+    for button in reader.all(".choices button"):
+        reader.js("arguments[0].click()", button)
+        before = labels(reader)
+        time.sleep(0.15)
+        assert labels(reader) == before
+        assert reader.text(".play") == "Play"
+    reader.open(pages["rssr"])
+    reader.js("document.querySelectorAll('.choices button')[1].click()")
+    before = labels(reader)
+    reader.wait(lambda: labels(reader) != before)
+
+
+def test_by_keyboard_alone(reader: Reader, pages: dict[str, Path]) -> None:
+    keys = pytest.importorskip("selenium.webdriver.common.keys").Keys
+    reader.open(pages["rcsr"])
+    canvas = reader.one(".stage canvas")
+    for key in (keys.ARROW_LEFT, keys.ARROW_UP, "+"):
+        before = labels(reader)
+        canvas.send_keys(key)
+        reader.settled()
+        assert labels(reader) != before
+    canvas.send_keys("0")
+    slider = reader.one(".bar input")
+    slider.send_keys(keys.ARROW_RIGHT)
+    assert reader.text(".bar output") == "O1.Rz = 152 deg"
+    reached = set()
+    reader.js("document.activeElement.blur(); window.scrollTo(0, 0)")
+    for _ in range(60):
+        reader.driver.switch_to.active_element.send_keys(keys.TAB)
+        reached.add(reader.js("const e = document.activeElement; return e.tagName + '.' + e.className + '.' + e.type"))
+    assert {
+        "CANVAS..undefined",
+        "INPUT..range",
+        "SUMMARY..undefined",
+        "BUTTON.play.button",
+        "SELECT..select-one",
+    } <= reached
+
+
+def test_tables_sort_and_copy(reader: Reader, pages: dict[str, Path]) -> None:
+    reader.open(pages["rcsr"])
+    table = next(t for t in reader.all("main table") if "force" in t.text)
+    column = 4
+    cells = "return [...arguments[0].tBodies[0].rows].map((row) => row.cells[arguments[1]].textContent)"
+    button = table.find_elements("css selector", "th button")[column]
+    reader.js("arguments[0].click()", button)
+    up = [float(text) for text in reader.js(cells, table, column)]
+    assert up == sorted(up)
+    reader.js("arguments[0].click()", button)
+    assert [float(text) for text in reader.js(cells, table, column)] == up[::-1]
+    assert table.find_elements("css selector", "th")[column].get_attribute("aria-sort") == "descending"
+    reader.command("Browser.grantPermissions", permissions=["clipboardReadWrite", "clipboardSanitizedWrite"])
+    frame = reader.js("return arguments[0].closest('.table').querySelector('.copy')", table)
+    reader.js("arguments[0].click()", frame)
+    reader.wait(lambda: reader.js("return arguments[0].textContent", frame) == "Copied")
+
+
+@pytest.mark.parametrize("name", SHOWN)
+@pytest.mark.parametrize("width", [320, 390])
+def test_a_phone_shows_it_without_scrolling_sideways(
+    reader: Reader, pages: dict[str, Path], name: str, width: int
+) -> None:
+    reader.open(pages[name], width=width, height=800)
+    for part in reader.all("details"):
+        reader.js("arguments[0].open = true", part)
+    assert reader.js("return document.documentElement.scrollWidth") <= width
+
+
+def test_on_paper_stand_still_pictures(reader: Reader, pages: dict[str, Path]) -> None:
+    reader.open(pages["four-bar"])
+    shown = "return [...document.querySelectorAll(arguments[0])].map((e) => e.getClientRects().length > 0)"
+    assert reader.js(shown, ".stills, #view") == [True, False]
+    reader.command("Emulation.setEmulatedMedia", media="print", features=[])
+    assert reader.js(shown, ".stills, #view") == [False, True]
+    assert all(reader.js("return [...document.querySelectorAll('.stills img')].map((p) => p.naturalWidth > 100)"))
+    pdf = base64.b64decode(reader.command("Page.printToPDF")["data"])
+    assert pdf.startswith(b"%PDF")
+    assert len(re.findall(rb"/Type\s*/Page\b", pdf)) > 3  # what is folded is printed
+    assert reader.complaints() == []
+
+
+def test_without_drawing_in_space_all_else_works(tmp_path: Path, pages: dict[str, Path]) -> None:
+    with chromium(tmp_path / "profile", *DRAWS_NOT) as reader:
+        reader.open(pages["four-bar"])
+        assert "cannot draw in three dimensions" in reader.text(".stage")
+        assert reader.all(".charts canvas")
+        reader.js(
+            "document.querySelector('.panel select').value = 2; document.querySelector('.panel select').dispatchEvent(new Event('change'))"
+        )
+        assert "coupler" in reader.text(".facts")
+        assert reader.complaints() == []
+
+
+def test_a_hostile_name_runs_nothing(reader: Reader, tmp_path: Path) -> None:
+    name = "<script>window.ran = 1</script><img src=x onerror='window.ran = 2'>"
+    m = named(name)
+    mg.write_report(m, mg.solve(m, {m.drives[0].freedom: np.linspace(0, 1, 4)}), path=tmp_path / "x.html")
+    reader.open(tmp_path / "x.html")
+    for button in reader.all(".choices button"):
+        reader.js("arguments[0].click()", button)
+    assert reader.js("return window.ran") is None
+    assert name in reader.text("h1")
+    assert reader.complaints() == []
+    reader.js("const s = document.createElement('script'); s.textContent = 'window.ran = 3'; document.body.append(s)")
+    assert reader.js("return window.ran") is None  # the policy of the page
+    assert any("Content Security Policy" in text for text in reader.complaints())
+
+
+@pytest.mark.parametrize("name", ["four-bar", "rssr", "rcsr"])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_accessibility(reader: Reader, pages: dict[str, Path], name: str, scheme: str) -> None:
+    """axe-core finds nothing serious, everything unfolded, and with an advice shown."""
+    if not AXE.is_file():
+        pytest.skip("axe-core is not there: npm ci in the folder of the scripts")
+    reader.open(pages[name], prefers_color_scheme=scheme)
+    for part in reader.all("details"):
+        reader.js("arguments[0].open = true", part)
+    reader.js("[...document.querySelectorAll('.choices button')].at(-1).click()")
+    reader.settled()
+    # the page allows no script but its own: the checker runs beside it
+    reader.command("Page.setBypassCSP", enabled=True)
+    source = AXE.read_text(encoding="utf-8")
+    reader.command("Runtime.evaluate", expression=source)
+    found = reader.command(
+        "Runtime.evaluate", expression="axe.run().then((r) => JSON.stringify(r.violations))", awaitPromise=True
+    )
+    violations = json.loads(found["result"]["value"])
+    told = [(v["id"], v["impact"], [node["target"] for node in v["nodes"]][:3]) for v in violations]
+    assert not [v for v in told if v[1] in ("serious", "critical")]
+
+
+def test_a_notebook_shows_the_same_view(reader: Reader, tmp_path: Path) -> None:
+    """The module of the widget in a page that does what a notebook's front end does: it calls ``render`` and takes it away again."""
+    pytest.importorskip("anywidget", reason="anywidget is not installed (extra: notebook)")
+    widget = mg.solve(mg.load("four-bar"), {"A": np.linspace(0, 1, 11)}).view()
+    module = f"data:text/javascript;base64,{base64.b64encode(widget._esm.encode()).decode()}"
+    data = json_for_script(widget.data)
+    page = (
+        f'<!DOCTYPE html><style>{widget._css}</style><div id="cell"></div><script type="application/json" id="d">{data}</script>'
+        f'<script type="module">import w from "{module}"; const data = JSON.parse(document.getElementById("d").textContent);'
+        'window.done = w.render({ model: { get: () => data }, el: document.getElementById("cell") });</script>'
+    )
+    (tmp_path / "cell.html").write_text(page, encoding="utf-8")
+    reader.open(tmp_path / "cell.html")
+    reader.wait(lambda: reader.all("#cell .label"))
+    before = labels(reader)
+    at_slider(reader, 9)
+    assert labels(reader) != before
+    reader.js("window.done()")
+    assert reader.js("return document.getElementById('cell').childElementCount") == 0
+    assert reader.complaints() == []
+    assert reader.requests() == []
+
+
+def test_views_that_cannot_be_drawn_say_why() -> None:
+    pytest.importorskip("anywidget", reason="anywidget is not installed (extra: notebook)")
+    with pytest.raises(mg.DeclarationError, match="no geometry is declared"):
+        mg.chain("RRRR").view()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert mg.load("bricard-cube").view().data["cycle"] is None
+
+
+@pytest.mark.skipif(
+    not AXE.is_file() or shutil.which("node") is None, reason="no node, or no npm ci in the folder of the scripts"
+)
+def test_the_scripts_are_built_from_their_sources(tmp_path: Path) -> None:
+    """Checked by TypeScript, linted and tested; what they are built to is what stands in the repository."""
+    copy = tmp_path / "web"
+    shutil.copytree(WEB, copy, ignore=shutil.ignore_patterns("node_modules"))
+    (copy / "node_modules").symlink_to(MODULES)
+    for command in (["npm", "run", "check"], ["npm", "test"], ["npm", "run", "build"]):
+        done = subprocess.run(command, cwd=copy, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-1000:]
+    for name in ("vendor.js", "vendor.css", "view.js", "built.json"):
+        assert (copy / name).read_bytes() == (WEB / name).read_bytes()
