@@ -11,7 +11,7 @@ from mechgraph.document.tree import plain
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.report.report import DeterminacyReport, check
 from mechgraph.report.words import component_words
-from mechgraph.result.places import with_unit
+from mechgraph.result.numbers import with_unit
 from mechgraph.result.solution import Solution
 from mechgraph.show.page.changes import compared, stress_arrows
 from mechgraph.show.page.cycle import Cycle

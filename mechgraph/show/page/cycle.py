@@ -10,8 +10,10 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.document.tree import plain
 from mechgraph.model.pair import Pair
-from mechgraph.result.places import NOISE, driver_value
+from mechgraph.result.numbers import NOISE
+from mechgraph.result.places import driver_value
 from mechgraph.result.solution import Solution
+from mechgraph.show.canvas import with_unit
 from mechgraph.show.page.forces import components_of, wrench_of
 from mechgraph.show.page.packing import packed
 from mechgraph.show.scene import Scene
@@ -82,9 +84,9 @@ class Cycle:
             steps = np.sign(values[-1] - values[0]) * np.diff(values)
             if (steps > 0).all():
                 unit = "deg" if turns else self.unit(LENGTH)
-                return _with_unit(plain(name), unit), np.rad2deg(values) if turns else values
+                return with_unit(plain(name), unit), np.rad2deg(values) if turns else values
         if self.s.t is not None:
-            return _with_unit("time", self.unit(TIME)), self.at(np.broadcast_to(self.s.t, self.s.batch))
+            return with_unit("time", self.unit(TIME)), self.at(np.broadcast_to(self.s.t, self.s.batch))
         return "number of the position", self.scene.positions.astype(float)
 
     def places(self) -> list[str]:
@@ -192,7 +194,3 @@ class Cycle:
         )
         at = frames[f"pair:{pair.name}@{pair.type.f}"][:, :, 3]
         return {"pair": i, "at": packed(at), "force": packed(force), "moment": packed(moment), "open": lost}
-
-
-def _with_unit(name: str, unit: str) -> str:
-    return f"{name} [{unit}]" if unit else name

@@ -14,7 +14,7 @@ from mechgraph.result.solution import Solution
 from mechgraph.show.curves import effort_curve
 from mechgraph.show.skeleton import draw_skeleton
 
-RC = {"svg.hashsalt": "mechgraph", "svg.fonttype": "none", "text.parse_math": False}
+RC: dict[Any, Any] = {"svg.hashsalt": "mechgraph", "svg.fonttype": "none", "text.parse_math": False}
 """The same file at every call; names as text in the reader's fonts, none of them a formula."""
 
 
