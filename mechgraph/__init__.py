@@ -43,6 +43,7 @@ from mechgraph.response.respond import respond
 from mechgraph.response.small_motion import equilibrium, linearize
 from mechgraph.response.stops import Stop
 from mechgraph.result.free_body import FreeBody, free_body
+from mechgraph.result.over_time import OverTime, over_time
 from mechgraph.result.solution import Solution
 from mechgraph.variants.result import Study
 from mechgraph.variants.study import study
@@ -78,6 +79,7 @@ __all__ = [
     "MechgraphWarning",
     "MissingExtraError",
     "Motion",
+    "OverTime",
     "Pair",
     "PairType",
     "ReachError",
@@ -100,6 +102,7 @@ __all__ = [
     "library",
     "linearize",
     "load",
+    "over_time",
     "pair_types",
     "respond",
     "save",

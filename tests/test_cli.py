@@ -160,6 +160,16 @@ def test_files_as_the_suffix_says(tmp_path: Path) -> None:
     assert "file of the mechanism" in bad("save", tmp_path / "m.toml", "--out", tmp_path / "m.toml")
 
 
+def test_figures_over_time() -> None:
+    shown = run("solve", "7r", "--drive", "O1=0:360:5deg@10", "--over-time").stdout
+    assert "over a whole cycle of 1 revolutions" in shown
+    assert "Work per revolution" in shown
+    assert "no times" in bad("solve", "7r", "--drive", "O1=0:360:5deg", "--over-time")
+    assert (
+        "1 s, from the first position to the last" in run("respond", "windows-2", "--for", "1s", "--over-time").stdout
+    )
+
+
 def test_loads_on_a_link(tmp_path: Path) -> None:
     deck = tmp_path / "rod.inp"
     shown = run("loads", "haug-slider-crank", "rod", "--drive", "A=0:360:5deg@30", "--out", deck, "--held", "B")

@@ -40,6 +40,7 @@ def results() -> dict[str, Any]:
         "mechanism": m, "solution": s, "one position": one, "kinematics": mg.kinematics(m, {"A": [0.1, 0.2]}),
         "report": mg.check(m), "report of rssr": mg.check(rssr), "solution of rssr": mg.solve(rssr),
         "topology": mg.check(mg.chain("RPRHRRR")), "formulation": mg.formulate(m), "response system": mg.formulate(m, unknowns="response"),
+        "over time": mg.over_time(mg.solve(m, {"A": mg.Motion(np.linspace(0, 1, 9), 2.0)})),
         "free body": mg.free_body(mg.solve(rssr), rssr.links[2].name),
         "pair": s["B"], "pair at one position": one["B"], "link": s.link("coupler"), "point": s.link("coupler").point((0, 0, 0)),
         "load": s.load(1), "gears": gears(), "coupling": moved.coupling("teeth"), "declared coupling": gears().couplings[0],

@@ -20,6 +20,7 @@ from mechgraph.cli.options import (
     Named,
     OnReach,
     Out,
+    OverTime,
     Redundant,
     Tolerance,
 )
@@ -30,6 +31,9 @@ from mechgraph.cli.records import Written, write_json
 from mechgraph.document import Document
 from mechgraph.result.export import FORMATS
 from mechgraph.typed import drives_of, duration, parse_at, refuse
+
+Told = list[Document] | dict[str, Any]
+"""Documents to be shown, or a record."""
 
 
 def solve(
@@ -43,6 +47,7 @@ def solve(
     engine: Engine = "auto",
     compared: Compare = False,
     tol: Tolerance = None,
+    over_time: OverTime = False,
     json: AsJson = False,
 ) -> None:
     """Solve positions, efforts of the drivers and all reactions, print a summary and write a table.
@@ -63,7 +68,7 @@ def solve(
         how: dict[str, Any] = {"method": method, "redundant": redundant, "on_reach": on_reach, "engine": engine}
         s = mg.solve(m, motions or None, actuate=actuate, tol=tol, progress=moved, **how)
     with working(f"summary of {m.name}"):
-        told = _told(s, out, json)
+        told = _told(s, out, json, over_time)
     _tell("solve", *told)
     if compared:
         show_compared(mechanism)
@@ -71,20 +76,25 @@ def solve(
         raise typer.Exit(NO_ANSWER)
 
 
-def _told(s: mg.Solution, out: Path | None, json: bool) -> tuple[Document | dict[str, Any], Written | None]:
+def _told(s: mg.Solution, out: Path | None, json: bool, over_time: bool) -> tuple[Told, Written | None]:
     """What is told of a solution, and the file that was written."""
-    told = s.to_dict() if json else s.document(asked=True)
+    figures = mg.over_time(s) if over_time else None
+    told: Told = [s.document(asked=True), *([figures.document()] if figures else [])]
+    if json:
+        told = s.to_dict() | {"over_time": figures and figures.to_dict()}
     if out is None:
         return told, None
     s.write(out)
     return told, Written(str(out), s.status.size, len(s.part(slice(1)).columns()))
 
 
-def _tell(command: str, told: Document | dict[str, Any], written: Written | None) -> None:
+def _tell(command: str, told: Told, written: Written | None) -> None:
     if isinstance(told, dict):
         write_json(command, told, written=written)
         return
-    show(told)
+    for place, document in enumerate(told):
+        write("\n" * bool(place))
+        show(document)
     if written is not None:
         write(f"\nWrote {written.file}: {written.rows} rows, {written.columns} columns.\n")
 
@@ -113,6 +123,7 @@ def respond(
     rtol: Annotated[float, typer.Option(help="Relative tolerance of a step.")] = 1e-8,
     atol: Annotated[float, typer.Option(help="Absolute tolerance (radians, lengths / L, and their rates).")] = 1e-10,
     engine: Engine = "auto",
+    over_time: OverTime = False,
     json: AsJson = False,
 ) -> None:
     """Follow the motion that the loads produce, print a summary with the energy balance and write a table.
@@ -133,7 +144,7 @@ def respond(
             progress=moved,
         )  # fmt: skip
     with working(f"summary of {m.name}"):
-        told = _told(r, out, json)
+        told = _told(r, out, json, over_time)
     _tell("respond", *told)
     if r.stopped:
         fail(r.stopped, NO_ANSWER)

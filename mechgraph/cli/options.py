@@ -99,3 +99,9 @@ Out = Annotated[
 Compare = Annotated[
     bool, typer.Option("--compare", help="Also the results stored in a FreeCAD assembly (.asmt) beside ours.")
 ]
+OverTime = Annotated[
+    bool,
+    typer.Option(
+        "--over-time", help="Also peak, mean, RMS and work of drivers, and shaking, over time or a whole cycle."
+    ),
+]

@@ -15,6 +15,7 @@ from mechgraph.report.data import AdviceData, schemas
 from mechgraph.report.rounding import Rounding
 from mechgraph.report.sections import KEYS
 from mechgraph.response.course import ResponseData
+from mechgraph.result.over_time import OverTimeData
 from mechgraph.result.record import SolutionData
 
 
@@ -245,8 +246,8 @@ COMMANDS: dict[str, Callable[[Json], Json]] = {
     "list": _record(ListData),
     "check": _check,
     "equations": _record(EquationsData),
-    "solve": _record(SolutionData, written=Written | None),
-    "respond": _record(ResponseData, written=Written | None),
+    "solve": _record(SolutionData, over_time=OverTimeData | None, written=Written | None),
+    "respond": _record(ResponseData, over_time=OverTimeData | None, written=Written | None),
     "save": _record(SaveData),
     "loads": _record(LoadsData),
 }

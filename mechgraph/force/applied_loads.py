@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -242,3 +243,9 @@ def user_twists(here: Configuration, V: Array) -> Array:
 def kinetic_power(rates: Rates, inertia: Array) -> Array:
     """Rate of kinetic energy of every link ``(N, T)``: minus the power of its inertia wrench."""
     return -np.asarray((rates.V * inertia).sum(axis=0))
+
+
+def kinetic_energy(here: Configuration, V: Array) -> Array:
+    """``sum over links V . I V / 2``, ``(T,)``, internal units."""
+    momentum = inertia_wrenches(here, SimpleNamespace(V=np.zeros_like(V), A=V))  # type: ignore[arg-type]
+    return np.asarray(-0.5 * (V * momentum).sum(axis=(0, 1)))

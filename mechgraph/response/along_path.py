@@ -22,9 +22,10 @@ from mechgraph.closure.driver_path import DriverPath
 from mechgraph.closure.indexing import System
 from mechgraph.closure.rank import closure_rank
 from mechgraph.closure.solver import closure_solver
+from mechgraph.force.applied_loads import kinetic_energy
 from mechgraph.response.chart import Closed
 from mechgraph.response.charts import Task
-from mechgraph.response.motion_equations import along_one, kinetic_energy
+from mechgraph.response.motion_equations import along_one
 from mechgraph.response.way import POINTS, Piece, Way
 
 FAST = 2.0

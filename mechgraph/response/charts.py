@@ -9,8 +9,9 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.indexing import Index, System
+from mechgraph.force.applied_loads import kinetic_energy
 from mechgraph.response.chart import Chart, Closed
-from mechgraph.response.motion_equations import Loads, Moved, kinetic_energy, moved
+from mechgraph.response.motion_equations import Loads, Moved, moved
 from mechgraph.response.prescribed import Prescribed
 
 

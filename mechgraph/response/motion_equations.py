@@ -163,11 +163,6 @@ def along_one(here: Configuration, f: FactoredClosure, loads: Loads) -> tuple[Ar
     return np.stack([stored + constant, linear, gyroscopic]) / columns.mass[0], np.stack([constant, linear])
 
 
-def kinetic_energy(here: Configuration, V: Array) -> Array:
-    """``sum over links V . I V / 2``, ``(T,)``, internal units."""
-    return np.asarray(-0.5 * (V * _inertia(here, np.zeros_like(V), V)).sum(axis=(0, 1)))
-
-
 def accelerations(mass: Array, force: Array) -> tuple[Array, Array]:
     """``v' (n, T)`` with ``M v' = Q``, zero along motions without inertia; and the part of ``Q`` that acts along these, ``(n, T)``."""
     if mass.shape[0] == 1:

@@ -11,12 +11,12 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.indexing import Index, System
-from mechgraph.force.applied_loads import Site
+from mechgraph.force.applied_loads import Site, kinetic_energy
 from mechgraph.force.block import ForceTask, forces_of_block
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.response.chart import Closed
 from mechgraph.response.charts import Task
-from mechgraph.response.motion_equations import kinetic_energy, moved
+from mechgraph.response.motion_equations import moved
 from mechgraph.result.trajectory import BlockMotion, Trajectory
 
 Block = tuple[Index, Task, Closed, Array]

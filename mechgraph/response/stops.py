@@ -22,12 +22,13 @@ from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.arguments import items_of
+from mechgraph.force.applied_loads import kinetic_energy
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import is_numeric, wrong
 from mechgraph.response.chart import Chart
 from mechgraph.response.charts import Task
 from mechgraph.response.events import Event, Occurrence, first_root
-from mechgraph.response.motion_equations import NO_INERTIA, UNOPPOSED, Stopped, accelerations, kinetic_energy, moved
+from mechgraph.response.motion_equations import NO_INERTIA, UNOPPOSED, Stopped, accelerations, moved
 from mechgraph.response.prescribed import Prescribed
 
 TOUCHING = 1e-9

@@ -16,10 +16,10 @@ from mechgraph.model.link import Link
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import wrong
 from mechgraph.result.numbers import number
-from mechgraph.result.places import OK, driver_value
+from mechgraph.result.places import OK
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import Mask
-from mechgraph.units import TIME, unit_of
+from mechgraph.units import unit_of
 
 COMPONENTS = ("Mx", "My", "Mz", "Fx", "Fy", "Fz")
 """Names of the components of a wrench."""
@@ -155,7 +155,7 @@ class BalancedLoads:
         """
         why = self._greatest()
         places = list(why) if isinstance(at, str) and at == "worst" else self._positions(at)
-        return tuple(Case(i, self.place(i), tuple(why.get(i, ()))) for i in sorted(places))
+        return tuple(Case(i, self.solution.place(i), tuple(why.get(i, ()))) for i in sorted(places))
 
     def _positions(self, at: Any) -> list[int]:
         solved = np.flatnonzero(self._solved)
@@ -191,20 +191,6 @@ class BalancedLoads:
         """Sizes of what is known of vectors, flat; NaN where not solved."""
         sizes = np.linalg.norm(np.nan_to_num(vectors), axis=-1)
         return np.where(self._solved, sizes, np.nan).ravel()
-
-    def place(self, position: int) -> str:
-        """The drivers' values at a position, and its time."""
-        s = self.solution
-        parts = []
-        for name in s.prescribed:
-            k, j = s.whole.freedom(name)
-            parts.append(
-                driver_value(s.whole, name, float(s[s.whole.pairs[k].name].position[..., j].ravel()[position]))
-            )
-        if s.t is not None:
-            t = float(np.broadcast_to(s.t, s.batch).ravel()[position])
-            parts.append(f"t = {t:.6g} {unit_of(s.mechanism.units, TIME)}".rstrip())
-        return ", ".join(parts) or "as assembled"
 
     def envelope(self) -> tuple[Range, ...]:
         """Least and greatest of every component of all that acts, over the solved positions."""

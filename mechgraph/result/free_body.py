@@ -52,7 +52,7 @@ class FreeBody(BalancedLoads, Shown):
             for size, largest in most.items():
                 r = ranges[one.name, size]
                 row += (
-                    [number(r.greatest, largest), self.place(r.at_greatest)]
+                    [number(r.greatest, largest), self.solution.place(r.at_greatest)]
                     if r.at_greatest >= 0
                     else ["not unique", ""]
                 )

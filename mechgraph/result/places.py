@@ -76,3 +76,9 @@ class Places:
             t = np.broadcast_to(np.asarray(self.values.t, dtype=float), self.values.batch).reshape(-1)[index]
             return f"t = {with_unit(number(t), unit_of(self.m.units, (0, 0, 1)))}"
         return ", ".join(found) or f"position {index}"
+
+    def full_name(self, index: int) -> str:
+        """The same with the names of the drivers, ``A.Rz = 30 deg``."""
+        values = zip(self.drivers, self.driver_values, strict=True)
+        found = [driver_value(self.values.whole, n, v[index]) for n, v in values if np.isfinite(v[index])]
+        return ", ".join(found) or self.name(index)

@@ -15,7 +15,7 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.newton import Work
 from mechgraph.quantities import wrong
 from mechgraph.result import export
-from mechgraph.result.places import OK
+from mechgraph.result.places import OK, Places
 from mechgraph.result.record import solution_data
 from mechgraph.result.summary import summary
 from mechgraph.result.table import Include, table_of
@@ -144,6 +144,11 @@ class Solution(Shown):
         return self._values.checks()
 
     @property
+    def kinetic_energy(self) -> Array:
+        """Kinetic energy of all links ``(...)``."""
+        return self._values.kinetic_energy()
+
+    @property
     def shaking(self) -> Array:
         """Wrench ``(..., 6)`` about the global origin that pairs and springs transmit to the frame."""
         return self._values.shaking()
@@ -191,6 +196,10 @@ class Solution(Shown):
         """
         # up to a room above: a user looks for it here
         return importlib.import_module("mechgraph.show.page.widget").view(self)
+
+    def place(self, index: int) -> str:
+        """A position of the flat batch in words: the values of the drivers, or its time."""
+        return Places(self._values).full_name(index)
 
     def state(self, index: Any = ()) -> State:
         """Screws, loads and coordinates at one position, for ``Formulation.assemble``."""

@@ -21,7 +21,7 @@ from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.rates import Rates, Velocities
 from mechgraph.equations.state import State
 from mechgraph.errors import MechgraphError
-from mechgraph.force.applied_loads import Site, inertia_wrenches, user_poses, user_twists
+from mechgraph.force.applied_loads import Site, inertia_wrenches, kinetic_energy, user_poses, user_twists
 from mechgraph.force.block import BlockForces
 from mechgraph.force.dalembert import given_effort_loads
 from mechgraph.force.passive_hold import hold_names, is_idle, turns
@@ -316,6 +316,10 @@ class Trajectory:
 
         found = self._evaluated(motion)
         return MaterialPoint(*(self._out(found[i : i + 3]) for i in (0, 3, 6)))
+
+    def kinetic_energy(self) -> Array:
+        """Kinetic energy of all links."""
+        return self._out(self._L**2 * self._evaluated(lambda block: kinetic_energy(block.here, block.rates.V)))
 
     # --- forces --------------------------------------------------------------------------------------------------------
 

@@ -205,6 +205,9 @@ class Values(Protocol):
     def link_point(self, link: int, p: Any) -> MaterialPoint:
         """A material point given in the link's frame; the mass centre where it is None."""
 
+    def kinetic_energy(self) -> Array:
+        """Kinetic energy of all links, ``(...)``."""
+
     def shaking(self) -> Array:
         """Wrench on the frame about the global origin, ``(..., 6)``."""
 
