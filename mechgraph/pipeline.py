@@ -26,8 +26,9 @@ from mechgraph.model.load_base import Load
 from mechgraph.numerics.linear import independent_rows, rank_of, singular_values
 from mechgraph.numerics.tolerances import PATH
 from mechgraph.report.report import check
+from mechgraph.result.kept import BlockMotion
 from mechgraph.result.solution import Solution
-from mechgraph.result.trajectory import BlockMotion, Trajectory
+from mechgraph.result.trajectory import Trajectory
 from mechgraph.structure.actuation import actuation_fault, stand_still
 from mechgraph.structure.branching import branches, branches_text
 from mechgraph.structure.mobility import Freedoms, free_motion

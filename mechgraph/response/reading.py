@@ -17,7 +17,8 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.response.chart import Closed
 from mechgraph.response.charts import Task
 from mechgraph.response.motion_equations import moved
-from mechgraph.result.trajectory import BlockMotion, Trajectory
+from mechgraph.result.kept import BlockMotion
+from mechgraph.result.trajectory import Trajectory
 
 Block = tuple[Index, Task, Closed, Array]
 """Places, the task by which they were followed, closed states, and the rates ``v (n, T)`` of the independent columns of their factors."""
