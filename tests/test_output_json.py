@@ -51,7 +51,7 @@ def test_every_command_has_a_schema() -> None:
     commands = {command.name for command in app.registered_commands}
     takes = {c.name for c in app.registered_commands if "json" in c.callback.__annotations__}
     assert takes == set(COMMANDS)
-    assert commands - takes <= {"plot", "report"}  # which write a picture or a page and have nothing to tell
+    assert commands - takes <= {"plot"}
 
 
 @pytest.mark.parametrize("call", CALLS, ids=" ".join)
@@ -130,6 +130,12 @@ def test_solve_tells_the_results(tmp_path: Path) -> None:
         assert told["not_unique"] == ["Fz", "Mx", "My"]
     assert data["checks"]["closure"] == s.checks.closure.max()
     assert mg.kinematics(mg.load("four-bar"), {"A": [0.1]}).to_dict()["reactions"] == []
+
+
+def test_a_page_is_named(tmp_path: Path, schema: jsonschema.protocols.Validator) -> None:
+    data = run("report", "four-bar", "-o", tmp_path / "x.html")
+    schema.validate(data)
+    assert (data["mechanism"], data["file"]) == ("four-bar", str(tmp_path / "x.html"))
 
 
 def test_loads_tells_what_acts() -> None:

@@ -11,7 +11,7 @@ import mechgraph as mg
 from mechgraph.cli.options import AsJson, Named
 from mechgraph.cli.output import show, write
 from mechgraph.cli.reading import loaded, refuse_own_file
-from mechgraph.cli.records import LibraryItem, ListData, SaveData, write_json
+from mechgraph.cli.records import FileData, LibraryItem, ListData, write_json
 from mechgraph.document import Document, Table
 from mechgraph.exchange.files import WRITERS
 from mechgraph.typed import refuse
@@ -68,6 +68,6 @@ def save(
         m = known[advice].apply()
     mg.save(m, out)
     if json:
-        write_json("save", SaveData(m.name, str(out)))
+        write_json("save", FileData(m.name, str(out)))
     else:
         write(f"Wrote {out}.\n")

@@ -10,10 +10,11 @@ import numpy as np
 import typer
 
 import mechgraph as mg
-from mechgraph.cli.options import Actuate, Drives, Engine, Method, Named, OnReach, Redundant, Tolerance
+from mechgraph.cli.options import Actuate, AsJson, Drives, Engine, Method, Named, OnReach, Redundant, Tolerance
 from mechgraph.cli.outcome import NO_ANSWER, NO_ANSWERS
 from mechgraph.cli.output import working, write
 from mechgraph.cli.reading import loaded, refuse_own_file
+from mechgraph.cli.records import FileData, write_json
 from mechgraph.typed import drives_of
 
 
@@ -27,6 +28,7 @@ def report(
     on_reach: OnReach = "flag",
     engine: Engine = "auto",
     tol: Tolerance = None,
+    json: AsJson = False,
 ) -> None:
     """Write a page to pass on: verdict, determinacy report, the mechanism in space, curves, tables, equations.
 
@@ -52,7 +54,10 @@ def report(
             except NO_ANSWERS as error:
                 failure, s = error, getattr(error, "solution", None)
         mg.write_report(m, s, path=out)
-    write(f"Wrote {out}: {out.stat().st_size / 1e6:.2f} MB.\n")
+    if json:
+        write_json("report", FileData(m.name, str(out)))
+    else:
+        write(f"Wrote {out}: {out.stat().st_size / 1e6:.2f} MB.\n")
     if failure is not None:
         raise failure
     if s is not None and not (np.asarray(s.status) == "ok").any():

@@ -160,8 +160,8 @@ class LoadsData:
 
 
 @dataclass(frozen=True)
-class SaveData:
-    """A mechanism that was written as a file."""
+class FileData:
+    """A mechanism, its page or its picture, that was written as a file."""
 
     mechanism: str
     file: str
@@ -248,7 +248,8 @@ COMMANDS: dict[str, Callable[[Json], Json]] = {
     "equations": _record(EquationsData),
     "solve": _record(SolutionData, over_time=OverTimeData | None, written=Written | None),
     "respond": _record(ResponseData, over_time=OverTimeData | None, written=Written | None),
-    "save": _record(SaveData),
+    "save": _record(FileData),
+    "report": _record(FileData),
     "loads": _record(LoadsData),
 }
 """The schema of what every command prints."""
