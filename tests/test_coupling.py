@@ -258,3 +258,15 @@ def test_couplings_that_say_the_same_twice_have_no_unique_effort() -> None:
     once = mg.check(m.replace(couplings=twice[:1]))
     assert once.determinate
     assert once.unique["g1"] == {"effort": True}
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.parametrize("method", ["loop_wrench", "newton_euler"])
+def test_couplings_that_say_the_same_share_alike(method, engine):
+    """m1 + 2 m2 = 3 at the wheel; of all such pairs that with the least efforts m1 and 2 m2."""
+    pairs = [mg.Pair(k, "R", "frame", k.lower(), point=(i, 0, 0), axis=(0, 0, 1)) for i, k in enumerate("ABD")]
+    twice = [mg.Coupling({"A": 1, "B": 1}, name="one"), mg.Coupling({"A": 2, "B": 2}, name="two")]
+    m = mg.Mechanism("gears", pairs=pairs, couplings=twice, drives=["A", "D"], loads=[mg.Effort("B", -3)])
+    s = mg.solve(m, {"A": 0.0, "D": 0.0}, redundant="minimum_norm", method=method, engine=engine)
+    assert s.coupling("one").effort == pytest.approx(1.5, abs=1e-12)
+    assert s.coupling("two").effort == pytest.approx(0.75, abs=1e-12)

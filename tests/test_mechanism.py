@@ -506,3 +506,11 @@ def test_a_start_is_not_sought_too_far_away():
     m = mg.Mechanism("arm", None, axes, ["A", "B"], frame="f")
     with pytest.raises(mg.DeclarationError, match=r"A: comes 1e\+07 away from the start; expected at most 1e\+04"):
         mg.assemble(m, {"A": 1e7, "B": 1.0})
+
+
+@pytest.mark.parametrize("values", [(0.1, 0.2), [0.1, 0.2], np.array([0.1, 0.2])])
+def test_start_values_of_a_pair_in_one_sequence(values):
+    m = mg.load("rcsr").replace(start={"O1": 0.5, "O2": values})
+    assert dict(m.start) == {"O1.Rz": 0.5, "O2.Rz": 0.1, "O2.Tz": 0.2}
+    with pytest.raises(mg.DeclarationError, match="has 2 freedoms; name one of"):
+        m.replace(start={"O2": np.array([[0.1, 0.2]])})

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import concurrent.futures
 import dataclasses
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import mechanisms as known
@@ -324,12 +324,66 @@ def test_every_variant_may_have_its_own_motion() -> None:
 # --- executors ---------------------------------------------------------------------------------------------------------------
 
 
+def test_variants_solved_alone_keep_the_outcome_of_every_position() -> None:
+    """A rocker whose length goes through zero to its negative cannot be followed there: that variant is solved alone, as by ``solve``."""
+    z, ends = (0, 0, 1), [("frame", "crank"), ("crank", "coupler"), ("coupler", "rocker"), ("frame", "rocker")]
+    places = [((0, 0, 0), (0, 0, 0)), ((1, 0, 0), (0, 0, 0)), ((3, 0, 0), (2.5, 0, 0)), ((3.2, 0, 0), (0, 0, 0))]
+    pairs = [
+        mg.Pair(name, "R", *links, on_a=mg.Marker(at[0], z), on_b=mg.Marker(at[1], z))
+        for name, links, at in zip("ABCD", ends, places, strict=True)
+    ]
+    start = {"A": 0.5, "B": 0.24, "C": 0.87, "D": 1.61}
+    m = mg.Mechanism("four-bar", pairs=pairs, drives=["A"], loads=[mg.Effort("D", 1.0)], start=start)
+    drive = {"A": np.linspace(0.5, 5.5, 6)}
+    study = mg.study(m, {"C.on_b.point.x": [-2.5, -0.9, 2.4]}, ["A.effort"], n=3, motions=drive, sampling="grid")
+    for i in range(3):
+        s = mg.solve(study.variant(i), drive, on_reach="flag")
+        assert study.status[i].tolist() == s.status.tolist()
+        np.testing.assert_allclose(study.outputs["A.effort"][i], s["A"].effort[:, 0], rtol=1e-9, atol=1e-9)
+    assert study.failed.tolist() == [False, True, False]
+    assert set(study.status[1]) == {"ok", "out of reach"}
+
+
+class Lazy(concurrent.futures.Executor):
+    """Does the first task at once, and the others never."""
+
+    def __init__(self) -> None:
+        self.futures: list[concurrent.futures.Future[Any]] = []
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> concurrent.futures.Future[Any]:
+        self.futures.append(concurrent.futures.Future())
+        if len(self.futures) == 1:
+            self.futures[0].set_result(fn(*args, **kwargs))
+        return self.futures[-1]
+
+
+def test_what_is_not_begun_is_cancelled_where_a_study_ends_early(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "POSITIONS_TOGETHER", len(ANGLES))
+    lazy = Lazy()
+
+    def stop(done: int, of: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        mg.study(
+            mg.load("rcsr"),
+            {"link1.mass": [1.0, 2.0, 3.0]},
+            "O1.effort",
+            n=3,
+            motions=RCSR,
+            executor=lazy,
+            progress=stop,
+        )
+    assert len(lazy.futures) == 4
+    assert [future.cancelled() for future in lazy.futures] == [False, True, True, True]
+
+
 def test_same_seed_same_result_whatever_the_executor(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "POSITIONS_TOGETHER", 3 * len(ANGLES))
     ways = {"length[2]": scipy.stats.norm(0.4, 0.004), "link1.mass": scipy.stats.uniform(1, 2)}
     found = []
     calls: list[tuple[int, int]] = []
-    with ThreadPoolExecutor(2) as threads:
+    with concurrent.futures.ThreadPoolExecutor(2) as threads:
         for executor in (None, threads):
             found.append(
                 mg.study(

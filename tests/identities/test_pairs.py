@@ -343,3 +343,26 @@ def test_the_table_prints_every_row():
     text = str(mg.pair_types())
     for row in mg.pair_types().values():
         assert row.name.split()[0] in text
+
+
+def test_efforts_are_named_after_the_axes_of_their_freedoms():
+    """A couple for a turn, a force for a slide, about and along the same axis."""
+    named = {symbol: [e.name for e in row.efforts] for symbol, row in mg.pair_types().items()}
+    assert named["C"] == ["Mz", "Fz"]
+    assert named["Sc"] == ["Fz", "My", "Mx"]
+    assert named["Sp"] == ["Fx", "Fy", "Mx", "My", "Mz"]
+    for row in mg.pair_types().values():
+        assert [e.name for e in row.efforts] == [("M" if f.turns else "F") + f.name[1] for f in row.freedoms]
+
+
+@pytest.mark.parametrize("size", [1e-3, 0.05, 0.5, 2.0, 3.1])
+def test_rates_of_rotation_vectors_are_their_derivatives(size):
+    """d/dt log(exp(t w) exp(v)) at t = 0, by central differences; small and large turns."""
+    rng, h = np.random.default_rng(5), 1e-5
+    v = rng.normal(size=(3, 4))
+    v *= size / np.linalg.norm(v, axis=0)
+    w = rng.normal(size=(3, 4))
+    turned = [
+        evaluation.turn_between(evaluation.turned(se3.quaternion_exp(v), s * h * w), np.eye(4, 1)) for s in (1, -1)
+    ]
+    np.testing.assert_allclose(evaluation.turn_tangent(v, w), (turned[0] - turned[1]) / (2 * h), rtol=0, atol=2e-8)
