@@ -24,6 +24,8 @@ TURNS = (1, 4, 16)
 """Turns of the driver over which a motion is followed to see whether it repeats itself, one number after the other."""
 WORTH = 2
 """How many times as far positions must lie for that."""
+ROUNDING = 1e-14
+"""Part of a driver's value up to which a position is the start itself: so near to it nothing is followed, dead point or not."""
 BACK = 1e-11
 """Distance (radians, lengths / L) up to which a motion is back: rounding over a poor condition; shifts are whole turns or nothing."""
 
@@ -74,7 +76,8 @@ def _along_curves(path: DriverPath, requests: list[Request], total: int) -> Posi
             turns[places] = np.floor(at / way.period)
             at = np.clip(at - way.period * turns[places], 0.0, way.period)
             values = np.where(turns[places] > 0, begin + way.sense * at, values)
-        points = np.array([[begin, begin + way.sense * way.length]]) if way.length > 0 else np.array([[begin]])
+        ahead = way.length > ROUNDING * max(1.0, abs(begin))
+        points = np.array([[begin, begin + way.sense * way.length] if ahead else [begin]])
         legs.add(way.request, points, values, places, at)
     found = legs.followed().positions
     if turns.any():
