@@ -13,30 +13,47 @@ from numpy.typing import NDArray
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import CLOSED, closed_start, named_columns
 from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.coordinates import continued
 from mechgraph.closure.driver_motion import DriverMotion
-from mechgraph.closure.driver_path import BLOCK, FARTHEST, DriverPath, Positions, Request, Status, in_blocks
+from mechgraph.closure.driver_path import (
+    BLOCK,
+    FARTHEST,
+    DriverPath,
+    Positions,
+    Status,
+    far_faults,
+    in_blocks,
+    requests,
+)
 from mechgraph.closure.following import follow
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.passive_rest import Idle, unspun
-from mechgraph.closure.rates import Rates, Velocities, distance_to_dead_point, rates
+from mechgraph.closure.rates import Rates, Velocities, at_dead_points, disagreement, distance_to_dead_point, rates
 from mechgraph.closure.solver import ClosureSolver, FactoredClosure, closure_solver, engine_for
-from mechgraph.errors import DeadPointError, DeclarationError, IndeterminateError
+from mechgraph.errors import DeclarationError, IndeterminateError
 from mechgraph.force.block import BlockForces, ForceTask, forces_of_block
 from mechgraph.model.load_base import Load
-from mechgraph.numerics.linear import independent_rows, rank_of, singular_values
+from mechgraph.numerics.linear import independent_rows
 from mechgraph.numerics.tolerances import PATH
+from mechgraph.report.refused import (
+    change_point_error,
+    dead_point_error,
+    structure_error,
+    undecided_error,
+    undriven_error,
+)
 from mechgraph.report.report import check
 from mechgraph.result.kept import BlockMotion
 from mechgraph.result.solution import Solution
 from mechgraph.result.trajectory import Trajectory
 from mechgraph.structure.actuation import actuation_fault, stand_still
-from mechgraph.structure.branching import branches, branches_text
+from mechgraph.structure.branching import branches
 from mechgraph.structure.mobility import Freedoms, free_motion
 from mechgraph.structure.passive import PassiveMotion
 
 CONTRADICTION = 1e-6
 """Relative part of the closure rates that drivers may leave open before they count as contradicting each other."""
-NOISE = 1e-13
+CLOSING = 1e-13
 """Part of the condition number within which a start is not told from a dead point: some hundred roundings of its closing."""
 Mask = NDArray[np.bool_]
 
@@ -98,7 +115,7 @@ class Pipeline:
         self.bodies: tuple[Idle, ...] = ()
         self.hold: Index | None = None
         if not self.solver.leaves_nothing_free(self.start):
-            self.lead = self._independent()
+            self.lead = self.freedoms.leading(self.columns)
             self._check_determinate()
             self.passive, self.bodies, self.hold = self.freedoms.passive, self.freedoms.bodies, self.freedoms.hold
             self.solver = closure_solver(self.engine, self.leading, self.hold)
@@ -120,66 +137,28 @@ class Pipeline:
         """Refuse a path that would be followed for hours."""
         begin = self.x[self.system.single_rows[self.columns]][:, None]
         far = np.abs(self.values("position", self.drive.batch) - begin).max(axis=1)
-        faults = [
-            f"motion of {name!r}: comes {size * unit:.3g} away from the start; expected at most {FARTHEST * unit:.3g}"
-            for name, size, unit in zip(self.drive.names, far, self.unit, strict=True)
-            if size > FARTHEST
-        ]
+        names = [f"motion of {name!r}" for name in self.drive.names]
+        faults = far_faults(names, far, self.unit, np.full(len(far), FARTHEST))
         if faults:
             raise DeclarationError(f"solve {self.m.name!r}", faults)
-
-    def _independent(self) -> Index:
-        """The leading drivers: as many as can move independently, taken in the order of the drivers."""
-        if not self.freedoms.dependent:
-            return np.arange(len(self.columns))
-        rank = rank_of(singular_values(self.freedoms.null[self.columns]), PATH.independent)
-        order = [int(c) for c in self.columns]
-        chosen = independent_rows(self.freedoms.null, order, rank)
-        return np.array([order.index(c) for c in sorted(chosen, key=order.index)], dtype=np.intp)
 
     def _check_determinate(self) -> None:
         free = self.freedoms.undriven
         if len(self.columns) and not self.freedoms.mobility:
-            raise IndeterminateError(
-                f"mechanism {self.m.name!r}: {', '.join(self.drive.names)} cannot drive it: it is a structure (mobility 0) where it was "
-                "assembled. Change a pair, see mg.check",
-                check(self.drive.m),
-            )
+            raise structure_error(self.drive.m, self.drive.names)
         still = np.sqrt((self.freedoms.null[self.columns] ** 2).sum(axis=1)) < PATH.independent
         if free and still.any() and len(self.columns) <= self.freedoms.mobility:
-            value = dict(
-                zip(self.drive.names, (self.x[self.system.single_rows[self.columns]] * self.unit).tolist(), strict=True)
-            )
-            names = ", ".join(name for name, rests in zip(self.drive.names, still, strict=True) if rests)
-            raise DeadPointError(
-                f"mechanism {self.m.name!r}: dead point where it was assembled: {names} stands still there while the mechanism moves, so "
-                "that it does not determine the motion; drive another freedom, or start at another position",
-                value,
-                self._standing(),
-            )
+            names = [name for name, rests in zip(self.drive.names, still, strict=True) if rests]
+            raise dead_point_error(self.drive.m, names, self._begin, self._standing())
         self._refuse_change_point()
         if free:
-            own = self.drive.m.freedom_names()
-            names = ", ".join(dict.fromkeys(name for motion in free for name in motion.names if name in own))
-            count, more = (
-                ("1 freedom is", "one driver")
-                if len(free) == 1
-                else (f"{len(free)} freedoms are", f"{len(free)} drivers")
-            )
-            raise IndeterminateError(
-                f"mechanism {self.m.name!r}: {count} neither driven nor passive (moving: {names}); add {more}, or change a pair",
-                check(self.drive.m),
-            )
+            raise undriven_error(self.drive.m, free)
 
     def _check_passive(self) -> None:
         """Rows as they are solved and rows over their own lengths, by which the rank is decided, leave the same motions free."""
         free = self.solver.factored(self.start, self.solver.chosen(self.start, np.full(1, -1))).motions().shape[1]
         if free != len(self.passive):
-            raise IndeterminateError(
-                f"mechanism {self.m.name!r}: where it was assembled it is so nearly singular that rounding decides whether "
-                f"{len(self.passive)} freedoms or {free} are passive. Start at another position, or check the dimensions",
-                check(self.drive.m),
-            )
+            raise undecided_error(self.drive.m, sorted({free, len(self.passive)}))
 
     def _standing(self) -> Solution | None:
         """The start at rest, where the drivers leave motions free: what equilibrium determines of the forces.
@@ -225,19 +204,17 @@ class Pipeline:
         f = self.solver.factored(here, self.solver.chosen(here, np.full(1, -1)))
         if f.condition[0] <= PATH.singular and not self.freedoms.undriven:
             near = distance_to_dead_point(here, f, columns)[0]
-            if f.condition[0] < PATH.doubtful or near > NOISE * f.condition[0]:
+            if f.condition[0] < PATH.doubtful or near > CLOSING * f.condition[0]:
                 return
         ways = branches(self.system, self.x, columns, self.freedoms.passive)
-        if not ways:
-            return
+        if ways:
+            raise change_point_error(self.drive.m, self._begin, ways)
+
+    @property
+    def _begin(self) -> dict[str, float]:
+        """Values of the drivers at the start, by name."""
         values = self.x[self.system.single_rows[self.columns]] * self.unit
-        error = DeadPointError(
-            f"mechanism {self.m.name!r}: change point where it was assembled: {branches_text(ways, self.drive.names[0])}. A path that "
-            "starts there has no velocity to continue: start beside it, on the branch that is meant, or drive another freedom",
-            dict(zip(self.drive.names, values.tolist(), strict=True)),
-        )
-        error.branches = ways
-        raise error
+        return dict(zip(self.drive.names, values.tolist(), strict=True))
 
     @property
     def leading(self) -> Index:
@@ -257,25 +234,13 @@ class Pipeline:
         variant = np.zeros(T, dtype=np.intp) if one and not shared else np.arange(T) // batch[-1]
         followed = (1, batch[-1]) if shared else batch
         path = DriverPath(self.system, self.solver, starts.system_of, start)
-        found = follow(path, self._requests(followed, starts), int(np.prod(followed)))
+        found = follow(
+            path, requests(starts.x, self.values("position", followed)[self.lead], followed), int(np.prod(followed))
+        )
         if self.bodies:
             found = unspun(path, found, self.bodies)
             found.interpolate()
         return Outcome(self, starts, batch, variant, found, path)
-
-    def _requests(self, batch: tuple[int, ...], starts: Starts) -> list[Request]:
-        """What is asked of every start. With one driver all cases lie on one curve; with several, each case has a polygon of its own."""
-        values = self.values("position", batch)[self.lead]
-        T, N = values.shape[1], batch[-1] if batch else 1
-        if starts.x.shape[1] == 1:
-            if len(self.lead) == 1:
-                return [Request(starts.x[:, 0], 0, values, np.arange(T))]
-            return [Request(starts.x[:, 0], 0, values[:, i : i + N], np.arange(i, i + N)) for i in range(0, T, N)]
-        begun = np.flatnonzero(np.isfinite(starts.x).all(axis=0))
-        return [
-            Request(starts.x[:, v], v, values[:, v * N : (v + 1) * N], np.arange(v * N, (v + 1) * N))
-            for v in begun.tolist()
-        ]
 
 
 class Outcome:
@@ -356,7 +321,7 @@ class Outcome:
         f = self.solver.factored(here, which)
         found.work.factorizations += here.T
         open_ = here.closure > CLOSED
-        dead = self._dead(here, f) & ~open_
+        dead = at_dead_points(here, f, line.leading) & ~open_
         if (open_ | dead).any():
             self.trajectory.mark(places[open_], Status.NOT_CLOSED.value)
             self.trajectory.mark(places[dead], Status.DEAD_POINT.value)
@@ -365,11 +330,16 @@ class Outcome:
             f = f.part(keep, here)
         if not places.size:
             return None
-        moved = self._rates(here, f, places)
+        return self._agreed(self._rates(here, f, places), places), f
+
+    def _agreed(self, moved: Rates, places: Index) -> BlockMotion:
+        """Rates at places; where dependent drivers contradict the leading ones is noted."""
+        line = self.line
         if len(line.lead) < len(line.columns):
-            moved.contradiction = self._disagreement(here, moved, places)
+            given = line.values("position", self.batch), self._velocity, self._acceleration
+            moved.contradiction = disagreement(moved, line.columns, *(values[:, places] for values in given))
         self.contradicting[places] = moved.contradiction > CONTRADICTION
-        return BlockMotion(places, moved), f
+        return BlockMotion(places, moved)
 
     def _rates(self, here: Configuration, f: FactoredClosure, places: Index) -> Rates:
         """Rates at states for the motions of the drivers at places."""
@@ -395,15 +365,17 @@ class Outcome:
             moved = self._rates(beside, f, np.repeat(places, k))
             weights = crossing.weights(found.place[places])
             dq, ddq = (np.einsum("fnk,kn->fn", values.reshape(-1, n, k), weights) for values in (moved.dq, moved.ddq))
+            open_ = Configuration(self._system_at(places), found.x[:, places]).closure > CLOSED
+            self.trajectory.mark(places[open_], Status.NOT_CLOSED.value)
             for regular in (True, False):
-                mine = np.flatnonzero((found.status[places] == Status.OK) == regular)
+                mine = np.flatnonzero(((found.status[places] == Status.OK) == regular) & ~open_)
                 if not mine.size:
                     continue
                 at = places[mine]
                 here = Configuration(self._system_at(at), found.x[:, at])
                 motion = Rates(Velocities(here, dq[:, mine]), ddq[:, mine], np.zeros(len(mine)))
                 factors = self.solver.factored(here, self.solver.chosen(here, found.which[at])) if regular else None
-                yield BlockMotion(at, motion), factors
+                yield self._agreed(motion, at), factors
 
     def _put(self, motion: BlockMotion, f: FactoredClosure | None) -> None:
         self.trajectory.has_forces |= self.line.options.method is not None
@@ -443,64 +415,7 @@ class Outcome:
             raise DeclarationError(f"solve {line.m.name!r}", [too_large])
         return found
 
-    def _dead(self, here: Configuration, f: FactoredClosure) -> Mask:
-        """Positions so near to a dead point that their rates would be noise."""
-        dead = np.asarray(f.condition > PATH.singular)
-        doubtful = np.flatnonzero((f.condition > PATH.doubtful) & ~dead)
-        if doubtful.size:
-            few = here.part(doubtful)
-            near = distance_to_dead_point(few, f.part(doubtful, few), self.line.leading)
-            dead[doubtful] = ~(near > PATH.dead_point)
-        return dead
-
-    def _disagreement(self, here: Configuration, moved: Rates, places: Index) -> Array:
-        """How far given positions and rates of dependent drivers are from those that the leading drivers enforce, ``(T,)``."""
-        line = self.line
-        turns = line.values("position", self.batch)[:, places] - here.x[line.system.single_rows[line.columns]]
-        turns -= np.where(line.system.is_length[line.columns], 0.0, 2 * np.pi)[:, None] * np.round(turns / (2 * np.pi))
-        out = np.abs(turns).max(axis=0, initial=0.0)
-        for given, found in ((self._velocity, moved.dq), (self._acceleration, moved.ddq)):
-            asked = given[:, places]
-            size = np.abs(found).max(axis=0, initial=0.0) + np.abs(asked).max(axis=0, initial=0.0)
-            gap = np.abs(found[line.columns] - asked).max(axis=0, initial=0.0)
-            out = np.maximum(out, gap / np.where(size > 0, size, 1.0))
-        return np.maximum(out, moved.contradiction)
-
 
 def _system_at(starts: Starts, variant: Index, places: Index) -> System:
     """The system with the numbers of the positions at flat places."""
     return starts.system_of(variant[places])
-
-
-def continued(path: DriverPath, found: Positions) -> Array:
-    """User coordinates ``(F, T)`` of all positions, rotation vectors continued along their tracks from the start."""
-    s = path.system
-    start = s.start_coordinates(s.m.start)
-    if all(len(factor) == 1 for g in s.groups for factor in g.row.factors):
-        q = s.coordinates_of(found.x)
-        return q if found.gained is None else q + found.gained
-    out = np.full((s.n_freedoms, found.x.shape[1]), np.nan)
-    good = np.flatnonzero(found.moved)
-    turns = np.zeros(found.x.shape[1], dtype=np.intp) if found.turns is None else found.turns
-    for track, mine in _by_track(found.track[good]):
-        nodes, near = found.nodes_of(track), start
-        spin = np.zeros((s.n_freedoms, len(nodes)))
-        if found.spin is not None:
-            spin = found.spin[:, found.tracks.nodes.track == track]
-        for turn in range(int(turns[good[mine]].max()) + 1):
-            at = good[mine][turns[good[mine]] == turn]
-            place = np.concatenate([nodes.place, found.place[at]])
-            order = np.argsort(place, kind="stable")
-            on_the_way = path.advance(nodes.x, turn * spin, nodes.track) if turn else nodes.x
-            q = s.coordinates_of(np.concatenate([on_the_way, found.x[:, at]], axis=1)[:, order], near)
-            back = np.empty_like(order)
-            back[order] = np.arange(len(order))
-            out[:, at], near = q[:, back[len(nodes) :]], q[:, -1]
-    return out if found.gained is None else out + found.gained
-
-
-def _by_track(track: Index) -> list[tuple[int, Index]]:
-    """Positions of every track."""
-    order = np.argsort(track, kind="stable")
-    cuts = np.flatnonzero(np.diff(track[order])) + 1
-    return [(int(track[part[0]]), part) for part in np.split(order, cuts) if part.size]

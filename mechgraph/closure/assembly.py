@@ -10,7 +10,7 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array, rotate
 from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.driver_path import FARTHEST, DriverPath, Request, Status
+from mechgraph.closure.driver_path import FARTHEST, DriverPath, Request, Status, far_faults
 from mechgraph.closure.following import follow
 from mechgraph.closure.indexing import Index, System, indexed
 from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
@@ -334,12 +334,8 @@ def assembled_at(
 
 def _refuse_far(m: Mechanism, names: Iterable[str], way: Array, unit: Array) -> None:
     """Refuse a way that would be followed for minutes; that of one freedom that turns is cut where the motion repeats itself."""
-    most = FARTHEST if len(way) == 1 else FARTHEST_TOGETHER
-    faults = [
-        f"{name}: comes {size * one:.3g} away from the start; expected at most {most * one:.3g}. Give a nearer value, or a guess"
-        for name, size, one in zip(names, np.abs(way), unit, strict=True)
-        if size > most
-    ]
+    most = np.full(len(way), FARTHEST if len(way) == 1 else FARTHEST_TOGETHER)
+    faults = far_faults(names, np.abs(way), unit, most, ". Give a nearer value, or a guess")
     if faults:
         raise DeclarationError(f"assemble {m.name!r}", faults)
 

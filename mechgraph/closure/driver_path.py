@@ -7,7 +7,7 @@ start -> first -> second ...
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -32,6 +32,15 @@ FARTHEST = 1e6
 """Longest way of a driver from its start (radians, or lengths / L)."""
 BLOCK = 1024
 """Positions evaluated together, so that what is computed on the way stays in the cache of a core (measured)."""
+
+
+def far_faults(names: Iterable[str], ways: Array, units: Array, most: Array, advice: str = "") -> list[str]:
+    """What is wrong with ways that would be followed for hours."""
+    return [
+        f"{name}: comes {way * unit:.3g} away from the start; expected at most {limit * unit:.3g}{advice}"
+        for name, way, unit, limit in zip(names, ways, units, most, strict=True)
+        if way > limit
+    ]
 
 
 class Status(Enum):
@@ -136,6 +145,19 @@ class Request:
         """The driver values of the start, of what is to be passed and of the positions, one after the other."""
         start = self.x[rows][:, None]
         return np.concatenate([start, self.values] if self.via is None else [start, self.via, self.values], axis=1)
+
+
+def requests(x: Array, values: Array, batch: tuple[int, ...]) -> list[Request]:
+    """What is asked of starts ``x (nx, V)``, NaN where there is none, by driver values ``(d, T)`` of a batch of positions.
+
+    Of one start: with one driver all cases lie on one curve; with several, each case has a polygon of its own.
+    """
+    T, N = values.shape[1], batch[-1] if batch else 1
+    if x.shape[1] == 1:
+        whole = T if len(values) == 1 else N
+        return [Request(x[:, 0], 0, values[:, i : i + whole], np.arange(i, i + whole)) for i in range(0, T, whole)]
+    begun = np.flatnonzero(np.isfinite(x).all(axis=0)).tolist()
+    return [Request(x[:, v], v, values[:, v * N : (v + 1) * N], np.arange(v * N, (v + 1) * N)) for v in begun]
 
 
 @dataclass

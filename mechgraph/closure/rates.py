@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure import passive_rest as idle
@@ -12,6 +13,7 @@ from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.passive_rest import Idle
 from mechgraph.closure.solver import FactoredClosure
+from mechgraph.numerics.tolerances import PATH
 
 
 class Velocities:
@@ -104,6 +106,30 @@ def distance_to_dead_point(here: Configuration, solver: FactoredClosure, columns
         moved = rates(here, solver, columns, one, nothing)
         grown = np.abs(moved.ddq).max(axis=0, initial=0.0)
         out = np.minimum(out, 0.5 * np.abs(moved.dq).max(axis=0, initial=0.0) / np.maximum(grown, 1e-300))
+    return out
+
+
+def at_dead_points(here: Configuration, solver: FactoredClosure, columns: Index) -> NDArray[np.bool_]:
+    """Which positions are so near to a dead point of the drivers ``columns`` that their rates would be noise, ``(T,)``."""
+    dead = np.asarray(solver.condition > PATH.singular)
+    doubtful = np.flatnonzero((solver.condition > PATH.doubtful) & ~dead)
+    if doubtful.size:
+        few = here.part(doubtful)
+        near = distance_to_dead_point(few, solver.part(doubtful, few), columns)
+        dead[doubtful] = ~(near > PATH.dead_point)
+    return dead
+
+
+def disagreement(moved: Rates, columns: Index, positions: Array, velocity: Array, acceleration: Array) -> Array:
+    """How far motions given to freedoms ``columns (d, T)`` are from those found, relative ``(T,)``; angles up to whole turns."""
+    system = moved.here.system
+    off = positions - moved.here.x[system.single_rows[columns]]
+    off -= np.where(system.is_length[columns], 0.0, 2 * np.pi)[:, None] * np.round(off / (2 * np.pi))
+    out = np.maximum(np.abs(off).max(axis=0, initial=0.0), moved.contradiction)
+    for asked, found in ((velocity, moved.dq), (acceleration, moved.ddq)):
+        size = np.abs(found).max(axis=0, initial=0.0) + np.abs(asked).max(axis=0, initial=0.0)
+        gap = np.abs(found[columns] - asked).max(axis=0, initial=0.0)
+        out = np.maximum(out, gap / np.where(size > 0, size, 1.0))
     return out
 
 

@@ -15,8 +15,8 @@ from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.passive_rest import Idle
 from mechgraph.closure.rank import ClosureRank, EngineName, rank_of_rows
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.numerics.linear import independent_rows, singular_values
-from mechgraph.numerics.tolerances import MOTIONS
+from mechgraph.numerics.linear import independent_rows, rank_of, singular_values
+from mechgraph.numerics.tolerances import MOTIONS, PATH
 from mechgraph.structure.passive import PassiveMotion, passive_motions, small_combinations
 from mechgraph.structure.position import Position
 
@@ -62,6 +62,15 @@ class Freedoms:
             return self.null
         P, _ = np.linalg.qr(np.stack([p.rates for p in self.passive], axis=1))
         return np.asarray(self.null - P @ (P.T @ self.null))
+
+    def leading(self, columns: Index) -> Index:
+        """Places of the drivers that lead among ``columns``: as many as can move independently, taken in their order."""
+        if not self.dependent:
+            return np.arange(len(columns))
+        rank = rank_of(singular_values(self.null[columns]), PATH.independent)
+        order = columns.tolist()
+        chosen = independent_rows(self.null, order, rank)
+        return np.array([order.index(c) for c in sorted(chosen, key=order.index)], dtype=np.intp)
 
     @property
     def redundancy(self) -> int:

@@ -129,6 +129,8 @@ def solve_together(
         begun, x, sharing = valid, line.x[:, None], V
     else:
         begun, x, sharing = *_led(line, path, valid), 1
+    if not begun.any():
+        return Together(None, np.ones(V, dtype=bool), nothing)
     starts = Starts(x, systems.cases, variants.loads, sharing)
     q = systems.coordinates_of(starts.x[..., None], line.system.start_coordinates(line.m.start))[..., 0][: len(nothing)]
     try:

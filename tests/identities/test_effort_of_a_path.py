@@ -80,6 +80,15 @@ def test_variants_that_differ_by_little_are_led_in_a_step(monkeypatch):
     assert {careful for problem, careful in led if problem == "NumbersPath"} == {0}
 
 
+@pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
+def test_a_study_of_which_no_variant_can_be_led():
+    """The first position is out of reach of all: each is assembled and solved alone, and the study goes on."""
+    m = near_its_dead_point(1e-6)
+    begin = m.start["D.Rz"]
+    study = mg.study(m, {"B.point.y": [0.001, 0.002]}, ["D.effort"], n=2, motions={"D": [begin, begin - 0.01]})
+    assert study.status.tolist() == [["out of reach", "ok"]] * 2
+
+
 def two_pairs(other, **place):
     """Two links joined by pairs of which one holds what the other leaves free: nothing moves."""
     pairs = [mg.Pair("P0", "W", "f", "a", point=(0.3, -1, 0.2), axis=(1, 2, -1), second=(2, -1, 0))]
