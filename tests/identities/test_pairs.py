@@ -316,6 +316,22 @@ def test_rotation_vectors_are_continuous_where_the_axis_wanders_near_a_half_turn
         ({"freedoms": ["Tx", "Ty", "Tz", "rotation", mg.Freedom("Q", (0, 0, 1, 0, 0, 0))]}, "pair type"),
         ({"freedoms": [mg.Freedom("R", (0, 0, np.nan, 0, 0, 0))]}, "pair type"),
         ({"freedoms": [mg.Freedom("R", (0, 0, 1))]}, "pair type"),
+        (
+            {"freedoms": ["Rz"], "bookkeeping": mg.Bookkeeping((), (mg.Component("Fz", (0, 0, 1)),))},
+            "bookkeeping: along 'Fz': wrench = .*six finite numbers, moment part first",
+        ),
+        (
+            {"freedoms": ["Rz"], "bookkeeping": mg.Bookkeeping((mg.Freedom("Rz", (0, 0, 1)),), ())},
+            "freedom 'Rz': twist = .*six finite numbers, angular part first",
+        ),
+        (
+            {"freedoms": ["Rz"], "bookkeeping": mg.Bookkeeping(("Rz",), ())},
+            "bookkeeping: conditions = 'Rz': expected a Freedom",
+        ),
+        (
+            {"freedoms": ["Rz"], "bookkeeping": mg.Bookkeeping((), ("Fz",))},
+            "bookkeeping: along = 'Fz': expected a Component",
+        ),
     ],
 )
 def test_a_bad_row_is_refused(more, word):
