@@ -164,3 +164,46 @@ def test_the_check_finds_a_circle(source: str) -> None:
     sources = {"room.a": "from room.b import g", "room.b": "import room.c", "room.c": source, "room.d": "import room.a"}
     assert circles(sources) == [["room.a", "room.b", "room.c"]]
     assert not circles({**sources, "room.c": "import other"})
+
+
+UPWARD = {
+    ("model/mechanism.py", "snapped", "mechgraph.structure.snapping"),
+    ("model/mechanism.py", "view", "mechgraph.show.page.widget"),
+    ("result/solution.py", "view", "mechgraph.show.page.widget"),
+}
+"""Methods that a user looks for on a class of a lower room: all they do is call, when they are called, a function of a room above."""
+
+
+def calls_upward(source: str) -> set[tuple[str, str]]:
+    """(function, module) of imports of the package by name, which no check of import statements sees."""
+    found = set()
+    for function in ast.walk(ast.parse(source)):
+        if isinstance(function, ast.FunctionDef):
+            for node in ast.walk(function):
+                named = (
+                    isinstance(node, ast.Call)
+                    and getattr(node.func, "attr", getattr(node.func, "id", "")) == "import_module"
+                )
+                if named and str(getattr(node.args[0], "value", "")).startswith("mechgraph"):
+                    found.add((function.name, node.args[0].value))
+    return found
+
+
+def test_only_thin_methods_import_the_package_by_name() -> None:
+    sources = {file.relative_to(PACKAGE).as_posix(): file.read_text(encoding="utf-8") for file in FILES}
+    found = {(name, *call) for name, source in sources.items() for call in calls_upward(source)}
+    assert found == UPWARD
+    for name, method, _ in UPWARD:
+        bodies = [
+            node.body
+            for node in ast.walk(ast.parse(sources[name]))
+            if isinstance(node, ast.FunctionDef) and node.name == method
+        ]
+        assert [len(body) <= 3 for body in bodies] == [True]  # docstring, call, return
+
+
+def test_the_check_finds_an_import_by_name() -> None:
+    assert calls_upward("def f():\n    return importlib.import_module('mechgraph.show').g()") == {
+        ("f", "mechgraph.show")
+    }
+    assert not calls_upward("def f():\n    return importlib.import_module('pint')")
