@@ -27,6 +27,7 @@ from mechgraph.model.coupling import Coupling
 from mechgraph.model.drive import Drive
 from mechgraph.model.force_law import Damper, ForceLaw, Spring, TorsionSpring
 from mechgraph.model.force_table import ForceTable
+from mechgraph.model.gears import Belt, BevelGears, Rack, SpurGears, WormGear
 from mechgraph.model.library import library_names as library
 from mechgraph.model.link import Link
 from mechgraph.model.load import Effort, Gravity, Wrench
@@ -53,6 +54,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "AssemblyError",
+    "Belt",
+    "BevelGears",
     "Bookkeeping",
     "Component",
     "ContentError",
@@ -82,14 +85,17 @@ __all__ = [
     "OverTime",
     "Pair",
     "PairType",
+    "Rack",
     "ReachError",
     "Response",
     "ResponseError",
     "Solution",
     "Spring",
+    "SpurGears",
     "Stop",
     "Study",
     "TorsionSpring",
+    "WormGear",
     "Wrench",
     "assemble",
     "chain",

@@ -25,6 +25,7 @@ from mechgraph.equations.symbols import (
 )
 from mechgraph.equations.terms import AXES, Block, Known, ScalarEquation, Screw, Term, Unknown
 from mechgraph.errors import DeclarationError
+from mechgraph.model.coupling import BaseCoupling
 from mechgraph.model.mechanism import Mechanism, check_mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.model.row_parts import Component, Freedom
@@ -35,7 +36,8 @@ class _Draft:
     """What is collected while a formulation is built.
 
     ``acts`` are the terms with which every pair acts on its link b (and with the opposite sign on link a), ``driven`` the pairs in
-    which drivers and couplings act, each with the symbol of what it exerts, ``duals`` the free dual forces of pairs.
+    which drivers and couplings act, each with the symbol of what it exerts, ``touched`` the forces of gears on links, ``duals`` the free
+    dual forces of pairs.
     """
 
     m: Mechanism
@@ -46,6 +48,7 @@ class _Draft:
     duals: dict[int, list[int]] = field(default_factory=dict)
     blocks: list[Block] = field(default_factory=list)
     driven: list[tuple[int, Symbol]] = field(default_factory=list)
+    touched: dict[str, list[tuple[float, Symbol, list[Term]]]] = field(default_factory=dict)
     accelerations: list[int] = field(default_factory=list)
 
     def unknown(self, symbol: Symbol, owner: str, group: str, couple: bool, meaning: str, freedom: str = "") -> int:
@@ -156,9 +159,26 @@ def _multipliers(draft: _Draft) -> None:
         couple = any(m.pairs[k].type.freedoms[j].turns for k, j in places)
         size = Symbol("M" if couple else "F", "C", name=coupling.name)
         unknown = draft.unknown(size, coupling.name, "coupling", couple, f"multiplier of the coupling {coupling.name}")
+        if coupling.steps:
+            _touch(draft, g, coupling, unknown)
+            continue
         for i, (place, (freedom, _)) in enumerate(zip(places, coupling.terms, strict=True)):
             exerted = Symbol("F", "C", "dual", name=f"{coupling.name},{freedom}")
             _exert(draft, place, unknown, exerted, "coupling", coupling.name, (g, i))
+
+
+def _touch(draft: _Draft, g: int, coupling: BaseCoupling, unknown: int) -> None:
+    """The force of gears on each other: ``F_C(g) = M_C(g) G_C(g)`` on gear b, minus that on gear a."""
+    m, line = draft.m, Symbol("G", "C", "dual", name=coupling.name)
+    draft.screws.append(Screw("contacts", g, 0, (line,), (moment_of(line),)))
+    exerted = Symbol("F", "C", "dual", name=coupling.name)
+    first, last = coupling.steps[0], coupling.steps[-1]
+    gears = [(m.pairs[first.pair], -first.sense, -1.0), (m.pairs[last.pair], last.sense, 1.0)]
+    for pair, side, sign in gears:
+        link = pair.b if side > 0 else pair.a
+        terms = [Term(unknown, sign, len(draft.screws) - 1, part) for part in range(6)]
+        draft.touched.setdefault(link, []).append((sign, exerted, terms))
+    draft.block((exerted, "=", draft.unknowns[unknown].symbol, line), "coupling", coupling.name)
 
 
 def _exert(
@@ -212,6 +232,10 @@ def _equilibrium(draft: _Draft, words: MotionWords | None) -> list[ScalarEquatio
         for k, exerted in draft.driven:
             if link.name in (m.pairs[k].a, m.pairs[k].b):
                 printed.append(("+" if m.pairs[k].b == link.name else "-", (exerted,)))
+        for sign, exerted, acting in draft.touched.get(link.name, []):
+            printed.append(("+" if sign > 0 else "-", (exerted,)))
+            for t in acting:
+                terms[t.part].append(t)
         draft.block((*summed(printed), "=", "0"), "link", link.name)
         for what, letter, offset in (("force", "F", 3), ("moment", "M", 0)):
             for i, axis in enumerate(AXES):

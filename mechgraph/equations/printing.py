@@ -121,6 +121,10 @@ COUPLINGS = (
     _entry(_dual("F", "C", "g,q")),
     "what coupling g exerts in freedom q: its number there times its multiplier, M or F with C(g)",
 )
+CONTACTS = (
+    _entry(_dual("F", "C", "g"), "=", Symbol("M", "C", name="g"), _dual("G", "C", "g")),
+    "force of gears g on the second one, minus that on the first: their line of contact, for a unit multiplier, times the multiplier",
+)
 CONSTANT = (_entry(Symbol("K", "C", name="g")), "the constant of coupling g")
 
 
@@ -184,8 +188,11 @@ def _symbols(f: Printed) -> Iterator[tuple[Equation, str]]:
         yield LOADS
     if any(u.group == "driver" for u in f.unknowns):
         yield DRIVERS
-    if m.couplings:
+    if any(not c.steps for c in m.couplings):
         yield COUPLINGS
+    if any(c.steps for c in m.couplings):
+        yield CONTACTS
+    if m.couplings:
         yield CONSTANT
     yield from MOTION
     if not all(isinstance(step, ConstantScrew) or step.holds_rotation for p in m.pairs for step in p.type.steps):

@@ -19,6 +19,7 @@ class State:
     along, conditions : for every pair the axial wrenches and the condition twists of Lee's bookkeeping.
     loads (6, N, T) : inertia and applied wrench of every link.
     coefficients : for every coupling the coefficients of its freedoms ``(terms, 1 or T)``; the declared ones where left out.
+    contacts : for every coupling the wrench on its gear b for a unit multiplier ``(6, 1, T)``; ``(6, 0, T)`` for one without gears.
     """
 
     coordinates: Array
@@ -31,6 +32,7 @@ class State:
     conditions: tuple[Array, ...]
     loads: Array
     coefficients: tuple[Array, ...] = ()
+    contacts: tuple[Array, ...] = ()
 
     def __repr__(self) -> str:
         freedoms, positions = self.coordinates.shape

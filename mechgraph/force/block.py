@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.contact_lines import ContactLines
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.rates import Rates
 from mechgraph.closure.solver import FactoredClosure
@@ -89,11 +90,14 @@ def forces_of_block(
         held, holds, hold_terms = hold(here, task.passive, f.motions(), loads, given, site.largest)
         loads = loads + held
     wrenches = METHODS[task.method](ForceProblem(here, loads, given, task.driven, f))
-    found = _least(here, wrenches, f, task)
+    lines = ContactLines(here)
+    found, flank = _least_on_flanks(here, wrenches, f, task, lines)
     own = np.zeros_like(found.efforts)
     own[task.driven] = (found.efforts - given - found.coupled)[task.driven]
     acting = own + given + found.coupled
     totals = here.pair_sums(here.E * acting) + found.reactions
+    if lines:
+        totals = totals + lines.relief(found.multipliers, flank)
     parts = (own, given, found.coupled)
     balance, wrench = _balance(here, found.reactions, totals, loads, (applied, inertia, held, *parts))
     power, term = _power(rates, totals, applied if held is None else applied + held, parts, inertia)
@@ -131,7 +135,29 @@ class _Found:
     coupled: Array
 
 
-def _least(here: Configuration, wrenches: Wrenches, f: FactoredClosure, task: ForceTask) -> _Found:
+def _least_on_flanks(
+    here: Configuration, wrenches: Wrenches, f: FactoredClosure, task: ForceTask, lines: ContactLines
+) -> tuple[_Found, Array]:
+    """See ``_least``; with the signs of the multipliers ``(n, T)`` that tell on which flanks gears touch each other.
+
+    Where multipliers are not unique those of least norm may touch on other flanks than the first ones found: then once more on these.
+    """
+    flank = wrenches.multipliers
+    if not lines:
+        return _least(here, wrenches, f, task, lines, flank), flank
+    for _ in range(FLANKS):
+        relief = [lines.relief(part, flank) for part in (wrenches.multipliers, wrenches.multiplier_stress)]
+        relieved = replace(wrenches, totals=wrenches.totals - relief[0], stress=wrenches.stress - relief[1])
+        found = _least(here, relieved, f, task, lines, flank)
+        if not (found.multipliers * flank < 0.0).any():
+            break
+        flank = found.multipliers
+    return found, flank
+
+
+def _least(
+    here: Configuration, wrenches: Wrenches, f: FactoredClosure, task: ForceTask, lines: ContactLines, flank: Array
+) -> _Found:
     """Reactions and efforts of least norm; where self-stresses are random ones only if that is asked for."""
     totals, multipliers = wrenches.totals, wrenches.multipliers
     acting = np.union1d(task.driven, here.system.coupled_freedoms)
@@ -140,9 +166,11 @@ def _least(here: Configuration, wrenches: Wrenches, f: FactoredClosure, task: Fo
     )
     s = stress.wrenches.shape[2]
     if s and not f.complete and task.redundant == "minimum_norm":
-        x = _least_multipliers(here, totals, multipliers, f, acting)
+        x = _least_multipliers(here, totals, multipliers, f, acting, lines, flank)
+        others = x[6 * here.system.graph.n_loops :]
         totals = totals + here.pair_wrenches(x[:, None])[:, :, 0]
-        multipliers = multipliers - x[6 * here.system.graph.n_loops :]
+        totals = totals + lines.relief(others, flank) if lines else totals
+        multipliers = multipliers - others
     efforts = pair_power(here, totals)
     reactions = reaction_part(here, totals, efforts)
     if s and f.complete:
@@ -153,12 +181,20 @@ def _least(here: Configuration, wrenches: Wrenches, f: FactoredClosure, task: Fo
     return _Found(reactions, efforts, stress, multipliers, row_efforts(here, multipliers[:, None])[:, 0])
 
 
+FLANKS = 3
+"""How often flanks are changed in search of multipliers of least norm."""
 STRAIN = 1e-4
 """Weight of efforts beside reactions: where drivers or couplings strain each other without any reaction, their efforts decide alone."""
 
 
 def _least_multipliers(
-    here: Configuration, totals: Array, multipliers: Array, f: FactoredClosure, acting: Index
+    here: Configuration,
+    totals: Array,
+    multipliers: Array,
+    f: FactoredClosure,
+    acting: Index,
+    lines: ContactLines,
+    flank: Array,
 ) -> Array:
     """Multipliers ``(rows, T)`` of the closure rows that make the reactions least, and then the efforts that leave them as they are.
 
@@ -168,6 +204,13 @@ def _least_multipliers(
     efforts = pair_power(here, totals)
     points = at_pair_points(here, reaction_part(here, totals, efforts)).swapaxes(0, 1).reshape(-1, here.T)
     R = [reaction_map(here, t) for t in range(here.T)]
+    if lines:
+        n = len(multipliers)
+        of_unit = lines.relief(np.repeat(np.eye(n)[:, :, None], here.T, axis=2), flank)
+        of_unit = at_pair_points(here, of_unit).swapaxes(0, 1).reshape(-1, n, here.T)
+        behind = np.zeros((len(of_unit), here.system.n_rows, here.T))
+        behind[:, -n:] = of_unit
+        R = [R[t] + scipy.sparse.csr_array(behind[..., t]) for t in range(here.T)]
     if len(acting) < 2:
         return f.least(R, points)
     M = [STRAIN * effort_map(here, t, acting) for t in range(here.T)]

@@ -14,6 +14,7 @@ import scipy
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.contact_lines import ContactLines
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.solver import FactoredClosure
 from mechgraph.equations.build import BookkeepingName, formulate
@@ -130,11 +131,15 @@ def _components_and_efforts(problem: ForceProblem, held: Index, bookkeeping: Boo
     u, null = solve(f, state, here.T)
     totals, multipliers = (part[..., 0, :] for part in _pair_totals(f, state, u[:, None]))
     totals = totals + here.pair_sums(here.E * problem.efforts)
+    lines, flank = ContactLines(here), np.ones(multipliers.shape)
+    if lines:
+        totals = totals + lines.through(multipliers, flank)
     if null is None:
         loops = problem.solver.self_stresses()
         stress, multiplier_stress = here.pair_wrenches(loops), -loops[6 * here.system.graph.n_loops :]
     else:
         stress, multiplier_stress = _pair_totals(f, state, null)
+        stress = stress + lines.through(multiplier_stress, flank) if lines else stress
     return Wrenches(totals, stress, multipliers, multiplier_stress)
 
 
@@ -220,8 +225,8 @@ def given_effort_loads(here: Configuration, efforts: Array) -> Array:
     return out
 
 
-def internal_state(here: Configuration, loads: Array) -> State:
-    """The State of a batch in internal units."""
+def internal_state(here: Configuration, loads: Array, flank: Array | None = None) -> State:
+    """The State of a batch in internal units; ``flank (n, T)``: signs of the multipliers of couplings, all positive where left out."""
     s = here.system
     reactions: list[Array] = [np.zeros(0)] * len(s.m.pairs)
     efforts = list(reactions)
@@ -246,6 +251,7 @@ def internal_state(here: Configuration, loads: Array) -> State:
         conditions,
         loads,
         tuple(coefficients),
+        tuple(ContactLines(here).unit(np.ones((len(s.m.couplings), here.T)) if flank is None else flank)),
     )
 
 

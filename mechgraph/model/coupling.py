@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar, Self
 
 from mechgraph.model.field_format import COEFFICIENTS, NUMBER, TEXT, Described
 from mechgraph.model.nameable import Nameable
@@ -15,8 +15,55 @@ from mechgraph.units import LENGTH, PURE
 Terms = tuple[tuple[str, float], ...]
 
 
+class BaseCoupling(Described):
+    """What all couplings share: ``terms``, freedoms with their coefficients, and a ``constant`` (None: the value at the start)."""
+
+    kind: ClassVar[str]
+    """Name of the kind in files."""
+    name: str
+    terms: Terms
+    constant: float | None
+    steps: tuple[Any, ...] = ()
+    """Pairs on the way along which the force of the coupling is closed, where it acts along a line of its own."""
+
+    @property
+    def freedoms(self) -> tuple[str, ...]:
+        """Names of the freedoms, in order."""
+        return tuple(freedom for freedom, _ in self.terms) if _is_terms(self.terms) else ()
+
+    @property
+    def coefficients(self) -> tuple[float, ...]:
+        """The coefficients, in the order of the freedoms."""
+        return tuple(coefficient for _, coefficient in self.terms)
+
+    def faults(self, m: Any) -> list[str]:
+        """What is wrong with it in a mechanism, one line each."""
+        raise NotImplementedError
+
+    def placed(self, m: Any) -> Self:
+        """The same with the terms that it has in a mechanism without faults, by the full names of freedoms."""
+        raise NotImplementedError
+
+    @property
+    def varies(self) -> bool:
+        """Whether its coefficients are numbers of their own, which a study may vary."""
+        return not self.steps
+
+    def renumbered(self, coefficients: Sequence[float], constant: float) -> Self:
+        """The same with other coefficients, and another constant where it has one."""
+        return self
+
+    def in_own_units(self, units: Mapping[str, str], turns: Sequence[bool]) -> Self:
+        """The same with quantities of pint as plain numbers in these units; ``turns`` says which freedoms are angles."""
+        raise NotImplementedError
+
+    def converted(self, length: float, turns: Sequence[bool]) -> Self:
+        """The same relation with lengths times ``length``; ``turns`` says which freedoms are angles."""
+        raise NotImplementedError
+
+
 @dataclass(frozen=True, init=False)
-class Coupling(Described):
+class Coupling(BaseCoupling):
     """A linear relation between single freedoms, ``sum_i c_i q_i = constant``; its multiplier is an unknown effort.
 
     The multiplier m acts with the effort ``c_i m`` in freedom i, so that its power is ``m sum_i c_i q'_i = 0``. The sum is a length
@@ -31,6 +78,7 @@ class Coupling(Described):
     constant : the value of the sum; left out, the sum keeps the value that it has at ``start``.
     """
 
+    kind: ClassVar[str] = "linear"
     name: Annotated[str, TEXT("name", default="g1, g2, ...")]
     terms: Annotated[Terms, COEFFICIENTS("freedom → coefficient; single freedoms, none of the rotation of S, Sg, Sp")]
     constant: Annotated[
@@ -48,15 +96,14 @@ class Coupling(Described):
         object.__setattr__(self, "terms", _read_terms(terms))
         object.__setattr__(self, "constant", plain(constant))
 
-    @property
-    def freedoms(self) -> tuple[str, ...]:
-        """Names of the freedoms, in order."""
-        return tuple(freedom for freedom, _ in self.terms) if _is_terms(self.terms) else ()
+    def placed(self, m: Nameable) -> Self:
+        """See ``BaseCoupling``."""
+        return self.replace(terms=[(m.full_name(freedom), value) for freedom, value in self.terms])
 
-    @property
-    def coefficients(self) -> tuple[float, ...]:
-        """The coefficients, in the order of the freedoms."""
-        return tuple(coefficient for _, coefficient in self.terms)
+    def renumbered(self, coefficients: Sequence[float], constant: float) -> Self:
+        """See ``BaseCoupling``."""
+        terms = tuple(zip(self.freedoms, coefficients, strict=True))
+        return self.replace(terms=terms, constant=None if self.constant is None else constant)
 
     @property
     def text(self) -> str:
@@ -86,7 +133,7 @@ class Coupling(Described):
             found.append(number_fault(self.constant, where + "constant"))
         return list(dict.fromkeys(fault for fault in found if fault))
 
-    def in_own_units(self, units: Mapping[str, str], turns: Sequence[bool]) -> Coupling:
+    def in_own_units(self, units: Mapping[str, str], turns: Sequence[bool]) -> Self:
         """The same with quantities of pint as plain numbers in these units; ``turns`` says which freedoms are angles."""
         if not _is_terms(self.terms):
             return self
@@ -97,7 +144,7 @@ class Coupling(Described):
         ]
         return self.replace(terms=terms, constant=without_units(self.constant, LENGTH if slides else PURE, units))
 
-    def converted(self, length: float, turns: Sequence[bool]) -> Coupling:
+    def converted(self, length: float, turns: Sequence[bool]) -> Self:
         """The same relation with lengths times ``length``; ``turns`` says which freedoms are angles (the rule stands above)."""
         if not any(turns):
             return self.replace(constant=None if self.constant is None else self.constant * length)

@@ -15,7 +15,7 @@ import scipy
 
 from mechgraph.algebra.inertia import physical
 from mechgraph.algebra.se3 import Array
-from mechgraph.model.coupling import Coupling
+from mechgraph.model.coupling import BaseCoupling
 from mechgraph.model.drive import Drive
 from mechgraph.model.link import Link
 from mechgraph.model.load import LOADS
@@ -39,7 +39,7 @@ def _kind_faults(m: Parts) -> list[str]:
     for what, items, kind in (
         ("link", m.links, (Link,)),
         ("pair", m.pairs, (Pair,)),
-        ("coupling", m.couplings, (Coupling,)),
+        ("coupling", m.couplings, (BaseCoupling,)),
         ("drive", m.drives, (Drive,)),
         ("load", m.loads, tuple(LOADS.values())),
     ):

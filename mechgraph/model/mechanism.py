@@ -16,7 +16,7 @@ import numpy as np
 from mechgraph.arguments import items_of
 from mechgraph.document import Document, Shown
 from mechgraph.errors import DeclarationError
-from mechgraph.model.coupling import Coupling
+from mechgraph.model.coupling import BaseCoupling
 from mechgraph.model.declaration import declaration_faults, flat_start, item_faults, mapping_faults
 from mechgraph.model.describe import mechanism_document
 from mechgraph.model.drive import Drive
@@ -61,7 +61,7 @@ class Mechanism(Parts, Shown):
         drives: Iterable[Drive | str] = (),
         loads: Iterable[Load] = (),
         *,
-        couplings: Iterable[Coupling] = (),
+        couplings: Iterable[BaseCoupling] = (),
         frame: str | None = None,
         start: Mapping[str, Any] | None = None,
         units: Mapping[str, str] | None = None,
@@ -118,7 +118,7 @@ class Mechanism(Parts, Shown):
             "couplings": [
                 item.in_own_units(self.units, [self.turns(name) for name in item.freedoms])
                 for item in self.couplings
-                if isinstance(item, Coupling)
+                if isinstance(item, BaseCoupling)
             ],
         }
         self._set(**{key: tuple(items) for key, items in new.items() if len(items) == len(getattr(self, key))})
@@ -133,8 +133,7 @@ class Mechanism(Parts, Shown):
         if faults:
             raise DeclarationError(f"mechanism {shown(self.name)}", faults)
         self._set(start=MappingProxyType(flat))
-        in_full = ([(self.full_name(q), value) for q, value in c.terms] for c in self.couplings)
-        self._set(couplings=tuple(c.replace(terms=t) for c, t in zip(self.couplings, in_full, strict=True)))
+        self._set(couplings=tuple(c.placed(self) for c in self.couplings))
 
     def __eq__(self, other: object) -> bool:
         return same_fields(self, other)
@@ -311,7 +310,7 @@ def _named(items: tuple[Any, ...], pairs: Iterable[Any]) -> tuple[Any, ...]:
     taken = {getattr(item, "name", None) for item in (*items, *pairs) if isinstance(getattr(item, "name", None), str)}
     free = (name for name in (f"g{i}" for i in itertools.count(1)) if name not in taken)
     return tuple(
-        c.replace(name=next(free)) if isinstance(c, Coupling) and isinstance(c.name, str) and not c.name else c
+        c.replace(name=next(free)) if isinstance(c, BaseCoupling) and isinstance(c.name, str) and not c.name else c
         for c in items
     )
 

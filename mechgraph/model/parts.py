@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Annotated, Any
 
 from mechgraph.errors import DeclarationError
-from mechgraph.model.coupling import Coupling
+from mechgraph.model.coupling import BaseCoupling
 from mechgraph.model.drive import Drive
 from mechgraph.model.field_format import FACTS, NUMBER, OTHER, TABLE, TABLES, TEXT, Formatted
 from mechgraph.model.link import Link
@@ -50,7 +50,7 @@ class Parts(Formatted):
     ]
     pairs: Annotated[tuple[Pair, ...], TABLES("pairs", key="pair", table="pair")]
     couplings: Annotated[
-        tuple[Coupling, ...],
+        tuple[BaseCoupling, ...],
         TABLES("linear relations between freedoms", key="coupling", table="coupling", default="none"),
     ]
     drives: Annotated[tuple[Drive, ...], TABLES("driven freedoms", key="drive", table="drive", default="none")]
@@ -106,7 +106,7 @@ class Parts(Formatted):
         """The pair of that name."""
         return self.pairs[self.place_of_pair(name)]
 
-    def coupling(self, name: str) -> Coupling:
+    def coupling(self, name: str) -> BaseCoupling:
         """The coupling of that name."""
         return self.couplings[self._index(name, _places(c.name for c in self.couplings), "coupling")]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,13 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.document import Bullets, Document, Heading, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError
+from mechgraph.model.coupling import BaseCoupling
 from mechgraph.model.field_format import NAMED_POINT
 from mechgraph.model.link import Link
 from mechgraph.model.load import Gravity
 from mechgraph.model.load_base import Load
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.pair import Marker
 from mechgraph.result.balanced_loads import At, BalancedLoads, PointLoad, about_origin
 from mechgraph.result.load_files import FORMATS
 from mechgraph.result.numbers import bracket, number
@@ -102,8 +106,14 @@ def free_body(s: Solution, link: str) -> FreeBody:
         p = _point(point)
         moment = wrench[..., :3] - np.cross(at + R @ np.array(p), wrench[..., 3:])
         local = np.concatenate([_turned_back(R, v) for v in (moment, wrench[..., 3:])], axis=-1)
-        acting.append(PointLoad(name, kind, p, local, _every(local), about, distributed))
+        acting.append(PointLoad(name, kind, p, local, np.isfinite(local), about, distributed))
 
+    for c in m.couplings:
+        for link_of, marker, sign in _gears(m, c):
+            if link_of == link:
+                mesh = s.coupling(c.name)
+                wrench = sign * np.concatenate([np.cross(mesh.point, mesh.force), mesh.force], axis=-1)
+                add(c.name, "contact", marker.point, wrench, "force of the other gear, about the middle of this one")
     for place, load in enumerate(m.loads):
         found = s.load(place).wrenches
         if load.in_freedom is None and link in found:
@@ -121,6 +131,13 @@ def free_body(s: Solution, link: str) -> FreeBody:
         about = "what holds the frame, at the origin of its frame"
         acting.append(PointLoad("support", "support", (0.0, 0.0, 0.0), left, np.isfinite(left), about))
     return FreeBody(s, one, tuple(acting), acceleration)
+
+
+def _gears(m: Mechanism, c: BaseCoupling) -> Iterator[tuple[str, Marker, float]]:
+    """Both gears of a coupling that has them: the link, its marker on the carrier, and the sign with which the force acts on it."""
+    for step, sense, sign in ((c.steps[0], -1.0, -1.0), (c.steps[-1], 1.0, 1.0)) if c.steps else ():
+        pair, at_b = m.pairs[step.pair], step.sense * sense > 0
+        yield (pair.b if at_b else pair.a), pair.markers[int(at_b)], sign
 
 
 def _inertia(link: Link, s: Solution, R: Array) -> tuple[Array, Array]:

@@ -9,8 +9,10 @@ import numpy as np
 from mechgraph.algebra.screw import shift_wrench
 from mechgraph.algebra.se3 import Array, cross, rotate, rotate_back
 from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.contact_lines import ContactLines
 from mechgraph.closure.driver_path import in_blocks
 from mechgraph.closure.indexing import Index
+from mechgraph.errors import DeclarationError
 from mechgraph.model.pair_type import PairType
 from mechgraph.result.kept import BlockMotion, Kept
 from mechgraph.result.states import user_wrench
@@ -46,11 +48,18 @@ class PairForces(Kept):
     def _transmitted(self, pair: int) -> Array:
         """What a pair transmits, reaction and efforts, and in every self-stress, ``(6, 1 + s, T)``, internal units."""
         columns = self._columns(pair)
-        efforts, stress = self._force("efforts")[columns], self._of("stress_efforts")[columns]
+        efforts = self._force("efforts")[columns] - self._through_contacts("multipliers", columns)
+        stress = self._of("stress_efforts")[columns] - self._through_contacts("multiplier_stress", columns)
         states = np.concatenate([efforts[:, None], stress], axis=1)
         E = self._evaluated(lambda block: block.here.E[:, columns])
         reactions = np.concatenate([self._of("reactions")[:, pair][:, None], self._of("stress")[:, pair]], axis=1)
         return np.asarray(reactions + np.einsum("cft,fst->cst", E, states))
+
+    def _through_contacts(self, name: str, columns: slice) -> Array:
+        """Efforts ``(f, ..., T)`` of multipliers that act where gears touch each other, not through the pairs of these freedoms."""
+        touching = [g for g, c in enumerate(self._system.m.couplings) if c.steps]
+        coefficients = self._system.coupling_matrix[touching, columns, 0]
+        return np.asarray(np.einsum("gf,g...->f...", coefficients, self._of(name)[touching]))
 
     def on_link(self, pair: int, link: int) -> tuple[Array, Mask]:
         """What a pair transmits to one of its links, in the link's frame about its marker there; and what of it is unique."""
@@ -175,3 +184,22 @@ class PairForces(Kept):
         scales = [np.broadcast_to(self._system_at(block).row_scale[row], len(block)) for block in blocks]
         total = self._L**2 * np.concatenate(scales) * self._force("multipliers")[coupling]
         return self._out(self._masked(total, self._of("multiplier_stress")[coupling]))
+
+    def contact(self, coupling: int) -> tuple[Array, Array]:
+        """Force of gears on the second one, and the point where it acts."""
+        c = self._system.m.couplings[coupling]
+        if not c.steps:
+            what = "acts in its freedoms, not along a line; SpurGears and its like have a force and a point"
+            raise DeclarationError(f"coupling {c.name!r}", [what])
+        m, stress = self._force("multipliers"), self._of("multiplier_stress")[coupling]
+
+        def of(block: BlockMotion) -> Array:
+            lines, here = ContactLines(block.here), m[:, block.places]
+            which = [g for g, _ in lines.contacts].index(coupling)
+            flank = (here[coupling] < 0.0).astype(np.intp)
+            points = lines.wrenches[which][1][:, flank, np.arange(len(block.places))]
+            return np.concatenate([lines.on_gear(here, here)[which][3:], points])
+
+        values, par = self._evaluated(of), self._system.par
+        force = self._masked(par.L * values[:3], np.broadcast_to(stress, (3, *stress.shape)))
+        return self._out(force), self._out(par.L * values[3:] + par.origin.reshape(3, 1))

@@ -29,11 +29,14 @@ def user_wrench(par: Parameters, f: Array) -> Array:
     return out
 
 
-def user_state(rates: Rates, coordinates: Array, loads: Array, applied: Array) -> MovingState:
-    """The State at one position with user coordinates ``(F, 1)`` and internal loads, all and the applied ones alone, ``(6, N, 1)``."""
+def user_state(rates: Rates, coordinates: Array, loads: Array, applied: Array, flank: Array) -> MovingState:
+    """The State at one position with user coordinates ``(F, 1)``, internal loads, all and the applied ones alone, ``(6, N, 1)``, and the
+    signs ``(n, 1)`` of the multipliers of couplings, which tell on which flanks gears touch each other.
+    """
     here = rates.here
     s, par = here.system, here.system.par
-    inner = internal_state(here, loads)
+    inner = internal_state(here, loads, flank)
+    scale = np.broadcast_to(s.row_scale, (s.n_rows, 1))[6 * s.graph.n_loops :]
     rows = [p.type for p in s.m.pairs]
     couples = [[c.is_couple for c in row.reactions or ()] for row in rows]
     efforts = [[c.is_couple for c in row.efforts] for row in rows]
@@ -52,6 +55,7 @@ def user_state(rates: Rates, coordinates: Array, loads: Array, applied: Array) -
         along=tuple(_user_screws(par, w, which) for w, which in zip(inner.along, along, strict=True)),
         conditions=tuple(user_twists(here, w) if w.shape[1] else w for w in inner.conditions),
         loads=user_wrench(par, loads),
+        contacts=tuple(user_wrench(par, G) / (par.L**2 * one) for G, one in zip(inner.contacts, scale, strict=True)),
         accelerations=unit * rates.ddq,
         freedoms=tuple(freedoms[:, mine] for mine in columns),
         biases=user_twists(here, rates.bias),

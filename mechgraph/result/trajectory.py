@@ -163,5 +163,6 @@ class Trajectory(PairForces):
             loads = self._of("loads")[:, :, [flat]] + given_effort_loads(block.here, acting)
             held = self._kept["hold"][:, :, [flat]] if "hold" in self._kept else 0.0
             applied = loads - inertia_wrenches(block.here, block.rates) - held
-        state = user_state(block.rates, self._coordinates[:, [flat]], loads, applied)
+        flank = self._of("multipliers")[:, [flat]] if self.has_forces else np.ones((len(self.whole.couplings), 1))
+        state = user_state(block.rates, self._coordinates[:, [flat]], loads, applied, flank)
         return state.of_first(len(self.mechanism.pairs), own)

@@ -184,6 +184,9 @@ class Values(Protocol):
     def multiplier(self, coupling: int) -> Array:
         """Multiplier of a coupling, ``(...)``."""
 
+    def contact(self, coupling: int) -> tuple[Array, Array]:
+        """Force of gears on the second one, and the point where it acts, ``(..., 3)``."""
+
     def blocks(self) -> Iterator[Index]:
         """The solved flat places in parts, for ``..._at``: all pairs at some places ``(n,)``, the batch last."""
 

@@ -133,6 +133,22 @@ class CouplingResult(Shown):
         """
         return self._values.multiplier(self._index)
 
+    @property
+    def force(self) -> Array:
+        """The force ``(..., 3)`` of gears, racks and belts on the second one, global directions; minus that acts on the first.
+
+        Raises
+        ------
+        DeclarationError
+            for a coupling that acts in freedoms alone.
+        """
+        return self._values.contact(self._index)[0]
+
+    @property
+    def point(self) -> Array:
+        """The point ``(..., 3)`` at which it acts."""
+        return self._values.contact(self._index)[1]
+
 
 class LinkResult(Shown):
     """Motion of one link in the global frame."""

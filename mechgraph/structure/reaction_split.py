@@ -48,7 +48,7 @@ def pair_power(here: Configuration, totals: Array) -> Array:
 
 
 def split_stress(here: Configuration, states: Array, multipliers: Array, acting: Index) -> Stress:
-    """Reaction parts and efforts of total wrench states ``(6, P, s, T)``; only the freedoms ``acting`` (driven, coupled) have efforts."""
+    """Reaction parts and efforts of pair wrench states ``(6, P, s, T)``; only the freedoms ``acting`` (driven, coupled) have efforts."""
     s = states.shape[2]
     efforts = np.zeros((here.system.n_freedoms, s, here.T))
     reactions = np.empty_like(states)

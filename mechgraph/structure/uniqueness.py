@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.contact_lines import ContactLines
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.rank import ClosureRank, EngineName, closure_rank
 from mechgraph.closure.sparse_solver import PROBES, SEED
@@ -120,7 +121,7 @@ class Uniqueness:
         if shared > CONNECTING:
             return basis_of(self.components.count, local, self._places_of_sets())
         states = self.components.table(
-            pair_states(self.components.configuration, self.closure.connecting(np.eye(shared)))
+            relieved_states(self.components.configuration, self.closure.connecting(np.eye(shared)), 1.0)
         )
         touched = np.flatnonzero(np.abs(states).max(axis=1) > UNIQUE * np.abs(states).max())
         number = np.array([self.components.system.graph.n_loops])
@@ -194,10 +195,19 @@ def uniqueness(
     probes = closure.orthonormal_stress() if few else closure.random_stress(np.random.default_rng(SEED), PROBES)
     coefficients = np.abs(here.system.coupling_matrix[:, :, 0]).max(axis=1, initial=0.0)
     multipliers = probes[6 * here.system.graph.n_loops :]
-    table = components.table(pair_states(here, probes))
-    return Uniqueness(components, closure, table, coefficients[:, None] * multipliers, probes)
+    # both flanks of gears: what is unique must be so on either
+    flanks = (1.0, -1.0) if ContactLines(here) else (1.0,)
+    table = np.concatenate([components.table(relieved_states(here, probes, one)) for one in flanks], axis=1)
+    return Uniqueness(components, closure, table, np.tile(coefficients[:, None] * multipliers, len(flanks)), probes)
 
 
 def pair_states(here: Configuration, rows: Array) -> Array:
     """Total pair wrenches ``(6, P, s, 1)`` of loop wrenches, the first of ``rows (rows, s)``: ``w = C^T x``."""
     return here.pair_wrenches(rows[: 6 * here.system.graph.n_loops, :, None])
+
+
+def relieved_states(here: Configuration, rows: Array, flank: float) -> Array:
+    """The same less what gears transmit that touch each other on one flank (sign 1 or -1), ``(6, P, s, 1)``."""
+    states, lines = pair_states(here, rows), ContactLines(here)
+    multipliers = -rows[6 * here.system.graph.n_loops :, :, None]
+    return states - lines.relief(multipliers, np.full((len(multipliers), here.T), flank)) if lines else states

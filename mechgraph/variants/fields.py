@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from mechgraph.algebra.inertia import physical
 from mechgraph.algebra.se3 import Array
 from mechgraph.model.chain import chain_numbers, markers_of_chain
-from mechgraph.model.coupling import Coupling
 from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.numeric import PerCase
@@ -87,7 +86,10 @@ class Variants:
             for k, link in enumerate(m.links)
         ]
         pairs = [_placed(pair, n, k) for k, pair in enumerate(m.pairs)]
-        couplings = [_coupled(c, n.couplings, own) for c, own in zip(m.couplings, coupling_places(m), strict=True)]
+        couplings = [
+            c.renumbered(n.couplings[own].tolist(), float(n.couplings[own.stop]))
+            for c, own in zip(m.couplings, coupling_places(m), strict=True)
+        ]
         loads = [_load_of(load, i) for load in self.loads]
         return m.replace(links=links, pairs=pairs, couplings=couplings, loads=loads)
 
@@ -106,12 +108,6 @@ def _placed(pair: Pair, n: Declared, k: int) -> Pair:
     if pair.on_a is not None:
         return pair.replace(on_a=markers[0], on_b=markers[1], **changes)
     return pair.replace(point=markers[0].point, axis=markers[0].axis, second=markers[0].second, **changes)
-
-
-def _coupled(c: Coupling, numbers: Array, own: slice) -> Coupling:
-    """A coupling with its ``own`` ones among the numbers of one variant."""
-    terms = zip(c.freedoms, numbers[own].tolist(), strict=True)
-    return c.replace(terms=terms, constant=None if c.constant is None else float(numbers[own.stop]))
 
 
 def _varies(load: Load) -> bool:

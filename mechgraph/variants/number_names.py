@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mechgraph.model.chain import NUMBERS_OF_CHAIN, chain_numbers
-from mechgraph.model.coupling import Coupling
+from mechgraph.model.coupling import BaseCoupling
 from mechgraph.model.field_format import Described, FieldFormat
 from mechgraph.model.link import Link
 from mechgraph.model.mechanism import Mechanism
@@ -76,7 +76,7 @@ def find_field(m: Mechanism, name: str) -> AnyField | str:
         if int(indexed["index"]) >= count:
             return f"{name!r}: there are {count} {indexed['what']}, counted from 0"
         return INDEXED[indexed["what"]](m, int(indexed["index"]), indexed["rest"] or "")
-    named: Sequence[tuple[Sequence[Link | Pair | Coupling], Finder]] = (
+    named: Sequence[tuple[Sequence[Link | Pair | BaseCoupling], Finder]] = (
         (m.links, _link_field),
         (m.pairs, _pair_field),
         (m.couplings, _coupling_field),
@@ -153,6 +153,8 @@ def _coupling_field(m: Mechanism, index: int, rest: str) -> Field | str:
         return Field("couplings", ((own.stop,),))
     if rest == "constant":
         return f"'{c.name}.constant': coupling {c.name!r} keeps the value that it has at the start; declare constant="
+    if not c.varies:
+        return f"'{c.name}.{rest}': the numbers of coupling {c.name!r} follow from its teeth; vary m.replace(couplings=...) yourself"
     if m.freedom_fault(rest, single=True) is None and m.full_name(rest) in c.freedoms:
         return Field("couplings", ((own.start + c.freedoms.index(m.full_name(rest)),),))
     return f"'{c.name}.{rest}': coupling {c.name!r} has the numbers {', '.join(c.freedoms)} and constant"
