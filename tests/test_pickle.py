@@ -54,7 +54,9 @@ def things() -> dict[str, Any]:
         "DeadPointError": mg.DeadPointError("dead", {"A": 1.0}), "ReachError": mg.ReachError("far", {"A": 1.0}, s),
         "response": mg.respond(mg.load("windows-2"), (0, 0.2)), "response in charts": mg.respond(pushed, (0, 0.2)),
         "ResponseError": mg.ResponseError("stopped", s), "event": mg.Event("A0", 0.1),
-        "stop": mg.Stop("A0", lower=0.1), "equilibrium": hanging,
+        "spur": mg.SpurGears("g", "A", "B", teeth=(20, 40)), "bevel": mg.BevelGears("g", "A", "B", teeth=(20, 40)),
+        "worm": mg.WormGear("g", "A", "B", teeth=(1, 40)), "rack": mg.Rack("g", "A", "B"),
+        "belt": mg.Belt("g", "A", "B", radii=(1, 2)), "stop": mg.Stop("A0", lower=0.1), "equilibrium": hanging,
         "linearized": mg.linearize(hanging),
         "IndeterminateError": mg.IndeterminateError("free", report),
     }  # fmt: skip

@@ -46,10 +46,8 @@ class ContactLines:
         here, columns = self.here, self._columns(contact)
         first, last = contact.steps[0].pair, contact.steps[-1].pair
         S = [here.S[:, columns[i]] for i in (0, -1)]
-        directions = [twist[3:] if turn == "P" else twist[:3] for twist, turn in zip(S, contact.turns, strict=True)]
-        axes = Axes(
-            here.pair_points[:, first], directions[0], here.pair_points[:, last], directions[1], here.system.par.L
-        )
+        along = S[1][3:] if contact.slides else S[1][:3]
+        axes = Axes(here.pair_points[:, first], S[0][:3], here.pair_points[:, last], along, here.system.par.L)
         P, n = contact.lines(axes)
         line = np.concatenate([cross(P, n), n])
         power = contact.steps[0].sense * (line * S[0][:, None]).sum(axis=0)

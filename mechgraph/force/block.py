@@ -149,7 +149,7 @@ def _least_on_flanks(
         relief = [lines.relief(part, flank) for part in (wrenches.multipliers, wrenches.multiplier_stress)]
         relieved = replace(wrenches, totals=wrenches.totals - relief[0], stress=wrenches.stress - relief[1])
         found = _least(here, relieved, f, task, lines, flank)
-        if not (found.multipliers * flank < 0.0).any():
+        if ((found.multipliers < 0.0) == (flank < 0.0)).all():
             break
         flank = found.multipliers
     return found, flank

@@ -36,6 +36,12 @@ class BaseCoupling(Described):
         """The coefficients, in the order of the freedoms."""
         return tuple(coefficient for _, coefficient in self.terms)
 
+    @property
+    def text(self) -> str:
+        """``2 A.Rz - 3 B.Tz = constant``."""
+        terms = " ".join(f"{'-' if c < 0 else '+'} {abs(c):.6g} {name}" for name, c in self.terms).removeprefix("+ ")
+        return f"{terms} = {'its value at start' if self.constant is None else f'{self.constant:.6g}'}"
+
     def faults(self, m: Any) -> list[str]:
         """What is wrong with it in a mechanism, one line each."""
         raise NotImplementedError
@@ -104,12 +110,6 @@ class Coupling(BaseCoupling):
         """See ``BaseCoupling``."""
         terms = tuple(zip(self.freedoms, coefficients, strict=True))
         return self.replace(terms=terms, constant=None if self.constant is None else constant)
-
-    @property
-    def text(self) -> str:
-        """``2 A.Rz - 3 B.Tz = constant``."""
-        terms = " ".join(f"{'-' if c < 0 else '+'} {abs(c):.6g} {name}" for name, c in self.terms).removeprefix("+ ")
-        return f"{terms} = {'its value at start' if self.constant is None else f'{self.constant:.6g}'}"
 
     def faults(self, m: Nameable) -> list[str]:
         """What is wrong with this coupling in a mechanism, one line each."""

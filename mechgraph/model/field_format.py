@@ -287,6 +287,13 @@ def _tensor_fault(value: Any, what: str, minimum: float | None) -> str | None:
     return None if is_numeric(value, (3, 3)) else wrong(value, what, "a 3 x 3 tensor of finite numbers")
 
 
+def _two_fault(value: Any, what: str, minimum: float | None) -> str | None:
+    good = is_numeric(value, (2,)) and (minimum is None or min(value) > minimum)
+    return (
+        None if good else wrong(value, what, "two finite numbers" + ("" if minimum is None else f" above {minimum:g}"))
+    )
+
+
 def _vector_fault(value: Any, what: str, minimum: float | None) -> str | None:
     return vector_fault(value, what)
 
@@ -356,6 +363,14 @@ VECTOR_SERIES = Kind(
     "3 numbers (series)", {"$ref": "#/$defs/vector_series"}, None, (3,), True, _series_fault(3), _turned
 )
 SAMPLES = Kind("n numbers", {"$ref": "#/$defs/series"}, None, None, True, _samples_fault)
+TWO = Kind(
+    "2 numbers",
+    {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2},
+    None,
+    (2,),
+    True,
+    _two_fault,
+)
 NUMBERS = Kind("n numbers", {"type": "array", "items": {"type": "number"}})
 FACTS = Kind("table", {"type": "object"}, dict)
 COEFFICIENTS = Kind("table", {"type": "object", "additionalProperties": {"type": "number"}, "minProperties": 1}, dict)

@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from mechgraph.model.coupling import Coupling
 from mechgraph.model.drive import Drive
 from mechgraph.model.field_format import (
     FLAG,
@@ -26,6 +25,7 @@ from mechgraph.model.field_format import (
     Schema,
 )
 from mechgraph.model.force_table import ForceTable
+from mechgraph.model.gears import COUPLINGS
 from mechgraph.model.link import Link
 from mechgraph.model.load import LOADS
 from mechgraph.model.mechanism import Mechanism
@@ -35,6 +35,10 @@ from mechgraph.model.pair_type import PairType
 from mechgraph.model.row_parts import Bookkeeping, Component, Freedom
 from mechgraph.units import BASE_UNITS, LENGTH
 
+KINDS: dict[str, Mapping[str, Any]] = {"load": LOADS, "coupling": COUPLINGS}
+"""Tables of which the field ``kind`` says what stands in them: its values, and the classes."""
+USUAL = {"coupling": "linear"}
+"""What is meant where ``kind`` is left out."""
 SCHEMA = 1
 """Number of the file format."""
 DEGREES = "_deg"
@@ -126,7 +130,7 @@ TABLES_OF_FILE: dict[str, Table] = {
     "link": _table(Link),
     "pair": _table(Pair, words="A kinematic pair from link a to link b."),
     "marker": _table(Marker, words="A marker frame in a link's own frame."),
-    "coupling": _table(Coupling),
+    **{f"coupling {kind}": _table(coupling) for kind, coupling in COUPLINGS.items()},
     "chain": _table(
         None,
         words="A single closed loop: prod_k D_k(q_k) Tz(offset_k) Tx(length_k) Rx(twist_k) = 1.",

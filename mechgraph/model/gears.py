@@ -18,9 +18,8 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, cross
-from mechgraph.model.coupling import BaseCoupling
-from mechgraph.model.field_format import FLAG, FREEDOM_NAME, NUMBER, NUMBERS, TEXT
-from mechgraph.model.numeric import plain
+from mechgraph.model.coupling import BaseCoupling, Coupling
+from mechgraph.model.field_format import FLAG, FREEDOM_NAME, NUMBER, TEXT, TWO
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.quantities import is_numeric, wrong
 from mechgraph.units import LENGTH, PURE
@@ -79,8 +78,8 @@ class Contact(BaseCoupling):
     """
 
     kind: ClassVar[str]
-    turns: ClassVar[tuple[str, str]] = ("R", "R")
-    """Types of the pairs of both gears."""
+    slides: ClassVar[bool] = False
+    """Whether gear b slides, as a rack does."""
     name: Annotated[str, TEXT("name", default="g1, g2, ...")]
     a: Annotated[str, FREEDOM_NAME("pair of the first gear on the carrier")]
     b: Annotated[str, FREEDOM_NAME("pair of the second gear on the carrier")]
@@ -115,10 +114,12 @@ class Contact(BaseCoupling):
         found += [where + fault for fault in (m.freedom_fault(q, single=True) for q in ends.values()) if fault]
         if found:
             return found
-        for (side, q), symbol in zip(ends.items(), self.turns, strict=True):
-            pair = m.pairs[m.freedom(q)[0]]
-            if pair.type.symbol != symbol:
-                found.append(f"{where}{side} = {q!r}: is a pair {pair.type.symbol}; expected {symbol}")
+        for side, q in ends.items():
+            pair, wanted = m.pairs[m.freedom(q)[0]], "slide" if side == "b" and self.slides else "turn"
+            if _motion(pair) != wanted:
+                found.append(
+                    f"{where}{side} = {q!r}: is a pair {pair.type.symbol}; expected one whose only freedom is a {wanted} at its axis"
+                )
         if found:
             return found
         steps = self._way(m)
@@ -144,7 +145,7 @@ class Contact(BaseCoupling):
             if link in goal:
                 break
             for k, pair in enumerate(m.pairs):
-                if k not in (first, last) and pair.type.symbol == "R" and link in (pair.a, pair.b):
+                if k not in (first, last) and _motion(pair) == "turn" and link in (pair.a, pair.b):
                     other = pair.b if link == pair.a else pair.a
                     if other not in reached:
                         reached[other] = (link, k)
@@ -171,12 +172,13 @@ class Contact(BaseCoupling):
             off = np.abs(cross(q - p, z)).max()
             if np.abs(cross(z, w)).max() > FITTING or off > FITTING * max(1.0, float(np.abs(q - p).max())):
                 return (
-                    f"pair {pair.name!r} between the gears is not about the axis of {self.a!r} (off by {off:.3g}); {self.a!r} and {self.b!r} "
-                    "need a common carrier"
+                    f"pair {pair.name!r} between the gears is not about the axis of {self.a!r} (off by {off:.3g}); {self.a!r} and "
+                    f"{self.b!r} need a common carrier"
                 )
-            sense = float(np.sign((z * w).sum()))
+            sense, along = float(np.sign((z * w).sum())), ((p - q) * z).sum()
             p, w = _line(_marker(pair, step, behind=True))
             z = sense * w
+            p = p + along * z
         q, w = _line(_marker(pairs[-1], steps[-1], behind=False))
         return Axes(p, z, q, w)
 
@@ -209,9 +211,7 @@ class Contact(BaseCoupling):
 
     def _velocities(self, axes: Axes, P: Array) -> tuple[Array, Array]:
         """Velocities ``(3, T)`` of both gears at a point for unit rates."""
-        points = ((axes.pa, axes.za), (axes.pb, axes.zb))
-        va, vb = (z if turn == "P" else cross(z, P - p) for (p, z), turn in zip(points, self.turns, strict=True))
-        return va, vb
+        return cross(axes.za, P - axes.pa), axes.zb if self.slides else cross(axes.zb, P - axes.pb)
 
     def in_own_units(self, units: Any, turns: Any) -> Self:
         """See ``BaseCoupling``."""
@@ -220,6 +220,17 @@ class Contact(BaseCoupling):
     def converted(self, length: float, turns: Any) -> Self:
         """See ``BaseCoupling``."""
         return self.in_units((length, 1.0, 1.0))
+
+
+def _motion(pair: Pair) -> str:
+    """``"turn"`` or ``"slide"`` of a pair whose only freedom is one about or along its axis; nothing for other pairs."""
+    freedoms = pair.type.freedoms
+    plain: dict[tuple[float, ...], str] = {
+        (0.0, 0.0, 1.0, 0.0, 0.0, 0.0): "turn",
+        (0.0, 0.0, 0.0, 0.0, 0.0, 1.0): "slide",
+    }
+    single = len(freedoms) == 1 and not any(freedoms[0].per_pitch)
+    return plain.get(tuple(freedoms[0].twist), "") if single else ""
 
 
 def _marker(pair: Pair, step: Step, *, behind: bool) -> Marker:
@@ -231,7 +242,7 @@ def _line(marker: Marker) -> tuple[Array, Array]:
     return np.array(marker.point, dtype=float)[:, None], _unit(np.array(marker.axis, dtype=float)[:, None])
 
 
-_TEETH = NUMBERS("numbers of teeth of both gears", rules={"minItems": 2, "maxItems": 2})
+_TEETH = TWO("numbers of teeth of both gears")
 _PRESSURE = NUMBER("of the flanks, in the normal section", PURE, degrees=True, minimum=0.0)
 _FULL = float(np.deg2rad(20.0))
 
@@ -371,9 +382,7 @@ class WormGear(Contact):
     """A worm a and its wheel b on axes that cross at right angles; ``radius`` is that of the worm's pitch cylinder."""
 
     kind: ClassVar[str] = "worm"
-    teeth: Annotated[
-        Any, NUMBERS("starts of the worm and teeth of the wheel", rules={"minItems": 2, "maxItems": 2})
-    ] = None
+    teeth: Annotated[Any, TWO("starts of the worm and teeth of the wheel")] = None
     radius: Annotated[float, NUMBER("of the pitch cylinder of the worm", LENGTH, minimum=0.0)] = 1.0
     pressure_angle: Annotated[float, _PRESSURE] = _FULL
     left_hand: Annotated[bool, FLAG("whether the thread is left-handed")] = False
@@ -419,7 +428,7 @@ class Rack(Contact):
     """A pinion a on a pair R and a rack b on a pair P; the rack lies on the side of the pinion where the point of its pair is."""
 
     kind: ClassVar[str] = "rack"
-    turns: ClassVar[tuple[str, str]] = ("R", "P")
+    slides: ClassVar[bool] = True
     radius: Annotated[float, NUMBER("pitch radius of the pinion", LENGTH, minimum=0.0)] = 1.0
     pressure_angle: Annotated[float, _PRESSURE] = _FULL
 
@@ -451,17 +460,8 @@ class Belt(Contact):
     """A belt or chain around two pulleys on parallel axes, open or crossed; the strand that pulls carries all, the other nothing."""
 
     kind: ClassVar[str] = "belt"
-    radii: Annotated[Any, NUMBERS("of both pulleys", LENGTH, rules={"minItems": 2, "maxItems": 2})] = None
+    radii: Annotated[Any, TWO("of both pulleys", LENGTH, minimum=0.0)] = None
     crossed: Annotated[bool, FLAG("whether the strands cross")] = False
-
-    def value_faults(self, where: str) -> list[str]:
-        """See ``Described``."""
-        good = is_numeric(self.radii, (2,)) and min(self.radii) > 0
-        return super().value_faults(where) + ([] if good else [wrong(self.radii, "radii", "two numbers above 0")])
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "radii", plain(self.radii))
 
     def ratio(self, axes: Axes | None) -> float:
         """``r_b / r_a``."""
@@ -492,5 +492,5 @@ class Belt(Contact):
         return ends, _unit(starts - ends)
 
 
-COUPLINGS: dict[str, type[BaseCoupling]] = {c.kind: c for c in (SpurGears, BevelGears, WormGear, Rack, Belt)}
-"""Kinds of gears by their names in files."""
+COUPLINGS: dict[str, type[BaseCoupling]] = {c.kind: c for c in (Coupling, SpurGears, BevelGears, WormGear, Rack, Belt)}
+"""Couplings by the name of their kind in files."""

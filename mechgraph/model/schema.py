@@ -9,8 +9,7 @@ from typing import Any
 from urllib.parse import quote
 
 from mechgraph.model.field_format import TABLE, TABLES, FieldFormat
-from mechgraph.model.file_format import TABLES_OF_FILE, Table
-from mechgraph.model.load import LOADS
+from mechgraph.model.file_format import KINDS, TABLES_OF_FILE, USUAL, Table
 
 
 def _array(count: int) -> dict[str, Any]:
@@ -64,13 +63,13 @@ def laid_out(value: Any, depth: int = 0) -> str:
 
 
 def _table_schema(name: str, table: Table) -> dict[str, Any]:
-    kind = name.removeprefix("load ") if name.startswith("load ") else None
+    what, _, kind = name.partition(" ")
     properties: dict[str, Any] = {"kind": {"const": kind}} if kind else {}
     for key, about in table.fields.items():
         properties[key] = _field_schema(about, table.defaults.get(key))
         if about.degrees:
             properties[f"{key}_deg"] = _field_schema(about, None) | {"description": f"{about.meaning}; degrees"}
-    needed = [*(["kind"] if kind else []), *table.needed]
+    needed = [*(["kind"] if kind and USUAL.get(what) != kind else []), *table.needed]
     return {
         "description": table.words,
         "type": "object",
@@ -99,8 +98,8 @@ def _field_schema(about: FieldFormat, default: Any) -> dict[str, Any]:
 
 
 def _reference(name: str) -> dict[str, Any]:
-    if name == "load":
-        return {"oneOf": [_reference(f"load {kind}") for kind in LOADS]}
+    if name in KINDS:
+        return {"oneOf": [_reference(f"{name} {kind}") for kind in KINDS[name]]}
     return {"$ref": f"#/$defs/{quote(name)}"}
 
 
@@ -113,7 +112,7 @@ def with_field_tables(markdown: str) -> str:
 
 
 def _rows(names: str) -> Iterator[tuple[str, ...]]:
-    listed = [f"load {kind}" for kind in LOADS] if names == "load" else names.split(", ")
+    listed = [f"{names} {kind}" for kind in KINDS[names]] if names in KINDS else names.split(", ")
     several = len(listed) > 1
     head = ("field", "type", "unit", "meaning", "default")
     yield ("table", *head) if several else head
@@ -121,7 +120,7 @@ def _rows(names: str) -> Iterator[tuple[str, ...]]:
     for name in listed:
         table = TABLES_OF_FILE[name]
         for i, (key, about) in enumerate(table.fields.items()):
-            first = (f"`{name.removeprefix('load ')}`" if i == 0 else "",) if several else ()
+            first = (f"`{name.rpartition(' ')[2]}`" if i == 0 else "",) if several else ()
             yield *first, *_row(key, about, table)
 
 

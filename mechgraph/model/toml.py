@@ -17,9 +17,8 @@ import tomli_w
 from mechgraph.errors import ContentError, DeclarationError, FileError
 from mechgraph.model.chain import chain
 from mechgraph.model.field_format import COEFFICIENTS, SIX, STANDS_AS, TABLE, Described
-from mechgraph.model.file_format import DEGREES, SCHEMA, TABLES_OF_FILE
+from mechgraph.model.file_format import DEGREES, KINDS, SCHEMA, TABLES_OF_FILE, USUAL
 from mechgraph.model.library import library_names, library_path
-from mechgraph.model.load import LOADS
 from mechgraph.model.mechanism import Mechanism, check_mechanism
 from mechgraph.model.pair_table import TABLE as PAIR_TABLE
 from mechgraph.model.pair_type import PairType
@@ -98,17 +97,17 @@ class _Reader:
         out = []
         for i, entry in enumerate(raw):
             where = f"{key} {shown(entry.get('name', i + 1))}" if isinstance(entry, Mapping) else f"{key} {i + 1}"
-            out.append(self.load(entry, where) if key == "load" else self.item(key, entry, where))
+            out.append(self.of_kind(key, entry, where) if key in KINDS else self.item(key, entry, where))
         made = [item for item in out if item is not None]
         self.left_out |= len(made) < len(raw)
         return made
 
-    def load(self, raw: Any, where: str) -> Any:
-        """The load of a table, whose ``kind`` says which."""
-        kind = raw.get("kind") if isinstance(raw, Mapping) else None
-        if isinstance(kind, str) and kind in LOADS:
-            return self.item(f"load {kind}", {key: value for key, value in raw.items() if key != "kind"}, where)
-        self.faults.append(wrong(kind, f"{where}: kind", f"one of {', '.join(LOADS)}"))
+    def of_kind(self, key: str, raw: Any, where: str) -> Any:
+        """The object of a table whose ``kind`` says what stands in it."""
+        kind = raw.get("kind", USUAL.get(key)) if isinstance(raw, Mapping) else None
+        if isinstance(kind, str) and kind in KINDS[key]:
+            return self.item(f"{key} {kind}", {key: value for key, value in raw.items() if key != "kind"}, where)
+        self.faults.append(wrong(kind, f"{where}: kind", f"one of {', '.join(KINDS[key])}"))
         return None
 
     def start(self, raw: Any) -> dict[str, Any]:
@@ -302,8 +301,9 @@ def to_data(m: Mechanism, path: str = "") -> dict[str, Any]:
 
 def _item_data(key: str, item: Any, path: str) -> dict[str, Any]:
     """The table of a link, pair, coupling, drive or load."""
-    if key == "load":
-        return {"kind": item.kind} | _data(item, path, f"load {item.kind}")
+    if key in KINDS:
+        named = {} if USUAL.get(key) == item.kind else {"kind": item.kind}
+        return named | _data(item, path, f"{key} {item.kind}")
     return _data(item, path, f"{key} {getattr(item, next(iter(item.formats)))!r}")
 
 

@@ -101,6 +101,9 @@ def coupling_document(values: Values, k: int) -> Document:
     blocks: list[Block] = [Paragraph(f"{coupling.text}; {_solved(places)}.")]
     if values.has_forces:
         rows: list[tuple[str, Array]] = [(f"multiplier{unit}", values.multiplier(k))]
+        if coupling.steps:
+            force = np.linalg.norm(values.contact(k)[0], axis=-1)
+            rows.append((f"force of contact{bracket(unit_of(m.units, (1, 1, -2)))}", force))
         blocks.append(ranges(rows, places.name))
     return Document(f"Coupling {coupling.name} of {m.name}", tuple(blocks))
 

@@ -1,0 +1,351 @@
+"""Gears, racks and belts: forces against hand calculations, motion against Willis' equation, and what holds for every contact."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import mechgraph as mg
+
+Z = (0.0, 0.0, 1.0)
+TAN = np.tan(np.deg2rad(20.0))
+
+
+def two(gears, b=(0.3, 0, 0), axis=Z, torque=10.0, swapped=(False, False), second="R", **more):
+    """Two gears on the frame, the first driven, a torque (or force) on the second."""
+    ends = [("frame", "one"), ("frame", "two")]
+    (pa, qa), (pb, qb) = (end[::-1] if turn else end for end, turn in zip(ends, swapped, strict=True))
+    pairs = [
+        mg.Pair("A", "R", pa, qa, point=(0, 0, 0), axis=Z),
+        mg.Pair("B", second, pb, qb, point=b, axis=axis),
+    ]
+    links = [mg.Link("frame"), mg.Link("one"), mg.Link("two")]
+    return mg.Mechanism(
+        "two gears", links, pairs, drives=["A"], couplings=[gears], loads=[mg.Effort("B", torque)], **more
+    )
+
+
+def solved(m, **more):
+    return mg.solve(m, {m.drives[0].freedom: mg.Motion(np.array([0.0, 0.4, 1.0]), 2.0)}, **more)
+
+
+def spur(**more):
+    return mg.SpurGears("g", "A", "B", **{"teeth": (20, 40), **more})
+
+
+# --- forces by hand --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("torque", [10.0, -10.0])
+def test_spur_gears_by_hand(torque):
+    """F_t = M / r across the line of centres, F_t tan 20 deg apart along it, whichever way the torque acts."""
+    s = solved(two(spur(), torque=torque))
+    np.testing.assert_allclose(s["B"].position[:, 0], -s["A"].position[:, 0] / 2, atol=1e-14)
+    tangential, apart = torque / 0.2, abs(torque) / 0.2 * TAN
+    for force in (s.coupling("g").force, -s["B"].force, s["A"].force):
+        np.testing.assert_allclose(force, np.broadcast_to([apart, tangential, 0.0], (3, 3)), atol=1e-11)
+    np.testing.assert_allclose(s.coupling("g").point, np.broadcast_to([0.1, 0, 0], (3, 3)), atol=1e-15)
+    np.testing.assert_allclose(s["A"].effort, torque / 2, rtol=1e-13)
+    assert s.checks.power.max() < 1e-12
+    assert all(all(ok.all() for ok in s[name].unique.values()) for name in "AB")
+
+
+def test_ring_gears_by_hand():
+    """The ring is pushed outwards, wherever it is declared; both turn the same way."""
+    for teeth, sign in (((20, 40), -1.0), ((40, 20), 1.0)):
+        s = solved(two(spur(teeth=teeth, internal=True), b=(0.1, 0, 0)))
+        np.testing.assert_allclose(s["B"].velocity[:, 0], 2.0 * teeth[0] / teeth[1], rtol=1e-13)
+        radius = 0.1 * teeth[1] / 20
+        np.testing.assert_allclose(s.coupling("g").point[:, 0], 0.1 + sign * radius, rtol=1e-12)
+        np.testing.assert_allclose(s.coupling("g").force[:, 0], -10.0 / radius * TAN, rtol=1e-12)
+
+
+@pytest.mark.parametrize("hand", [1.0, -1.0])
+def test_helical_gears_by_hand(hand):
+    """F_a = F_t tan beta, F_r = F_t tan alpha_n / cos beta; bearings take the couple F_a r too.
+
+    Gear a has the hand, gear b the other one. The teeth of a right-handed gear a run along (0, sin beta, cos beta) at the mesh; what pushes
+    gear b along +y has no part along them, so that it pushes along -z.
+    """
+    beta = 0.3 * hand
+    s = solved(two(spur(helix_angle=beta)))
+    tangential = 10.0 / 0.2
+    wanted = [tangential * TAN / np.cos(beta), tangential, -tangential * np.tan(beta)]
+    np.testing.assert_allclose(s.coupling("g").force[0], wanted, rtol=1e-12)
+    # frame on gear a: minus the moment of -F at (0.1, 0, 0)
+    np.testing.assert_allclose(s["A"].moment[0], [0.0, 0.1 * tangential * np.tan(beta), 0.0], atol=1e-12)
+
+
+def test_bevel_gears_by_hand():
+    """At right angles: F_r1 = F_t tan alpha cos delta_1 is the axial force of gear 2, and the other way round."""
+    gears = mg.BevelGears("g", "A", "B", teeth=(20, 30), module=0.004)
+    pairs = [
+        mg.Pair("A", "R", "frame", "one", point=(0, 0, 0.1), axis=Z),
+        mg.Pair("B", "R", "frame", "two", point=(0.1, 0, 0), axis=(1, 0, 0)),
+    ]
+    m = mg.Mechanism("bevel", pairs=pairs, drives=["A"], couplings=[gears], loads=[mg.Effort("B", 6.0)])
+    s = solved(m)
+    r1, r2 = 0.04, 0.06
+    np.testing.assert_allclose(s.coupling("g").point, np.broadcast_to([r1, 0, r2], (3, 3)), atol=1e-14)
+    delta = np.arctan2(20, 30)
+    tangential = 6.0 / r2
+    force = s.coupling("g").force[0]
+    assert abs(force[1]) == pytest.approx(tangential, rel=1e-12)
+    # gear b is pushed away along its own axis, and towards its own axis
+    np.testing.assert_allclose(
+        force[[0, 2]], [tangential * TAN * np.cos(delta), -tangential * TAN * np.sin(delta)], rtol=1e-12
+    )
+    np.testing.assert_allclose(np.abs(s["B"].velocity[:, 0]), 2.0 * 20 / 30, rtol=1e-13)
+
+
+@pytest.mark.parametrize("left", [False, True])
+def test_worm_and_wheel_by_hand(left):
+    """tan lambda = z1 r2 / (z2 r1); without friction F_t1 = F_a1 tan lambda, and F_r = F_a1 tan alpha_n / cos lambda."""
+    gears = mg.WormGear("g", "A", "B", teeth=(2, 40), radius=0.02, left_hand=left)
+    s = solved(two(gears, b=(0.1, 0, 0), axis=(0, 1, 0), torque=80.0))
+    r1, r2 = 0.02, 0.08
+    lead = np.arctan(2 * r2 / (40 * r1))
+    along = 80.0 / r2
+    force = s.coupling("g").force[0]
+    np.testing.assert_allclose(np.abs(force), [along * TAN / np.cos(lead), along * np.tan(lead), along], rtol=1e-12)
+    assert abs(s["A"].effort[0, 0]) == pytest.approx(along * np.tan(lead) * r1, rel=1e-12)
+    # a thread with the right hand, turned as a screw in +z, carries the teeth of the wheel along +z
+    screw = 1.0 if not left else -1.0
+    at_mesh = np.cross([0, s["B"].velocity[0, 0], 0], [-r2, 0, 0])
+    assert at_mesh[2] == pytest.approx(-screw * 2.0 * r1 * np.tan(lead), rel=1e-12)
+
+
+def test_rack_by_hand_and_as_a_wheel_that_grows():
+    """x = r q; F_t = F; a wheel of radius R comes near to it as 1 / R."""
+    rack = mg.Rack("g", "A", "B", radius=0.05)
+    s = solved(two(rack, b=(0, -0.06, 0), axis=(1, 0, 0), torque=7.0, second="P"))
+    np.testing.assert_allclose(s["B"].velocity[:, 0], 0.05 * 2.0, rtol=1e-13)
+    np.testing.assert_allclose(
+        s.coupling("g").force, np.broadcast_to([-7.0, -7.0 * TAN, 0], (3, 3)), rtol=1e-12, atol=1e-12
+    )
+    np.testing.assert_allclose(s.coupling("g").point, np.broadcast_to([0, -0.05, 0], (3, 3)), atol=1e-14)
+    off = []
+    for teeth in (2000, 20000):
+        R = 0.05 * teeth / 20
+        m = two(spur(teeth=(20, teeth)), b=(0, -0.05 - R, 0), torque=7.0 * R)
+        wheel = solved(m)
+        np.testing.assert_allclose(
+            np.abs(wheel.coupling("g").force), np.abs(s.coupling("g").force), rtol=1e-9, atol=1e-9
+        )
+        # the driven point of the wheel's rim moves on a circle
+        phi = wheel["B"].position[-1, 0] - wheel["B"].position[0, 0]
+        off.append(abs(R * np.sin(abs(phi)) - 0.05 * 1.0))
+    assert off[0] / off[1] == pytest.approx(100.0, rel=0.02)
+
+
+@pytest.mark.parametrize("crossed", [False, True])
+@pytest.mark.parametrize("torque", [6.0, -6.0])
+def test_belt_by_hand(crossed, torque):
+    """One strand pulls with M / r along the common tangent; an open belt turns both pulleys the same way."""
+    belt = mg.Belt("g", "A", "B", radii=(0.1, 0.2), crossed=crossed)
+    s = solved(two(belt, b=(0.6, 0, 0), torque=torque))
+    np.testing.assert_allclose(s["B"].velocity[:, 0], -1.0 if crossed else 1.0, rtol=1e-13)
+    force, point = s.coupling("g").force[0], s.coupling("g").point[0]
+    assert np.linalg.norm(force) == pytest.approx(6.0 / 0.2, rel=1e-12)
+    sine = (0.3 if crossed else -0.1) / 0.6
+    assert force[0] == pytest.approx(-30.0 * np.sqrt(1 - sine**2), rel=1e-12)
+    assert np.linalg.norm(point - [0.6, 0, 0]) == pytest.approx(0.2, rel=1e-12)
+    assert np.cross(point - [0.6, 0, 0], force)[2] == pytest.approx(-torque, rel=1e-12)
+
+
+# --- trains ------------------------------------------------------------------------------------------------------------------
+
+
+def planetary(planets=1, teeth=(24, 18, 60)):
+    """Sun and arm on the frame, planets on the arm, the ring is the frame."""
+    sun, planet, ring = teeth
+    module = 0.002
+    r = module * (sun + planet) / 2
+    links = [mg.Link("frame"), mg.Link("sun"), mg.Link("arm")]
+    pairs = [
+        mg.Pair("S", "R", "frame", "sun", point=(0, 0, 0), axis=Z),
+        mg.Pair("C", "R", "frame", "arm", point=(0, 0, 0), axis=Z),
+    ]
+    gears = []
+    for i in range(planets):
+        turn = 2 * np.pi * i / planets
+        links.append(mg.Link(f"p{i}"))
+        pairs.append(mg.Pair(f"P{i}", "R", "arm", f"p{i}", point=(r * np.cos(turn), r * np.sin(turn), 0), axis=Z))
+        gears.append(mg.SpurGears(f"sun{i}", "S", f"P{i}", teeth=(sun, planet), module=module))
+        gears.append(mg.SpurGears(f"ring{i}", "C", f"P{i}", teeth=(ring, planet), module=module, internal=True))
+    loads = [mg.Effort("C", -50.0)]
+    return mg.Mechanism("planetary", links, pairs, drives=["S"], couplings=gears, loads=loads)
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.parametrize("planets", [1, 3])
+def test_planetary_gears_obey_willis(planets, engine):
+    """w_arm = w_sun z_s / (z_s + z_r); torques 1 : 1 + z_r / z_s; the share of each of three planets is not unique."""
+    m = planetary(planets)
+    s = solved(m, engine=engine)
+    np.testing.assert_allclose(s["C"].velocity[:, 0], 2.0 * 24 / 84, rtol=1e-13)
+    np.testing.assert_allclose(s["P0"].velocity[:, 0], -2.0 * 24 / 84 * 60 / 18, rtol=1e-12)
+    np.testing.assert_allclose(s["S"].effort, 50.0 * 24 / 84, rtol=1e-12)
+    report = mg.check(m)
+    assert (report.mobility, report.redundancy) == (1, planets - 1)
+    if planets == 1:
+        # sun and ring push the planet with the same tangential force; its pin carries twice that, along the tangent
+        tangential = 50.0 * 24 / 84 / 0.024
+        pin = s["P0"].force[0]
+        assert np.linalg.norm(pin) == pytest.approx(2 * tangential, rel=1e-11)
+        np.testing.assert_allclose(s.coupling("sun0").force[0] + s.coupling("ring0").force[0] + pin, 0.0, atol=1e-10)
+    else:
+        assert not report.unique["sun0"]["effort"]
+        shared = solved(m, engine=engine, redundant="minimum_norm")
+        forces = [np.linalg.norm(shared.coupling(f"sun{i}").force, axis=1) for i in range(3)]
+        np.testing.assert_allclose(
+            forces, np.broadcast_to(50.0 * 24 / 84 / 0.024 / 3 / np.cos(np.deg2rad(20)), (3, 3)), rtol=1e-8
+        )
+
+
+def test_bevel_differential():
+    """Both axle shafts turn as their mean with the cage, and carry equal torques whatever their speeds."""
+    pairs = [
+        mg.Pair("C", "R", "frame", "cage", point=(0, 0, 0), axis=Z),
+        mg.Pair("L", "R", "frame", "left", point=(0, 0, -0.1), axis=Z),
+        mg.Pair("R", "R", "frame", "right", point=(0, 0, 0.1), axis=Z),
+        mg.Pair("P", "R", "cage", "planet", point=(0.05, 0, 0), axis=(1, 0, 0)),
+    ]
+    gears = [
+        mg.BevelGears("left gears", "L", "P", teeth=(20, 10), module=0.004),
+        mg.BevelGears("right gears", "R", "P", teeth=(20, 10), module=0.004),
+    ]
+    m = mg.Mechanism("differential", pairs=pairs, drives=["C", "L"], couplings=gears, loads=[mg.Effort("R", -30.0)])
+    t = np.linspace(0, 1, 5)
+    s = mg.solve(m, {"C": mg.Motion(2 * t, 2.0), "L": mg.Motion(3 * t, 3.0)})
+    np.testing.assert_allclose(s["R"].velocity[:, 0], 1.0, rtol=1e-13)
+    np.testing.assert_allclose(s["L"].effort, -30.0, rtol=1e-12)
+    np.testing.assert_allclose(s["C"].effort, 60.0, rtol=1e-12)
+    assert s.checks.power.max() < 1e-12
+
+
+# --- what holds for all --------------------------------------------------------------------------------------------------------
+
+
+def anywhere(m, seed):
+    """The same mechanism in another place of space."""
+    rng = np.random.default_rng(seed)
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = Rotation.random(rng=rng).as_matrix(), rng.normal(size=3)
+    return m.moved(pose), pose
+
+
+MACHINES = {
+    "spur": lambda: two(spur()),
+    "other way round": lambda: two(spur(helix_angle=-0.2), swapped=(True, False)),
+    "both": lambda: two(spur(internal=True, helix_angle=0.2), b=(0.1, 0, 0.02), swapped=(True, True)),
+    "worm": lambda: two(mg.WormGear("g", "A", "B", teeth=(1, 30), radius=0.02), b=(0.1, 0, 0), axis=(0, 1, 0)),
+    "rack": lambda: two(mg.Rack("g", "A", "B", radius=0.05), b=(0, -0.06, 0), axis=(1, 0, 0), second="P"),
+    "belt": lambda: two(mg.Belt("g", "A", "B", radii=(0.1, 0.2), crossed=True), b=(0.6, 0, 0)),
+    "bevel": lambda: two(
+        mg.BevelGears("g", "A", "B", teeth=(20, 30), module=0.1, spiral_angle=0.4), b=(0.3, 0, 0.7), axis=(1, 0, 0.4)
+    ),
+    "planetary": planetary,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_contacts_in_any_place_by_any_method(name):
+    """No work, no force on the links between, the same in any frame, the same by all methods, and printed as solved."""
+    m = MACHINES[name]()
+    s = solved(m)
+    assert s.checks.power.max() < 1e-12
+    assert s.checks.equilibrium.max() < 1e-12
+    moved, pose = anywhere(m, 1)
+    again = solved(moved)
+    others = [solved(m, method=way) for way in ("newton_euler", "printed")]
+    for c in m.couplings:
+        np.testing.assert_allclose(again.coupling(c.name).force, s.coupling(c.name).force @ pose[:3, :3].T, atol=1e-9)
+        point = s.coupling(c.name).point @ pose[:3, :3].T + pose[:3, 3]
+        np.testing.assert_allclose(again.coupling(c.name).point, point, atol=1e-12)
+        for other in others:
+            np.testing.assert_allclose(other.coupling(c.name).force, s.coupling(c.name).force, rtol=1e-10, atol=1e-9)
+    for p in m.pairs:
+        for other in others:
+            np.testing.assert_allclose(other[p.name].reaction, s[p.name].reaction, rtol=1e-9, atol=1e-9)
+            np.testing.assert_allclose(other[p.name].total, s[p.name].total, rtol=1e-9, atol=1e-9)
+    # every link is in equilibrium under what its pairs and gears exert
+    for link in m.links[1:]:
+        left = np.zeros((3, 6))
+        for p in m.pairs:
+            sign = (p.b == link.name) - (p.a == link.name)
+            left = left + sign * s[p.name].total
+        for c in m.couplings:
+            first, last = c.steps[0], c.steps[-1]
+            for step, side, sign in ((first, -first.sense, -1), (last, last.sense, 1)):
+                pair = m.pairs[step.pair]
+                if (pair.b if side > 0 else pair.a) == link.name:
+                    F, P = s.coupling(c.name).force, s.coupling(c.name).point
+                    left = left + sign * np.concatenate([np.cross(P, F), F], axis=1)
+        np.testing.assert_allclose(left, 0.0, atol=1e-9)
+    f = mg.formulate(m)
+    found = dict(zip([u.name for u in f.unknowns], f.solve(s.state(1)), strict=True))
+    for c in m.couplings:
+        assert found[f"M_C({c.name})"] == pytest.approx(s.coupling(c.name).effort[1], rel=1e-9)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_contacts_in_files_units_and_motion(name, tmp_path):
+    m = MACHINES[name]().replace(units={"length": "m", "mass": "kg", "time": "s"})
+    mg.save(m, tmp_path / "gears.toml")
+    again = mg.load(tmp_path / "gears.toml")
+    assert again == m
+    assert [c.terms for c in again.couplings] == [c.terms for c in m.couplings]
+    s, small = solved(m), solved(m.to_units(length="mm"))
+    for c in m.couplings:
+        np.testing.assert_allclose(small.coupling(c.name).force, 1e3 * s.coupling(c.name).force, rtol=1e-9, atol=1e-7)
+        np.testing.assert_allclose(small.coupling(c.name).point, 1e3 * s.coupling(c.name).point, rtol=1e-9, atol=1e-9)
+
+
+def test_geared_rotors_swing_as_one():
+    """Under a torsion spring two wheels geared 1 : 2 have the inertia I_a + I_b / 4."""
+    wheels = (("one", (0, 0, 0), 2.0), ("two", (0.3, 0, 0), 5.0))
+    links = [mg.Link("frame"), *(mg.Link(n, mass=1, center=c, inertia=i * np.eye(3)) for n, c, i in wheels)]
+    m = two(spur()).replace(links=links, drives=[], loads=[mg.TorsionSpring("A", stiffness=4.0)])
+    assert mg.linearize(m).frequencies == pytest.approx([np.sqrt(4.0 / (2.0 + 5.0 / 4))], rel=1e-9)
+    r = mg.respond(m, (0, 5), start={"A": 0.3})
+    np.testing.assert_allclose(r["A"].position[:, 0], 0.3 * np.cos(np.sqrt(4 / 3.25) * r.t), atol=1e-6)
+    # the contact turns gear b
+    np.testing.assert_allclose(
+        np.abs(r.coupling("g").force[:, 1] * 0.2), np.abs(5.0 * r["B"].acceleration[:, 0]), rtol=1e-9, atol=1e-12
+    )
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: two(spur(module=0.02)), "0.3 apart; 20 and 40 teeth of module 0.02 mesh at 0.6 .at 0.3 with module 0.01"),
+        (lambda: two(spur(), axis=(0, 1, 0)), "axes are not parallel"),
+        (lambda: two(spur(teeth=(20, 0))), "teeth = .20.0, 0.0.: expected two whole numbers above 0"),
+        (lambda: two(spur(teeth=(20, 20), internal=True)), "different numbers of an internal pair"),
+        (lambda: two(spur(), b=(0, 0, 0.1)), "same axis"),
+        (lambda: two(mg.SpurGears("g", "A", "Q", teeth=(1, 2))), "unknown freedom 'Q'"),
+        (lambda: two(mg.SpurGears("g", "A", "A", teeth=(1, 2))), "the same freedom"),
+        (lambda: two(spur(), second="P"), "b = 'B': is a pair P; expected one whose only freedom is a turn"),
+        (lambda: two(mg.BevelGears("g", "A", "B", teeth=(1, 2)), b=(0.3, 0.1, 0), axis=(1, 0, 0)), "pass each other at 0.1"),
+        (lambda: two(mg.WormGear("g", "A", "B", teeth=(1, 30), radius=0.2), b=(0.1, 0, 0), axis=(0, 1, 0)), "more than the radius"),
+        (lambda: two(mg.Belt("g", "A", "B", radii=(0.2, 0.2), crossed=True)), "expected more than 0.4"),
+        (lambda: two(mg.Rack("g", "A", "B", radius=0.05), b=(0.1, 0, 0), axis=(1, 0, 0), second="P"), "level with the pinion's axis"),
+    ],
+)  # fmt: skip
+def test_gears_that_cannot_mesh_are_named(make, words):
+    with pytest.raises(mg.DeclarationError, match=words):
+        make()
+
+
+def test_gears_without_a_common_carrier_are_named():
+    pairs = [
+        mg.Pair("A", "R", "frame", "arm", point=(0, 0, 0), axis=Z),
+        mg.Pair("B", "R", "arm", "one", point=(1, 0, 0), axis=Z),
+        mg.Pair("C", "R", "one", "two", point=(2, 0, 0), axis=Z),
+        mg.Pair("D", "P", "two", "three", point=(2, 0, 0), axis=Z),
+        mg.Pair("E", "R", "three", "four", point=(3, 0, 0), axis=Z),
+    ]
+    with pytest.raises(mg.DeclarationError, match="pair 'B' between the gears is not about the axis of 'A'"):
+        mg.Mechanism("chain", pairs=pairs, couplings=[mg.SpurGears("g", "A", "C", teeth=(1, 2))])
+    with pytest.raises(mg.DeclarationError, match="no link in common"):
+        mg.Mechanism("chain", pairs=pairs, couplings=[mg.SpurGears("g", "C", "E", teeth=(1, 2))])
