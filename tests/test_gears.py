@@ -349,3 +349,10 @@ def test_gears_without_a_common_carrier_are_named():
         mg.Mechanism("chain", pairs=pairs, couplings=[mg.SpurGears("g", "A", "C", teeth=(1, 2))])
     with pytest.raises(mg.DeclarationError, match="no link in common"):
         mg.Mechanism("chain", pairs=pairs, couplings=[mg.SpurGears("g", "C", "E", teeth=(1, 2))])
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_links_cut_free_feel_the_teeth(name):
+    s = solved(MACHINES[name]())
+    for link in s.mechanism.links[1:]:
+        assert mg.free_body(s, link.name).balance < 1e-10
