@@ -1,5 +1,6 @@
 """Pictures of mechanisms, solutions, formulations and studies; matplotlib (the ``plot`` extra) is imported only when one is drawn."""
 
+from mechgraph.show.animation import animate, save_picture
 from mechgraph.show.curves import effort_curve, margin_curve, reaction_curve
 from mechgraph.show.diagrams import draw_graph, draw_sparsity, draw_structure
 from mechgraph.show.forces import polar_force, reaction_ranges
@@ -8,6 +9,7 @@ from mechgraph.show.skeleton import draw_skeleton
 from mechgraph.show.studies import study_bands, study_histogram, study_tornado
 
 __all__ = [
+    "animate",
     "draw_graph",
     "draw_skeleton",
     "draw_sparsity",
@@ -19,6 +21,7 @@ __all__ = [
     "polar_force",
     "reaction_curve",
     "reaction_ranges",
+    "save_picture",
     "study_bands",
     "study_histogram",
     "study_tornado",

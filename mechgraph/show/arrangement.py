@@ -25,6 +25,8 @@ RINGS = (1.0, 1.6, 2.4, 3.4, 4.6, 6.0, 8.0)
 ANGLES = np.linspace(0.0, 2 * np.pi, 24, endpoint=False) + 0.3
 FORBIDDEN = 1e4
 """Cost of covering another text, or of reaching beyond the axes, over that of covering one point of the drawing."""
+STEADY = 1.2
+"""Cost of moving a text by its height from where it stood before, over that of covering one point of the drawing."""
 LEADER = 2.4
 """Distance over the nearest from which on a fine line leads from the point to its text."""
 
@@ -44,7 +46,8 @@ class Arrangement(Artist):
 
     ``taken`` gives points ``(n, 2)`` on the screen that texts should not cover, ``pixels`` the screen place of points in space, ``camera``
     the directions to the right, up and towards the viewer, ``inside`` the box (pixels) in which everything has to stay; ``prepare`` is
-    called first, with the part of that box that the legend leaves.
+    called first, with the part of that box that the legend leaves. ``places`` holds how texts stood beside their points before
+    (by the text, in points of a 72nd inch): they are kept where that covers little more, and noted anew.
     """
 
     def __init__(
@@ -55,8 +58,10 @@ class Arrangement(Artist):
         camera: Callable[[], Array],
         inside: Callable[[], Array],
         prepare: Callable[[Array], None],
+        places: dict[str, Array] | None = None,
     ) -> None:
         super().__init__()
+        self._places = {} if places is None else places
         self._pixels, self._taken, self._camera, self._inside, self._prepare = pixels, taken, camera, inside, prepare
         self._ax, self._placed = ax, list[Placed]()
         self._corner: list[tuple[Line2D, Text, Array]] = []
@@ -124,13 +129,18 @@ class Arrangement(Artist):
         unit = self._ax.figure.dpi / 72.0
         box = self.room(renderer)
         self._prepare(box)
-        taken, boxes = self._taken(), self._furniture(renderer, unit, box)
+        # points closer than a letter's stroke count once
+        taken = (2 * unit) * np.unique(np.round(self._taken() / (2 * unit)), axis=0)
+        boxes = self._furniture(renderer, unit, box)
         points = [self._pixels(p.at[None])[0] for p in self._placed]
         right = self._camera()[0]
         for placed, point in zip(self._placed, points, strict=True):
             size = _size(placed.text, renderer) + 2.0 * unit
             away = float(np.linalg.norm(self._pixels((placed.at + placed.away * right)[None])[0] - point)) + 3.0 * unit
-            corner, ring = _best(point, size, away, box, boxes, taken)
+            before = self._places.get(placed.text.get_text())
+            kept = None if before is None else point + before * unit
+            corner, ring = _best(point, size, away, box, boxes, taken, kept)
+            self._places[placed.text.get_text()] = (corner - point) / unit
             placed.text.set_position(tuple(corner + unit))
             boxes.append(np.array([corner, corner + size]))
             far = ring >= LEADER
@@ -178,9 +188,9 @@ def _meet(low: Array, high: Array, other: Array) -> bool:
 
 
 def _best(
-    point: Array, size: Array, away: float, box: Array, boxes: Sequence[Array], taken: Array
+    point: Array, size: Array, away: float, box: Array, boxes: Sequence[Array], taken: Array, kept: Array | None = None
 ) -> tuple[Array, float]:
-    """Lower left corner of a text of some size near a point, and its distance over the nearest one."""
+    """Lower left corner of a text of some size near a point, and its distance over the nearest one; it would rather be ``kept``."""
     directions = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
     rings = np.repeat(RINGS, len(ANGLES))
     d = np.tile(directions, (len(RINGS), 1))
@@ -189,6 +199,8 @@ def _best(
     low = point + reach - 0.5 * size
     high = low + size
     cost = 0.35 * (rings - 1.0) + 0.02 * (1.0 - d[:, 0]) + 0.02 * (1.0 - d[:, 1])
+    if kept is not None:
+        cost += STEADY * np.minimum(np.linalg.norm(low - kept, axis=1) / float(size[1]), 2.0)
     beyond = np.maximum(box[0] - low, 0.0).sum(axis=1) + np.maximum(high - box[1], 0.0).sum(axis=1)
     cost += FORBIDDEN * (beyond > 0) * (1.0 + beyond)
     for other in boxes:

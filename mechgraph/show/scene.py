@@ -71,6 +71,11 @@ class Scene:
         X = self.frames[part.frame][t]
         return np.asarray(part.shape.vertices @ X[:, :3].T + X[:, 3])
 
+    def all_vertices(self, t: int) -> Array:
+        """Everything that is drawn at a position with all other places of points, ``(n, 3)``."""
+        every = np.concatenate([*(self.vertices(part, t) for part in self.parts), self.everything])
+        return np.asarray(every[np.isfinite(every).all(axis=1)])
+
     def place(self, label: Label, t: int) -> Array:
         """The point of a label in the global frame, ``(3,)``."""
         X = self.frames[label.frame][t]

@@ -226,20 +226,21 @@ class Drawing:
 
     # --- what stands beside it -----------------------------------------------------------------------------------------
 
-    def drawn(self, t: int) -> Array:
-        """All vertices at a position with all other places of points, ``(n, 3)``."""
-        parts = [self.scene.vertices(part, t) for part in self.scene.parts]
-        every = np.concatenate([*parts, self.scene.everything])
-        return every[np.isfinite(every).all(axis=1)]
+    def furniture(
+        self, t: int, labels: bool, extent: Array | None = None, places: dict[str, Array] | None = None
+    ) -> None:
+        """Equal scales, no frame; names, directions and a scale; where pairs are many, numbers and a legend.
 
-    def furniture(self, t: int, labels: bool) -> None:
-        """Equal scales, no frame; names, directions and a scale; where pairs are many, numbers and a legend."""
+        ``extent``: points that fill the axes, those at this position where left out; ``places``: where names stood before, which is
+        where they are put again if they can.
+        """
         from mechgraph.show.arrangement import Arrangement, nice_length
 
         painter, samples = self.painter, self._samples(t)
         bare(self.ax)
         arranged = Arrangement(
             self.ax, painter.pixels, lambda: painter.pixels(samples), lambda: painter.camera, lambda: inside(self.ax), painter.fill,
+            places,
         )  # fmt: skip
         axes = [(name, axis, MUTED) for name, axis in zip("xyz", np.eye(3), strict=True)]
         if self.scene.gravity is not None:
@@ -255,7 +256,7 @@ class Drawing:
             arranged.scale(0.0, "hatched: not unique", REACTION)
         if labels:
             self._names(arranged, t)
-        painter.fit(self.drawn(t), arranged.room)
+        painter.fit(self.scene.all_vertices(t) if extent is None else extent, arranged.room)
         for artist in (*self.ax.lines, *self.ax.collections):
             artist.set_clip_on(False)
             artist.set_in_layout(False)
