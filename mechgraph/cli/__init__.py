@@ -5,6 +5,7 @@ from mechgraph.cli.formulation import equations
 from mechgraph.cli.library import list_library, save
 from mechgraph.cli.motion import respond, solve
 from mechgraph.cli.page import report
+from mechgraph.cli.picture import plot
 from mechgraph.cli.program import app
 from mechgraph.cli.strength import loads
 
@@ -16,5 +17,6 @@ app.command("equations")(equations)
 app.command("solve")(solve)
 app.command("respond")(respond)
 app.command("save")(save)
+app.command("plot")(plot)
 app.command("loads")(loads)
 app.command("report")(report)
