@@ -17,6 +17,7 @@ DRAWING = {  # pins (x, z) as drawn
     "bucket foot": (5.60, 1.95), "tip": (6.00, -1.95),
 }  # fmt: skip
 WEIGHTS = {"boom": (1800.0, (2.60, 1.60)), "stick": (900.0, (5.50, 1.10)), "bucket": (750.0, (6.50, -1.10))}
+CYLINDERS = ("lift", "crowd", "curl")  # of boom, stick and bucket
 SOIL = (40e3, -12e3)  # N at the tip: the soil holds the bucket back, what it carries pulls down
 TIP = np.column_stack([np.linspace(8.0, 5.0, 31), np.linspace(-1.0, -2.0, 31)])
 
@@ -38,7 +39,7 @@ def cylinder(name: str, a: str, b: str, foot: str, head: str) -> list[mg.Pair]:
 
 def excavator() -> mg.Mechanism:
     links = [mg.Link("frame"), mg.Link("lever"), mg.Link("tie")]
-    links += [mg.Link(f"{name} cyl {part}") for name in WEIGHTS for part in ("barrel", "rod")]
+    links += [mg.Link(f"{name} {part}") for name in CYLINDERS for part in ("barrel", "rod")]
     links += [
         mg.Link(name, mass, (x, 0, z), points={"tip": at("tip")} if name == "bucket" else {})
         for name, (mass, (x, z)) in WEIGHTS.items()
@@ -50,19 +51,19 @@ def excavator() -> mg.Mechanism:
         mg.Pair("K", "R", "stick", "lever", point=at("K"), axis=Y),
         mg.Pair("L", "S", "lever", "tie", point=at("L")),
         mg.Pair("M", "C", "tie", "bucket", point=at("M"), axis=Y),
-        *cylinder("boom cyl", "frame", "boom", "boom foot", "boom head"),
-        *cylinder("stick cyl", "boom", "stick", "stick foot", "stick head"),
-        *cylinder("bucket cyl", "stick", "lever", "bucket foot", "L"),
+        *cylinder("lift", "frame", "boom", "boom foot", "boom head"),
+        *cylinder("crowd", "boom", "stick", "stick foot", "stick head"),
+        *cylinder("curl", "stick", "lever", "bucket foot", "L"),
     ]
     soil = mg.Wrench("bucket", force=(SOIL[0], 0, SOIL[1]), point="tip")
-    cylinders = ["boom cyl.Tz", "stick cyl.Tz", "bucket cyl.Tz"]
+    cylinders = [f"{name}.Tz" for name in CYLINDERS]
     units = {"length": "m", "mass": "kg", "time": "s"}
     return mg.Mechanism("excavator", links, pairs, cylinders, [mg.Gravity((0, 0, -G)), soil], units=units)
 
 
 def dig(m: mg.Mechanism) -> mg.Solution:
-    motion = {"bucket.tip.Tx": TIP[:, 0], "bucket.tip.Tz": TIP[:, 1], "bucket cyl.Tz": np.zeros(len(TIP))}
-    return mg.solve(m, motion, actuate=["boom cyl.Tz", "stick cyl.Tz", "bucket cyl.Tz"])
+    motion = {"bucket.tip.Tx": TIP[:, 0], "bucket.tip.Tz": TIP[:, 1], "curl.Tz": np.zeros(len(TIP))}
+    return mg.solve(m, motion, actuate=[f"{name}.Tz" for name in CYLINDERS])
 
 
 # By hand, in the plane (x, z); a moment is x F_z - z F_x
@@ -110,9 +111,9 @@ def by_hand(tip: Plane) -> dict[str, Plane | float]:
     stick_cylinder = pushed(moment(["stick", "bucket"], elbow), elbow, p["stick foot"], p["stick head"])
     boom_cylinder = pushed(moment(list(WEIGHTS), np.zeros(2)), np.zeros(2), drawn["boom foot"], p["boom head"])
     return {
-        "boom cyl": boom_cylinder,
-        "stick cyl": stick_cylinder,
-        "bucket cyl": bucket_cylinder,
+        "lift": boom_cylinder,
+        "crowd": stick_cylinder,
+        "curl": bucket_cylinder,
         "A": -soil - sum(weight.values()) - along(boom_cylinder, drawn["boom foot"], p["boom head"]),
         "B": -soil - weight["stick"] - weight["bucket"] - along(stick_cylinder, p["stick foot"], p["stick head"]),
         "C": -soil - weight["bucket"] - tie,
@@ -134,7 +135,7 @@ def main() -> None:
         size, (fx, _, fz) = np.linalg.norm(force[worst]), force[worst]
         print(f"{name:<4}{size / 1e3:11.1f}{fx / 1e3:9.1f}{fz / 1e3:9.1f}{TIP[worst, 0]:14.1f}")
         assert np.allclose(force[:, [0, 2]], [h[name] for h in hand], rtol=0, atol=1e-8 * size)
-    for name in ("boom cyl", "stick cyl", "bucket cyl"):
+    for name in CYLINDERS:
         push = s[name].effort[:, m.freedom(f"{name}.Tz")[1]]
         print(f"{name}: {push.min() / 1e3:.1f} to {push.max() / 1e3:.1f} kN")
         assert np.allclose(push, [h[name] for h in hand], rtol=1e-8, atol=0)

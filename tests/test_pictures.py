@@ -1,5 +1,8 @@
 """Pictures of results, graphs and studies: what they show against what they are made from; units on every axis, gaps, hatches."""
 
+import os
+import subprocess
+import sys
 from typing import Any
 
 import matplotlib
@@ -206,6 +209,18 @@ def test_the_frame_of_a_structure_is_hatched_and_parallel_pairs_bulge_apart() ->
     twin = mg.Mechanism("twin", pairs=[mg.Pair(n, "S", "frame", "body") for n in "AB"])
     lines = [line for line in show.draw_graph(twin).lines if str(line.get_gid()).startswith("pair ")]
     assert np.abs(np.array(lines[0].get_data()) - np.array(lines[1].get_data())).max() > 0.1
+
+
+def test_graphs_are_laid_out_the_same_each_time() -> None:
+    """Whatever order sets of texts have in a process."""
+    code = (
+        "import mechgraph as mg; from mechgraph.show import draw_graph, draw_structure; m = mg.load('andrews'); "
+        "print([[[round(float(v), 9) for v in line.get_xdata()] for line in draw(m).lines] for draw in (draw_graph, draw_structure)])"
+    )
+    runs = [subprocess.run([sys.executable, "-c", code], env=os.environ | {"PYTHONHASHSEED": str(seed)}, capture_output=True, text=True, check=True).stdout
+            for seed in (1, 2)]  # fmt: skip
+    assert runs[0] == runs[1]
+    assert len(runs[0]) > 1000
 
 
 @pytest.mark.parametrize("name", ["rcsr", "7r"])

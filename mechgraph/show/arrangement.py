@@ -27,6 +27,8 @@ FORBIDDEN = 1e4
 """Cost of covering another text, or of reaching beyond the axes, over that of covering one point of the drawing."""
 STEADY = 1.2
 """Cost of moving a text by its height from where it stood before, over that of covering one point of the drawing."""
+LOW, BROAD = 8, 0.25
+"""Lines up to which a legend may stand below, and its width over that of the axes from which it does."""
 LEADER = 2.4
 """Distance over the nearest from which on a fine line leads from the point to its text."""
 
@@ -93,12 +95,18 @@ class Arrangement(Artist):
         self._legend = [self._text(text, colour, fontsize=8.0) for text, colour in lines]
 
     def room(self, renderer: Any = None) -> Array:
-        """The box that the legend leaves, after placing its lines from the upper right corner down."""
+        """The box that the legend leaves: its lines go from the upper right corner down, a few broad ones along the lower edge."""
         unit, box = self._ax.figure.dpi / 72.0, self._inside().copy()
         if not self._legend:
             return box
         sizes = np.array([_size(text, renderer) for text in self._legend])
         height = float(sizes[:, 1].max()) + 2.0 * unit
+        width, n = float(sizes[:, 0].max()), len(sizes)
+        if n <= LOW and width > BROAD * (box[1, 0] - box[0, 0]):
+            for row, text in enumerate(reversed(self._legend)):
+                text.set_position((box[0, 0], box[0, 1] + row * height))
+            box[0, 1] += (n + 1) * height
+            return box
         rows = max(int((box[1, 1] - box[0, 1]) / height), 1)
         columns = [range(i, min(i + rows, len(sizes))) for i in range(0, len(sizes), rows)]
         for column in reversed(columns):

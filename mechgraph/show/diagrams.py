@@ -194,9 +194,10 @@ class _Canvas:
         painter.fit(free, arranged.room)
 
 
-def _places(graph: nx.Graph[str]) -> dict[str, Array]:
+def _places(named: nx.Graph[str]) -> dict[str, Array]:
     """Where nodes are drawn, neighbours at a distance of about one; the same each time."""
-    begin: dict[str, Any]
+    graph: nx.Graph[int] = nx.convert_node_labels_to_integers(named)  # sets of texts have another order each time
+    begin: dict[int, Any]
     if len(graph) < 3:
         begin = {name: (float(i), 0.0) for i, name in enumerate(graph)}
     elif max(degree for _, degree in graph.degree) == 2:
@@ -204,10 +205,11 @@ def _places(graph: nx.Graph[str]) -> dict[str, Array]:
         begin = {name: (np.cos(a), np.sin(a)) for name, a in zip(_cycle_order(graph), turn, strict=True)}
     else:
         begin = _clearest(graph)
-    return _scaled(graph, begin)
+    at = _scaled(graph, begin)
+    return {name: at[i] for i, name in enumerate(named)}
 
 
-def _clearest(graph: nx.Graph[str]) -> dict[str, Any]:
+def _clearest(graph: nx.Graph[int]) -> dict[int, Any]:
     """Of several layouts that give distances their due, the one in which the fewest lines cross each other or run over nodes."""
     if len(graph) > LARGE:
         return nx.spring_layout(graph, seed=0)
@@ -217,7 +219,7 @@ def _clearest(graph: nx.Graph[str]) -> dict[str, Any]:
     return min(found, key=lambda at: _clashes(graph, at))
 
 
-def _clashes(graph: nx.Graph[str], at: dict[str, Array]) -> int:
+def _clashes(graph: nx.Graph[int], at: dict[int, Array]) -> int:
     """Pairs of lines that cross, and lines that nearly run over a node that is not their end."""
     count = 0
     for (a, b), (c, d) in combinations(graph.edges, 2):
@@ -237,14 +239,14 @@ def _side(p: Array, q: Array, r: Array) -> bool:
     return bool((q[0] - p[0]) * (r[1] - p[1]) > (q[1] - p[1]) * (r[0] - p[0]))
 
 
-def _scaled(graph: nx.Graph[str], begin: dict[str, Any]) -> dict[str, Array]:
+def _scaled(graph: nx.Graph[int], begin: dict[int, Any]) -> dict[int, Array]:
     at = {name: np.asarray(begin[name], dtype=float) for name in graph}
     lengths = [float(np.linalg.norm(at[a] - at[b])) for a, b in graph.edges]
     unit = float(np.median(lengths)) if lengths else 1.0
     return {name: p / unit for name, p in at.items()}
 
 
-def _cycle_order(graph: nx.Graph[str]) -> list[str]:
+def _cycle_order(graph: nx.Graph[int]) -> list[int]:
     """Nodes of a cycle or path, one after the other."""
     ends = [name for name, degree in graph.degree if degree < 2]
     return list(nx.dfs_preorder_nodes(graph, source=(ends or list(graph))[0]))

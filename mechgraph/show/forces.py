@@ -121,6 +121,8 @@ def polar_force(s: Solution, pair: str, *, on: Literal["a", "b"] = "a", ax: Any 
             f"polar force of {m.name!r}",
             [f"the force in {pair!r} across its axis is not unique; mg.check(m).unique says why"],
         )
+    from matplotlib.ticker import MaxNLocator
+
     inside = np.einsum("tij,ti->tj", frame, force)
     ax = new_axes((5.6, 5.6), projection="polar") if ax is None else ax
     full = np.full((np.asarray(s.status).size, 2), np.nan)
@@ -137,4 +139,5 @@ def polar_force(s: Solution, pair: str, *, on: Literal["a", "b"] = "a", ax: Any 
     ax.set_title(f"{what}\nas seen on {link}, {greatest}", color=INK, fontsize=10)
     ax.tick_params(colors=MUTED)
     ax.set_rlabel_position(100)
+    ax.yaxis.set_major_locator(MaxNLocator(4))
     return ax
