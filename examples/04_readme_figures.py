@@ -105,7 +105,7 @@ def main(folder: Path) -> None:
         with rc_context({"font.size": 9.0}):
             figure = Figure(layout="constrained")
             draw(figure, m, s)
-            show.save_picture(figure.axes[0], folder / name, dpi=95.0)
+            show.save_picture(figure.axes[0], folder / name, dpi=86.0)
         print(f"{name}: {(folder / name).stat().st_size / 1000:.0f} kB")
     notes = {name: fingerprint(name) for name in PICTURES}
     (folder / NOTES).write_text(json.dumps(notes, indent=2) + "\n", encoding="utf-8")

@@ -1,11 +1,13 @@
 """Films and pictures as files: what they hold, whole or not at all, and the command that makes them."""
 
 import importlib.util
+import json
 import shutil
 import sys
 import xml.etree.ElementTree
 from pathlib import Path
 
+import jsonschema
 import matplotlib
 import matplotlib.pyplot as plt
 import numpy as np
@@ -17,6 +19,7 @@ from typer.testing import CliRunner
 import mechgraph as mg
 from mechgraph import show
 from mechgraph.cli import app
+from mechgraph.cli.records import output_schema
 
 THETA = np.linspace(0, 2 * np.pi, 9)
 FAST = {"frames": 3, "dpi": 40.0}
@@ -121,8 +124,13 @@ def test_the_plot_command_draws_every_kind(tmp_path: Path) -> None:
         result = CliRunner().invoke(app, ["plot", "four-bar", kind, "--out", str(out), *of.get(kind, [])])
         assert result.exit_code == 0, result.output
         assert xml.etree.ElementTree.parse(out).getroot().tag.endswith("svg")
-    result = CliRunner().invoke(app, ["plot", "four-bar", "--out", str(tmp_path / "film.gif"), "--frames", "2"])
+    result = CliRunner().invoke(
+        app, ["plot", "four-bar", "--out", str(tmp_path / "film.gif"), "--frames", "2", "--json"]
+    )
     assert result.exit_code == 0
+    data = json.loads(result.stdout)
+    jsonschema.Draft202012Validator(output_schema()).validate(data)
+    assert (data["mechanism"], data["picture"], data["file"]) == ("four-bar", "skeleton", str(tmp_path / "film.gif"))
     with Image.open(tmp_path / "film.gif") as film:
         assert film.n_frames == 2
     assert not plt.get_fignums()
@@ -131,6 +139,7 @@ def test_the_plot_command_draws_every_kind(tmp_path: Path) -> None:
 def test_the_plot_command_refuses(tmp_path: Path) -> None:
     for arguments, words in (
         (["four-bar", "reaction"], "--of A"),
+        (["four-bar", "shadows"], "expected one of skeleton"),
         (["four-bar", "--out", str(tmp_path / "x.jpg")], ".svg"),
         (["four-bar", "efforts", "--out", str(tmp_path / "x.gif")], ".svg"),
     ):

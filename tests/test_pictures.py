@@ -217,8 +217,13 @@ def test_graphs_are_laid_out_the_same_each_time() -> None:
         "import mechgraph as mg; from mechgraph.show import draw_graph, draw_structure; m = mg.load('andrews'); "
         "print([[[round(float(v), 9) for v in line.get_xdata()] for line in draw(m).lines] for draw in (draw_graph, draw_structure)])"
     )
-    runs = [subprocess.run([sys.executable, "-c", code], env=os.environ | {"PYTHONHASHSEED": str(seed)}, capture_output=True, text=True, check=True).stdout
-            for seed in (1, 2)]  # fmt: skip
+    runs = []
+    for seed in ("1", "2"):
+        surroundings = os.environ | {"PYTHONHASHSEED": seed}
+        done = subprocess.run(
+            [sys.executable, "-c", code], env=surroundings, capture_output=True, text=True, check=True
+        )
+        runs.append(done.stdout)
     assert runs[0] == runs[1]
     assert len(runs[0]) > 1000
 

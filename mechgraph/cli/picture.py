@@ -6,34 +6,21 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 
 import mechgraph as mg
 from mechgraph import show
-from mechgraph.cli.options import Actuate, Drives, Named, OnReach, Tolerance
+from mechgraph.cli.options import Actuate, AsJson, Drives, Named, OnReach, Tolerance
 from mechgraph.cli.output import progress, working, write
 from mechgraph.cli.reading import loaded, refuse_own_file
+from mechgraph.cli.records import PlotData, write_json
 from mechgraph.show.animation import FORMATS as FILMS
 from mechgraph.show.animation import PICTURES
 from mechgraph.typed import drives_of, refuse
 from mechgraph.writing import format_of, formats_text
-
-What = Literal[
-    "skeleton",
-    "graph",
-    "structure",
-    "equations",
-    "efforts",
-    "reaction",
-    "ranges",
-    "polar",
-    "path",
-    "hodograph",
-    "margin",
-]
 
 
 @dataclass(frozen=True)
@@ -79,9 +66,15 @@ KINDS: dict[str, _Picture] = {
 }
 
 
+def _kinds(incomplete: str) -> list[str]:
+    return [kind for kind in KINDS if kind.startswith(incomplete)]
+
+
 def plot(
     mechanism: Named,
-    what: Annotated[What, typer.Argument(help="What is drawn.")] = "skeleton",
+    what: Annotated[
+        str, typer.Argument(metavar="WHAT", autocompletion=_kinds, help=f"What is drawn: {', '.join(KINDS)}.")
+    ] = "skeleton",
     out: Annotated[
         Path | None,
         typer.Option(
@@ -117,12 +110,17 @@ def plot(
     actuate: Actuate = None,
     on_reach: OnReach = "raise",
     tol: Tolerance = None,
+    json: AsJson = False,
 ) -> None:
-    """Draw a picture, or a film of the skeleton: mechgraph plot four-bar reaction --of B --out B.svg
+    """Draw a picture, or a film of the skeleton.
+
+    Example: mechgraph plot four-bar reaction --of B --out B.svg
 
     Exit status: 0 done; 1 the mechanism has no answer (the message says why); 2 wrong usage or bad input. A file is written whole or not
     at all.
     """
+    if what not in KINDS:
+        refuse(f"WHAT {what!r}", f"expected one of {', '.join(KINDS)}")
     kind, m = KINDS[what], loaded(mechanism)
     target = Path(f"{Path(mechanism).stem}.png") if out is None else out
     film = what == "skeleton" and (
@@ -151,4 +149,7 @@ def plot(
         with progress(f"drawing {m.name}", count) as reached:
             each = None if reached is None else lambda done, of_all: reached(done)
             show.animate(drawn, target, frames=frames, forces=forces, progress=each)
-    write(f"Wrote {target}.\n")
+    if json:
+        write_json("plot", PlotData(m.name, what, str(target)))
+    else:
+        write(f"Wrote {target}.\n")

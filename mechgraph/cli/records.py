@@ -167,6 +167,15 @@ class FileData:
     file: str
 
 
+@dataclass(frozen=True)
+class PlotData:
+    """A picture that was drawn."""
+
+    mechanism: str
+    picture: str
+    file: str
+
+
 def check_data(m: mg.Mechanism, report: mg.DeterminacyReport) -> Json:
     """The facts of a report, each advice with the change to the declaration that it advises."""
     facts, declared = report.to_dict(), to_data(m)
@@ -251,6 +260,7 @@ COMMANDS: dict[str, Callable[[Json], Json]] = {
     "save": _record(FileData),
     "report": _record(FileData),
     "loads": _record(LoadsData),
+    "plot": _record(PlotData),
 }
 """The schema of what every command prints."""
 

@@ -194,7 +194,7 @@ class _Canvas:
         painter.fit(free, arranged.room)
 
 
-def _places(named: nx.Graph[str]) -> dict[str, Array]:
+def _places(named: nx.Graph[Any]) -> dict[str, Array]:
     """Where nodes are drawn, neighbours at a distance of about one; the same each time."""
     graph: nx.Graph[int] = nx.convert_node_labels_to_integers(named)  # sets of texts have another order each time
     begin: dict[int, Any]
