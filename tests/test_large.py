@@ -218,7 +218,7 @@ def test_a_bordered_system_proves_the_rank(name: str) -> None:
     assert loops.rank == np.linalg.matrix_rank(J, 1e-9)
     assert loops.redundant == J.shape[0] - loops.rank
     assert loops.held == J.shape[1] - loops.rank
-    stress = loops.random_stress(loops.first, here.S[:, :, 0], here.middles[:, :, 0], np.random.default_rng(1), 3)
+    stress = loops.random_stress(loops.first, loops.rows, np.random.default_rng(1), 3)
     assert np.abs(J.T @ stress).max(initial=0.0) < 1e-11 * np.abs(stress).max(initial=1.0)
 
 
@@ -248,7 +248,7 @@ def test_factors_of_one_pattern_are_renewed() -> None:
     system, x = assembled(ladder(40))
     here = Configuration(system, x[:, None])
     loops = LoopSystem.at(here, np.array([0]))
-    again = loops.factor(here.S[:, :, 0], here.middles[:, :, 0])
+    again = loops.factor(loops.rows)
     b = np.random.default_rng(2).normal(size=(6 * system.graph.n_loops, 2))
     assert_allclose(loops.solve(again, b), loops.solve(loops.first, b), atol=1e-11)
     tau = np.random.default_rng(3).normal(size=(system.n_freedoms, 2))
