@@ -29,7 +29,7 @@ from mechgraph.closure.following import follow
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.passive_rest import Idle, unspun
 from mechgraph.closure.rates import Rates, Velocities, at_dead_points, disagreement, distance_to_dead_point, rates
-from mechgraph.closure.solver import ClosureSolver, FactoredClosure, closure_solver, engine_for
+from mechgraph.closure.solver import ClosureSolver, FactoredClosure, closure_solver, engine_for, solver_at_start
 from mechgraph.errors import DeclarationError, IndeterminateError
 from mechgraph.force.block import BlockForces, ForceTask, forces_of_block
 from mechgraph.model.load_base import Load
@@ -109,12 +109,12 @@ class Pipeline:
         self.unit = np.where(self.system.is_length[self.columns], self.system.par.L, 1.0)
         self._refuse_far()
         self.engine = engine_for(self.system.n_rows, int(np.prod(drive.batch)), options.engine)
-        self.solver = closure_solver(self.engine, self.columns)
+        self.solver, proved = solver_at_start(self.engine, self.columns, self.start)
         self.lead = np.arange(len(self.columns))
         self.passive: tuple[PassiveMotion, ...] = ()
         self.bodies: tuple[Idle, ...] = ()
         self.hold: Index | None = None
-        if not self.solver.leaves_nothing_free(self.start):
+        if not proved:
             self.lead = self.freedoms.leading(self.columns)
             self._check_determinate()
             self.passive, self.bodies, self.hold = self.freedoms.passive, self.freedoms.bodies, self.freedoms.hold

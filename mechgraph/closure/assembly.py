@@ -59,8 +59,10 @@ def scaled_start(m: Mechanism) -> Configuration:
     kept, key = m.once(_kept_starts), q.tobytes()
     if key not in kept:
         here = scaled(Configuration(raw, raw.state_of(q[:, None])))
-        for part, name in ((here.system, "numbers"), (here.system, "effort_numbers"), (here, "middles")):
-            getattr(part, name)
+        for name in ("numbers", "effort_numbers"):
+            getattr(here.system, name)
+        for name in ("middles", "S", "closure", "solvers"):
+            getattr(here, name)
         kept.clear()
         kept[key] = here.system.known(), here.evaluated()
     known, evaluated = kept[key]

@@ -47,6 +47,11 @@ class Configuration:
         self.x = x
         self.T = x.shape[1]
 
+    @kept
+    def solvers(self) -> dict[Any, Any]:
+        """What ``closure.solver`` keeps with a start."""
+        return {}
+
     def part(self, at: Index) -> Configuration:
         """Some of the positions, evaluated separately."""
         par = self.system.par

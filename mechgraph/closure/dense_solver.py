@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -59,22 +60,25 @@ class DenseFactored:
 
     complete = True
 
-    def __init__(self, forms: list[Form], fixed: Index, here: Configuration, which: Index) -> None:
-        self.here, self.which = here, which
+    def __init__(self, forms: list[Form], fixed: Index, J: Array, which: Index) -> None:
+        self.J, self.which = J, which
+        self.rows, self.freedoms, self.T = J.shape
         self._forms, self._fixed = forms, fixed
+        self._sensitivity: Array | None = None
         self._parts = []
         for i in dict.fromkeys(which.tolist()):
             at = np.flatnonzero(which == i)
-            J = here.J if len(at) == here.T else here.J[:, :, at]
-            form = forms[i]
-            self._parts.append((form, at, ChosenSystem(form.rows(J), [form.choice], np.zeros(len(at), dtype=np.intp))))
+            form, mine = forms[i], _at(J, at)
+            self._parts.append(
+                (form, at, ChosenSystem(form.rows(mine), [form.choice], np.zeros(len(at), dtype=np.intp)))
+            )
 
     def _joined(self, values: list[Array], shape: tuple[int, ...]) -> Array:
         """Values of the forms at all positions."""
         if len(values) == 1:
             return values[0]
         width = max((value.shape[1] for value in values if value.ndim == 3), default=0)
-        out = np.zeros((shape[0], width, self.here.T) if len(shape) > 1 else (self.here.T,))
+        out = np.zeros((shape[0], width, self.T) if len(shape) > 1 else (self.T,))
         for (_, at, _), value in zip(self._parts, values, strict=True):
             out[(..., at) if value.ndim < 3 else (slice(None), slice(0, value.shape[1]), at)] = value
         return out
@@ -82,40 +86,42 @@ class DenseFactored:
     @property
     def condition(self) -> Array:
         """See the protocol in ``closure.solver``."""
-        return self._joined([system.condition for _, _, system in self._parts], (self.here.T,))
+        return self._joined([system.condition for _, _, system in self._parts], (self.T,))
 
     def solve(self, b: Array) -> Array:
         """See the protocol in ``closure.solver``."""
         found = [system.solve(form.rows(_at(b, at))) for form, at, system in self._parts]
-        return self._joined(found, (self.here.system.n_freedoms, b.shape[1]))
+        return self._joined(found, (self.freedoms, b.shape[1]))
 
     def solve_transposed(self, b: Array) -> Array:
         """See the protocol in ``closure.solver``."""
         found = [form.back(system.solve_transposed(_at(b, at))) for form, at, system in self._parts]
-        return self._joined(found, (self.here.system.n_rows, b.shape[1]))
+        return self._joined(found, (self.rows, b.shape[1]))
 
     def sensitivity(self) -> Array:
         """See the protocol in ``closure.solver``."""
-        fixed = self._fixed
-        Z = self.solve(-self.here.J[:, fixed])
-        Z[fixed, np.arange(len(fixed))] = 1.0
-        return Z
+        if self._sensitivity is None:
+            fixed = self._fixed
+            Z = self.solve(-self.J[:, fixed])
+            Z[fixed, np.arange(len(fixed))] = 1.0
+            self._sensitivity = Z
+        return self._sensitivity
 
     def motions(self) -> Array:
         """See the protocol in ``closure.solver``."""
         found = [system.null_of_columns() for _, _, system in self._parts]
-        return self._joined(found, (self.here.system.n_freedoms, 0))
+        return self._joined(found, (self.freedoms, 0))
 
     def self_stresses(self) -> Array:
         """See the protocol in ``closure.solver``."""
         found = [form.back(system.null_of_transpose()) for form, _, system in self._parts]
-        return self._joined(found, (self.here.system.n_rows, 0))
+        return self._joined(found, (self.rows, 0))
 
     def regular_between(self, a: Configuration, b: Configuration) -> NDArray[np.bool_]:
         """See the protocol in ``closure.solver``."""
-        out = np.ones(self.here.T, dtype=bool)
+        out = np.ones(self.T, dtype=bool)
         for form, at, system in self._parts:
-            matrices = [form.rows(_at(other.J, at)) for other in (self.here, a, b)]
+            matrices = [form.rows(_at(J, at)) for J in (self.J, a.J, b.J)]
             if form.turn is not None:
                 # turned rows may be singular where the loop is not: the rows independent at these very positions are asked
                 matrices = _independent_rows(matrices, form.choice)
@@ -135,13 +141,13 @@ class DenseFactored:
 
     def part(self, at: Index, here: Configuration) -> DenseFactored:
         """See the protocol in ``closure.solver``."""
-        return DenseFactored(self._forms, self._fixed, here, self.which[at])
+        return DenseFactored(self._forms, self._fixed, self.J[:, :, at], self.which[at])
 
     def least(self, R: Sequence[scipy.sparse.csr_array], r0: Array) -> Array:
         """See the protocol in ``closure.solver``."""
         null = self.self_stresses()
-        out = np.zeros((null.shape[0], self.here.T))
-        for t in range(self.here.T):
+        out = np.zeros((null.shape[0], self.T))
+        for t in range(self.T):
             mixed = R[t] @ null[:, :, t]
             out[:, t] = null[:, :, t] @ np.linalg.lstsq(mixed, -r0[:, t], rcond=None)[0]
         return out
@@ -183,7 +189,7 @@ class DenseSolver:
     def __init__(self, fixed: Index, keep: Index | None = None) -> None:
         self.fixed, self.keep = fixed, keep
         self.forms: list[Form] = []
-        self._last: DenseFactored | None = None
+        self._last: tuple[weakref.ref[Configuration], DenseFactored] | None = None
 
     def leaves_nothing_free(self, here: Configuration) -> bool:
         """See the protocol in ``closure.solver``."""
@@ -191,6 +197,13 @@ class DenseSolver:
         f = self.factored(here, which)
         free = self.forms[int(which[0])].choice.held.size
         return not free and bool((f.condition < PATH.doubtful).all()) and independent(here, f.sensitivity())
+
+    def begun(self, here: Configuration) -> DenseSolver:
+        """See the protocol in ``closure.solver``."""
+        out = DenseSolver(self.fixed, self.keep)
+        out.forms = list(self.forms)
+        out._last = self._last and (weakref.ref(here), self._last[1])
+        return out
 
     def corrigible(self, dq: Array, which: Index) -> Array:
         """See the protocol in ``closure.solver``."""
@@ -204,14 +217,21 @@ class DenseSolver:
 
     def factored(self, here: Configuration, which: Index) -> DenseFactored:
         """See the protocol in ``closure.solver``; those of the last positions are kept for who asks next."""
-        if self._last is None or self._last.here is not here or not np.array_equal(self._last.which, which):
-            self._last = DenseFactored(self.forms, self.fixed, here, which.copy())
-        return self._last
+        known = self._of(here)
+        if known is None or not np.array_equal(known.which, which):
+            known = DenseFactored(self.forms, self.fixed, here.J, which.copy())
+            self._last = weakref.ref(here), known
+        return known
+
+    def _of(self, here: Configuration) -> DenseFactored | None:
+        """The factors of the last positions, where these are they."""
+        return self._last[1] if self._last is not None and self._last[0]() is here else None
 
     def chosen(self, here: Configuration, which: Index) -> Index:
         """See ``ClosureSolver``; a new form is taken where it is much better than the old one and of the same rank."""
-        if self._last is not None and self._last.here is here and (which < 0).all():
-            return self._last.which.copy()
+        known = self._of(here)
+        if known is not None and (which < 0).all():
+            return known.which.copy()
         which = which.copy()
         for t in np.flatnonzero(which < 0):
             which[t] = self._fitting(here.J[:, :, t])

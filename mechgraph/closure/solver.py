@@ -86,6 +86,9 @@ class ClosureSolver(Protocol):
     def leaves_nothing_free(self, here: Configuration) -> bool:
         """Whether the factors at a position prove that the fixed columns determine all others; False proves nothing."""
 
+    def begun(self, here: Configuration) -> ClosureSolver:
+        """A solver that goes on from here with the forms of this one, which was last asked at the same state."""
+
     def corrigible(self, dq: Array, which: Index) -> Array:
         """Increments ``(F, T)`` without the motions that are held: no correction can remove what a prediction adds to them."""
 
@@ -96,6 +99,23 @@ def engine_for(rows: int, positions: int, engine: str) -> Literal["dense", "spar
         return "dense" if engine == "dense" else "sparse"
     limit = next(limit for most, limit in SPARSE_ROWS.items() if positions <= most)
     return "sparse" if rows >= limit else "dense"
+
+
+def solver_at_start(
+    engine: Literal["dense", "sparse"], fixed: Index, start: Configuration
+) -> tuple[ClosureSolver, bool]:
+    """The solver with the columns ``fixed``, and whether it proves at a start that they leave nothing free.
+
+    What was chosen and factored there is kept with the start, for the next call with the same columns.
+    """
+    key = engine, fixed.tobytes()
+    if key not in start.solvers:
+        solver = closure_solver(engine, fixed)
+        proved = solver.leaves_nothing_free(start)
+        start.solvers.clear()
+        start.solvers[key] = solver.begun(start), proved
+    solver, proved = start.solvers[key]
+    return solver.begun(start), proved
 
 
 def closure_solver(engine: Literal["dense", "sparse"], fixed: Index, keep: Index | None = None) -> ClosureSolver:

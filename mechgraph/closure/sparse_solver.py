@@ -179,6 +179,13 @@ class SparseSolver:
         form = self.forms[int(which[0])]
         return form.regular and not form.held and independent(here, self.factored(here, which).sensitivity())
 
+    def begun(self, here: Configuration) -> SparseSolver:
+        """See ``ClosureSolver``."""
+        out = SparseSolver(self.fixed, self.keep)
+        out.forms = list(self.forms)
+        out._last = self._last and (weakref.ref(here), dict(self._last[1]))
+        return out
+
     def corrigible(self, dq: Array, which: Index) -> Array:
         """See ``ClosureSolver``."""
         for i in np.unique(which):
