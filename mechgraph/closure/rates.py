@@ -41,8 +41,7 @@ class Rates(Velocities):
     """
 
     def __init__(self, velocities: Velocities, ddq: Array, contradiction: Array) -> None:
-        super().__init__(velocities.here, velocities.dq)
-        self.V, self.bias = velocities.V, velocities.bias
+        vars(self).update(vars(velocities))  # with what is known of V and bias
         self.ddq, self.contradiction = ddq, contradiction
 
     @cached_property

@@ -56,12 +56,14 @@ class Reactions:
     """Greatest ``force`` and ``moment`` of the reaction of every pair, and where they are ``loose``, not unique.
 
     There they are those of the components alone that are ``kept`` as unique ``(2, 6, P)``, unless values of least norm stand for all.
+    ``touched (6, P)`` are the components, in the order of the pair table, that are not unique somewhere.
     """
 
     force: Greatest
     moment: Greatest
     loose: Mask
     kept: Mask
+    touched: Mask
 
 
 def efforts(values: Values) -> tuple[Range, Range]:
@@ -83,27 +85,41 @@ def reactions(values: Values) -> Reactions:
         moment.look(np.linalg.norm(wrenches[:3], axis=0), places)
         force.look(np.linalg.norm(wrenches[3:], axis=0), places)
         loose |= np.stack([open_[3:].any(axis=(0, 2)), open_[:3].any(axis=(0, 2))])
-    if values.least_norm or not loose.any():
-        return Reactions(force, moment, loose, np.zeros((2, 6, P), dtype=bool))
-    return _of_what_is_unique(values, force, moment, loose)
+    kept, touched = np.zeros((2, 6, P), dtype=bool), np.zeros((6, P), dtype=bool)
+    if loose.any():
+        found, touched = _of_what_is_unique(values)
+        if not values.least_norm:
+            kept = _kept(values.whole, touched)
+            for one, whole, open_ in zip(found, (force, moment), loose, strict=True):
+                whole.best, whole.at = np.where(open_, one.best, whole.best), np.where(open_, one.at, whole.at)
+    return Reactions(force, moment, loose, kept, touched)
 
 
-def _of_what_is_unique(values: Values, force: Greatest, moment: Greatest, loose: Mask) -> Reactions:
-    """The same where components are not unique somewhere: the greatest values without these."""
-    P = loose.shape[1]
+def _of_what_is_unique(values: Values) -> tuple[tuple[Greatest, Greatest], Mask]:
+    """The greatest forces and moments of the components that are unique everywhere, and which are not.
+
+    Where a block shows another one that is not, all is begun again without it; nearly always the first one shows them all.
+    """
+    P = len(values.whole.pairs)
     touched = np.zeros((6, P), dtype=bool)
-    for places in values.blocks():
-        touched |= values.components_at(places)[1].any(axis=2)
-    kinds = _kinds(values.whole)
-    kept = np.stack([(kinds == kind) & ~touched for kind in (0, 1)])
-    found = Greatest(P), Greatest(P)
-    for places in values.blocks():
-        components = values.components_at(places)[0]
-        for one, mine in zip(found, kept, strict=True):
-            one.look(np.sqrt((np.where(mine[:, :, None], components, 0.0) ** 2).sum(axis=0)), places)
-    for one, whole, open_ in zip(found, (force, moment), loose, strict=True):
-        whole.best, whole.at = np.where(open_, one.best, whole.best), np.where(open_, one.at, whole.at)
-    return Reactions(force, moment, loose, kept)
+    while True:
+        found, kept = (Greatest(P), Greatest(P)), _kept(values.whole, touched)
+        for places in values.blocks():
+            components, loose = values.components_at(places)
+            here = loose.any(axis=2)
+            if (here & ~touched).any():
+                touched |= here
+                break
+            for one, mine in zip(found, kept, strict=True):
+                one.look(np.sqrt((np.where(mine[:, :, None], components, 0.0) ** 2).sum(axis=0)), places)
+        else:
+            return found, touched
+
+
+def _kept(m: Mechanism, touched: Mask) -> Mask:
+    """Which components are forces and which are moments, those that are ``touched`` left out."""
+    kinds = _kinds(m)
+    return np.stack([(kinds == kind) & ~touched for kind in (0, 1)])
 
 
 def _kinds(m: Mechanism) -> Array:

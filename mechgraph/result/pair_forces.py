@@ -14,6 +14,7 @@ from mechgraph.closure.driver_path import in_blocks
 from mechgraph.closure.indexing import Index
 from mechgraph.errors import DeclarationError
 from mechgraph.model.pair_type import PairType
+from mechgraph.numerics.linear import EVERY, Place
 from mechgraph.result.kept import BlockMotion, Kept
 from mechgraph.result.states import user_wrench
 from mechgraph.result.values import Mask
@@ -130,9 +131,9 @@ class PairForces(Kept):
         own, given = self._efforts(columns)
         return self._out(self._masked(own, self._stress_of_drives(columns))), self._out(given)
 
-    def _efforts(self, columns: slice) -> tuple[Array, Array]:
-        """What drives supply in freedoms and what loads do there, ``(f, T)`` each, in the user's units."""
-        total, given, coupled = (self._force(name)[columns] for name in ("efforts", "given", "coupled"))
+    def _efforts(self, columns: slice, places: Place = EVERY) -> tuple[Array, Array]:
+        """What drives supply in freedoms and what loads do there, ``(f, n)`` each, in the user's units."""
+        total, given, coupled = (self._force(name)[columns, places] for name in ("efforts", "given", "coupled"))
         own = np.where(self._driven(columns), total - given - coupled, np.where(np.isnan(given), np.nan, 0.0))
         unit = np.where(self._system.is_length[columns], self._L, self._L**2)[:, None]
         return unit * own, unit * given
@@ -140,9 +141,9 @@ class PairForces(Kept):
     def _driven(self, columns: slice) -> Mask:
         return np.isin(np.arange(self._system.n_freedoms)[columns], self.driven)[:, None]
 
-    def _stress_of_drives(self, columns: slice) -> Array:
-        """What self-stresses have in the efforts of drives, ``(f, s, T)``."""
-        stress = self._of("stress_efforts")[columns] - self._of("coupled_stress")[columns]
+    def _stress_of_drives(self, columns: slice, places: Place = EVERY) -> Array:
+        """What self-stresses have in the efforts of drives, ``(f, s, n)``."""
+        stress = self._of("stress_efforts")[columns][..., places] - self._of("coupled_stress")[columns][..., places]
         return np.where(self._driven(columns)[:, None], stress, 0.0)
 
     # --- all pairs at once -----------------------------------------------------------------------------------------------
@@ -162,7 +163,8 @@ class PairForces(Kept):
 
     def components_at(self, places: Index) -> tuple[Array, Mask]:
         """Components of all pairs ``(6, P, n)`` by the pair table, 0 beyond those of a pair, and which are not unique."""
-        states = np.concatenate([self._force("reactions")[:, :, None], self._of("stress")], axis=2)[..., places]
+        reactions, stress = self._force("reactions")[:, :, None, places], self._of("stress")[..., places]
+        states = np.concatenate([reactions, stress], axis=2)
         s, found = self._system, np.zeros((6, *states.shape[1:]))
         here = Configuration(self._system_at(places), self._of("x")[:, places])
         for group, part in zip(s.groups, PairFrames(here).components(states), strict=True):
@@ -175,8 +177,8 @@ class PairForces(Kept):
     def efforts_at(self, places: Index) -> tuple[Array, Array, Mask]:
         """Own and applied efforts in all freedoms ``(F, n)``, and which of the former are not unique."""
         every = slice(None)
-        own, given = (values[:, places] for values in self._efforts(every))
-        return own, given, _touched(self._stress_of_drives(every)[..., places])
+        own, given = self._efforts(every, places)
+        return own, given, _touched(self._stress_of_drives(every, places))
 
     def multiplier(self, coupling: int) -> Array:
         """The multiplier of a coupling in the user's units: the effort ``c_i m`` in freedom i."""

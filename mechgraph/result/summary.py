@@ -13,7 +13,8 @@ from mechgraph.errors import counted
 from mechgraph.result.extremes import Greatest, Range, Reactions, efforts, reactions
 from mechgraph.result.numbers import NOISE, bracket, number, with_unit
 from mechgraph.result.places import OK, Places
-from mechgraph.result.values import Values
+from mechgraph.result.values import Mask, Values
+from mechgraph.structure.components import labels_of
 from mechgraph.units import force_hint, unit_of
 
 LISTED = 20
@@ -222,10 +223,10 @@ class _View(Places):
         """Which reaction components and efforts are not unique."""
         loose = np.flatnonzero(self.reactions.loose[:, : len(self.m.pairs)].any(axis=0))
         columns = [self.values.whole.freedom(name)[0] for name in self.values.actuated]
-        loose = np.union1d(loose, [k for k in columns if k < len(self.m.pairs) and self._loose_drive(k)]).astype(int)
+        loose = np.union1d(loose, [k for k in columns if k < len(self.m.pairs) and self._loose_efforts(k).any()]).astype(int)
         items = []
         for k in loose[:LISTED].tolist():
-            parts = [n for n, ok in self.values.unique(k).items() if not np.asarray(ok).reshape(-1)[self.solved].all()]
+            parts = self._not_unique(k)
             if parts:
                 items.append(f"{self.m.pairs[k].name}: {', '.join(parts)}")
         if items:
@@ -233,9 +234,17 @@ class _View(Places):
             yield Paragraph(LEAST_NORM if self.values.least_norm else NO_VALUE)
             yield Bullets(_shortened(items, len(loose)))
 
-    def _loose_drive(self, pair: int) -> bool:
-        first = sum(p.type.f for p in self.values.whole.pairs[:pair])
-        return bool(self.ranges[0].loose[first : first + self.values.whole.pairs[pair].type.f].any())
+    def _not_unique(self, k: int) -> list[str]:
+        """Names of the components and efforts of a pair that are not unique somewhere."""
+        pair = self.values.whole.pairs[k]
+        driven = np.flatnonzero([name in self.values.actuated for name in pair.freedom_names])
+        loose = [*self.reactions.touched[: 6 - pair.type.f, k], *self._loose_efforts(k)[driven]]
+        return [name for (_, name), open_ in zip(labels_of(pair, driven), loose, strict=True) if open_]
+
+    def _loose_efforts(self, k: int) -> Mask:
+        """Which efforts of drives in the freedoms of a pair are not unique somewhere."""
+        first = sum(p.type.f for p in self.values.whole.pairs[:k])
+        return self.ranges[0].loose[first : first + self.values.whole.pairs[k].type.f]
 
     def passive(self) -> Iterator[Block]:
         """The passive freedoms: idle ones, and those that only an effort that no part supplies holds against the loads."""
