@@ -75,7 +75,7 @@ def test_rates_bias_and_efforts_belong_to_the_same_rows(ring):
     x, rng = state(system, 3), np.random.default_rng(5)
     here, dq = Configuration(system, x), rng.normal(size=(4, 3))
     assert_allclose(here.closure_rates(dq), np.einsum("rft,ft->rt", here.J, dq), atol=1e-13)
-    bias = here.closure_bias(dq, here.link_twists(dq))
+    bias = here.closure_bias(here.bias(dq, here.link_twists(dq)))
     assert bias.shape == (8, 3)
     assert not bias[6:].any()
     assert_allclose(bias[:6], here.loop_sums(here.bias(dq, here.link_twists(dq))), atol=0)

@@ -310,9 +310,9 @@ class Configuration:
         """``J q' (n_rows, T)`` for rates ``dq (F, T)``, without forming ``J``."""
         return _stacked([part.rates(self, dq) for part in self.system.rows])
 
-    def closure_bias(self, dq: Array, V: Array) -> Array:
-        """Velocity part ``(n_rows, T)`` of the closure accelerations ``J q'' + bias``; zero for couplings."""
-        return _stacked([part.bias(self, dq, V) for part in self.system.rows])
+    def closure_bias(self, pairs: Array) -> Array:
+        """Velocity part ``(n_rows, T)`` of the closure accelerations ``J q'' + bias`` from that of the pairs (``bias``, ``(6, P, T)``)."""
+        return _stacked([part.bias(self, pairs) for part in self.system.rows])
 
     def row_efforts(self, x: Array) -> Array:
         """Efforts ``(F, k, T)`` that multipliers ``x (n_rows, k, T)`` of rows other than loops exert in the freedoms."""

@@ -79,7 +79,7 @@ def rates(
         spin = idle.resting_part(G, idle.body_twists(bodies, points, moving.V))
         moving = Velocities(here, dq + np.einsum("fpt,pt->ft", Z, spin))
     turning = (moving.dq * moving.dq).max(axis=0, initial=0.0)
-    ddq, gap_a = _completed(here, solver, columns, acceleration, here.closure_bias(moving.dq, moving.V), turning)
+    ddq, gap_a = _completed(here, solver, columns, acceleration, here.closure_bias(moving.bias), turning)
     moved = Rates(moving, ddq, np.maximum(gap_v, gap_a))
     if bodies:
         now = idle.body_accelerations(bodies, points, moved.V, moved.A)

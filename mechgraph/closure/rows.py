@@ -45,10 +45,6 @@ class Evaluated(Protocol):
     def loop_sums(self, per_pair: Array) -> Array:
         """``(6, P, T)`` -> ``(6 loops, T)``."""
 
-    def bias(self, dq: Array, V: Array) -> Array:
-        """Velocity part of the relative accelerations ``(6, P, T)``."""
-
-
 class Rows(Protocol):
     """``n`` closure rows ``phi(q) = 0`` of one contributor, evaluated at a configuration of ``T`` positions."""
 
@@ -71,8 +67,8 @@ class Rows(Protocol):
     def rates(self, here: Evaluated, dq: Array) -> Array:
         """``J q' (n, T)`` for rates ``dq (F, T)``."""
 
-    def bias(self, here: Evaluated, dq: Array, V: Array) -> Array:
-        """Velocity part ``(n, T)`` of ``d^2 phi/dt^2 = J q'' + bias`` for rates ``dq`` and link twists ``V (6, N, T)``."""
+    def bias(self, here: Evaluated, pairs: Array) -> Array:
+        """Velocity part ``(n, T)`` of ``d^2 phi/dt^2 = J q'' + bias``, from that of the relative accelerations of ``pairs (6, P, T)``."""
 
     def efforts(self, here: Evaluated, x: Array) -> Array | None:
         """``J^T x (F, k, T)`` for multipliers ``x (n, k, T)``; None where the rows act through pair wrenches, as loops do."""
@@ -115,9 +111,9 @@ class LoopRows:
         """``sum_k C_lk S_k q'_k``."""
         return here.loop_sums(here.pair_sums(here.S * dq))
 
-    def bias(self, here: Evaluated, dq: Array, V: Array) -> Array:
+    def bias(self, here: Evaluated, pairs: Array) -> Array:
         """The velocity parts of the relative accelerations, summed along the loops."""
-        return here.loop_sums(here.bias(dq, V))
+        return here.loop_sums(pairs)
 
     def efforts(self, here: Evaluated, x: Array) -> None:
         """None: loops act through pair wrenches, ``Configuration.pair_wrenches``."""
@@ -170,9 +166,9 @@ class CouplingRows:
         """``sum_j c_j q'_j``."""
         return self._sums(dq[self._columns])
 
-    def bias(self, here: Evaluated, dq: Array, V: Array) -> Array:
+    def bias(self, here: Evaluated, pairs: Array) -> Array:
         """Zero: the relation is linear."""
-        return np.zeros((len(self.constant), here.T), dtype=dq.dtype)
+        return np.zeros((len(self.constant), here.T), dtype=pairs.dtype)
 
     def efforts(self, here: Evaluated, x: Array) -> Array:
         """``c_j x`` in every freedom."""

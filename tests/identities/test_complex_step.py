@@ -281,7 +281,7 @@ def test_a_frame_along_a_circle_is_a_revolute_at_its_centre():
     assert_allclose(
         a.bias(du, V), b.bias(slope * du, b.link_twists(slope * du)) + b.pair_sums(b.S * bent * du**2), atol=1e-12
     )
-    assert_allclose(a.closure_bias(du, V), a.loop_sums(a.bias(du, V)), atol=1e-13)
+    assert_allclose(a.closure_bias(a.bias(du, V)), a.loop_sums(a.bias(du, V)), atol=1e-13)
     assert_allclose(a.closure, b.closure, atol=1e-12)
 
 
