@@ -45,6 +45,7 @@ class Evaluated(Protocol):
     def loop_sums(self, per_pair: Array) -> Array:
         """``(6, P, T)`` -> ``(6 loops, T)``."""
 
+
 class Rows(Protocol):
     """``n`` closure rows ``phi(q) = 0`` of one contributor, evaluated at a configuration of ``T`` positions."""
 

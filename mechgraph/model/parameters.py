@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import accumulate, chain, pairwise
 from operator import attrgetter
 from typing import Any
@@ -43,7 +44,7 @@ class Parameters:
     origin: Array
     L: float
 
-    @property
+    @cached_property
     def batch(self) -> int:
         """Number of variants."""
         return max(getattr(self, name).shape[-1] for name in BATCHED)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.numerics.hermite import divided_differences, newton_form
+from mechgraph.numerics.hermite import cubic
 from mechgraph.numerics.newton import Problem
 from mechgraph.numerics.tolerances import PATH
 from mechgraph.numerics.tracks import Nodes
@@ -19,9 +19,8 @@ def middles(problem: Problem, a: Nodes, b: Nodes, drive: Array) -> Array:
     h = b.place - a.place
     direction = (b.drive - a.drive) / h
     y = problem.difference(b.x, a.x)
-    rates = np.stack([(a.Z * direction).sum(axis=1), problem.tangent(y, (b.Z * direction).sum(axis=1))])
-    values, places = np.stack([np.zeros_like(y), y]), np.stack([np.zeros_like(h), h])
-    dq = newton_form(*divided_differences(places, values, rates), 0.5 * h)
+    there = problem.tangent(y, (b.Z * direction).sum(axis=1))
+    dq = cubic(y, (a.Z * direction).sum(axis=1), there, h, 0.5 * h)
     off = drive - 0.5 * (a.drive + b.drive)
     dq += 0.5 * ((a.Z + b.Z) * off).sum(axis=1)
     return problem.advance(a.x, dq, a.track)

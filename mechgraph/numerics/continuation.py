@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.numerics.certificate import middles, smooth
-from mechgraph.numerics.hermite import divided_differences, newton_form
+from mechgraph.numerics.hermite import cubic, divided_differences, newton_form
 from mechgraph.numerics.newton import Newton, Problem, Work
 from mechgraph.numerics.tolerances import PATH
 from mechgraph.numerics.tracks import Nodes, Paths
@@ -135,12 +135,9 @@ class Follower:
             every = two.size == len(h)
             mine = slice(None) if every else two
             a, b = (before, last) if every else (before.take(two), last.take(two))
-            direction = change[:, mine] / h[mine]
             y = self.problem.difference(a.x, b.x)
-            rates = np.stack([(b.Z * direction).sum(axis=1), self.problem.tangent(y, (a.Z * direction).sum(axis=1))])
-            values = np.stack([np.zeros_like(y), y])
-            places = np.stack([np.zeros(two.size), a.place - b.place])
-            dq[:, mine] = newton_form(*divided_differences(places, values, rates), h[mine])
+            there = self.problem.tangent(y, (a.Z * (change[:, mine] / h[mine])).sum(axis=1))
+            dq[:, mine] = cubic(y, dq[:, mine] / h[mine], there, a.place - b.place, h[mine])
             order[mine] = 4
         bent = np.flatnonzero(known & ~straight & (ratio < 4.0))
         if bent.size:
@@ -170,7 +167,8 @@ class Follower:
             new = Nodes.closed(found, drive, last.track, at, sure=False)
             march.h = _next_step(at - last.place, found.correction, order, good, self._longest(last, new, drive))
             kept = np.flatnonzero(good)
-            out += self._moved(march, new.take(kept), last.take(kept), kept)
+            moved = (new, last) if len(kept) == len(good) else (new.take(kept), last.take(kept))
+            out += self._moved(march, *moved, kept)
             self._spend(march.last.track, PATH.quick_steps)
             going = (march.last.place < self.paths.end[march.last.track]) & (march.h >= PATH.shortest_quick)
             march.keep(going & ~self.given_up[march.last.track])

@@ -49,6 +49,13 @@ def newton_form(coefficients: Array, nodes: Array, at: Array) -> Array:
     return out
 
 
+def cubic(values: Array, rates: Array, rates_there: Array, width: Array, at: Array) -> Array:
+    """Cubics ``(F, n)`` at places ``at (n,)`` that are zero at 0 and ``values`` at ``width (n,)``, with rates given at both."""
+    s = at / width
+    left = 1.0 - s
+    return np.asarray(values * (s * s * (1.0 + 2.0 * left)) + (at * left) * (left * rates - s * rates_there))
+
+
 class Interpolation:
     """States between nodes of tracks: Hermite interpolation through the nodes beside a step, as far as a track goes straight on.
 

@@ -253,13 +253,10 @@ class ChosenSystem:
         self.choices = choices
         self.which = which
         self._parts: list[tuple[Choice, Place, Factor]] = []
-        for i in sorted(set(which.tolist())):
-            choice, at = choices[i], np.flatnonzero(which == i)
-            square = A[choice.rows[:, None], choice.cols]
-            if at.size == len(which):
-                self._parts.append((choice, EVERY, Factor(square)))
-            else:
-                self._parts.append((choice, at, Factor(square[:, :, at])))
+        used = sorted(set(which.tolist()))
+        for i in used:
+            choice, at = choices[i], EVERY if len(used) == 1 else np.flatnonzero(which == i)
+            self._parts.append((choice, at, Factor(A[choice.rows[:, None], choice.cols][:, :, at])))
 
     @cached_property
     def condition(self) -> Array:

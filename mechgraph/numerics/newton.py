@@ -66,7 +66,7 @@ class Problem(Protocol):
     """Whether the equations may change more slowly than the path values, see ``pace``."""
 
     def at(self, x: Array, drive: Array, tracks: Index) -> Any:
-        """The equations at states, the path values put in."""
+        """The equations at (a copy of) states, the path values put in."""
 
     def chosen(self, point: Any, which: Index) -> Index:
         """Forms (by number) of the linear equations at the points: ``which``, or others where these are ill-conditioned."""
@@ -200,7 +200,7 @@ class _Run:
     def evaluate(self) -> None:
         """Evaluate the active states; where the residual is at its goal, or at rounding and no longer falls, they are done."""
         mine = self._mine
-        self.point = self.problem.at(self.x[:, mine].copy(), self.drive[:, mine], self.tracks[mine])
+        self.point = self.problem.at(self.x[:, mine], self.drive[:, mine], self.tracks[mine])
         self.work.evaluations += self.active.size
         self.work.calls += 1
         self.left = np.abs(self.point.residual).max(axis=0, initial=0.0)
@@ -241,9 +241,9 @@ class _Run:
             self._choose_again(np.flatnonzero(again))
             small, finite = small & ~unmet, (finite & ~unmet) | again
         if small.any():
-            at = mine if small.all() else self.active[small]
-            self.Z[:, :, at] = self.problem.sensitivity(self.point, f)[:, :, small]
-            self.condition[at], self.done[at] = f.condition[small], True
+            at, those = (mine, slice(None)) if small.all() else (self.active[small], small)
+            self.Z[:, :, at] = self.problem.sensitivity(self.point, f)[:, :, those]
+            self.condition[at], self.done[at] = f.condition[those], True
         lost = np.abs(self.total[:, mine]).max(axis=0, initial=0.0) > PATH.lost
         self.active = self.active[finite & ~small & ~lost]
 

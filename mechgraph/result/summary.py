@@ -223,7 +223,9 @@ class _View(Places):
         """Which reaction components and efforts are not unique."""
         loose = np.flatnonzero(self.reactions.loose[:, : len(self.m.pairs)].any(axis=0))
         columns = [self.values.whole.freedom(name)[0] for name in self.values.actuated]
-        loose = np.union1d(loose, [k for k in columns if k < len(self.m.pairs) and self._loose_efforts(k).any()]).astype(int)
+        loose = np.union1d(
+            loose, [k for k in columns if k < len(self.m.pairs) and self._loose_efforts(k).any()]
+        ).astype(int)
         items = []
         for k in loose[:LISTED].tolist():
             parts = self._not_unique(k)

@@ -58,7 +58,7 @@ class NumbersPath(DriverPath):
     def at(self, x: Array, drive: Array, tracks: Index) -> Configuration:
         """The equations with the numbers at a part of the way."""
         self._last = drive, tracks
-        return Configuration(self.system_at(drive[0], tracks), x)
+        return Configuration(self.system_at(drive[0], tracks), x.copy())
 
     def sensitivity(self, point: Configuration, factored: FactoredClosure) -> Array:
         """Rates with the part of the way, by a forward difference: the numbers come from a function or a table of any kind."""
