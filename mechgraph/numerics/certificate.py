@@ -14,15 +14,15 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
-def middles(problem: Problem, a: Nodes, b: Nodes, drive: Array) -> Array:
-    """States in the middle between neighbours, by Hermite interpolation of both ends."""
+def between(problem: Problem, a: Nodes, b: Nodes, part: Array | float, drive: Array) -> Array:
+    """States at a ``part`` of the way between neighbours, at path values ``drive (d, n)``, by Hermite interpolation of both ends."""
     h = b.place - a.place
     direction = (b.drive - a.drive) / h
     y = problem.difference(b.x, a.x)
     there = problem.tangent(y, (b.Z * direction).sum(axis=1))
-    dq = cubic(y, (a.Z * direction).sum(axis=1), there, h, 0.5 * h)
-    off = drive - 0.5 * (a.drive + b.drive)
-    dq += 0.5 * ((a.Z + b.Z) * off).sum(axis=1)
+    dq = cubic(y, (a.Z * direction).sum(axis=1), there, h, part * h)
+    off = drive - a.drive - part * (b.drive - a.drive)
+    dq += ((a.Z + part * (b.Z - a.Z)) * off).sum(axis=1)
     return problem.advance(a.x, dq, a.track)
 
 

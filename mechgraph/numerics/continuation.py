@@ -19,7 +19,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.numerics.certificate import middles, smooth
+from mechgraph.numerics.certificate import between, smooth
 from mechgraph.numerics.hermite import cubic, divided_differences, newton_form
 from mechgraph.numerics.newton import Newton, Problem, Work
 from mechgraph.numerics.tolerances import PATH
@@ -74,8 +74,9 @@ class Follower:
         open_ = np.flatnonzero(~stuck & (paths.end > 0))
         if not open_.size:
             return Tracks(start, self.ends, self.crossings, self.work)
-        nodes = self._quick(start.take(open_), first)
-        nodes = Nodes.join([start, self._settled(nodes)])
+        begun = start.take(open_)
+        nodes = self._filled(Nodes.join([begun, self._quick(begun, first)]))
+        nodes = Nodes.join([start, self._settled(nodes.take(nodes.place > 0.0))])
         nodes = self._cut(self._certified_all(nodes))
         reached = np.zeros(V)
         np.maximum.at(reached, nodes.track, nodes.place)
@@ -165,7 +166,8 @@ class Follower:
             found = self.newton.nodes(x, drive, last.track, last.which, PATH.quick)
             good = found.done & (found.correction <= PATH.correction) & (found.condition <= PATH.singular)
             new = Nodes.closed(found, drive, last.track, at, sure=False)
-            march.h = _next_step(at - last.place, found.correction, order, good, self._longest(last, new, drive))
+            longest = PATH.ahead * self._longest(last, new, drive)
+            march.h = _next_step(at - last.place, found.correction, order, good, longest)
             kept = np.flatnonzero(good)
             moved = (new, last) if len(kept) == len(good) else (new.take(kept), last.take(kept))
             out += self._moved(march, *moved, kept)
@@ -195,6 +197,21 @@ class Follower:
         self.steps[tracks] += 1
         self.given_up[tracks] |= self.steps[tracks] > most + PATH.steps_a_point * self.paths.count[tracks]
 
+    def _filled(self, nodes: Nodes) -> Nodes:
+        """The nodes with others between them, interpolated, where steps are too long for the certificate."""
+        left, right = nodes.steps
+        a, b = nodes.take(left), nodes.take(right)
+        parts = np.ceil((b.place - a.place) / self._longest(a, b, b.drive)).astype(np.intp)
+        step = np.repeat(np.arange(len(a)), np.maximum(parts - 1, 0))
+        if not step.size:
+            return nodes
+        part = (1 + np.arange(step.size) - np.searchsorted(step, step)) / parts[step]
+        a, b = a.take(step), b.take(step)
+        place = a.place + part * (b.place - a.place)
+        drive = self.paths.drive(a.track, place)
+        more = replace(a, x=between(self.problem, a, b, part, drive), drive=drive, place=place, sure=b.sure)
+        return Nodes.join([nodes, more])
+
     def _settled(self, nodes: Nodes) -> Nodes:
         """All nodes closed in one batch; those that do not stay where they were marked by a condition without end."""
         if not len(nodes):
@@ -218,7 +235,7 @@ class Follower:
         a, b = nodes.take(left), nodes.take(right)
         place = 0.5 * (a.place + b.place)
         drive = self.paths.drive(a.track, place)
-        x = middles(self.problem, a, b, drive)
+        x = between(self.problem, a, b, 0.5, drive)
         found = self.newton.nodes(x, drive, a.track, a.which, PATH.node)
         middle = Nodes.closed(found, drive, a.track, place, sure=True)
         ok = found.done & (found.which == a.which) & (found.correction <= PATH.correction)

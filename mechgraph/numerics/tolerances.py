@@ -109,6 +109,8 @@ class PathTolerances:
     """First step of a path, where there are no earlier nodes to predict from."""
     longest: float = 0.35
     """Longest step between nodes, unless tracks go straight on; longer ones would be refused by the certificate more often than not."""
+    ahead: float = 3.0
+    """Times that longest step up to which the first march may reach at once; nodes between are interpolated and closed with the others."""
     shortest_quick: float = 2e-3
     """Step at which the first march stops and the careful one takes over."""
     shortest: float = 1e-9
