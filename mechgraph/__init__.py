@@ -25,6 +25,7 @@ from mechgraph.kinetostatics import assemble, kinematics, solve
 from mechgraph.model.chain import chain
 from mechgraph.model.coupling import Coupling
 from mechgraph.model.drive import Drive
+from mechgraph.model.event import Event
 from mechgraph.model.force_law import Damper, ForceLaw, Spring, TorsionSpring
 from mechgraph.model.force_table import ForceTable
 from mechgraph.model.gears import Belt, BevelGears, Rack, SpurGears, WormGear
@@ -36,13 +37,13 @@ from mechgraph.model.motion import Motion
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.pair_table import pair_types
 from mechgraph.model.pair_type import PairType
+from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.model.row_parts import Bookkeeping, Component, Freedom
+from mechgraph.model.stop import Stop
 from mechgraph.report.report import DeterminacyReport, check
 from mechgraph.response.course import Response
-from mechgraph.response.events import Event
 from mechgraph.response.respond import respond
 from mechgraph.response.small_motion import equilibrium, linearize
-from mechgraph.response.stops import Stop
 from mechgraph.result.free_body import FreeBody, free_body
 from mechgraph.result.over_time import OverTime, over_time
 from mechgraph.result.solution import Solution
@@ -89,6 +90,7 @@ __all__ = [
     "ReachError",
     "Response",
     "ResponseError",
+    "ResponseSetup",
     "Solution",
     "Spring",
     "SpurGears",

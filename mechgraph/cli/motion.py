@@ -101,7 +101,10 @@ def _tell(command: str, told: Told, written: Written | None) -> None:
 
 def respond(
     mechanism: Named,
-    span: Annotated[str, typer.Option("--for", metavar="TIME", help="How long: 10s.")],
+    span: Annotated[
+        str | None,
+        typer.Option("--for", metavar="TIME", help="How long: 10s. Left out, as [response] of the file says."),
+    ] = None,
     start: Annotated[
         list[str] | None, typer.Option("--start", metavar="FREEDOM=VALUE", help="Coordinate at the beginning (repeat).")
     ] = None,
@@ -117,16 +120,21 @@ def respond(
     ] = None,
     out: Out = None,
     method: Annotated[
-        Literal["auto", "RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"],
+        Literal["auto", "RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"] | None,
         typer.Option(help="Stepper of scipy; Radau for stiff loads."),
-    ] = "auto",
-    rtol: Annotated[float, typer.Option(help="Relative tolerance of a step.")] = 1e-8,
-    atol: Annotated[float, typer.Option(help="Absolute tolerance (radians, lengths / L, and their rates).")] = 1e-10,
+    ] = None,
+    rtol: Annotated[float | None, typer.Option(help="Relative tolerance of a step, 1e-8 by itself.")] = None,
+    atol: Annotated[
+        float | None,
+        typer.Option(help="Absolute tolerance (radians, lengths / L, and their rates), 1e-10 by itself."),
+    ] = None,
     engine: Engine = "auto",
     over_time: OverTime = False,
     json: AsJson = False,
 ) -> None:
     """Follow the motion that the loads produce, print a summary with the energy balance and write a table.
+
+    What is left out is that of [response] of the file, where it has one.
 
     Example: mechgraph respond windows-2 --for 500ms --rate A0=-1
 
@@ -134,14 +142,20 @@ def respond(
     usage or bad input. Ctrl-C keeps what was computed. A file is written whole or not at all.
     """
     check_out(out, mechanism, FORMATS)
-    m, end = loaded(mechanism), duration(span)
+    m = loaded(mechanism)
     begin = dict(parse_at(m, text, "--start") for text in start or ())
     rates = dict(parse_at(m, text, "--rate") for text in rate or ())
-    t = np.linspace(0.0, end, points) if points else (0.0, end)
-    with progress(f"moving {m.name}", end) as moved:
+    if span is not None:
+        times = np.array([0.0, duration(span)])
+    elif m.response is not None:
+        times = m.response.times
+    else:
+        refuse("respond", "how long? Give --for TIME; the mechanism has no [response] that says it")
+    t = np.linspace(times[0], times[-1], points) if points else times
+    with progress(f"moving {m.name}", float(times[-1])) as moved:
         r = mg.respond(
-            m, t, start=begin, rates=rates, rtol=rtol, atol=atol, method=method, engine=engine, on_stop="return",
-            progress=moved,
+            m, t, start=begin or None, rates=rates or None, rtol=rtol, atol=atol, method=method, engine=engine,
+            on_stop="return", progress=moved,
         )  # fmt: skip
     with working(f"summary of {m.name}"):
         told = _told(r, out, json, over_time)

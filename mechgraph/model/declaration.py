@@ -23,6 +23,7 @@ from mechgraph.model.numeric import tolerance_fault
 from mechgraph.model.pair import PARALLEL, Marker, Pair, largest_cosine
 from mechgraph.model.pair_type import PairType
 from mechgraph.model.parts import Parts
+from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.quantities import column, is_numeric, shown, wrong
 from mechgraph.units import BASE_UNITS
 
@@ -230,6 +231,10 @@ def _reference_faults(m: Parts) -> list[str]:
     faults += _repeated(drives, "drive")
     for load in m.loads:
         faults += load.faults(m)
+    if isinstance(m.response, ResponseSetup):
+        faults += m.response.faults(m)
+    elif m.response is not None:
+        faults.append(wrong(m.response, "response", "an mg.ResponseSetup"))
     return faults
 
 

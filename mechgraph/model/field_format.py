@@ -374,6 +374,8 @@ TWO = Kind(
 NUMBERS = Kind("n numbers", {"type": "array", "items": {"type": "number"}})
 FACTS = Kind("table", {"type": "object"}, dict)
 COEFFICIENTS = Kind("table", {"type": "object", "additionalProperties": {"type": "number"}, "minProperties": 1}, dict)
+BY_FREEDOM = Kind("table", {"type": "object", "additionalProperties": {"type": "number"}})
+"""Numbers by freedoms; in a file in degrees under the name of the freedom with ``_deg`` added."""
 TABLE = Kind("table", {})
 TABLES = Kind("tables", {})
 OTHER = Kind("", {})

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from mechgraph.model.drive import Drive
+from mechgraph.model.event import Event
 from mechgraph.model.field_format import (
     FLAG,
     INTEGER,
@@ -32,7 +33,9 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.pair_type import PairType
+from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.model.row_parts import Bookkeeping, Component, Freedom
+from mechgraph.model.stop import Stop
 from mechgraph.units import BASE_UNITS, LENGTH
 
 KINDS: dict[str, Mapping[str, Any]] = {"load": LOADS, "coupling": COUPLINGS}
@@ -149,6 +152,9 @@ TABLES_OF_FILE: dict[str, Table] = {
         rules=_one_of("oneOf", "position", f"position{DEGREES}", "sweep", f"sweep{DEGREES}"),
         sweep=_SWEEP,
     ),
+    "response": _table(ResponseSetup),
+    "event": _table(Event, words="A time at which the coordinate of a freedom, or one of its rates, passes a value."),
+    "stop": _table(Stop, words="Limits of a freedom, which it strikes."),
     "law": _table(ForceTable, needed=("force",), rules=_one_of("anyOf", "x", "v", f"x{DEGREES}", f"v{DEGREES}")),
     **{f"load {kind}": _table(load) for kind, load in LOADS.items()},
     "pair_type": _table(

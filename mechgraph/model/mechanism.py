@@ -26,6 +26,7 @@ from mechgraph.model.numeric import plain, same_fields
 from mechgraph.model.pair import Pair
 from mechgraph.model.pair_type import PairType
 from mechgraph.model.parts import Parts
+from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.quantities import is_numeric, shown, wrong
 from mechgraph.units import base_factors
 
@@ -45,6 +46,7 @@ class Mechanism(Parts, Shown):
     start : pair coordinates near which to assemble, freedom -> value; picks the branch.
     units : names of the units of ``length``, ``mass`` and ``time`` in which the numbers are declared (a consistent set).
     tol : accuracy to which directions (radians) and distances (over L) are meant, see ``snapped``; left out, they are exact.
+    response : what ``respond`` takes where it is given nothing else: time, start, rates, motions, events, tolerances.
     source, description, expected : where it comes from, what it is, and facts that a test checks.
 
     Raises
@@ -66,6 +68,7 @@ class Mechanism(Parts, Shown):
         start: Mapping[str, Any] | None = None,
         units: Mapping[str, str] | None = None,
         tol: float | None = None,
+        response: ResponseSetup | None = None,
         source: str = "",
         description: str = "",
         expected: Mapping[str, Any] | None = None,
@@ -84,6 +87,7 @@ class Mechanism(Parts, Shown):
             frame=first if frame is None else frame,
             units=MappingProxyType(dict(units) if isinstance(units, Mapping) else {}),
             tol=plain(tol),
+            response=response,
             source=source,
             description=description,
             expected=MappingProxyType(dict(expected) if isinstance(expected, Mapping) else {}),
@@ -134,6 +138,8 @@ class Mechanism(Parts, Shown):
             raise DeclarationError(f"mechanism {shown(self.name)}", faults)
         self._set(start=MappingProxyType(flat))
         self._set(couplings=tuple(c.placed(self) for c in self.couplings))
+        if self.response is not None:
+            self._set(response=self.response.with_full_names(self.full_name))
 
     def __eq__(self, other: object) -> bool:
         return same_fields(self, other)
@@ -223,7 +229,8 @@ class Mechanism(Parts, Shown):
         loads = [load.with_full_names(self.full_name) for load in self.loads]
         start = {k: v for k, v in self.start.items() if k not in gone}
         pairs = [new if p.name == pair else p for p in self.pairs]
-        return self.replace(pairs=pairs, drives=drives, loads=loads, start=start)
+        response = None if self.response is None else self.response.without(lost)
+        return self.replace(pairs=pairs, drives=drives, loads=loads, start=start, response=response)
 
     def to_units(self, **units: str) -> Mechanism:
         """The same mechanism in other units, e.g. ``m.to_units(length="mm", mass="g")`` (``units`` extra).
@@ -241,6 +248,7 @@ class Mechanism(Parts, Shown):
             drives=[drive.in_units(base, turns(drive.freedom)) for drive in self.drives],
             loads=[load.in_units(base, turns(load.in_freedom)) for load in self.loads],
             start={name: value if turns(name) else value * base[0] for name, value in self.start.items()},
+            response=None if self.response is None else self.response.converted(base, turns),
             units={**self.units, **units},
         )
 

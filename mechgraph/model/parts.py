@@ -11,11 +11,12 @@ from typing import Annotated, Any
 from mechgraph.errors import DeclarationError
 from mechgraph.model.coupling import BaseCoupling
 from mechgraph.model.drive import Drive
-from mechgraph.model.field_format import FACTS, NUMBER, OTHER, TABLE, TABLES, TEXT, Formatted
+from mechgraph.model.field_format import BY_FREEDOM, FACTS, NUMBER, TABLE, TABLES, TEXT, Formatted
 from mechgraph.model.link import Link
 from mechgraph.model.load_base import Load
 from mechgraph.model.pair import Pair
 from mechgraph.model.pair_type import PairType
+from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.quantities import shown, without_units
 from mechgraph.units import LENGTH, PURE
 
@@ -57,12 +58,16 @@ class Parts(Formatted):
     loads: Annotated[tuple[Load, ...], TABLES("loads", key="load", table="load", default="none")]
     start: Annotated[
         Mapping[str, float],
-        OTHER(
+        BY_FREEDOM(
             "pair coordinates near which to assemble, freedom → number, or pair → one number a freedom; "
             "degrees with `_deg` added to the name",
             default="all 0",
             rules=START,
         ),
+    ]
+    response: Annotated[
+        ResponseSetup | None,
+        TABLE("what `respond` takes where it is given nothing else", table="response", default="none"),
     ]
     expected: Annotated[Mapping[str, Any], FACTS("facts that a test checks; any names", default="empty")]
 

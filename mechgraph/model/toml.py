@@ -16,7 +16,7 @@ import tomli_w
 
 from mechgraph.errors import ContentError, DeclarationError, FileError
 from mechgraph.model.chain import chain
-from mechgraph.model.field_format import COEFFICIENTS, SIX, STANDS_AS, TABLE, Described
+from mechgraph.model.field_format import BY_FREEDOM, COEFFICIENTS, SIX, STANDS_AS, TABLE, TABLES, Described
 from mechgraph.model.file_format import DEGREES, KINDS, SCHEMA, TABLES_OF_FILE, USUAL
 from mechgraph.model.library import library_names, library_path
 from mechgraph.model.mechanism import Mechanism, check_mechanism
@@ -76,27 +76,32 @@ class _Reader:
         for key, value in fields.items():
             if table.fields[key].kind is TABLE:
                 fields[key] = self.item(table.fields[key].table, value, f"{where}.{key}")
+            elif table.fields[key].kind is BY_FREEDOM:
+                fields[key] = self.by_freedom(value, f"{where}.{key}")
+            elif table.fields[key].kind is TABLES and kind in NESTED:
+                fields[key] = self.items(table.fields[key].table, value, f"{where}.")
         if kind in READ_FIRST and len(self.faults) == before:
             READ_FIRST[kind](self, fields, where)
         if any(key not in fields for key in table.needed) or (len(self.faults) > before and kind in READ_FIRST):
             return None
         try:
-            return table.make(**fields)
+            return table.make(**{table.attributes.get(key, key): value for key, value in fields.items()})
         except DeclarationError as error:
             self.faults += [f"{where}: {fault}" for fault in error.faults]
         except (TypeError, ValueError) as error:
             self.faults.append(f"{where}: {error}")
         return None
 
-    def items(self, key: str, raw: Any) -> list[Any]:
-        """The objects of an array of tables; those at fault are left out."""
+    def items(self, key: str, raw: Any, of: str = "") -> list[Any]:
+        """The objects of an array of tables (``of`` a table above); those at fault are left out."""
         if not isinstance(raw, list):
-            self.faults.append(wrong(raw, f"[[{key}]]", "an array of tables"))
+            self.faults.append(wrong(raw, f"[[{of}{key}]]", "an array of tables"))
             self.left_out = True
             return []
         out = []
         for i, entry in enumerate(raw):
-            where = f"{key} {shown(entry.get('name', i + 1))}" if isinstance(entry, Mapping) else f"{key} {i + 1}"
+            name = shown(entry.get("name", i + 1)) if isinstance(entry, Mapping) else i + 1
+            where = f"{of}{key} {name}"
             out.append(self.of_kind(key, entry, where) if key in KINDS else self.item(key, entry, where))
         made = [item for item in out if item is not None]
         self.left_out |= len(made) < len(raw)
@@ -110,13 +115,13 @@ class _Reader:
         self.faults.append(wrong(kind, f"{where}: kind", f"one of {', '.join(KINDS[key])}"))
         return None
 
-    def start(self, raw: Any) -> dict[str, Any]:
-        """Start values, degrees turned into radians."""
+    def by_freedom(self, raw: Any, where: str = "start") -> dict[str, Any]:
+        """Values by freedoms, degrees turned into radians."""
         if not isinstance(raw, Mapping):
-            self.faults.append(wrong(raw, "[start]", "a table"))
+            self.faults.append(wrong(raw, f"[{where}]", "a table"))
             return {}
         return {
-            key.removesuffix(DEGREES): self.radians(value, f"start.{key}") if key.endswith(DEGREES) else value
+            key.removesuffix(DEGREES): self.radians(value, f"{where}.{key}") if key.endswith(DEGREES) else value
             for key, value in raw.items()
         }
 
@@ -175,6 +180,8 @@ def _with_six(reader: _Reader, fields: dict[str, Any], where: str) -> None:
             fields[key] = tuple(value)
 
 
+NESTED = ("response",)
+"""Tables whose arrays of tables hold objects."""
 READ_FIRST = {
     "motion": _with_sweep,
     "pair": _with_type,
@@ -205,9 +212,11 @@ def parse(data: Mapping[str, Any], subject: str) -> Mechanism:
             if attribute != key:
                 arguments[attribute] = reader.items(key, top[key])
             elif table.fields[key].kind is TABLE:
-                arguments[key] = reader.fields(table.fields[key].table, top[key], key)
+                inner = table.fields[key].table
+                made_of = reader.fields if TABLES_OF_FILE[inner].make is None else reader.item
+                arguments[key] = made_of(inner, top[key], key)
             else:
-                arguments[key] = reader.start(top[key]) if key == "start" else top[key]
+                arguments[key] = reader.by_freedom(top[key]) if table.fields[key].kind is BY_FREEDOM else top[key]
     if "chain" in top and top.get("pair"):
         reader.faults.append("both [chain] and [[pair]]; give one form")
     chained = reader.fields("chain", top["chain"], "chain") if "chain" in top else {}
@@ -279,8 +288,8 @@ def _data(item: Described, path: str, where: str) -> dict[str, Any]:
     out = {}
     for key, about in item.formats.items():
         value = getattr(item, key)
-        if value is not None and not (isinstance(value, Mapping) and not value):
-            out[key] = dict(value) if about.kind is COEFFICIENTS else _plain(value, f"{where}.{key}", path)
+        if value is not None and not (isinstance(value, Mapping | tuple) and not value):
+            out[about.key or key] = dict(value) if about.kind is COEFFICIENTS else _plain(value, f"{where}.{key}", path)
     return out
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Literal, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import scipy
@@ -13,74 +13,15 @@ import scipy
 from mechgraph.algebra.se3 import Array
 from mechgraph.arguments import items_of
 from mechgraph.errors import DeclarationError
+from mechgraph.model.event import WHATS, Event
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.quantities import is_numeric, real_array, shown, wrong
+from mechgraph.quantities import real_array, shown, wrong
 from mechgraph.result.solution import Solution
 
 ACCURACY = 1e-12
 """Part of a step to which the time of an event is found."""
 LOOKS = 8
 """Parts of a step at whose ends freedoms are looked at, so that one which passes its value and comes back is seen."""
-
-
-WHATS = ("position", "velocity", "acceleration")
-
-
-@dataclass(frozen=True)
-class Event:
-    """A quantity that passes a value: ``of`` is the name of a freedom, or a function of the Solution at one time that gives a number.
-
-    ``what``: of a freedom its ``"position"``, ``"velocity"`` or ``"acceleration"``; ``direction``: 1 for rising, -1 for falling, 0 for
-    both; ``terminal``: the motion ends there.
-    """
-
-    of: str | Callable[[Solution], Any]
-    value: float = 0.0
-    what: Literal["position", "velocity", "acceleration"] = "position"
-    direction: int = 0
-    terminal: bool = False
-    name: str = ""
-
-    @property
-    def text(self) -> str:
-        """The event in words."""
-        if self.name:
-            return self.name
-        of = f"{self.what} of {self.of}" if isinstance(self.of, str) else getattr(self.of, "__name__", "function")
-        return f"{of} passes {self.value:g}"
-
-    def faults(self, m: Mechanism) -> list[str]:
-        """What is wrong with it."""
-        found = []
-        if isinstance(self.of, str):
-            fault = m.freedom_fault(self.of, single=True)
-            found += [f"event: {fault}"] if fault else []
-        elif not callable(self.of):
-            found.append(f"event of {self.of!r}: expected the name of a freedom, or a function of a Solution")
-        if not is_numeric(self.value, ()):
-            return [*found, f"event of {self.of!r}: {wrong(self.value, 'value', 'a finite number')}"]
-        if self.what not in WHATS:
-            found.append(f"event {self.text}: {wrong(self.what, 'what', ', '.join(map(repr, WHATS)))}")
-        if self.direction not in (-1, 0, 1):
-            found.append(f"event {self.text}: {wrong(self.direction, 'direction', '-1, 0 or 1')}")
-        return found
-
-    def looks(self, begin: float, end: float) -> Array:
-        """Times of a step at which to look: a function, which needs a whole Solution, is looked at where the step ends."""
-        return np.linspace(begin, end, LOOKS + 1) if isinstance(self.of, str) else np.array([begin, end])
-
-    def heights(self, motion: Watched, t: Array) -> Array:
-        """How far the quantity is above the value at times ``(T,)``."""
-        if isinstance(self.of, str):
-            return motion.freedom(self.of, t)[WHATS.index(self.what)] - self.value
-        return np.array([self._height(motion.response(float(one))) for one in t])
-
-    def _height(self, s: Solution) -> float:
-        assert callable(self.of)
-        height = real_array(self.of(s))
-        if height is None or height.size != 1 or not np.isfinite(height).all():
-            raise DeclarationError("respond", [f"event {self.text}: gave {shown(height)}; expected one finite number"])
-        return float(height.reshape(())) - self.value
 
 
 @dataclass(frozen=True)
@@ -117,15 +58,34 @@ class Watch:
         """What happens in a step, in the order of time."""
         found = []
         for which, event in enumerate(self.events):
-            t = event.looks(begin, end)
+            t = _looks(event, begin, end)
             known = [self._before[which]] if which in self._before else []
-            h = np.concatenate([known, event.heights(self.motion, t[len(known) :])])
+            h = np.concatenate([known, _heights(event, self.motion, t[len(known) :])])
             self._before[which] = float(h[-1])
             turns = (h[:-1] != 0.0) & (np.sign(h[:-1]) != np.sign(h[1:]))
             for i in np.flatnonzero(turns & ((event.direction == 0) | (np.sign(h[1:] - h[:-1]) == event.direction))):
-                root = first_root(partial(event.heights, self.motion), t[i], t[i + 1])
+                root = first_root(partial(_heights, event, self.motion), t[i], t[i + 1])
                 found.append(Occurrence(event, root, bool(h[i + 1] > h[i])))
         yield from sorted(found, key=lambda one: one.t)
+
+
+def _looks(event: Event, begin: float, end: float) -> Array:
+    """Times of a step at which to look: a function, which needs a whole Solution, is looked at where the step ends."""
+    return np.linspace(begin, end, LOOKS + 1) if isinstance(event.of, str) else np.array([begin, end])
+
+
+def _heights(event: Event, motion: Watched, t: Array) -> Array:
+    """How far the quantity is above the value at times ``(T,)``."""
+    if isinstance(event.of, str):
+        return motion.freedom(event.of, t)[WHATS.index(event.what)] - event.value
+    return np.array([_height(event, motion.response(float(one))) for one in t])
+
+
+def _height(event: Event, s: Solution) -> float:
+    height = real_array(event.of(s))
+    if height is None or height.size != 1 or not np.isfinite(height).all():
+        raise DeclarationError("respond", [f"event {event.text}: gave {shown(height)}; expected one finite number"])
+    return float(height.reshape(())) - event.value
 
 
 def first_root(height: Callable[[Array], Array], begin: float, end: float) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from types import SimpleNamespace
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -14,22 +15,23 @@ from mechgraph.closure.rank import closure_rank
 from mechgraph.closure.solver import ENGINES, EngineName, engine_for
 from mechgraph.errors import AssemblyError, DeclarationError, ResponseError
 from mechgraph.model.declaration import mapping_faults
+from mechgraph.model.event import Event
 from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism, check_mechanism
-from mechgraph.quantities import is_numeric, real_array, wrong
+from mechgraph.model.response_setup import METHODS, MethodName, ResponseSetup, read_times, tolerance_faults
+from mechgraph.model.stop import Stop
 from mechgraph.report.report import hinted
 from mechgraph.response.along_path import Arc, PathStage
 from mechgraph.response.charts import ChartStage, Task
 from mechgraph.response.course import Course, Response
-from mechgraph.response.events import Event, Occurrence, Watch, read_events
+from mechgraph.response.events import Occurrence, Watch, read_events
 from mechgraph.response.initial import read_rates, read_start, start_rates, started
 from mechgraph.response.integration import Integration, Stage
 from mechgraph.response.motion_equations import Loads, Stopped
 from mechgraph.response.prescribed import OVER_POSITIONS, read_motions
-from mechgraph.response.stops import Stop, Stops, read_stops
+from mechgraph.response.stops import Stops, read_stops
 from mechgraph.structure.snapping import meant
 
-MethodName = Literal["auto", "RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"]
 OnStopName = Literal["raise", "return"]
 CROWDED = 1000
 """Impacts and releases, each ``SOON`` after the one before, after which the motion is given up."""
@@ -39,18 +41,18 @@ SOON = 1e-9
 
 def respond(
     m: Mechanism,
-    t: Any,
+    t: Any = None,
     *,
     start: Mapping[str, float] | None = None,
     rates: Mapping[str, float] | None = None,
     motions: Mapping[str, Any] | None = None,
     loads: Iterable[Load] | None = None,
-    rtol: float = 1e-8,
-    atol: float = 1e-10,
-    method: MethodName = "auto",
+    rtol: float | None = None,
+    atol: float | None = None,
+    method: MethodName | None = None,
     engine: EngineName = "auto",
-    events: Iterable[Event] | Event = (),
-    stops: Iterable[Stop] | Stop = (),
+    events: Iterable[Event] | Event | None = None,
+    stops: Iterable[Stop] | Stop | None = None,
     on_stop: OnStopName = "raise",
     tol: float | None = None,
     progress: Callable[[float], None] | None = None,
@@ -60,6 +62,8 @@ def respond(
     The accelerations of as many independent freedoms as the mechanism has mobility are unknowns beside the reactions; see
     ``response.motion_equations``. Integrated by the steppers of ``scipy.integrate``; every output is closed.
 
+    Arguments from ``t`` to ``stops`` that are left out are those of ``m.response`` (``[response]`` in a file) where it has one.
+
     Parameters
     ----------
     t : ``(begin, end)``, for outputs at the steps taken, or the times of the outputs, rising.
@@ -68,7 +72,7 @@ def respond(
     motions : freedoms that are prescribed: freedom -> ``Motion`` with ``t`` (its quintic spline), or a callable ``t -> (position,
         velocity, acceleration)``. A drive with a stored motion is prescribed; other declared drives are free.
     loads : replace the declared ones; constants and functions, no arrays over positions.
-    rtol, atol : tolerances of a step, relative and absolute (radians and lengths / L, and their rates).
+    rtol, atol : tolerances of a step, relative and absolute (radians and lengths / L, and their rates); left out, 1e-8 and 1e-10.
     method : a stepper of ``scipy.integrate``: explicit ``"RK23"``, ``"RK45"``, ``"DOP853"``, for stiff laws ``"Radau"``, ``"BDF"``,
         ``"LSODA"``; ``"auto"`` is DOP853.
     engine : as in ``solve``.
@@ -86,29 +90,31 @@ def respond(
         where the motion cannot be followed to its end, or is interrupted; carries the Response so far.
     """
     check_mechanism(m, "respond")
+    given = {"t": t, "start": start, "rates": rates, "motions": motions, "rtol": rtol, "atol": atol, "method": method}
+    how = _how(m, given | {"events": events, "stops": stops})
     faults = option_faults(
         {
-            "method": (method, get_args(MethodName)),
+            "method": (how.method, METHODS),
             "engine": (engine, ENGINES),
             "on_stop": (on_stop, get_args(OnStopName)),
         }
     )
-    faults += mapping_faults(start=start, rates=rates, motions=motions)
-    faults += [
-        wrong(value, name, "a number from 1e-14 to 0.1")
-        for name, value in (("rtol", rtol), ("atol", atol))
-        if not is_numeric(value, ()) or not 1e-14 <= value <= 0.1
-    ]
-    times, watched, limits = _times(t, faults), read_events(m, events, faults), read_stops(m, stops, faults)
-    given = None if loads is None else items_of(loads, "loads", faults)
+    faults += mapping_faults(start=how.start, rates=how.rates, motions=how.motions)
+    faults += tolerance_faults(how.rtol, how.atol)
+    times, watched, limits = (
+        read_times(how.t, faults),
+        read_events(m, how.events, faults),
+        read_stops(m, how.stops, faults),
+    )
+    replaced = None if loads is None else items_of(loads, "loads", faults)
     if faults:
         raise DeclarationError(f"respond {m.name!r}", faults)
-    declared = m if given is None else m.replace(loads=given)
+    declared = m if replaced is None else m.replace(loads=replaced)
     m = meant(declared, tol, "respond")
     begin = float(times[0])
-    prescribed = read_motions(m, motions or {}, faults)
-    wanted = read_start(m, start or {}, prescribed, begin, faults) if not faults else {}
-    wanted_rates = read_rates(m, rates or {}, faults)
+    prescribed = read_motions(m, how.motions, faults)
+    wanted = read_start(m, how.start, prescribed, begin, faults) if not faults else {}
+    wanted_rates = read_rates(m, how.rates, faults)
     faults += [f"{one.where}{', '.join(one.over_positions)}: {OVER_POSITIONS}" for one in m.loads if one.over_positions]
     if faults:
         raise DeclarationError(f"respond {m.name!r}", faults)
@@ -125,23 +131,17 @@ def respond(
     faults = standing.beyond(x)
     if faults:
         raise DeclarationError(f"respond {m.name!r}", faults)
-    it = Integration("DOP853" if method == "auto" else method, float(rtol), float(atol))
+    it = Integration("DOP853" if how.method == "auto" else how.method, float(how.rtol), float(how.atol))
     return _followed(Course(it, task, m, times), standing, watched, x, dq, on_stop, progress)
 
 
-def _times(t: Any, faults: list[str]) -> Array:
-    """Times of outputs, or begin and end."""
-    times = real_array(t)
-    if (
-        times is None
-        or times.ndim != 1
-        or len(times) < 2
-        or not np.isfinite(times).all()
-        or not (np.diff(times) > 0).all()
-    ):
-        faults.append(wrong(t, "t", "(begin, end) or rising times of the outputs, at least two"))
-        return np.zeros(2)
-    return times
+def _how(m: Mechanism, given: Mapping[str, Any]) -> Any:
+    """The arguments of a call; those left out are what is stored with the mechanism, else what serves by itself."""
+    stored = m.response
+    setup = stored or ResponseSetup((0.0, 1.0))
+    fallback = {name: getattr(setup, name) for name in given if name not in ("t", "motions")}
+    fallback |= {"t": stored and stored.times, "motions": {one.freedom: one.motion for one in setup.motions}}
+    return SimpleNamespace(**{name: fallback[name] if value is None else value for name, value in given.items()})
 
 
 def _followed(

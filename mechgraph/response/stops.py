@@ -23,11 +23,13 @@ from numpy.typing import NDArray
 from mechgraph.algebra.se3 import Array
 from mechgraph.arguments import items_of
 from mechgraph.force.applied_loads import kinetic_energy
+from mechgraph.model.event import Event
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.quantities import is_numeric, wrong
+from mechgraph.model.stop import Stop
+from mechgraph.quantities import wrong
 from mechgraph.response.chart import Chart
 from mechgraph.response.charts import Task
-from mechgraph.response.events import Event, Occurrence, first_root
+from mechgraph.response.events import Occurrence, first_root
 from mechgraph.response.motion_equations import NO_INERTIA, UNOPPOSED, Stopped, accelerations, moved
 from mechgraph.response.prescribed import Prescribed
 
@@ -38,30 +40,6 @@ LOOKS = np.unique(np.append(np.linspace(0.125, 1.0, 8), 0.5 ** np.arange(3, 20))
 itself is that of the step before, whose rates an impact may have changed."""
 LOWEST = 1e-9
 """Height (radians, lengths / L) of a rebound below which the freedom rests on its stop; what it loses is of that order."""
-
-
-@dataclass(frozen=True)
-class Stop:
-    """Limits of a freedom, ``lower`` and ``upper`` (None: no limit), which it strikes with a coefficient of ``restitution`` 0 to 1."""
-
-    freedom: str
-    lower: float | None = None
-    upper: float | None = None
-    restitution: float = 0.0
-
-    def faults(self, m: Mechanism) -> list[str]:
-        """What is wrong with it."""
-        fault = m.freedom_fault(self.freedom, single=True)
-        found = [fault] if fault else []
-        limits = {name: value for name in ("lower", "upper") if (value := getattr(self, name)) is not None}
-        found += [wrong(v, name, "a finite number") for name, v in limits.items() if not is_numeric(v, ())]
-        if not limits:
-            found.append("has neither lower nor upper limit")
-        elif len(limits) == 2 and not found and not limits["lower"] < limits["upper"]:
-            found.append(f"lower = {self.lower:g}, upper = {self.upper:g}: expected lower < upper")
-        if not is_numeric(self.restitution, ()) or not 0.0 <= self.restitution <= 1.0:
-            found.append(wrong(self.restitution, "restitution", "a number from 0 to 1"))
-        return [f"stop of {self.freedom!r}: {fault}" for fault in found]
 
 
 def read_stops(m: Mechanism, stops: Any, faults: list[str]) -> tuple[Stop, ...]:

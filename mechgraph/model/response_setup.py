@@ -1,0 +1,211 @@
+"""What a response starts from and how it is followed, as it is stored with a mechanism: ``[response]`` in a file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Annotated, Any, Literal, get_args
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.arguments import items_of
+from mechgraph.model.drive import Drive
+from mechgraph.model.event import Event
+from mechgraph.model.field_format import BY_FREEDOM, NUMBER, OTHER, SERIES, TABLES, TEXT, Described
+from mechgraph.model.motion import Motion
+from mechgraph.model.nameable import Nameable
+from mechgraph.model.numeric import plain, same_fields
+from mechgraph.model.stop import Stop
+from mechgraph.quantities import is_numeric, real_array, wrong
+from mechgraph.units import LENGTH, PURE, TIME, factor_of
+
+MethodName = Literal["auto", "RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"]
+METHODS: tuple[MethodName, ...] = get_args(MethodName)
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseSetup(Described):
+    """What ``respond(m)`` takes where its arguments are left out; see there.
+
+    ``time``: ``(begin, end)`` or the times of the outputs, rising; ``points``: with ``(begin, end)`` so many outputs, evenly spread;
+    ``motions``: freedom -> ``Motion``, or ``Drive``s that carry one.
+    """
+
+    time: Annotated[Any, SERIES("begin and end, or the rising times of the outputs", TIME)]
+    points: Annotated[
+        int | None,
+        OTHER(
+            "number of outputs from begin to end", default="the steps taken", rules={"type": "integer", "minimum": 2}
+        ),
+    ] = None
+    start: Annotated[
+        Any,
+        BY_FREEDOM(
+            "coordinates at the beginning, freedom → number; degrees with `_deg` added",
+            default="`start`",
+        ),
+    ] = None
+    rates: Annotated[
+        Any,
+        BY_FREEDOM("rates at the beginning, freedom → number; degrees with `_deg` added", default="at rest"),
+    ] = None
+    motions: Annotated[
+        Any, TABLES("freedoms that are prescribed, motions with `t`", key="drive", table="drive", default="stored ones")
+    ] = ()
+    rtol: Annotated[float, NUMBER("relative tolerance of a step")] = 1e-8
+    atol: Annotated[float, NUMBER("absolute tolerance: radians, lengths / L, and their rates")] = 1e-10
+    method: Annotated[MethodName, TEXT("stepper of `scipy.integrate`", choices=METHODS)] = "auto"
+    events: Annotated[Any, TABLES("events that are watched", key="event", table="event", default="none")] = ()
+    stops: Annotated[Any, TABLES("limits of freedoms", key="stop", table="stop", default="none")] = ()
+
+    def __post_init__(self) -> None:
+        self.read_numbers()
+        for name in ("start", "rates"):
+            value = getattr(self, name)
+            kept = {} if value is None else value
+            object.__setattr__(self, name, MappingProxyType(dict(kept)) if isinstance(kept, Mapping) else kept)
+        motions = self.motions
+        if isinstance(motions, Mapping):
+            motions = tuple(Drive(name, motion) for name, motion in motions.items())
+        object.__setattr__(self, "motions", motions)
+        for name, kind in (("motions", Drive), ("events", Event), ("stops", Stop)):
+            value = getattr(self, name)
+            if isinstance(value, kind):
+                object.__setattr__(self, name, (value,))
+            elif isinstance(value, list):
+                object.__setattr__(self, name, tuple(value))
+
+    def __eq__(self, other: object) -> bool:
+        return same_fields(self, other)
+
+    def __hash__(self) -> int:
+        return hash((self.rtol, self.atol, self.method))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        given = {name: getattr(self, name) for name in self.formats}
+        return _rebuilt, (given | {"start": dict(self.start), "rates": dict(self.rates)},)
+
+    @property
+    def times(self) -> Array:
+        """Begin and end, or the times of the outputs."""
+        times = np.array(self.time, dtype=float)
+        return times if self.points is None else np.linspace(times[0], times[-1], self.points)
+
+    def faults(self, m: Nameable) -> list[str]:
+        """What is wrong with it, one line each."""
+        found: list[str] = []
+        read_times(self.time, found)
+        points = self.points
+        if points is not None and (type(points) is not int or points < 2 or len(np.atleast_1d(self.time)) != 2):
+            found.append(wrong(points, "points", "a number from 2 on, beside time = (begin, end)"))
+        for what in ("start", "rates"):
+            found += _value_faults(m, what, getattr(self, what))
+        found += tolerance_faults(self.rtol, self.atol)
+        if self.method not in METHODS:
+            found.append(wrong(self.method, "method", f"one of {', '.join(map(repr, METHODS))}"))
+        for what, kind in (("motions", Drive), ("events", Event), ("stops", Stop)):
+            items = items_of(getattr(self, what), what, found)
+            found += [
+                wrong(one, f"an item of {what}", f"an mg.{kind.__name__}") for one in items if not isinstance(one, kind)
+            ]
+        found += [fault for one in self._known(self.motions, Drive) for fault in _motion_faults(m, one)]
+        for one in (*self._known(self.events, Event), *self._known(self.stops, Stop)):
+            found += one.faults(m)
+        return [f"response: {fault}" for fault in found]
+
+    @staticmethod
+    def _known(items: Any, kind: type) -> list[Any]:
+        return [one for one in items if isinstance(one, kind)] if isinstance(items, tuple) else []
+
+    def with_full_names(self, full_name: Callable[[str], str]) -> ResponseSetup:
+        """The same with all freedoms spelled in full."""
+        return replace(
+            self,
+            start={full_name(name): value for name, value in self.start.items()},
+            rates={full_name(name): value for name, value in self.rates.items()},
+            motions=tuple(replace(one, freedom=full_name(one.freedom)) for one in self.motions),
+            events=tuple(replace(one, of=full_name(one.of)) if isinstance(one.of, str) else one for one in self.events),
+            stops=tuple(replace(one, freedom=full_name(one.freedom)) for one in self.stops),
+        )
+
+    def without(self, gone: set[str]) -> ResponseSetup:
+        """The same without what is said of some freedoms, named in full."""
+        return replace(
+            self,
+            start={name: value for name, value in self.start.items() if name not in gone},
+            rates={name: value for name, value in self.rates.items() if name not in gone},
+            motions=tuple(one for one in self.motions if one.freedom not in gone),
+            events=tuple(one for one in self.events if one.of not in gone),
+            stops=tuple(one for one in self.stops if one.freedom not in gone),
+        )
+
+    def converted(self, base: tuple[float, float, float], turns: Callable[[str], bool]) -> ResponseSetup:
+        """The same in other units; ``turns``: whether a freedom is a turn."""
+
+        def scaled(values: Mapping[str, float], order: int) -> dict[str, float]:
+            powers = {True: (PURE[0], 0, -order), False: (LENGTH[0], 0, -order)}
+            return {name: value * factor_of(powers[turns(name)], base) for name, value in values.items()}
+
+        return replace(
+            self,
+            time=plain(np.asarray(self.time) * base[2]),
+            start=scaled(self.start, 0),
+            rates=scaled(self.rates, 1),
+            motions=tuple(one.in_units(base, turns(one.freedom)) for one in self.motions),
+            events=tuple(one.in_units(base, isinstance(one.of, str) and turns(one.of)) for one in self.events),
+            stops=tuple(one.in_units(base, turns(one.freedom)) for one in self.stops),
+        )
+
+
+def read_times(t: Any, faults: list[str]) -> Array:
+    """Times of outputs, or begin and end; adds what is wrong to ``faults``."""
+    times = real_array(t)
+    fits = times is not None and times.ndim == 1 and len(times) > 1 and np.isfinite(times).all()
+    if times is None or not fits or not (np.diff(times) > 0).all():
+        faults.append(wrong(t, "t", "(begin, end) or rising times of the outputs, at least two"))
+        return np.zeros(2)
+    return times
+
+
+def tolerance_faults(rtol: Any, atol: Any) -> list[str]:
+    """What is wrong with the tolerances of a step."""
+    return [
+        wrong(value, name, "a number from 1e-14 to 0.1")
+        for name, value in (("rtol", rtol), ("atol", atol))
+        if not is_numeric(value, ()) or not 1e-14 <= value <= 0.1
+    ]
+
+
+def _value_faults(m: Nameable, what: str, values: Any) -> list[str]:
+    """What is wrong with numbers by freedoms."""
+    if not isinstance(values, Mapping):
+        return [wrong(values, what, "a mapping")]
+    found = []
+    for name, value in values.items():
+        fault = m.freedom_fault(name, single=what == "start")
+        if fault:
+            found.append(f"{what} of {name!r}: {fault}")
+        elif not is_numeric(value, ()):
+            found.append(wrong(value, f"{what} of {name!r}", "a finite number"))
+    return found
+
+
+def _motion_faults(m: Nameable, one: Drive) -> list[str]:
+    fault = m.freedom_fault(one.freedom, single=True)
+    if fault:
+        return [f"motion of {one.freedom!r}: {fault}"]
+    if isinstance(one.motion, Motion):
+        return one.faults() or (
+            [] if one.motion.t is not None else [f"motion of {one.freedom!r}: has no times; give t"]
+        )
+    return (
+        []
+        if callable(one.motion)
+        else [wrong(one.motion, f"motion of {one.freedom!r}", "a Motion with t, or a function of t")]
+    )
+
+
+def _rebuilt(given: dict[str, Any]) -> ResponseSetup:
+    return ResponseSetup(**given)
