@@ -48,6 +48,7 @@ def results() -> dict[str, Any]:
         "equilibrium": mg.equilibrium(pendulum(), {"A": 0.2}), "linear": mg.linearize(pendulum()),
         "snapped": m.snapped(1e-4), "changes": m.snapped(1e-4).changes, "assembled": mg.assemble(m, {"A": 0.3}),
         "study": mg.study(m, {"coupler.mass": scipy.stats.norm(0.1, 0.01)}, "A.effort", 5, motions={"A": [0.1, 0.2]}),
+        "stop": mg.Stop("A", upper=1.0), "event": mg.Event("A", 0.3),
         "motion": mg.Motion.law("cycloidal", 1.0, 2.0, np.linspace(0, 2, 500)),
         "wrench": mg.Wrench("coupler", force=np.ones((500, 3)), point=(0, 0, 0)),
         "force table": mg.ForceTable(x=list(range(500)), force=list(range(500))),

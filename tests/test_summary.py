@@ -98,6 +98,19 @@ def test_efforts_that_are_not_unique_are_marked() -> None:
     assert not s["A"].unique["effort"].any()
 
 
+def test_couplings_and_tolerances_are_told() -> None:
+    """By hand: a load of -3 on the wheel of 40 teeth is 3 / 40 of a multiplier."""
+    gears = mg.Mechanism("gears", pairs=[
+        mg.Pair("A", "R", "frame", "pinion", point=(0, 0, 0), axis=Z), mg.Pair("B", "R", "frame", "wheel", point=(0.06, 0, 0), axis=Z),
+    ], couplings=[mg.Coupling({"A": 20, "B": 40}, name="teeth")], drives=["A"], loads=[mg.Effort("B", -3)])  # fmt: skip
+    s = mg.solve(gears, {"A": 0.5}, tol=1e-4)
+    assert re.search(r"^teeth +0\.075 +28\.648 deg +0\.075 +28\.648 deg$", s.summary(), re.MULTILINE)
+    (told,) = s.to_dict()["multipliers"]
+    assert (told["coupling"], told["unique"]) == ("teeth", True)
+    assert told["greatest"]["value"] == pytest.approx(0.075, rel=1e-12)
+    assert "Geometry as it is meant to 0.0001" in s.summary()
+
+
 def test_printing_looks_for_nothing_expensive(four_bar: mg.Mechanism, monkeypatch: pytest.MonkeyPatch) -> None:
     s = mg.solve(four_bar, TURN)
     whole = s.summary()

@@ -11,7 +11,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.document import Block, Document, Paragraph
 from mechgraph.model.pair import Pair
 from mechgraph.result.numbers import bracket, ranges
-from mechgraph.result.places import Places
+from mechgraph.result.places import Places, coupling_unit
 from mechgraph.result.values import Values
 from mechgraph.units import unit_of
 
@@ -96,8 +96,7 @@ def coupling_document(values: Values, k: int) -> Document:
     """The relation that a coupling imposes, and its multiplier."""
     m = values.mechanism
     coupling, places = m.couplings[k], Places(values)
-    slides = not any(m.turns(name) for name in coupling.freedoms)
-    unit = bracket(unit_of(m.units, (1 if slides else 2, 1, -2)))
+    unit = bracket(coupling_unit(m, coupling))
     blocks: list[Block] = [Paragraph(f"{coupling.text}; {_solved(places)}.")]
     if values.has_forces:
         rows: list[tuple[str, Array]] = [(f"multiplier{unit}", values.multiplier(k))]

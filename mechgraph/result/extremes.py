@@ -66,6 +66,15 @@ class Reactions:
     touched: Mask
 
 
+def multipliers(values: Values) -> Range:
+    """Ranges of the multipliers of all couplings."""
+    found, loose = values.multipliers()
+    out = Range(len(found))
+    if len(found):
+        out.look(found, np.arange(found.shape[1]), loose)
+    return out
+
+
 def efforts(values: Values) -> tuple[Range, Range]:
     """Ranges of own and of applied efforts of all freedoms."""
     own, applied = (Range(len(values.whole.freedom_names())) for _ in range(2))

@@ -182,10 +182,18 @@ class PairForces(Kept):
 
     def multiplier(self, coupling: int) -> Array:
         """The multiplier of a coupling in the user's units: the effort ``c_i m`` in freedom i."""
+        return self._out(self._masked(self._multiplier(coupling), self._of("multiplier_stress")[coupling]))
+
+    def multipliers(self) -> tuple[Array, Mask]:
+        """The multipliers of all couplings ``(n, T)``, of least norm where redundant, and where they are not unique."""
+        found = [self._multiplier(k) for k in range(len(self.mechanism.couplings))]
+        loose = _touched(self._of("multiplier_stress"))[: len(found)]
+        return np.array(found).reshape(len(found), self._count), loose
+
+    def _multiplier(self, coupling: int) -> Array:
         row, blocks = 6 * self._system.graph.n_loops + coupling, in_blocks(np.arange(self._count))
         scales = [np.broadcast_to(self._system_at(block).row_scale[row], len(block)) for block in blocks]
-        total = self._L**2 * np.concatenate(scales) * self._force("multipliers")[coupling]
-        return self._out(self._masked(total, self._of("multiplier_stress")[coupling]))
+        return np.asarray(self._L**2 * np.concatenate(scales) * self._force("multipliers")[coupling])
 
     def contact(self, coupling: int) -> tuple[Array, Array]:
         """Force of gears on the second one, and the point where it acts."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.model.coupling import BaseCoupling
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.result.numbers import number, with_unit
 from mechgraph.result.values import Values
@@ -27,6 +28,12 @@ def coordinate(m: Mechanism, name: str, value: float) -> str:
 def driver_value(m: Mechanism, name: str, value: float) -> str:
     """``A.Rz = 30 deg``: a driver's value with its unit."""
     return f"{name} = {coordinate(m, name, value)}"
+
+
+def coupling_unit(m: Mechanism, coupling: BaseCoupling) -> str:
+    """The unit of the multiplier: a force where all freedoms are slides, else a moment."""
+    slides = not any(m.turns(name) for name in coupling.freedoms)
+    return unit_of(m.units, (1 if slides else 2, 1, -2))
 
 
 class Places:

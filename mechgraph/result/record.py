@@ -8,8 +8,8 @@ from typing import Annotated
 
 import numpy as np
 
-from mechgraph.result.extremes import Greatest, Range, efforts, reactions
-from mechgraph.result.places import OK, Places
+from mechgraph.result.extremes import Greatest, Range, efforts, multipliers, reactions
+from mechgraph.result.places import OK, Places, coupling_unit
 from mechgraph.result.values import LoadBearing, Values
 from mechgraph.units import unit_of
 
@@ -30,6 +30,17 @@ class EffortRange:
     """The range of an effort over the positions; without values where it is not unique and nothing of least norm stands for it."""
 
     freedom: str
+    unit: str
+    unique: bool
+    least: At | None
+    greatest: At | None
+
+
+@dataclass(frozen=True)
+class MultiplierRange:
+    """The range of the multiplier of a coupling over the positions, as that of an effort."""
+
+    coupling: str
     unit: str
     unique: bool
     least: At | None
@@ -90,6 +101,9 @@ class SolutionData:
     least_norm: Annotated[bool, "values of least norm stand for what is not unique, an assumption"]
     efforts: Annotated[tuple[EffortRange, ...], "what the drives supply"]
     applied_efforts: Annotated[tuple[EffortRange, ...], "what springs, dampers and given efforts do"]
+    multipliers: Annotated[
+        tuple[MultiplierRange, ...], "what the couplings exert, a moment or force for a coefficient of 1"
+    ]
     reactions: tuple[ReactionData, ...]
     warnings: Annotated[tuple[LoadBearing, ...], "passive freedoms that carry load"]
     passive: Annotated[tuple[str, ...], "names of all passive freedoms"]
@@ -125,6 +139,7 @@ def solution_data(values: Values) -> SolutionData:
         values.least_norm,
         () if own is None else tuple(_effort(places, own, k, names[k]) for k in driven),
         () if applied is None else tuple(_effort(places, applied, k, names[k]) for k in loaded),
+        _multipliers(places) if forces else (),
         _reactions(places) if forces else (),
         values.load_bearing(),
         tuple(values.passive_efforts()) if forces else (),
@@ -145,12 +160,24 @@ def _at(places: Places, found: Greatest, k: int, sign: float = 1.0) -> At | None
 
 
 def _effort(places: Places, found: Range, k: int, name: str) -> EffortRange:
-    loose, m = bool(found.loose[k]), places.values.whole
+    m = places.values.whole
     pair, j = m.freedom(name)
     unit = unit_of(m.units, (2 if m.pairs[pair].type.efforts[j].is_couple else 1, 1, -2))
+    return EffortRange(name, unit, *_ends(places, found, k))
+
+
+def _multipliers(places: Places) -> tuple[MultiplierRange, ...]:
+    found, m = multipliers(places.values), places.m
+    return tuple(
+        MultiplierRange(c.name, coupling_unit(m, c), *_ends(places, found, k)) for k, c in enumerate(m.couplings)
+    )
+
+
+def _ends(places: Places, found: Range, k: int) -> tuple[bool, At | None, At | None]:
+    """Whether a quantity is unique, and its extremes where it has a value."""
+    loose = bool(found.loose[k])
     known = not loose or places.values.least_norm
-    ends = (_at(places, found.low, k, -1.0), _at(places, found.high, k)) if known else (None, None)
-    return EffortRange(name, unit, not loose, *ends)
+    return not loose, *((_at(places, found.low, k, -1.0), _at(places, found.high, k)) if known else (None, None))
 
 
 def _reactions(places: Places) -> tuple[ReactionData, ...]:

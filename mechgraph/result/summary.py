@@ -10,11 +10,12 @@ import numpy as np
 
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Table
 from mechgraph.errors import counted
-from mechgraph.result.extremes import Greatest, Range, Reactions, efforts, reactions
+from mechgraph.result.extremes import Greatest, Range, Reactions, efforts, multipliers, reactions
 from mechgraph.result.numbers import NOISE, bracket, number, with_unit
-from mechgraph.result.places import OK, Places
+from mechgraph.result.places import OK, Places, coupling_unit
 from mechgraph.result.values import Mask, Values
 from mechgraph.structure.components import labels_of
+from mechgraph.structure.snapping import SnappedMechanism
 from mechgraph.units import force_hint, unit_of
 
 LISTED = 20
@@ -84,7 +85,7 @@ class _View(Places):
     def positions(self) -> Iterator[Block]:
         """How many positions were solved, and the ranges of those that were not, by reason."""
         done, of = int(self.solved.sum()), self.status.size
-        yield Paragraph(f"Solved {done} of {of} position{'s' if of != 1 else ''}.")
+        yield Paragraph(f"Solved {done} of {of} position{'s' if of != 1 else ''}.{self._meant()}")
         items = []
         for first, last in self.runs():
             if self.status[first] == OK:
@@ -94,6 +95,14 @@ class _View(Places):
         if items:
             yield Heading("Not solved", 2)
             yield Bullets(_shortened(items))
+
+    def _meant(self) -> str:
+        """With what tolerance the geometry is meant."""
+        m = self.m
+        if not isinstance(m, SnappedMechanism):
+            return ""
+        meant = f" Geometry as it is meant to {m.changes.tol:g}, changed by {m.changes.largest:.1g} at most"
+        return f"{meant}; closure errors are those of the geometry as declared."
 
     def _beside(self, first: int, last: int) -> str:
         """The solved positions on both sides of a range that is not solved."""
@@ -151,16 +160,21 @@ class _View(Places):
         loaded = np.flatnonzero(applied.size[: len(self.m.freedom_names())] > 0).tolist()
         known = [k for k in driven if self.mark or not own.loose[k]]
         largest = max([float(own.size[k]) for k in known] + [float(applied.size[k]) for k in loaded], default=0.0)
-        yield from self._ranges("Efforts of the drivers", "driver", own, driven, largest)
-        yield from self._ranges(
-            "Applied efforts (springs, dampers, given efforts)", "freedom", applied, loaded, largest
-        )
+        heads = [name + bracket(self.effort_unit(name)) for name in names]
+        yield from self._ranges("Efforts of the drivers", "driver", own, driven, heads, largest)
+        title = "Applied efforts (springs, dampers, given efforts)"
+        yield from self._ranges(title, "freedom", applied, loaded, heads, largest)
+        if self.m.couplings:
+            heads = [c.name + bracket(coupling_unit(self.m, c)) for c in self.m.couplings]
+            every = list(range(len(heads)))
+            yield from self._ranges("Multipliers of the couplings", "coupling", multipliers(self.values), every, heads)
 
-    def _ranges(self, title: str, what: str, found: Range, columns: list[int], largest: float) -> Iterator[Block]:
-        names = self.values.whole.freedom_names()
+    def _ranges(
+        self, title: str, what: str, found: Range, columns: list[int], heads: list[str], largest: float = 0.0
+    ) -> Iterator[Block]:
         rows: list[tuple[str, ...]] = []
         for k in columns[:LISTED]:
-            head, mark = names[k] + bracket(self.effort_unit(names[k])), self.mark if found.loose[k] else ""
+            head, mark = heads[k], self.mark if found.loose[k] else ""
             if found.loose[k] and not mark:
                 rows.append((head, "not unique", "", "", ""))
                 continue

@@ -187,6 +187,9 @@ class Values(Protocol):
     def contact(self, coupling: int) -> tuple[Array, Array]:
         """Force of gears on the second one, and the point where it acts, ``(..., 3)``."""
 
+    def multipliers(self) -> tuple[Array, Mask]:
+        """Multipliers of all couplings ``(n, T)``, of least norm where redundant, and where they are not unique."""
+
     def blocks(self) -> Iterator[Index]:
         """The solved flat places in parts, for ``..._at``: all pairs at some places ``(n,)``, the batch last."""
 
