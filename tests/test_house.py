@@ -90,6 +90,15 @@ def test_the_check_finds_an_absolute_path(folder: str) -> None:
     assert not lines_with(ABSOLUTE_PATH, f"https://example.org/{folder}/me, a/{folder}/b")
 
 
+MERGE_MARK = re.compile(r"^(?:<{7} |>{7} )", re.MULTILINE)
+
+
+def test_no_merge_was_left_undecided() -> None:
+    texts = {name_of(file): file.read_bytes().decode("utf-8", "replace") for file in repository_files()}
+    assert not [f"{name}:{line}" for name, text in texts.items() for line in lines_with(MERGE_MARK, text)]
+    assert lines_with(MERGE_MARK, "a\n" + "<" * 7 + " HEAD\nb\n" + ">" * 7 + " other\n") == [2, 4]
+
+
 def test_nothing_prints_but_the_command_line() -> None:
     found = []
     for file in package_files():
