@@ -314,14 +314,14 @@ class Outcome:
 
     def _moved(self, places: Index) -> tuple[BlockMotion, FactoredClosure] | None:
         """Rates of a block, and the factors with which they were found; None where it has no position that is closed and regular."""
-        found, line = self.found, self.line
+        found = self.found
         here = found.here if found.here is not None and len(places) == found.x.shape[1] else None
         here = here or Configuration(self._system_at(places), found.x[:, places])
         which = self.solver.chosen(here, found.which[places])
         f = self.solver.factored(here, which)
         found.work.factorizations += here.T
         open_ = here.closure > CLOSED
-        dead = at_dead_points(here, f, line.leading) & ~open_
+        dead = at_dead_points(here, f, self.solver) & ~open_
         if (open_ | dead).any():
             self.trajectory.mark(places[open_], Status.NOT_CLOSED.value)
             self.trajectory.mark(places[dead], Status.DEAD_POINT.value)

@@ -12,7 +12,7 @@ from mechgraph.closure import passive_rest as idle
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.passive_rest import Idle
-from mechgraph.closure.solver import FactoredClosure
+from mechgraph.closure.solver import ClosureSolver, FactoredClosure
 from mechgraph.numerics.tolerances import PATH
 
 
@@ -108,15 +108,37 @@ def distance_to_dead_point(here: Configuration, solver: FactoredClosure, columns
     return out
 
 
-def at_dead_points(here: Configuration, solver: FactoredClosure, columns: Index) -> NDArray[np.bool_]:
-    """Which positions are so near to a dead point of the drivers ``columns`` that their rates would be noise, ``(T,)``."""
-    dead = np.asarray(solver.condition > PATH.singular)
-    doubtful = np.flatnonzero((solver.condition > PATH.doubtful) & ~dead)
+def at_dead_points(here: Configuration, factored: FactoredClosure, solver: ClosureSolver) -> NDArray[np.bool_]:
+    """Which positions are so near to a singular one of the drivers that their rates would be noise, ``(T,)``."""
+    dead = np.asarray(factored.condition > PATH.singular)
+    doubtful = np.flatnonzero((factored.condition > PATH.doubtful) & ~dead)
     if doubtful.size:
         few = here.part(doubtful)
-        near = distance_to_dead_point(few, solver.part(doubtful, few), columns)
-        dead[doubtful] = ~(near > PATH.dead_point)
+        f = factored.part(doubtful, few)
+        near = distance_to_dead_point(few, f, solver.fixed)
+        dead[doubtful] = ~(near > PATH.dead_point) | (_scatter(few, f, solver) > PATH.scatter)
     return dead
+
+
+def _scatter(here: Configuration, factored: FactoredClosure, solver: ClosureSolver) -> Array:
+    """By what part the accelerations for unit driver rates change where the residual changes by rounding, ``(T,)``.
+
+    Near a crossing of branches, at a distance ``d``, by ``rounding / d^3``, where the rates themselves do not grow; near a fold by
+    ``rounding / d^1/2``.
+    """
+    rounding = np.where(np.arange(here.system.n_rows) % 2, PATH.rounding, -PATH.rounding)
+    dx = factored.solve(np.repeat(rounding[:, None, None], here.T, axis=2))[:, 0]
+    there = Configuration(here.system, here.system.advance(here.x, dx))
+    beside = solver.factored(there, factored.which)
+    nothing = np.zeros((len(solver.fixed), here.T))
+    out = np.zeros(here.T)
+    for i in range(len(solver.fixed)):
+        one = nothing.copy()
+        one[i] = 1.0
+        a, b = (rates(x, f, solver.fixed, one, nothing) for x, f in ((here, factored), (there, beside)))
+        change, size = (np.abs(values).max(axis=0, initial=0.0) for values in (a.ddq - b.ddq, a.ddq))
+        out = np.maximum(out, change / np.maximum(size, 1.0))
+    return out
 
 
 def disagreement(moved: Rates, columns: Index, positions: Array, velocity: Array, acceleration: Array) -> Array:

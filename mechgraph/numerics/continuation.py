@@ -52,8 +52,9 @@ class Tracks:
 class Follower:
     """Follows the tracks of a problem; see the head of this file."""
 
-    def __init__(self, problem: Problem) -> None:
-        self.problem = problem
+    def __init__(self, problem: Problem, leads: bool = True) -> None:
+        """``leads``: whether tracks may be followed behind their starts, see ``with_lead``."""
+        self.problem, self.leads = problem, leads
         self.work = Work()
         self.newton = Newton(problem, self.work)
 
@@ -65,8 +66,9 @@ class Follower:
         Unless ``careful`` a track ends, not named, where the quick march or its certificate ends.
         """
         V = x.shape[1]
-        self.paths = paths
+        self.paths, self._x = paths, x
         self.crossings: list[tuple[int, float]] = []
+        self._leads: dict[int, Nodes] = {}
         start = self._start(x, np.full(V, -1) if which is None else which)
         self.stuck = stuck = ~(start.condition <= PATH.singular) & (paths.end > 0)
         self.ends = [End.CROSSING if here else End.REACHED for here in stuck]
@@ -331,31 +333,57 @@ class Follower:
     def _passed(self, nodes: Nodes, march: _March, i: int) -> Nodes:
         """All nodes, with the one behind the crossing where the track ``i`` of a march is stuck; as they are where it does not go on."""
         track = int(march.last.track[i])
-        beyond = self._beyond(nodes.take(nodes.track == track), track)
+        mine = nodes.take(nodes.track == track)
+        beyond = self._beyond(self.with_lead(mine, track), track)
         if beyond is None:
             return nodes
         march.move(beyond, beyond, np.array([i]))
         march.known[i], march.h[i] = False, 0.5 * PATH.shortest_quick
         # the branch is smooth there: it is interpolated from where its nodes are not noise
-        clear = 2.0 * self.crossings[-1][1] - beyond.place[0]
+        clear = max(2.0 * self.crossings[-1][1] - beyond.place[0], 0.0)
         return Nodes.join([nodes.take((nodes.track != track) | (nodes.place <= clear)), beyond])
+
+    def with_lead(self, nodes: Nodes, track: int) -> Nodes:
+        """The nodes of a track up to a singular point, and where that is soon after the start, those behind it, at places below zero.
+
+        They are the branch on which the track begins: what the singular point is and how the branch passes it is told by them.
+        """
+        if not self.leads or nodes.place[-1] > LEAD:
+            return nodes
+        if track not in self._leads:
+            starts = self.paths.drive(np.arange(len(self.paths.end)), np.zeros(len(self.paths.end)))
+            direction = self.paths.drive(np.array([track]), np.array([PATH.first]))[:, 0] - starts[:, track]
+            points = list(starts.T[:, :, None])
+            points[track] = np.stack([starts[:, track], starts[:, track] - LEAD / PATH.first * direction], axis=1)
+            back = Follower(self.problem, leads=False)
+            back.work = back.newton.work = self.work
+            found = back.follow(self._x, Paths(points)).nodes
+            found = found.take((found.track == track) & (found.place > 0.0))
+            self._leads[track] = Nodes.join([replace(found, place=-found.place)])
+        return Nodes.join([self._leads[track], nodes])
 
     def _beyond(self, nodes: Nodes, track: int) -> Nodes | None:
         """The node behind a crossing of branches, on the branch of continuous velocity; None at a fold (and the end is named).
 
-        Towards a fold at ``s*`` rates grow as the inverse of the closure matrix, both as ``|s* - s|^-1/2``; towards a crossing they
-        stay. The branch is extrapolated from nodes well before the crossing, where the matrix is still regular, to as far behind it, and
-        must close there with a correction that is small against the distance to any other branch.
+        Towards a fold at ``s*`` rates grow as ``|s* - s|^-1/2``; towards a crossing they stay. The rates are what tells, not the condition
+        of the equations, which is a matter of how they are solved. The branch is extrapolated from nodes well before the crossing, where
+        the matrix is still regular, to as far behind it, and must close there with a correction that is small against the distance to
+        any other branch.
         """
+        # what is nearer, as where a track starts there, is rounding
+        nodes = nodes.take(nodes.condition <= max(PATH.crossing, 1e3 * float(nodes.condition.min())))
         last = nodes.take(np.array([len(nodes) - 1]))
         size = np.abs(nodes.Z).max(axis=(0, 1))
         earlier = np.flatnonzero(nodes.condition < 0.05 * last.condition[0])
         if not earlier.size:
-            self.ends[track] = End.FOLD
+            # a start that cannot be left in either direction is a singular point itself
+            there = track in self._leads and not len(self._leads[track])
+            self.ends[track] = End.CROSSING if there else End.FOLD
+            self.crossings += [(track, float(last.place[0]))] * there
             return None
         reference = int(earlier[-1])
-        growth = np.log(size[-1] / size[reference]) / np.log(last.condition[0] / nodes.condition[reference])
-        if growth > PATH.crossing_growth:
+        away = max(int(np.searchsorted(nodes.place, last.place[0] - PATH.away)) - 1, 0)
+        if size[-1] > PATH.steeper * size[away]:
             self.ends[track] = End.FOLD
             return None
         self.ends[track] = End.CROSSING
@@ -370,7 +398,8 @@ class Follower:
         for distance in (4e-3, 1e-3, 2.5e-4):
             # also where that is behind the end: whether a crossing is passed does not hang on where a path ends
             at = np.array([crossing + distance])
-            smooth = nodes.take((nodes.place <= crossing - 0.5 * distance) & (nodes.which == nodes.which[-1]))
+            smooth = nodes.take(nodes.place <= crossing - 0.5 * distance)
+            smooth = smooth.take(smooth.which == smooth.which[-1:])
             smooth = smooth.take(np.unique(smooth.place, return_index=True)[1])
             if len(smooth) < 3:
                 continue
@@ -391,6 +420,10 @@ class Follower:
                 self.ends[track] = End.REACHED
                 return new
         return None
+
+
+LEAD = 0.1
+"""How far a track is followed behind its start, where a singular point lies no further ahead; as far as ``_behind`` asks for nodes."""
 
 
 def _spread(places: Array, crossing: float, distance: float) -> Index:

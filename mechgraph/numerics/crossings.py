@@ -71,16 +71,18 @@ def passed(follower: Follower, nodes: Nodes, track: int, place: float) -> Crossi
     here = np.array([track])
     drive = paths.drive(here, np.array([place]))[:, 0]
     direction = (paths.drive(here, np.array([place + PATH.first])) - drive[:, None])[:, 0] / PATH.first
-    mine = nodes.take((nodes.track == track) & (np.abs(nodes.place - place) > NOISE))
+    mine = nodes.take(nodes.track == track)
+    before = follower.with_lead(mine.take(mine.place < place), track)
+    mine = Nodes.join([before, mine.take(mine.place > place)])
+    mine = mine.take(np.abs(mine.place - place) > NOISE)
     off = mine.drive - drive[:, None] - direction[:, None] * (mine.place - place)
     mine = mine.take(np.abs(off).max(axis=0, initial=0.0) < 1e-12)
-    if not (mine.place > place).any():
+    if not (mine.place > place).any() or not (mine.place < place).any():
         return None
     wanted = place + np.concatenate([-_DISTANCES[::-1], _DISTANCES])
     picked = mine.take(np.unique([int(np.argmin(np.abs(mine.place - at))) for at in wanted]))
     picked = picked.take(np.unique(picked.place, return_index=True)[1])
-    # a track may start beside its crossing, with no node before it
-    base = picked.take(np.full(len(SIDES), max(int(np.searchsorted(picked.place, place)) - 1, 0)))
+    base = picked.take(np.full(len(SIDES), np.searchsorted(picked.place, place) - 1))
     dq = problem.difference(picked.x, base.x[:, :1])
     rates = problem.tangent(dq, (picked.Z * direction[:, None]).sum(axis=1))
     form = divided_differences((picked.place - base.place[0])[:, None], dq.T[:, :, None], rates.T[:, :, None])

@@ -113,7 +113,7 @@ class PathTolerances:
     """Times that longest step up to which the first march may reach at once; nodes between are interpolated and closed with the others."""
     shortest_quick: float = 2e-3
     """Step at which the first march stops and the careful one takes over."""
-    shortest: float = 1e-9
+    shortest: float = 1e-10
     """Step at which the careful march stops; the end of the reach is known to this, far above the rounding of a driver value."""
     quick_steps: int = 30_000
     """Most steps of a track in the first march (a thousand turns and more that do not repeat themselves): half a minute."""
@@ -141,6 +141,8 @@ class PathTolerances:
     """Condition number above which a position counts as a dead point: rates would keep fewer than seven digits."""
     dead_point: float = 1e-10
     """Distance to a dead point (in driver coordinates) below which a position counts as one."""
+    scatter: float = 1e-2
+    """Part by which rounding may change accelerations before a position counts as one: beside a crossing of branches, not near a fold."""
     doubtful: float = 1e4
     """Condition number above which the distance to a dead point is computed."""
     dead_zone: float = 1e-7
@@ -148,9 +150,10 @@ class PathTolerances:
     crossing: float = 3e6
     """Condition number at which the careful march stops before a crossing: rounding over it is far below the distance of the branches
     there; at a fold the end of the reach is nearer than ``shortest`` before."""
-    crossing_growth: float = 0.5
-    """Power with which rates grow against the inverse of the closure matrix: one at a fold (both as |s* - s|^-1/2), zero at a crossing
-    of branches; half way between decides."""
+    away: float = 2e-3
+    """Distance before a singular point at which its rates are compared with those next to it."""
+    steeper: float = 10.0
+    """Factor by which they grow towards a fold, which is met to ``shortest``: by thousands; towards a crossing they stay."""
     held: float = 3.0
     """Largest rate of a freedom for a unit rate of the freedom that holds a passive motion, before another one holds it."""
     interpolation: float = 3e-14

@@ -73,7 +73,7 @@ class NumbersPath(DriverPath):
         begin, end = (Configuration(self.system_at(np.full(V, part), np.arange(V)), x).residual for part in (0.0, 1.0))
         way = np.nan_to_num(np.abs(end - begin).max(axis=0, initial=0.0))
         self._step = NUMBERS_STEP / np.where(way > 0, np.clip(way, NUMBERS_STEP / LONGEST_STEP, 1.0), 1.0)
-        return Follower(self).follow(x, Paths([np.array([[0.0, float(ok)]]) for ok in valid]), first=1.0)
+        return Follower(self, leads=False).follow(x, Paths([np.array([[0.0, float(ok)]]) for ok in valid]), first=1.0)
 
 
 NUMBERS_STEP = 1e-7
