@@ -44,7 +44,16 @@ class Tags(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.seen.add(tag)
-        assert {key for key, _ in attrs} <= {"style", "border", "data-latex", "class", "display", "accent", "width"}
+        assert {key for key, _ in attrs} <= {
+            "style",
+            "border",
+            "data-latex",
+            "class",
+            "display",
+            "accent",
+            "width",
+            "stretchy",
+        }
 
 
 @pytest.mark.parametrize("name", NAMES)

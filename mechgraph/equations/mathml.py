@@ -9,9 +9,18 @@ from collections.abc import Iterable
 from mechgraph.document.tree import plain
 from mechgraph.equations.symbols import LATEX_LETTERS, Symbol
 
+OPEN, CLOSE = '<mo stretchy="false">(</mo>', '<mo stretchy="false">)</mo>'
 ACCENTS = {"dot": "˙", "ddot": "¨", "bar": "¯", "hat": "^"}
 GREEK = {r"\rho": "ρ", r"\theta": "θ", r"\omega": "ω", r"\alpha": "α"}
-SIGNS = {"e": "<mi>ϵ</mi>", ".": "<mo>⋅</mo>", "x": "<mo>×</mo>", "exp(": "<mi>exp</mi><mo>(</mo>", "-": "<mo>−</mo>"}
+SIGNS = {
+    "e": "<mi>ϵ</mi>",
+    ".": "<mo>⋅</mo>",
+    "x": "<mo>×</mo>",
+    "exp(": f"<mi>exp</mi>{OPEN}",
+    "(": OPEN,
+    ")": CLOSE,
+    "-": "<mo>−</mo>",
+}
 """Words that are written otherwise than they stand there."""
 COMMAND = re.compile(r"\\(\w+)\{(.*)\}")
 
@@ -49,7 +58,7 @@ def _symbol(symbol: Symbol) -> str:
         base = f'<mover accent="true">{base}<mo>^</mo></mover>'
     along = "0" if symbol.moment else symbol.along
     above = (f"<mo>{primes}</mo>" if primes else "") + (_above(along) if along else "")
-    name = f"<mo>(</mo>{_text(symbol.name)}<mo>)</mo>" if symbol.name else ""
+    name = f"{OPEN}{_text(symbol.name)}{CLOSE}" if symbol.name else ""
     place = f"<mi>{html.escape(symbol.place)}</mi>" if symbol.place else ""
     below = place.replace("mi>", "mn>") if symbol.place[:1].isdigit() else place
     below += name + (f"<mi>{symbol.axis}</mi>" if symbol.axis else "")

@@ -23,10 +23,12 @@ from mechgraph.show.shapes import Shape, frame_along
 from mechgraph.show.stage import Part
 from mechgraph.structure.self_stress import SelfStress
 
-MOST_LINKS = 400
+MOST_LINKS = 250
 """Links up to which a mechanism is drawn in space."""
-MOST_ITEMS = 24
-"""Freedoms, self-stresses and advice, each, that are shown."""
+MOST_ITEMS, LEAST_ITEMS = 24, 4
+"""Freedoms, self-stresses and advice, each, that are shown of a small mechanism, and of any."""
+DRAWN = 1000
+"""Links that are drawn in all of these together, about."""
 LONGEST_TITLE = 48
 """Letters of a self-stress by which it is chosen; all of it stands below the picture."""
 MOST_POSITIONS = 1500
@@ -92,9 +94,10 @@ class _View:
             "self-stresses": len(self.report.self_stresses),
             "advice": len(self.report.advice),
         }[what]
+        most = max(LEAST_ITEMS, min(MOST_ITEMS, DRAWN // len(self.m.links)))
         for number, item in enumerate(items):
-            if number == MOST_ITEMS:
-                self.notes.append(f"Of {total} {what} the first {MOST_ITEMS} are shown.")
+            if number == most:
+                self.notes.append(f"Of {total} {what} the first {most} are shown.")
                 return
             yield item
 

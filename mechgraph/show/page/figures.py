@@ -9,9 +9,8 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.document.tree import plain
-from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
-from mechgraph.show.canvas import MUTED, PALETTE
+from mechgraph.show.canvas import colours
 from mechgraph.show.page.packing import packed, rounded
 from mechgraph.show.scene import Scene
 from mechgraph.show.shapes import Shape
@@ -19,7 +18,7 @@ from mechgraph.show.stage import Part
 
 OBLIQUE = (0.6, -1.0, 0.55)
 """Direction from which a spatial mechanism is seen, in upright axes."""
-ROOM = 7.0
+ROOM = 9.0
 """Room about what is drawn, for names and arrows, over the half width of a symbol."""
 LEFT_OUT = {"reaction"}
 """Parts that the page draws itself, from numbers."""
@@ -30,6 +29,7 @@ class Figure:
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.m = scene, scene.mechanism
+        self.colours = colours(self.m)
         self.home = {f"pair:{p.name}@0": (p.a, p.markers[0].pose()) for p in self.m.pairs}
         self.home |= {f"pair:{p.name}@{p.type.f}": (p.b, p.markers[1].pose()) for p in self.m.pairs}
         self.parts = [part for part in scene.parts if part.role not in LEFT_OUT]
@@ -47,7 +47,7 @@ class Figure:
 
     def data(self, frames: Mapping[str, Array], rows: Mapping[str, list[list[str]]]) -> dict[str, Any]:
         """The figure where it stands at the first of ``frames``; ``rows`` are facts of the pairs."""
-        scene, colours = self.scene, colours_of(self.m)
+        scene = self.scene
         points = (
             np.concatenate([at[:1] for at in scene.points.values()]) if scene.positions.size == 1 else scene.everything
         )
@@ -65,7 +65,7 @@ class Figure:
             "center": rounded(screen.T @ (low + high) / 2),
             "up": rounded(scene.upright[:, 2]),
             "look": rounded(look),
-            "links": [{"name": plain(name), "colour": colours[name]} for name in self.m.link_names()],
+            "links": [{"name": plain(name), "colour": self.colours[name]} for name in self.m.link_names()],
             "pairs": [self._pair(pair, rows.get(pair.name, [])) for pair in self.m.pairs],
             "pieces": [self.piece(part) for part in self.parts],
             "labels": [self._label(label) for label in scene.labels],
@@ -91,12 +91,11 @@ class Figure:
 
     def piece(self, part: Part) -> dict[str, Any]:
         """A part in the frame that is handed over."""
-        colours = colours_of(self.m)
         frame, X = self.placed(part.frame)
         shape = part.shape.moved(X[:, :3], X[:, 3])
         names = [p.name for p in self.m.pairs]
         return {
-            "frame": self.number[frame], "role": part.role, "colour": colours.get(part.link, ""), "dashed": part.dashed,
+            "frame": self.number[frame], "role": part.role, "colour": self.colours.get(part.link, ""), "dashed": part.dashed,
             "pair": names.index(part.owner) if part.owner in names else -1,
             "vertices": packed(shape.vertices), "triangles": triangles(shape), "lines": segments(shape),
         }  # fmt: skip
@@ -113,12 +112,6 @@ class Figure:
             "pair": pair,
             "at": rounded(at),
         }
-
-
-def colours_of(m: Mechanism) -> dict[str, str]:
-    """A colour for every link; grey for the frame."""
-    moving = [name for name in m.link_names() if name != m.frame]
-    return {m.frame: MUTED} | {name: PALETTE[i % len(PALETTE)] for i, name in enumerate(moving)}
 
 
 def triangles(shape: Shape) -> list[int]:

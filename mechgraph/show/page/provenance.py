@@ -35,7 +35,7 @@ def declaration(m: Mechanism) -> str:
 
 def provenance(m: Mechanism, report: DeterminacyReport, s: Solution | None, study: Study | None) -> Document:
     """One table: program, mechanism, options."""
-    return Document("", (Table(("what", "value"), tuple(_rows(m, report, s, study))),))
+    return Document("", (Table(("what", "value"), tuple(row for row in _rows(m, report, s, study) if row[1])),))
 
 
 def _rows(

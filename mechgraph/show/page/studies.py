@@ -13,13 +13,11 @@ Q = (0.00135, 0.5, 0.99865)
 
 
 def study_document(study: Study) -> Document:
-    """Outputs where the mechanism itself has them greatest: nominal value, mean, deviation, quantiles, sensitivities."""
-    return Document("", tuple(_blocks(study)))
+    """What the study tells of itself; and outputs where the mechanism itself has them greatest, with quantiles and sensitivities."""
+    return Document("", (*study.document().blocks, *_blocks(study)))
 
 
 def _blocks(study: Study) -> Iterator[Block]:
-    count, bad = len(study.status), int(study.failed.sum())
-    yield Paragraph(f"{count} variants, {bad} of them not solved at some position.")
     rows, slopes = [], []
     for name in study.outputs:
         nominal = np.asarray(study.nominal[name], dtype=float)
@@ -32,7 +30,8 @@ def _blocks(study: Study) -> Iterator[Block]:
         slopes += [(name, parameter, f"{float(v[at]):.5g}") for parameter, v in study.sensitivities(name).items()]
     head = ("output", "entry", "nominal", "mean", "deviation", "0.135 %", "median", "99.865 %")
     if rows:
+        yield Heading("Outputs where they are greatest", 2)
+        yield Paragraph("At the position, and of the component, where the mechanism itself has the greatest value.")
         yield Table(head, tuple(rows), align="llrrrrrr")
-        yield Paragraph("Every output at the position (and component) where it is greatest for the mechanism itself.")
         yield Heading("Sensitivities there", 2)
         yield Table(("output", "parameter", "derivative"), tuple(slopes), align="llr")

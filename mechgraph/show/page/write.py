@@ -22,13 +22,15 @@ from mechgraph.show.page import made
 from mechgraph.show.page.content import view_data
 from mechgraph.show.page.packing import json_for_script
 from mechgraph.show.page.provenance import declaration, provenance, version
-from mechgraph.show.page.stills import stills
+from mechgraph.show.page.stills import Pictures, pictures_of_graph, pictures_of_study, stills
 from mechgraph.show.page.studies import study_document
 from mechgraph.variants.result import Study
 from mechgraph.writing import write_whole
 
 STYLED = re.compile(r' style="text-align: (left|right|center)"| border="1"')
 """What the page's own style sheet does instead: its policy allows no style beside it."""
+MOST_UNKNOWNS = 300
+"""Unknowns up to which the equations stand in components too: some 0.6 MB."""
 START = "mechgraphView.start();"
 
 
@@ -110,18 +112,26 @@ def _content(m: Mechanism, report: DeterminacyReport, s: Solution | None, study:
         "brief": _html(Document("", tuple(b for b in report.document().blocks if isinstance(b, Bullets)))),
         "report": _html(Document("", report.document(full=True).blocks)),
         "data": json_for_script(data) if data is not None else "",
-        "stills": list(stills(m if s is None else s.mechanism, s)) if drawn else [],
-        "results": [(title, _html(document)) for title, document in _results(s, study)],
-        "equations": _html(Document("", formulate(report.mechanism).document().blocks)),
+        "stills": stills(m if s is None else s.mechanism, s) if drawn else [],
+        "graph": pictures_of_graph(m) if not m.has_geometry else [],
+        "results": [(title, _html(document), pictures) for title, document, pictures in _results(s, study)],
+        "equations": _html(_equations(report.mechanism)),
         "provenance": _html(provenance(m, report, s, study)), "declaration": declaration(m),
         "version": version(), "libraries": made.libraries(),
     }  # fmt: skip
 
 
+def _equations(m: Mechanism) -> Document:
+    """All equations; of a large mechanism without their components."""
+    f = formulate(m)
+    return Document("", f.document(components=len(f.unknowns) <= MOST_UNKNOWNS).blocks)
+
+
 def _judged(r: DeterminacyReport) -> tuple[str, str]:
     """A colour and a word for the verdict, the word for those who do not see the colour."""
-    closed = r.mobility is not None or not r.mechanism.has_geometry
-    if not closed or r.undriven or r.contradicting_drives:
+    if not r.mechanism.has_geometry:
+        return "fair", "By its graph alone"
+    if r.mobility is None or r.undriven or r.contradicting_drives:
         return "bad", "No answer as it stands"
     if r.near or not r.determinate or any(p.load_bearing for p in r.passive):
         return "fair", "To be read with care"
@@ -143,11 +153,11 @@ def _numbers(r: DeterminacyReport, s: Solution | None) -> Iterator[tuple[str, st
         yield "positions solved", f"{int((status == 'ok').sum())} of {status.size}"
 
 
-def _results(s: Solution | None, study: Study | None) -> Iterator[tuple[str, Document]]:
+def _results(s: Solution | None, study: Study | None) -> Iterator[tuple[str, Document, Pictures]]:
     if s is not None:
-        yield "Results", Document("", s.document(asked=True).blocks)
+        yield "Results", Document("", s.document(asked=True).blocks), []
     if study is not None:
-        yield "Study", study_document(study)
+        yield "Study", study_document(study), pictures_of_study(study)
 
 
 def _html(document: Document) -> str:
@@ -167,7 +177,7 @@ def _filled(content: dict[str, Any]) -> str:
     style = made.view_style() + made.text_of("page.css")
     scripts = [*made.scripts(), START]
     markup = {name: Markup(content[name]) for name in ("brief", "report", "equations", "provenance", "data")}
-    results = [(title, Markup(html)) for title, html in content["results"]]
+    results = [(title, Markup(html), pictures) for title, html, pictures in content["results"]]
     page = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=False).from_string(
         made.text_of("page.html")
     )

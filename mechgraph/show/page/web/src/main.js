@@ -23,7 +23,7 @@ export function start() {
   /** @type {HTMLDetailsElement[]} */
   let opened = [];
   window.addEventListener("beforeprint", () => {
-    opened = [...document.querySelectorAll("details")].filter((part) => !part.open);
+    opened = [...document.querySelectorAll(/** @type {"details"} */ ("details.printed"))].filter((part) => !part.open);
     for (const part of opened) part.open = true;
   });
   window.addEventListener("afterprint", () => {

@@ -13,7 +13,7 @@ import { canDraw, Stage } from "./stage.js";
 /** Seconds of a whole cycle, of a way to one side, of a turn. */
 const SECONDS = { cycle: 6, swing: 2, spin: 4 };
 /** Length of the longest arrow in sizes of the figure. */
-const LONGEST = 0.22;
+const LONGEST = 0.17;
 const NO_DRAWING = "This browser cannot draw in three dimensions (WebGL is off); the still pictures and all numbers are here.";
 
 class View {
