@@ -26,7 +26,8 @@ from test_cli import run
 from test_hostile_names import NAMES, named
 
 import mechgraph as mg
-from mechgraph.show.page import made
+from mechgraph.show.canvas import PALETTE, REACTION
+from mechgraph.show.page import content, made
 from mechgraph.show.page.packing import json_for_script, packed
 from mechgraph.show.page.write import report_page
 
@@ -36,7 +37,7 @@ WEB = Path(made.__file__).parent / "web"
 SHOWN = ("four-bar", "rssr", "bricard-cube", "rcsr")
 """Redundant; with a passive freedom; without a stored motion; determinate."""
 SVG = {"svg", "metadata", "RDF", "Work", "type", "format", "title", "creator", "Agent", "defs", "style", "g", "path", "use", "text",
-       "clipPath", "rect", "tspan"}  # fmt: skip
+       "clipPath", "rect", "tspan", "pattern"}  # fmt: skip
 """Elements of the still pictures."""
 LARGEST_PAGE = 1_000_000
 """Bytes of a page without its data."""
@@ -335,6 +336,58 @@ def test_without_geometry_and_without_closed_loops() -> None:
     )
     page = report_page(open_loop)
     assert "No answer as it stands" in page
+
+
+def test_what_is_too_large_is_left_out_and_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    m = mg.load("four-bar")
+    monkeypatch.setattr(content, "MOST_ITEMS", 2)
+    monkeypatch.setattr(content, "LEAST_ITEMS", 2)
+    page = data_of(report_page(m))
+    assert [len([i for i in page["items"] if i["group"] == group]) for group in ("Self-stresses", "Advice")] == [2, 2]
+    assert page["note"] == "Of 3 self-stresses the first 2 are shown. Of 8 advice the first 2 are shown."
+    s = mg.solve(m, {"A": np.linspace(0, 1, 31)})
+    monkeypatch.setattr(content, "MOST_POSITIONS", 10)
+    page = data_of(report_page(m, s))
+    assert numbers(page["cycle"]["x"]) == pytest.approx(np.rad2deg(np.linspace(0, 1, 31))[::4])
+    assert page["note"].startswith("Of 31 positions every 4th is shown.")
+    monkeypatch.setattr(content, "MOST_LINKS", 3)
+    assert "more links than are drawn in space" in report_page(m)
+    assert 'id="data"' not in report_page(m)
+
+
+SIGHT = {
+    "usual": np.eye(3),
+    "protanopia": np.array(
+        [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]]
+    ),
+    "deuteranopia": np.array(
+        [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]]
+    ),
+    "tritanopia": np.array(
+        [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]]
+    ),
+}
+"""How linear red, green and blue are seen (Machado, Oliveira and Fernandes, 2009, severity 1)."""
+
+
+def seen(colour: str, sight: str) -> np.ndarray:
+    """CIELAB of what is seen of ``#rrggbb``."""
+    c = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
+    rgb = np.clip(SIGHT[sight] @ np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4), 0, 1)
+    xyz = (
+        np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+        @ rgb
+        / [0.9505, 1, 1.089]
+    )
+    f = np.where(xyz > 0.008856, np.cbrt(xyz), 7.787 * xyz + 16 / 116)
+    return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
+
+
+@pytest.mark.parametrize("sight", SIGHT)
+def test_colours_are_told_apart(sight: str) -> None:
+    colours = [*PALETTE, REACTION]
+    found = [seen(colour, sight) for colour in colours]
+    assert min(np.linalg.norm(a - b) for i, a in enumerate(found) for b in found[:i]) > 12
 
 
 def test_a_response_and_a_study_have_pages() -> None:

@@ -13,9 +13,9 @@ INK = "#1f2933"
 MUTED = "#7b8794"
 FAINT = "#c8d0d8"
 GRID = "#e4e7eb"
-PALETTE = ("#0b6fa4", "#d9730d", "#1a936f", "#7a4fa3", "#3fa7d6", "#8d5524", "#8a9a00", "#c25b8f")
-"""Colours of moving links and of curves, in order and then again; told apart by colour-blind readers too."""
-REACTION, LOAD = "#c1121f", "#a3006a"
+PALETTE = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#6b3a00")
+"""Colours of moving links and of curves, in order and then again; told apart by colour-blind readers too (Okabe and Ito, and a brown)."""
+REACTION, LOAD = "#d55e00", "#a3006a"
 """Colours of reaction forces and of loads."""
 HATCH = "/////"
 """How what is not unique is filled: it has no value."""

@@ -75,6 +75,7 @@ def _picture(draw: Callable[[], Any]) -> str:
         raise MissingExtraError("matplotlib", "report") from None
     buffer = io.BytesIO()
     with rc_context(RC), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph", UserWarning)  # the reader's fonts may have it
+        # the reader's fonts may have the letters of a name; a name as long as the picture leaves the curves no room
+        warnings.filterwarnings("ignore", "Glyph|constrained_layout not applied", UserWarning)
         draw().figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     return f"data:image/svg+xml,{quote(visible(buffer.getvalue().decode()), safe=' =:/,.;()-')}"

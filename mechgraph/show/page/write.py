@@ -31,6 +31,7 @@ STYLED = re.compile(r' style="text-align: (left|right|center)"| border="1"')
 """What the page's own style sheet does instead: its policy allows no style beside it."""
 MOST_UNKNOWNS = 300
 """Unknowns up to which the equations stand in components too: some 0.6 MB."""
+TOO_LARGE = "It has more links than are drawn in space."
 START = "mechgraphView.start();"
 
 
@@ -103,8 +104,9 @@ def _faults(m: Mechanism, solution: Any, study: Any) -> list[str]:
 def _content(m: Mechanism, report: DeterminacyReport, s: Solution | None, study: Study | None) -> dict[str, Any]:
     side, word = _judged(report)
     data = view_data(report, s)
+    drawn = data is not None
     remarks = [report.rounding.text] if report.rounding is not None else []
-    drawn = report.geometry is not None and data is not None
+    remarks += [TOO_LARGE] if report.geometry is not None and not drawn else []
     return {
         "name": m.name or "mechanism", "about": m.description, "side": side, "word": word, "verdict": report.verdict,
         "remarks": [*remarks, *([report.note] if report.note else []), *map(str, s.warnings if s is not None and s.has_forces else ())],
