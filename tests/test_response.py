@@ -342,3 +342,28 @@ def test_loads_along_motions_without_inertia_are_refused(function):
     # unloaded, it goes along and is not moved
     r = mg.respond(tail.replace(loads=[]), (0, 1), rates={"A": 1.0})
     assert r["A"].velocity[-1, 0] == pytest.approx(1.0, abs=1e-9)
+
+
+def test_a_chain_of_sixty_pendulums_starts_as_lagrange_says():
+    """M_ij = m l^2 (n - j - 1/2) cos(a_i - a_j) for j > i, m l^2 (n - i - 2/3) on the diagonal, of absolute angles a; batches agree."""
+    n, m, rod_length = 60, 0.1, 0.05
+    angles = np.random.default_rng(3).normal(scale=0.5, size=n)
+    rates = np.random.default_rng(4).normal(size=n)
+    links = [mg.Link("frame")]
+    links += [rod(f"l{i}", (rod_length * i, 0, 0), (rod_length * (i + 1), 0, 0), m) for i in range(n)]
+    pairs = [mg.Pair(f"A{i}", "R", links[i].name, f"l{i}", point=(rod_length * i, 0, 0), axis=Z) for i in range(n)]
+    chain = mg.Mechanism("chain", links, pairs, loads=[DOWN])
+    names = [f"A{i}" for i in range(n)]
+    r = mg.respond(
+        chain, (0, 1e-4), start=dict(zip(names, angles, strict=True)), rates=dict(zip(names, rates, strict=True))
+    )
+    a, w = np.cumsum(angles), np.cumsum(rates)
+    i, j = np.indices((n, n))
+    c = m * rod_length**2 * np.where(i == j, n - i - 2 / 3, n - np.maximum(i, j) - 0.5)
+    off = a[:, None] - a
+    Q = -m * G * rod_length * (n - np.arange(n) - 0.5) * np.cos(a) - (c * np.sin(off)) @ w**2
+    expected = np.diff(np.linalg.solve(c * np.cos(off), Q), prepend=0.0)
+    found = np.array([r[name].acceleration[0, 0] for name in names])
+    np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
+    again = np.array([r.at(0.0)[name].acceleration[0] for name in names])
+    np.testing.assert_allclose(again, found, atol=1e-11 * np.abs(expected).max())

@@ -57,9 +57,9 @@ class Status(Enum):
     BEYOND_TOLERANCE = "beyond tolerance"
 
 
-def in_blocks(places: Index) -> list[Index]:
-    """Places in parts of about equal size, at most ``BLOCK`` each; at least one part."""
-    return [np.asarray(part) for part in np.array_split(places, max(1, -(-len(places) // BLOCK)))]
+def in_blocks(places: Index, most: int = BLOCK) -> list[Index]:
+    """Places in parts of about equal size, at most so many each; at least one part."""
+    return [np.asarray(part) for part in np.array_split(places, max(1, -(-len(places) // most)))]
 
 
 SystemOf = Callable[[Index], System]

@@ -22,7 +22,7 @@ from mechgraph.response.chart import Closed
 from mechgraph.response.charts import Task
 from mechgraph.response.events import Occurrence
 from mechgraph.response.integration import Integration
-from mechgraph.response.motion_equations import moved
+from mechgraph.response.motion_equations import moved, positions_together
 from mechgraph.response.reading import trajectory_of
 from mechgraph.result.numbers import ranges
 from mechgraph.result.record import SolutionData, solution_data
@@ -162,7 +162,8 @@ class Course:
     def _states(self, flat: Array) -> Iterator[tuple[Index, Task, Closed, Array, Array]]:
         """Closed states at times ``(T,)`` in blocks: places, task, states, rates of the independent columns, work done."""
         for places, stage, y, work in self.integration.at(flat):
-            for part in in_blocks(np.arange(len(places))):
+            together = positions_together(self.task.system, (len(y) - 1) // 2)
+            for part in in_blocks(np.arange(len(places)), together):
                 closed, v = stage.states(flat[places[part]], y[:, part])
                 if not closed.done.all() or float(closed.here.closure.max()) > CLOSED:
                     raise ResponseError(

@@ -18,8 +18,10 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array
+from mechgraph.algebra.se3 import Array, cross, rotate, rotate_back
 from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.driver_path import BLOCK
+from mechgraph.closure.indexing import System
 from mechgraph.closure.rates import Rates, Velocities
 from mechgraph.closure.solver import FactoredClosure
 from mechgraph.force.applied_loads import Site, inertia_wrenches
@@ -27,6 +29,10 @@ from mechgraph.model.load_base import Load
 
 MASSLESS = 1e-12
 """Eigenvalue of the mass matrix, of which the diagonal is one, below which a motion has no inertia."""
+RESISTED = 1e-9
+"""Pivot (squared) of the same matrix above which every motion has inertia."""
+NUMBERS = 5_000_000
+"""Numbers in an array of twists."""
 UNOPPOSED = 1e-9
 """Part of the largest generalized force below which none acts along a motion without inertia."""
 
@@ -76,6 +82,28 @@ NO_INERTIA = (
 )
 
 
+def positions_together(system: System, n: int) -> int:
+    """Positions evaluated together, so that the twists of all links for ``n`` motions do not take much memory."""
+    return max(1, min(BLOCK, NUMBERS // (6 * len(system.m.links) * max(n, 1))))
+
+
+def link_twists(here: Configuration, Z: Array) -> Array:
+    """Twists of all links ``(6, N, k, T)`` for several rates ``(F, k, T)`` at every position."""
+    k, T = Z.shape[1:]
+    terms = (here.S[:, :, None] * Z).reshape(6, len(Z), k * T)
+    sums = here.system.tree.sums(here.pair_sums(terms))
+    return np.asarray(sums.reshape(6, sums.shape[1], k, T))
+
+
+def _momenta(here: Configuration, V: Array) -> Array:
+    """Spatial inertias of all links times twists ``(6, N, k, T)``: moments of momentum about the internal origin, and momenta."""
+    par, R = here.system.par, here.poses[:, :3, :, None]
+    c = (rotate(here.poses[:, :3], par.center) + here.poses[:, 3])[:, :, None]
+    momentum = par.mass[:, None] * (V[3:] + cross(V[:3], c))
+    spin = rotate(R, rotate(par.inertia[:, :, :, None], rotate_back(R, V[:3])))
+    return np.concatenate([cross(c, momentum) + spin, momentum])
+
+
 class Columns:
     """What the motions of unit rates do at closed states: ``Z (F, n, T)`` of the independent columns and ``Zp`` of the prescribed ones.
 
@@ -85,24 +113,25 @@ class Columns:
     def __init__(self, here: Configuration, f: FactoredClosure, n: int) -> None:
         self.here, self.f, self.n = here, f, n
         self.Z, self.Zp = np.split(f.sensitivity(), [n], axis=1)
-        self.V = [here.link_twists(self.Z[:, k]) for k in range(n)]
-        still = np.zeros((6, len(here.system.m.links), here.T))
-        self.reluctance = [_inertia(here, still, V) for V in self.V]
-        self.mass = np.empty((n, n, here.T))
-        for k in range(n):
-            for j in range(k, n):
-                self.mass[k, j] = self.mass[j, k] = -(self.V[k] * self.reluctance[j]).sum(axis=(0, 1))
+        self.V = link_twists(here, self.Z)
+        self.momenta = _momenta(here, self.V)
+        rows = 6 * len(here.system.m.links)
+        self._V = self.V.reshape(rows, n, here.T)
+        # a matrix product for every position: the masses of many freedoms are most of the work
+        self.mass = np.moveaxis(
+            np.moveaxis(self._V, (2, 1), (0, 1)) @ np.moveaxis(self.momenta.reshape(rows, n, here.T), 2, 0), 0, -1
+        )
 
     def force(self, wrenches: Array, efforts: Array) -> Array:
         """Generalized forces ``(n, T)`` of wrenches on the links and efforts in the freedoms."""
-        return np.array(
-            [(V * wrenches).sum(axis=(0, 1)) + (self.Z[:, k] * efforts).sum(axis=0) for k, V in enumerate(self.V)]
-        ).reshape(self.n, self.here.T)
+        by_wrenches = np.einsum("rkt,rt->kt", self._V, wrenches.reshape(len(self._V), self.here.T))
+        return np.asarray(by_wrenches + np.einsum("fkt,ft->kt", self.Z, efforts))
 
     def largest(self, wrenches: Iterable[Array], efforts: Iterable[Array]) -> float:
         """The largest part that a component of wrenches or of efforts has in a generalized force."""
-        parts = [np.abs(V * one).max(initial=0.0) for one in wrenches for V in self.V]
-        return float(max([*parts, *(np.abs(self.Z * one[:, None]).max(initial=0.0) for one in efforts)], default=0.0))
+        by_wrenches, by_efforts = (np.abs(columns).max(axis=-2, initial=0.0) for columns in (self.V, self.Z))
+        parts = [float(np.abs(by_wrenches * one).max(initial=0.0)) for one in wrenches]
+        return max([*parts, *(float(np.abs(by_efforts * one).max(initial=0.0)) for one in efforts)], default=0.0)
 
     def bound(self, dq: Array, ddq: Array | None = None) -> tuple[Velocities, Array, Array]:
         """At rates ``dq (F, T)``, the independent ones constant: velocities, accelerations ``ddq`` of all freedoms, and the inertia."""
@@ -135,10 +164,10 @@ def moved(here: Configuration, f: FactoredClosure, v: Array, p: Array, loads: Lo
     wrenches, efforts = stored + rest + inertia, by_stored + by_rest
     force = columns.force(wrenches, efforts)
     a, unopposed = accelerations(columns.mass, force)
-    if np.abs(unopposed).max(initial=0.0) > UNOPPOSED * columns.largest((stored, rest, inertia), (by_stored, by_rest)):
+    left = np.abs(unopposed).max(initial=0.0)
+    if left and left > UNOPPOSED * columns.largest((stored, rest, inertia), (by_stored, by_rest)):
         raise Stopped(NO_INERTIA)
-    for reluctance, one in zip(columns.reluctance, a, strict=True):
-        wrenches = wrenches + reluctance * one
+    wrenches = wrenches - np.einsum("ijkt,kt->ijt", columns.momenta, a)
     power = (V * rest).sum(axis=(0, 1)) + (dq * by_rest).sum(axis=0)
     for k in range(Zp.shape[1]):
         effort = -((here.link_twists(Zp[:, k]) * wrenches).sum(axis=(0, 1)) + (Zp[:, k] * efforts).sum(axis=0))
@@ -170,7 +199,14 @@ def accelerations(mass: Array, force: Array) -> tuple[Array, Array]:
         return np.divide(force, mass[0], out=np.zeros_like(force), where=moves), np.where(moves, 0.0, force)
     M, Q = np.moveaxis(mass, -1, 0), force.T[..., None]
     size = _sizes(M)
-    w, U = np.linalg.eigh(in_unit_inertias(M))
+    unit = in_unit_inertias(M)
+    try:
+        pivots = np.linalg.cholesky(unit)
+    except np.linalg.LinAlgError:
+        pivots = np.zeros_like(unit)
+    if (np.einsum("...ii->...i", pivots) ** 2 > RESISTED).all():
+        return (np.linalg.solve(unit, Q / size[..., None]) / size[..., None])[..., 0].T, np.zeros_like(force)
+    w, U = np.linalg.eigh(unit)
     kept = (w > MASSLESS * w[:, -1:])[..., None]
     parts = np.swapaxes(U, 1, 2) @ (Q / size[..., None])
     a = U @ np.where(kept, parts / np.where(kept, w[..., None], 1.0), 0.0)
