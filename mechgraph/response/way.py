@@ -34,9 +34,9 @@ POINTS = 16
 """Points of a series; even, so that none lies in the middle."""
 FASTEST = 6.0
 """Rate of another freedom against that of the coordinate at which the table ends."""
-AROUND = 0.32
+AROUND = 0.64
 """Length of the piece with a change point in its middle: the accelerations of states beside it lose rounding over the cube of the
-distance, 4e-11 at the nearest point of the series."""
+distance, 5e-12 at the nearest point of the series."""
 TAIL = 1e-12
 """Part of the largest coefficient that the last two of a series may have; what a smooth series leaves out behind them is far smaller."""
 ROUNDING = 1e-14
@@ -86,11 +86,11 @@ class Way:
         """Tabulate the next part, up to ``most`` at first."""
         place = min(self.length + self._next, most)
         self._next *= 2.0
-        self._follow(place + AROUND)
+        self._follow(place + AROUND / 2)
         # a part does not end beside a change point
-        while near := [c.place for c in self.crossings if abs(place - c.place) < AROUND]:
-            place = max(near) + AROUND
-            self._follow(place + AROUND)
+        while near := [c.place for c in self.crossings if abs(place - c.place) < AROUND / 2 - SHORTEST]:
+            place = max(near) + AROUND / 2
+            self._follow(place + AROUND / 2)
         known = self._known()
         self.closed = place > known
         place = min(place, known)
