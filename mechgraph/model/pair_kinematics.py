@@ -86,7 +86,7 @@ def twists_of(row: Row, pitch: Array, frames: Sequence[Array], x: Array | None =
     The state ``x`` may be left out where all twists are constant in their frames.
     """
     X = frames[0]
-    out = np.empty((6, row.f, *X.shape[2:]), dtype=X.dtype if x is None else np.result_type(X, x))
+    out = np.empty((6, row.f, *X.shape[2:]), dtype=frames[-1].dtype if x is None else np.result_type(X, x))
     numbers = np.empty((row.nx, *X.shape[2:])) if x is None else x
     for step, columns, rows in _placed(row):
         local = step.twists(numbers[rows], pitch)

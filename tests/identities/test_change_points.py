@@ -213,3 +213,14 @@ def test_a_path_cannot_be_assembled_at_a_change_point():
     m = four_bar(1, 2, 1, 2, np.pi / 2).replace(start={"A": np.pi / 2})
     with pytest.raises(mg.DeadPointError, match="2 branches meet there"):
         mg.solve(m, {"A": np.array([np.pi / 2, 1.7])})
+
+
+def test_branches_are_rates_for_a_unit_rate_of_a_slide_that_drives():
+    """A rack of radius 0.5 turns the crank: twice the slopes of the parallelogram in line, whatever the size of the mechanism."""
+    m = four_bar(1, 2, 1, 2, crank=0.0)
+    rack = mg.Pair("T", "P", "frame", "rack", point=(0, 3, 0), axis=X)
+    m = m.replace(links=None, pairs=[*m.pairs, rack], couplings=[mg.Coupling({"T": 2.0, "A": -1.0})], drives=["T"])
+    with pytest.raises(mg.DeadPointError, match="2 branches meet there") as caught:
+        mg.kinematics(m, {"T": np.array([0.0, 0.1])})
+    found = sorted((way["T.Tz"], way["A.Rz"], way["D.Rz"]) for way in caught.value.branches)
+    np.testing.assert_allclose(found, [(1, 2, -6), (1, 2, 2)], atol=1e-6)

@@ -382,3 +382,19 @@ def test_rates_of_rotation_vectors_are_their_derivatives(size):
         evaluation.turn_between(evaluation.turned(se3.quaternion_exp(v), s * h * w), np.eye(4, 1)) for s in (1, -1)
     ]
     np.testing.assert_allclose(evaluation.turn_tangent(v, w), (turned[0] - turned[1]) / (2 * h), rtol=0, atol=2e-8)
+
+
+@pytest.mark.parametrize("row", [row for row in ROWS.values() if row.reactions is None], ids=lambda row: row.symbol)
+def test_reactions_without_components_are_a_basis_about_marker_b(row):
+    """Orthonormal in the directions of marker B, moments about its origin; reciprocal at complex states too, without a conjugate."""
+    x = states(row)
+    frames, S, _, W = evaluated(row, x)
+    B = frames[-1]
+    moment = W[:3] - np.cross(np.broadcast_to(B[:, None, 3], W[3:].shape), W[3:], axis=0)
+    N = np.concatenate([np.einsum("jint,jcnt->icnt", B[:, :3], part) for part in (moment, W[3:])])
+    unit = np.einsum("icnt,idnt->cdnt", N, N)
+    np.testing.assert_allclose(unit, np.broadcast_to(np.eye(6 - row.f)[:, :, None, None], unit.shape), atol=1e-13)
+    x = x + 1e-2j * np.random.default_rng(3).normal(size=x.shape)
+    _, S, _, W = evaluated(row, x)
+    assert np.abs(W.imag).max() > 1e-4
+    np.testing.assert_allclose(np.einsum("ifnt,icnt->fcnt", S, W), 0, atol=1e-13)

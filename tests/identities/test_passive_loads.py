@@ -177,3 +177,12 @@ def test_rods_that_hang_on_balls_end_in_one_pose_however_many_positions_are_aske
     ]
     for end in ends:
         np.testing.assert_allclose(end, ends[-1], atol=1e-10)
+
+
+@pytest.mark.parametrize("size", [1e-12, 1.0, 1e12])
+def test_an_effort_of_any_size_is_held(size: float) -> None:
+    """What counts as rounding is measured by the loads that act."""
+    light = shaft(mg.Effort("A.Rz", size))
+    s, said = solved(light)
+    assert len(said) == 1
+    assert np.abs(next(iter(s.passive_effort.values()))) == pytest.approx(size, rel=1e-9)
