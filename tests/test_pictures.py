@@ -13,6 +13,7 @@ from test_show import check_texts, four_bar, texts_of
 
 import mechgraph as mg
 from mechgraph import show
+from mechgraph.errors import visible
 from mechgraph.show.margins import margins
 
 Z = (0.0, 0.0, 1.0)
@@ -200,6 +201,36 @@ def test_graphs_and_structures_of_the_library(name: str) -> None:
     ax = show.draw_structure(m)
     assert {f"{p.name} ({p.type.symbol})" for p in m.pairs} <= {text.partition(": ")[2] for text in texts_of(ax)}
     check_texts(ax)
+
+
+def test_couplings_tie_pairs() -> None:
+    gears = mg.Mechanism("gears", pairs=[
+        mg.Pair("A", "R", "frame", "pinion", point=(0, 0, 0), axis=Z), mg.Pair("B", "R", "frame", "wheel", point=(0.06, 0, 0), axis=Z),
+    ], couplings=[mg.Coupling({"A": 20, "B": 40}, name="teeth")], drives=["A"])  # fmt: skip
+    for ax in (show.draw_graph(gears), show.draw_structure(gears)):
+        assert [line for line in ax.lines if line.get_gid() == "coupling teeth"]
+        assert "teeth" in {text.partition(": ")[2] for text in texts_of(ax)}
+        check_texts(ax)
+
+
+@pytest.mark.parametrize("name", ["$x$", "_hidden", "$\\frac{", "a\nb", "50 %", "<b>&amp;"])
+def test_names_are_shown_as_they_are(name: str) -> None:
+    """No formula is made of them, no legend leaves them out, nothing fails."""
+    m = mg.Mechanism(name, [mg.Link("frame"), mg.Link(name, 1.0, (0.5, 0, 0), points={name: (1, 0, 0)})],
+        [mg.Pair(name, "R", "frame", name, point=(0, 0, 0), axis=Z)], [name], [mg.Gravity((0, -9.81, 0))], units=UNITS)  # fmt: skip
+    s = mg.solve(m, {name: [0.0, 0.5, 1.0]})
+    drawn = [
+        show.draw_graph(m),
+        show.draw_structure(m),
+        show.draw_sparsity(mg.formulate(m)),
+        show.draw_skeleton(s, forces=True),
+    ]
+    drawn += [show.reaction_curve(s, name), show.polar_force(s, name), show.reaction_ranges(s)]
+    drawn += [draw(s) for draw in (show.effort_curve, show.point_path, show.hodograph, show.margin_curve)]
+    for ax in drawn:
+        ax.figure.draw_without_rendering()
+    assert len(labels(show.point_path(s))) == 1
+    assert visible(name).replace("$", r"\$") in labels(show.point_path(s))[0]
 
 
 def test_the_frame_of_a_structure_is_hatched_and_parallel_pairs_bulge_apart() -> None:

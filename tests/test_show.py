@@ -217,6 +217,13 @@ def test_without_matplotlib(monkeypatch: pytest.MonkeyPatch) -> None:
         draw_skeleton(s)
 
 
+def test_cases_have_paths_of_their_own() -> None:
+    s = mg.kinematics(four_bar(), {"A": np.stack([np.linspace(0, 1, 5), np.linspace(0, 2, 5)])})
+    (path,) = drawn(draw_skeleton(s, 7, traces=["B"]), "trace of B")
+    tip = s.link("crank").point((1, 0, 0)).position[..., :2]
+    assert np.allclose(path.get_segments(), tip)
+
+
 def test_highlighted_loop_of_a_mechanism_that_was_not_solved() -> None:
     """Links outside the loop are grey; the picture needs no drivers."""
     m = mg.load("rcsr-csr")

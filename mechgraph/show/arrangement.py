@@ -18,6 +18,7 @@ from matplotlib.text import Text
 from matplotlib.transforms import IdentityTransform
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.errors import visible
 from mechgraph.show.canvas import MUTED
 
 RINGS = (1.0, 1.6, 2.4, 3.4, 4.6, 6.0, 8.0)
@@ -117,7 +118,8 @@ class Arrangement(Artist):
         return box
 
     def _text(self, text: str, colour: str, **style: Any) -> Text:
-        out = Text(0, 0, text, color=colour, zorder=20, ha="left", va="bottom", transform=IdentityTransform(), **style)
+        where: dict[str, Any] = {"ha": "left", "va": "bottom", "transform": IdentityTransform()}
+        out = Text(0, 0, visible(text), color=colour, zorder=20, parse_math=False, **where, **style)
         out.set_path_effects([effects.withStroke(linewidth=2.6, foreground="white")])
         out.set_in_layout(False)
         self._ax.add_artist(out)

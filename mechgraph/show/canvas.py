@@ -6,7 +6,7 @@ import importlib
 from collections.abc import Sequence
 from typing import Any
 
-from mechgraph.errors import MissingExtraError
+from mechgraph.errors import MissingExtraError, visible
 from mechgraph.model.mechanism import Mechanism
 
 INK = "#1f2933"
@@ -53,9 +53,15 @@ def plain(ax: Any) -> None:
     ax.set_axisbelow(True)
 
 
+def said(text: str) -> str:
+    """A text with names of a user as matplotlib shows it: no formula is made of it, and a legend leaves none out."""
+    plain_text = visible(text).replace("$", r"\$")
+    return f"\u2009{plain_text}" if plain_text.startswith("_") else plain_text
+
+
 def with_unit(text: str, unit: str) -> str:
     """``force [N]``; the text alone where there is no unit."""
-    return f"{text} [{unit}]" if unit else text
+    return said(f"{text} [{unit}]" if unit else text)
 
 
 def colours(m: Mechanism, highlight: Sequence[str] = ()) -> dict[str, str]:

@@ -16,7 +16,7 @@ from mechgraph.errors import DeclarationError
 from mechgraph.quantities import shown
 from mechgraph.response.course import Response
 from mechgraph.result.solution import Solution
-from mechgraph.show.canvas import HATCH, INK, MUTED, PALETTE, new_axes, plain, with_unit
+from mechgraph.show.canvas import HATCH, INK, MUTED, PALETTE, new_axes, plain, said, with_unit
 from mechgraph.show.margins import margins
 from mechgraph.units import unit_of
 
@@ -96,7 +96,7 @@ def draw_curve(ax: Any, x: Abscissa, y: Array, label: str, **style: Any) -> None
         ys = np.where(there, ys, np.nan)
         beside = np.concatenate([[False], there, [False]])
         alone = there & ~beside[:-2] & ~beside[2:]
-        (line,) = ax.plot(xs, ys, label="_" * bool(i) + label, **{"lw": 2.0, "solid_capstyle": "round", **style})
+        (line,) = ax.plot(xs, ys, label="_" * bool(i) + said(label), **{"lw": 2.0, "solid_capstyle": "round", **style})
         if alone.any():
             ax.plot(xs[alone], ys[alone], "o", ms=4.5, color=line.get_color(), label="_")
 
@@ -116,7 +116,7 @@ def hatched_strips(ax: Any, x: Abscissa, lost: Sequence[tuple[str, Array, str]])
             begin, end = ax.get_xlim()
         strip = Rectangle(
             (begin, 1 - STRIP * (i + 0.92)), end - begin, 0.84 * STRIP, transform=ax.get_xaxis_transform(),
-            facecolor="white", edgecolor=colour, hatch=HATCH, lw=0.8, label=f"{name}: not unique", gid=f"not unique {name}", zorder=3,
+            facecolor="white", edgecolor=colour, hatch=HATCH, lw=0.8, label=said(f"{name}: not unique"), gid=f"not unique {name}", zorder=3,
         )  # fmt: skip
         ax.add_patch(strip)
 

@@ -13,7 +13,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.equations.formulation import Formulation
 from mechgraph.model.mechanism import Mechanism, check_mechanism
-from mechgraph.show.canvas import FAINT, HATCH, INK, MUTED, PALETTE, bare, colours, new_axes
+from mechgraph.show.canvas import FAINT, HATCH, INK, MUTED, PALETTE, bare, colours, new_axes, said
 from mechgraph.show.painting import FlatPainter, inside
 from mechgraph.topology.linkgraph import link_graph
 
@@ -34,7 +34,7 @@ LABELLED = 64
 def draw_graph(m: Mechanism, *, ax: Any = None) -> Any:
     """Draw the link-pair graph: links as dots, pairs as lines between them, coloured by the loops that they lie in. Returns the axes.
 
-    A pair in several loops has a strand for each; one in no loop is grey. The frame is a square.
+    A pair in several loops has a strand for each; one in no loop is grey. The frame is a square. Dotted lines are couplings.
     """
     check_mechanism(m, "draw_graph")
     graph: nx.Graph[str] = nx.Graph()
@@ -54,6 +54,8 @@ def draw_graph(m: Mechanism, *, ax: Any = None) -> Any:
             canvas.line(curve + shift * across, colour, f"pair {pair}")
         middles[pair] = curve[len(curve) // 2]
         canvas.keep_free(curve)
+    for c in m.couplings:
+        canvas.coupling(c.name, [middles[m.pairs[m.freedom(q)[0]].name] for q in c.freedoms])
     for name, (x, y) in at.items():
         frame = name == m.frame
         canvas.ax.scatter(
@@ -91,7 +93,7 @@ def _edges(m: Mechanism, at: dict[str, Array]) -> Iterator[tuple[str, Array]]:
 def draw_structure(m: Mechanism, *, ax: Any = None) -> Any:
     """Draw the structural diagram: links as lines between two pairs and as polygons between more, pairs as circles. Returns the axes.
 
-    The frame is hatched. Nothing is to scale: it is the graph alone.
+    The frame is hatched, a dotted line ties the pairs of a coupling. Nothing is to scale: it is the graph alone.
     """
     check_mechanism(m, "draw_structure")
     graph: nx.Graph[str] = nx.Graph()
@@ -108,6 +110,8 @@ def draw_structure(m: Mechanism, *, ax: Any = None) -> Any:
             continue
         middle = _draw_link(canvas, link, corners, colour[link], link == m.frame)
         canvas.name(link, middle, colour[link] if link != m.frame else INK)
+    for c in m.couplings:
+        canvas.coupling(c.name, [at[m.pairs[m.freedom(q)[0]].name] for q in c.freedoms])
     for pair in m.pairs:
         x, y = at[pair.name]
         canvas.ax.scatter(x, y, s=130, facecolor="white", edgecolor=INK, linewidth=1.5, zorder=4)
@@ -157,6 +161,12 @@ class _Canvas:
 
     def line(self, points: Array, colour: str, gid: str, lw: float = 2.4) -> None:
         self.ax.plot(*points.T, color=colour, lw=lw, solid_capstyle="round", zorder=2, gid=gid)
+
+    def coupling(self, name: str, points: Sequence[Array]) -> None:
+        """A dotted line between the pairs that a coupling ties."""
+        row = np.array(points)
+        self.ax.plot(*row.T, color=INK, lw=1.4, ls=(0, (1, 2)), zorder=1.5, gid=f"coupling {name}")
+        self.name(name, row[:2].mean(axis=0), INK, style="italic")
 
     def hatch(self, p: Array, q: Array) -> None:
         """Strokes beside a line: it is fixed."""
@@ -280,12 +290,12 @@ def draw_sparsity(f: Formulation, *, ax: Any = None) -> Any:
         for i in starts[1:]:
             put(i - 0.5, color=FAINT, lw=0.8, zorder=0.5)
         if len(items) <= LABELLED:
-            axis.set_ticks(range(len(items)), [item.name for item in items])
+            axis.set_ticks(range(len(items)), [said(item.name) for item in items])
         else:
             ends = [*starts[1:], len(items)]
             every = -(-len(starts) // LABELLED)
             middles = [0.5 * (a + b - 1) for a, b in zip(starts, ends, strict=True)]
-            axis.set_ticks(middles[::every], [groups[a] for a in starts[::every]])
+            axis.set_ticks(middles[::every], [said(groups[a]) for a in starts[::every]])
     ax.xaxis.tick_top()
     ax.tick_params(axis="x", rotation=90, labelsize=7, length=0)
     ax.tick_params(axis="y", labelsize=7, length=0)

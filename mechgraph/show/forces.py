@@ -10,7 +10,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
 from mechgraph.result.solution import Solution
 from mechgraph.show.acting import known_force
-from mechgraph.show.canvas import HATCH, INK, MUTED, PALETTE, REACTION, new_axes, plain, with_unit
+from mechgraph.show.canvas import HATCH, INK, MUTED, PALETTE, REACTION, new_axes, plain, said, with_unit
 from mechgraph.show.curves import known_pair
 from mechgraph.show.scene import place_of
 from mechgraph.show.stage import Stage
@@ -52,7 +52,7 @@ def reaction_ranges(s: Solution, *, moment: bool = False, ax: Any = None) -> Any
                 gid=f"not unique {name}",
             )  # fmt: skip
         labels.append(f"{name} ({' '.join(parts) or 'nothing'} unique)" if lost else name)
-    ax.set_yticks(range(len(labels)), labels)
+    ax.set_yticks(range(len(labels)), map(said, labels))
     ax.invert_yaxis()
     ax.set_xlim(0.0, 1.08 * largest)
     what = "moment" if moment else "force"
@@ -136,7 +136,7 @@ def polar_force(s: Solution, pair: str, *, on: Literal["a", "b"] = "a", ax: Any 
     link = p.a if on == "a" else p.b
     what = with_unit(f"force of {p.a} on {p.b} in {pair} across its axis", unit)
     greatest = f"greatest {full[peak, 1]:.4g} {unit}".rstrip()
-    ax.set_title(f"{what}\nas seen on {link}, {greatest}", color=INK, fontsize=10)
+    ax.set_title(f"{what}\nas seen on {said(link)}, {greatest}", color=INK, fontsize=10)
     ax.tick_params(colors=MUTED)
     ax.set_rlabel_position(100)
     ax.yaxis.set_major_locator(MaxNLocator(4))

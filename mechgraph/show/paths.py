@@ -12,7 +12,7 @@ from mechgraph.errors import DeclarationError
 from mechgraph.quantities import shown
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import MaterialPoint
-from mechgraph.show.canvas import INK, MUTED, PALETTE, new_axes, plain, with_unit
+from mechgraph.show.canvas import INK, MUTED, PALETTE, new_axes, plain, said, with_unit
 from mechgraph.show.scene import place_of
 from mechgraph.show.stage import Stage
 from mechgraph.units import unit_of
@@ -113,7 +113,12 @@ def _draw(s: Solution, found: dict[str, Array], rank: int, ax: Any) -> Any:
         for k, row in enumerate(rows):
             seen = row @ axes.T
             ax.plot(
-                *seen.T, color=colour, lw=1.9, label="_" * bool(k) + name, marker="o" if len(row) == 1 else "", ms=4
+                *seen.T,
+                color=colour,
+                lw=1.9,
+                label="_" * bool(k) + said(name),
+                marker="o" if len(row) == 1 else "",
+                ms=4,
             )
             there = seen[np.isfinite(seen).all(axis=1)]
             if len(there):

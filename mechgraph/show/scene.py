@@ -47,6 +47,7 @@ class Scene:
     normal : of a mechanism all of whose points lie in a plane, else None.
     upright : axes of what stands upright, as columns: two level ones, and up.
     gravity : the vector g, None where there is none.
+    cases : number of the case to which every drawn position belongs; within one they follow each other.
     not_unique : pairs whose reaction force has no value somewhere, as it is not unique.
     reaction_scale : length of an arrow for a unit of force.
     """
@@ -63,6 +64,7 @@ class Scene:
     normal: Array | None
     upright: Array
     gravity: Array | None
+    cases: Any
     not_unique: tuple[str, ...] = ()
     reaction_scale: float = 0.0
 
@@ -127,6 +129,9 @@ def scene_at(
     """The scene of a mechanism that stands somewhere; a ``solution`` gives values to loads that vary, and to reactions."""
     stage = Stage(m, place, len(positions))
     parts = [*bodies.links(stage), *bodies.pairs(stage), *acting.loads(stage, solution, positions)]
+    cases = np.asarray(positions) // (
+        solution.batch[-1] if solution is not None and solution.batch else 1 + len(positions)
+    )
     lost: tuple[str, ...] = ()
     scale = 0.0
     if forces and solution is not None and solution.has_forces:
@@ -134,5 +139,5 @@ def scene_at(
         parts += arrows
     return Scene(
         m, positions, stage.frames, tuple(parts), tuple(bodies.labels(stage)), stage.points, stage.everything, stage.size,
-        stage.symbol, stage.normal, stage.upright, stage.gravity, lost, scale,
+        stage.symbol, stage.normal, stage.upright, stage.gravity, cases, lost, scale,
     )  # fmt: skip

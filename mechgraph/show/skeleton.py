@@ -160,8 +160,9 @@ class Drawing:
                 self.painter.lines(pieces, colors=self.colour[mover], gid=f"trace of {name}", **style)
 
     def _pieces(self, path: Array) -> list[Array]:
-        """A path cut where positions between were not solved."""
-        cuts = np.flatnonzero(np.diff(self.scene.positions) > 1) + 1
+        """A path cut where positions between were not solved, and between cases."""
+        gaps = (np.diff(self.scene.positions) > 1) | (np.diff(self.scene.cases) > 0)
+        cuts = np.flatnonzero(gaps) + 1
         return [piece for piece in np.split(path, cuts) if len(piece) > 1]
 
     def position(self, t: int) -> None:

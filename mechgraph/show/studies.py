@@ -9,7 +9,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
 from mechgraph.quantities import wrong
-from mechgraph.show.canvas import INK, PALETTE, new_axes, plain, with_unit
+from mechgraph.show.canvas import INK, PALETTE, new_axes, plain, said, with_unit
 from mechgraph.show.curves import Abscissa, lay_out
 from mechgraph.units import unit_of
 from mechgraph.variants.result import Study
@@ -123,7 +123,7 @@ def study_tornado(
     for colour, word in zip((PALETTE[0], PALETTE[1]), ("lower end", "upper end"), strict=True):
         ax.barh([0], [0], left=itself[at], color=colour, label=f"parameter at its {word}")
     ax.axvline(itself[at], color=INK, lw=1.4, zorder=3)
-    ax.set_yticks(range(len(order)), order)
+    ax.set_yticks(range(len(order)), map(said, order))
     ax.invert_yaxis()
     ax.set_xlabel(picked.label_at(at if picked.placed else None), color=INK)
     plain(ax)
