@@ -145,6 +145,20 @@ def test_beyond_a_dozen_pairs_numbers_stand_for_names() -> None:
     check_texts(ax)
 
 
+def test_a_legend_leaves_room_and_counts_what_it_leaves_out() -> None:
+    pairs = [
+        mg.Pair(f"p{i}", "R", f"k{i}", f"k{i + 1}", point=(float(i), float(i % 2), 0.3 * (i % 3)), axis=(0, 0, 1))
+        for i in range(90)
+    ]
+    ax = draw_skeleton(mg.Mechanism("long", pairs=pairs))
+    ax.figure.set_size_inches(5, 3)
+    assert any(text.startswith("\u2026 and ") for text in shown(ax))
+    check_texts(ax)
+    ax.figure.set_size_inches(12, 24)
+    assert not any(text.startswith("\u2026") for text in shown(ax))
+    assert {"90  p89 (R)", "k90"} <= shown(ax)
+
+
 def test_forces_that_are_not_unique_are_hatched_and_have_no_arrow() -> None:
     s = mg.solve(mg.load("spherical-four-bar"))
     ax = draw_skeleton(s, forces=True)

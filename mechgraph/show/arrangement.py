@@ -1,7 +1,7 @@
 """What stands beside a drawing and is arranged on the screen each time that it is drawn: names, directions, a scale.
 
-Texts are measured by the renderer and put where they cover least, never one on another and never beyond the axes. Loaded only when
-something is drawn: it needs matplotlib.
+Texts are measured by the renderer and put where they cover least, never one on another and never beyond the axes: where there is no room
+at all one is left out. Loaded only when something is drawn: it needs matplotlib.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ FORBIDDEN = 1e4
 """Cost of covering another text, or of reaching beyond the axes, over that of covering one point of the drawing."""
 STEADY = 1.2
 """Cost of moving a text by its height from where it stood before, over that of covering one point of the drawing."""
+WIDEST = 0.45
+"""Part of the width of the axes that the columns of a legend may take; lines beyond are counted."""
 LOW, BROAD = 8, 0.25
 """Lines up to which a legend may stand below, and its width over that of the axes from which it does."""
 LEADER = 2.4
@@ -70,6 +72,7 @@ class Arrangement(Artist):
         self._corner: list[tuple[Line2D, Text, Array]] = []
         self._bars: list[tuple[Line2D, Text, float]] = []
         self._legend: list[Text] = []
+        self._lines: list[str] = []
         self.set_zorder(-50)
         self.set_in_layout(False)
         ax.add_artist(self)
@@ -94,12 +97,15 @@ class Arrangement(Artist):
     def legend(self, lines: Sequence[tuple[str, str]]) -> None:
         """Lines of a text and a colour each, on the right, in as many columns as they need."""
         self._legend = [self._text(text, colour, fontsize=8.0) for text, colour in lines]
+        self._lines = [text.get_text() for text in self._legend]
 
     def room(self, renderer: Any = None) -> Array:
         """The box that the legend leaves: its lines go from the upper right corner down, a few broad ones along the lower edge."""
         unit, box = self._ax.figure.dpi / 72.0, self._inside().copy()
         if not self._legend:
             return box
+        for text, line in zip(self._legend, self._lines, strict=True):
+            text.set_text(line)  # the last one may have counted others
         sizes = np.array([_size(text, renderer) for text in self._legend])
         height = float(sizes[:, 1].max()) + 2.0 * unit
         width, n = float(sizes[:, 0].max()), len(sizes)
@@ -109,7 +115,20 @@ class Arrangement(Artist):
             box[0, 1] += (n + 1) * height
             return box
         rows = max(int((box[1, 1] - box[0, 1]) / height), 1)
-        columns = [range(i, min(i + rows, len(sizes))) for i in range(0, len(sizes), rows)]
+        left = box[1, 0] - WIDEST * (box[1, 0] - box[0, 0])
+        columns: list[range] = []
+        for i in range(0, n, rows):
+            column = range(i, min(i + rows, n))
+            if columns and box[1, 0] - sizes[: column.stop, 0].max() * (len(columns) + 1) < left:
+                break
+            columns.append(column)
+        shown = columns[-1].stop
+        for i, text in enumerate(self._legend):
+            text.set_visible(i < shown)
+        if shown < n:
+            shown -= 1
+            self._legend[shown].set_text(f"\u2026 and {n - shown} more")
+            sizes[shown] = _size(self._legend[shown], renderer)
         for column in reversed(columns):
             box[1, 0] -= sizes[column, 0].max()
             for row, i in enumerate(column):
@@ -149,7 +168,11 @@ class Arrangement(Artist):
             away = float(np.linalg.norm(self._pixels((placed.at + placed.away * right)[None])[0] - point)) + 3.0 * unit
             before = self._places.get(placed.text.get_text())
             kept = None if before is None else point + before * unit
-            corner, ring = _best(point, size, away, box, boxes, taken, kept)
+            corner, ring, free = _best(point, size, away, box, boxes, taken, kept)
+            placed.text.set_visible(free)
+            if not free:
+                placed.leader.set_data([], [])
+                continue
             self._places[placed.text.get_text()] = (corner - point) / unit
             placed.text.set_position(tuple(corner + unit))
             boxes.append(np.array([corner, corner + size]))
@@ -189,6 +212,7 @@ class Arrangement(Artist):
 
 
 def _size(text: Text, renderer: Any) -> Array:
+    text.set_visible(True)  # one that is hidden has no size
     box = text.get_window_extent(renderer)
     return np.array([box.width, box.height])
 
@@ -199,8 +223,8 @@ def _meet(low: Array, high: Array, other: Array) -> bool:
 
 def _best(
     point: Array, size: Array, away: float, box: Array, boxes: Sequence[Array], taken: Array, kept: Array | None = None
-) -> tuple[Array, float]:
-    """Lower left corner of a text of some size near a point, and its distance over the nearest one; it would rather be ``kept``."""
+) -> tuple[Array, float, bool]:
+    """Lower left corner of a text near a point, its distance over the nearest one, and whether it is free; it would rather be ``kept``."""
     directions = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
     rings = np.repeat(RINGS, len(ANGLES))
     d = np.tile(directions, (len(RINGS), 1))
@@ -213,14 +237,16 @@ def _best(
         cost += STEADY * np.minimum(np.linalg.norm(low - kept, axis=1) / float(size[1]), 2.0)
     beyond = np.maximum(box[0] - low, 0.0).sum(axis=1) + np.maximum(high - box[1], 0.0).sum(axis=1)
     cost += FORBIDDEN * (beyond > 0) * (1.0 + beyond)
-    for other in boxes:
-        overlap = np.clip(np.minimum(high, other[1]) - np.maximum(low, other[0]), 0.0, None).prod(axis=1)
-        cost += FORBIDDEN * (overlap > 0) * (1.0 + overlap / size.prod())
-    if len(taken):
-        covered = ((taken > low[:, None] - away / 3) & (taken < high[:, None] + away / 3)).all(axis=2)
+    if boxes:
+        others = np.array(boxes)[:, :, None]
+        overlap = np.clip(np.minimum(high, others[:, 1]) - np.maximum(low, others[:, 0]), 0.0, None).prod(axis=2)
+        cost += FORBIDDEN * ((overlap > 0) * (1.0 + overlap / size.prod())).sum(axis=0)
+    near = taken[(np.abs(taken - point) < np.abs(reach).max(axis=0) + size).all(axis=1)]
+    if len(near):
+        covered = ((near > low[:, None] - away / 3) & (near < high[:, None] + away / 3)).all(axis=2)
         cost += covered.sum(axis=1) * 0.6
     best = int(np.argmin(cost))
-    return low[best], float(rings[best])
+    return low[best], float(rings[best]), bool(cost[best] < FORBIDDEN)
 
 
 def nice_length(extent: float) -> float:
