@@ -149,3 +149,15 @@ def test_import_loads_only_what_every_start_needs() -> None:
     run = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr
     assert run.stdout.split() == []
+
+
+@pytest.mark.parametrize("name", ["FARTHEST", "LARGEST", "LISTED", "MOST", "NAMED", "NOISE", "SEED"])
+def test_a_bound_has_one_value(name: str) -> None:
+    """Names as general as these stand for one number wherever they stand (response has names of its own); others say what they bound."""
+    found: dict[str, list[str]] = {}
+    for path in sorted(PACKAGE.rglob("*.py")):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            ours = isinstance(node, ast.Assign) and any(isinstance(t, ast.Name) and t.id == name for t in node.targets)
+            if ours and "response" not in path.parts:
+                found.setdefault(ast.unparse(node.value), []).append(path.name)
+    assert len(found) <= 1, found

@@ -23,7 +23,7 @@ Index = NDArray[np.intp]
 
 WINDOW = 2e-3
 """Distance from a crossing below which states and rates are interpolated: accelerations lose rounding over its cube."""
-NOISE = 1e-3
+NEAREST = 1e-3
 """Distance from a crossing below which a node is not used: its sensitivities lose rounding over the square."""
 SIDES = np.array([-6, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 6]) / 6
 """Places of the states on both sides, in parts of a span."""
@@ -74,7 +74,7 @@ def passed(follower: Follower, nodes: Nodes, track: int, place: float) -> Crossi
     mine = nodes.take(nodes.track == track)
     before = follower.with_lead(mine.take(mine.place < place), track)
     mine = Nodes.join([before, mine.take(mine.place > place)])
-    mine = mine.take(np.abs(mine.place - place) > NOISE)
+    mine = mine.take(np.abs(mine.place - place) > NEAREST)
     off = mine.drive - drive[:, None] - direction[:, None] * (mine.place - place)
     mine = mine.take(np.abs(off).max(axis=0, initial=0.0) < 1e-12)
     if not (mine.place > place).any() or not (mine.place < place).any():

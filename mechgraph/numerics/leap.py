@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 NODES = 5
 """Nodes from which the branch is extrapolated."""
-FARTHEST = 0.2
+LONGEST_LEAP = 0.2
 """Distance of a crossing behind the last node up to which it is leapt at."""
 BEHIND = np.array([0.02, 0.05, 0.09])
 """Distances of the nodes behind a crossing."""
@@ -46,7 +46,7 @@ def leapt(follower: Follower, nodes: Nodes) -> tuple[Crossing, Nodes] | None:
         return None
     ahead = -inverse[-1] / fall[-1]
     crossing = float(place[-1] + ahead)
-    if not ahead < FARTHEST:
+    if not ahead < LONGEST_LEAP:
         return None
     behind = _behind(follower, last, crossing)
     if behind is None:

@@ -14,7 +14,7 @@ LINES = 25
 """Most lines of text on 80 columns."""
 CHANGES = 4
 """Most changes of pairs that are advised here."""
-NAMED = 4
+PAIRS_NAMED = 4
 """Most pairs named for one set of components."""
 HOW_MUCH = "What is not unique depends on fits, stiffness and temperature; how much force a misfit locks in, a rigid model cannot know."
 MORE = "All the facts: report.text(full=True), mechgraph check --full."
@@ -61,7 +61,7 @@ def _trusted(r: Facts) -> Iterator[str]:
             if efforts.any() and efforts.all()
             else []
         )
-        some = [f"{words} of {listed(pairs, NAMED)}" for words, pairs, _ in patterns(known, known.is_unique)]
+        some = [f"{words} of {listed(pairs, PAIRS_NAMED)}" for words, pairs, _ in patterns(known, known.is_unique)]
         some = ["every reaction"] if known.all_unique else some
         yield f"unique, as equilibrium alone gives it: {'; '.join(some + driven) or 'nothing'}"
         if not known.all_unique:

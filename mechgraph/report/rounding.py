@@ -22,11 +22,11 @@ WIDEST = 1e-2
 """Largest tolerance that is tried."""
 CLOSE = 1e-3
 """Change of a pair up to which numbers of any number of digits are taken for rounded: of random mechanisms hardly one comes so near."""
-LARGEST = 300
+MOST_PAIRS = 300
 """Pairs up to which rounding is looked for without being asked."""
 SAFE = 4.0
 """Tolerance that is advised, in largest changes of a pair: closure errors add up along a loop."""
-NAMED = 3
+CHANGES_NAMED = 3
 """Most pairs that are named."""
 
 
@@ -56,7 +56,7 @@ def rounding(m: Mechanism, verdict: Callable[[Mechanism], tuple[Any, ...]]) -> R
     The verdict is a tuple that begins with the finite mobility; empty where there is none. Changes of pairs beyond what ``plausible``
     says are no rounding: a mechanism may come near a special one by chance.
     """
-    if isinstance(m, SnappedMechanism) or not m.has_geometry or len(m.pairs) > LARGEST:
+    if isinstance(m, SnappedMechanism) or not m.has_geometry or len(m.pairs) > MOST_PAIRS:
         return None
     own: tuple[Any, ...] | None = None
     other: tuple[SnappedMechanism, float, tuple[Any, ...]] | None = None
@@ -126,7 +126,7 @@ def _worded(exact: SnappedMechanism, tol: float, verdict: tuple[Any, ...]) -> Ro
         f"Axis of {c.pair}: {np.degrees(c.angle):.2g} deg {off}"
         if c.angle * exact.changes.L >= c.shift
         else f"{c.pair}: {c.shift:.2g} {unit}".rstrip() + " off"
-        for c in sorted(moved, key=lambda c: -max(c.angle, c.shift / exact.changes.L))[:NAMED]
+        for c in sorted(moved, key=lambda c: -max(c.angle, c.shift / exact.changes.L))[:CHANGES_NAMED]
     )
     advised = _rounded_up(max(tol, SAFE * exact.changes.largest))
     text = f"With {' and '.join(meant) or f'loops that close to {exact.changes.closure:.2g}'} the mechanism "

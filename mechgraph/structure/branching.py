@@ -25,13 +25,13 @@ from mechgraph.structure.passive import PassiveMotion
 
 STARTS = 64
 """Random starts of the search; k self-stresses that are not those of a regular position allow 2^k branches."""
-SEED = 5
+STARTS_SEED = 5
 """Of these starts."""
 SOLVED = 1e-9
 """Residual of a branch."""
-LISTED = 8
+FREEDOMS_LISTED = 8
 """Most freedoms listed of a branch."""
-MOST = 16
+MOST_BRANCHES = 16
 """Most branches that are told apart."""
 SAME = 1e-3
 """Difference of rates up to which two branches are one: rates of branches that touch are found to the square root of rounding."""
@@ -74,7 +74,7 @@ def branches(
 ) -> tuple[dict[str, float], ...]:
     """The branches that meet at a closed state ``x (nx,)``: rates of all freedoms by name, for unit rates of the drivers ``columns``.
 
-    Empty where there is one alone, or where more than ``MOST`` directions meet the conditions: then a freedom is left free. The rank is
+    Empty where there is one alone, or where more than ``MOST_BRANCHES`` directions do: then a freedom is left free. The rank is
     decided to the accuracy with which closing meets a singular position (``RANKS.nearby``). Passive motions are at rest.
     """
     found = rank_of_rows(ClosureRows.at(Configuration(system, x[:, None])), tolerance=RANKS.nearby)
@@ -83,7 +83,7 @@ def branches(
         idle, _ = np.linalg.qr(np.stack([p.rates for p in passive], axis=1))
         U, s, _ = np.linalg.svd(N - idle @ (idle.T @ N), full_matrices=False)
         N = U[:, s > 0.5]
-    rng = np.random.default_rng(SEED)
+    rng = np.random.default_rng(STARTS_SEED)
     # so many random combinations of the self-stresses say as much about N.shape[1] motions as all of them
     stress = found.random_stress(rng, min(found.count - found.rank, N.shape[1] + 1))
     curvature = _Curvature(system, x, N, stress, columns)
@@ -93,7 +93,7 @@ def branches(
     for one in (N @ a[:, error < 1e3 * SOLVED]).T:
         if all(np.abs(one - other).max() > SAME for other in ways):
             ways.append(np.where(np.abs(one) < SAME**2, 0.0, one))
-    if not 1 < len(ways) <= MOST:
+    if not 1 < len(ways) <= MOST_BRANCHES:
         return ()
     unit = np.where(system.is_length, system.par.L, 1.0)
     names = system.m.freedom_names()
@@ -103,7 +103,7 @@ def branches(
 
 def branches_text(ways: Sequence[dict[str, float]], driver: str) -> str:
     """Branches by the rates of the freedoms in which they differ, in words."""
-    differ = [name for name in ways[0] if np.ptp([way[name] for way in ways]) > SAME][:LISTED]
+    differ = [name for name in ways[0] if np.ptp([way[name] for way in ways]) > SAME][:FREEDOMS_LISTED]
     texts = [", ".join(f"{name} {way[name]:.4g}" for name in differ) for way in ways]
     return f"{len(ways)} branches meet there, by their rates for a unit rate of {driver}: " + "; ".join(
         f"({i}) {text}" for i, text in enumerate(texts, 1)

@@ -44,13 +44,13 @@ POSITIONS = 5
 """Positions along a motion each way."""
 DIRECTIONS = 4
 """Random motions that are followed, each both ways; one where there is but one."""
-LARGEST = 60
+MOST_ROWS = 60
 """Closure rows up to which motions are followed: dense decompositions. Larger mechanisms are left to the relations."""
 FAR = 4.0
 """Tolerances beyond which a change on the way is given up: the first linearizations overshoot."""
 DENSE = 1200
 """Numbers to be changed from which on relations are met by an iterative least-norm solution."""
-SEED = 11
+SEARCH_SEED = 11
 """Seed of these motions."""
 
 
@@ -60,7 +60,7 @@ def least_change(placed: Placed, tol: float) -> tuple[Array, tuple[Relation, ...
     declared = placed.changed(none)
     found = Relations(Configuration(declared, placed.x[:, None]), placed.frames)
     change, met, dropped = _meeting(placed, found, found.near(tol), tol)
-    if placed.system.n_rows > LARGEST:
+    if placed.system.n_rows > MOST_ROWS:
         return change, met, dropped, False
     sure = [{r.text for r in found.near(tol * part)} for part in SURE]
     sets = dict.fromkeys((met, *(tuple(r for r in met if r.text in texts) for texts in sure), ()))
@@ -190,7 +190,7 @@ def _rows_along(
 
 def _followed(system: System, x: Array, rank: int, step: float, open_: float) -> Array | None:
     """States ``(nx, T)`` along the motions that are left where only ``rank`` rows count, as far as the loops close to ``open_``."""
-    rng = np.random.default_rng(SEED)
+    rng = np.random.default_rng(SEARCH_SEED)
     mobility, out = system.n_freedoms - rank, []
     for _ in range(DIRECTIONS if mobility > 1 else 1):
         wish = rng.normal(size=system.n_freedoms)

@@ -23,7 +23,7 @@ STEP = 1e-30
 """Step of the complex-step derivatives: exact, as the residuals are analytic."""
 LONG = 10.0
 """Lengths of fewer tolerances than this are not compared."""
-FARTHEST = 10.0
+LONGEST_ARM = 10.0
 """Longest arm (over L) that counts: lines that come nearest farther away are as good as parallel."""
 
 
@@ -148,7 +148,7 @@ class Relations:
         for a, i in enumerate(placed):
             rest = np.array(placed[a + 1 :], dtype=np.intp)
             apart, arms = self._apart(i, rest, 2 * tol)
-            near = (apart <= tol * (2.0 + np.minimum(arms, FARTHEST))) & (self.owner[rest] != self.owner[i])
+            near = (apart <= tol * (2.0 + np.minimum(arms, LONGEST_ARM))) & (self.owner[rest] != self.owner[i])
             for j, miss in zip(rest[near].tolist(), apart[near].tolist(), strict=True):
                 f, g = self.features[i], self.features[j]
                 if f.is_line and g.is_line:

@@ -17,7 +17,7 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.numeric import tolerance_fault
 from mechgraph.model.parameters import Parameters, parameters
 from mechgraph.numerics.linear import singular_values
-from mechgraph.structure.least_change import LARGEST, least_change, weakness
+from mechgraph.structure.least_change import MOST_ROWS, least_change, weakness
 from mechgraph.structure.near_relations import Relation, Relations
 from mechgraph.structure.placed_pairs import EXACT, Placed
 
@@ -128,7 +128,7 @@ def candidates(m: Mechanism, tol: float) -> Array:
     placed = Placed(here)
     declared = Configuration(placed.changed(np.zeros_like(placed.misfit)), placed.x[:, None])
     sizes = [r.miss / 2 for r in Relations(declared, placed.frames).near(tol)] + [float(here.closure[0])]
-    s = singular_values(declared.J[:, :, 0]) if here.system.n_rows <= LARGEST else np.zeros(0)
+    s = singular_values(declared.J[:, :, 0]) if here.system.n_rows <= MOST_ROWS else np.zeros(0)
     weak = s[(s > EXACT * s.max(initial=0.0)) & (s < weakness(here.system, tol))] if s.size else s
     return np.array([*sizes, *(weak * tol / weakness(here.system, tol)).tolist()])
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-LISTED = 10
+VARIANTS_LISTED = 10
 """Most variants that are named with the reason why they were not solved."""
 
 
@@ -99,8 +99,12 @@ class Study(Shown):
             ),
         ]
         if self.messages:
-            told = [f"variant {i}: {text}" for i, text in list(self.messages.items())[:LISTED]]
-            more = [f"... and {len(self.messages) - LISTED} more (messages)"] if len(self.messages) > LISTED else []
+            told = [f"variant {i}: {text}" for i, text in list(self.messages.items())[:VARIANTS_LISTED]]
+            more = (
+                [f"... and {len(self.messages) - VARIANTS_LISTED} more (messages)"]
+                if len(self.messages) > VARIANTS_LISTED
+                else []
+            )
             blocks += [Heading("Not solved", 2), Bullets([*told, *more])]
         return Document(f"Study of {self.mechanism.name}", blocks)
 

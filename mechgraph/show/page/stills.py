@@ -23,7 +23,7 @@ from mechgraph.variants.result import Study
 
 OUTPUTS = 4
 """Outputs of a study of which pictures are made."""
-NAMED = 40
+PAIRS_LABELLED = 40
 """Pairs up to which names stand in the still picture: finding room for them takes long."""
 RC: dict[Any, Any] = {"svg.hashsalt": "mechgraph", "svg.fonttype": "none", "text.parse_math": False}
 """The same file at every call; names as text in the reader's fonts, none of them a formula."""
@@ -35,7 +35,7 @@ Pictures = list[tuple[str, str]]
 
 def stills(m: Mechanism, s: Solution | None) -> Pictures:
     """The mechanism where it begins, what its drivers supply, and from what to what its reactions range."""
-    out = [(m.name, _picture(lambda: draw_skeleton(m if s is None else s, labels=len(m.pairs) <= NAMED)))]
+    out = [(m.name, _picture(lambda: draw_skeleton(m if s is None else s, labels=len(m.pairs) <= PAIRS_LABELLED)))]
     if s is None or not s.has_forces:
         return out
     if s.mechanism.drives:
