@@ -5,6 +5,7 @@ from __future__ import annotations
 import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy
@@ -190,6 +191,10 @@ class DenseSolver:
         self.fixed, self.keep = fixed, keep
         self.forms: list[Form] = []
         self._last: tuple[weakref.ref[Configuration], DenseFactored] | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what is kept of the last positions: it refers to them weakly, and is computed again."""
+        return vars(self) | {"_last": None}
 
     def leaves_nothing_free(self, here: Configuration) -> bool:
         """See the protocol in ``closure.solver``."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import scipy
@@ -160,6 +161,10 @@ class SparseSolver:
         self.fixed, self.keep = fixed, np.zeros(0, dtype=np.intp) if keep is None else keep
         self.forms: list[LoopSystem] = []
         self._last: tuple[weakref.ref[Configuration], dict[tuple[int, int], SparseFactor]] | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what is kept of the last positions: it refers to them weakly, and is computed again."""
+        return vars(self) | {"_last": None}
 
     def factor(self, here: Configuration, t: int, number: int) -> SparseFactor:
         """A position factored in a form; what is known of the last positions is kept for who asks next."""
