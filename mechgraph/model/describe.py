@@ -103,6 +103,10 @@ def _loads(m: Parts) -> Iterator[Block]:
     yield from _listed(map(repr, m.loads))
 
 
+def _response(m: Parts) -> Iterator[Block]:
+    yield from _listed([] if m.response is None else [repr(m.response)])
+
+
 def _start(m: Parts) -> Iterator[Block]:
     yield from _listed(f"{name} = {value:.6g}" for name, value in m.start.items() if value)
 
@@ -115,7 +119,7 @@ def _listed(items: Iterable[str]) -> Iterator[Block]:
 
 
 PARTS: Mapping[str, Any] = {
-    "Links": _links, "Pairs": _pairs, "Drivers": _drives, "Couplings": _couplings, "Loads": _loads, "Start": _start,
+    "Links": _links, "Pairs": _pairs, "Drivers": _drives, "Couplings": _couplings, "Loads": _loads, "Response": _response, "Start": _start,
 }  # fmt: skip
 """The parts of the document by title."""
 
