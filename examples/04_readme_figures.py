@@ -21,6 +21,7 @@ import numpy as np
 
 import mechgraph as mg
 from mechgraph import show
+from mechgraph.show import canvas
 
 HERE = Path(__file__).resolve().parent
 FIGURES = HERE / "figures"
@@ -84,14 +85,14 @@ PICTURES: dict[str, tuple[Made, Callable[[Any, mg.Mechanism, mg.Solution], None]
 
 
 def fingerprint(name: str) -> str:
-    """A hash of what a picture is drawn from: the mechanism as a file, where it moves, and how it is drawn."""
+    """A hash of what a picture is drawn from: the mechanism as a file, where it moves, how it is drawn, and in which colours."""
     made, draw = PICTURES[name]
     m, s = made()
     with tempfile.TemporaryDirectory() as folder:
         mg.save(m, Path(folder) / "m.toml")
         declared = (Path(folder) / "m.toml").read_text(encoding="utf-8")
     moved = {q: np.round(s[s.whole.pairs[s.whole.freedom(q)[0]].name].position, 6).tolist() for q in s.prescribed}
-    text = json.dumps([declared, moved, inspect.getsource(draw)])
+    text = json.dumps([declared, moved, inspect.getsource(draw), canvas.PALETTE, canvas.REACTION, canvas.LOAD])
     return hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import combinations, pairwise
+from itertools import chain, combinations, pairwise
 from textwrap import wrap
 from typing import Any
 
-import networkx as nx
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
@@ -21,10 +20,6 @@ STRAND = 0.035
 """Distance of the strands of an edge that lies in several loops, and"""
 BULGE = 0.22
 """of edges between the same two links, over the distance of neighbours."""
-LARGE = 40
-"""Nodes from which on one layout is taken, unseen; from four times as many on that of springs, which is faster."""
-CLEAR = 0.15
-"""Distance of a line from a node that is not its end, over that of neighbours, below which they clash."""
 WIDE = 34
 """Letters of a line of the legend."""
 LABELLED = 64
@@ -36,12 +31,11 @@ def draw_graph(m: Mechanism, *, ax: Any = None) -> Any:
 
     A pair in several loops has a strand for each; one in no loop is grey. The frame is a square. Dotted lines are couplings.
     """
+    from mechgraph.show.layout import places
+
     check_mechanism(m, "draw_graph")
-    graph: nx.Graph[str] = nx.Graph()
-    graph.add_nodes_from(m.link_names())
-    graph.add_edges_from((p.a, p.b) for p in m.pairs)
     loops = [tuple(m.pairs[k].name for k, _ in loop) for loop in m.once(link_graph).loops]
-    at = _places(graph)
+    at = places(m.link_names(), ((p.a, p.b) for p in m.pairs))
     canvas = _Canvas(ax, np.array(list(at.values())))
     middles = {}
     for pair, curve in _edges(m, at):
@@ -95,13 +89,11 @@ def draw_structure(m: Mechanism, *, ax: Any = None) -> Any:
 
     The frame is hatched, a dotted line ties the pairs of a coupling. Nothing is to scale: it is the graph alone.
     """
+    from mechgraph.show.layout import places
+
     check_mechanism(m, "draw_structure")
-    graph: nx.Graph[str] = nx.Graph()
-    graph.add_nodes_from(p.name for p in m.pairs)
     of_link = {name: [p.name for p in m.pairs if name in (p.a, p.b)] for name in m.link_names()}
-    for names in of_link.values():
-        graph.add_edges_from(combinations(names, 2))
-    at = _places(graph)
+    at = places((p.name for p in m.pairs), chain.from_iterable(combinations(names, 2) for names in of_link.values()))
     canvas = _Canvas(ax, np.array(list(at.values())))
     colour = colours(m)
     for link, names in of_link.items():
@@ -202,64 +194,6 @@ class _Canvas:
             arranged.name(text, at, colour, 0.07, **style)
         arranged.legend(legend)
         painter.fit(free, arranged.room)
-
-
-def _places(named: nx.Graph[Any]) -> dict[str, Array]:
-    """Where nodes are drawn, neighbours at a distance of about one; the same each time."""
-    graph: nx.Graph[int] = nx.convert_node_labels_to_integers(named)  # sets of texts have another order each time
-    begin: dict[int, Any]
-    if len(graph) < 3:
-        begin = {name: (float(i), 0.0) for i, name in enumerate(graph)}
-    elif max(degree for _, degree in graph.degree) == 2:
-        turn = 2 * np.pi * np.arange(len(graph)) / len(graph)
-        begin = {name: (np.cos(a), np.sin(a)) for name, a in zip(_cycle_order(graph), turn, strict=True)}
-    else:
-        begin = _clearest(graph)
-    at = _scaled(graph, begin)
-    return {name: at[i] for i, name in enumerate(named)}
-
-
-def _clearest(graph: nx.Graph[int]) -> dict[int, Any]:
-    """Of several layouts that give distances their due, the one in which the fewest lines cross each other or run over nodes."""
-    if len(graph) > LARGE:
-        return nx.kamada_kawai_layout(graph) if len(graph) < 4 * LARGE else nx.spring_layout(graph, seed=0)
-    first = [nx.planar_layout(graph)] if nx.is_planar(graph) else []
-    first += [nx.circular_layout(graph), *(nx.spring_layout(graph, seed=seed) for seed in range(3))]
-    found = [_scaled(graph, nx.kamada_kawai_layout(graph, pos=pos)) for pos in first]
-    return min(found, key=lambda at: _clashes(graph, at))
-
-
-def _clashes(graph: nx.Graph[int], at: dict[int, Array]) -> int:
-    """Pairs of lines that cross, and lines that nearly run over a node that is not their end."""
-    count = 0
-    for (a, b), (c, d) in combinations(graph.edges, 2):
-        if len({a, b, c, d}) == 4:
-            p, q, r, s = at[a], at[b], at[c], at[d]
-            count += _side(p, q, r) != _side(p, q, s) and _side(r, s, p) != _side(r, s, q)
-    for a, b in graph.edges:
-        for name in graph:
-            if name not in (a, b):
-                along = at[b] - at[a]
-                u = np.clip((at[name] - at[a]) @ along / (along @ along), 0.0, 1.0)
-                count += bool(np.linalg.norm(at[a] + u * along - at[name]) < CLEAR)
-    return count
-
-
-def _side(p: Array, q: Array, r: Array) -> bool:
-    return bool((q[0] - p[0]) * (r[1] - p[1]) > (q[1] - p[1]) * (r[0] - p[0]))
-
-
-def _scaled(graph: nx.Graph[int], begin: dict[int, Any]) -> dict[int, Array]:
-    at = {name: np.asarray(begin[name], dtype=float) for name in graph}
-    lengths = [float(np.linalg.norm(at[a] - at[b])) for a, b in graph.edges]
-    unit = float(np.median(lengths)) if lengths else 1.0
-    return {name: p / unit for name, p in at.items()}
-
-
-def _cycle_order(graph: nx.Graph[int]) -> list[int]:
-    """Nodes of a cycle or path, one after the other."""
-    ends = [name for name, degree in graph.degree if degree < 2]
-    return list(nx.dfs_preorder_nodes(graph, source=(ends or list(graph))[0]))
 
 
 def draw_sparsity(f: Formulation, *, ax: Any = None) -> Any:
