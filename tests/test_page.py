@@ -526,6 +526,19 @@ def test_a_click_on_a_pair_shows_its_numbers(reader: Reader, pages: dict[str, Pa
         assert pair.b in reader.text(".facts")
 
 
+def test_names_of_pairs_with_unknown_reactions_are_hatched(reader: Reader, pages: dict[str, Path]) -> None:
+    hatched = "return [...document.querySelectorAll('.label.open')].map((l) => l.textContent)"
+    reader.open(pages["four-bar"])
+    reader.settled()
+    assert reader.js(hatched) == ["A (R)", "B (R)", "C (R)", "D (R)"]
+    reader.js("[...document.querySelectorAll('.tools input')].at(-1).click()")
+    reader.settled()
+    assert reader.js(hatched) == []
+    reader.open(pages["rcsr"])
+    reader.settled()
+    assert reader.js(hatched) == []
+
+
 def test_play_and_pause(reader: Reader, pages: dict[str, Path]) -> None:
     reader.open(pages["rcsr"])
     play = reader.one(".play")
@@ -692,6 +705,20 @@ def test_a_notebook_shows_the_same_view(reader: Reader, tmp_path: Path) -> None:
     assert reader.js("return document.getElementById('cell').childElementCount") == 0
     assert reader.complaints() == []
     assert reader.requests() == []
+
+
+def test_a_notebook_that_runs_holds_the_view() -> None:
+    pytest.importorskip("anywidget", reason="anywidget is not installed (extra: notebook)")
+    nbclient, nbformat = pytest.importorskip("nbclient"), pytest.importorskip("nbformat")
+    code = "import mechgraph as mg\nmg.load('four-bar').view()"
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(code)])
+    nbclient.NotebookClient(notebook, timeout=120, kernel_name="python3").execute()
+    (output,) = notebook.cells[0].outputs
+    assert "application/vnd.jupyter.widget-view+json" in output.data
+    states = notebook.metadata.widgets["application/vnd.jupyter.widget-state+json"]["state"].values()
+    (state,) = [s["state"] for s in states if "_esm" in s["state"]]
+    assert state["data"]["items"][0]["title"] == "solved motion"
+    assert "mechgraphView.mount" in state["_esm"]
 
 
 def test_views_that_cannot_be_drawn_say_why() -> None:

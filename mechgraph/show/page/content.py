@@ -36,7 +36,7 @@ MOST_POSITIONS = 1500
 
 ARROWS = (
     "Arrows: force (one head) and moment (two heads) that the first link of a pair exerts on the second; striped where part of the "
-    "reaction is not unique and left out"
+    "reaction is not unique and left out. A hatched name: not all of the reaction of that pair is unique"
 )
 
 Data = dict[str, Any]

@@ -18,7 +18,7 @@ from mechgraph.show.stage import Part
 
 OBLIQUE = (0.6, -1.0, 0.55)
 """Direction from which a spatial mechanism is seen, in upright axes."""
-ROOM = 9.0
+ROOM = 6.0
 """Room about what is drawn, for names and arrows, over the half width of a symbol."""
 LEFT_OUT = {"reaction"}
 """Parts that the page draws itself, from numbers."""
@@ -48,9 +48,8 @@ class Figure:
     def data(self, frames: Mapping[str, Array], rows: Mapping[str, list[list[str]]]) -> dict[str, Any]:
         """The figure where it stands at the first of ``frames``; ``rows`` are facts of the pairs."""
         scene = self.scene
-        points = (
-            np.concatenate([at[:1] for at in scene.points.values()]) if scene.positions.size == 1 else scene.everything
-        )
+        points = np.concatenate([scene.everything, *(moved(part.shape, frames[part.frame][0]) for part in self.parts)])
+        points = points[np.isfinite(points).all(axis=1)]
         look = scene.normal if scene.normal is not None else scene.upright @ np.array(OBLIQUE) / np.linalg.norm(OBLIQUE)
         screen = np.stack([np.cross(scene.upright[:, 2], look), scene.upright[:, 2], look])
         screen[0] /= np.linalg.norm(screen[0])
@@ -112,6 +111,11 @@ class Figure:
             "pair": pair,
             "at": rounded(at),
         }
+
+
+def moved(shape: Shape, X: Array) -> Array:
+    """Vertices of a shape in a frame ``(3, 4)``."""
+    return np.asarray(shape.vertices @ X[:, :3].T + X[:, 3])
 
 
 def triangles(shape: Shape) -> list[int]:

@@ -57,6 +57,8 @@ export class Stage {
     this.labels = [];
     this.figure = /** @type {Figure | null} */ (null);
     this.selected = -1;
+    /** @type {Set<number>} */
+    this.open = new Set();
     this.asked = 0;
     /** @type {THREE.Object3D[]} */
     this.added = [];
@@ -413,6 +415,7 @@ export class Stage {
       const { node, label } = this.labels[i];
       node.style.visibility = place ? "visible" : "hidden";
       if (place) node.style.transform = `translate(${place.left}px, ${place.top}px)`;
+      node.classList.toggle("open", this.open.has(label.pair));
       node.classList.toggle("chosen", label.pair >= 0 && label.pair === this.selected);
     });
   }

@@ -35,7 +35,7 @@ class View {
     this.motion = null;
     this.still = matchMedia("(prefers-reduced-motion: reduce)");
     this.dark = matchMedia("(prefers-color-scheme: dark)");
-    this.forces = (data.cycle?.forces ?? []).map(({ at, force, moment, open }) => ({ open: open.length > 0, at: unpacked(at), force: unpacked(force), moment: unpacked(moment) }));
+    this.forces = (data.cycle?.forces ?? []).map(({ pair, at, force, moment, open }) => ({ pair, open: open.length > 0, at: unpacked(at), force: unpacked(force), moment: unpacked(moment) }));
     this.longest = { force: greatest(this.forces.map((f) => f.force)), moment: greatest(this.forces.map((f) => f.moment)) };
     /** @type {Curves[]} */
     this.curves = [];
@@ -228,6 +228,7 @@ class View {
   draw() {
     if (!this.stage) return;
     if (this.motion) this.stage.pose(between(this.motion.values, this.motion.frames.length, this.frame), this.motion.frames);
+    this.stage.open = new Set(this.cycling && this.ui.forces.input.checked ? this.forces.filter((f) => f.open).map((f) => f.pair) : []);
     this.stage.point(this.cycling ? this.ofCycle() : this.ofItem());
   }
 
