@@ -186,6 +186,15 @@ def test_points_of_links_and_unknown_ones() -> None:
         m.replace(loads=[mg.Damper(("frame", "block", "seat", "ear"), coefficient=3.0)])
 
 
+@pytest.mark.parametrize("place", [place for place, _ in PLACES.values()], ids=PLACES)
+def test_what_two_links_exert_on_each_other_is_no_load_on_the_frame(place: object) -> None:
+    """The frame bears the weight of the block, and the law through itself and the driver: together the weight alone."""
+    for law in (mg.ForceLaw(place, law=lambda x, v, t: 7.0 + 0.0 * x), mg.Damper(place, coefficient=3.0)):  # type: ignore[arg-type]
+        m = block(law, mg.Gravity((0.0, 0.0, -10.0)))
+        s = mg.solve(m, {"P": mg.Motion(AT, 2.0, 0.0)})
+        np.testing.assert_allclose(s.shaking[:, 3:], np.broadcast_to([0.0, 0.0, -20.0], (7, 3)), atol=1e-12)
+
+
 # --- units, studies --------------------------------------------------------------------------------------------------------
 
 
