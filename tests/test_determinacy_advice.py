@@ -175,3 +175,20 @@ def test_the_best_turn_lays_x_along_the_largest_bending_moment() -> None:
     wrenches = np.concatenate([moment + np.cross(frames[:, 3], force, axis=0), force]).T[:, :, None]
     np.testing.assert_allclose(pair_changes.best_turns(frames, wrenches), wanted, atol=1e-12)
     assert pair_changes.best_turns(frames, wrenches[:, :, :0]).tolist() == [0.0] * 9
+
+
+def test_cylinders_between_balls_are_completed_until_nothing_is_redundant():
+    """A crane arm on a cylinder that carries a planar four-bar: three redundant constraints each, the cylinder takes away its own three."""
+    bars = [
+        ("A", "R", "frame", "arm", (0, 0, 0)), ("B", "R", "frame", "tube", (1, -1, 0)), ("C", "R", "rod", "arm", (2, 0, 0)),
+        ("E", "R", "arm", "stick", (5, 0, 0)), ("H", "R", "stick", "bar", (6, 0, 0)), ("K", "R", "bar", "crank", (7, 0.5, 0)),
+        ("L", "R", "crank", "arm", (4, -1, 0)),
+    ]  # fmt: skip
+    pairs = [mg.Pair(name, kind, a, b, point=at, axis=(0, 0, 1)) for name, kind, a, b, at in bars]
+    pairs.append(mg.Pair("lift", "P", "tube", "rod", point=(1, -1, 0), axis=(1, 1, 0)))
+    report = mg.check(mg.Mechanism("crane", pairs=pairs, drives=["lift", "L"]))
+    assert report.redundancy == 6
+    whole, alone = [advice for advice in report.advice if advice.brief.startswith("cylinder lift between ball joints")]
+    assert "redundancy 6 -> 0" in whole.brief
+    assert "redundancy 6 -> 3" in alone.brief
+    assert mg.check(whole.apply()).redundancy == 0
