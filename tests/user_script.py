@@ -58,8 +58,8 @@ def solved() -> mg.Solution:
 def read(s: mg.Solution) -> dict[str, Array]:
     """Results with their types."""
     pair, link = s["C"], s.link("boom")
-    good: bool = bool((s.status == "ok").all())
-    assert good
+    status: npt.NDArray[np.str_] = s.status
+    assert (status == "ok").all()
     return {
         "effort": pair.effort,
         "reaction": pair.reaction,

@@ -6,6 +6,9 @@ import importlib
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from mechgraph.algebra.se3 import Array
 from mechgraph.data import json_text, plain
 from mechgraph.document import Document, Shown, to_text
@@ -114,7 +117,7 @@ class Solution(Shown):
         return self._values.has_forces
 
     @property
-    def status(self) -> Any:
+    def status(self) -> NDArray[np.str_]:
         """Named outcomes, one a position: an array of texts."""
         return self._values.status()
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.arguments import items_of
@@ -44,7 +45,7 @@ def table_of(s: Values, include: Sequence[Include] = ()) -> list[Column]:
         raise DeclarationError("table of a solution", faults)
     out: list[Column] = []
 
-    def put(name: str, values: Array, *dimension: float, unit: str = "") -> None:
+    def put(name: str, values: Array | NDArray[np.str_], *dimension: float, unit: str = "") -> None:
         out.append(Column(name, np.asarray(values), unit or unit_of(m.units, dimension)))
 
     if s.t is not None:

@@ -151,7 +151,7 @@ class Values(Protocol):
     least_norm: bool
     radius: float
 
-    def status(self) -> Any:
+    def status(self) -> NDArray[np.str_]:
         """Named outcomes, one a position."""
 
     def checks(self) -> Checks:
