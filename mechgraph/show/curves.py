@@ -147,6 +147,41 @@ def effort_curve(
     DeclarationError
         where the solution has no forces or no such driver; MissingExtraError without matplotlib.
     """
+    names, m = _driver_names(s, freedom), s.whole
+    x = abscissa(s, over)
+    ax = new_axes() if ax is None else ax
+    found = {name: _driver_effort(s, name) for name in names}
+    sides = dict.fromkeys((effort.couple for effort in found.values()), ax)
+    if len(sides) == 2:
+        sides[False] = ax.twinx()
+    several, entries = len(names) > 1, 0
+    for i, (name, effort) in enumerate(found.items()):
+        colour, side = PALETTE[i % len(PALETTE)], sides[effort.couple]
+        draw_curve(side, x, effort.known, name if several else "driver", color=colour)
+        if effort.loaded:
+            label = f"applied in {name}" if several else "applied"
+            draw_curve(side, x, effort.applied, label, color=colour if several else MUTED, ls=(0, (4, 2)))
+        entries += 1 + effort.loaded
+        if marked is not None:
+            at = x.values.reshape(-1)[marked], effort.known.reshape(-1)[marked]
+            side.plot(*at, "o", ms=8, mfc="white", mec=PALETTE[1], mew=2.2, zorder=5, label="_")
+    for couple, side in sides.items():
+        side.axhline(0.0, color=MUTED, lw=0.8, zorder=0)
+        own = [name for name, effort in found.items() if effort.couple == couple]
+        who = "of the drivers" if len(own) > 1 else f"{'of the driver' if entries == 1 else 'in'} {own[0]}"
+        lay_out(side, x, with_unit(f"{'torque' if couple else 'force'} {who}", unit_of(m.units, (1 + couple, 1, -2))))
+    if len(sides) == 2:
+        sides[False].spines["right"].set_visible(True)
+        sides[False].grid(False)
+    lost = [(name, effort.unknown, PALETTE[i % len(PALETTE)]) for i, (name, effort) in enumerate(found.items())]
+    lost = [strip for strip in lost if strip[1].any()]
+    hatched_strips(ax, x, lost)
+    _legend(ax, [side for side in sides.values() if side is not ax], entries + len(lost))
+    return ax
+
+
+def _driver_names(s: Solution, freedom: str | Iterable[str] | None) -> list[str]:
+    """Full names of the drivers that were asked for."""
     m = s.whole
     if not s.has_forces or not s.actuated:
         raise DeclarationError(
@@ -157,55 +192,32 @@ def effort_curve(
     faults = [f"{name!r} is no driver; drivers: {', '.join(s.actuated)}" for name in names if name not in s.actuated]
     if faults or not names:
         raise DeclarationError(f"effort curve of {m.name!r}", faults or ["no driver is named"])
-    x = abscissa(s, over)
-    ax = new_axes() if ax is None else ax
-    couples = {name: m.pairs[m.freedom(name)[0]].type.efforts[m.freedom(name)[1]].is_couple for name in names}
-    sides = dict.fromkeys(couples.values(), ax)
-    if len(sides) == 2:
-        sides[False] = ax.twinx()
-    curves, lost = 0, []
-    for i, name in enumerate(names):
-        k, j = m.freedom(name)
-        result, colour, side = s[m.pairs[k].name], PALETTE[i % len(PALETTE)], sides[couples[name]]
-        unique = _effort_is_unique(result, m.pairs[k].type.f, m.pairs[k].type.freedoms[j].name)
-        effort, applied = (np.asarray(v[..., j]) for v in (result.effort, result.applied_effort))
-        known = np.where(unique, effort, np.nan)
-        solved = np.asarray(s.status) == "ok"
-        if (solved & ~np.isfinite(known)).any():
-            lost.append((name, solved & ~np.isfinite(known), colour))
-        loaded = bool(np.nan_to_num(applied).any())
-        several = len(names) > 1
-        draw_curve(side, x, known, name if several else "driver", color=colour)
-        if loaded:
-            label = f"applied in {name}" if several else "applied"
-            draw_curve(side, x, applied, label, color=colour if several else MUTED, ls=(0, (4, 2)))
-        curves += 1 + loaded
-        if marked is not None:
-            at = x.values.reshape(-1)[marked], known.reshape(-1)[marked]
-            side.plot(*at, "o", ms=8, mfc="white", mec=PALETTE[1], mew=2.2, zorder=5, label="_")
-    for kind, side in sides.items():
-        side.axhline(0.0, color=MUTED, lw=0.8, zorder=0)
-        own = [name for name in names if couples[name] == kind]
-        what = "torque" if kind else "force"
-        who = (
-            f"of the driver {own[0]}"
-            if len(own) == 1 and curves == 1
-            else f"in {own[0]}"
-            if len(own) == 1
-            else "of the drivers"
-        )
-        lay_out(side, x, with_unit(f"{what} {who}", unit_of(m.units, (2 if kind else 1, 1, -2))))
-    if len(sides) == 2:
-        sides[False].spines["right"].set_visible(True)
-        sides[False].grid(False)
-    hatched_strips(ax, x, lost)
-    _legend(ax, [side for side in sides.values() if side is not ax], curves + len(lost))
-    return ax
+    return names
 
 
-def _effort_is_unique(result: Any, freedoms: int, name: str) -> Array:
-    unique = result.unique
-    return np.asarray(unique.get("effort", unique.get(f"effort {name}", True)))
+@dataclass(frozen=True)
+class _DriverEffort:
+    """What a driver supplies, NaN where that is not unique; where it is ``unknown`` so; what loads do in its freedom."""
+
+    couple: bool
+    known: Array
+    unknown: Array
+    applied: Array
+
+    @property
+    def loaded(self) -> bool:
+        """Whether a load acts in the freedom."""
+        return bool(np.nan_to_num(self.applied).any())
+
+
+def _driver_effort(s: Solution, name: str) -> _DriverEffort:
+    k, j = s.whole.freedom(name)
+    pair = s.whole.pairs[k]
+    result = s[pair.name]
+    unique = result.unique.get("effort", result.unique.get(f"effort {pair.type.freedoms[j].name}", True))
+    known = np.where(unique, result.effort[..., j], np.nan)
+    unknown = (np.asarray(s.status) == "ok") & ~np.isfinite(known)
+    return _DriverEffort(pair.type.efforts[j].is_couple, known, unknown, np.asarray(result.applied_effort[..., j]))
 
 
 def _legend(ax: Any, others: Sequence[Any], entries: int) -> None:
