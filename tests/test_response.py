@@ -367,3 +367,15 @@ def test_a_chain_of_sixty_pendulums_starts_as_lagrange_says():
     np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
     again = np.array([r.at(0.0)[name].acceleration[0] for name in names])
     np.testing.assert_allclose(again, found, atol=1e-11 * np.abs(expected).max())
+
+
+def test_the_spin_of_a_rod_between_spheres_is_held_by_a_slotted_one():
+    """Free it keeps its spin, in freedoms of two; slotted it goes along with the crank, on one path. Energy stays in both."""
+    free = mg.load("rssr").replace(drives=[])
+    held = free.with_pair_type("B", "U")
+    t = np.linspace(0, 0.3, 7)
+    for m, coordinates in ((free, "in independent freedoms"), (held, "along the path")):
+        r = mg.respond(m, t, rates={"A": 2.0}, rtol=1e-10, atol=1e-12)
+        assert r.work.coordinates == coordinates
+        assert np.abs(r.energy.balance).max() < 1e-8 * r.energy.kinetic.max()
+    assert mg.check(free).mobility == mg.check(held).mobility + 1 == 2

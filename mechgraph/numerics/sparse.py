@@ -86,8 +86,11 @@ class SparseFactor:
 
     def __init__(self, A: scipy.sparse.csc_array, lu: Factors | None, row_place: Index, col_place: Index) -> None:
         self._A, self._lu, self._row_place, self._col_place = A, lu, row_place, col_place
-        self._pivots = np.zeros(1) if lu is None else np.asarray(lu.lu.U.diagonal())
-        self.smallest_pivot = float(np.abs(self._pivots).min(initial=1.0))
+
+    @cached_property
+    def smallest_pivot(self) -> float:
+        """The smallest pivot, at most 1; 0 where the matrix is exactly singular. Reading it costs as much as a solution."""
+        return 0.0 if self._lu is None else float(np.abs(self._lu.lu.U.diagonal()).min(initial=1.0))
 
     @cached_property
     def distance(self) -> float:
