@@ -370,7 +370,7 @@ def test_a_chain_of_sixty_pendulums_starts_as_lagrange_says():
 
 
 def test_the_spin_of_a_rod_between_spheres_is_held_by_a_slotted_one():
-    """Free it keeps its spin, in freedoms of two; slotted it goes along with the crank, on one path. Energy stays in both."""
+    """Free it keeps its spin, a second freedom; slotted it goes along with the crank, on one path. Energy stays in both."""
     free = mg.load("rssr").replace(drives=[])
     held = free.with_pair_type("B", "U")
     t = np.linspace(0, 0.3, 7)
