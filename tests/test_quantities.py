@@ -159,7 +159,7 @@ def test_quantities_in_calls_are_converted_or_refused():
 
 NO_NUMBERS = ["0.0305", b"1", True, np.bool_(True), 1j, np.complex128(1), np.ma.array(1.0), datetime.date(2000, 1, 1),
               np.datetime64(1, "s"), decimal.Decimal(1), fractions.Fraction(1, 2), None, {}, {1}, 10**400, 10**5000, float("nan"),
-              object()]  # fmt: skip
+              NotImplemented]  # fmt: skip
 
 
 @pytest.mark.parametrize("value", NO_NUMBERS, ids=shown)

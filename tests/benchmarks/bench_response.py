@@ -62,7 +62,10 @@ def once(program: ModuleType, case: Case, variant: str, place: int) -> tuple[flo
 def climbed(program: ModuleType, case: Case, variant: str, first: int, most: float) -> list[Run]:
     """The coarsest settings that reach the accuracies, one after the other; ``most`` seconds are worth a run."""
     out: list[Run] = []
-    why, took, place, errors = "", 0.0, first, [np.inf]
+    place = first
+    while place and once(program, case, variant, place)[1] <= ACCURACIES[0]:
+        place -= 1  # a smaller row may have asked for more
+    why, took, errors = "", 0.0, [np.inf]
     steps = len(program.ladder(case, variant))
     while len(out) < len(ACCURACIES) and place < steps and took < most:
         took, error, why = once(program, case, variant, place)
@@ -132,7 +135,7 @@ MEANING = (
     "equation, the others mechgraph at 1e-10. mechgraph returns all reactions with the motion, the others were asked for one point. "
     "Pinocchio: classical Runge-Kutta steps of our own or scipy's DOP853 around `constraintDynamics` with Baumgarte's stabilization, for "
     "Bricard also around `lcaba`; that leaves the stabilization out, so that it loses the row of four-bars at its flat position, and it "
-    "did not come back from Andrews' mechanism. The governor, which has no loops, by `aba` and LSODA. Exudyn: planar bodies where the "
+    "was given up on Andrews' mechanism. The governor, which has no loops, by `aba` and LSODA. Exudyn: planar bodies where the "
     "mechanism is planar, its two implicit solvers with default settings (its "
     "explicit ones refuse joints), the solver that ignores redundant constraints where there are any. A time limit says that the next "
     "finer setting was not tried. Written by people who know mechgraph better."

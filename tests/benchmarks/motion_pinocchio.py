@@ -26,7 +26,7 @@ def variants(case: Case) -> tuple[str, ...]:
     if case.stiff:
         return ("aba, LSODA",)
     known = ("constraintDynamics, RK4", "constraintDynamics, DOP853")
-    # lcaba goes wrong on rows of loops and does not return on Andrews' mechanism
+    # lcaba goes wrong on rows of loops; on Andrews' mechanism it was given up after minutes
     one_loop = len(case.joints) == len(case.bodies) + 1 and not case.planar
     return (*known, "lcaba, RK4", "lcaba, DOP853") if one_loop else known
 
