@@ -300,6 +300,20 @@ def test_curves_are_those_of_the_solution() -> None:
     assert cycle["places"][1] == "O1.Rz = 155 deg"
 
 
+@pytest.mark.parametrize("drive", [1.2, [1.2, 1.2], [0.0, 1.2]])
+def test_the_mechanism_stands_where_the_solution_says(drive: Any) -> None:
+    """Also at one position, or where nothing moves: not where the report was made."""
+    m = mg.load("four-bar")
+    s = mg.solve(m, {"A": np.array(drive)})
+    data = data_of(report_page(m, s))
+    motion = data["items"][0]["motion"]
+    last = numbers(data["figures"][0]["frames"]).copy()
+    last[motion["frames"]] = numbers(motion["values"])[-1]
+    for link, pose in zip(m.link_names(), last, strict=False):
+        found = s.link(link).pose.reshape(-1, 4, 4)[-1, :3]
+        np.testing.assert_allclose(pose.reshape(3, 4), found, atol=1e-6)
+
+
 @pytest.mark.parametrize("redundant", ["nan", "minimum_norm"])
 def test_what_is_not_unique_is_never_drawn_as_known(redundant: Any) -> None:
     m = mg.load("four-bar")

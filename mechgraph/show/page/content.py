@@ -60,8 +60,8 @@ class _View:
         self.g = g
         self.start = scene_at(self.m, place_of_states(g.system, g.x[:, None]), np.zeros(1, dtype=np.intp))
         self.scene = scene(self._thinned()) if self.s is not None else self.start
-        self.figure = Figure(self.scene)
-        self.figures = [self.figure.data(self.start.frames, self._rows())]
+        self.figure = Figure(self.scene, self.start.frames)
+        self.figures = [self.figure.data(self._rows())]
 
     def _thinned(self) -> Solution:
         """The solution, or as many of its positions as are shown."""
@@ -169,7 +169,7 @@ class _View:
             stands = scene_at(
                 changed, place_of_states(after.geometry.system, after.geometry.x[:, None]), np.zeros(1, dtype=np.intp)
             )
-            self.figures.append(Figure(stands).data(stands.frames, _rows_of(changed, after)))
+            self.figures.append(Figure(stands, stands.frames).data(_rows_of(changed, after)))
             pairs = [n.rsplit(".", 1)[0] if advice.effect is None else n for n in advice.freedoms]
             marked = [names.index(n) for n in pairs if n in names]
             rows = {

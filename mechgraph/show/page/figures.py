@@ -25,9 +25,10 @@ LEFT_OUT = {"reaction"}
 
 
 class Figure:
-    """What is drawn of a scene; ``names`` are the frames that are handed over, in order."""
+    """What is drawn of a scene, and where it ``stands``; ``names`` are the frames that are handed over, in order."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, stands: Mapping[str, Array]) -> None:
+        self.stands = stands
         self.scene, self.m = scene, scene.mechanism
         self.colours = colours(self.m)
         self.home = {f"pair:{p.name}@0": (p.a, p.markers[0].pose()) for p in self.m.pairs}
@@ -45,9 +46,9 @@ class Figure:
             return f"link:{link}", pose
         return frame, np.eye(3, 4)
 
-    def data(self, frames: Mapping[str, Array], rows: Mapping[str, list[list[str]]]) -> dict[str, Any]:
-        """The figure where it stands at the first of ``frames``; ``rows`` are facts of the pairs."""
-        scene = self.scene
+    def data(self, rows: Mapping[str, list[list[str]]]) -> dict[str, Any]:
+        """The figure where it stands; ``rows`` are facts of the pairs."""
+        scene, frames = self.scene, self.stands
         points = np.concatenate([scene.everything, *(moved(part.shape, frames[part.frame][0]) for part in self.parts)])
         points = points[np.isfinite(points).all(axis=1)]
         look = scene.normal if scene.normal is not None else scene.upright @ np.array(OBLIQUE) / np.linalg.norm(OBLIQUE)
@@ -76,9 +77,14 @@ class Figure:
         return np.stack([np.asarray(frames[name]).reshape(-1, 12) for name in names], axis=1)
 
     def motion(self, frames: Mapping[str, Array], kind: str) -> dict[str, Any]:
-        """How the figure moves: the frames that do not stand still, over ``T``."""
+        """How the figure moves: the frames that leave the place where it stands, over ``T``."""
         still = 1e-7 * self.scene.size
-        moving = [n for n in self.names if np.nanmax(np.ptp(frames[n], axis=0), initial=0.0) > still]
+
+        def travel(name: str) -> float:
+            every = np.concatenate([self.stands[name][:1], frames[name]])
+            return float(np.nanmax(np.ptp(every, axis=0), initial=0.0))
+
+        moving = [name for name in self.names if travel(name) > still]
         values = self.of(frames, moving) if moving else np.zeros((len(next(iter(frames.values()))), 0, 12))
         return {"frames": [self.number[name] for name in moving], "values": packed(values), "kind": kind}
 
