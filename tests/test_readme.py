@@ -113,9 +113,9 @@ def test_first_block_is_the_new_topology_of_the_examples() -> None:
 def test_commands_for_a_fresh_clone() -> None:
     main_job, tests = (body for kind, body in BLOCK.findall(README.read_text(encoding="utf-8")) if kind == "sh")
     assert ".venv/bin/mechgraph solve 7r" in main_job
-    assert tests.strip().endswith("python -m pytest")
+    assert tests.strip().endswith("python -m pytest -n auto")
     ci = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
-    assert re.search(r"^python -m pytest$", ci, re.MULTILINE)
+    assert re.search(r"^python -m pytest -n auto$", ci, re.MULTILINE)
     for text in (main_job, tests, ci):
         assert re.search(r"-m venv ", text)
         assert re.search(r"python -m pip install .*'\.\[(cli|test|dev)\]'", text)
