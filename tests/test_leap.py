@@ -49,9 +49,12 @@ def test_a_change_point_is_leapt_over(engine, bars):
     np.testing.assert_allclose(np.abs(cranks), np.broadcast_to(at, (bars + 1, 5)), atol=1e-12)
 
 
-@pytest.mark.parametrize("lower", [1e-3, 1e-6, 1e-9, 1e-11])
+@pytest.mark.parametrize("lower", [1e-3, 1e-6, 1e-9, 1e-10])
 def test_what_is_no_change_point_is_not_leapt_over(lower):
-    """One foot off the line by a little opens the crossing: the branches turn back before it, at a distance of the root of that."""
+    """One foot off the line by a little opens the crossing: the branches turn back before it, at a distance of the root of that.
+
+    A foot that is off by 1e-11, as the digits of a declaration leave it, counts as on the line: with and without a leap.
+    """
     w = way(lower)
     assert not w.crossings
     assert w.follower.work.careful > 0
