@@ -3,7 +3,11 @@
 Metres, kilograms, newtons; x forward, z up, the foot of the boom at the origin. The bucket is drawn through the soil on a straight line
 while its own cylinder is locked; boom and stick cylinder move the tip there. The numbers by hand are statics in the plane: a triangle for
 the position, then one body after the other, moments about its pin.
+
+``python examples/12_excavator.py excavator.html`` also writes the page to pass on: the machine in motion with all forces.
 """
+
+import sys
 
 import numpy as np
 from numpy.typing import NDArray
@@ -139,6 +143,8 @@ def main() -> None:
         push = s[name].effort[:, m.freedom(f"{name}.Tz")[1]]
         print(f"{name}: {push.min() / 1e3:.1f} to {push.max() / 1e3:.1f} kN")
         assert np.allclose(push, [h[name] for h in hand], rtol=1e-8, atol=0)
+    if len(sys.argv) > 1:
+        mg.write_report(m, s, path=sys.argv[1])
 
 
 if __name__ == "__main__":

@@ -30,7 +30,8 @@ def run(script: Path, *arguments: str) -> str:
 
 
 def draws(script: Path) -> bool:
-    return "sys.argv" in script.read_text(encoding="utf-8") and "draw" in script.read_text(encoding="utf-8")
+    text = script.read_text(encoding="utf-8")
+    return "sys.argv" in text and "draw" in text and "write_report" not in text
 
 
 @pytest.mark.parametrize("script", EXAMPLES, ids=lambda script: script.stem)
@@ -51,6 +52,14 @@ def test_a_worked_example_draws_only_on_request() -> None:
     script = next(script for script in EXAMPLES if script.stem == "03_lee_rcsr")
     assert draws(script)
     assert ".png:" not in run(script)
+
+
+def test_the_worked_machine_has_its_page(tmp_path: Path) -> None:
+    """Written on request from what is declared, so that it is always current."""
+    script = next(script for script in EXAMPLES if script.stem == "12_excavator")
+    run(script, str(tmp_path / "excavator.html"))
+    page = (tmp_path / "excavator.html").read_text(encoding="utf-8")
+    assert all(f"{name} (R)" in page for name in "ABCK")
 
 
 def test_pictures_of_the_readme_are_current_and_small() -> None:
