@@ -135,10 +135,9 @@ def test_what_moves_by_itself_needs_no_drive(make):
 
 
 def test_bricard_keeps_its_energy():
-    """One freedom, one redundant constraint, from rest; the fastest freedom changes on the way."""
+    """One freedom, one redundant constraint, from rest."""
     r = mg.respond(bricard(), (0, 10), rtol=1e-11, atol=1e-13)
     assert np.abs(r.energy.balance).max() < 1e-8 * r.energy.kinetic.max()
-    assert r.work.stages > 1
     assert r.checks.closure.max() < 1e-12
 
 
