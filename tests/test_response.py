@@ -247,6 +247,11 @@ def test_at_other_times():
     direct = mg.respond(windows(1), np.array([0.0, 0.3, 1.7]), rates={"A0": -1.0}, rtol=1e-10, atol=1e-12)
     np.testing.assert_allclose(again["A0"].position, direct["A0"].position[1:], atol=1e-8)
     assert r.at(0.5)["A0"].position.shape == (1,)
+    mixed = np.array([0.3, 1.7, 0.31, 0.9, 1.69])  # in any order, from any step
+    for name in ("position", "velocity", "force"):
+        alone = [getattr(r.at(t)["A0"], name) for t in mixed.tolist()]
+        np.testing.assert_allclose(getattr(r.at(mixed)["A0"], name), alone, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(r.at(mixed).energy.work, [r.at(t).energy.work for t in mixed.tolist()], atol=1e-12)
     with pytest.raises(mg.DeclarationError, match="between 0 and 2"):
         r.at(3.0)
 

@@ -176,3 +176,13 @@ def test_random_pendulums_between_stops(seed):
         assert (push[low] > -1e-5).all()
         assert (push[high] < 1e-5).all()
         assert (push[~low & ~high] == 0.0).all()
+
+
+def test_stops_of_prescribed_freedoms_are_refused():
+    """And one that a prescribed freedom drives against is named when it is met."""
+    falling = {"A": lambda t: (1 - t, -1.0, 0.0)}
+    with pytest.raises(mg.DeclarationError, match="stop of 'A': its motion is prescribed"):
+        mg.respond(slide(), (0, 2), start={"A": 1.0}, motions=falling, stops=mg.Stop("A", lower=0.0))
+    turning = {"A": lambda t: (-t, -1.0, 0.0)}
+    with pytest.raises(mg.ResponseError, match="moved against its stop by prescribed motions"):
+        mg.respond(square(), (0, 2), motions=turning, stops=mg.Stop("D", lower=-0.5))

@@ -143,10 +143,10 @@ class Integration:
         of = np.array([id(self.segments[i].stage) for i in step])
         for stage in dict.fromkeys(of.tolist()):
             places = np.flatnonzero(of == stage)
-            parts, work = [], []
-            for i in dict.fromkeys(step[places].tolist()):
-                segment = self.segments[i]
-                parts.append(np.asarray(segment.dense(t[places[step[places] == i]])))
-                work.append(segment.work + parts[-1][-1])
-            y = np.concatenate(parts, axis=1)
-            yield places, self.segments[int(step[places[0]])].stage, y, np.concatenate(work)
+            first = self.segments[int(step[places[0]])]
+            y, work = np.empty((len(first.stage.begin()), len(places))), np.empty(len(places))
+            for i in np.unique(step[places]).tolist():
+                segment, mine = self.segments[i], step[places] == i
+                y[:, mine] = segment.dense(t[places[mine]])
+                work[mine] = segment.work + y[-1, mine]
+            yield places, first.stage, y, work

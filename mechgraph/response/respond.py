@@ -128,7 +128,7 @@ def respond(
     task = Task(system, Loads.of(m.loads), prescribed, columns, engine_for(system.n_rows, 1, engine))
     dq = start_rates(m, task, x, wanted_rates, begin)
     standing = Stops.of(m, task, limits)
-    faults = standing.beyond(x)
+    faults = standing.faults(x)
     if faults:
         raise DeclarationError(f"respond {m.name!r}", faults)
     it = Integration("DOP853" if how.method == "auto" else how.method, float(how.rtol), float(how.atol))

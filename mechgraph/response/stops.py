@@ -33,6 +33,8 @@ from mechgraph.response.events import Occurrence, first_root
 from mechgraph.response.motion_equations import NO_INERTIA, UNOPPOSED, Stopped, accelerations, moved
 from mechgraph.response.prescribed import Prescribed
 
+IMMOVABLE = 1e-12
+"""Rate of a freedom for unit rates of the independent ones below which these do not move it."""
 TOUCHING = 1e-9
 """Gap (radians, lengths / L) up to which a stop counts as closed."""
 LOOKS = np.unique(np.append(np.linspace(0.125, 1.0, 8), 0.5 ** np.arange(3, 20)))
@@ -129,9 +131,13 @@ class Stops:
                     limits.append(_Limit(stop, name, column, int(s.single_rows[column]), sign, float(value) / unit))
         return cls(task, tuple(limits))
 
-    def beyond(self, x: Array) -> list[str]:
-        """Faults of a state ``x (nx,)`` that is beyond limits."""
-        return [
+    def faults(self, x: Array) -> list[str]:
+        """What is wrong with them at the start, a state ``x (nx,)``: freedoms that are prescribed, or beyond their limits."""
+        driven = {limit.stop.freedom for limit in self.limits if limit.column in self.task.columns}
+        found = [
+            f"stop of {name!r}: its motion is prescribed; leave the stop or the motion out" for name in sorted(driven)
+        ]
+        return found + [
             f"start of {limit.stop.freedom!r}: is beyond its {limit.name} stop at {limit.user:g}; give a start within its limits"
             for limit in self.limits
             if limit.sign * (x[limit.row] - limit.value) < -TOUCHING
@@ -215,12 +221,12 @@ class _Free:
         self.sign = np.array([limit.sign for limit in closed])
         self.Z = f.sensitivity()[:, : len(self.chart.free), 0]
         G = self.sign[:, None] * self.Z[self.columns]
-        answers = [accelerations(self.mass, g[:, None]) for g in G]
-        if any(
-            np.abs(left).max(initial=0.0) > UNOPPOSED * np.abs(g).max() for g, (_, left) in zip(G, answers, strict=True)
-        ):
+        self.moves = np.abs(G).max(axis=1, initial=0.0) > IMMOVABLE
+        self.impulse_to_rate, left = np.zeros(G.T.shape), np.zeros(G.T.shape)
+        for i in np.flatnonzero(self.moves):
+            (self.impulse_to_rate[:, [i]], left[:, [i]]) = accelerations(self.mass, G[i][:, None])
+        if np.abs(left).max(initial=0.0) > UNOPPOSED * np.abs(G).max(initial=0.0):
             raise Stopped(NO_INERTIA)
-        self.impulse_to_rate = np.stack([a[:, 0] for a, _ in answers], axis=1)
         self.D = G @ self.impulse_to_rate
         self.w, self.w_rate = self.sign * dq[self.columns], self.sign * found.rates.ddq[self.columns, 0]
 
@@ -238,6 +244,8 @@ class _Free:
 
     def struck(self, e: Array) -> tuple[Array, float]:
         """Rates after an impact with coefficients of restitution ``e``, and the kinetic energy lost."""
+        if (~self.moves & (self.w < 0.0) & ~self.still).any():
+            raise Stopped("a freedom is moved against its stop by prescribed motions alone, which no force can hold up")
         p = self._least(self.D, self.w + e * np.minimum(self.w, 0.0))
         after = self.dq + self.Z @ (self.impulse_to_rate @ p)
         here = self.chart.start
