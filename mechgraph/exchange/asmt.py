@@ -18,7 +18,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array, compose
 from mechgraph.errors import DeclarationError, FileError
 from mechgraph.exchange.indented import Node, numbers_of, tree_of
-from mechgraph.model.sweep import MOST_POSITIONS
+from mechgraph.model.sweep import LONGEST_SWEEP
 from mechgraph.quantities import shown
 
 FIRST_LINES = ("OndselSolver", "freeCAD: 3D CAD with Motion Simulation  by  askoh.com")
@@ -168,7 +168,7 @@ class Reader:
             float(node.numbers(key, (1,), "SimulationParameters", self.faults)[0]) for key in ("tstart", "tend", "hout")
         )
         count = round((end - start) / step) if step > 0 and end > start else 0
-        return np.asarray(start + step * np.arange(min(count, MOST_POSITIONS - 1) + 1), float)
+        return np.asarray(start + step * np.arange(min(count, LONGEST_SWEEP - 1) + 1), float)
 
     def read(self) -> Assembly:
         """The whole file.

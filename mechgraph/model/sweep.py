@@ -6,9 +6,9 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 
-MOST_POSITIONS = 1_000_000
+LONGEST_SWEEP = 1_000_000
 """Longest sweep that a file or the command line may ask for."""
-ROUNDING = 1e-9
+LATE_END = 1e-9
 """Part of a step by which the end may come late through rounding and still be excluded."""
 
 
@@ -19,6 +19,6 @@ def swept(first: float, end: float, step: float) -> Array | str:
     count = (end - first) / step
     if count < 0:
         return "no positions: the step leads away from the end; change its sign, or exchange first and end"
-    if count > MOST_POSITIONS:
-        return f"{count:.3g} positions, at most {MOST_POSITIONS} are taken; take a larger step"
-    return np.asarray(first + step * np.arange(max(int(np.ceil(count - ROUNDING)), 1)), dtype=float)
+    if count > LONGEST_SWEEP:
+        return f"{count:.3g} positions, at most {LONGEST_SWEEP} are taken; take a larger step"
+    return np.asarray(first + step * np.arange(max(int(np.ceil(count - LATE_END)), 1)), dtype=float)

@@ -18,7 +18,7 @@ from mechgraph.structure.kind import kind_of
 from mechgraph.structure.placed_pairs import EXACT
 from mechgraph.structure.snapping import SnappedMechanism, candidates, snapped
 
-WIDEST = 1e-2
+LARGEST_TOL = 1e-2
 """Largest tolerance that is tried."""
 CLOSE = 1e-3
 """Change of a pair up to which numbers of any number of digits are taken for rounded: of random mechanisms hardly one comes so near."""
@@ -61,7 +61,7 @@ def rounding(m: Mechanism, verdict: Callable[[Mechanism], tuple[Any, ...]]) -> R
     own: tuple[Any, ...] | None = None
     other: tuple[SnappedMechanism, float, tuple[Any, ...]] | None = None
     try:
-        sizes = candidates(m, WIDEST)
+        sizes = candidates(m, LARGEST_TOL)
     except MechgraphError:  # the loops do not close to that either
         return None
     for tol in _decades(sizes):
@@ -85,7 +85,7 @@ def plausible(m: Mechanism, L: float) -> float:
     """Largest change (radians, or length / ``L``) that rounding explains: some half units of the last digit in which points and axes are
     written, at least ``CLOSE``.
 
-    A last digit so coarse that half a unit exceeds ``WIDEST``, as in (0, 0, 1), was not rounded to: such numbers are exact.
+    A last digit so coarse that half a unit exceeds ``LARGEST_TOL``, as in (0, 0, 1), was not rounded to: such numbers are exact.
     """
     units = []
     for pair in m.pairs:
@@ -93,7 +93,7 @@ def plausible(m: Mechanism, L: float) -> float:
             sizes = L, math.hypot(*place.axis), math.hypot(*place.second)
             vectors = zip((place.point, place.axis, place.second), sizes, strict=True)
             units += [0.5 * 10.0 ** -max(map(_decimals, vector)) / size for vector, size in vectors]
-    return max(CLOSE, SAFE * max((unit for unit in units if unit <= WIDEST), default=0.0))
+    return max(CLOSE, SAFE * max((unit for unit in units if unit <= LARGEST_TOL), default=0.0))
 
 
 def _decimals(value: float) -> int:
@@ -105,8 +105,8 @@ def _decimals(value: float) -> int:
 def _decades(sizes: Array) -> Iterator[float]:
     """The powers of ten from the smallest of the sizes up."""
     if (sizes > EXACT).any():
-        first = int(np.ceil(np.log10(np.clip(sizes[sizes > EXACT].min(), 1e-12, WIDEST))))
-        yield from (10.0**p for p in range(first, int(np.log10(WIDEST)) + 1))
+        first = int(np.ceil(np.log10(np.clip(sizes[sizes > EXACT].min(), 1e-12, LARGEST_TOL))))
+        yield from (10.0**p for p in range(first, int(np.log10(LARGEST_TOL)) + 1))
 
 
 def _worded(exact: SnappedMechanism, tol: float, verdict: tuple[Any, ...]) -> Rounding:

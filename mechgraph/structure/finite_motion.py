@@ -43,7 +43,7 @@ STROKE = 0.35
 """Length over which a motion is followed."""
 RESOLUTION = 0.01
 """Parts in which that length is given: just where it ends is a matter of step control."""
-KEPT = 0.5
+STEP_KEPT = 0.5
 """Part of a step in one direction that must be left for it to count: about 1 on a motion, 0 where it returns."""
 MOVED = 0.05
 """Part of a step that must be left for the position reached to count as another one."""
@@ -125,7 +125,7 @@ class _Closed:
     def dimension(self) -> int:
         """Number of directions in which a step is kept."""
         table = np.stack([self.kept(v, STEPS[1]) for v in np.eye(self.N.shape[1])])
-        return int((np.linalg.svd(table, compute_uv=False) > KEPT).sum())
+        return int((np.linalg.svd(table, compute_uv=False) > STEP_KEPT).sum())
 
     def followed(self, v: Array) -> float:
         """Length over which the motion ``N v`` goes on with the loops closed, as many single freedoms given as move independently.

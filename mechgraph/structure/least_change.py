@@ -36,7 +36,7 @@ MANY = 0.7
 """Part of the worst miss from which relations that do not hold together are dropped at a time: the least likely to be meant."""
 ROUNDS = 25
 """Most linearizations; each leaves a part of the size of the change."""
-STEP, FARTHER = 0.12, 0.3
+NEARER, FARTHER = 0.12, 0.3
 """Steps between the positions along a motion: at first, and once the loops close at those."""
 LOOSE = 1e-10
 """Hundredth of the residual with which positions near the start, which tell little from each other, lead on to farther ones."""
@@ -169,12 +169,12 @@ def _moving(
     """The smallest change that meets relations and lets the mechanism move with that mobility; None where there is none within ``tol``."""
     rank = placed.system.n_freedoms - mobility
     change = _solved(placed, partial(_relation_rows, found, relations))[0]
-    for step in (STEP, FARTHER):
-        states = _followed(placed.changed(change), placed.x, rank, step, 100.0 * tol if step == STEP else 10.0 * tol)
+    for step in (NEARER, FARTHER):
+        states = _followed(placed.changed(change), placed.x, rank, step, 100.0 * tol if step == NEARER else 10.0 * tol)
         if states is None:
             return None
         change, rest = _solved(placed, partial(_rows_along, placed, found, relations, states, rank), change, FAR * tol)
-        if rest.max() > (LOOSE if step == STEP else EXACT) * 100 or np.max(placed.moved(change)) > SLACK * tol:
+        if rest.max() > (LOOSE if step == NEARER else EXACT) * 100 or np.max(placed.moved(change)) > SLACK * tol:
             return None
     return change
 

@@ -19,7 +19,7 @@ from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
 from mechgraph.model.pair_type import PairType
 
-STEP = 1e-30
+COMPLEX_STEP = 1e-30
 """Step of the complex-step derivatives: exact, as the residuals are analytic."""
 LONG = 10.0
 """Lengths of fewer tolerances than this are not compared."""
@@ -227,12 +227,12 @@ class Relations:
         for n, i in enumerate(which):
             at = 6 * int(np.searchsorted(owners, self.owner[i]))
             w[n, at : at + 3], t[n, at + 3 : at + 6] = np.eye(3), np.eye(3)
-        D = d[which][:, None] + 1j * STEP * np.cross(w, d[which][:, None])
-        E = e[which][:, :, None] + 1j * STEP * np.cross(w[:, None], e[which][:, :, None])
-        P = p[which][:, None] + 1j * STEP * (t + np.cross(w, arm[which][:, None]))
+        D = d[which][:, None] + 1j * COMPLEX_STEP * np.cross(w, d[which][:, None])
+        E = e[which][:, :, None] + 1j * COMPLEX_STEP * np.cross(w[:, None], e[which][:, :, None])
+        P = p[which][:, None] + 1j * COMPLEX_STEP * (t + np.cross(w, arm[which][:, None]))
         r = _RESIDUALS[relation.kind](D, E, P)
         columns = (6 * owners[:, None] + np.arange(6)).ravel()
-        return r[:, 0].real, r.imag / STEP, columns
+        return r[:, 0].real, r.imag / COMPLEX_STEP, columns
 
 
 def _square(d: Array) -> Array:

@@ -24,7 +24,7 @@ from mechgraph.structure.position import Position
 from mechgraph.topology.components import components_of_edges, cut_off, labels_of_bipartite, members
 from mechgraph.topology.linkgraph import LinkGraph
 
-STEP = 1e-4
+DIFFERENCE_STEP = 1e-4
 """Step of the central differences that tell whether a pair element leaves its place."""
 LONGEST_SERIES = 40
 """Pairs of one series up to which any two are tried as a border; in longer ones neighbours only."""
@@ -176,7 +176,7 @@ def _leaving(position: Position, k: int, links: tuple[int, ...], moves: Array, t
     """Rate at which the reaction wrenches of pair ``k`` leave their span, one column a motion."""
     pair = position.pair(k)
     carried = position.graph.ends[k][0] in links
-    steps = np.array([STEP, -STEP, 0.0])
+    steps = np.array([DIFFERENCE_STEP, -DIFFERENCE_STEP, 0.0])
     columns = []
     for move, twist in zip(moves[position.columns(k)].T, twists.T, strict=True):
         frame = np.repeat(pair.frame, 3, axis=2)
@@ -186,7 +186,7 @@ def _leaving(position: Position, k: int, links: tuple[int, ...], moves: Array, t
         frames = evaluation.frames_of(pair.type, pair.pitch, x, frame[:, :, None])
         W = evaluation.reactions_of(pair.type, pair.pitch, frames)[:, :, 0]
         Q, _ = np.linalg.qr(W[:, :, 2])
-        change = (W[:, :, 0] - W[:, :, 1]) / (2 * STEP)
+        change = (W[:, :, 0] - W[:, :, 1]) / (2 * DIFFERENCE_STEP)
         columns.append((change - Q @ (Q.T @ change)).ravel())
     return np.stack(columns, axis=1)
 

@@ -19,7 +19,7 @@ from mechgraph.model.row_parts import Component
 from mechgraph.structure.components import Components
 from mechgraph.structure.reaction_split import UNIQUE
 
-ROUND = 5e-13
+ZERO_ENTRY = 5e-13
 """Entry of a unit direction that counts as zero for its sign."""
 
 
@@ -103,7 +103,7 @@ def _named(components: Components, pair: int, kind: str, axes: Index, unique: Ar
     inner = null_space(unique.T, 1e-9) if across else unique
     direction = np.zeros(3)
     direction[axes] = inner[:, 0]
-    direction = np.where(np.abs(direction) < ROUND, 0.0, direction)
+    direction = np.where(np.abs(direction) < ZERO_ENTRY, 0.0, direction)
     direction = direction * np.sign(direction[np.flatnonzero(direction)[0]])
     name = components.system.m.pairs[pair].name
     return UniqueDirection(name, kind, tuple(direction.tolist()), across, tuple((R @ direction).tolist()))
