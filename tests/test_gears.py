@@ -321,12 +321,17 @@ def test_geared_rotors_swing_as_one():
         (lambda: two(spur(module=0.02)), "0.3 apart; 20 and 40 teeth of module 0.02 mesh at 0.6 .at 0.3 with module 0.01"),
         (lambda: two(spur(), axis=(0, 1, 0)), "axes are not parallel"),
         (lambda: two(spur(teeth=(20, 0))), "teeth = .20.0, 0.0.: expected two whole numbers above 0"),
+        (lambda: two(spur(teeth=(20.5, 40))), "teeth = .20.5, 40.0.: expected two whole numbers above 0"),
+        (lambda: two(spur(teeth=(20, 40, 60))), "expected two whole numbers above 0"),
+        (lambda: two(spur(module=0.0)), "module = 0.0: expected a finite number above 0"),
+        (lambda: two(mg.Rack("g", "A", "B", radius=-0.05), second="P"), "radius = -0.05: expected a finite number above 0"),
+        (lambda: two(mg.Belt("g", "A", "B", radii=(0.1, 0.0))), "radii = .0.1, 0.0.: expected two finite numbers above 0"),
         (lambda: two(spur(teeth=(20, 20), internal=True)), "different numbers of an internal pair"),
         (lambda: two(spur(), b=(0, 0, 0.1)), "same axis"),
         (lambda: two(mg.SpurGears("g", "A", "Q", teeth=(1, 2))), "unknown freedom 'Q'"),
         (lambda: two(mg.SpurGears("g", "A", "A", teeth=(1, 2))), "the same freedom"),
         (lambda: two(spur(), second="P"), "b = 'B': is a pair P; expected one whose only freedom is a turn"),
-        (lambda: two(mg.BevelGears("g", "A", "B", teeth=(1, 2)), b=(0.3, 0.1, 0), axis=(1, 0, 0)), "pass each other at 0.1"),
+        (lambda: two(mg.BevelGears("g", "A", "B", teeth=(1, 2), module=0.1), b=(0.3, 0.1, 0), axis=(1, 0, 0)), "pass each other at 0.1"),
         (lambda: two(mg.WormGear("g", "A", "B", teeth=(1, 30), radius=0.2), b=(0.1, 0, 0), axis=(0, 1, 0)), "more than the radius"),
         (lambda: two(mg.Belt("g", "A", "B", radii=(0.2, 0.2), crossed=True)), "expected more than 0.4"),
         (lambda: two(mg.Rack("g", "A", "B", radius=0.05), b=(0.1, 0, 0), axis=(1, 0, 0), second="P"), "level with the pinion's axis"),
@@ -335,6 +340,32 @@ def test_geared_rotors_swing_as_one():
 def test_gears_that_cannot_mesh_are_named(make, words):
     with pytest.raises(mg.DeclarationError, match=words):
         make()
+
+
+@pytest.mark.parametrize("kind", ["spur", "bevel", "worm", "rack", "belt"])
+def test_numbers_that_decide_are_never_assumed(kind, tmp_path):
+    made = {"spur": mg.SpurGears, "bevel": mg.BevelGears, "worm": mg.WormGear, "rack": mg.Rack, "belt": mg.Belt}[kind]
+    with pytest.raises(TypeError, match=r"missing .* required"):
+        made("g", "A", "B")
+    file = tmp_path / "gears.toml"
+    mg.save(two(spur()), file)
+    lines = file.read_text().replace('kind = "spur"', f'kind = "{kind}"').splitlines()
+    start = next(i for i, line in enumerate(lines) if line.startswith("teeth"))
+    end = next(i for i in range(start, len(lines)) if lines[i].endswith("]"))
+    file.write_text("\n".join(lines[:start] + lines[end + 1 :]))
+    with pytest.raises(mg.FileError, match=r"fields? (teeth, )?(module|radius|radii|teeth) missing"):
+        mg.load(file)
+
+
+def test_rounded_places_fit_within_the_tolerance_of_the_mechanism():
+    """A distance written as 0.3333 for a third: said where nothing says how the numbers are meant, fit where tol does."""
+    gears, b = spur(module=1 / 90), (0.3333, 0.0, 0.0)
+    with pytest.raises(
+        mg.DeclarationError, match=r"0\.3333 apart; 20 and 40 teeth of module 0\.0111111 mesh at 0\.3333333"
+    ):
+        two(gears, b=b)
+    s = solved(two(gears, b=b, tol=1e-4))
+    np.testing.assert_allclose(s["B"].velocity[:, 0], -1.0, rtol=1e-13)
 
 
 def test_gears_without_a_common_carrier_are_named():

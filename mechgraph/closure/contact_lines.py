@@ -6,7 +6,7 @@ wrench ``F = G m`` acts on gear b, ``-F`` on gear a, and the pairs j on the way 
 
     wrench of the pair = wrench that closes the equilibrium - (s_j G - E_j c_j) m.
 
-``s_j G . S_j = c_j`` (see ``model.gears``), so that what is taken off does no work in any freedom: motion and efforts are those of the
+``s_j G . S_j = c_j`` (see ``model.contact``), so that what is taken off does no work in any freedom: motion and efforts are those of the
 linear relation, reactions are those of the contact.
 """
 
@@ -19,7 +19,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array, cross
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
-from mechgraph.model.gears import Axes, Contact
+from mechgraph.model.contact import Axes, Contact
 
 
 class ContactLines:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Self
@@ -15,7 +16,7 @@ from mechgraph.units import LENGTH, PURE
 Terms = tuple[tuple[str, float], ...]
 
 
-class BaseCoupling(Described):
+class BaseCoupling(Described, ABC):
     """What all couplings share: ``terms``, freedoms with their coefficients, and a ``constant`` (None: the value at the start)."""
 
     kind: ClassVar[str]
@@ -42,13 +43,13 @@ class BaseCoupling(Described):
         terms = " ".join(f"{'-' if c < 0 else '+'} {abs(c):.6g} {name}" for name, c in self.terms).removeprefix("+ ")
         return f"{terms} = {'its value at start' if self.constant is None else f'{self.constant:.6g}'}"
 
+    @abstractmethod
     def faults(self, m: Any) -> list[str]:
         """What is wrong with it in a mechanism, one line each."""
-        raise NotImplementedError
 
+    @abstractmethod
     def placed(self, m: Any) -> Self:
         """The same with the terms that it has in a mechanism without faults, by the full names of freedoms."""
-        raise NotImplementedError
 
     @property
     def varies(self) -> bool:
@@ -59,13 +60,13 @@ class BaseCoupling(Described):
         """The same with other coefficients, and another constant where it has one."""
         return self
 
+    @abstractmethod
     def in_own_units(self, units: Mapping[str, str], turns: Sequence[bool]) -> Self:
         """The same with quantities of pint as plain numbers in these units; ``turns`` says which freedoms are angles."""
-        raise NotImplementedError
 
+    @abstractmethod
     def converted(self, length: float, turns: Sequence[bool]) -> Self:
         """The same relation with lengths times ``length``; ``turns`` says which freedoms are angles."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True, init=False)

@@ -287,11 +287,14 @@ def _tensor_fault(value: Any, what: str, minimum: float | None) -> str | None:
     return None if is_numeric(value, (3, 3)) else wrong(value, what, "a 3 x 3 tensor of finite numbers")
 
 
-def _two_fault(value: Any, what: str, minimum: float | None) -> str | None:
-    good = is_numeric(value, (2,)) and (minimum is None or min(value) > minimum)
-    return (
-        None if good else wrong(value, what, "two finite numbers" + ("" if minimum is None else f" above {minimum:g}"))
-    )
+def _positive_fault(
+    shape: tuple[int, ...], words: str, whole: bool = False
+) -> Callable[[Any, str, float | None], str | None]:
+    def fault(value: Any, what: str, minimum: float | None) -> str | None:
+        good = is_numeric(value, shape) and np.min(value) > 0 and not (whole and np.any(np.mod(value, 1)))
+        return None if good else wrong(value, what, f"{words} above 0")
+
+    return fault
 
 
 def _vector_fault(value: Any, what: str, minimum: float | None) -> str | None:
@@ -363,13 +366,19 @@ VECTOR_SERIES = Kind(
     "3 numbers (series)", {"$ref": "#/$defs/vector_series"}, None, (3,), True, _series_fault(3), _turned
 )
 SAMPLES = Kind("n numbers", {"$ref": "#/$defs/series"}, None, None, True, _samples_fault)
-TWO = Kind(
-    "2 numbers",
-    {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2},
+_ABOVE_0: Schema = {"type": "number", "exclusiveMinimum": 0}
+_TWO: Schema = {"type": "array", "minItems": 2, "maxItems": 2}
+POSITIVE = Kind("number > 0", _ABOVE_0, None, (), True, _positive_fault((), "a finite number"))
+TWO_POSITIVE = Kind(
+    "2 numbers > 0", {**_TWO, "items": _ABOVE_0}, None, (2,), True, _positive_fault((2,), "two finite numbers")
+)
+TWO_WHOLE = Kind(
+    "2 integers > 0",
+    {**_TWO, "items": {"type": "integer", "exclusiveMinimum": 0}},
     None,
     (2,),
     True,
-    _two_fault,
+    _positive_fault((2,), "two whole numbers", whole=True),
 )
 NUMBERS = Kind("n numbers", {"type": "array", "items": {"type": "number"}})
 FACTS = Kind("table", {"type": "object"}, dict)

@@ -96,7 +96,7 @@ def snapped(m: Mechanism, tol: float) -> SnappedMechanism:
     change, met, dropped, mobile = least_change(placed, tol)
     pairs = placed.pairs(change)
     kept = {k: getattr(m, k) for k in m.formats}
-    out = SnappedMechanism(**{**kept, "pairs": pairs, "start": placed.start, "tol": None})
+    out = SnappedMechanism(**{**kept, "pairs": pairs, "start": placed.start, "tol": tol})
     L, moved = here.system.par.L, placed.moved(change)
     rows = [
         Change(pair.name, float(angle) if angle > EXACT else 0.0, float(shift * L) if shift > EXACT else 0.0)

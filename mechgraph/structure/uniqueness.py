@@ -67,8 +67,8 @@ class Uniqueness:
 
     def is_unique_on(self, twists: Array) -> bool:
         """Whether the power of every pair's total wrench on ``twists (6, n)`` about the internal origin is unique, and every multiplier."""
-        wrenches = pair_states(self.components.configuration, self.probes)[..., 0]
-        power = np.einsum("in,ips->nps", twists, wrenches)
+        states = _on_every_flank(self.components.configuration, self.probes)
+        power = np.einsum("in,ips->nps", twists, np.concatenate(states, axis=2)[..., 0])
         return bool(np.abs(power).max(initial=0.0) <= UNIQUE and self.coupling_is_unique.all())
 
     @property
@@ -195,15 +195,19 @@ def uniqueness(
     probes = closure.orthonormal_stress() if few else closure.random_stress(np.random.default_rng(SEED), PROBES)
     coefficients = np.abs(here.system.coupling_matrix[:, :, 0]).max(axis=1, initial=0.0)
     multipliers = probes[6 * here.system.graph.n_loops :]
-    # both flanks of gears: what is unique must be so on either
-    flanks = (1.0, -1.0) if ContactLines(here) else (1.0,)
-    table = np.concatenate([components.table(relieved_states(here, probes, one)) for one in flanks], axis=1)
-    return Uniqueness(components, closure, table, np.tile(coefficients[:, None] * multipliers, len(flanks)), probes)
+    states = _on_every_flank(here, probes)
+    table = np.concatenate([components.table(one) for one in states], axis=1)
+    return Uniqueness(components, closure, table, np.tile(coefficients[:, None] * multipliers, len(states)), probes)
 
 
 def pair_states(here: Configuration, rows: Array) -> Array:
     """Total pair wrenches ``(6, P, s, 1)`` of loop wrenches, the first of ``rows (rows, s)``: ``w = C^T x``."""
     return here.pair_wrenches(rows[: 6 * here.system.graph.n_loops, :, None])
+
+
+def _on_every_flank(here: Configuration, rows: Array) -> list[Array]:
+    """``relieved_states`` on both flanks of gears: what is unique must be so on either; where there are none, these are the same."""
+    return [relieved_states(here, rows, flank) for flank in ((1.0, -1.0) if ContactLines(here) else (1.0,))]
 
 
 def relieved_states(here: Configuration, rows: Array, flank: float) -> Array:

@@ -1,0 +1,245 @@
+"""Contacts: couplings that know the lines along which their force acts, so that bearings feel it; what gears, racks and belts share.
+
+The line of a contact, ``n (3,)`` through ``P (3,)``, stands still on the carrier, the link between the two gears. The force ``F`` on
+gear b (and ``-F`` on gear a) does no work on the motions that the coupling allows, ``F . (V_b - V_a) = 0``: with the freedoms ``j`` on
+the way from gear a to gear b through the carrier, passed in the sense ``s_j``,
+
+    sum_j c_j q_j = constant,   c_j m = s_j F . S_j,
+
+where ``m`` is the multiplier. There are two lines, for the two signs of ``m``: both flanks of a tooth, both strands of a belt. Source:
+Litvin and Fuentes, Gear Geometry and Applied Theory, 2004, chapters 10 (pitch points), 14 to 19.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array, cross
+from mechgraph.model.coupling import BaseCoupling
+from mechgraph.model.field_format import FREEDOM_NAME, TEXT
+from mechgraph.model.pair import Marker, Pair
+
+FITTING = 1e-6
+"""Part of a length, or angle, by which gears may miss the place that their teeth ask for; twice the tolerance of the mechanism if more."""
+
+
+class Axes(NamedTuple):
+    """Axes of both gears, points and unit directions ``(3, T)`` each, and the unit of length in which they are given."""
+
+    pa: Array
+    za: Array
+    pb: Array
+    zb: Array
+    unit: float = 1.0
+
+    @property
+    def across(self) -> Array:
+        """From axis a to axis b, at right angles to axis a, ``(3, T)``."""
+        d = self.pb - self.pa
+        return d - self.za * (d * self.za).sum(axis=0)
+
+
+Lines = tuple[Array, Array]
+"""Points and unit directions ``(3, 2, T)`` of the force on gear b, for both flanks or strands; along each it acts in one sense only."""
+
+
+class Step(NamedTuple):
+    """A pair on the way from gear a to gear b: its place, and whether it is passed from its link a to its link b (1) or back (-1)."""
+
+    pair: int
+    sense: float
+
+
+def unit(v: Array) -> Array:
+    """Vectors ``(3, T)`` of length 1 along ``v``."""
+    return np.asarray(v / np.sqrt((v * v).sum(axis=0)))
+
+
+def teeth_lines(P: Array, away: Array, trace: Array, pressure_angle: float) -> Lines:
+    """Both flanks at a pitch point: normals at the pressure angle to the pitch plane, across the ``trace`` of the teeth.
+
+    ``away (3, T)``: from gear a to gear b, at right angles to the pitch plane.
+    """
+    over = np.cos(pressure_angle) * unit(cross(away, trace))
+    out = np.sin(pressure_angle) * away
+    return np.stack([P, P], axis=1), np.stack([out + over, out - over], axis=1)
+
+
+@dataclass(frozen=True)
+class Contact(BaseCoupling):
+    """What gears, racks and belts share.
+
+    ``a`` and ``b`` are the freedoms of the two gears on their carrier: pairs R (of a rack P) that share a link, or that pairs R about the
+    axis of a connect, as a sun wheel on the frame and a planet on its arm.
+    """
+
+    kind: ClassVar[str]
+    slides: ClassVar[bool] = False
+    """Whether gear b slides, as a rack does."""
+    name: Annotated[str, TEXT("name", default="g1, g2, ...")]
+    a: Annotated[str, FREEDOM_NAME("pair of the first gear on the carrier")]
+    b: Annotated[str, FREEDOM_NAME("pair of the second gear on the carrier")]
+
+    def __post_init__(self) -> None:
+        self.read_numbers()
+        object.__setattr__(self, "constant", None)
+        object.__setattr__(self, "terms", ())
+        object.__setattr__(self, "steps", ())
+
+    # --- what a kind of gears says -----------------------------------------------------------------------------------
+
+    @property
+    @abstractmethod
+    def ratio(self) -> float:
+        """The size of ``c_b / c_a``."""
+
+    @abstractmethod
+    def lines(self, axes: Axes) -> Lines:
+        """The lines of the force on gear b."""
+
+    @abstractmethod
+    def misfits(self, axes: Axes, fitting: float) -> list[str]:
+        """What is wrong with the places of the gears, which may miss theirs by ``fitting`` of a length, or angle."""
+
+    # --- in a mechanism ----------------------------------------------------------------------------------------------
+
+    def faults(self, m: Any) -> list[str]:
+        """What is wrong with it in a mechanism, one line each."""
+        where = f"coupling {self.name!r}: "
+        found = [where + fault for fault in self.value_faults("")]
+        ends = {side: getattr(self, side) for side in "ab"}
+        found += [where + fault for fault in (m.freedom_fault(q, single=True) for q in ends.values()) if fault]
+        if found:
+            return found
+        for side, q in ends.items():
+            pair, wanted = m.pairs[m.freedom(q)[0]], "slide" if side == "b" and self.slides else "turn"
+            if _motion(pair) != wanted:
+                found.append(
+                    f"{where}{side} = {q!r}: is a pair {pair.type.symbol}; expected one whose only freedom is a {wanted} at its axis"
+                )
+        if found:
+            return found
+        steps = self._way(m)
+        if isinstance(steps, str):
+            return [where + steps]
+        if any(not pair.has_geometry or pair.faults() for pair in m.pairs):
+            return []
+        placed = self._axes(m, steps)
+        wrong = [placed] if isinstance(placed, str) else self.misfits(placed[0], _fitting(m))
+        return [where + fault for fault in wrong]
+
+    def _way(self, m: Any) -> tuple[Step, ...] | str:
+        """The pairs from gear a to gear b, or why there is no carrier between them."""
+        first, last = (m.freedom(q)[0] for q in (self.a, self.b))
+        if first == last:
+            return f"a and b are the same freedom {self.a!r}; name those of two gears"
+        alone = (
+            f"{self.a!r} and {self.b!r} have no link in common that could carry both gears, and no pairs R about the axis of {self.a!r} "
+            "connect them; gears need a common carrier"
+        )
+        reached: dict[str, tuple[str, int] | None] = dict.fromkeys((m.pairs[first].a, m.pairs[first].b))
+        queue, goal = list(reached), {m.pairs[last].a, m.pairs[last].b}
+        for link in queue:
+            if link in goal:
+                break
+            for k, pair in enumerate(m.pairs):
+                if k not in (first, last) and _motion(pair) == "turn" and link in (pair.a, pair.b):
+                    other = pair.b if link == pair.a else pair.a
+                    if other not in reached:
+                        reached[other] = (link, k)
+                        queue.append(other)
+        else:
+            return alone
+        back, middle = link, []
+        while (before := reached[back]) is not None:
+            middle.append((before[0], before[1]))
+            back = before[0]
+        ways = [
+            (m.pairs[first].b if back == m.pairs[first].a else m.pairs[first].a, first),
+            *reversed(middle),
+            (link, last),
+        ]
+        return tuple(Step(k, 1.0 if m.pairs[k].a == start else -1.0) for start, k in ways)
+
+    def _axes(self, m: Any, steps: tuple[Step, ...]) -> tuple[Axes, list[float]] | str:
+        """The axes of the gears in the frame of the carrier, in the declared configuration, and the senses (1, -1) of the axes of the pairs
+        between them, seen along that of gear a; or what is wrong with them.
+        """
+        pairs: list[Pair] = [m.pairs[step.pair] for step in steps]
+        fitting, senses = _fitting(m), []
+        p, z = _line(_marker(pairs[0], steps[0], behind=True))
+        for pair, step in zip(pairs[1:-1], steps[1:-1], strict=True):
+            q, w = _line(_marker(pair, step, behind=False))
+            off = np.abs(cross(q - p, z)).max()
+            if np.abs(cross(z, w)).max() > fitting or off > fitting * max(1.0, float(np.abs(q - p).max())):
+                return (
+                    f"pair {pair.name!r} between the gears is not about the axis of {self.a!r} (off by {off:.3g}); {self.a!r} and "
+                    f"{self.b!r} need a common carrier"
+                )
+            senses.append(float(np.sign((z * w).sum())))
+            along = ((p - q) * z).sum()
+            p, w = _line(_marker(pair, step, behind=True))
+            z = senses[-1] * w
+            p = p + along * z
+        q, w = _line(_marker(pairs[-1], steps[-1], behind=False))
+        return Axes(p, z, q, w), senses
+
+    def placed(self, m: Any) -> Self:
+        """The same with the coefficients of its freedoms, by their full names; needs sound faults-free gears."""
+        steps = self._way(m)
+        assert not isinstance(steps, str)
+        senses, sign = [1.0] * (len(steps) - 2), 1.0
+        if all(pair.has_geometry for pair in m.pairs):
+            placed = self._axes(m, steps)
+            assert not isinstance(placed, str)
+            axes, senses = placed
+            P, n = (part[:, 0] for part in self.lines(axes))
+            va, vb = self._velocities(axes, P)
+            sign = float(np.sign((n * va).sum() * (n * vb).sum()))
+        values = [1.0, *senses, sign * self.ratio]
+        names = [m.pairs[step.pair].freedom_names[0] for step in steps]
+        terms = [(name, v * steps[0].sense * s.sense) for name, v, s in zip(names, values, steps, strict=True)]
+        out = self.replace(**{side: m.full_name(getattr(self, side)) for side in "ab"})
+        object.__setattr__(out, "terms", tuple(terms))
+        object.__setattr__(out, "steps", steps)
+        return out
+
+    def _velocities(self, axes: Axes, P: Array) -> tuple[Array, Array]:
+        """Velocities ``(3, T)`` of both gears at a point for unit rates."""
+        return cross(axes.za, P - axes.pa), axes.zb if self.slides else cross(axes.zb, P - axes.pb)
+
+    def in_own_units(self, units: Any, turns: Any) -> Self:
+        """See ``BaseCoupling``."""
+        return self.without_quantities(units)
+
+    def converted(self, length: float, turns: Any) -> Self:
+        """See ``BaseCoupling``."""
+        return self.in_units((length, 1.0, 1.0))
+
+
+def _fitting(m: Any) -> float:
+    return max(FITTING, 2.0 * (m.tol or 0.0))
+
+
+def _motion(pair: Pair) -> str:
+    """``"turn"`` or ``"slide"`` of a pair whose only freedom is one about or along its axis; nothing for other pairs."""
+    freedoms = pair.type.freedoms
+    plain: dict[tuple[float, ...], str] = {
+        (0.0, 0.0, 1.0, 0.0, 0.0, 0.0): "turn",
+        (0.0, 0.0, 0.0, 0.0, 0.0, 1.0): "slide",
+    }
+    single = len(freedoms) == 1 and not any(freedoms[0].per_pitch)
+    return plain.get(tuple(freedoms[0].twist), "") if single else ""
+
+
+def _marker(pair: Pair, step: Step, *, behind: bool) -> Marker:
+    """The marker of a pair on the link before it on the way, or on the link behind it."""
+    return pair.markers[int((step.sense > 0) == behind)]
+
+
+def _line(marker: Marker) -> tuple[Array, Array]:
+    return np.array(marker.point, dtype=float)[:, None], unit(np.array(marker.axis, dtype=float)[:, None])
