@@ -39,7 +39,7 @@ MOST_REVERSED = 30
 """Pairs up to which that is done: every marker may cost an assembly."""
 FARTHEST_TOGETHER = 1e4
 """Longest way of freedoms that are moved together, which is followed whole: some seconds."""
-FIRST = 8
+TRIED_FIRST = 8
 """How many of them are tried before the others; an even number, as they are of two kinds in turn."""
 
 
@@ -287,7 +287,7 @@ def _search(m: Mechanism, system: System, x: Array, preferred: Mapping[str, floa
         dq = np.zeros((system.n_freedoms, 1))
         dq[free, 0] = rng.normal(0.0, 0.2 + 1.3 * i / RESTARTS, len(free))
         guesses.append(system.advance(guess[:, None], dq)[:, 0])
-    for round_ in (slice(0, FIRST), slice(FIRST, RESTARTS)):
+    for round_ in (slice(0, TRIED_FIRST), slice(TRIED_FIRST, RESTARTS)):
         states, errors = np.stack(guesses[round_], axis=1), np.empty(len(guesses[round_]))
         for kind, (_, fixed) in enumerate(attempts[:2]):
             states[:, kind::2], errors[kind::2] = close_all(system, states[:, kind::2], fixed, tol=tol)

@@ -14,7 +14,7 @@ from mechgraph.model.parameters import Parameters
 
 MARKER_A, MARKER_B = range(2)
 """Order of the constant poses in ``Numbers.constants``, after the identity."""
-CHUNK = 4096
+FACTORS_AT_ONCE = 4096
 """Factors whose coefficients are multiplied with their markers at once: what lies between stays in the cache."""
 
 
@@ -68,12 +68,12 @@ class Numbers:
     def _folded(self, b: FactorBatch) -> Array:
         """The same with the markers beside them, ``(n, 16, m)``, of one mechanism."""
         n = len(b.pairs)
-        if n > CHUNK:
-            first = self._folded(b.part(slice(0, CHUNK)))
+        if n > FACTORS_AT_ONCE:
+            first = self._folded(b.part(slice(0, FACTORS_AT_ONCE)))
             out = np.empty((n, *first.shape[1:]), dtype=first.dtype)
-            out[:CHUNK] = first
-            for i in range(CHUNK, n, CHUNK):
-                out[i : i + CHUNK] = self._folded(b.part(slice(i, i + CHUNK)))
+            out[:FACTORS_AT_ONCE] = first
+            for i in range(FACTORS_AT_ONCE, n, FACTORS_AT_ONCE):
+                out[i : i + FACTORS_AT_ONCE] = self._folded(b.part(slice(i, i + FACTORS_AT_ONCE)))
             return out
         C = self._coefficients(b)[..., 0]
         left, right = self._beside(b)
@@ -118,8 +118,8 @@ class Numbers:
         """Wrenches of a table in their nodes, moment and force ``(3, 2, K, B)``; without arms where they act at markers B."""
         batch = np.broadcast_shapes(self.constants.shape[3:], self.par.pitch.shape[1:])[0]
         out = np.empty((3, 2, len(table.pairs), batch), dtype=np.result_type(self.constants, self.par.pitch))
-        for i in range(0, len(table.pairs), CHUNK):
-            self._place_components(table.taken(slice(i, i + CHUNK)), out[:, :, i : i + CHUNK])
+        for i in range(0, len(table.pairs), FACTORS_AT_ONCE):
+            self._place_components(table.taken(slice(i, i + FACTORS_AT_ONCE)), out[:, :, i : i + FACTORS_AT_ONCE])
         return out
 
     def _place_components(self, table: ScrewTable, out: Array) -> None:

@@ -19,14 +19,14 @@ from mechgraph.closure.indexing import Index
 from mechgraph.numerics.continuation import Follower
 from mechgraph.numerics.tracks import Nodes, Paths
 
-TURN = 2 * np.pi
+TURN = 2.0 * np.pi
 TURNS = (1, 4, 16)
 """Turns of the driver over which a motion is followed to see whether it repeats itself, one number after the other."""
 WORTH = 2
 """How many times as far positions must lie for that."""
-ROUNDING = 1e-14
+AT_START = 1e-14
 """Part of a driver's value up to which a position is the start itself: so near to it nothing is followed, dead point or not."""
-BACK = 1e-11
+BACK_AGAIN = 1e-11
 """Distance (radians, lengths / L) up to which a motion is back: rounding over a poor condition; shifts are whole turns or nothing."""
 
 
@@ -76,7 +76,7 @@ def _along_curves(path: DriverPath, requests: list[Request], total: int) -> Posi
             turns[places] = np.floor(at / way.period)
             at = np.clip(at - way.period * turns[places], 0.0, way.period)
             values = np.where(turns[places] > 0, begin + way.sense * at, values)
-        ahead = way.length > ROUNDING * max(1.0, abs(begin))
+        ahead = way.length > AT_START * max(1.0, abs(begin))
         points = np.array([[begin, begin + way.sense * way.length] if ahead else [begin]])
         legs.add(way.request, points, values, places, at)
     found = legs.followed().positions
@@ -129,5 +129,5 @@ def _shift(path: DriverPath, follower: Follower, node: Nodes, start: Nodes, cros
     turned[system.single_rows[turning]] += shift[turning][:, None]
     again = path.at(turned, turned[path.rows], start.track)
     # screws and couplings of freedoms that have gained turns may not be back
-    back = np.abs(again.poses - here.poses).max() <= BACK and again.closure[0] <= BACK + here.closure[0]
-    return shift if back and np.abs(left).max(initial=0.0) <= BACK else None
+    back = np.abs(again.poses - here.poses).max() <= BACK_AGAIN and again.closure[0] <= BACK_AGAIN + here.closure[0]
+    return shift if back and np.abs(left).max(initial=0.0) <= BACK_AGAIN else None

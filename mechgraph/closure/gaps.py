@@ -25,7 +25,7 @@ GAPS = 200
 """Most gaps behind which a polygon is taken up again."""
 DIVISIONS = 64
 """Most parts into which an edge is divided."""
-FIRST, TRIALS = 4, 128
+FIRST_CORNERS, MOST_CORNERS = 4, 128
 """Corners to which ways are tried together: of one polygon at first, and of all at most."""
 
 SHORTLY, CAREFUL = 0.05, 8
@@ -170,12 +170,12 @@ def _ways_back(path: DriverPath, found: Positions, polygons: list[_Polygon]) -> 
     out: dict[int, _Way] = {}
     tried: list[_Way] = []
     left: list[float] = []
-    count = FIRST
+    count = FIRST_CORNERS
     while True:
         open_ = [i for i, p in enumerate(polygons) if p.ended is not None and i not in out and p.untried < len(p.at)]
         if not open_:
             break
-        count = max(FIRST, min(count, TRIALS // len(open_)))
+        count = max(FIRST_CORNERS, min(count, MOST_CORNERS // len(open_)))
         ways = [way for i in open_ for way in _ways_to(found, polygons, i, count)]
         count *= 2
         missing = _left(path, found, ways)

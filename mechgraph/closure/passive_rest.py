@@ -93,9 +93,9 @@ def body_accelerations(idle: tuple[Idle, ...], points: list[Array], V: Array, A:
 
 GAUSS = 8
 """Points of Gauss and Legendre a step between nodes: what is integrated over it is exact to rounding."""
-TURNS = 8
+MOST_TURNS = 8
 """Most repetitions of the turn that takes the spin out."""
-TURNED = 1e-13
+UNTURNED = 1e-13
 """Angle that is rounding."""
 
 
@@ -188,9 +188,9 @@ class _Carried:
 
     def turned(self, x: Array, which: Index, track: Index, place: Array, turns: Index | None = None) -> Array:
         """States with every body turned to where it stands when it does not spin, ``turns`` periods of the track later."""
-        for _ in range(TURNS):
+        for _ in range(MOST_TURNS):
             angles, dq = self._turn(x, which, track, place, turns)
-            if np.abs(angles).max(initial=0.0) < TURNED:
+            if np.abs(angles).max(initial=0.0) < UNTURNED:
                 break
             # exact where the rates of the turn are constant (ball joints, hinges); over a plane it comes nearer with every repetition
             x = self.follower.newton.close(self.path.advance(x, dq, track), x[self.path.rows], track, which).x

@@ -27,7 +27,7 @@ from mechgraph.quantities import has_quantity, is_numeric
 
 SLIDES, TURNS = ("Tx", "Ty", "Tz"), ("Rx", "Ry", "Rz")
 PART = re.compile(r"(?P<point>.+)\.(?P<part>Tx|Ty|Tz|T\([^()]*\))")
-STEEP = 0.98
+ALMOST_PARALLEL = 0.98
 """Cosine between the first and the last axis of three successive turns from which on they do not describe a rotation well."""
 PROPER = 1e-6
 """Largest entry of ``R R^T - 1`` of a pose."""
@@ -285,7 +285,7 @@ def _chart(R: Array) -> Array | None:
         if abs(axes[a] @ axes[b]) < 1e-12
     ]
     a, b = min(square, key=lambda ab: (round(float(steep[ab]), 9), ab))
-    if steep[a, b] > STEEP:
+    if steep[a, b] > ALMOST_PARALLEL:
         return None
     return np.stack([axes[a], np.cross(axes[b], axes[a]), axes[b]], axis=1)
 

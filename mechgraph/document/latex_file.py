@@ -13,7 +13,7 @@ from itertools import pairwise
 from mechgraph.document.latex import block_latex, section, tabular
 from mechgraph.document.tree import Block, Document, Equation, Table, joined, plain
 
-WIDEST = 78
+LINE_SIGNS = 78
 """Signs of usual width that a line of an equation holds."""
 ACCENTS = {0x300, 0x301, 0x302, 0x303, 0x304, 0x306, 0x307, 0x308, 0x30A, 0x30B, 0x30C, 0x327}
 """Combining accents that TeX sets on letters; it knows these letters itself."""
@@ -60,8 +60,8 @@ def _broken(latex: str) -> str:
     """A displayed equation, in lines where it is long: broken before signs, and within a product where that alone is too long."""
     lines: list[str] = []
     for term in _terms(latex):
-        for part in [term] if _width(term) <= WIDEST else _pieces(term):
-            if lines and _width(lines[-1]) + _width(part) < WIDEST:
+        for part in [term] if _width(term) <= LINE_SIGNS else _pieces(term):
+            if lines and _width(lines[-1]) + _width(part) < LINE_SIGNS:
                 lines[-1] += f" {part}"
             else:
                 lines.append(part)

@@ -30,7 +30,7 @@ from mechgraph.model.motion import Motion
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.quantities import shown
 
-ROUNDING = 1e-12
+UNMENTIONED = 1e-12
 """Corrections up to here are not worth a word."""
 
 
@@ -131,7 +131,7 @@ class Builder:
             I = self.pose(joint.i)
             fixed = np.column_stack([*self.straightened(snap, joint, row, I)])
             out.append(self.seat(joint, row, fixed))
-        if snap.largest > ROUNDING:
+        if snap.largest > UNMENTIONED:
             self.notes.append(
                 f"axes that are parallel or perpendicular to {FITS:g} rad, and lines that are one to {FITS:g} L, were made so exactly "
                 f"(largest turn {snap.largest:.2g} rad)"
@@ -156,7 +156,7 @@ class Builder:
         centers = [part.pose @ [*part.center, 1.0] for part in a.parts.values() if part.center is not None]
         points = np.array([self.pose(path)[:, 3] for path in a.markers] + centers or [np.zeros(3)])
         radius = float(np.sqrt(((points - points.mean(axis=0)) ** 2).sum(axis=1).mean()))
-        return radius if radius > ROUNDING * max(1.0, float(np.abs(points).max())) else 1.0
+        return radius if radius > UNMENTIONED * max(1.0, float(np.abs(points).max())) else 1.0
 
     def pair(self, seat: Seat) -> Pair:
         """The pair, marker J moved to its place where it is meant to be there."""
@@ -172,7 +172,7 @@ class Builder:
                 f"{joint.kind} {joint.name!r} does not fit as the parts stand: its markers are {distance:.3g} and {angle:.3g} rad "
                 "off; the loops are closed by moving the parts"
             )
-        elif max(distance / self.size, angle) > ROUNDING:
+        elif max(distance / self.size, angle) > UNMENTIONED:
             self.moved[joint.j] = (distance, angle)
         pitch = self.number(joint, seat.row) / (2 * np.pi) if seat.row.number == "pitch" else None
         return self.by_markers(

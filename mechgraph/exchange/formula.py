@@ -17,7 +17,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.quantities import shown
 
-LONGEST = 2000
+LONGEST_FORMULA = 2000
 """Characters of a formula."""
 DOUBLE = re.compile(r"(?<=[\d.])d(?![a-z])")
 """The letter that Smalltalk writes after a number of double precision: ``4.0d*pi*time``."""
@@ -98,8 +98,8 @@ def evaluated(formula: str, t: Array) -> tuple[Array, Array, Array]:
         where it is none, holds what is not known here, or has no finite value.
     """
     text = DOUBLE.sub("", formula.strip().lower()).replace("^", "**")
-    if len(text) > LONGEST:
-        raise FormulaFault(f"longer than {LONGEST} characters")
+    if len(text) > LONGEST_FORMULA:
+        raise FormulaFault(f"longer than {LONGEST_FORMULA} characters")
     try:
         tree = ast.parse(text, mode="eval").body
         with np.errstate(all="ignore"):

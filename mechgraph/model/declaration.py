@@ -20,7 +20,7 @@ from mechgraph.model.drive import Drive
 from mechgraph.model.link import Link
 from mechgraph.model.load import LOADS
 from mechgraph.model.numeric import tolerance_fault
-from mechgraph.model.pair import PARALLEL, Marker, Pair, largest_cosine
+from mechgraph.model.pair import PARALLEL_COSINE, Marker, Pair, largest_cosine
 from mechgraph.model.pair_type import PairType
 from mechgraph.model.parts import Parts
 from mechgraph.model.response_setup import ResponseSetup
@@ -181,7 +181,7 @@ def _pairs_are_sound(pairs: Sequence[Pair], tol: float | None) -> bool:
         return False
     markers = [*by_point, *(p.on_a for p in by_markers), *(p.on_b for p in by_markers)]
     square = np.array([p.type.square_second for p in (*by_point, *by_markers, *by_markers)], dtype=bool)
-    return _markers_are_sound(markers, np.where(square, largest_cosine(tol), PARALLEL))
+    return _markers_are_sound(markers, np.where(square, largest_cosine(tol), PARALLEL_COSINE))
 
 
 def _markers_are_sound(markers: Sequence[Any], most: Array) -> bool:

@@ -27,7 +27,7 @@ from mechgraph.model.pair_type import PairType
 from mechgraph.quantities import is_numeric, shown, wrong
 from mechgraph.units import LENGTH
 
-PARALLEL = 1 - 1e-12
+PARALLEL_COSINE = 1 - 1e-12
 """Cosine above which a second direction is parallel to the axis."""
 PERPENDICULAR = 1e-6
 """Largest cosine between axis and second direction that counts as perpendicular where a pair type needs it."""
@@ -76,7 +76,7 @@ class Marker(Described):
         if not found:
             along = sum(z * x for z, x in zip(self.axis, self.second, strict=True))
             cosine = along / (math.hypot(*self.axis) * math.hypot(*self.second))
-            if abs(cosine) > PARALLEL:
+            if abs(cosine) > PARALLEL_COSINE:
                 found.append(
                     f"{where}second = {self.second!r}: parallel to the axis {self.axis!r}; give another direction"
                 )
@@ -210,7 +210,7 @@ class Pair(Described):
         if isinstance(self.a, str) and isinstance(self.b, str) and self.a == self.b:
             found.append(f"{where}joins link {self.a!r} to itself; a pair joins two links")
         found += list(self._pitch_faults(where))
-        most = largest_cosine(tol) if self.type.square_second else PARALLEL
+        most = largest_cosine(tol) if self.type.square_second else PARALLEL_COSINE
         if (self.on_a is None) != (self.on_b is None):
             missing = "on_b" if self.on_b is None else "on_a"
             found.append(f"{where}{missing} is missing; a pair by markers needs one on each link")

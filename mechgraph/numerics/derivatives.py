@@ -14,7 +14,7 @@ from mechgraph.algebra.se3 import Array
 CHEBYSHEV_POINTS = 32
 """Points of one panel where a callable is differentiated."""
 
-ROUNDING = 8.0 * float(np.finfo(np.float64).eps)
+CHEBYSHEV_NOISE = 8.0 * float(np.finfo(np.float64).eps)
 """Relative size below which a Chebyshev coefficient of a callable is taken for rounding."""
 
 DERIVATIVE_TOLERANCE = 1e-6
@@ -119,7 +119,7 @@ def _panels(function: Callable[[Array], Array], low: float, high: float) -> list
         times = (left + right) / 2.0 + (right - left) / 2.0 * nodes
         values = function(times)
         steep = np.abs(times).max(1) * np.abs(np.diff(values) / np.diff(times)).max(1)
-        rounding = ROUNDING * (np.abs(values).max(1) + steep / 4.0)
+        rounding = CHEBYSHEV_NOISE * (np.abs(values).max(1) + steep / 4.0)
         halves: list[tuple[float, float]] = []
         for (a, b), coefficients, floor in zip(ends, values @ transform.T, rounding, strict=True):
             significant = np.flatnonzero(np.abs(coefficients) > floor)

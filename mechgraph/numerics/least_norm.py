@@ -23,9 +23,9 @@ Array = NDArray[np.float64]
 
 WHOLE = 400
 """Rows or columns up to which singular values are those of the whole matrix (a tenth of a second at most)."""
-STEPS = 24
+LANCZOS_STEPS = 24
 """Lanczos steps for the smallest singular value of a larger one."""
-SETTLED = 1e-3
+LANCZOS_SETTLED = 1e-3
 """Relative change at which these steps end."""
 POWER_SEED = 3
 
@@ -76,14 +76,14 @@ def _largest(apply: Callable[[Array], Array], v: Array) -> float:
     alpha: list[float] = []
     beta: list[float] = []
     value = 0.0
-    for _ in range(STEPS):
+    for _ in range(LANCZOS_STEPS):
         w = apply(basis[-1])
         alpha.append(float(w @ basis[-1]))
         for u in basis:
             w -= (w @ u) * u
         found = float(scipy.linalg.eigvalsh_tridiagonal(alpha, beta)[-1])
         size = float(np.linalg.norm(w))
-        if abs(found - value) <= SETTLED * found or size <= SETTLED**2 * found:
+        if abs(found - value) <= LANCZOS_SETTLED * found or size <= LANCZOS_SETTLED**2 * found:
             return found
         value = found
         beta.append(size)

@@ -159,7 +159,7 @@ WHOLE = 400
 """Unknowns up to which a singular value decomposition is a matter of a tenth of a second."""
 REGULAR = 1e-9
 """Distance from a singular matrix, rows and columns of size one, below which an LU is not trusted."""
-ROUNDING = 1e-13
+ZERO_ROW = 1e-13
 """Size of a row, against the largest, that is rounding of zeros."""
 OPEN = 1e-7
 """Part that an unknown has in the solutions without a right side, above which it is not unique; relative residual of a contradiction."""
@@ -194,5 +194,5 @@ def _unit_rows(A: scipy.sparse.csc_array) -> tuple[Array, scipy.sparse.csc_array
     size = np.zeros(A.shape[0])
     places = A.tocoo()
     np.maximum.at(size, places.row, np.abs(places.data))
-    size[size <= ROUNDING * size.max(initial=0.0)] = 1.0
+    size[size <= ZERO_ROW * size.max(initial=0.0)] = 1.0
     return size, scipy.sparse.csc_array(scipy.sparse.diags_array(1.0 / size) @ A)

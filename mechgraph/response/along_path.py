@@ -30,10 +30,10 @@ from mechgraph.response.way import POINTS, Piece, Way
 
 FAST = 2.0
 """Rate of another freedom against that of the coordinate above which it becomes the coordinate."""
-TURN = 2 * np.pi
+TURN = 2.0 * np.pi
 UNEVEN = 0.37
 """Where in its part of a turn loads are compared with those a turn later: not at the quarters, where change points often are."""
-BACK = 1e-9
+PERIODIC = 1e-9
 """Difference of poses (and part of the quotients) after a turn of the coordinate up to which the path has come back."""
 
 
@@ -99,7 +99,7 @@ class Arc:
         """How the state has advanced after a turn of the coordinate, where all links and loads are back; None where they are not."""
         s = self.task.system
         ends = self.close(self.begin + sense * TURN * np.array([0.0, 1.0])).here
-        if np.abs(ends.poses[..., 1] - ends.poses[..., 0]).max() > BACK:
+        if np.abs(ends.poses[..., 1] - ends.poses[..., 0]).max() > PERIODIC:
             return None
         out = np.zeros(s.n_state)
         singles = np.flatnonzero(s.single_rows >= 0)
@@ -111,7 +111,7 @@ class Arc:
         further = Configuration(s, around.here.x + sense * out[:, None])
         loads, factored = self.task.loads, self.path.solver.factored(further, around.f.which)
         now, then = along_one(around.here, around.f, loads), along_one(further, factored, loads)
-        same = all(np.abs(a - b).max() <= BACK * np.abs(a).max(initial=1.0) for a, b in zip(now, then, strict=True))
+        same = all(np.abs(a - b).max() <= PERIODIC * np.abs(a).max(initial=1.0) for a, b in zip(now, then, strict=True))
         return out if same else None
 
 

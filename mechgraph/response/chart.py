@@ -20,13 +20,13 @@ from mechgraph.closure.rank import closure_rank
 from mechgraph.closure.solver import ClosureSolver, FactoredClosure, closure_solver
 from mechgraph.numerics.tolerances import PATH
 
-STEEP = 3.0
+STEEPEST = 3.0
 """Largest rate of a freedom for unit rates of the independent ones, against that where the chart was laid out, before a new one is."""
-TURNED = 1.0
+MOST_TURNED = 1.0
 """Angle of an independent rotation from where the chart was laid out above which a new one is."""
-ITERATIONS = 12
+CLOSING_STEPS = 12
 """Most Newton steps to a closed state."""
-SETTLED = 1e-13
+LAST_STEP = 1e-13
 """Newton step from which on a state counts as closed; the step before it was a millionth, so that only rounding is left."""
 LOST = 1.0
 """Correction above which closing is given up: the step was too long."""
@@ -66,8 +66,8 @@ class Chart:
 
     def worn(self, f: FactoredClosure, u: Array) -> bool:
         """Whether another chart should take over at a state with coordinates ``u (n,)``."""
-        far = self.turns and np.abs(u[self._singles < 0]).max(initial=0.0) > TURNED
-        return bool(far or self._steepness(f) > STEEP * self.steepness or not f.condition[0] < PATH.doubtful)
+        far = self.turns and np.abs(u[self._singles < 0]).max(initial=0.0) > MOST_TURNED
+        return bool(far or self._steepness(f) > STEEPEST * self.steepness or not f.condition[0] < PATH.doubtful)
 
     def coordinates(self, x: Array) -> Array:
         """Independent coordinates ``u (n, T)`` of states: how far they are from where the chart was laid out."""
@@ -90,7 +90,7 @@ class Chart:
         single = self._singles >= 0
         x[self._singles[single]] = self.x0[self._singles[single], None] + u[single]
         total, before = np.zeros(x.shape[1]), np.full(x.shape[1], np.inf)
-        for _ in range(ITERATIONS):
+        for _ in range(CLOSING_STEPS):
             here = Configuration(s, x)
             f = self.solver.factored(here, np.repeat(self.which, here.T))
             step = f.solve(-here.residual[:, None])[:, 0]
@@ -106,7 +106,7 @@ class Chart:
             total = total + size
             with np.errstate(invalid="ignore"):
                 # below what is asked for, or twice below what rounding allows where the condition is poor
-                closed = (size <= SETTLED) | ((size <= 10 * SETTLED) & (before <= 10 * SETTLED))
+                closed = (size <= LAST_STEP) | ((size <= 10 * LAST_STEP) & (before <= 10 * LAST_STEP))
             before = size
             if closed.all() or not np.isfinite(size).all() or (total > LOST).any():
                 break

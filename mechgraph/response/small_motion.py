@@ -38,9 +38,9 @@ STEP = 0.004
 """Step of the differences (radians, lengths / L); their error and rounding are both near 1e-13 where forces bend within 0.3."""
 STENCIL = ((1, 4 / 5), (2, -1 / 5), (3, 4 / 105), (4, -1 / 280))
 """Steps and weights of the first derivative by central differences of eighth order."""
-ITERATIONS = 60
+EQUILIBRIUM_STEPS = 60
 """Most Newton steps to an equilibrium."""
-LONGEST = 0.3
+LONGEST_EQUILIBRIUM_STEP = 0.3
 """Longest of them."""
 BALANCED = 1e-12
 """Generalized force, against the largest that a load exerts on the way, that counts as none."""
@@ -186,23 +186,23 @@ def equilibrium(m: Mechanism, start: Mapping[str, float] | None = None, *, engin
     """
     place = _Place(m, "equilibrium of", "start", start, engine)
     largest = 0.0
-    for _ in range(ITERATIONS):
+    for _ in range(EQUILIBRIUM_STEPS):
         Q, M, _, K = place.derivatives()
         largest = max(largest, float(np.abs(Q).max()), float(np.abs(K).max()) * STEP)
         if np.abs(Q).max() <= BALANCED * largest or not largest:
             break
         step: Array = np.asarray(np.linalg.lstsq(K, Q, rcond=1e-12)[0], dtype=float)
         size = float(np.abs(step).max())
-        closed = place.closed(step[:, None] * min(1.0, LONGEST / size if size else 1.0))
+        closed = place.closed(step[:, None] * min(1.0, LONGEST_EQUILIBRIUM_STEP / size if size else 1.0))
         if not closed.done[0]:
-            closed = place.closed(0.1 * step[:, None] * min(1.0, LONGEST / size))
+            closed = place.closed(0.1 * step[:, None] * min(1.0, LONGEST_EQUILIBRIUM_STEP / size))
         if not closed.done[0]:
             break
         place.go(closed.here.x[:, 0])
     else:
         raise ResponseError(
-            f"mechanism {m.name!r}: no equilibrium was found near start in {ITERATIONS} steps; generalized forces of {np.abs(Q).max():.3g} "
-            "are left (internal units). Give another start; loads that drive it on and on have none"
+            f"mechanism {m.name!r}: no equilibrium was found near start in {EQUILIBRIUM_STEPS} steps; generalized forces of "
+            f"{np.abs(Q).max():.3g} are left (internal units). Give another start; loads that drive it on and on have none"
         )
     if np.abs(Q).max() > 1e3 * BALANCED * (largest or 1.0):
         raise ResponseError(

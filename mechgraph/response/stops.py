@@ -37,7 +37,7 @@ IMMOVABLE = 1e-12
 """Rate of a freedom for unit rates of the independent ones below which these do not move it."""
 TOUCHING = 1e-9
 """Gap (radians, lengths / L) up to which a stop counts as closed."""
-LOOKS = np.unique(np.append(np.linspace(0.125, 1.0, 8), 0.5 ** np.arange(3, 20)))
+LOOKS_IN_STEP = np.unique(np.append(np.linspace(0.125, 1.0, 8), 0.5 ** np.arange(3, 20)))
 """Parts of a step at which gaps are looked at: closely behind its beginning, where a freedom may have just left its stop. The beginning
 itself is that of the step before, whose rates an impact may have changed."""
 LOWEST = 1e-9
@@ -154,7 +154,7 @@ class Stops:
     def met(self, motion: Moving, begin: float, end: float) -> float | None:
         """The first time in a step at which a free limit is passed, or a held one no longer presses."""
         times: list[float] = []
-        looks = begin + (end - begin) * LOOKS
+        looks = begin + (end - begin) * LOOKS_IN_STEP
         free = [limit for limit in self.limits if limit not in self.held]
         if free:
             x = motion.positions(looks)

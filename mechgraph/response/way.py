@@ -24,7 +24,7 @@ from mechgraph.numerics.tolerances import PATH
 from mechgraph.numerics.tracks import Nodes, Paths
 from mechgraph.response.motion_equations import Loads, along_one
 
-CHUNK = 0.8
+FIRST_PART = 0.8
 """Length of path that is tabulated first (radians, or lengths / L); every further part is twice as long as the one before."""
 AGAIN = 0.1
 """First step where the path is taken up again."""
@@ -37,13 +37,13 @@ FASTEST = 6.0
 AROUND = 0.64
 """Length of the piece with a change point in its middle: the accelerations of states beside it lose rounding over the cube of the
 distance, 5e-12 at the nearest point of the series."""
-TAIL = 1e-12
+SERIES_TAIL = 1e-12
 """Part of the largest coefficient that the last two of a series may have; what a smooth series leaves out behind them is far smaller."""
-ROUNDING = 1e-14
+COEFFICIENT_NOISE = 1e-14
 """Rounding of what a series is made of, times the square of the condition."""
-SHORTEST = 0.01
+SHORTEST_PIECE = 0.01
 """Shortest piece."""
-FLAT = 0.3
+NOT_FALLING = 0.3
 """Part of the coefficients before them that the last ones of a series have where they are noise: those of a smooth series of that size
 (``NOISE``, against the largest term) fall by a hundred from four to four."""
 NOISE = 1e-9
@@ -72,7 +72,7 @@ class Way:
         self.follower = Follower(path)
         self.length, self.closed = 0.0, False
         self.crossings: list[Crossing] = []
-        self._next, self._ended = CHUNK, False
+        self._next, self._ended = FIRST_PART, False
         self._pieces: list[Piece] = []
         self._starts: list[float] = []
         here = Paths([self._drives(np.zeros(2))])
@@ -88,7 +88,7 @@ class Way:
         self._next *= 2.0
         self._follow(place + AROUND / 2)
         # a part does not end beside a change point
-        while near := [c.place for c in self.crossings if abs(place - c.place) < AROUND / 2 - SHORTEST]:
+        while near := [c.place for c in self.crossings if abs(place - c.place) < AROUND / 2 - SHORTEST_PIECE]:
             place = max(near) + AROUND / 2
             self._follow(place + AROUND / 2)
         known = self._known()
@@ -149,7 +149,7 @@ class Way:
     def _known(self) -> float:
         """How far the coordinate serves: to before the first node at which another freedom moves much faster."""
         nodes, singles = self._nodes, self.path.system.single_rows >= 0
-        near = np.array([np.abs(nodes.place - c.place) < SHORTEST for c in self.crossings]).any(axis=0)
+        near = np.array([np.abs(nodes.place - c.place) < SHORTEST_PIECE for c in self.crossings]).any(axis=0)
         steep = np.flatnonzero((np.abs(nodes.Z[singles]).max(axis=(0, 1)) > FASTEST) & ~near)
         return float(nodes.place[max(int(steep[0]) - 1, 0)]) if steep.size else self._reached
 
@@ -176,7 +176,7 @@ class Way:
             for (a, b), c, steepness, noise in zip(spans, *self._series(spans), strict=True):
                 if (
                     _coarse(c, noise)
-                    and b - a > SHORTEST
+                    and b - a > SHORTEST_PIECE
                     and not (np.abs(middles - 0.5 * (a + b)) < 0.25 * (b - a)).any()
                 ):
                     again += [(a, 0.5 * (a + b)), (0.5 * (a + b), b)]
@@ -213,7 +213,7 @@ class Way:
         singles = self.path.system.single_rows >= 0
         steepness = np.abs(f.sensitivity()[singles, 0]).max(axis=0).reshape(len(spans), POINTS).max(axis=1)
         # rounding over the square of the distance from a singular position, which the condition measures
-        noise = ROUNDING * (f.condition**2).reshape(len(spans), POINTS).max(axis=1)
+        noise = COEFFICIENT_NOISE * (f.condition**2).reshape(len(spans), POINTS).max(axis=1)
         return np.einsum("pk,spq->skq", T, values), steepness, noise
 
 
@@ -221,6 +221,6 @@ def _coarse(c: Array, noise: float) -> bool:
     """Whether series ``(POINTS, 5)`` leave more out than rounding, which stays however short the piece is."""
     late, last = np.abs(c[-8:-4]).max(axis=0), np.abs(c[-4:]).max(axis=0)
     tail, size = np.abs(c[-2:]).max(axis=0), np.abs(c).max(axis=0)
-    rounding = (last > FLAT * late) & (last < NOISE * size[:3].max())
-    small = tail <= max(TAIL, noise) * np.maximum(size, 1e-3 * size[:3].max())
+    rounding = (last > NOT_FALLING * late) & (last < NOISE * size[:3].max())
+    small = tail <= max(SERIES_TAIL, noise) * np.maximum(size, 1e-3 * size[:3].max())
     return bool(not (small | rounding).all())

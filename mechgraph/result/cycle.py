@@ -18,7 +18,7 @@ SAME_TIME = 1e-6
 """Part of the duration by which drivers may disagree about the time of a position."""
 RETURNED = 1e-6
 """Part of the range of a coordinate (at least 1 rad for a turn) within which it is back where it was."""
-STEPS = 2.0
+STEPS_TO_CLOSE = 2.0
 """So many of its largest steps may part the last value of a coordinate from the first where the end of a cycle is left out."""
 
 
@@ -132,7 +132,9 @@ def _returned(values: Array, name: str, s: Solution, ended: bool) -> bool:
         gap -= 2 * np.pi * round(gap / (2 * np.pi))
     size = float(np.ptp(values)) + float(np.abs(values).max())
     return abs(gap) <= (
-        RETURNED * max(size, 1e-300) if ended else STEPS * float(np.abs(np.diff(values)).max()) + RETURNED * size
+        RETURNED * max(size, 1e-300)
+        if ended
+        else STEPS_TO_CLOSE * float(np.abs(np.diff(values)).max()) + RETURNED * size
     )
 
 

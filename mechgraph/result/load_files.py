@@ -211,7 +211,7 @@ class _Deck:
             max((float(np.abs(w[part]).max()) for _, w in wrenches), default=0.0) for part in (slice(3, 6), slice(0, 3))
         )
         arm = max(float(np.linalg.norm(one.point)) for one in self.body.acting)
-        floor = ROUNDING * np.repeat([max(moment, arm * force), force], 3)
+        floor = NOT_WRITTEN * np.repeat([max(moment, arm * force), force], 3)
         applied: dict[tuple[int, int], float] = {}
         held: dict[tuple[int, int], float] = {}
         for one, wrench in wrenches:
@@ -259,7 +259,7 @@ def _listed(loads: dict[tuple[int, int], float]) -> list[tuple[int, int, float]]
 
 _ARMS = np.kron(np.eye(3), [[1.0], [-1.0]])
 """Where the six nodes of couples stand around theirs."""
-ROUNDING = 1e-14
+NOT_WRITTEN = 1e-14
 """Part of the largest force or moment of a case below which one is not written."""
 
 

@@ -9,13 +9,13 @@ import numpy as np
 
 from mechgraph.document import Table
 
-NOISE = 1e-11
+SHOWN_AS_ZERO = 1e-11
 """Part of the largest value of its kind below which a value is rounding noise and shown as 0."""
 
 
 def number(value: float, scale: float = 0.0) -> str:
     """Five digits; 0 for what is noise beside ``scale``."""
-    if abs(value) <= NOISE * scale or abs(value) < 1e-300:
+    if abs(value) <= SHOWN_AS_ZERO * scale or abs(value) < 1e-300:
         return "0"
     return f"{value:.5g}"
 

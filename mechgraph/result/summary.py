@@ -11,7 +11,7 @@ import numpy as np
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Table
 from mechgraph.errors import counted
 from mechgraph.result.extremes import Greatest, Range, Reactions, efforts, multipliers, reactions
-from mechgraph.result.numbers import NOISE, bracket, number, with_unit
+from mechgraph.result.numbers import SHOWN_AS_ZERO, bracket, number, with_unit
 from mechgraph.result.places import OK, Places, coupling_unit
 from mechgraph.result.values import Mask, Values
 from mechgraph.structure.components import labels_of
@@ -229,7 +229,7 @@ class _View(Places):
         if loose and not self.mark and not kept:
             return ["not unique", ""]
         mark = (self.mark or f" ({' '.join(kept)})") if loose else ""
-        if found.best[k] <= NOISE * scale:
+        if found.best[k] <= SHOWN_AS_ZERO * scale:
             return ["0" + mark, ""]
         return [number(found.best[k]) + mark, self.name(int(found.at[k]))]
 

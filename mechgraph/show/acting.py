@@ -14,11 +14,11 @@ from mechgraph.model.pair import Pair
 from mechgraph.result.solution import Solution
 from mechgraph.show import shapes
 from mechgraph.show.shapes import Shape, frame_along
-from mechgraph.show.stage import FLAT, Part, Stage
+from mechgraph.show.stage import FLAT_THICKNESS, Part, Stage
 
-LONGEST = 0.2
+LONGEST_ARROW = 0.2
 """Length of the longest force arrow over the extent."""
-SHORTEST = 0.25
+SHORTEST_ARROW = 0.25
 """Length of the shortest arrow of a load over the longest: direction matters more than size there."""
 NOTHING = 1e-9
 """Force over the largest below which no arrow is drawn."""
@@ -55,13 +55,13 @@ def loads(stage: Stage, solution: Solution | None, positions: Any) -> Iterator[P
         kind = [np.linalg.norm(other.vector, axis=1) for other in acting if other.turns == one.turns]
         longest = max(float(np.nanmax(v, initial=0.0)) for v in kind) or 1.0
         share = np.linalg.norm(one.vector, axis=1) / longest
-        share = np.where(share > NOTHING, np.maximum(share, SHORTEST), np.nan)
+        share = np.where(share > NOTHING, np.maximum(share, SHORTEST_ARROW), np.nan)
         frame = f"load:{one.load}:{'moment' if one.turns else 'force'}"
         if one.turns:
             length = width = 2.5 * stage.symbol * share
             at = one.at
         else:
-            length, width = LONGEST * stage.size * share, np.full(stage.count, 0.42 * stage.symbol)
+            length, width = LONGEST_ARROW * stage.size * share, np.full(stage.count, 0.42 * stage.symbol)
             at = one.at - frame_along(one.vector)[..., 2] * length[:, None]
         stage.frames[frame] = stretched(one.vector, at, length, width)
         yield Part("load", f"loads[{one.load}]", "", frame, shapes.turn_arrow() if one.turns else shapes.arrow())
@@ -131,12 +131,12 @@ def reactions(stage: Stage, solution: Solution, positions: Any) -> tuple[list[Pa
     values = {p.name: known_force(stage, solution, p, positions, stage.normal) for p in stage.m.pairs}
     lost = tuple(name for name, force in values.items() if np.isnan(force).any())
     longest = max((float(np.nanmax(np.linalg.norm(v, axis=1), initial=0.0)) for v in values.values()), default=0.0)
-    scale = LONGEST * stage.size / longest if longest else 0.0
+    scale = LONGEST_ARROW * stage.size / longest if longest else 0.0
     out = []
     for pair in stage.m.pairs:
         force = values[pair.name]
         length = np.linalg.norm(force, axis=1) * scale
-        length = np.where(length > FLAT * stage.size, length, np.nan)
+        length = np.where(length > FLAT_THICKNESS * stage.size, length, np.nan)
         at = stage.points[pair.name, pair.b]
         width = np.minimum(0.36 * stage.symbol, 0.2 * length)
         stage.frames[f"reaction:{pair.name}"] = stretched(np.nan_to_num(force), at, length, width)
@@ -164,6 +164,6 @@ def known_force(stage: Stage, solution: Solution, pair: Pair, positions: Any, al
         direction = stage.frames[f"pair:{pair.name}@{part.frame}"][:, :, :3] @ np.array(part.wrench[3:])
         across = direction - (direction * along).sum(axis=1, keepdims=True) * along
         value = np.where(unique[part.name], result.components[part.name].reshape(-1)[positions], np.nan)
-        bears = np.linalg.norm(across, axis=1, keepdims=True) > FLAT
+        bears = np.linalg.norm(across, axis=1, keepdims=True) > FLAT_THICKNESS
         out = out + np.where(bears, across * value[:, None], 0.0)
     return out

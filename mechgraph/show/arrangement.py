@@ -28,7 +28,7 @@ FORBIDDEN = 1e4
 """Cost of covering another text, or of reaching beyond the axes, over that of covering one point of the drawing."""
 STEADY = 1.2
 """Cost of moving a text by its height from where it stood before, over that of covering one point of the drawing."""
-WIDEST = 0.45
+LEGEND_WIDTH = 0.45
 """Part of the width of the axes that the columns of a legend may take; lines beyond are counted."""
 LOW, BROAD = 8, 0.25
 """Lines up to which a legend may stand below, and its width over that of the axes from which it does."""
@@ -115,7 +115,7 @@ class Arrangement(Artist):
             box[0, 1] += (n + 1) * height
             return box
         rows = max(int((box[1, 1] - box[0, 1]) / height), 1)
-        left = box[1, 0] - WIDEST * (box[1, 0] - box[0, 0])
+        left = box[1, 0] - LEGEND_WIDTH * (box[1, 0] - box[0, 0])
         columns: list[range] = []
         for i in range(0, n, rows):
             column = range(i, min(i + rows, n))

@@ -14,7 +14,7 @@ from mechgraph.document.tree import plain
 from mechgraph.model.pair import Pair
 from mechgraph.show import shapes
 from mechgraph.show.shapes import Shape, frame_along
-from mechgraph.show.stage import FLAT, Label, Part, Stage, distinct
+from mechgraph.show.stage import FLAT_THICKNESS, Label, Part, Stage, distinct
 from mechgraph.show.symbols import Line, lines_of, symbol
 
 ROD, EDGE = 0.3, 0.2
@@ -40,7 +40,7 @@ def links(stage: Stage) -> Iterator[Part]:
 
 
 def _body(stage: Stage, link: str, corners: list[Array]) -> Iterator[Part]:
-    frame, near = f"link:{link}", FLAT * stage.size
+    frame, near = f"link:{link}", FLAT_THICKNESS * stage.size
     points = distinct(corners, near)
     if len(points) == 1 and stage.m.link(link).mass > 0:
         points = distinct([*points, np.asarray(stage.m.link(link).center, dtype=float)], near)
@@ -58,7 +58,7 @@ def _feet(stage: Stage) -> Iterator[Part]:
     name = stage.m.frame
     X = stage.frames[f"link:{name}"][0]
     foot = shapes.foot().moved(1.8 * stage.symbol * X[:, :3].T @ stage.upright)
-    for at in distinct(stage.corners(name), FLAT * stage.size):
+    for at in distinct(stage.corners(name), FLAT_THICKNESS * stage.size):
         yield Part("foot", name, "", f"link:{name}", foot.moved(np.eye(3), at))
 
 
@@ -73,10 +73,10 @@ def hull(points: Array) -> tuple[tuple[tuple[int, ...], ...], tuple[tuple[int, i
     """Faces and edges of the convex hull of points: none and a line, a flat plate, or a body."""
     middle = points - points.mean(axis=0)
     _, spread, Vt = np.linalg.svd(middle, full_matrices=False)
-    if len(points) == 2 or spread[1] <= FLAT * spread[0]:
+    if len(points) == 2 or spread[1] <= FLAT_THICKNESS * spread[0]:
         order = np.argsort(middle @ Vt[0]).tolist()
         return (), tuple(pairwise(order))
-    if len(points) == 3 or spread[2] <= FLAT * spread[0]:
+    if len(points) == 3 or spread[2] <= FLAT_THICKNESS * spread[0]:
         corners = [int(i) for i in scipy.spatial.ConvexHull(middle @ Vt[:2].T).vertices]
         return (tuple(corners),), tuple(pairwise([*corners, corners[0]]))
     solid = scipy.spatial.ConvexHull(points)
@@ -85,7 +85,7 @@ def hull(points: Array) -> tuple[tuple[tuple[int, ...], ...], tuple[tuple[int, i
         for i, j in pairwise([*face, face[0]]):
             edges.setdefault((min(i, j), max(i, j)), []).append(k)
     normals = solid.equations[:, :3]
-    sharp = tuple(edge for edge, (k, m) in edges.items() if normals[k] @ normals[m] < 1 - FLAT)
+    sharp = tuple(edge for edge, (k, m) in edges.items() if normals[k] @ normals[m] < 1 - FLAT_THICKNESS)
     return tuple(tuple(face) for face in solid.simplices.tolist()), sharp
 
 
@@ -119,7 +119,7 @@ def _strokes(stage: Stage, pair: Pair, lines: list[Line], size: float) -> list[t
     X = pair.markers[0].pose()
     along, (low, high) = X[:, :3] @ lines[slides[0]].direction, out[slides[0]]
     for d in (p - X[:, 3] for p in stage.corners(pair.a)):
-        if np.linalg.norm(np.cross(d, along)) < FLAT * stage.size:
+        if np.linalg.norm(np.cross(d, along)) < FLAT_THICKNESS * stage.size:
             low, high = min(low, float(d @ along) + 2.6 * size), max(high, float(d @ along) - 2.6 * size)
     out[slides[0]] = (low, high)
     return out

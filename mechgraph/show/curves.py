@@ -20,7 +20,7 @@ from mechgraph.show.canvas import HATCH, INK, MUTED, PALETTE, new_axes, plain, s
 from mechgraph.show.margins import margins
 from mechgraph.units import unit_of
 
-STEPS = (10, 15, 30, 45, 60, 90, 180, 360)
+TICKS = (10, 15, 30, 45, 60, 90, 180, 360)
 """Distances of ticks of angles, degrees."""
 STRIP = 0.07
 """Height of a hatched strip over that of the axes."""
@@ -85,7 +85,7 @@ def lay_out(ax: Any, x: Abscissa, label: str) -> None:
     if x.degrees and known.size and np.ptp(known) > 60:
         from matplotlib.ticker import MultipleLocator
 
-        step = next((d for d in STEPS if np.ptp(known) / d <= 8), 360)
+        step = next((d for d in TICKS if np.ptp(known) / d <= 8), 360)
         ax.xaxis.set_major_locator(MultipleLocator(step))
 
 

@@ -20,7 +20,7 @@ STRAND = 0.035
 """Distance of the strands of an edge that lies in several loops, and"""
 BULGE = 0.22
 """of edges between the same two links, over the distance of neighbours."""
-WIDE = 34
+LEGEND_LETTERS = 34
 """Letters of a line of the legend."""
 LABELLED = 64
 """Equations and unknowns up to which each is named beside the pattern; beyond, their owners are."""
@@ -66,7 +66,9 @@ def draw_graph(m: Mechanism, *, ax: Any = None) -> Any:
     for pair, middle in middles.items():
         canvas.name(f"{pair} ({m.pair(pair).type.symbol})", middle, INK)
     words = ((f"loop {i + 1}: {', '.join(loop)}", PALETTE[i % len(PALETTE)]) for i, loop in enumerate(loops))
-    canvas.finish([(line, colour) for text, colour in words for line in wrap(text, WIDE, subsequent_indent="    ")])
+    canvas.finish(
+        [(line, colour) for text, colour in words for line in wrap(text, LEGEND_LETTERS, subsequent_indent="    ")]
+    )
     return canvas.ax
 
 

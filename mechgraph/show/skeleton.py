@@ -16,7 +16,7 @@ from mechgraph.show.painting import FlatPainter, Painter, SpacePainter, edges_of
 from mechgraph.show.scene import Part, Scene, scene
 from mechgraph.units import unit_of
 
-MOST_NAMES = 12
+NAMES_IN_DRAWING = 12
 """Pairs up to which all names stand in the drawing; beyond, numbers stand there and a legend beside it says what they are."""
 GHOST = 0.3
 """Opacity of the other positions."""
@@ -264,7 +264,7 @@ class Drawing:
 
     def _names(self, arranged: Any, t: int) -> None:
         m, lines = self.scene.mechanism, []
-        numbered = len(m.pairs) > MOST_NAMES
+        numbered = len(m.pairs) > NAMES_IN_DRAWING
         for label in self.scene.labels:
             text, colour = label.text, self.colour.get(label.link, INK)
             if numbered and label.kind == "pair":

@@ -18,7 +18,7 @@ from mechgraph.model.pair import Pair
 from mechgraph.show.shapes import Shape
 from mechgraph.show.symbols import Line, lines_of
 
-FLAT = 1e-6
+FLAT_THICKNESS = 1e-6
 """Thickness over extent below which a mechanism is drawn as a plane one, and a link as a plate; points closer than that are one."""
 SYMBOL = 0.026
 """Half width of a symbol over the extent of the mechanism, where pairs leave room for it."""
@@ -120,7 +120,7 @@ class Stage:
                 and (line := lines_of(pair.type, pair.pitch_per_radian)[0]).turns
             ):
                 axis = self.frames[f"pair:{pair.name}@0"][0, :, :3] @ line.direction
-                normal = normal if np.linalg.norm(np.cross(axis, normal)) < FLAT else None
+                normal = normal if np.linalg.norm(np.cross(axis, normal)) < FLAT_THICKNESS else None
         return normal
 
     def _pair_frames(self, pair: Pair) -> list[Array]:
@@ -156,7 +156,7 @@ class Stage:
         """Half width of a symbol: less where another pair is near."""
         here = self.points[pair.name, pair.b][0]
         gaps = (float(np.linalg.norm(here - self.points[p.name, p.b][0])) for p in self.m.pairs if p is not pair)
-        nearest = min((gap for gap in gaps if gap > FLAT * self.size), default=self.size)
+        nearest = min((gap for gap in gaps if gap > FLAT_THICKNESS * self.size), default=self.size)
         return float(np.clip(0.4 * nearest, 0.45 * self.symbol, self.symbol))
 
     def freedom(self, name: str) -> tuple[Pair, int, Line, str]:
@@ -191,5 +191,5 @@ def distinct(points: Iterable[Array], tolerance: float) -> Array:
 def plane_normal(points: Array) -> Array | None:
     """The normal of the plane in which all points lie, its largest component positive; None where there is no such plane."""
     _, spread, Vt = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
-    flat = len(spread) > 2 and spread[2] <= FLAT * spread[0] < spread[1]
+    flat = len(spread) > 2 and spread[2] <= FLAT_THICKNESS * spread[0] < spread[1]
     return np.asarray(Vt[2] * np.sign(Vt[2][np.argmax(np.abs(Vt[2]))])) if flat else None

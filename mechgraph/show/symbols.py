@@ -23,7 +23,7 @@ GUIDE, BODY, PIN = 0.95, 0.62, 0.24
 """Radii of guides, of what runs in them, and of pins, over the size of a symbol."""
 PAD = 1.6
 """How far a guide or plate goes beyond the stroke."""
-PARALLEL = 1e-6
+PARALLEL_SINE = 1e-6
 """Sine below which two directions are parallel."""
 
 Role = Literal["guide", "body", "dark"]
@@ -149,4 +149,4 @@ def _drum(line: Line, stroke: tuple[float, float], slides: list[Line], size: flo
 
 
 def _parallel(u: Array, v: Array) -> bool:
-    return float(np.linalg.norm(np.cross(u, v))) < PARALLEL
+    return float(np.linalg.norm(np.cross(u, v))) < PARALLEL_SINE

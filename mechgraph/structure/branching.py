@@ -27,7 +27,7 @@ STARTS = 64
 """Random starts of the search; k self-stresses that are not those of a regular position allow 2^k branches."""
 STARTS_SEED = 5
 """Of these starts."""
-SOLVED = 1e-9
+BRANCH_RESIDUAL = 1e-9
 """Residual of a branch."""
 FREEDOMS_LISTED = 8
 """Most freedoms listed of a branch."""
@@ -88,9 +88,9 @@ def branches(
     stress = found.random_stress(rng, min(found.count - found.rank, N.shape[1] + 1))
     curvature = _Curvature(system, x, N, stress, columns)
     first = rng.normal(size=(N.shape[1], STARTS))
-    a, error = closest_zeros(curvature.at, _Point.steps, np.add, first, tolerance=SOLVED)
+    a, error = closest_zeros(curvature.at, _Point.steps, np.add, first, tolerance=BRANCH_RESIDUAL)
     ways: list[Array] = []
-    for one in (N @ a[:, error < 1e3 * SOLVED]).T:
+    for one in (N @ a[:, error < 1e3 * BRANCH_RESIDUAL]).T:
         if all(np.abs(one - other).max() > SAME for other in ways):
             ways.append(np.where(np.abs(one) < SAME**2, 0.0, one))
     if not 1 < len(ways) <= MOST_BRANCHES:

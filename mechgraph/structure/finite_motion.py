@@ -37,7 +37,7 @@ from mechgraph.numerics.linear import independent_rows
 from mechgraph.numerics.tolerances import RANKS
 from mechgraph.numerics.tracks import Paths
 
-STEPS = (0.05, 0.0125, 0.003)
+TRIAL_STEPS = (0.05, 0.0125, 0.003)
 """Lengths of trial steps (radians, or lengths / L): the first ones tell a motion that returns, the last ones tolerate curvature."""
 STROKE = 0.35
 """Length over which a motion is followed."""
@@ -47,7 +47,7 @@ STEP_KEPT = 0.5
 """Part of a step in one direction that must be left for it to count: about 1 on a motion, 0 where it returns."""
 MOVED = 0.05
 """Part of a step that must be left for the position reached to count as another one."""
-TRIALS = 6
+RANDOM_STEPS = 6
 """Random steps away from a position that is not regular."""
 FROZEN = 12
 """Corrections with the equations of the position left."""
@@ -113,7 +113,7 @@ class _Closed:
         rows = self.closure.reduced
         already = rows.open_part(Configuration(self.system, self.x[:, None]).residual[:, 0])
         limit = 10 * max(CLOSURE_GOAL, rows.rounding, already)
-        for h in STEPS:
+        for h in TRIAL_STEPS:
             closed = _corrected(self.system, self._stepped(v, h), rows)
             if (
                 closed is not None
@@ -124,7 +124,7 @@ class _Closed:
 
     def dimension(self) -> int:
         """Number of directions in which a step is kept."""
-        table = np.stack([self.kept(v, STEPS[1]) for v in np.eye(self.N.shape[1])])
+        table = np.stack([self.kept(v, TRIAL_STEPS[1]) for v in np.eye(self.N.shape[1])])
         return int((np.linalg.svd(table, compute_uv=False) > STEP_KEPT).sum())
 
     def followed(self, v: Array) -> float:
@@ -135,7 +135,7 @@ class _Closed:
         single = np.flatnonzero(self.system.single_rows >= 0)
         given = np.array(independent_rows(self.N, single.tolist(), self.N.shape[1]), dtype=np.intp)
         ahead = STROKE * self.increments(v)[given]
-        if not np.abs(ahead).max(initial=0.0) > MOVED * STEPS[0]:
+        if not np.abs(ahead).max(initial=0.0) > MOVED * TRIAL_STEPS[0]:
             return 0.0
         solver = closure_solver(engine_for(self.system.n_rows, 1, self.engine), given)
         path = DriverPath(self.system, solver, lambda variants: self.system)
@@ -176,7 +176,7 @@ class FiniteMotion:
     @cached_property
     def closure_nearby(self) -> ClosureRank | None:
         """The closure equations at a position reached by a motion; None where nothing moves."""
-        x = self.begin[0].moved(self.begin[1], STEPS[0]) if self.begin else None
+        x = self.begin[0].moved(self.begin[1], TRIAL_STEPS[0]) if self.begin else None
         return self.begin[0].reached(x).closure if self.begin and x is not None else None
 
     @property
@@ -206,13 +206,13 @@ def _near_by(start: _Closed, rng: np.random.Generator) -> FiniteMotion:
     """The mobility about a position that is not regular: the largest of those at positions reached from it."""
     best = FiniteMotion(0, start.closure.rank)
     rank = best.rank_nearby
-    for _ in range(TRIALS):
-        x = start.moved(start.random(rng), STEPS[0])
+    for _ in range(RANDOM_STEPS):
+        x = start.moved(start.random(rng), TRIAL_STEPS[0])
         if x is None:
             continue
         change = start.change(x)
         length = float(np.abs(change).max())
-        if not length > MOVED * STEPS[0]:
+        if not length > MOVED * TRIAL_STEPS[0]:
             continue
         there = start.reached(x)
         rank = max(rank, there.closure.rank)

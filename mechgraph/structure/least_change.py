@@ -28,7 +28,7 @@ from mechgraph.numerics.linear import singular_values
 from mechgraph.structure.near_relations import Relation, Relations
 from mechgraph.structure.placed_pairs import EXACT, Placed
 
-SURE = (0.25, 0.0625)
+FIRMLY_MEANT = (0.25, 0.0625)
 """Parts of the tolerance: relations that are nearer than others stay, where not all let the mechanism move."""
 SLACK = 1.001
 """A tolerance is met up to this factor: it may be the printed size of the change itself."""
@@ -62,7 +62,7 @@ def least_change(placed: Placed, tol: float) -> tuple[Array, tuple[Relation, ...
     change, met, dropped = _meeting(placed, found, found.near(tol), tol)
     if placed.system.n_rows > MOST_ROWS:
         return change, met, dropped, False
-    sure = [{r.text for r in found.near(tol * part)} for part in SURE]
+    sure = [{r.text for r in found.near(tol * part)} for part in FIRMLY_MEANT]
     sets = dict.fromkeys((met, *(tuple(r for r in met if r.text in texts) for texts in sure), ()))
     for mobility in range(_mobility(declared, placed.x, tol), _mobility(placed.changed(change), placed.x, 0.0), -1):
         for relations in sets:

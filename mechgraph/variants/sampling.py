@@ -13,7 +13,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
 from mechgraph.quantities import is_numeric, real_array, shown, wrong
 
-TAIL = 0.00135
+IGNORED_TAIL = 0.00135
 """Part of a distribution without end that is ignored at either end: three standard deviations of a normal one."""
 SPREAD = (0.15866, 0.84134)
 """Quantiles whose half distance is called the spread: the standard deviation of a normal distribution."""
@@ -108,11 +108,11 @@ def deviation(distribution: Any) -> float:
 
 
 def reach(distribution: Any) -> tuple[float, float]:
-    """Smallest and largest value; where a distribution has no end, its quantiles at ``TAIL``."""
+    """Smallest and largest value; where a distribution has no end, its quantiles at ``IGNORED_TAIL``."""
     low, high = (float(end) for end in distribution.support())
     return (
-        low if np.isfinite(low) else float(distribution.ppf(TAIL)),
-        high if np.isfinite(high) else float(distribution.ppf(1 - TAIL)),
+        low if np.isfinite(low) else float(distribution.ppf(IGNORED_TAIL)),
+        high if np.isfinite(high) else float(distribution.ppf(1 - IGNORED_TAIL)),
     )
 
 

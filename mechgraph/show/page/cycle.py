@@ -10,7 +10,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.document.tree import plain
 from mechgraph.model.pair import Pair
-from mechgraph.result.numbers import NOISE
+from mechgraph.result.numbers import SHOWN_AS_ZERO
 from mechgraph.result.places import driver_value
 from mechgraph.result.solution import Solution
 from mechgraph.show.canvas import with_unit
@@ -36,7 +36,7 @@ class Cycle:
         most = [
             max((float(np.nanmax(np.abs(v), initial=0.0)) for v in rows), default=0.0) for rows in (forces, moments)
         ]
-        self.noise = NOISE * max(most[0], most[1] / scene.size)
+        self.noise = SHOWN_AS_ZERO * max(most[0], most[1] / scene.size)
 
     def at(self, values: Any) -> Array:
         """Values at the positions of the scene, the batch flat."""

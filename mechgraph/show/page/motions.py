@@ -16,14 +16,14 @@ from mechgraph.report.report import DeterminacyReport
 
 REACH = 0.35
 """How far a freedom is followed to either side (radians, or lengths / L), in so many steps."""
-STEPS = 12
+STEPS_A_MODE = 12
 LEAST = 3
 """Steps that must be closed for a motion to count as one."""
 KEPT = 0.3
 """Part of a step that must be left once the loops are closed."""
 SHAKEN = 0.12
 """How far an infinitesimal motion is drawn."""
-TURN = 48
+PICTURES_A_TURN = 48
 """Positions of a full turn."""
 
 
@@ -62,9 +62,9 @@ def wiggles(report: DeterminacyReport) -> Iterator[Wiggle]:
     for passive, found in zip(g.freedoms.passive, report.passive, strict=True):
         rate = float(np.linalg.norm(passive.twist[:3])) if found.turns else 0.0
         if rate:
-            along = np.linspace(0, 2 * np.pi / rate, TURN + 1)
+            along = np.linspace(0, 2 * np.pi / rate, PICTURES_A_TURN + 1)
         else:
-            along = REACH * np.linspace(-1, 1, 2 * STEPS + 1)
+            along = REACH * np.linspace(-1, 1, 2 * STEPS_A_MODE + 1)
         x = g.system.advance(g.x[:, None], passive.rates[:, None] * along)
         yield Wiggle(
             "Passive freedoms",
@@ -92,7 +92,7 @@ def _followed(g: Geometry, group: str, title: str, text: str, rates: Array, rest
     v = rates / np.abs(rates).max()
     sides = [_side(g, sign * v, rest) for sign in (-1.0, 1.0)]
     if max(map(len, sides)) < LEAST:
-        x = g.system.advance(g.x[:, None], v[:, None] * SHAKEN * np.linspace(-1, 1, 2 * STEPS + 1))
+        x = g.system.advance(g.x[:, None], v[:, None] * SHAKEN * np.linspace(-1, 1, 2 * STEPS_A_MODE + 1))
         return Wiggle(
             group, title, f"{text}. Infinitesimal only: beyond it the loops open, as they are drawn here", x, "swing"
         )
@@ -101,8 +101,8 @@ def _followed(g: Geometry, group: str, title: str, text: str, rates: Array, rest
 
 def _side(g: Geometry, v: Array, rest: Index) -> list[Array]:
     """Closed states to one side: each step goes on in the direction of the one before."""
-    h, x, out = REACH / STEPS, g.x, []
-    for _ in range(STEPS):
+    h, x, out = REACH / STEPS_A_MODE, g.x, []
+    for _ in range(STEPS_A_MODE):
         guess = g.system.advance(x[:, None], h * v[:, None])[:, 0]
         closed, error = close(g.system, guess, rest)
         moved = g.system.difference(closed[:, None], x[:, None])[:, 0]
