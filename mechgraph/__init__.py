@@ -5,6 +5,10 @@ from typing import TYPE_CHECKING, Any
 
 from mechgraph import starting  # noqa: F401  # isort: skip  # before all that takes time to load
 from mechgraph.algebra import inertia
+from mechgraph.atlas.atlas import atlas, load_chains, save_chains
+from mechgraph.atlas.chain import Chain
+from mechgraph.atlas.identify import Identity, identify
+from mechgraph.atlas.system_groups import SystemGroup, system_groups
 from mechgraph.equations.build import formulate
 from mechgraph.equations.formulation import Formulation
 from mechgraph.errors import (
@@ -58,6 +62,7 @@ __all__ = [
     "Belt",
     "BevelGears",
     "Bookkeeping",
+    "Chain",
     "Component",
     "ContentError",
     "Coupling",
@@ -75,6 +80,7 @@ __all__ = [
     "FreeBody",
     "Freedom",
     "Gravity",
+    "Identity",
     "IndeterminateError",
     "Link",
     "Marker",
@@ -96,26 +102,32 @@ __all__ = [
     "SpurGears",
     "Stop",
     "Study",
+    "SystemGroup",
     "TorsionSpring",
     "WormGear",
     "Wrench",
     "assemble",
+    "atlas",
     "chain",
     "check",
     "equilibrium",
     "formulate",
     "free_body",
+    "identify",
     "inertia",
     "kinematics",
     "library",
     "linearize",
     "load",
+    "load_chains",
     "over_time",
     "pair_types",
     "respond",
     "save",
+    "save_chains",
     "solve",
     "study",
+    "system_groups",
     "write_report",
 ]
 

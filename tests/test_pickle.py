@@ -60,6 +60,7 @@ def things() -> dict[str, Any]:
         "worm": mg.WormGear("g", "A", "B", teeth=(1, 40)), "rack": mg.Rack("g", "A", "B"),
         "belt": mg.Belt("g", "A", "B", radii=(1, 2)), "stop": mg.Stop("A0", lower=0.1), "equilibrium": hanging,
         "linearized": mg.linearize(hanging),
+        "chain": next(mg.atlas(6)), "identity": mg.identify(mg.load("four-bar")), "system group": next(mg.system_groups(1)),
         "IndeterminateError": mg.IndeterminateError("free", report),
     }  # fmt: skip
     return out | {f"row {symbol}": row for symbol, row in mg.pair_types().items()}

@@ -1,0 +1,1 @@
+"""Kinematic chains up to isomorphism: generated, named, their inversions and drivers; system groups."""

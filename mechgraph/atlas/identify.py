@@ -1,0 +1,139 @@
+"""``mg.identify``: which chain a mechanism is, its usual name, its inversions and drivers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from mechgraph.atlas.atlas import atlas
+from mechgraph.atlas.chain import Chain
+from mechgraph.errors import DeclarationError, counted
+from mechgraph.model.mechanism import Mechanism, check_mechanism
+
+Joints = tuple[tuple[int, ...], ...]
+
+MOST_LINKS = 12
+"""Links up to which the number of a chain in the atlas is looked up (a second at most)."""
+
+
+@dataclass(frozen=True)
+class Usual:
+    """A usual name: of the chain with these ``joints``, and of its inversions by one frame link each."""
+
+    name: str
+    joints: Joints
+    inversions: Mapping[int, str]
+
+
+USUAL = (
+    Usual("four-bar", ((0, 1), (1, 2), (2, 3), (3, 0)), {}),
+    Usual("five-bar", ((0, 1), (1, 2), (2, 3), (3, 4), (4, 0)), {}),
+    Usual("Watt", ((0, 1), (0, 2), (2, 3), (3, 1), (0, 4), (4, 5), (5, 1)), {2: "I", 0: "II"}),
+    Usual("Stephenson", ((0, 2), (2, 1), (0, 3), (3, 1), (0, 4), (4, 5), (5, 1)), {2: "I", 4: "II", 0: "III"}),
+)
+"""Names in use. Stephenson I stands on the binary link between the ternary ones, II on one of the two in a row, III on a ternary one.
+
+Source: Norton, Design of Machinery, section 2.13.
+"""
+
+
+@dataclass(frozen=True)
+class Identity:
+    """Which chain a mechanism is.
+
+    Attributes
+    ----------
+    chain : the chain with the pair types of the mechanism; links and joints in the order of declaration.
+    frame : number of the frame link.
+    links, pairs : names, in that order.
+    """
+
+    chain: Chain
+    frame: int
+    links: tuple[str, ...]
+    pairs: tuple[str, ...]
+
+    @cached_property
+    def bare(self) -> Chain:
+        """The same with a turning joint in place of every pair, as planar chains are counted and named."""
+        return replace(self.chain, types=("R",) * len(self.pairs), family=3)
+
+    @cached_property
+    def number(self) -> tuple[int, int] | None:
+        """Place in the atlas of its links and mobility, from 1, and the number of chains there; None for what is not in it."""
+        mobility = self.bare.mobility
+        if mobility < 0 or self.bare.loops < 1 or self.bare.links > MOST_LINKS:
+            return None
+        code = self.bare.code
+        places = [
+            chain.code == code for chain in atlas(self.bare.links, mobility, fractionated=self.bare.is_fractionated)
+        ]
+        return (places.index(True) + 1, len(places)) if True in places else None
+
+    @cached_property
+    def usual(self) -> tuple[str, str]:
+        """Usual names of the chain and of the inversion, empty where there is none."""
+        for row in USUAL:
+            known = Chain(max(map(max, row.joints)) + 1, row.joints, ("R",) * len(row.joints))
+            if known.code == self.bare.code:
+                mine = self.bare.code_with_frame(self.frame)
+                found = (name for link, name in row.inversions.items() if known.code_with_frame(link) == mine)
+                return row.name, next(found, "")
+        return "", ""
+
+    @property
+    def name(self) -> str:
+        """E.g. ``Stephenson III``, ``ring of 7 links``, or ``8-link chain 5 of 16, mobility 1``."""
+        chain, inversion = self.usual
+        if chain:
+            return f"{chain} {inversion}".strip()
+        n = self.bare.links
+        if set(self.bare.degrees) == {2} and self.bare.loops == 1:
+            return f"ring of {n} links"
+        if self.number:
+            fractionated = "fractionated " if self.bare.is_fractionated else ""
+            return f"{fractionated}{n}-link chain {self.number[0]} of {self.number[1]}, mobility {self.bare.mobility}"
+        return f"{n}-link chain ({self.bare.assortment})"
+
+    @cached_property
+    def inversions(self) -> tuple[tuple[str, ...], ...]:
+        """Links that are alike as frame, with the pair types; one tuple for each inversion."""
+        return tuple(tuple(self.links[i] for i in group) for group in self.chain.inversions)
+
+    @cached_property
+    def drivers(self) -> tuple[tuple[str, ...], ...]:
+        """Pairs that are alike as driver on this frame, with the pair types."""
+        return tuple(tuple(self.pairs[k] for k in group) for group in self.chain.drivers(self.frame))
+
+    @property
+    def text(self) -> str:
+        """Name, pair types round a ring, inversions and drivers."""
+        groups = {"inversions (alike as frame)": self.inversions, "drivers (alike)": self.drivers}
+        lines = [f"{self.name}: {self.chain.assortment}; {counted(self.bare.loops, 'loop')}"]
+        lines += [f"  {what}: {'; '.join(', '.join(g) for g in of)}" for what, of in groups.items()]
+        return "\n".join(lines)
+
+    def __str__(self) -> str:
+        return self.text
+
+
+def identify(m: Mechanism, family: int = 3) -> Identity:
+    """Which chain a mechanism is: by its links and pairs alone, whatever the dimensions.
+
+    Raises
+    ------
+    DeclarationError
+        for a mechanism with couplings (gears): a chain has pairs alone.
+    """
+    check_mechanism(m, "identify")
+    if m.couplings:
+        names = ", ".join(c.name for c in m.couplings)
+        raise DeclarationError(
+            f"identify {m.name!r}",
+            [f"couplings {names}: a kinematic chain has pairs alone; put links with lower pairs in their place first"],
+        )
+    place = m.link_index
+    joints = tuple((place[p.a], place[p.b]) for p in m.pairs)
+    chain = Chain(len(m.links), joints, tuple(p.type.symbol for p in m.pairs), family)
+    return Identity(chain, place[m.frame], m.link_names(), tuple(p.name for p in m.pairs))
