@@ -13,7 +13,7 @@ from mechgraph.model.mechanism import Mechanism, check_mechanism
 
 Joints = tuple[tuple[int, ...], ...]
 
-MOST_LINKS = 12
+NUMBERED_LINKS = 12
 """Links up to which the number of a chain in the atlas is looked up (a second at most)."""
 
 
@@ -63,7 +63,7 @@ class Identity:
     def number(self) -> tuple[int, int] | None:
         """Place in the atlas of its links and mobility, from 1, and the number of chains there; None for what is not in it."""
         mobility = self.bare.mobility
-        if mobility < 0 or self.bare.loops < 1 or self.bare.links > MOST_LINKS:
+        if mobility < 0 or self.bare.loops < 1 or self.bare.links > NUMBERED_LINKS:
             return None
         code = self.bare.code
         places = [
