@@ -7,8 +7,7 @@ type of the numbers that come in, real or complex.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -18,25 +17,10 @@ from mechgraph.closure.batches import Index, ScrewTable
 from mechgraph.closure.indexing import System
 from mechgraph.closure.tree import run_sums
 from mechgraph.model import pair_kinematics as evaluation
-
-Value = TypeVar("Value")
+from mechgraph.numerics.kept import kept
 
 ROUNDINGS = 20
 """Roundings of a position that add up in a closure residual."""
-
-
-class kept(Generic[Value]):
-    """A ``cached_property`` without its lock, which takes longer than the arithmetic of one position."""
-
-    def __init__(self, make: Callable[[Any], Value]) -> None:
-        self.make, self.__doc__ = make, make.__doc__
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self.name = name
-
-    def __get__(self, instance: Any, owner: type) -> Value:
-        value = instance.__dict__[self.name] = self.make(instance)
-        return value
 
 
 class Configuration:

@@ -66,13 +66,11 @@ class DenseFactored:
         self.rows, self.freedoms, self.T = J.shape
         self._forms, self._fixed = forms, fixed
         self._sensitivity: Array | None = None
+        used = list(dict.fromkeys(which.tolist()))
         self._parts = []
-        for i in dict.fromkeys(which.tolist()):
-            at = np.flatnonzero(which == i)
-            form, mine = forms[i], _at(J, at)
-            self._parts.append(
-                (form, at, ChosenSystem(form.rows(mine), [form.choice], np.zeros(len(at), dtype=np.intp)))
-            )
+        for i in used:
+            at = np.arange(self.T) if len(used) == 1 else np.flatnonzero(which == i)
+            self._parts.append((forms[i], at, _chosen(forms[i].rows(_at(J, at)), forms[i].choice)))
 
     def _joined(self, values: list[Array], shape: tuple[int, ...]) -> Array:
         """Values of the forms at all positions."""
@@ -127,9 +125,7 @@ class DenseFactored:
                 # turned rows may be singular where the loop is not: the rows independent at these very positions are asked
                 matrices = _independent_rows(matrices, form.choice)
                 whole = np.arange(len(form.choice.cols))
-                system = ChosenSystem(
-                    matrices[0], [Choice(whole, whole, whole[:0], whole[:0])], np.zeros(len(at), dtype=np.intp)
-                )
+                system = _chosen(matrices[0], Choice(whole, whole, whole[:0], whole[:0]))
             before, behind = (system.change(matrix) for matrix in matrices[1:])
             # on the parabola |change| <= max of both ends; below one it is regular (Banach's lemma)
             regular = scaled_norm(np.maximum(np.abs(before), np.abs(behind))) <= PATH.departure
@@ -170,8 +166,12 @@ def _independent_rows(matrices: list[Array], choice: Choice) -> list[Array]:
 
 def _fits(form: Form, J: Array) -> bool:
     """Whether the turned rows of a form are as independent at a matrix ``(m, F)`` as they should be."""
-    system = ChosenSystem(form.rows(J[:, :, None]), [form.choice], np.zeros(1, dtype=np.intp))
-    return bool(system.condition[0] <= PATH.fair)
+    return bool(_chosen(form.rows(J[:, :, None]), form.choice).condition[0] <= PATH.fair)
+
+
+def _chosen(A: Array, choice: Choice) -> ChosenSystem:
+    """Matrices ``(m, n, T)`` in one choice of rows and columns."""
+    return ChosenSystem(A, [choice], np.zeros(A.shape[2], dtype=np.intp))
 
 
 def _at(values: Array, at: Index) -> Array:

@@ -87,8 +87,9 @@ class DriverPath:
         """See ``numerics.newton.Problem``."""
         x = x.copy()
         x[self.rows] = drive
-        if self._start is not None and np.array_equal(x, self._start.x):
-            return self._start
+        start = self._start
+        if start is not None and x.shape == start.x.shape and (x == start.x).all():
+            return start
         return Configuration(self._system_of(self.variant_of[tracks]), x)
 
     def chosen(self, point: Configuration, which: Index) -> Index:

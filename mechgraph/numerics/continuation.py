@@ -72,7 +72,7 @@ class Follower:
         start = self._start(x, np.full(V, -1) if which is None else which)
         self.stuck = stuck = ~(start.condition <= PATH.singular) & (paths.end > 0)
         self.ends = [End.CROSSING if here else End.REACHED for here in stuck]
-        self.steps, self.given_up = np.zeros(V, dtype=np.intp), np.zeros(V, dtype=bool)
+        self.given_up = np.zeros(V, dtype=bool)
         open_ = np.flatnonzero(~stuck & (paths.end > 0))
         if not open_.size:
             return Tracks(start, self.ends, self.crossings, self.work)
@@ -102,7 +102,7 @@ class Follower:
 
     def _renewed(self, nodes: Nodes) -> Nodes:
         """The same nodes in better forms where theirs are poor."""
-        poor = np.flatnonzero(nodes.condition > PATH.fair)
+        poor = (nodes.condition > PATH.fair).nonzero()[0]
         if not poor.size:
             return nodes
         few = nodes.take(poor)
@@ -124,34 +124,33 @@ class Follower:
         extrapolated; behind a corner the change of the sensitivity over the last step; else the sensitivity alone.
         """
         h, change = at - last.place, drive - last.drive
-        dq = (last.Z * change).sum(axis=1)
-        order = np.full(len(h), 2)
+        dq = np.add.reduce(last.Z * change, axis=1)
+        order = np.full(len(h), 2.0)
         came = last.drive - before.drive
         back = last.place - before.place
         ratio = h / np.where(back > 0, back, 1.0)
-        size = np.sqrt((came * came).sum(axis=0) * (change * change).sum(axis=0))
-        along = (came * change).sum(axis=0)
+        along, came2, change2 = (np.add.reduce(a * b) for a, b in ((came, change), (came, came), (change, change)))
         known = known & (back > 0) & (ratio < 16.0) & (along > 0)
-        straight = known & (along > (1 - 1e-9) * size) & (ratio > 0.25)
-        two = np.flatnonzero(straight)
+        straight = known & (along > (1 - 1e-9) * np.sqrt(came2 * change2)) & (ratio > 0.25)
+        two = straight.nonzero()[0]
+        every = two.size == len(h)
         if two.size:
-            every = two.size == len(h)
             mine = slice(None) if every else two
             a, b = (before, last) if every else (before.take(two), last.take(two))
             y = self.problem.difference(a.x, b.x)
-            there = self.problem.tangent(y, (a.Z * (change[:, mine] / h[mine])).sum(axis=1))
+            there = self.problem.tangent(y, np.add.reduce(a.Z * (change[:, mine] / h[mine]), axis=1))
             dq[:, mine] = cubic(y, dq[:, mine] / h[mine], there, a.place - b.place, h[mine])
-            order[mine] = 4
-        bent = np.flatnonzero(known & ~straight & (ratio < 4.0))
-        if bent.size:
+            order[mine] = 4.0
+        if not every:
+            bent = (known & ~straight & (ratio < 4.0)).nonzero()[0]
             dq[:, bent] += 0.5 * ratio[bent] * ((last.Z - before.Z)[:, :, bent] * change[:, bent]).sum(axis=1)
-            order[bent] = 3
+            order[bent] = 3.0
         return self.problem.corrigible(dq, last.which), order
 
-    def _longest(self, last: Nodes, new: Nodes, drive: Array) -> Array:
+    def _longest(self, last: Nodes, new: Nodes, drive: Array) -> Array | float:
         """The longest next steps, by the pace of the tracks at both ends of the last one."""
         if not self.problem.paced:
-            return np.full(len(new), PATH.longest)
+            return PATH.longest
         change = (drive - last.drive) / np.maximum(new.place - last.place, PATH.shortest)
         paces = [self.problem.pace(node.x, (node.Z * change).sum(axis=1)) for node in (last, new)]
         return PATH.longest / np.maximum(np.maximum(*paces), np.finfo(float).tiny)
@@ -170,12 +169,14 @@ class Follower:
             new = Nodes.closed(found, drive, last.track, at, sure=False)
             longest = PATH.ahead * self._longest(last, new, drive)
             march.h = _next_step(at - last.place, found.correction, order, good, longest)
-            kept = np.flatnonzero(good)
+            kept = good.nonzero()[0]
             moved = (new, last) if len(kept) == len(good) else (new.take(kept), last.take(kept))
             out += self._moved(march, *moved, kept)
-            self._spend(march.last.track, PATH.quick_steps)
-            going = (march.last.place < self.paths.end[march.last.track]) & (march.h >= PATH.shortest_quick)
-            march.keep(going & ~self.given_up[march.last.track])
+            self._spend(march, PATH.quick_steps)
+            track = march.last.track
+            march.keep(
+                (march.last.place < self.paths.end[track]) & (march.h >= PATH.shortest_quick) & ~self.given_up[track]
+            )
         return Nodes.join(out) if out else start.take(np.zeros(0, dtype=np.intp))
 
     def _predicted(self, march: _March) -> tuple[Array, Array, Array, Array]:
@@ -189,15 +190,17 @@ class Follower:
     def _moved(self, march: _March, new: Nodes, before: Nodes, at: Index) -> list[Nodes]:
         """The tracks ``at`` of a march moved on to new nodes, each in a better form where its own is poor; the nodes made."""
         renewed = self._renewed(new)
-        changed = np.flatnonzero(renewed.which != new.which)
         march.move(renewed, before, at)
+        changed = (renewed.which != new.which).nonzero()[0]
         march.known[at[changed]] = False
         return [new, renewed.take(changed)] if changed.size else [new]
 
-    def _spend(self, tracks: Index, most: int) -> None:
-        """Count a step of tracks, and give up those that have taken more than ``most`` of a march."""
-        self.steps[tracks] += 1
-        self.given_up[tracks] |= self.steps[tracks] > most + PATH.steps_a_point * self.paths.count[tracks]
+    def _spend(self, march: _March, most: int) -> None:
+        """Count a step of a march, and give up its tracks that have taken more than ``most``."""
+        march.steps += 1
+        if march.steps > most:
+            tracks = march.last.track
+            self.given_up[tracks] |= march.steps > most + PATH.steps_a_point * self.paths.count[tracks]
 
     def _filled(self, nodes: Nodes) -> Nodes:
         """The nodes with others between them, interpolated, where steps are too long for the certificate."""
@@ -290,7 +293,6 @@ class Follower:
         # beyond this condition rounding moves a state by as much as branches that cross are apart (a fold is far beyond its limit there)
         worst = np.zeros(len(self.paths.end))
         worst[tracks] = np.maximum(PATH.crossing, 1e3 * nodes.condition[first])
-        self.steps[:] = 0
         found = [nodes]
         while len(march.last):
             stuck = ~self._careful_step(march, worst, found) & (march.h < PATH.shortest)
@@ -299,7 +301,7 @@ class Follower:
                 for i in np.flatnonzero(stuck):
                     nodes = self._passed(nodes, march, int(i))
                 found = [nodes]
-            self._spend(march.last.track, PATH.careful_steps)
+            self._spend(march, PATH.careful_steps)
             ended = self.given_up | np.array([end is not End.REACHED for end in self.ends])
             march.keep((march.last.place < self.paths.end[march.last.track]) & ~ended[march.last.track])
         return Nodes.join(found)
@@ -432,20 +434,23 @@ def _spread(places: Array, crossing: float, distance: float) -> Index:
     return np.unique(np.clip(np.searchsorted(places, wanted), 0, len(places) - 1))
 
 
-def _next_step(h: Array, correction: Array, order: Array, good: Mask, longest: Array) -> Array:
+def _next_step(h: Array, correction: Array, order: Array, good: Mask, longest: Array | float) -> Array:
     """The step that aims at the wanted correction, at most the ``longest``; half of one that failed."""
-    grown = h * np.clip((PATH.aim / np.maximum(correction, 1e-9)) ** (1 / order), 0.5, 2.0)
+    grown = h * np.minimum(np.maximum((PATH.aim / np.maximum(correction, 1e-9)) ** (1 / order), 0.5), 2.0)
     return np.where(good, np.minimum(np.maximum(grown, 10 * PATH.shortest), longest), 0.5 * h)
 
 
 @dataclass
 class _March:
-    """Tracks on their way: the last node of each, the one ``before`` (``known`` where the last came straight from it), the next step."""
+    """Tracks on their way: the last node of each, the one ``before`` (``known`` where the last came straight from it), the next step
+    ``h``, and the number of ``steps`` taken.
+    """
 
     last: Nodes
     before: Nodes
     known: Mask
     h: Array
+    steps: int = 0
 
     def move(self, new: Nodes, before: Nodes, at: Index) -> None:
         """Go on to new nodes of the tracks ``at``."""

@@ -6,11 +6,12 @@ Source for the strategy: Golub and Van Loan, Matrix Computations, section 5.4 (r
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
+
+from mechgraph.numerics.kept import kept
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -145,6 +146,15 @@ class Choice:
     held: Index
     fixed: Index
 
+    def square(self, A: Array) -> Array:
+        """``A[rows][:, cols] (r, r, T)`` of matrices ``(m, n, T)``, without a copy where that can be."""
+        rows, cols = self._places
+        return A[rows][:, cols]
+
+    @kept
+    def _places(self) -> tuple[Place, Place]:
+        return compact(self.rows), compact(self.cols)
+
     def same(self, other: Choice) -> bool:
         """Whether two choices are equal."""
         pairs = ((self.rows, other.rows), (self.cols, other.cols), (self.held, other.held))
@@ -207,13 +217,15 @@ class Factor:
         if not few:
             self._inverse = np.ascontiguousarray(self._inverse)
 
-    @cached_property
+    @kept
     def condition(self) -> Array:
         """Condition numbers ``(T,)`` in the infinity norm."""
-        norms = [np.abs(M).sum(axis=1).max(axis=0, initial=0.0) for M in (self._A, self._inverse)]
         with np.errstate(invalid="ignore", over="ignore"):
-            product = norms[0] * norms[1]
-        return np.where(np.isnan(product), np.inf, product)
+            norms = [
+                np.maximum.reduce(np.add.reduce(np.abs(M), axis=1), axis=0, initial=0.0)
+                for M in (self._A, self._inverse)
+            ]
+            return np.asarray(np.fmin(norms[0] * norms[1], np.inf))  # of a singular matrix NaN, which fmin leaves out
 
     def applied(self, B: Array) -> Array:
         """``A^-1 B`` for square ``B (n, n, T)``, without refinement."""
@@ -256,9 +268,9 @@ class ChosenSystem:
         used = sorted(set(which.tolist()))
         for i in used:
             choice, at = choices[i], EVERY if len(used) == 1 else np.flatnonzero(which == i)
-            self._parts.append((choice, at, Factor(A[choice.rows[:, None], choice.cols][:, :, at])))
+            self._parts.append((choice, at, Factor(choice.square(A)[:, :, at])))
 
-    @cached_property
+    @kept
     def condition(self) -> Array:
         """Condition numbers of the square parts ``(T,)``."""
         if self._parts and self._parts[0][1] is EVERY:
@@ -309,7 +321,7 @@ class ChosenSystem:
     def change(self, other: Array) -> Array:
         """``1 - A^-1 A_other`` of the square parts ``(n, n, T)``, of one choice for all positions."""
         choice, _, factor = self._parts[0]
-        out = -factor.applied(other[np.ix_(choice.rows, choice.cols)])
+        out = -factor.applied(choice.square(other))
         out[np.arange(len(choice.cols)), np.arange(len(choice.cols))] += 1.0
         return out
 

@@ -10,6 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from mechgraph.numerics.kept import kept
 from mechgraph.numerics.tolerances import PATH
 
 Array = NDArray[np.float64]
@@ -18,6 +19,16 @@ Mask = NDArray[np.bool_]
 
 UNMET = 30.0
 """Residual over the step that takes it away from which on it is asked whether it does: rows are of size one, a few freedoms each."""
+
+
+LONGEST = 0.5
+"""Longest step (largest increment) that is taken at once."""
+EVERY = slice(None)
+
+
+def largest(values: Array) -> Array:
+    """Largest sizes ``(n,)`` of the columns of values ``(m, n)``."""
+    return np.asarray(np.maximum.reduce(np.abs(values), axis=0, initial=0.0))
 
 
 class Factored(Protocol):
@@ -141,10 +152,10 @@ class Closed:
     done: Mask
     point: Any = None
 
-    @property
+    @kept
     def correction(self) -> Array:
         """Largest correction of a freedom ``(n,)``."""
-        return np.asarray(np.abs(self.total).max(axis=0, initial=0.0))
+        return largest(self.total)
 
 
 @dataclass
@@ -154,105 +165,114 @@ class Newton:
     problem: Problem
     work: Work = field(default_factory=Work)
 
-    def nodes(self, x: Array, drive: Array, tracks: Index, which: Index, goal: float | Array) -> Closed:
+    def nodes(self, x: Array, drive: Array, tracks: Index, which: Index, goal: float) -> Closed:
         """States corrected until the last step is below ``goal``, with their sensitivities."""
-        return self._run(x, drive, tracks, which, goal, 0.0)
+        return _Run(self, x, drive, tracks, which, goal, 0.0).closed()
 
     def close(self, x: Array, drive: Array, tracks: Index, which: Index) -> Closed:
         """States corrected until the residual is rounding."""
-        return self._run(x, drive, tracks, which, 0.0, PATH.closed)
-
-    def _run(self, x: Array, drive: Array, tracks: Index, which: Index, step_goal: Any, goal: float) -> Closed:
-        run = _Run(self, x.copy(), drive, tracks, which.copy(), np.broadcast_to(step_goal, x.shape[1]), goal)
-        for _ in range(PATH.iterations):
-            run.evaluate()
-            if run.closed_all:
-                return Closed(run.x, run.total, run.Z, run.condition, run.which, run.done, run.whole)
-            run.correct()
-            if not run.active.size:
-                break
-        return Closed(run.x, run.total, run.Z, run.condition, run.which, run.done)
+        return _Run(self, x, drive, tracks, which, 0.0, PATH.closed).closed()
 
 
 class _Run:
     """States ``x (nx, n)`` on their way to zeros; ``active`` are those that are corrected further, evaluated at ``point``."""
 
     def __init__(
-        self, newton: Newton, x: Array, drive: Array, tracks: Index, which: Index, step_goal: Array, goal: float
+        self, newton: Newton, x: Array, drive: Array, tracks: Index, which: Index, step_goal: float, goal: float
     ) -> None:
         (F, d), n = newton.problem.size, x.shape[1]
         self.problem, self.work = newton.problem, newton.work
-        self.x, self.drive, self.tracks, self.which = x, drive, tracks, which
+        self.x, self.drive, self.tracks, self.which = x.copy(), drive, tracks, which.copy()
         self.step_goal, self.goal = step_goal, goal
         self.total, self.Z, self.condition = np.zeros((F, n)), np.zeros((F, d, n)), np.full(n, np.inf)
         self.done, self.before, self.fresh = np.zeros(n, dtype=bool), np.full(n, np.inf), np.ones(n, dtype=bool)
-        self.active, self.closed_all = np.arange(n), False
+        self.active = np.arange(n)
+
+    def closed(self) -> Closed:
+        """The outcome, after as many steps as it takes."""
+        point = None
+        for _ in range(PATH.iterations):
+            if self._evaluated():
+                point = self.point if self.active.size == len(self.done) else None
+                break
+            self._correct()
+            if not self.active.size:
+                break
+        return Closed(self.x, self.total, self.Z, self.condition, self.which, self.done, point)
 
     @property
     def _mine(self) -> Index | slice:
         return slice(None) if self.active.size == len(self.done) else self.active
 
-    @property
-    def whole(self) -> Any:
-        """The evaluation of all states, where they were closed by it together."""
-        return self.point if self.active.size == len(self.done) else None
+    def _evaluated(self) -> bool:
+        """Evaluate the active states; where the residual is at its goal, or at rounding and no longer falls, they are done.
 
-    def evaluate(self) -> None:
-        """Evaluate the active states; where the residual is at its goal, or at rounding and no longer falls, they are done."""
+        Whether all of them are.
+        """
         mine = self._mine
         self.point = self.problem.at(self.x[:, mine], self.drive[:, mine], self.tracks[mine])
         self.work.evaluations += self.active.size
         self.work.calls += 1
-        self.left = np.abs(self.point.residual).max(axis=0, initial=0.0)
+        self.left = largest(self.point.residual)
         if self.goal == 0:
-            return
+            return False
         near = self.left <= self.goal
         stalled = self.left > 0.5 * self.before[mine]
         if stalled.any():
             near |= stalled & (self.left <= np.maximum(PATH.accepted, self.point.rounding))
         self.x[:, self.active[near]] = self.point.x[:, near]
         self.done[self.active[near]] = True
-        self.closed_all = bool(near.all())
-        if near.any() and not self.closed_all:
+        if near.all():
+            return True
+        if near.any():
             keep = np.flatnonzero(~near)
             self.active, self.point, self.left = self.active[keep], self.point.part(keep), self.left[keep]
+        return False
 
-    def correct(self) -> None:
+    def _correct(self) -> None:
         """Take one step; where it is at its goal the state is done, where it leads too far away it is left."""
         mine = self._mine
         f = self.problem.factored(self.point, self.which[mine])
         self.work.factorizations += self.active.size
         step = f.solve(-self.point.residual[:, None])[:, 0]
-        size = np.abs(step).max(axis=0, initial=0.0)
-        finite = np.isfinite(size)
-        if not finite.all() or (size > 0.5).any():
-            step = np.where(finite, step, 0.0) * np.minimum(1.0, 0.5 / np.maximum(size, 0.5))
+        size = largest(step)
+        finite = None
+        if not (size <= LONGEST).all():
+            finite = np.isfinite(size)
+            step = np.where(finite, step, 0.0) * np.minimum(1.0, LONGEST / np.maximum(size, LONGEST))
         self.x[:, mine] = self.problem.advance(self.point.x, step, self.tracks[mine])
         self.total[:, mine] += step
         self.before[mine] = self.left
-        small = finite & (size <= self.step_goal[mine])
-        if small.any() and self.step_goal[0] <= PATH.node:
+        small = self._small(f, size)
+        going = ~small if finite is None else finite & ~small
+        unmet = self._unmet(small, step, size)
+        if unmet is not None:
+            again = unmet & self.fresh[mine]
+            self._choose_again(np.flatnonzero(again))
+            small, going = small & ~unmet, (going & ~unmet) | again
+        if small.any():
+            at, those = (mine, EVERY) if small.all() else (self.active[small], small)
+            self.Z[:, :, at] = self.problem.sensitivity(self.point, f)[:, :, those]
+            self.condition[at], self.done[at] = f.condition[those], True
+        if going.any():
+            going &= largest(self.total[:, mine]) <= PATH.lost
+        self.active = self.active[going]
+
+    def _small(self, f: Any, size: Array) -> Mask:
+        """Where a step of that size is at its goal."""
+        small = size <= self.step_goal
+        if self.step_goal <= PATH.node and small.any():
             # the rates of a node err by the last step times the condition: poor ones are closed further, down to rounding
             condition_here = np.maximum(f.condition, 1.0)
             small &= size <= np.maximum(PATH.rates / condition_here, PATH.rounding * condition_here)
-        unmet = self._unmet(small, step, size)
-        if unmet.any():
-            again = unmet & self.fresh[mine]
-            self._choose_again(np.flatnonzero(again))
-            small, finite = small & ~unmet, (finite & ~unmet) | again
-        if small.any():
-            at, those = (mine, slice(None)) if small.all() else (self.active[small], small)
-            self.Z[:, :, at] = self.problem.sensitivity(self.point, f)[:, :, those]
-            self.condition[at], self.done[at] = f.condition[those], True
-        lost = np.abs(self.total[:, mine]).max(axis=0, initial=0.0) > PATH.lost
-        self.active = self.active[finite & ~small & ~lost]
+        return np.asarray(small)
 
-    def _unmet(self, small: Mask, step: Array, size: Array) -> Mask:
-        """Where a last step leaves the residual of rows that were left out as dependent as large as it is: they are not."""
-        doubt = small & (self.left > np.maximum(UNMET * size, 1e3 * np.minimum(self.step_goal[self._mine], PATH.node)))
+    def _unmet(self, small: Mask, step: Array, size: Array) -> Mask | None:
+        """Where a last step leaves the residual of rows that were left out as dependent as large as it is: they are not. None: nowhere."""
+        doubt = small & (self.left > np.maximum(UNMET * size, 1e3 * min(self.step_goal, PATH.node)))
         if not doubt.any():
-            return doubt
-        rest = np.abs(self.point.residual + self.point.closure_rates(step)).max(axis=0, initial=0.0)
+            return None
+        rest = largest(self.point.residual + self.point.closure_rates(step))
         return np.asarray(doubt & (rest > 0.5 * self.left))
 
     def _choose_again(self, again: Index) -> None:

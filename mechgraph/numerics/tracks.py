@@ -34,29 +34,33 @@ class Paths:
         self.count = count = np.array([len(length) for length in self.length])
         self._last = np.cumsum(count) - 1
         self._first = self._last - count + 1
+        self._second = np.minimum(self._first + 1, self._last)
         # one rising key for all tracks: place on the track plus the lengths of the tracks before it
         self._offset = np.concatenate([[0.0], np.cumsum(self.end + 1.0)[:-1]])
         self._all = np.concatenate(points, axis=1)
         self._places = np.concatenate(self.length)
         self._key = self._places + np.repeat(self._offset, count)
+        # of the leg that leads to every point: where it begins (a first point is a leg of its own), and what it adds
+        begin = np.arange(len(self._key)) - 1
+        begin[self._first] += 1
+        self._begin, self._from = self._all[:, begin], self._places[begin]
+        self._way, self._added = self._places - self._from, self._all - self._begin
+        self._way[self._way == 0] = 1.0
 
     def drive(self, tracks: Index, at: Array) -> Array:
         """Path values ``(d, n)`` at places of tracks; behind the end straight on."""
-        right = np.searchsorted(self._key, at + self._offset[tracks], side="left")
-        right = np.clip(right, np.minimum(self._first[tracks] + 1, self._last[tracks]), self._last[tracks])
-        left = np.maximum(right - 1, self._first[tracks])
-        width = self._places[right] - self._places[left]
-        u = np.where(width > 0, (at - self._places[left]) / np.where(width > 0, width, 1.0), 1.0)
+        point = np.searchsorted(self._key, at + self._offset[tracks])
+        point = np.minimum(np.maximum(point, self._second[tracks]), self._last[tracks])
+        u = (at - self._from[point]) / self._way[point]
+        values = self._begin.take(point, axis=1) + u * self._added.take(point, axis=1)
         # the ends themselves are met exactly
-        return np.where(
-            u == 1.0, self._all[:, right], self._all[:, left] + u * (self._all[:, right] - self._all[:, left])
-        )
+        return np.where(u == 1.0, self._all.take(point, axis=1), values)
 
     def step(self, tracks: Index, at: Array, h: Array) -> Array:
         """Where a step of at most ``h`` leads: to the furthest point within it up to which the path is nearly straight."""
         out = np.minimum(at + h, self.end[tracks])
         inside = np.searchsorted(self._key, out + self._offset[tracks], side="right") - 1
-        for i in np.flatnonzero(self._places[inside] > at):
+        for i in (self._places[inside] > at).nonzero()[0]:
             out[i] = self._furthest(int(tracks[i]), float(at[i]), float(out[i]))
         return out
 
