@@ -27,14 +27,14 @@ def multiplied(A: Array, B: Array, out: Array | None = None) -> Array:
 
 SMALL_CROSS = 2000
 """Numbers up to which a vector product is faster with its factors written out turned (fewer calls) than row by row (less memory)."""
-AHEAD, BEHIND = np.array([1, 2, 0, 2, 0, 1]), np.array([2, 0, 1, 1, 2, 0])
+LEFT_FACTORS, RIGHT_FACTORS = np.array([1, 2, 0, 2, 0, 1]), np.array([2, 0, 1, 1, 2, 0])
 """Components of both factors in the six products of a vector product, those that are subtracted last."""
 
 
 def cross(a: Array, b: Array, out: Array | None = None) -> Array:
     """Vector product of ``(3, ...)`` arrays along the first axis, into ``out`` where given."""
     if a.size <= SMALL_CROSS and b.size <= SMALL_CROSS:
-        products = a.take(AHEAD, 0) * b.take(BEHIND, 0)
+        products = a.take(LEFT_FACTORS, 0) * b.take(RIGHT_FACTORS, 0)
         return np.subtract(products[:3], products[3:], out=products[:3] if out is None else out)
     if out is None:
         shape = a.shape if a.shape == b.shape else np.broadcast_shapes(a.shape, b.shape)
