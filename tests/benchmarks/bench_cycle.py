@@ -19,7 +19,7 @@ import numpy as np
 from bench_core import best, seven_r
 
 import mechgraph as mg
-from mechgraph import kinetostatics
+from mechgraph import kinetostatics, pipeline
 from mechgraph.closure import driver_path
 from mechgraph.force import block
 from mechgraph.force.dalembert import METHODS
@@ -34,8 +34,8 @@ STAGES = (
     ("certificate", Follower, "_certified_all"),
     ("careful march", Follower, "_careful"),
     ("nodes between", driver_path, "refined"),
-    ("interpolation, Newton", driver_path._Legs, "_closed"),
-    ("rates", kinetostatics, "rates"),
+    ("interpolation, Newton", driver_path.Legs, "_closed"),
+    ("rates", pipeline, "rates"),
     ("loads", block.Site, "collect"),
     ("inertia", block, "inertia_wrenches"),
     ("wrenches", METHODS, "loop_wrench"),
