@@ -27,7 +27,8 @@ from mechgraph.closure.driver_path import (
 )
 from mechgraph.closure.following import follow
 from mechgraph.closure.indexing import Index, System
-from mechgraph.closure.passive_rest import Idle, unspun
+from mechgraph.closure.passive_motion import PassiveMotion
+from mechgraph.closure.passive_rest import unspun
 from mechgraph.closure.rates import Rates, Velocities, at_dead_points, disagreement, distance_to_dead_point, rates
 from mechgraph.closure.solver import ClosureSolver, FactoredClosure, closure_solver, engine_for, solver_at_start
 from mechgraph.errors import DeclarationError, IndeterminateError
@@ -49,7 +50,6 @@ from mechgraph.result.trajectory import Trajectory
 from mechgraph.structure.actuation import actuation_fault, stand_still
 from mechgraph.structure.branching import branches
 from mechgraph.structure.mobility import Freedoms, free_motion
-from mechgraph.structure.passive import PassiveMotion
 
 CONTRADICTION = 1e-6
 """Relative part of the closure rates that drivers may leave open before they count as contradicting each other."""
@@ -95,7 +95,7 @@ class Pipeline:
     columns, lead : driven freedoms; places of the leading drivers among them (independent ones, which are followed; the others are
         checked to agree).
     solver, engine : the closure equations with the leading drivers given, and what solves them.
-    passive, bodies : passive motions, and the links that have them.
+    passive : passive motions.
     """
 
     def __init__(self, drive: DriverMotion, options: Options) -> None:
@@ -112,12 +112,11 @@ class Pipeline:
         self.solver, proved = solver_at_start(self.engine, self.columns, self.start)
         self.lead = np.arange(len(self.columns))
         self.passive: tuple[PassiveMotion, ...] = ()
-        self.bodies: tuple[Idle, ...] = ()
         self.hold: Index | None = None
         if not proved:
             self.lead = self.freedoms.leading(self.columns)
             self._check_determinate()
-            self.passive, self.bodies, self.hold = self.freedoms.passive, self.freedoms.bodies, self.freedoms.hold
+            self.passive, self.hold = self.freedoms.passive, self.freedoms.hold
             self.solver = closure_solver(self.engine, self.leading, self.hold)
             self._check_passive()
         self.acting = self._acting() if options.method else self.columns
@@ -237,8 +236,8 @@ class Pipeline:
         found = follow(
             path, requests(starts.x, self.values("position", followed)[self.lead], followed), int(np.prod(followed))
         )
-        if self.bodies:
-            found = unspun(path, found, self.bodies)
+        if self.passive:
+            found = unspun(path, found, self.passive)
             found.interpolate()
         return Outcome(self, starts, batch, variant, found, path)
 
@@ -346,7 +345,7 @@ class Outcome:
         line = self.line
         velocity, acceleration = self._velocity[line.lead][:, places], self._acceleration[line.lead][:, places]
         with np.errstate(over="ignore", invalid="ignore"):
-            moved = rates(here, f, line.leading, velocity, acceleration, line.bodies)
+            moved = rates(here, f, line.leading, velocity, acceleration, line.passive)
             largest = np.square(np.max([np.abs(values).max(initial=0.0) for values in (moved.V, moved.dq, moved.ddq)]))
         if not np.isfinite(largest):  # accelerations hold squares of rates
             too_large = "rates are beyond the largest number (1.8e308): give smaller velocities and accelerations"

@@ -1,9 +1,6 @@
-"""Passive freedoms at rest: links that could spin or slide idly are kept from doing so, in space.
+"""Where passive links stand when they are at rest in their passive motions on the way from the start, in space.
 
-A passive motion moves one body (a cluster of links) and nothing else, so it can be stopped in many ways. Here the body itself is
-at rest in it: its twist has no part along the passive twist ``u`` (for the coupler between two spheres, no spin about
-their line: ``w . u = 0``, hence ``alpha . u = 0``). No choice of a coordinate enters, and a body that is symmetric about its
-line needs no effort to be held so.
+What rest is, and the rates that follow from it, is in ``passive_motion``; here it is integrated along the path.
 """
 
 from __future__ import annotations
@@ -13,106 +10,42 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, cross, rotate, rotate_back
-from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_path import DriverPath, Positions, Status, in_blocks
 from mechgraph.closure.indexing import Index
+from mechgraph.closure.passive_motion import PassiveMotion, PassiveMotions
+from mechgraph.closure.rates import Velocities
+from mechgraph.closure.solver import FactoredClosure
 from mechgraph.numerics.continuation import Follower
 from mechgraph.numerics.hermite import Interpolation
 from mechgraph.numerics.tracks import Nodes
 
-TURNING = 1e-6
-"""Part of a unit motion from which on a body takes part in it."""
-
-
-@dataclass(frozen=True)
-class Idle:
-    """A body with passive freedoms, by one of its links."""
-
-    link: int
-
-
-def rest_points(here: Configuration, idle: tuple[Idle, ...], Z: Array) -> list[Array]:
-    """For every body the point ``(3, T)`` of it whose velocity counts, fixed in the body.
-
-    On the axis where one passive turn is all it has (the foot from the origin of the link), so that only the spin counts; else
-    the origin of the link.
-    """
-    twists = [here.link_twists(Z[:, i]) for i in range(Z.shape[1])]
-    out = []
-    for body in idle:
-        origin = here.poses[:, 3, body.link]
-        mine = [V[:, body.link] for V in twists if np.abs(V[:, body.link]).max() > TURNING]
-        point = origin
-        if len(mine) == 1 and (np.abs(mine[0][:3]).max(axis=0) > TURNING).all():
-            w, v = mine[0][:3], mine[0][3:] + cross(mine[0][:3], origin)
-            point = origin + cross(w, v) / (w * w).sum(axis=0)
-        out.append(point)
-    return out
-
-
-def body_twists(idle: tuple[Idle, ...], points: list[Array], V: Array) -> Array:
-    """Angular velocity and velocity of the rest point of every body, stacked ``(6 bodies, T)``."""
-    out = []
-    for body, P in zip(idle, points, strict=True):
-        twist = V[:, body.link]
-        out += [twist[:3], twist[3:] + cross(twist[:3], P)]
-    return np.concatenate(out)
-
-
-def passive_twists(here: Configuration, idle: tuple[Idle, ...], points: list[Array], Z: Array) -> Array:
-    """``body_twists`` of all passive motions ``Z (F, p, T)``: ``(6 bodies, p, T)``."""
-    return np.stack([body_twists(idle, points, here.link_twists(Z[:, i])) for i in range(Z.shape[1])], axis=1)
-
-
-def resting_part(G: Array, b: Array) -> Array:
-    """Multiples ``(p, T)`` of the passive motions that take the part along them out of ``b``: ``-(G^T G)^-1 G^T b``."""
-    A = np.einsum("ipt,iqt->tpq", G, G)
-    return -np.linalg.solve(A, np.einsum("ipt,it->tp", G, b)[..., None])[..., 0].T
-
-
-def turning_part(idle: tuple[Idle, ...], points: list[Array], V: Array, G: Array) -> Array:
-    """Change of the passive twists, which turn with their bodies, in the condition of rest: ``(w x d) . v``, ``(p, T)``."""
-    out = np.zeros(G.shape[1:])
-    now = body_twists(idle, points, V)
-    for i in range(len(idle)):
-        w, v = now[6 * i : 6 * i + 3], now[6 * i + 3 : 6 * i + 6]
-        for p in range(G.shape[1]):
-            out[p] += (cross(w, G[6 * i + 3 : 6 * i + 6, p]) * v).sum(axis=0)
-    return out
-
-
-def body_accelerations(idle: tuple[Idle, ...], points: list[Array], V: Array, A: Array) -> Array:
-    """Angular acceleration and acceleration of the rest point of every body, ``(6 bodies, T)``."""
-    out = []
-    for body, P in zip(idle, points, strict=True):
-        w, alpha = V[:3, body.link], A[:3, body.link]
-        velocity = V[3:, body.link] + cross(w, P)
-        out += [alpha, A[3:, body.link] + cross(alpha, P) + cross(w, velocity)]
-    return np.concatenate(out)
-
-
 GAUSS = 8
 """Points of Gauss and Legendre a step between nodes: what is integrated over it is exact to rounding."""
+POINTS, WEIGHTS = np.polynomial.legendre.leggauss(GAUSS)
+PLACES = np.concatenate([[-1.0], POINTS, [1.0]])
+"""The points of a step and its ends."""
+TO_SERIES = WEIGHTS[:, None] * np.polynomial.legendre.legvander(POINTS, GAUSS - 1) * (np.arange(GAUSS) + 0.5)
+"""Coefficients of Legendre's series from values at the points."""
 MOST_TURNS = 8
 """Most repetitions of the turn that takes the spin out."""
 UNTURNED = 1e-13
 """Angle that is rounding."""
 
 
-def unspun(path: DriverPath, found: Positions, bodies: tuple[Idle, ...]) -> Positions:
-    """The same positions with passive bodies not spinning on the way from the start.
+def unspun(path: DriverPath, found: Positions, passive: tuple[PassiveMotion, ...]) -> Positions:
+    """The same positions with passive links at rest on the way from the start.
 
-    Along a track some freedom of every passive body is held, so that the body turns about its axis ``u`` by an angle of no meaning. Where
-    it is when it never spins (``w . u = 0``) follows from the way of the axis alone: a vector across it is carried parallel along
-    ``u(s)``. Against the part ``n`` across ``u`` of a fixed vector ``e`` it turns by ``-integral n' . (u x n) ds``, taken by Gauss and
-    Legendre's rule in every step between nodes, so that it does not hang on which positions were asked for. Bodies with more than one
-    passive motion are left as they are. Source: Bishop, There is more than one way to frame a curve, Amer. Math. Monthly 82, 1975.
+    Along a track some freedom of every passive motion is held, so that its links are turned about their axis ``u`` (or displaced along
+    it) by an amount of no meaning. Where they are at rest follows from what does not depend on this amount: the ways of the axis in space
+    and in a link, and the spins of the links against each other. They are integrated by Gauss and Legendre's rule in every step between
+    nodes, so that it does not hang on which positions were asked for. Links with several passive motions are left as they are.
+    Source: Bishop, There is more than one way to frame a curve, Amer. Math. Monthly 82, 1975 (vectors carried along an axis).
     """
     nodes, good = found.tracks.nodes, np.flatnonzero((found.status == Status.OK) & (found.near < 0))
     interpolation = Interpolation(path, nodes)
     if not len(interpolation.left) or not good.size:
         return found
-    carried = _Carried(path, interpolation, found.follower, bodies)
+    carried = _Carried(path, interpolation, found.follower, passive)
     x = found.x.copy()
     turns = np.zeros(found.x.shape[1], dtype=np.intp) if found.turns is None else found.turns
     for at in in_blocks(good):
@@ -124,139 +57,191 @@ def unspun(path: DriverPath, found: Positions, bodies: tuple[Idle, ...]) -> Posi
     return replace(found, x=x, here=None, tracks=tracks, crossings=crossings, spin=spin)
 
 
+@dataclass(frozen=True)
+class _At:
+    """One passive motion at a batch of positions: axes ``u (3, T)`` about which it ``turns``, or along which it displaces.
+
+    ``unit`` its rates ``(F, T)``, ``length`` of its twist, ``R (3, 3, T)`` and ``origin (3, T)`` of the first of its links.
+    """
+
+    turns: bool
+    u: Array
+    unit: Array
+    length: Array
+    R: Array
+    origin: Array
+
+    @classmethod
+    def of(cls, here: PassiveMotions, i: int) -> _At:
+        """Motion ``i`` of several."""
+        motion = here.passive[i]
+        twist, pose = here.twists[:, here.first(i), i], here.here.poses[:, :, motion.links[0]]
+        along = twist[:3] if motion.turns else twist[3:]
+        length = np.sqrt((along * along).sum(axis=0))
+        return cls(motion.turns, along / length, here.rates[:, i] / length, length, pose[:, :3], pose[:, 3])
+
+    def take(self, at: Index) -> _At:
+        """Some of the positions."""
+        return _At(self.turns, *(part[..., at] for part in (self.u, self.unit, self.length, self.R, self.origin)))
+
+    def in_sense(self, u: Array) -> _At:
+        """The motion in the sense of other axes."""
+        sense = np.where((self.u * u).sum(axis=0) < 0, -1.0, 1.0)
+        return replace(self, u=sense * self.u, unit=sense * self.unit, length=sense * self.length)
+
+    def amount(self, e: Array, c: Array) -> Array:
+        """Angle about ``u`` from references ``e`` in space to references ``c`` in the link; or the place of its origin along ``u``."""
+        if not self.turns:
+            return np.asarray((self.origin * self.u).sum(axis=0))
+        return _angle(_across(e, self.u)[0], _across(rotate(self.R, c), self.u)[0], self.u)
+
+    def amount_rate(self, e: Array, c: Array, V: Array, change: Array) -> Array:
+        """The rate of ``amount`` where the link moves with ``V (6, T)`` and the twist of the motion changes by ``change (6, T)``.
+
+        For a turn ``w . u``, with the turning about ``u`` of the references taken across it.
+        """
+        du = (change[:3] if self.turns else change[3:]) / self.length
+        du = du - (du * self.u).sum(axis=0) * self.u
+        w, v = V[:3], V[3:] + cross(V[:3], self.origin)
+        if not self.turns:
+            return np.asarray((v * self.u + self.origin * du).sum(axis=0))
+        in_link = _turning(rotate(self.R, c), self.u, du - cross(w, self.u))
+        return np.asarray((w * self.u).sum(axis=0) + in_link - _turning(e, self.u, du))
+
+
+@dataclass(frozen=True)
+class _Course:
+    """One passive motion at rest along all steps.
+
+    Its axes ``u (3, steps, GAUSS + 2)`` at the places of every step, references ``e``, ``c (3, steps)`` of the amount, the amount where a
+    step ``begin``s, the Legendre ``series`` of its further change, and by how much it differs after the whole track, where that is a
+    ``period``.
+    """
+
+    u: Array
+    e: Array
+    c: Array
+    begin: Array
+    series: Array
+    period: Array
+
+    def missing(self, at: _At, step: Index, t: Array, turns: Index) -> tuple[Array, Array]:
+        """Amounts ``(n,)`` that are missing to rest in steps at ``t`` from -1 to 1, so many periods later; their increments ``(F, n)``."""
+        nearest = np.argmin(np.abs(t[:, None] - PLACES), axis=1)
+        at = at.in_sense(self.u[:, step, nearest])
+        amount = self.begin[step] + (self.series[step] * _integrals(t)).sum(axis=1) + turns * self.period[step]
+        amount = amount - at.amount(self.e[:, step], self.c[:, step])
+        amount = _wrapped(amount) if at.turns else amount
+        return amount, at.unit * amount
+
+
 class _Carried:
-    """Vectors across the axes of passive bodies, carried parallel along tracks."""
+    """Passive motions at rest along tracks."""
 
     def __init__(
-        self, path: DriverPath, interpolation: Interpolation, follower: Follower, bodies: tuple[Idle, ...]
+        self, path: DriverPath, interpolation: Interpolation, follower: Follower, passive: tuple[PassiveMotion, ...]
     ) -> None:
-        self.path, self.interpolation, self.follower, self.bodies = path, interpolation, follower, bodies
+        self.path, self.interpolation, self.follower, self.passive = path, interpolation, follower, passive
         nodes, left = interpolation.nodes, interpolation.left
         self._h = nodes.place[interpolation.right] - nodes.place[left]
-        self._starts = np.searchsorted(nodes.track, nodes.track[left])
-        self._at_nodes = path.at(nodes.x, nodes.drive, nodes.track)
-        f = path.factored(self._at_nodes, nodes.which)
-        axes, _, _ = _axes(self._at_nodes, bodies, f.motions())
-        points, weights = np.polynomial.legendre.leggauss(GAUSS)
-        self._to_series = (
-            weights[:, None] * np.polynomial.legendre.legvander(points, GAUSS - 1) * (np.arange(GAUSS) + 0.5)
-        )
-        here, rates = self._between(0.5 * (points + 1.0))
-        w = here.link_twists(rates)[:3]
-        self._bodies = [
-            None if axis is None else self._carry(body.link, axis[:, self._starts], here, w[:, body.link])
-            for body, axis in zip(bodies, axes, strict=True)
-        ]
+        track = nodes.track[left]
+        self._first = np.concatenate([[True], track[1:] != track[:-1]])
+        here, _ = self._motions(nodes.x, nodes.which, nodes.track)
+        between, V, change = self._between()
+        self._courses = {
+            i: self._course(_At.of(here, i), _At.of(between, i), V[:, here.first(i)], change[:, here.first(i), i])
+            for i in range(len(passive))
+            if here.alone[i]
+        }
 
-    def _between(self, parts: Array) -> tuple[Configuration, Array]:
-        """States and rates at parts of all steps."""
+    def _motions(self, x: Array, which: Index, track: Index) -> tuple[PassiveMotions, FactoredClosure]:
+        """Passive motions at states, and the equations there."""
+        here = self.path.at(x, x[self.path.rows], track)
+        f = self.path.factored(here, which)
+        return PassiveMotions(here, self.passive, f.motions()), f
+
+    def _between(self) -> tuple[PassiveMotions, Array, Array]:
+        """The motions at the Gauss points of all steps, twists ``(6, n, T)`` at rest in them, rates ``(6, n, p, T)`` of their own."""
         nodes, left = self.interpolation.nodes, self.interpolation.left
-        step = np.repeat(np.arange(len(left)), len(parts))
-        place = nodes.place[left][step] + np.tile(parts, len(left)) * self._h[step]
+        step = np.repeat(np.arange(len(left)), GAUSS)
+        place = nodes.place[left][step] + 0.5 * (np.tile(POINTS, len(left)) + 1.0) * self._h[step]
         track, which = nodes.track[left][step], nodes.which[left][step]
         drive = self.follower.paths.drive(track, place)
         closed = self.follower.newton.close(self.interpolation(step, place, drive), drive, track, which)
-        here = self.path.at(closed.x, drive, track)
-        rates = self.path.factored(here, closed.which).sensitivity() * self.interpolation.slope[:, step]
-        return here, rates.sum(axis=1)
+        there, f = self._motions(closed.x, closed.which, track)
+        dq = (f.sensitivity() * self.interpolation.slope[:, step]).sum(axis=1)
+        moving = Velocities(there.here, dq + there.at_rest(there.here.link_twists(dq)))
+        return there, moving.V[:, there.links], there.twist_rates(f, moving.dq, moving.V, moving.bias)
 
-    def _carry(self, link: int, axis: Array, here: Configuration, w: Array) -> _Body:
-        """The vector of one body carried along all steps; ``axis (3, steps)`` where the track of each step starts."""
-        R = self._at_nodes.poses[:, :3, link]
-        body_axis = rotate_back(R[:, :, self._starts], axis)
-        across = _perpendicular(body_axis)
-        left, right = (rotate(R[:, :, at], body_axis) for at in (self.interpolation.left, self.interpolation.right))
-        e = _perpendicular(left)
-        u = rotate(here.poses[:, :3, link], np.repeat(body_axis, GAUSS, axis=1))
-        n, length = _across(np.repeat(e, GAUSS, axis=1), u)
-        rate = -(np.repeat(e, GAUSS, axis=1) * u).sum(axis=0) * (cross(w, u) * cross(u, n)).sum(axis=0) / length
-        series = -self._h[:, None] * (rate.reshape(-1, GAUSS) @ self._to_series)
-        # from the reference vector of a step to that of the next, at the node between them
-        end, _ = _across(e, right)
-        turn = np.zeros(len(series))
-        turn[1:] = _angle(e[:, 1:], end[:, :-1], left[:, 1:]) + series[:-1, 0]
-        track = self.interpolation.nodes.track[self.interpolation.left]
-        first = np.concatenate([[True], track[1:] != track[:-1]])
-        at_start = _angle(e, rotate(R[:, :, self._starts], across), left)
-        turn[first] = at_start[first]
-        total = np.cumsum(turn)
-        begin = (total - turn)[np.flatnonzero(first)][np.cumsum(first) - 1]
-        # a track that comes back to where it starts comes back with the vector turned
-        after = total - begin + series[:, 0] - _angle(end, rotate(R[:, :, self._starts], across), right)
-        last = np.flatnonzero(np.append(first[1:], True))
-        return _Body(body_axis, across, e, total - begin, series, after[last][np.cumsum(first) - 1])
+    def _course(self, here: _At, between: _At, V: Array, change: Array) -> _Course:
+        """One motion, given at the nodes and at the Gauss points; there with the twist ``V`` of its link and the rate of its own."""
+        left, right, n = self.interpolation.left, self.interpolation.right, len(self.interpolation.left)
+        first, last = np.flatnonzero(self._first), np.flatnonzero(np.append(self._first[1:], True))
+        of_track = np.cumsum(self._first) - 1
+        u = np.concatenate([here.u[:, left, None], between.u.reshape(3, n, GAUSS), here.u[:, right, None]], axis=2)
+        # one sense along every track
+        within = np.cumprod(np.where((u[:, :, 1:] * u[:, :, :-1]).sum(axis=0) < 0, -1.0, 1.0), axis=1)
+        sense = np.cumprod(np.concatenate([[1.0], within[:-1, -1]]))
+        u *= (sense * sense[first][of_track])[:, None] * np.concatenate([np.ones((n, 1)), within], axis=1)
+        e = _perpendicular(u[:, :, 0])
+        c = rotate_back(here.R[:, :, left], e)
+        every = [np.repeat(references, GAUSS, axis=1) for references in (e, c)]
+        rate = between.in_sense(u[:, :, 1:-1].reshape(3, -1)).amount_rate(every[0], every[1], V, change)
+        series = self._h[:, None] * (rate.reshape(n, GAUSS) @ TO_SERIES)
 
-    def turned(self, x: Array, which: Index, track: Index, place: Array, turns: Index | None = None) -> Array:
-        """States with every body turned to where it stands when it does not spin, ``turns`` periods of the track later."""
+        def amount(nodes: Index, steps: Index, side: int) -> Array:
+            return here.take(nodes).in_sense(u[:, steps, side]).amount(e[:, steps], c[:, steps])
+
+        # from the references of a step to those of the next, at the node between them
+        inner = np.flatnonzero(~self._first)
+        begin = np.zeros(n)
+        begin[inner] = amount(right[inner - 1], inner, 0) - amount(right[inner - 1], inner - 1, -1)
+        begin[inner] += series[inner - 1, 0]
+        begin = np.cumsum(begin)
+        begin += (amount(left[first], first, 0) - begin[first])[of_track]
+        # a track that comes back to where it starts comes back with its passive links moved
+        period = begin[last] + series[last, 0] - amount(left[first], last, -1)
+        period *= np.where((u[:, last, -1] * u[:, first, 0]).sum(axis=0) < 0, -1.0, 1.0)
+        return _Course(u, e, c, begin, series, period[of_track])
+
+    def turned(self, x: Array, which: Index, track: Index, place: Array, turns: Index) -> Array:
+        """States with all passive links moved to where they stand when they are at rest, ``turns`` periods of the track later."""
         for _ in range(MOST_TURNS):
-            angles, dq = self._turn(x, which, track, place, turns)
-            if np.abs(angles).max(initial=0.0) < UNTURNED:
+            amount, dq = self._missing(x, which, track, place, turns)
+            if amount < UNTURNED:
                 break
-            # exact where the rates of the turn are constant (ball joints, hinges); over a plane it comes nearer with every repetition
+            # exact where the rates of the motion are constant (ball joints, hinges); over a plane it comes nearer with every repetition
             x = self.follower.newton.close(self.path.advance(x, dq, track), x[self.path.rows], track, which).x
         return x
 
     def turned_nodes(self, nodes: Nodes) -> Array:
         """States of nodes on the tracks."""
-        return self.turned(nodes.x, nodes.which, nodes.track, nodes.place)
+        return self.turned(nodes.x, nodes.which, nodes.track, nodes.place, np.zeros(len(nodes), dtype=np.intp))
 
     def spin(self, nodes: Nodes) -> Array:
         """Increments ``(F, nodes)`` from nodes to one period later."""
-        return self._turn(nodes.x, nodes.which, nodes.track, nodes.place, np.ones(len(nodes), dtype=np.intp))[1]
+        return self._missing(nodes.x, nodes.which, nodes.track, nodes.place, np.ones(len(nodes), dtype=np.intp))[1]
 
-    def _turn(
-        self, x: Array, which: Index, track: Index, place: Array, turns: Index | None = None
-    ) -> tuple[Array, Array]:
-        """Angles ``(turns, n)`` that are missing, and the increments ``(F, n)`` that turn by them.
-
-        Links that one passive motion turns share an angle: the mean, as at rest their mean spin vanishes (welded ones have the same).
-        """
+    def _missing(self, x: Array, which: Index, track: Index, place: Array, turns: Index) -> tuple[float, Array]:
+        """The largest amount of a motion that is missing to rest at states, and the increments ``(F, n)`` that lead there."""
         nodes = self.interpolation.nodes
         tracks = nodes.track[self.interpolation.left]
         moved = np.isin(track, tracks)
         step = self.interpolation.find(np.where(moved, track, tracks[0]), place)
-        here = self.path.at(x, x[self.path.rows], track)
-        Z = self.path.factored(here, which).motions()
-        axes, numbers, unit = _axes(here, self.bodies, Z)
-        integrals = _integrals(2.0 * (place - nodes.place[self.interpolation.left[step]]) / self._h[step] - 1.0)
-        shared: dict[int, list[Array]] = {}
-        dq = np.zeros((Z.shape[0], x.shape[1]))
-        for body, known, axis, number in zip(self.bodies, self._bodies, axes, numbers, strict=True):
-            if known is None or axis is None:
-                continue
-            R = here.poses[:, :3, body.link]
-            u = rotate(R, known.axis[:, step])
-            n, _ = _across(known.e[:, step], u)
-            angle = known.turn[step] + (known.series[step] * integrals).sum(axis=1)
-            angle = angle - _angle(n, rotate(R, known.across[:, step]), u)
-            if turns is not None:
-                angle = angle + turns * known.period[step]
-            angle = np.sign((axis * u).sum(axis=0)) * np.where(moved, angle, 0.0)
-            shared.setdefault(number, []).append(angle)
-        angles = {
-            number: _wrapped(some[0] + np.mean([_wrapped(a - some[0]) for a in some], axis=0))
-            for number, some in shared.items()
-        }
-        for number, angle in angles.items():
-            dq += unit[number] * angle
-        return np.array(list(angles.values())), dq
+        t = 2.0 * (place - nodes.place[self.interpolation.left[step]]) / self._h[step] - 1.0
+        here, _ = self._motions(x, which, track)
+        dq, most = np.zeros((here.rates.shape[0], x.shape[1])), 0.0
+        for i, course in self._courses.items():
+            amount, part = course.missing(_At.of(here, i), step, t, turns)
+            most = max(most, float(np.abs(np.where(moved, amount, 0.0)).max(initial=0.0)))
+            dq += np.where(moved, part, 0.0)
+        return most, dq
 
 
-@dataclass(frozen=True)
-class _Body:
-    """One passive body along all steps, ``(3, steps)`` and ``(steps,)``.
-
-    ``axis`` and a vector ``across`` it in the body's own frame; the reference ``e`` of every step, the angle ``turn`` of the carried
-    vector against it where the step begins, the Legendre ``series`` of its further turning, and by how much it is turned after the whole
-    track, where that is a ``period``.
-    """
-
-    axis: Array
-    across: Array
-    e: Array
-    turn: Array
-    series: Array
-    period: Array
+def _turning(e: Array, u: Array, du: Array) -> Array:
+    """Rate at which the part of ``e`` across ``u`` turns about it where ``u`` changes by ``du``: ``n' . (u x n)``."""
+    n, length = _across(e, u)
+    return np.asarray(-(e * u).sum(axis=0) * (du * cross(u, n)).sum(axis=0) / length)
 
 
 def _integrals(t: Array) -> Array:
@@ -290,26 +275,3 @@ def _angle(a: Array, b: Array, u: Array) -> Array:
 def _wrapped(angle: Array) -> Array:
     """Angles in [-pi, pi)."""
     return np.remainder(angle + np.pi, 2 * np.pi) - np.pi
-
-
-def _axes(
-    here: Configuration, bodies: tuple[Idle, ...], Z: Array
-) -> tuple[list[Array | None], list[int], dict[int, Array]]:
-    """For every body that has one passive turn its axis ``(3, T)``, else None, and the number of that motion.
-
-    By number the rates ``(F, T)`` that turn by one radian.
-    """
-    G = passive_twists(here, bodies, rest_points(here, bodies, Z), Z)
-    axes: list[Array | None] = []
-    numbers: list[int] = []
-    units: dict[int, Array] = {}
-    for i in range(len(bodies)):
-        mine = [p for p in range(Z.shape[1]) if np.abs(G[6 * i : 6 * i + 6, p]).max() > TURNING]
-        u = G[6 * i : 6 * i + 3, mine[0]] if len(mine) == 1 else np.zeros((3, here.T))
-        length = np.sqrt((u * u).sum(axis=0))
-        turns = len(mine) == 1 and bool((length > TURNING).all())
-        axes.append(u / length if turns else None)
-        numbers.append(mine[0] if mine else -1)
-        if turns:
-            units[mine[0]] = Z[:, mine[0]] / length
-    return axes, numbers, units

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure import passive_rest as idle
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
-from mechgraph.closure.passive_rest import Idle
+from mechgraph.closure.passive_motion import PassiveMotion, PassiveMotions
 from mechgraph.closure.solver import ClosureSolver, FactoredClosure
 from mechgraph.numerics.tolerances import PATH
 
@@ -64,30 +63,23 @@ def rates(
     columns: Index,
     velocity: Array,
     acceleration: Array,
-    bodies: tuple[Idle, ...] = (),
+    passive: tuple[PassiveMotion, ...] = (),
 ) -> Rates:
     """Rates for driver velocities and accelerations ``(d, T)``.
 
-    ``J q' = 0`` and ``J q'' = -bias``, the driven part known; passive freedoms of ``bodies`` at rest (see ``closure.passive_rest``).
+    ``J q' = 0`` and ``J q'' = -bias``, the driven part known; ``passive`` motions at rest (see ``closure.passive_motion``).
     """
     dq, gap_v = _completed(here, solver, columns, velocity, None)
     moving = Velocities(here, dq)
-    Z = solver.motions() if bodies else np.zeros((len(dq), 0, here.T))
-    if bodies:
-        points = idle.rest_points(here, bodies, Z)
-        G = idle.passive_twists(here, bodies, points, Z)
-        spin = idle.resting_part(G, idle.body_twists(bodies, points, moving.V))
-        moving = Velocities(here, dq + np.einsum("fpt,pt->ft", Z, spin))
+    rest = PassiveMotions(here, passive, solver.motions()) if passive else None
+    if rest is not None:
+        moving = Velocities(here, dq + rest.at_rest(moving.V))
     turning = (moving.dq * moving.dq).max(axis=0, initial=0.0)
     ddq, gap_a = _completed(here, solver, columns, acceleration, here.closure_bias(moving.bias), turning)
     moved = Rates(moving, ddq, np.maximum(gap_v, gap_a))
-    if bodies:
-        now = idle.body_accelerations(bodies, points, moved.V, moved.A)
-        change = np.linalg.solve(
-            np.einsum("ipt,iqt->tpq", G, G), idle.turning_part(bodies, points, moved.V, G).T[..., None]
-        )[..., 0].T
-        spin = idle.resting_part(G, now) - change
-        moved = Rates(moving, ddq + np.einsum("fpt,pt->ft", Z, spin), moved.contradiction)
+    if rest is not None:
+        more = rest.still_at_rest(solver, moved.dq, moved.V, moved.bias, moved.A)
+        moved = Rates(moving, ddq + more, moved.contradiction)
     return moved
 
 

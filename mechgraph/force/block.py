@@ -11,6 +11,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.contact_lines import ContactLines
 from mechgraph.closure.indexing import Index
+from mechgraph.closure.passive_motion import PassiveMotion
 from mechgraph.closure.rates import Rates
 from mechgraph.closure.solver import FactoredClosure
 from mechgraph.force.applied_loads import Site, inertia_wrenches, kinetic_power
@@ -19,7 +20,6 @@ from mechgraph.force.passive_hold import hold
 from mechgraph.force.reaction_map import effort_map, reaction_map
 from mechgraph.model.load_base import Load
 from mechgraph.numerics.linear import add_at
-from mechgraph.structure.passive import PassiveMotion
 from mechgraph.structure.reaction_split import (
     Stress,
     at_pair_points,

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import System
-from mechgraph.force.passive_hold import hold_at_rest, hold_names, is_idle, turns
+from mechgraph.closure.passive_motion import PassiveMotion
+from mechgraph.force.passive_hold import hold_at_rest, hold_names, is_idle
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.linear import independent_rows, rank_of, singular_values
 from mechgraph.numerics.tolerances import MOTIONS
 from mechgraph.structure.mobility import Freedoms, drive_order, single_freedoms
-from mechgraph.structure.passive import PassiveMotion
 from mechgraph.structure.position import Position
 from mechgraph.units import unit_of
 
@@ -126,11 +126,11 @@ def passive_findings(system: System, x: Array, passive: tuple[PassiveMotion, ...
     held = hold_at_rest(Configuration(system, x[:, None]), q, m.loads, passive)
     out = []
     for i, (motion, name) in enumerate(zip(passive, hold_names(m, passive), strict=True)):
-        unit = unit_of(m.units, (2 if turns(motion) else 1, 1, -2))
+        unit = unit_of(m.units, (2 if motion.turns else 1, 1, -2))
         bearing = None if held is None else not is_idle(held[0][i], held[1][i])
-        scale = system.par.L ** (2 if turns(motion) else 1)
+        scale = system.par.L ** (2 if motion.turns else 1)
         effort = abs(float(held[0][i, 0])) * scale if held is not None and bearing else 0.0
-        found = PassiveFinding("", (), (), None, name, bearing, effort, unit, turns(motion))
+        found = PassiveFinding("", (), (), None, name, bearing, effort, unit, motion.turns)
         out.append(_passive_finding(system, motion, found))
     return tuple(out)
 
@@ -144,12 +144,12 @@ def _passive_finding(system: System, motion: PassiveMotion, found: PassiveFindin
     axis = screw_axis(system, motion.twist)
     one = len(links) == 1
     line = f"the line {'-'.join(p.name for p in pairs)} ({'-'.join(p.type.symbol for p in pairs)})"
-    if turns(motion):
+    if motion.turns:
         how = f"turn{'s' if one else ''} about {line}, through {vector(axis[0])} along {vector(axis[1])}"
     else:
         how = f"slide{'s' if one else ''} along {vector(axis[1])} in the pairs {', '.join(p.name for p in pairs)}"
     together = "" if one else " together"
-    what = "couple" if turns(motion) else "force"
+    what = "couple" if motion.turns else "force"
     load = {
         True: f"load-bearing, only a {what} of {found.size} that no part supplies would hold it",
         False: "carries no load",

@@ -17,6 +17,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_path import Status, in_blocks
 from mechgraph.closure.indexing import Index, System
+from mechgraph.closure.passive_motion import PassiveMotion
 from mechgraph.closure.rates import Rates, Velocities
 from mechgraph.errors import MechgraphError
 from mechgraph.force.block import BlockForces
@@ -24,7 +25,6 @@ from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.newton import Work
 from mechgraph.numerics.tolerances import PATH
-from mechgraph.structure.passive import PassiveMotion
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from mechgraph.equations.state import State
 from mechgraph.errors import MechgraphError
 from mechgraph.force.applied_loads import Site, inertia_wrenches, kinetic_energy, user_poses, user_twists
 from mechgraph.force.dalembert import given_effort_loads
-from mechgraph.force.passive_hold import hold_names, is_idle, turns
+from mechgraph.force.passive_hold import hold_names, is_idle
 from mechgraph.model.force_law import Law
 from mechgraph.numerics.tolerances import MOTIONS
 from mechgraph.result.kept import BlockMotion
@@ -91,7 +91,7 @@ class Trajectory(PairForces):
     def passive_efforts(self) -> dict[str, Array]:
         """What keeps passive bodies at rest, by name: a couple about the axis of a turn, a force along a slide."""
         return {
-            name: self._out((self._L**2 if turns(motion) else self._L) * size)
+            name: self._out((self._L**2 if motion.turns else self._L) * size)
             for name, motion, size in zip(
                 hold_names(self.mechanism, self._passive), self._passive, self._force("holds"), strict=True
             )
@@ -104,15 +104,15 @@ class Trajectory(PairForces):
         m, terms = self.mechanism, self._of("hold_terms")
         out = []
         for motion, (name, size), part in zip(self._passive, self.passive_efforts().items(), terms, strict=True):
-            scale = self._L**2 if turns(motion) else self._L
+            scale = self._L**2 if motion.turns else self._L
             if is_idle(size.ravel(), scale * part):
                 continue
             links = tuple(m.links[i].name for i in motion.links)
             pairs = tuple(p.name for p in m.pairs if p.a in links or p.b in links)
             # the freedoms of pairs that prescribe motion come last
             freedoms = tuple(n for n, r in zip(m.freedom_names(), motion.rates, strict=False) if abs(r) > MOTIONS.still)
-            unit = unit_of(m.units, (2 if turns(motion) else 1, 1, -2))
-            out.append(LoadBearing(name, turns(motion), float(np.nanmax(np.abs(size))), unit, links, pairs, freedoms))
+            unit = unit_of(m.units, (2 if motion.turns else 1, 1, -2))
+            out.append(LoadBearing(name, motion.turns, float(np.nanmax(np.abs(size))), unit, links, pairs, freedoms))
         return tuple(out)
 
     def load(self, index: int) -> LoadResult:

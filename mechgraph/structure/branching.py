@@ -18,10 +18,10 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.loop_rows import ClosureRows
+from mechgraph.closure.passive_motion import PassiveMotion
 from mechgraph.closure.rank import rank_of_rows
 from mechgraph.numerics.newton import closest_zeros
 from mechgraph.numerics.tolerances import RANKS
-from mechgraph.structure.passive import PassiveMotion
 
 STARTS = 64
 """Random starts of the search; k self-stresses that are not those of a regular position allow 2^k branches."""

@@ -12,12 +12,12 @@ import scipy
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index, System
-from mechgraph.closure.passive_rest import Idle
+from mechgraph.closure.passive_motion import PassiveMotion
 from mechgraph.closure.rank import ClosureRank, EngineName, rank_of_rows
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.linear import independent_rows, rank_of, singular_values
 from mechgraph.numerics.tolerances import MOTIONS, PATH
-from mechgraph.structure.passive import PassiveMotion, passive_motions, small_combinations
+from mechgraph.structure.passive import passive_motions, small_combinations
 from mechgraph.structure.position import Position
 
 
@@ -81,11 +81,6 @@ class Freedoms:
     def mobility(self) -> int:
         """Freedoms minus rank."""
         return self.null.shape[1]
-
-    @property
-    def bodies(self) -> tuple[Idle, ...]:
-        """The links that have passive freedoms, each a body."""
-        return tuple(Idle(link) for link in sorted({link for p in self.passive for link in p.links}))
 
 
 def _left_free(closure: ClosureRank, at_rest: ClosureRank, columns: Index) -> Array:

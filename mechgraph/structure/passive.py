@@ -18,6 +18,7 @@ import scipy
 from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array, compose, pose_exp
 from mechgraph.closure.indexing import Index
+from mechgraph.closure.passive_motion import PassiveMotion
 from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.numerics.tolerances import MOTIONS
 from mechgraph.structure.position import Position
@@ -28,15 +29,6 @@ DIFFERENCE_STEP = 1e-4
 """Step of the central differences that tell whether a pair element leaves its place."""
 LONGEST_SERIES = 40
 """Pairs of one series up to which any two are tried as a border; in longer ones neighbours only."""
-
-
-@dataclass(frozen=True)
-class PassiveMotion:
-    """A passive freedom: unit rates ``(F,)``, the links that move as one, and their twist about the internal origin."""
-
-    rates: Array
-    links: tuple[int, ...]
-    twist: Array
 
 
 @dataclass(frozen=True)

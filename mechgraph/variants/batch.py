@@ -37,7 +37,7 @@ class NumbersPath(DriverPath):
     """The closure equations while the numbers change, drivers at rest: the path value is the part of the way."""
 
     def __init__(self, line: Pipeline, numbers_at: NumbersAt) -> None:
-        solver = closure_solver(line.engine, line.leading, line.freedoms.hold if line.bodies else None)
+        solver = closure_solver(line.engine, line.leading, line.freedoms.hold if line.passive else None)
         super().__init__(line.system, solver, line.system.cases)
         self.size, self.paced = (self.system.n_freedoms, 1), False
         self._line, self._numbers_at = line, numbers_at

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from attack import Bars, anywhere, carried, conditions, differences, everything, solved, wrapped
 from mechanisms import Z
-from strategies import closed_mechanism, with_drives, with_loads
+from strategies import chebyshev_rate, chebyshev_times, closed_mechanism, with_drives, with_loads
 
 import mechgraph as mg
 
@@ -151,11 +151,38 @@ def two_rods():
 
 @pytest.mark.parametrize(
     ("m", "engine", "end"),
-    [(rssr(), "dense", 6.0), (two_rods(), "dense", 6.0), (mg.load("rssr"), "dense", 6.0), (rssr(), "sparse", 1.0)],
+    [(rssr(), "dense", 6.0), (two_rods(), "dense", 6.0), (mg.load("rssr"), "dense", 6.0), (two_rods(), "sparse", 1.0)],
     ids=["rssr", "two rods", "library", "sparse"],
 )
 def test_passive_bodies(m, engine, end):
     assert_subsets_agree(m, "A", np.linspace(-1.0, end, 15), np.random.default_rng(43), engine=engine)
+
+
+CARRIED = {
+    "H inside, S and E": {"seed": 8, "loops": 1},
+    "R and P inside, S and E": {"seed": 24, "loops": 1, "mobility": 2, "branches": 0},
+    "slide, Sp and E": {"seed": 130, "loops": 1},
+    "slide, Cp and E": {"seed": 183, "loops": 2},
+}
+"""Passive links that move against each other, or that slide: what keeps them at rest is no matter of one body's axis."""
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.parametrize("case", CARRIED)
+def test_passive_links_that_move_against_each_other_or_slide(case, engine):
+    """They stand at the same place for any positions of a path, and their rates are the derivatives of it."""
+    m = with_drives(closed_mechanism(**CARRIED[case], masses=False), CARRIED[case]["seed"])
+    drive = m.drives[0].freedom
+    assert_subsets_agree(m, drive, np.linspace(-0.4, 0.3, 6), np.random.default_rng(44), engine=engine)
+    t = chebyshev_times(0.0, 0.01, 8)
+    s = mg.kinematics(m, {drive: mg.Motion(t, velocity=1.0)}, engine=engine)
+    for k in m.link_names():
+        rate, tail = chebyshev_rate(t, s.link(k).pose)
+        spin = rate @ np.linalg.inv(s.link(k).pose)
+        twist = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0], *spin[:, :3, 3].T], axis=1)
+        np.testing.assert_allclose(s.link(k).twist, twist, atol=1e-9 + 10 * tail)
+        rate, tail = chebyshev_rate(t, s.link(k).twist)
+        np.testing.assert_allclose(s.link(k).acceleration, rate, atol=1e-8 + 10 * tail)
 
 
 @pytest.mark.parametrize("engine", ["dense", "sparse"])

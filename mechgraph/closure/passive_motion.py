@@ -1,0 +1,186 @@
+"""Passive motions at rest: links that could spin or slide idly are kept from doing so, in space.
+
+A passive motion moves some links as one and nothing else, so it can be stopped in many ways. Here these links are at rest in it:
+their twists together have no part along the passive twist ``u`` (for the coupler between two spheres, no spin about their line:
+``w . u = 0``, hence ``alpha . u + w . u' = 0``; where they also move against each other, ``sum_b w_b . u = 0``). No choice of a coordinate
+enters, and a body that is symmetric about its line needs no effort to be held so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy
+
+from mechgraph.algebra.screw import cross_twist
+from mechgraph.algebra.se3 import Array, cross
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.solver import FactoredClosure
+from mechgraph.topology.components import labels_of_bipartite, members
+
+TURNING = 1e-6
+"""Part of a unit motion from which on it turns the links that it moves."""
+
+
+@dataclass(frozen=True)
+class PassiveMotion:
+    """A passive freedom: unit rates ``(F,)``, the links that move as one, and their twist about the internal origin."""
+
+    rates: Array
+    links: tuple[int, ...]
+    twist: Array
+
+    @property
+    def turns(self) -> bool:
+        """Whether it turns its links, so that a couple holds them; else it displaces them, and a force does."""
+        return bool(np.abs(self.twist[:3]).max() > TURNING)
+
+
+class PassiveMotions:
+    """The passive motions at a batch of positions, and the twists that are at rest in them.
+
+    Attributes
+    ----------
+    links : the links that have passive motions; ``alone (p,)`` whether those of a motion have no other.
+    rates, twists : the motions ``(F, p, T)``, in the order of those at the start, and the twists ``(6, n, p, T)`` of the links.
+    points : for every link the point ``(3, n, T)`` whose velocity counts. On the axis where one passive turn is all it has (the foot from
+        the origin of the link), so that only the spin counts; else the origin of the link.
+    """
+
+    def __init__(self, here: Configuration, passive: Sequence[PassiveMotion], rates: Array) -> None:
+        self.here, self.passive, self.rates = here, passive, rates
+        self.links = sorted({link for motion in passive for link in motion.links})
+        self.twists = self._twists(self.rates)
+        if len(passive) > 1:
+            mixes = _named(passive, self.rates, self.twists, self.links)
+            self.rates = np.einsum("fpt,tpq->fqt", self.rates, mixes)
+            self.twists = np.einsum("cnpt,tpq->cnqt", self.twists, mixes)
+        mine = [[i for i, motion in enumerate(passive) if link in motion.links] for link in self.links]
+        self.alone = [all(len(mine[self.links.index(link)]) == 1 for link in motion.links) for motion in passive]
+        self._on_axis = np.array([len(some) == 1 and passive[some[0]].turns for some in mine])
+        self._first = [some[0] for some in mine]
+        self._origins = here.poses[:, 3, self.links]
+        self.points = self._origins + np.where(self._on_axis[:, None], self._feet[0], 0.0)
+
+    def first(self, i: int) -> int:
+        """The place among ``links`` of the first that motion ``i`` moves."""
+        return self.links.index(self.passive[i].links[0])
+
+    def _twists(self, rates: Array) -> Array:
+        """Twists ``(6, n, p, T)`` of the links for rates ``(F, p, T)``."""
+        return np.stack([self.here.link_twists(rates[:, i])[:, self.links] for i in range(rates.shape[1])], axis=2)
+
+    @cached_property
+    def _feet(self) -> tuple[Array, Array, Array]:
+        """From the origins to the feet on the axes ``w x v / w^2 (3, n, T)``, with ``w`` and ``v``; anything where there is no axis."""
+        first = self.twists[:, np.arange(len(self.links)), self._first]
+        w, v = first[:3], first[3:] + cross(first[:3], self._origins)
+        return cross(w, v) / np.maximum((w * w).sum(axis=0), 1e-300), w, v
+
+    @cached_property
+    def _along(self) -> Array:
+        """Passive twists with the velocities of the rest points, ``(6, n, p, T)``."""
+        return self._at_points(self.twists)
+
+    def _at_points(self, twists: Array) -> Array:
+        """Twists ``(6, n, p, T)`` about the rest points."""
+        return np.concatenate([twists[:3], twists[3:] + cross(twists[:3], self.points[:, :, None])])
+
+    @cached_property
+    def _inverse(self) -> Array:
+        """``(G^T G)^-1 (T, p, p)`` of the passive twists ``G``."""
+        return np.linalg.inv(np.einsum("cnpt,cnqt->tpq", self._along, self._along))
+
+    def dual(self, power: Array) -> Array:
+        """Wrenches ``(6, n, T)`` about the rest points, of least size, that do the power ``(p, T)`` along the motions."""
+        return np.einsum("cnpt,tpq,qt->cnt", self._along, self._inverse, power, optimize=True)
+
+    def _against(self, power: Array) -> Array:
+        """Rates ``(F, T)`` of the passive motions that take ``power (p, T)`` out."""
+        return -np.einsum("fpt,tpq,qt->ft", self.rates, self._inverse, power, optimize=True)
+
+    def at_rest(self, V: Array) -> Array:
+        """Rates ``(F, T)`` that, added to those of the twists ``V (6, N, T)``, leave no part along the motions: ``G^T (V + G x) = 0``."""
+        return self._against(self._power(self._along, V[:, self.links]))
+
+    def _power(self, along: Array, V: Array) -> Array:
+        """``(p, T)``: twists ``V (6, n, T)``, taken about the rest points, times others."""
+        return np.einsum("cnpt,cnt->pt", along, self._at_points(V[:, :, None])[:, :, 0])
+
+    def still_at_rest(self, f: FactoredClosure, dq: Array, V: Array, bias: Array, A: Array) -> Array:
+        """Accelerations ``(F, T)`` to be added so that the condition of rest holds on: ``G^T V' + G'^T V = 0``.
+
+        For twists ``V`` at rest with accelerations ``A (6, N, T)``, of the rates ``dq`` with their velocity part ``bias (6, P, T)``.
+        """
+        moving, change = V[:, self.links], self.twist_rates(f, dq, V, bias)
+        point = moving[3:] + cross(moving[:3], self._origins)
+        foot, w, v = self._feet
+        first = change[:, np.arange(len(self.links)), self._first]
+        # of the foot w x v / w^2, v being the passive velocity of the origin
+        dv = first[3:] + cross(first[:3], self._origins) + cross(w, point)
+        size = np.maximum((w * w).sum(axis=0), 1e-300)
+        turned = (cross(first[:3], v) + cross(w, dv) - 2.0 * (w * first[:3]).sum(axis=0) * foot) / size
+        point = point + np.where(self._on_axis[:, None], turned, 0.0)
+        along = self._at_points(change)
+        along[3:] += cross(self.twists[:3], point[:, :, None])
+        now = self._at_points(A[:, self.links][:, :, None])[:, :, 0]
+        now[3:] += cross(moving[:3], point)
+        return self._against(self._power(along, moving) + np.einsum("cnpt,cnt->pt", self._along, now))
+
+    def twist_rates(self, f: FactoredClosure, dq: Array, V: Array, bias: Array) -> Array:
+        """Rates ``(6, n, p, T)`` of the passive twists ``U``, up to multiples of these, where the mechanism moves with ``dq``.
+
+        The mechanism moves along its path by ``s`` and along a passive motion by ``t``: ``dU/ds - dV/dt = ad(V) U``. The accelerations
+        of both motions together, without those of each alone, are ``dU/ds + dV/dt``.
+        """
+        out = np.empty_like(self.twists)
+        for i in range(out.shape[2]):
+            z = self.rates[:, i]
+            U = self.here.link_twists(z)
+            mixed = self.here.bias(dq + z, V + U) - bias - self.here.bias(z, U)
+            ddq = f.solve(-self.here.closure_bias(mixed)[:, None])[:, 0]
+            out[:, :, i] = self.here.accelerations_with(ddq, mixed)[:, self.links]
+        return 0.5 * (out + cross_twist(V[:, self.links][:, :, None], self.twists))
+
+
+def _named(passive: Sequence[PassiveMotion], Z: Array, V: Array, links: list[int]) -> Array:
+    """Mixes ``(T, p, p)`` of motions ``Z`` with twists ``V (6, n, p, T)`` of some links: column i moves those of passive motion i as one.
+
+    First motions that share no link are told apart, by the dual of what each set of links does; then those that do. Where the same links
+    have several motions, those that are nearest in their freedoms to the motions at the start.
+    """
+    p, T = V.shape[2:]
+    twists = V.transpose(3, 1, 0, 2)
+
+    def of_links(some: Iterable[int]) -> Array:
+        at = [links.index(link) for link in sorted(some)]
+        return twists[:, at].reshape(T, 6 * len(at), p)
+
+    touched = scipy.sparse.lil_array((p, max(links) + 1))
+    for i, motion in enumerate(passive):
+        touched[[i], list(motion.links)] = 1.0
+    groups = members(labels_of_bipartite(touched.tocsr()))
+    moved = [{link for i in group for link in passive[i].links} for group in groups]
+    spaces = [
+        np.linalg.svd(of_links(some), full_matrices=False)[2][:, : len(group)]
+        for group, some in zip(groups, moved, strict=True)
+    ]
+    alone = np.split(
+        np.linalg.inv(np.concatenate(spaces, axis=1)), np.cumsum([len(group) for group in groups])[:-1], axis=2
+    )
+    out = np.empty((T, p, p))
+    for group, some, mine in zip(groups, moved, alone, strict=True):
+        for i in group:
+            lead, *rest = passive[i].links
+            apart = [of_links([link]) - of_links([lead]) for link in rest]
+            rows = np.concatenate([of_links(some.difference(passive[i].links)), *apart], axis=1) @ mine
+            count = sum(passive[j].links == passive[i].links for j in group)
+            space = mine @ np.linalg.eigh(np.swapaxes(rows, 1, 2) @ rows)[1][:, :, :count]
+            there = np.moveaxis(Z, 2, 0) @ space
+            out[:, :, i] = (
+                (space @ (np.linalg.pinv(there) @ passive[i].rates)[..., None])[..., 0] if count > 1 else space[..., 0]
+            )
+    return out
