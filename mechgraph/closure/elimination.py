@@ -11,6 +11,7 @@ Source: George and Heath, Solution of sparse linear least squares problems using
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import scipy
@@ -70,8 +71,7 @@ class Elimination:
 
     def _sweep(self, K: scipy.sparse.csr_array, owners: Index) -> None:
         K.sum_duplicates()
-        starts = np.flatnonzero(np.diff(owners, prepend=-1))
-        blocks = list(zip(starts.tolist(), [*starts[1:].tolist(), K.shape[0]], strict=True))
+        blocks = list(pairwise([*np.flatnonzero(np.diff(owners, prepend=-1)).tolist(), K.shape[0]]))
         columns = [np.unique(K.indices[K.indptr[i] : K.indptr[j]]).astype(np.intp) for i, j in blocks]
         order = _block_order(columns, K.shape[1])
         last = np.full(K.shape[1], -1)
@@ -162,6 +162,8 @@ def householder(A: Array) -> tuple[Array, Array, Array]:
 
 def _block_order(columns: list[Index], width: int) -> list[int]:
     """An order of the blocks that keeps the front short: Cuthill and McKee on blocks that share columns."""
+    if not columns:
+        return []  # no loop has a freedom: a graph without nodes has no order for scipy
     rows = np.repeat(np.arange(len(columns)), [len(c) for c in columns])
     at = np.concatenate([*columns, np.zeros(0, dtype=np.intp)])
     touch = scipy.sparse.csr_array((np.ones(len(at)), (rows, at)), shape=(len(columns), width))

@@ -182,3 +182,21 @@ def test_another_freedom_is_held_where_the_one_held_no_longer_turns_the_body():
     assert fastest(solver.chosen(here, first)).max() <= worst
     assert fastest(solver.chosen(here, found.which)).max() <= worst
     assert len(set(found.which.tolist())) > 1
+
+
+def welded(*more):
+    """A frame and a link welded twice, with more pairs."""
+    loop = [mg.Pair(name, "W", "frame", "base", point=(i, 0, 0)) for i, name in enumerate("AB")]
+    return mg.Mechanism("welded twice", None, [*loop, *more])
+
+
+@pytest.mark.parametrize("freedoms", [0, 1, 2])
+def test_loops_without_any_freedom(freedoms):
+    """A loop of welds, alone and with open chains on it: rows without a column."""
+    m = welded(*(mg.Pair(f"C{i}", "R", "base", f"arm{i}", point=(i, 1, 0), axis=Z) for i in range(freedoms)))
+    dense, sparse = (mg.check(m, engine=e) for e in ("dense", "sparse"))
+    assert (dense.mobility, dense.redundancy) == (sparse.mobility, sparse.redundancy) == (freedoms, 6)
+    assert str(dense) == str(sparse)
+    driven = m.replace(drives=[f"C{i}" for i in range(freedoms)])
+    if freedoms:
+        assert_engines_agree(driven, {d.freedom: np.array([0.1, 0.3]) for d in driven.drives})
