@@ -367,6 +367,12 @@ class Configuration:
             return np.moveaxis(flat.reshape(len(s.m.pairs), 6, *x.shape[1:]), 1, 0)
         return np.asarray(np.einsum("lp,list->ipst", s.loop_matrix, loops))
 
+    def tree_efforts(self, wrenches: Array) -> Array:
+        """Efforts ``(F, T)`` of wrenches ``(6, N, T)`` on the links in the freedoms along the tree, those of the chords zero."""
+        s = self.system
+        carried = s.tree.wrenches(wrenches, len(s.m.pairs))
+        return np.asarray(-(self.S * carried[:, s.owners]).sum(axis=0))
+
     def accelerations_with(self, ddq: Array, bias: Array) -> Array:
         """Accelerations dV/dt of all links ``(6, N, T)``, the velocity part ``bias (6, P, T)`` known."""
         relative = self.pair_sums(self.S * ddq)

@@ -179,13 +179,14 @@ class Places:
         return number, int(np.searchsorted(self.groups[number].pairs, pair))
 
     @shared
-    def _owner(self) -> Index:
+    def pair_of_freedom(self) -> Index:
+        """For every freedom its pair, as numbers."""
         return np.repeat(np.arange(len(self.m.pairs)), np.diff(self.first_column))
 
     @shared
     def owners(self) -> Place:
         """For every freedom its pair."""
-        return compact(self._owner)
+        return compact(self.pair_of_freedom)
 
     @shared
     def pair_ranks(self) -> Ranks:

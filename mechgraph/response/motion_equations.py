@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from types import SimpleNamespace
 
 import numpy as np
@@ -26,6 +27,7 @@ from mechgraph.closure.rates import Rates, Velocities
 from mechgraph.closure.solver import FactoredClosure
 from mechgraph.force.applied_loads import Site, inertia_wrenches
 from mechgraph.model.load_base import Load
+from mechgraph.response.saddle import saddle_accelerations
 
 MASSLESS = 1e-12
 """Eigenvalue of the mass matrix, of which the diagonal is one, below which a motion has no inertia."""
@@ -33,6 +35,8 @@ RESISTED = 1e-9
 """Pivot (squared) of the same matrix above which every motion has inertia."""
 NUMBERS = 5_000_000
 """Numbers in an array of twists."""
+SPARSE_FROM = 8000
+"""Freedoms times links from which on the sparse form is faster than the full mass matrix (measured on open chains)."""
 UNOPPOSED = 1e-9
 """Part of the largest generalized force below which none acts along a motion without inertia."""
 
@@ -58,12 +62,12 @@ class Loads:
 class Moved:
     """Rates and accelerations at a batch of states, with the power of loads and prescribed drivers.
 
-    ``rates``; ``mass (n, n, T)`` and ``force (n, T)`` of the reduced equations; ``power (T,)`` of prescribed drivers and of the loads
-    without a potential energy; internal units.
+    ``rates``; ``columns`` of the independent rates, with their masses, and the generalized ``force (n, T)``; ``power (T,)`` of prescribed
+    drivers and of the loads without a potential energy; internal units.
     """
 
     rates: Rates
-    mass: Array
+    columns: Columns
     force: Array
     power: Array
 
@@ -113,19 +117,46 @@ class Columns:
     def __init__(self, here: Configuration, f: FactoredClosure, n: int) -> None:
         self.here, self.f, self.n = here, f, n
         self.Z, self.Zp = np.split(f.sensitivity(), [n], axis=1)
-        self.V = link_twists(here, self.Z)
-        self.momenta = _momenta(here, self.V)
-        rows = 6 * len(here.system.m.links)
-        self._V = self.V.reshape(rows, n, here.T)
+
+    @cached_property
+    def V(self) -> Array:
+        """Twists of all links ``(6, N, n, T)``."""
+        return link_twists(self.here, self.Z)
+
+    @cached_property
+    def mass(self) -> Array:
+        """Mass matrices ``(n, n, T)``."""
+        rows, n, T = 6 * len(self.here.system.m.links), self.n, self.here.T
+        momenta = _momenta(self.here, self.V).reshape(rows, n, T)
         # a matrix product for every position: the masses of many freedoms are most of the work
-        self.mass = np.moveaxis(
-            np.moveaxis(self._V, (2, 1), (0, 1)) @ np.moveaxis(self.momenta.reshape(rows, n, here.T), 2, 0), 0, -1
-        )
+        return np.moveaxis(np.moveaxis(self.V.reshape(rows, n, T), (2, 1), (0, 1)) @ np.moveaxis(momenta, 2, 0), 0, -1)
 
     def force(self, wrenches: Array, efforts: Array) -> Array:
         """Generalized forces ``(n, T)`` of wrenches on the links and efforts in the freedoms."""
-        by_wrenches = np.einsum("rkt,rt->kt", self._V, wrenches.reshape(len(self._V), self.here.T))
-        return np.asarray(by_wrenches + np.einsum("fkt,ft->kt", self.Z, efforts))
+        by_freedom = efforts + self.here.tree_efforts(wrenches)
+        return np.asarray((self.Z * by_freedom[:, None]).sum(axis=0))
+
+    def accelerations(self, wrenches: Array, efforts: Array) -> tuple[Array, Array]:
+        """See ``accelerations``; of many freedoms in the sparse form where every motion has inertia."""
+        if self.n * len(self.here.system.m.links) >= SPARSE_FROM:
+            found = self.sparse_accelerations(wrenches, efforts)
+            if found is not None:
+                return found, np.zeros_like(found)
+        return accelerations(self.mass, self.force(wrenches, efforts))
+
+    def sparse_accelerations(self, wrenches: Array, efforts: Array) -> Array | None:
+        """``v' (n, T)`` by one sparse factorization a position (see ``response.saddle``); None where a motion may have no inertia."""
+        here = self.here
+        unit = np.broadcast_to(np.eye(6)[:, None, :, None], (6, len(here.system.m.links), 6, here.T))
+        inertia, forces = _momenta(here, unit), (self.Z * efforts[:, None]).sum(axis=0)
+        found = []
+        for t in range(here.T):
+            at = (part[..., t] for part in (here.S, self.Z, inertia, wrenches, forces))
+            a = saddle_accelerations(here.system.tree, here.system.pair_of_freedom, *at)
+            if a is None:
+                return None
+            found.append(a)
+        return np.stack(found, axis=1)
 
     def largest(self, wrenches: Iterable[Array], efforts: Iterable[Array]) -> float:
         """The largest part that a component of wrenches or of efforts has in a generalized force."""
@@ -162,17 +193,17 @@ def moved(here: Configuration, f: FactoredClosure, v: Array, p: Array, loads: Lo
     V = velocities.V
     (stored, by_stored), (rest, by_rest) = (columns.applied(some, velocities, t) for some in (loads.stored, loads.rest))
     wrenches, efforts = stored + rest + inertia, by_stored + by_rest
-    force = columns.force(wrenches, efforts)
-    a, unopposed = accelerations(columns.mass, force)
+    a, unopposed = columns.accelerations(wrenches, efforts)
     left = np.abs(unopposed).max(initial=0.0)
     if left and left > UNOPPOSED * columns.largest((stored, rest, inertia), (by_stored, by_rest)):
         raise Stopped(NO_INERTIA)
-    wrenches = wrenches - np.einsum("ijkt,kt->ijt", columns.momenta, a)
+    further = (Z * a).sum(axis=1)
     power = (V * rest).sum(axis=(0, 1)) + (dq * by_rest).sum(axis=0)
-    for k in range(Zp.shape[1]):
-        effort = -((here.link_twists(Zp[:, k]) * wrenches).sum(axis=(0, 1)) + (Zp[:, k] * efforts).sum(axis=0))
-        power += effort * p[0, k]
-    return Moved(Rates(velocities, ddq + (Z * a).sum(axis=1), np.zeros(here.T)), columns.mass, force, power)
+    if Zp.shape[1]:
+        left_over = wrenches - _momenta(here, here.link_twists(further)[:, :, None])[:, :, 0]
+        by_freedom = efforts + here.tree_efforts(left_over)
+        power -= (p[0] * (Zp * by_freedom[:, None]).sum(axis=0)).sum(axis=0)
+    return Moved(Rates(velocities, ddq + further, np.zeros(here.T)), columns, columns.force(wrenches, efforts), power)
 
 
 def along_one(here: Configuration, f: FactoredClosure, loads: Loads) -> tuple[Array, Array]:

@@ -216,7 +216,7 @@ class _Free:
         f = self.chart.solver.factored(self.chart.start, self.chart.which)
         p = task.prescribed_at(np.array([t]))[1:]
         found = moved(self.chart.start, f, dq[self.chart.free][:, None], p, task.loads, np.array([t]))
-        self.dq, self.mass = dq, found.mass
+        self.dq, self.mass = dq, found.columns.mass
         self.columns = np.array([limit.column for limit in closed])
         self.sign = np.array([limit.sign for limit in closed])
         self.Z = f.sensitivity()[:, : len(self.chart.free), 0]
