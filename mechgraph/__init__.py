@@ -33,6 +33,7 @@ from mechgraph.model.event import Event
 from mechgraph.model.force_law import Damper, ForceLaw, Spring, TorsionSpring
 from mechgraph.model.force_table import ForceTable
 from mechgraph.model.gears import Belt, BevelGears, Rack, SpurGears, WormGear
+from mechgraph.model.hertz import Hertz
 from mechgraph.model.library import library_names as library
 from mechgraph.model.link import Link
 from mechgraph.model.load import Effort, Gravity, Wrench
@@ -80,6 +81,7 @@ __all__ = [
     "FreeBody",
     "Freedom",
     "Gravity",
+    "Hertz",
     "Identity",
     "IndeterminateError",
     "Link",

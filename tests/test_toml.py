@@ -379,7 +379,7 @@ def test_library_files_keep_the_schema(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "kind", ["pair_type", "freedom", "component", "bookkeeping", "link", "marker", "pair", "drive"]
+    "kind", ["pair_type", "freedom", "component", "bookkeeping", "link", "marker", "hertz", "pair", "drive"]
 )
 def test_a_table_holds_what_its_constructor_takes(kind: str) -> None:
     table = TABLES_OF_FILE[kind]

@@ -16,6 +16,7 @@ from mechgraph.cli.options import (
     Compare,
     Drives,
     Engine,
+    Include,
     Method,
     Named,
     OnReach,
@@ -41,6 +42,7 @@ def solve(
     drive: Drives = None,
     actuate: Actuate = None,
     out: Out = None,
+    include: Include = None,
     method: Method = "loop_wrench",
     redundant: Redundant = "nan",
     on_reach: OnReach = "raise",
@@ -68,7 +70,7 @@ def solve(
         how: dict[str, Any] = {"method": method, "redundant": redundant, "on_reach": on_reach, "engine": engine}
         s = mg.solve(m, motions or None, actuate=actuate, tol=tol, progress=moved, **how)
     with working(f"summary of {m.name}"):
-        told = _told(s, out, json, over_time)
+        told = _told(s, out, tuple(include or ()), json, over_time)
     _tell("solve", *told)
     if compared:
         show_compared(mechanism)
@@ -76,7 +78,9 @@ def solve(
         raise typer.Exit(NO_ANSWER)
 
 
-def _told(s: mg.Solution, out: Path | None, json: bool, over_time: bool) -> tuple[Told, Written | None]:
+def _told(
+    s: mg.Solution, out: Path | None, include: tuple[Any, ...], json: bool, over_time: bool
+) -> tuple[Told, Written | None]:
     """What is told of a solution, and the file that was written."""
     figures = mg.over_time(s) if over_time else None
     told: Told = [s.document(asked=True), *([figures.document()] if figures else [])]
@@ -84,8 +88,8 @@ def _told(s: mg.Solution, out: Path | None, json: bool, over_time: bool) -> tupl
         told = s.to_dict() | {"over_time": figures and figures.to_dict()}
     if out is None:
         return told, None
-    s.write(out)
-    return told, Written(str(out), s.status.size, len(s.part(slice(1)).columns()))
+    s.write(out, include)
+    return told, Written(str(out), s.status.size, len(s.part(slice(1)).columns(include)))
 
 
 def _tell(command: str, told: Told, written: Written | None) -> None:
@@ -119,6 +123,7 @@ def respond(
         typer.Option("--points", min=2, help="Number of output times, evenly spread; without it the steps taken."),
     ] = None,
     out: Out = None,
+    include: Include = None,
     method: Annotated[
         Literal["auto", "RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"] | None,
         typer.Option(help="Stepper of scipy; Radau for stiff loads."),
@@ -158,7 +163,7 @@ def respond(
             on_stop="return", progress=moved,
         )  # fmt: skip
     with working(f"summary of {m.name}"):
-        told = _told(r, out, json, over_time)
+        told = _told(r, out, tuple(include or ()), json, over_time)
     _tell("respond", *told)
     if r.stopped:
         fail(r.stopped, NO_ANSWER)

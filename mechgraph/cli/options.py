@@ -10,6 +10,7 @@ import typer
 from mechgraph.cli.completion import freedom_names, freedoms, library_names
 from mechgraph.exchange.files import READERS
 from mechgraph.result.export import FORMATS
+from mechgraph.result.table import MORE
 from mechgraph.writing import formats_text
 
 Named = Annotated[
@@ -94,6 +95,10 @@ Out = Annotated[
         metavar="FILE",
         help=f"Write everything, one row a position; the suffix says how: {formats_text(FORMATS)}.",
     ),
+]
+Include = Annotated[
+    list[str] | None,
+    typer.Option("--include", metavar="WHAT", help=f"More columns for --out (repeat): {', '.join(MORE)}."),
 ]
 
 Compare = Annotated[

@@ -171,7 +171,7 @@ def _pairs_are_sound(pairs: Sequence[Pair], tol: float | None) -> bool:
     if any(p.a == p.b or (p.on_a is None) != (p.on_b is None) for p in pairs):
         return False
     takers = {id(t) for t in types if t.takes_pitch}
-    if any(p.faults(tol) for p in pairs if p.pitch is not None or p.lead is not None or id(p.type) in takers):
+    if any(p.faults(tol) for p in pairs if p.says_more or id(p.type) in takers):
         return False
     by_point = [p for p in pairs if p.point is not None or p.axis is not None]
     by_markers = [p for p in pairs if p.on_a is not None]

@@ -297,6 +297,10 @@ def _positive_fault(
     return fault
 
 
+def _two_fault(value: Any, what: str, minimum: float | None) -> str | None:
+    return None if is_numeric(value, (2,)) else wrong(value, what, "two finite numbers")
+
+
 def _vector_fault(value: Any, what: str, minimum: float | None) -> str | None:
     return vector_fault(value, what)
 
@@ -369,6 +373,7 @@ SAMPLES = Kind("n numbers", {"$ref": "#/$defs/series"}, None, None, True, _sampl
 _ABOVE_0: Schema = {"type": "number", "exclusiveMinimum": 0}
 _TWO: Schema = {"type": "array", "minItems": 2, "maxItems": 2}
 POSITIVE = Kind("number > 0", _ABOVE_0, None, (), True, _positive_fault((), "a finite number"))
+TWO = Kind("2 numbers", {**_TWO, "items": {"type": "number"}}, None, (2,), True, _two_fault)
 TWO_POSITIVE = Kind(
     "2 numbers > 0", {**_TWO, "items": _ABOVE_0}, None, (2,), True, _positive_fault((2,), "two finite numbers")
 )

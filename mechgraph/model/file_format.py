@@ -27,6 +27,7 @@ from mechgraph.model.field_format import (
 )
 from mechgraph.model.force_table import ForceTable
 from mechgraph.model.gears import COUPLINGS
+from mechgraph.model.hertz import Hertz
 from mechgraph.model.link import Link
 from mechgraph.model.load import LOADS
 from mechgraph.model.mechanism import Mechanism
@@ -133,6 +134,7 @@ TABLES_OF_FILE: dict[str, Table] = {
     "link": _table(Link),
     "pair": _table(Pair, words="A kinematic pair from link a to link b."),
     "marker": _table(Marker, words="A marker frame in a link's own frame."),
+    "hertz": _table(Hertz, words="What the pressure in a contact takes: materials and shapes of its elements."),
     **{f"coupling {kind}": _table(coupling) for kind, coupling in COUPLINGS.items()},
     "chain": _table(
         None,

@@ -15,12 +15,14 @@ from mechgraph.model.field_format import (
     LINK_NAME,
     NUMBER,
     POINT,
+    POSITIVE,
     TEXT,
     Described,
 )
 from mechgraph.model.field_format import (
     TABLE as NESTED,
 )
+from mechgraph.model.hertz import Hertz
 from mechgraph.model.numeric import plain
 from mechgraph.model.pair_table import TABLE
 from mechgraph.model.pair_type import PairType
@@ -107,6 +109,10 @@ class Pair(Described):
     point, axis, second : marker in global coordinates at the declared configuration (all coordinates zero).
     pitch, lead : advance per radian or per turn, right-hand positive; exactly one where the type needs it.
     on_a, on_b : instead of point/axis, a Marker on each link in that link's own frame.
+    closed : of a contact, "form" (b is held on both sides) or "force" (a can only push b, along the axis of a plane, along ``second`` of a
+        groove: where it would have to pull, the solution says that b lifts off).
+    radius : of the ball or cylinder on link b.
+    hertz : Hertz, materials and what else the pressure in a contact takes.
     """
 
     name: Annotated[str, TEXT("freedoms are named NAME.Rz and so on")]
@@ -138,6 +144,12 @@ class Pair(Described):
         Marker | None, NESTED("marker on link a, in its frame; instead of `point` and `axis`", table="marker")
     ] = None
     on_b: Annotated[Marker | None, NESTED("marker on link b, in its frame", table="marker")] = None
+    closed: Annotated[
+        str,
+        TEXT('of a contact: b is held on both sides, `"form"`, or only pushed, `"force"`', choices=("form", "force")),
+    ] = "form"
+    radius: Annotated[float | None, POSITIVE("of the ball or cylinder of a contact, on b", LENGTH)] = None
+    hertz: Annotated[Hertz | None, NESTED("materials of a contact, for its pressure", table="hertz")] = None
 
     def __init__(
         self,
@@ -153,6 +165,9 @@ class Pair(Described):
         lead: float | None = None,
         on_a: Marker | None = None,
         on_b: Marker | None = None,
+        closed: str = "form",
+        radius: float | None = None,
+        hertz: Hertz | None = None,
     ) -> None:
         row = TABLE.get(type, type) if isinstance(type, str) else type
         point, axis, second = plain(point), plain(axis), plain(second)
@@ -160,7 +175,8 @@ class Pair(Described):
             axis = (0.0, 0.0, 1.0)
         if second is None and is_numeric(axis, (3,)):
             second = second_direction(axis)
-        values = (name, row, a, b, point, axis, second, plain(pitch), plain(lead), on_a, on_b)
+        values: tuple[Any, ...] = (name, row, a, b, point, axis, second, plain(pitch), plain(lead), on_a, on_b)
+        values += (closed, plain(radius), hertz)
         for key, value in zip(self.formats, values, strict=True):
             object.__setattr__(self, key, value)
 
@@ -168,6 +184,11 @@ class Pair(Described):
     def has_geometry(self) -> bool:
         """Whether the pair says where it sits."""
         return self.point is not None or self.axis is not None or self.on_a is not None or self.on_b is not None
+
+    @property
+    def says_more(self) -> bool:
+        """Whether it says more than its type and where it sits."""
+        return (self.pitch, self.lead, self.radius, self.hertz, self.closed) != (None, None, None, None, "form")
 
     @property
     def pitch_per_radian(self) -> float:
@@ -209,7 +230,7 @@ class Pair(Described):
         ]
         if isinstance(self.a, str) and isinstance(self.b, str) and self.a == self.b:
             found.append(f"{where}joins link {self.a!r} to itself; a pair joins two links")
-        found += list(self._pitch_faults(where))
+        found += [*self._pitch_faults(where), *self._contact_faults(where)]
         most = largest_cosine(tol) if self.type.square_second else PARALLEL_COSINE
         if (self.on_a is None) != (self.on_b is None):
             missing = "on_b" if self.on_b is None else "on_a"
@@ -230,6 +251,33 @@ class Pair(Described):
             if self.point is not None and self.axis is not None:
                 found += Marker(self.point, self.axis, self.second).faults(where, most)
         return [fault for fault in found if fault]
+
+    def _contact_faults(self, where: str) -> Iterator[str | None]:
+        yield self.formats["closed"].fault(self.closed, f"{where}closed")
+        form, given = self.type.touching, {"radius": self.radius, "hertz": self.hertz}
+        if form is None:
+            said = [name for name, value in given.items() if value is not None]
+            said += ["closed"] if self.closed == "force" else []
+            if said:
+                have = ", ".join(symbol for symbol, row in TABLE.items() if row.touching)
+                yield f"{where}{', '.join(said)}: type {self.type.symbol} is no contact of two elements; {have} are"
+            return
+        yield None if self.radius is None else self.formats["radius"].fault(self.radius, f"{where}radius")
+        if self.hertz is None:
+            return
+        if not isinstance(self.hertz, Hertz):
+            yield wrong(self.hertz, f"{where}hertz", "mg.Hertz(moduli=(E_a, E_b))")
+            return
+        yield from (faults := self.hertz.value_faults(f"{where}hertz."))
+        if faults:
+            return
+        groove, needed = self.hertz.groove_radius, "the pressure depends on it; give it"
+        if self.radius is None:
+            yield f"{where}radius: {needed}"
+        elif any(form.a) and (groove is None or not groove > self.radius):
+            yield wrong(groove, f"{where}hertz.groove_radius", f"a number above the radius {self.radius:g} of the ball")
+        if form.along_line and self.hertz.length is None:
+            yield f"{where}hertz.length: {needed}"
 
     def _pitch_faults(self, where: str) -> Iterator[str | None]:
         given = [(n, v) for n, v in (("pitch", self.pitch), ("lead", self.lead)) if v is not None]

@@ -7,11 +7,12 @@ from typing import Any
 
 from mechgraph.document import Document, Shown, Table
 from mechgraph.model.pair_type import PairType, fill_row
-from mechgraph.model.row_parts import UNIT_TWISTS, UNIT_WRENCHES, Bookkeeping, Component, Freedom
+from mechgraph.model.row_parts import UNIT_TWISTS, UNIT_WRENCHES, Bookkeeping, Component, Freedom, Touching
 
 _AXIS = (Freedom("Tz", UNIT_TWISTS["Tz"]), Freedom("Rz", UNIT_TWISTS["Rz"]))
 _FZ = Component("Fz", UNIT_WRENCHES["Fz"])
 _MZ = Component("Mz", UNIT_WRENCHES["Mz"])
+_IN_GROOVE = Touching(("Fx", "Fy"), a=(0.0, -1.0), b=(1.0, 1.0))
 _SCREW_FZ = Component("Fz", UNIT_WRENCHES["Fz"], 0, (0.0, 0.0, -1.0, 0.0, 0.0, 0.0))
 
 
@@ -108,12 +109,30 @@ TABLE = PairTable(
             freedoms=["Tz", "Ry", "Rx"],
             reactions=["Fx@1", "Fy@1", "Mz@2"],
             square_second=True,
+            touching=_IN_GROOVE,
         ),
-        _row("Sg", "sphere in groove", freedoms=["Tz", "rotation"], reactions=["Fx@1", "Fy@1"]),
         _row(
-            "Cp", "cylinder on plane", freedoms=["Tx", "Ty", "Rz", "Rx"], reactions=["Fz@2", "My@3"], square_second=True
+            "Sg",
+            "sphere in groove",
+            freedoms=["Tz", "rotation"],
+            reactions=["Fx@1", "Fy@1"],
+            touching=_IN_GROOVE,
         ),
-        _row("Sp", "sphere on plane", freedoms=["Tx", "Ty", "rotation"], reactions=["Fz@2"]),
+        _row(
+            "Cp",
+            "cylinder on plane",
+            freedoms=["Tx", "Ty", "Rz", "Rx"],
+            reactions=["Fz@2", "My@3"],
+            square_second=True,
+            touching=Touching(("Fz",), a=(0.0, 0.0), b=(0.0, 1.0), tilting="My"),
+        ),
+        _row(
+            "Sp",
+            "sphere on plane",
+            freedoms=["Tx", "Ty", "rotation"],
+            reactions=["Fz@2"],
+            touching=Touching(("Fz",), a=(0.0, 0.0), b=(1.0, 1.0)),
+        ),
         _row("Tc", "torque coupling", freedoms=["Tx", "Ty", "Tz", "Rx", "Ry"], reactions=["Mz@4"]),
         _row("Fr", "free, all six", freedoms=["Tx", "Ty", "Tz", "Rx", "Ry", "Rz"], reactions=[], dual=False),
         _row("W", "weld", freedoms=[], reactions=["Fx", "Fy", "Fz", "Mx", "My", "Mz"], directed=False),

@@ -24,6 +24,7 @@ from mechgraph.model.row_parts import (
     Bookkeeping,
     Component,
     Freedom,
+    Touching,
     all_scaled,
     bookkeeping_faults,
     read_component,
@@ -82,6 +83,7 @@ class PairType:
     steps: tuple[Factor, ...]
     frame_before: tuple[int, ...]
     computed_efforts: bool
+    touching: Touching | None
 
     def __init__(
         self,
@@ -202,6 +204,7 @@ def fill_row(
     *,
     directed: bool = True,
     square_second: bool = False,
+    touching: Touching | None = None,
 ) -> list[str]:
     """Set the fields of a new row; the faults of what is given, before any number is tried."""
     faults: list[str] = []
@@ -244,6 +247,7 @@ def fill_row(
         "steps": steps,
         "frame_before": before,
         "computed_efforts": False,
+        "touching": touching,
     }
     for key, value in fields.items():
         object.__setattr__(row, key, value)

@@ -55,6 +55,26 @@ class Freedom:
 
 
 @dataclass(frozen=True)
+class Touching:
+    """How the elements of a pair touch each other at a point or along a line.
+
+    ``forces``: the components of the normal force; where a force closes the pair, a presses on b with a positive first one. ``a``, ``b``:
+    the curvatures of the elements along the groove (or line) and across it, times their radii: (0, -1) is a groove, (1, 1) a ball,
+    (0, 1) a cylinder, (0, 0) a plane. ``tilting``: of a line the couple that moves the force along it.
+    """
+
+    forces: tuple[str, ...]
+    a: tuple[float, float]
+    b: tuple[float, float]
+    tilting: str | None = None
+
+    @property
+    def along_line(self) -> bool:
+        """Whether it is a line."""
+        return not (self.a[0] or self.b[0])
+
+
+@dataclass(frozen=True)
 class Component:
     """One reaction component or effort: a constant wrench ``wrench + pitch * per_pitch`` in frame ``frame``.
 

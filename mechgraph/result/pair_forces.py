@@ -102,6 +102,11 @@ class PairForces(Kept):
         masked = self._masked(values, stress)
         return {name: self._out(part) for name, part in zip(row.component_names, masked, strict=True)}
 
+    def directions(self, pair: int) -> Array:
+        """Forces of the unit components."""
+        number, i = self._system.place_of(pair)
+        return self._out(self._evaluated(lambda block: block.here.W[number][3:, :, i]))
+
     def unique(self, pair: int) -> dict[str, Array]:
         """Which reaction components and efforts are unique, also where values of least norm stand for them."""
         columns = self._columns(pair)

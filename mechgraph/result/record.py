@@ -8,6 +8,7 @@ from typing import Annotated
 
 import numpy as np
 
+from mechgraph.result.contacts import LiftOff, lift_offs
 from mechgraph.result.extremes import Greatest, Range, efforts, multipliers, reactions
 from mechgraph.result.places import OK, Places, coupling_unit
 from mechgraph.result.values import LoadBearing, Values
@@ -106,6 +107,7 @@ class SolutionData:
     ]
     reactions: tuple[ReactionData, ...]
     warnings: Annotated[tuple[LoadBearing, ...], "passive freedoms that carry load"]
+    lift_off: Annotated[tuple[LiftOff, ...], "positions at which contacts that are only pushed would have to pull"]
     passive: Annotated[tuple[str, ...], "names of all passive freedoms"]
     checks: ChecksData
     engine: str
@@ -142,6 +144,7 @@ def solution_data(values: Values) -> SolutionData:
         _multipliers(places) if forces else (),
         _reactions(places) if forces else (),
         values.load_bearing(),
+        lift_offs(values),
         tuple(values.passive_efforts()) if forces else (),
         ChecksData(*worst),
         values.engine,

@@ -18,6 +18,7 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.newton import Work
 from mechgraph.quantities import wrong
 from mechgraph.result import export
+from mechgraph.result.contacts import ContactResult, LiftOff, contacts_of, lift_offs, place_of_contact
 from mechgraph.result.places import OK, Places
 from mechgraph.result.record import solution_data
 from mechgraph.result.summary import summary
@@ -102,6 +103,15 @@ class Solution(Shown):
         m = self.mechanism
         return CouplingResult(self._values, m.couplings.index(m.coupling(name)))
 
+    @property
+    def contacts(self) -> dict[str, ContactResult]:
+        """Facts of all pairs whose elements touch at a point or along a line, by name: paths, normal forces, sliding, pressure."""
+        return contacts_of(self._values)
+
+    def contact(self, pair: str) -> ContactResult:
+        """Facts of one of them."""
+        return ContactResult(self._values, place_of_contact(self._values, pair))
+
     def load(self, index: int) -> LoadResult:
         """What the load of that number in ``mechanism.loads`` does: wrenches on links, power, and how a force law is read."""
         count = len(self.mechanism.loads)
@@ -166,9 +176,9 @@ class Solution(Shown):
         return self._values.passive_efforts()
 
     @property
-    def warnings(self) -> tuple[LoadBearing, ...]:
-        """What makes reactions doubtful: passive freedoms that carry load, with size, unit, links and pairs."""
-        return self._values.load_bearing()
+    def warnings(self) -> tuple[LoadBearing | LiftOff, ...]:
+        """What makes reactions doubtful: passive freedoms that carry load, and contacts that would have to pull."""
+        return (*self._values.load_bearing(), *lift_offs(self._values))
 
     def document(self, asked: bool = False) -> Document:
         """What ``print`` shows; ``asked`` as in ``summary()``, also what takes long."""
@@ -218,7 +228,7 @@ class Solution(Shown):
         """All numbers of the table by column name with unit, ``(...)`` each.
 
         ``include`` adds the motion of named ``"points"``, the poses of ``"links"`` (origin x, y, z and rotation matrix Rxx, Rxy, ...) with
-        angular rates, the motion of mass ``"centers"``, and what the ``"loads"`` do.
+        angular rates, the motion of mass ``"centers"``, what the ``"loads"`` do, and the facts of ``"contacts"``.
         """
         return {column.label: column.values for column in table_of(self._values, include)}
 

@@ -10,13 +10,14 @@ import numpy as np
 
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Table
 from mechgraph.errors import counted
+from mechgraph.result.contacts import contacts_of, lift_offs
 from mechgraph.result.extremes import Greatest, Range, Reactions, efforts, multipliers, reactions
 from mechgraph.result.numbers import SHOWN_AS_ZERO, bracket, number, with_unit
 from mechgraph.result.places import OK, Places, coupling_unit
 from mechgraph.result.values import Mask, Values
 from mechgraph.structure.components import labels_of
 from mechgraph.structure.snapping import SnappedMechanism
-from mechgraph.units import force_hint, unit_of
+from mechgraph.units import FORCE, PRESSURE, force_hint, unit_of
 
 LISTED = 20
 """Most rows of one table."""
@@ -148,6 +149,7 @@ class _View(Places):
         if largest > 0 or found.loose.any() or own.loose.any():
             yield from self.effort_tables()
             yield from self.reaction_table()
+            yield from self.contacts()
             yield from self.redundant()
         else:
             yield Paragraph("All efforts and reactions are zero: no link has a mass that moves and no load acts.")
@@ -232,6 +234,41 @@ class _View(Places):
         if found.best[k] <= SHOWN_AS_ZERO * scale:
             return ["0" + mark, ""]
         return [number(found.best[k]) + mark, self.name(int(found.at[k]))]
+
+    def contacts(self) -> Iterator[Block]:
+        """Range of the normal force of every contact, its greatest sliding speed and pressure; where it would have to pull."""
+        found = list(contacts_of(self.values).items())
+        rows = []
+        for name, contact in found[:LISTED]:
+            force, slides = self.flat(contact.normal_force), self.flat(np.linalg.norm(contact.sliding, axis=-1))
+            if not np.isfinite(force).any():
+                rows.append((name, "not unique", "", "", "", number(np.nanmax(slides)), ""))
+                continue
+            low, high, size = int(np.nanargmin(force)), int(np.nanargmax(force)), float(np.nanmax(np.abs(force)))
+            ends = (number(force[low], size), self.name(low), number(force[high], size), self.name(high))
+            pressure = contact.hertz.pressure if self.m.pair(name).hertz is not None else np.array(np.nan)
+            greatest = number(np.nanmax(pressure)) if np.isfinite(pressure).any() else ""
+            rows.append((name, *ends, number(np.nanmax(slides)), greatest))
+        if not rows:
+            return
+        units = [bracket(unit_of(self.m.units, of)) for of in (FORCE, (1, 0, -1), PRESSURE)]
+        head = (
+            "contact",
+            f"least normal force{units[0]}",
+            "at",
+            "greatest",
+            "at",
+            f"sliding{units[1]}",
+            f"pressure{units[2]}",
+        )
+        width = len(head) if any(row[-1] for row in rows) else len(head) - 1
+        yield Heading("Contacts", 2)
+        yield Table(head[:width], tuple(row[:width] for row in rows), align="lrrrrrr"[:width])
+        if len(found) > LISTED:
+            yield Paragraph(f"And {len(found) - LISTED} more: s.contacts.")
+        items = [found.text for found in lift_offs(self.values)]
+        if items:
+            yield Bullets(_shortened(items))
 
     def redundant(self) -> Iterator[Block]:
         """Which reaction components and efforts are not unique."""

@@ -13,6 +13,7 @@ from mechgraph.arguments import items_of
 from mechgraph.errors import DeclarationError
 from mechgraph.model.force_law import Law
 from mechgraph.quantities import wrong
+from mechgraph.result.contacts import contact_columns
 from mechgraph.result.values import MaterialPoint, Values
 from mechgraph.result.views import PairResult
 from mechgraph.units import unit_of
@@ -136,11 +137,12 @@ def _loads(s: Values) -> Iterator[Extra]:
         yield f"{name} power", found.power, (2, 1, -3)
 
 
-Include = Literal["points", "links", "centers", "loads"]
+Include = Literal["points", "links", "centers", "loads", "contacts"]
 MORE: dict[str, Callable[[Values], Iterator[Extra]]] = {
     "points": _points,
     "links": _links,
     "centers": _centers,
     "loads": _loads,
+    "contacts": contact_columns,
 }
 """What a table may have beside the pairs, on request."""

@@ -175,6 +175,9 @@ class Values(Protocol):
     def components(self, pair: int) -> dict[str, Array]:
         """Reaction components by name, ``(...)``."""
 
+    def directions(self, pair: int) -> Array:
+        """Forces of the unit reaction components of a pair, global directions, ``(..., 3, 6 - f)``."""
+
     def unique(self, pair: int) -> dict[str, Array]:
         """Which reaction components and efforts of drives are unique, by name, ``(...)``."""
 
