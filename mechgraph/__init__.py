@@ -52,6 +52,7 @@ from mechgraph.response.small_motion import equilibrium, linearize
 from mechgraph.result.free_body import FreeBody, free_body
 from mechgraph.result.over_time import OverTime, over_time
 from mechgraph.result.solution import Solution
+from mechgraph.transmission import Transmission, transmission
 from mechgraph.variants.result import Study
 from mechgraph.variants.study import study
 
@@ -106,6 +107,7 @@ __all__ = [
     "Study",
     "SystemGroup",
     "TorsionSpring",
+    "Transmission",
     "WormGear",
     "Wrench",
     "assemble",
@@ -129,6 +131,7 @@ __all__ = [
     "save_chains",
     "solve",
     "study",
+    "transmission",
     "system_groups",
     "write_report",
 ]

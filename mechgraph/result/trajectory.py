@@ -41,6 +41,12 @@ class Trajectory(PairForces):
             self._out(unit * self._of("ddq")[columns]),
         )
 
+    def screws(self, pair: int) -> Array:
+        """Twists of the freedoms at unit rates."""
+        columns = self._columns(pair)
+        unit = np.where(self._system.is_length[columns], self._L, 1.0)[:, None]
+        return self._out(self._evaluated(lambda block: user_twists(block.here, block.here.S[:, columns]) / unit))
+
     def link(self, link: int) -> tuple[Array, Array, Array]:
         """Pose, twist and dV/dt of a link."""
 

@@ -178,6 +178,9 @@ class Values(Protocol):
     def directions(self, pair: int) -> Array:
         """Forces of the unit reaction components of a pair, global directions, ``(..., 3, 6 - f)``."""
 
+    def screws(self, pair: int) -> Array:
+        """Twists of the freedoms of a pair at unit rates about the global origin, ``(..., 6, f)``."""
+
     def unique(self, pair: int) -> dict[str, Array]:
         """Which reaction components and efforts of drives are unique, by name, ``(...)``."""
 

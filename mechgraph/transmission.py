@@ -1,0 +1,170 @@
+"""How well the drivers move an output against a load: transmission angle, deviation angle, and their form for any mechanism.
+
+The mechanism at rest and without mass, a unit effort in the freedom of the output: pairs (and gears) k transmit wrenches (F, M) to the
+output link, M about the point of the pair, where a unit rate of the freedom makes the velocity v and the angular velocity w:
+
+    sin mu = cos delta = |sum_k F_k . v_k + M_k . w| / sum_k (|F_k| |v_k| + |M_k| |w|),
+
+what the wrenches do over the most that they could do if they were turned about their points. One force alone gives the angle delta between
+it and the velocity of its point, and so the transmission angle mu of a planar four-bar, between coupler and output (H. Alt, Der
+Uebertragungswinkel, Werkstattstechnik 26, 1932); of a sphere on a plane delta is the angle between the normal and the velocity of the
+output where they touch (M. V. Hernandez, thesis, University of Florida, 1983, section 6.6). Where constraints are redundant the wrenches
+are those of least norm.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.data import plain
+from mechgraph.document import Document, Paragraph, Shown
+from mechgraph.errors import DeclarationError, MechgraphWarning
+from mechgraph.kinetostatics import solve
+from mechgraph.model.load import Effort
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.quantities import wrong
+from mechgraph.result.numbers import ranges
+from mechgraph.result.places import Places
+from mechgraph.result.solution import Solution
+
+NOTHING = 1e-12
+"""Part of the greatest load that drivers carry below which they carry none."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Transmission(Shown):
+    """How well ``drivers`` move the freedom ``output`` at the positions of a solution; NaN where they cannot hold it.
+
+    ``index (...)``: 1 where all that is transmitted moves the output, 0 where nothing of it does.
+    """
+
+    solution: Solution
+    drivers: tuple[str, ...]
+    output: str
+    index: Array
+
+    @property
+    def transmission_angle(self) -> Array:
+        """``mu = arcsin(index)``, 0 to pi/2: best at pi/2."""
+        return np.arcsin(self.index)
+
+    @property
+    def deviation_angle(self) -> Array:
+        """``delta = pi/2 - mu``: best at 0."""
+        return np.arccos(self.index)
+
+    def document(self) -> Document:
+        """Ranges of both angles, and where they are reached."""
+        rows = [
+            ("transmission angle [deg]", np.rad2deg(self.transmission_angle)),
+            ("deviation angle [deg]", np.rad2deg(self.deviation_angle)),
+        ]
+        places = Places(self.solution._values)
+        text = f"From {', '.join(self.drivers)} to {self.output}, links at rest and without mass."
+        return Document(f"Transmission of {self.solution.mechanism.name}", (Paragraph(text), ranges(rows, places.name)))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The ranges as plain data."""
+        known = self.transmission_angle[np.isfinite(self.index)]
+        least, greatest = (float(f(known)) if known.size else None for f in (np.min, np.max))
+        return dict(plain(TransmissionData(self.drivers, self.output, least, greatest)))
+
+
+@dataclass(frozen=True)
+class TransmissionData:
+    """The range of the transmission angle, in radians; none where the drivers never hold the output."""
+
+    drivers: Annotated[tuple[str, ...], "freedoms in which the efforts stand"]
+    output: Annotated[str, "the freedom that is loaded"]
+    least: float | None
+    greatest: float | None
+
+
+def transmission(s: Solution, output: str, driver: str | None = None) -> Transmission:
+    """How well the drivers move an output at all positions of a solution.
+
+    Parameters
+    ----------
+    output : a single freedom, ``"D"`` or ``"C.Tz"``, of a pair of the output link and the link on which it is guided.
+    driver : the freedom that moves it, where it is another than those that take the efforts of the solution.
+
+    Raises
+    ------
+    DeclarationError
+        for an output that is no freedom, or is the driver itself.
+    """
+    m = s.mechanism
+    named = {"output": output} if driver is None else {"output": output, "driver": driver}
+    faults = [f"{what}: {fault}" for what, name in named.items() if (fault := m.freedom_fault(name, single=True))]
+    if faults:
+        raise DeclarationError(f"transmission of {m.name!r}", faults)
+    output, drivers = m.full_name(output), s.actuated if driver is None else (m.full_name(driver),)
+    if output in drivers:
+        raise DeclarationError(
+            f"transmission of {m.name!r}", [wrong(output, "output", "another freedom than a driver")]
+        )
+    light = m.replace(
+        links=[link.replace(mass=0.0, inertia=None) for link in m.links], loads=[Effort(output, 1.0)], response=None
+    )
+    places = Places(s._values)
+    known = np.flatnonzero(places.solved)
+    if not known.size or not s.prescribed:
+        raise DeclarationError(f"transmission of {m.name!r}", ["no position with prescribed motion; solve one first"])
+    # where a position was not solved the motion waits at one that was
+    at = known[np.clip(np.searchsorted(known, np.arange(places.solved.size), side="right") - 1, 0, None)]
+    motions = {name: of[at].reshape(s.batch) for name, of in zip(places.drivers, places.driver_values, strict=True)}
+    actuate = None if set(drivers) == set(s.prescribed) else drivers
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MechgraphWarning)  # a contact transmits either way here
+        still = solve(light, motions, actuate=actuate, redundant="minimum_norm", on_reach="flag")
+    index = _index(still, output, drivers)
+    return Transmission(s, drivers, output, np.where(places.solved.reshape(s.batch), index, np.nan))
+
+
+def _index(s: Solution, output: str, drivers: tuple[str, ...]) -> Array:
+    """``sin mu`` at all positions of the unloaded mechanism with a unit effort in the output."""
+    m = s.mechanism
+    k, j = m.freedom(output)
+    guide = m.pairs[k]
+    link = guide.b if guide.b != m.frame else guide.a
+    V = s._values.screws(k)[..., j]
+    w = V[..., :3]
+    does, could = np.zeros(s.batch), np.zeros(s.batch)
+    for F, M, p in _wrenches(s, link, guide.name):
+        v = V[..., 3:] + np.cross(w, p)
+        does = does + (F * v).sum(axis=-1) + (M * w).sum(axis=-1)
+        could = could + _size(F) * _size(v) + _size(M) * _size(w)
+    efforts = [s[m.pairs[i].name].effort[..., n] for i, n in map(m.freedom, drivers)]
+    held = np.isfinite(np.sum(efforts, axis=0)) & (could > NOTHING)
+    return np.where(held, np.minimum(np.abs(does) / np.where(held, could, 1.0), 1.0), np.nan)
+
+
+def _wrenches(s: Solution, link: str, guide: str) -> list[tuple[Array, Array, Array]]:
+    """Force, moment about a point, and that point, of all that acts on a link beside its guide."""
+    m, found = s.mechanism, []
+    for pair in m.pairs:
+        if link in (pair.a, pair.b) and pair.name != guide:
+            total = s[pair.name].total
+            X = s.link(pair.b).pose
+            p = X[..., :3, :3] @ np.asarray(pair.markers[1].point) + X[..., :3, 3]
+            found.append((total[..., 3:], total[..., :3] - np.cross(p, total[..., 3:]), p))
+    for coupling in m.couplings:
+        if coupling.steps and link in _gears(m, coupling.steps):
+            result = s.coupling(coupling.name)
+            found.append((result.force, np.zeros_like(result.force), result.point))
+    return found
+
+
+def _gears(m: Mechanism, steps: Any) -> tuple[str, str]:
+    """The links of both gears of a contact."""
+    first, last = (m.pairs[steps[i].pair] for i in (0, -1))
+    return (first.a if steps[0].sense > 0 else first.b), (last.b if steps[-1].sense > 0 else last.a)
+
+
+def _size(v: Array) -> Array:
+    return np.asarray(np.linalg.norm(v, axis=-1))
