@@ -32,8 +32,8 @@ from mechgraph.result.numbers import ranges
 from mechgraph.result.places import Places
 from mechgraph.result.solution import Solution
 
-NOTHING = 1e-12
-"""Part of the greatest load that drivers carry below which they carry none."""
+UNMOVED = 1e-12
+"""What wrenches on the output could do for a unit effort, below which nothing is transmitted."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -140,7 +140,7 @@ def _index(s: Solution, output: str, drivers: tuple[str, ...]) -> Array:
         does = does + (F * v).sum(axis=-1) + (M * w).sum(axis=-1)
         could = could + _size(F) * _size(v) + _size(M) * _size(w)
     efforts = [s[m.pairs[i].name].effort[..., n] for i, n in map(m.freedom, drivers)]
-    held = np.isfinite(np.sum(efforts, axis=0)) & (could > NOTHING)
+    held = np.isfinite(np.sum(efforts, axis=0)) & (could > UNMOVED)
     return np.where(held, np.minimum(np.abs(does) / np.where(held, could, 1.0), 1.0), np.nan)
 
 
