@@ -18,7 +18,7 @@ from mechgraph.closure.solver import closure_solver, engine_for
 from mechgraph.errors import AssemblyError, DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker
-from mechgraph.numerics.linear import complement
+from mechgraph.numerics.linear import compact, complement
 from mechgraph.numerics.newton import closest_zeros, least_norm_steps
 from mechgraph.numerics.tolerances import PATH
 from mechgraph.quantities import is_numeric, shown, wrong
@@ -78,10 +78,10 @@ def scaled(here: Configuration) -> Configuration:
     """A state in the system about the centroid of the pair points there, with lengths over their RMS distance L (with mass centres)."""
     raw = here.system
     # pairs of six freedoms hold nothing: they may stand anywhere
-    holding = [k for k, pair in enumerate(raw.m.pairs) if pair.type.f < 6] or slice(None)
-    points = here.pair_points[:, holding, 0]
+    holding = np.flatnonzero(np.diff(raw.first_column) < 6)
+    points = here.pair_points[:, compact(holding) if holding.size else slice(None), 0]
     centroid = points.mean(axis=1)
-    massive = [i for i, link in enumerate(raw.m.links) if link.center is not None]
+    massive = compact(np.flatnonzero([link.center is not None for link in raw.m.links]))
     X = here.poses[:, :, massive]
     centers = (rotate(X[:, :3], raw.par.center[:, massive]) + X[:, 3])[:, :, 0]
     distances = np.concatenate([points, centers], axis=1) - centroid[:, None]

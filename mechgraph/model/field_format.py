@@ -238,7 +238,7 @@ class MovedFunction:
 
 def _on_each(change: Callable[[Any], Any], value: Any) -> Any:
     """A changed value; of a table of values each, read-only."""
-    if isinstance(value, Mapping):
+    if type(value) not in (tuple, np.ndarray) and isinstance(value, Mapping):  # asked last, as it takes long
         return MappingProxyType({name: change(item) for name, item in value.items()})
     return change(value)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from types import MappingProxyType
@@ -14,6 +15,8 @@ from mechgraph.errors import DeclarationError
 from mechgraph.model.field_format import FLAG, NUMBER, POINT, POINTS, TENSOR, TEXT, Described
 from mechgraph.quantities import is_numeric, shown
 from mechgraph.units import INERTIA, LENGTH, MASS
+
+NO_POINTS: Mapping[str, tuple[float, ...]] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -55,9 +58,9 @@ class Link(Described):
     ] = field(default=None, hash=False)
 
     def __post_init__(self) -> None:
-        if self.points is None:
-            object.__setattr__(self, "points", MappingProxyType({}))
         self.read_numbers()
+        if self.points is None:
+            object.__setattr__(self, "points", NO_POINTS)
 
     def __reduce__(self) -> tuple[Any, ...]:
         given = {name: getattr(self, name) for name in self.formats}

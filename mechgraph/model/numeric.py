@@ -32,8 +32,8 @@ def plain(value: Any) -> Any:
 
 
 def _as_tuples(value: Any, depth: int) -> Any:
-    if depth < 2:
-        return tuple(value) if depth else value
+    if depth < 3:
+        return tuple(map(tuple, value)) if depth == 2 else tuple(value) if depth else value
     return tuple([_as_tuples(v, depth - 1) for v in value])
 
 

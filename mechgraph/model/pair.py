@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Annotated, Any
 
 import numpy as np
@@ -40,6 +41,7 @@ def largest_cosine(tol: Any) -> float:
     return max(PERPENDICULAR, 2.0 * tol) if is_numeric(tol, ()) else PERPENDICULAR
 
 
+@lru_cache
 def second_direction(axis: Any) -> tuple[float, ...]:
     """The global axis least aligned with ``axis``, made perpendicular to it: what fills ``second`` where it is left out."""
     length = math.hypot(*axis)

@@ -154,14 +154,17 @@ def _rows(vectors: Iterable[Any], count: int) -> Array:
     return np.fromiter(chain.from_iterable(vectors), float, 3 * count).reshape(-1, 3)
 
 
-def _of_sides(m: Mechanism, field: str) -> Array:
-    """A field of the markers on both sides of all pairs, ``(2, 3, P)``."""
-    value = attrgetter(field)
+def _of_sides(m: Mechanism, fields: tuple[str, ...]) -> list[Array]:
+    """Fields of the markers on both sides of all pairs, ``(2, 3, P)`` each."""
     marked = [k for k, pair in enumerate(m.pairs) if pair.on_a is not None]
-    first = _rows((value(pair.on_a or pair) for pair in m.pairs), len(m.pairs))
-    out = np.stack([first, first])
-    out[1, marked] = _rows((value(m.pairs[k].on_b) for k in marked), len(marked))
-    return out.transpose(0, 2, 1)
+    sides = [pair.on_a or pair for pair in m.pairs], [m.pairs[k].on_b for k in marked]
+    out = []
+    for value in map(attrgetter, fields):
+        first, second = (_rows(map(value, side), len(side)) for side in sides)
+        both = np.stack([first, first])
+        both[1, marked] = second
+        out.append(both.transpose(0, 2, 1))
+    return out
 
 
 NOWHERE = (0.0, 0.0, 0.0)
@@ -171,7 +174,7 @@ WEIGHTLESS = (NOWHERE,) * 3
 
 def declared(m: Mechanism) -> Declared:
     """The declared numbers of one mechanism with geometry, a batch of one."""
-    point, axis, second = (_of_sides(m, field) for field in ("point", "axis", "second"))
+    point, axis, second = _of_sides(m, ("point", "axis", "second"))
     n = len(m.links)
     center = _rows((NOWHERE if link.center is None else link.center for link in m.links), n).T
     tensors = (WEIGHTLESS if link.inertia is None else link.inertia for link in m.links)
