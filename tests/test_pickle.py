@@ -58,6 +58,7 @@ def things() -> dict[str, Any]:
         "ResponseError": mg.ResponseError("stopped", s), "event": mg.Event("A0", 0.1),
         "spur": mg.SpurGears("g", "A", "B", teeth=(20, 40)), "bevel": mg.BevelGears("g", "A", "B", teeth=(20, 40), module=0.1),
         "worm": mg.WormGear("g", "A", "B", teeth=(1, 40), radius=0.1), "rack": mg.Rack("g", "A", "B", radius=0.1),
+        "hertz": mg.Hertz((2.1e11, 2.1e11)), "transmission": mg.transmission(s, "D"),
         "belt": mg.Belt("g", "A", "B", radii=(1, 2)), "stop": mg.Stop("A0", lower=0.1), "equilibrium": hanging,
         "linearized": mg.linearize(hanging),
         "chain": next(mg.atlas(6)), "identity": mg.identify(mg.load("four-bar")), "system group": next(mg.system_groups(1)),
