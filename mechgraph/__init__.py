@@ -46,12 +46,15 @@ from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.model.row_parts import Bookkeeping, Component, Freedom
 from mechgraph.model.stop import Stop
 from mechgraph.report.report import DeterminacyReport, check
+from mechgraph.report.structure import Structure, groups, structure
 from mechgraph.response.course import Response
 from mechgraph.response.respond import respond
 from mechgraph.response.small_motion import equilibrium, linearize
 from mechgraph.result.free_body import FreeBody, free_body
 from mechgraph.result.over_time import OverTime, over_time
 from mechgraph.result.solution import Solution
+from mechgraph.structure.decomposition import Decomposition, Group
+from mechgraph.structure.families import Families
 from mechgraph.transmission import Transmission, transmission
 from mechgraph.variants.result import Study
 from mechgraph.variants.study import study
@@ -71,10 +74,12 @@ __all__ = [
     "Damper",
     "DeadPointError",
     "DeclarationError",
+    "Decomposition",
     "DeterminacyReport",
     "Drive",
     "Effort",
     "Event",
+    "Families",
     "FileError",
     "ForceLaw",
     "ForceTable",
@@ -83,6 +88,7 @@ __all__ = [
     "Freedom",
     "Gravity",
     "Hertz",
+    "Group",
     "Identity",
     "IndeterminateError",
     "Link",
@@ -104,6 +110,7 @@ __all__ = [
     "Spring",
     "SpurGears",
     "Stop",
+    "Structure",
     "Study",
     "SystemGroup",
     "TorsionSpring",
@@ -117,6 +124,7 @@ __all__ = [
     "equilibrium",
     "formulate",
     "free_body",
+    "groups",
     "identify",
     "inertia",
     "kinematics",
@@ -130,6 +138,7 @@ __all__ = [
     "save",
     "save_chains",
     "solve",
+    "structure",
     "study",
     "transmission",
     "system_groups",

@@ -26,6 +26,7 @@ CALLS = [
     ("solve", "rcsr", "--drive", "O1=150:220:1deg", "--on-reach", "flag"), ("solve", "rssr", "--drive", "A=30deg"),
     ("loads", "7r", "link3", "--drive", "O1=0:360:30deg@10", "--at", "all"), ("loads", "four-bar", "coupler"),
     ("solve", "7r", "--drive", "O1=0:360:5deg@10", "--over-time"), ("respond", "windows-2", "--for", "1s", "--over-time"),
+    ("structure", "windows-2", "--driver", "A1"), ("structure", "bennett"),
     ("respond", "haug-slider-crank", "--for", "100ms", "--rate", "A=6"),
 ]  # fmt: skip
 

@@ -62,6 +62,8 @@ def things() -> dict[str, Any]:
         "belt": mg.Belt("g", "A", "B", radii=(1, 2)), "stop": mg.Stop("A0", lower=0.1), "equilibrium": hanging,
         "linearized": mg.linearize(hanging),
         "chain": next(mg.atlas(6)), "identity": mg.identify(mg.load("four-bar")), "system group": next(mg.system_groups(1)),
+        "structure": mg.structure(mg.load("four-bar")), "groups": mg.groups(mg.load("four-bar")),
+        "group": mg.groups(mg.load("four-bar")).groups[1], "families": mg.check(mg.load("four-bar")).families,
         "IndeterminateError": mg.IndeterminateError("free", report),
     }  # fmt: skip
     return out | {f"row {symbol}": row for symbol, row in mg.pair_types().items()}

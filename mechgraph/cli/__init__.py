@@ -8,11 +8,13 @@ from mechgraph.cli.page import report
 from mechgraph.cli.picture import plot
 from mechgraph.cli.program import app
 from mechgraph.cli.strength import loads
+from mechgraph.cli.structure import structure
 
 __all__ = ["app"]
 
 app.command("list")(list_library)
 app.command("check")(check)
+app.command("structure")(structure)
 app.command("equations")(equations)
 app.command("solve")(solve)
 app.command("respond")(respond)

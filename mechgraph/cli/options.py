@@ -57,6 +57,12 @@ At = Annotated[
         help="Assemble there first: A=30deg, B.Tz=0.02 (repeat).",
     ),
 ]
+Drivers = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--driver", metavar="FREEDOM", autocompletion=freedoms, help="Driver instead of those declared (repeat)."
+    ),
+]
 EquationsAt = Annotated[
     list[str] | None,
     typer.Option(

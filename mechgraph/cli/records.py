@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Annotated, Any
 
 import mechgraph as mg
@@ -17,6 +17,8 @@ from mechgraph.report.sections import KEYS
 from mechgraph.response.course import ResponseData
 from mechgraph.result.over_time import OverTimeData
 from mechgraph.result.record import SolutionData
+from mechgraph.structure.decomposition import Group
+from mechgraph.structure.families import Families
 
 
 @dataclass(frozen=True)
@@ -160,6 +162,43 @@ class LoadsData:
 
 
 @dataclass(frozen=True)
+class CountsData:
+    """Mobility by the counts of the textbooks, loops that are degenerate, and why counts and rank disagree."""
+
+    dobrovolski: int
+    apparent: float
+    by_apparent: float
+    degenerate: tuple[int, ...]
+    why: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class GroupsData:
+    """Driver links and structural groups in the order in which they can be solved."""
+
+    symbol: str
+    words: str
+    drivers: tuple[str, ...]
+    groups: tuple[Group, ...]
+    free: Annotated[tuple[str, ...], "links that these drivers do not determine"]
+    connectivity: Annotated[tuple[tuple[int, str, tuple[str, ...]], ...], "number, name, connected to"]
+
+
+@dataclass(frozen=True)
+class StructureData:
+    """Chain, families and groups."""
+
+    mechanism: str
+    chain: Annotated[str | None, "usual name of the kinematic chain; none where gears belong to it"]
+    inversions: Annotated[tuple[tuple[str, ...], ...], "links that are alike as frame"]
+    alike: Annotated[tuple[tuple[str, ...], ...], "pairs that are alike as driver"]
+    families: Families
+    counts: CountsData
+    groups: GroupsData
+    by_driver: Annotated[Mapping[str, str], "groups with another driver"]
+
+
+@dataclass(frozen=True)
 class FileData:
     """A mechanism, its page or its picture, that was written as a file."""
 
@@ -226,6 +265,24 @@ def loads_data(body: mg.FreeBody, at: Any, written: str | None) -> LoadsData:
     )
 
 
+def _with_properties(kind: type, value: Any) -> Any:
+    return kind(**{field.name: getattr(value, field.name) for field in fields(kind)})
+
+
+def structure_data(s: mg.Structure) -> StructureData:
+    """Chain, families and groups of a mechanism."""
+    return StructureData(
+        s.report.mechanism.name,
+        s.identity.name if s.identity else None,
+        s.identity.inversions if s.identity else (),
+        s.identity.drivers if s.identity else (),
+        s.families,
+        _with_properties(CountsData, s.families),
+        _with_properties(GroupsData, s.groups),
+        s.report.groups_by_driver,
+    )
+
+
 def write_json(command: str, data: Any, **more: Any) -> None:
     """The record of a command on standard output."""
     write(json_text({"schema": VERSION, "command": command, **plain(data), **more}))
@@ -261,6 +318,7 @@ COMMANDS: dict[str, Callable[[Json], Json]] = {
     "report": _record(FileData),
     "loads": _record(LoadsData),
     "plot": _record(PlotData),
+    "structure": _record(StructureData),
 }
 """The schema of what every command prints."""
 

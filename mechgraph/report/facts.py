@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,15 +20,20 @@ from mechgraph.report import driving, findings
 from mechgraph.report.advice import Advice, driving_advice
 from mechgraph.report.findings import Finding, LoopFact, PassiveFinding
 from mechgraph.structure.advice import advice
+from mechgraph.structure.decomposition import Decomposition, decomposition
+from mechgraph.structure.families import Families, families
 from mechgraph.structure.finite_motion import FiniteMotion, finite_motion
 from mechgraph.structure.generic import Generic, generic
 from mechgraph.structure.kind import Kind, kind_of, kind_of_mechanism
-from mechgraph.structure.mobility import Freedoms
+from mechgraph.structure.mobility import Freedoms, freedoms_at
 from mechgraph.structure.pair_changes import LARGEST_FOR_SETS, Effect
 from mechgraph.structure.self_stress import SelfStress
 from mechgraph.structure.uniqueness import Uniqueness, uniqueness
 from mechgraph.topology.linkgraph import LinkGraph
 from mechgraph.topology.matching import Parts, parts_of
+
+MOST_DRIVERS = 60
+"""Freedoms that are tried as driver where the groups of all choices are asked for."""
 
 
 def nearly_singular(loops: int) -> float:
@@ -165,10 +171,15 @@ class Facts:
         return {"structural": structural, "dimensions": nearby - structural, "here": self.redundancy - nearby}
 
     @cached_property
+    def _kind(self) -> Kind:
+        """The kind about the internal origin."""
+        return kind_of_mechanism(self.geometry.freedoms, self.motion) if self.geometry else Kind()
+
+    @cached_property
     def kind(self) -> Kind:
         """Planar, spherical or neither: of all pairs, else of the motion; its normal or centre in the global frame."""
         g = self.geometry
-        return kind_of_mechanism(g.freedoms, self.motion).in_global(g.system.par) if g else Kind()
+        return self._kind.in_global(g.system.par) if g else Kind()
 
     @cached_property
     def loop_kinds(self) -> tuple[Kind, ...]:
@@ -177,6 +188,41 @@ class Facts:
             return ()
         S, loops = g.freedoms.position.rows.S, g.system.loop_columns
         return tuple(kind_of(S[:, columns]).in_global(g.system.par) for columns, _ in loops)
+
+    # --- structure by the book ------------------------------------------------------------------------------------------
+
+    @cached_property
+    def families(self) -> Families | None:
+        """Mobility table, families of mechanism and loops, the counts of the textbooks."""
+        g = self.geometry
+        return families(g.freedoms, g.driven, self.motion) if g and self.motion else None
+
+    @cached_property
+    def groups(self) -> Decomposition | None:
+        """Driver links and structural groups in the order in which they can be solved, for the declared (else suggested) drivers."""
+        names = tuple(d.freedom for d in self.mechanism.drives)
+        return self.groups_with(names if names and not self.suggested_drives else (*names, *self.suggested_drives))
+
+    def groups_with(self, drives: Sequence[str]) -> Decomposition | None:
+        """The same for other drivers, by the names of their freedoms."""
+        if not (g := self.geometry):
+            return None
+        place = {name: i for i, name in enumerate(self.mechanism.freedom_names())}
+        columns = np.array([place[self.mechanism.full_name(name)] for name in drives], dtype=np.intp)
+        freedoms = (
+            g.freedoms if np.array_equal(columns, g.driven) else freedoms_at(g.freedoms.position, columns, self.asked)
+        )
+        return decomposition(freedoms, columns, self._kind)
+
+    @cached_property
+    def groups_by_driver(self) -> dict[str, str]:
+        """For every freedom that can drive, the symbol of the groups with it as driver (with mobility above one: instead of the last)."""
+        if not self.groups:
+            return {}
+        others = self.groups.drivers[:-1]
+        able = [name for f in self.drivable for name in f.freedoms if name not in others]
+        found = {name: self.groups_with((*others, name)) for name in able[:MOST_DRIVERS]}
+        return {name: d.symbol for name, d in found.items() if d and not d.free}
 
     @cached_property
     def own_forces_unique(self) -> bool:

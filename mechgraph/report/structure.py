@@ -1,0 +1,112 @@
+"""The structure of a mechanism as the textbooks tell it: chain, mobility table, families, counts, groups, other drivers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from mechgraph.arguments import items_of
+from mechgraph.atlas.identify import Identity, identify
+from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Shown, Table
+from mechgraph.errors import DeclarationError, MechgraphError, listed
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.quantities import wrong
+from mechgraph.report.report import DeterminacyReport, check
+from mechgraph.structure.decomposition import Decomposition
+from mechgraph.structure.families import COLUMNS, Families
+
+
+class Structure(Shown):
+    """The structure of a mechanism at a closed position; prints as a text.
+
+    ``report`` the determinacy report that it is taken from, ``groups`` and ``families`` those of the report, ``identity`` its chain (None
+    for a mechanism with couplings).
+    """
+
+    def __init__(self, report: DeterminacyReport, groups: Decomposition, families: Families) -> None:
+        self.report, self.groups, self.families = report, groups, families
+        self.identity: Identity | None = None if report.mechanism.couplings else identify(report.mechanism)
+
+    def __repr__(self) -> str:
+        return f"Structure({self.report.mechanism.name!r}: {self.groups.symbol}; print it)"
+
+    def document(self) -> Document:
+        """Chain, families, groups, and the groups of other drivers."""
+        blocks = [*self._chain(), Heading("Families", 2), *self._families()]
+        blocks += [Heading("Groups", 2), *self.groups.blocks(), *self._drivers()]
+        return Document(f"Structure of {self.report.mechanism.name}", tuple(blocks))
+
+    def _chain(self) -> Iterator[Block]:
+        if self.identity:
+            yield Paragraph(f"{self.identity.text.splitlines()[0]}.")
+
+    def _families(self) -> Iterator[Block]:
+        f = self.families
+        rows = [(row.link, *("yes" if has else "no" for has in row.columns), str(row.dimension)) for row in f.table]
+        yield Table(("link", *COLUMNS, "span"), tuple(rows), align="l" + "c" * 6 + "r")
+        loops = [
+            (str(i), " ".join(loop.pairs), str(loop.family), str(loop.rank), ", ".join(loop.locked) or "-")
+            for i, loop in enumerate(f.loops, start=1)
+        ]
+        yield Table(("loop", "pairs", "family", "rank", "locked"), tuple(loops), align="rlrrl")
+        counts = ", ".join(f"c{j} = {c}" for j, c in enumerate(f.classes, start=1) if c)
+        yield Paragraph(
+            f"Family {f.family}, n = {f.links} moving links, {counts}: Dobrovolski's count gives M = {f.dobrovolski}; with the apparent "
+            f"family {f.apparent:.4g} of the loops M = {f.by_apparent:.4g}; by rank M = {f.mobility}."
+        )
+        yield Bullets(f.why)
+
+    def _drivers(self) -> Iterator[Block]:
+        rows = tuple(self.report.groups_by_driver.items())
+        if len(rows) > 1:
+            yield Paragraph("With another driver:")
+            yield Table(("driver", "groups"), rows)
+
+
+def structure(m: Mechanism, drives: Iterable[str] | None = None, **options: Any) -> Structure:
+    """Chain, families and structural groups of a mechanism at its closed start.
+
+    Parameters
+    ----------
+    drives : names of freedoms; left out, the declared drivers, and what the report suggests beside them.
+    options : those of ``check``.
+
+    Raises
+    ------
+    DeclarationError
+        for a mechanism without geometry, or one whose loops do not close.
+    """
+    report = check(m, **options)
+    families = report.families
+    if families is None:
+        raise _no_position(report)
+    return Structure(report, _groups(report, drives), families)
+
+
+def groups(m: Mechanism, drives: Iterable[str] | None = None, **options: Any) -> Decomposition:
+    """Driver links and structural groups in the order in which they can be solved: the groups of ``structure`` alone."""
+    return _groups(check(m, **options), drives)
+
+
+def _groups(report: DeterminacyReport, drives: Iterable[str] | None) -> Decomposition:
+    m, faults = report.mechanism, list[str]()
+    names = None if drives is None else items_of((drives,) if isinstance(drives, str) else drives, "drives", faults)
+    known = {*m.freedom_names(), *(p.name for p in m.pairs if p.type.f == 1)}
+    faults += [
+        wrong(name, "drives", f"names of freedoms: {listed(sorted(known))}")
+        for name in names or ()
+        if name not in known
+    ]
+    if faults:
+        raise DeclarationError(f"groups of {m.name!r}", faults)
+    found = report.groups if names is None else report.groups_with(names)
+    if found is None:
+        raise _no_position(report)
+    return found
+
+
+def _no_position(report: DeterminacyReport) -> MechgraphError:
+    what = f"structure of {report.mechanism.name!r}"
+    return DeclarationError(
+        what, [f"{report.note} Families and groups need a closed position; give geometry that closes"]
+    )

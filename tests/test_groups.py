@@ -1,0 +1,206 @@
+"""Driver links and structural groups: names of the chapter, composition, order of solution, agreement of pattern and ranks."""
+
+import numpy as np
+import pytest
+from planar import Builder, named, of_chain
+
+import mechgraph as mg
+from mechgraph.structure.groups import _by_pattern, _by_rank
+from mechgraph.structure.link_rows import LinkRows
+
+VERSIONS = [f"D{kind}{j}" for kind, count in ((1, 1), (2, 4), (3, 2), (4, 4), (5, 8)) for j in range(count)]
+SYMBOLS = [
+    "R - D42", "R - D20", "T - D54",
+    "R - D10 - D10 - 1 + 0", "R - D10 - D10 - 1 + 2", "R - D10 - D10 - 2 + 0", "R - D10 - D10 - 2 + 3",
+    "R - D10 - D10 - 3 + 0", "R - D10 - D10 - 1 + 3",
+    "R - D21 - D30 - 1 + 3", "R - D43 - D50 - 2 + 0", "R - D31 - D20 - 3 + 0", "T - D21 - D50 - 2 + 0",
+    "R - D10 - D10 - D10 - 1 + 2 - 3 + 4", "R - D10 - D10 - D10 - 1 + 2 - 4 + 0",
+    "R - D10 - D10 - D10 - 2 + 0 - 2 + 4", "R - D10 - D10 - D10 - 2 + 0 - 2 + 5",
+    "R - D42 - D30 - D21 - 1 + 2 - 4 + 0", "T - D22 - D30 - D20 - 1 + 2 - 4 + 5",
+]  # fmt: skip
+"""The symbols of figures 2.22 to 2.28 (of 2.27a with the lower number first)."""
+
+
+def test_nineteen_versions() -> None:
+    assert len(VERSIONS) == 19
+    words = {"1": "RRR", "2": "RRT", "3": "RTR", "4": "TRT", "5": "TTR"}
+    for version in VERSIONS:
+        g = mg.groups(named(f"R - {version}"))
+        assert g.symbol == f"R - {version}"
+        assert g.words == f"R-{words[version[1]]}"
+
+
+@pytest.mark.parametrize("symbol", SYMBOLS)
+def test_symbols_of_the_chapter(symbol: str) -> None:
+    g = mg.groups(named(symbol))
+    assert g.symbol == symbol
+    assert [group.family for group in g.groups if not group.driver] == [3.0] * symbol.count("D")
+    assert not g.free
+
+
+def test_connectivity_table_of_figure_247() -> None:
+    """R-RRT-RTR; B and C are multiple joints, D a slide and a turn in one place."""
+    b = Builder()
+    for ends in (("0", "1"), ("1", "2"), ("2", "3")):
+        b.count = max(b.count, int(ends[1]) + 1)
+        b.pair("R", *ends)
+    b.pair("T", "0", "3")
+    b.count = 6
+    b.pair("R", "2", "4")
+    b.pair("T", "4", "5")
+    b.pair("R", "5", "0")
+    g = mg.groups(b.mechanism("figure 2.47"))
+    assert g.words == "R-RRT-RTR"
+    assert g.connectivity[1] == (2, "2", ("1 at P1", "3 at P2", "4 at P4"))
+    assert [group.links for group in g.groups] == [("1",), ("2", "3"), ("4", "5")]
+
+
+def random_mechanism(seed: int) -> mg.Mechanism:
+    """Dyads, and here and there a triad, on links that are there."""
+    rng = np.random.default_rng(seed)
+    b = Builder(seed)
+    b.driver(str(rng.choice(["R", "T"])))
+    for _ in range(4):
+        known = [str(i) for i in range(b.count)]
+        if rng.random() < 0.3:
+            middle = b.link()
+            for on in rng.choice(known, 3, replace=b.count < 5):
+                end = b.link()
+                b.pair("R", str(on), end)
+                b.pair("R", end, middle)
+        else:
+            b.dyad(f"D1{0}" if rng.random() < 0.5 else "D20", tuple(map(str, rng.choice(known, 2, replace=False))))
+    return b.mechanism(f"random {seed}")
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_groups_compose_to_the_whole(seed: int) -> None:
+    """Links and pairs add up for every driver, ranks of the groups to the rank of the whole; each hangs on links before it only."""
+    m = random_mechanism(seed)
+    report = mg.check(m)
+    for finding in report.drivable:
+        (name,) = finding.freedoms
+        g = report.groups_with([name])
+        links = [link for group in g.groups for link in group.links]
+        assert sorted([*links, *g.free]) == sorted(n for n in m.link_names() if n != m.frame)
+        assert sorted(p for group in g.groups for p in group.pairs) == sorted(p.name for p in m.pairs)
+        known = {m.frame}
+        for group in g.groups:
+            assert set(group.on) <= known
+            known |= set(group.links)
+            assert len(group.pairs) - len(group.links) == group.contours
+            assert 3 * len(group.links) == 2 * len(group.pairs) + (len(group.pairs) - group.freedoms)
+        assert sum(group.freedoms for group in g.groups) == 3 * len(report.loops)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 5, 6])
+def test_solving_group_by_group(seed: int) -> None:
+    """Each group closed alone, between links that stand where the groups before put them, gives the poses of the whole."""
+    m = random_mechanism(seed)
+    theta = np.array([0.0, 0.002])
+    s = mg.kinematics(m, {"P0": theta})
+    g = mg.groups(m)
+    poses = {m.frame: np.eye(4), **{g.groups[0].links[0]: s.link(g.groups[0].links[0]).pose[1]}}
+    for group in g.groups[1:]:
+        pairs = []
+        for name in group.pairs:
+            p = next(pair for pair in m.pairs if pair.name == name)
+            sides = {}
+            for side, link in (("on_a", p.a), ("on_b", p.b)):
+                X = poses[link] if link in poses else np.eye(4)
+                point, axis = X[:3, :3] @ np.array(p.point) + X[:3, 3], X[:3, :3] @ np.array(p.axis)
+                second = X[:3, :3] @ np.array(p.second)
+                sides[side] = mg.Marker(point=tuple(point), axis=tuple(axis), second=tuple(second))
+            a, b = (m.frame if link in poses else link for link in (p.a, p.b))
+            pairs.append(mg.Pair(name, p.type.symbol, a, b, **sides))
+        start = {pair.name: float(s[pair.name].position[0].item()) for pair in pairs}
+        alone = mg.kinematics(mg.Mechanism("group", pairs=pairs, frame=m.frame, start=start), {})
+        for link in group.links:
+            poses[link] = np.asarray(alone.link(link).pose)
+            assert poses[link] == pytest.approx(s.link(link).pose[1], abs=1e-11)
+
+
+@pytest.mark.parametrize("links", [6, 8])
+def test_pattern_and_ranks_agree(links: int) -> None:
+    """On all inversions with all drivers up to symmetry, at random places."""
+    for number, chain in enumerate(list(mg.atlas(links))[:: 1 if links == 6 else 5]):
+        for group in chain.inversions:
+            m = of_chain(chain, group[0], seed=number)
+            freedoms = mg.check(m).geometry.freedoms
+            twists = np.zeros((6, 3))
+            twists[[2, 3, 4], [0, 1, 2]] = 1.0
+            for alike in chain.drivers(group[0]):
+                rows = LinkRows(freedoms.position, np.array(alike[:1]), twists)
+                links_of = {i for i in range(links) if i != group[0]}
+                assert sorted(_by_pattern(rows, links_of)) == sorted(_by_rank(rows, links_of))
+
+
+def test_class_and_order() -> None:
+    """A triad is of class III and order 3, four links round a four-sided contour with two outer pairs of class IV and order 2."""
+    b = Builder(4)
+    b.driver("R")
+    middle = b.link()
+    for on in ("1", "0", "0"):
+        end = b.link()
+        b.pair("R", on, end)
+        b.pair("R", end, middle)
+    g = mg.groups(b.mechanism("triad"))
+    assert g.symbol == "R - III.3 - 1 + 0 + 0"
+    b = Builder(5)
+    b.driver("R")
+    a, c, d, e = (b.link() for _ in range(4))
+    b.pair("R", "1", a)
+    b.pair("R", "0", d)
+    for one, other in ((a, c), (c, d), (d, e), (e, a)):
+        b.pair("R", one, other)
+    g = mg.groups(b.mechanism("four sides"))
+    assert [(group.class_, group.order) for group in g.groups if not group.driver] == [(4, 2)]
+
+
+def test_other_drivers() -> None:
+    """Watt II by its middle crank: two dyads on that crank; by a pair of the coupler the driver stays within the group."""
+    by = mg.check(mg.load("windows-2")).groups_by_driver
+    assert by["A0.Rz"] == "R - D10 - D10 - 3 + 0"
+    assert by["A1.Rz"] == "R - D10 - D10 - 1 + 0"
+    assert by["B0.Rz"].startswith("RR(R)R - D10") or by["B0.Rz"].startswith("R(R)RR - D10")
+
+
+def test_spatial_groups() -> None:
+    assert mg.groups(mg.load("rcsr-csr")).symbol == "R - CSR - CSR - 2 + 0"
+    bennett = mg.groups(mg.load("bennett"))
+    assert (bennett.symbol, bennett.groups[1].redundancy) == ("R - RRR", 3)
+    assert mg.groups(mg.load("rssr")).symbol == "R - SSR"
+
+
+def test_a_coupling_belongs_to_the_group_that_it_determines() -> None:
+    m = mg.Mechanism(
+        "wheels",
+        pairs=[
+            mg.Pair("A", "R", "frame", "one", point=(0, 0, 0), axis=(0, 0, 1)),
+            mg.Pair("B", "R", "frame", "two", point=(3, 0, 0), axis=(0, 0, 1)),
+        ],
+        couplings=[mg.Coupling({"A": 1.0, "B": 2.0}, name="mesh")],
+        drives=["A"],
+    )
+    g = mg.groups(m)
+    assert [(group.links, group.couplings) for group in g.groups] == [(("one",), ()), (("two",), ("mesh",))]
+
+
+def test_what_drivers_leave_free() -> None:
+    m = named("R - D10")
+    g = mg.groups(m, [])
+    assert (g.groups, set(g.free)) == ((), {"1", "2", "3"})
+
+
+def test_wrong_drivers_are_named() -> None:
+    with pytest.raises(mg.DeclarationError, match="drives = 'Q': expected names of freedoms"):
+        mg.groups(mg.load("four-bar"), ["Q"])
+    with pytest.raises(mg.DeclarationError, match="need a closed position"):
+        mg.structure(mg.chain("RSSR"))
+
+
+def test_the_structure_prints() -> None:
+    text = str(mg.structure(mg.load("windows-2")))
+    for part in ("Watt II", "Dobrovolski's count gives M = 1", "R - D10 - D10 - 3 + 0", "With another driver"):
+        assert part in text
+    assert repr(mg.structure(mg.load("four-bar"))) == "Structure('four-bar': R - D10; print it)"
