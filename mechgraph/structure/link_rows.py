@@ -105,7 +105,7 @@ class LinkRows:
         _, s, Vt = np.linalg.svd(A)
         rank = int((s > RANKS.position * s[0]).sum()) if s.size else 0
         motions = Vt[rank:].reshape(-1, len(mine), self.b)
-        still = np.abs(motions).max(axis=(0, 2), initial=0.0) < STILL
+        still = np.abs(motions).max(axis=(0, 2), initial=0.0) < AT_REST
         return {link for link, at_rest in zip(mine, still, strict=True) if not at_rest}
 
     def determined(self, links: Iterable[int], solved: Iterable[int]) -> set[int]:
@@ -119,5 +119,5 @@ class LinkRows:
         return mine
 
 
-STILL = 1e-7
+AT_REST = 1e-7
 """Part of a motion of size one below which a link stands still."""
