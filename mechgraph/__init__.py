@@ -45,6 +45,7 @@ from mechgraph.model.pair_type import PairType
 from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.model.row_parts import Bookkeeping, Component, Freedom
 from mechgraph.model.stop import Stop
+from mechgraph.modes.assemblies import Assemblies, AssembliesOver, assemblies
 from mechgraph.report.report import DeterminacyReport, check
 from mechgraph.report.structure import Structure, groups, structure
 from mechgraph.response.course import Response
@@ -63,6 +64,8 @@ if TYPE_CHECKING:
     from mechgraph.show.page.write import write_report
 
 __all__ = [
+    "Assemblies",
+    "AssembliesOver",
     "AssemblyError",
     "Belt",
     "BevelGears",
@@ -118,6 +121,7 @@ __all__ = [
     "WormGear",
     "Wrench",
     "assemble",
+    "assemblies",
     "atlas",
     "chain",
     "check",

@@ -33,7 +33,7 @@ class States(Places):
         return compact(columns), compact(self.single_rows[columns])
 
     @shared
-    def _rotations(self) -> tuple[Index, Index] | None:
+    def rotations(self) -> tuple[Index, Index] | None:
         """Columns ``(3, n)`` and state rows ``(4, n)`` of the rotations; None where there are none."""
         parts = [
             (g.columns[columns], g.state_rows[rows])
@@ -77,8 +77,8 @@ class States(Places):
         out = np.empty((self.n_state, *shape), dtype=np.result_type(x, dq))
         columns, rows = self._singles
         out[rows] = x[rows] + dq[columns]
-        if self._rotations is not None:
-            turns, turned = self._rotations
+        if self.rotations is not None:
+            turns, turned = self.rotations
             out[turned] = evaluation.turned(x[turned], dq[turns])
         return out
 
@@ -88,15 +88,15 @@ class States(Places):
         out = np.empty((self.n_freedoms, *shape), dtype=np.result_type(x1, x0))
         columns, rows = self._singles
         out[columns] = x1[rows] - x0[rows]
-        if self._rotations is not None:
-            turns, turned = self._rotations
+        if self.rotations is not None:
+            turns, turned = self.rotations
             out[turns] = evaluation.turn_between(x1[turned], x0[turned])
         return out
 
     def tangent(self, dq: Array, rates: Array) -> Array:
         """Rates of increments ``dq (F, ...)`` at the state that they lead to, from the rates of the freedoms there."""
         out = rates.copy()
-        if self._rotations is not None:
-            turns, _ = self._rotations
+        if self.rotations is not None:
+            turns, _ = self.rotations
             out[turns] = evaluation.turn_tangent(dq[turns], rates[turns])
         return out

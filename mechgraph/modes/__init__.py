@@ -1,0 +1,1 @@
+"""All assemblies of a mechanism, and its branches as a map."""

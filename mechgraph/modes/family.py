@@ -1,0 +1,229 @@
+"""The class of a mechanism: its pairs moved about by complex rigid motions that keep what its closure rows rest on.
+
+Relative to a closed position all that a loop can do is a product of motions of the algebra ``h`` that its twists generate: all of
+se(3), plane motions where axes are parallel, rotations where they meet. A marker of a pair is moved by motions of the algebra that all
+loops through the pair share, so that every member of the class has closure equations of the same rank: the dimension of ``h``, summed
+over the loops. Over all members the assemblies form one irreducible variety, as every set of pair coordinates is closed by exactly one
+motion of the last marker of each loop. Its monodromy group is therefore transitive: from one assembly all others are reached.
+
+Sources: Herve, Analyse structurelle des mecanismes par groupe des deplacements, Mech. Mach. Theory 13, 1978; Sommese and Wampler, The
+Numerical Solution of Systems of Polynomials, 2005, chapters 7 and 15.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechgraph.algebra.screw import cross_twist, move_twist
+from mechgraph.algebra.se3 import compose, inverse, pose_exp, pose_log
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import Index, System
+from mechgraph.closure.rank import closure_rank
+from mechgraph.numerics.linear import complement
+
+SPAN = 1e-6
+"""Part of a twist outside a span up to which it lies in it."""
+Array = NDArray[Any]
+"""Numbers, real or complex."""
+CLOSED = 1e-9
+"""Closure error up to which a member of a class counts as closed."""
+GENERIC = 1e-7
+"""Singular value, as part of the largest, below which it counts as zero at random members."""
+
+
+@dataclass(frozen=True)
+class Member:
+    """Members of a class: markers ``(3, 4, 2 P, n)`` of links a, then of links b, complex, and driver values ``(d, n)``."""
+
+    markers: Array
+    drive: Array
+
+    @staticmethod
+    def joined(members: Sequence[Member]) -> Member:
+        """Several members, one after the other along the last axis."""
+        return Member(*(np.concatenate([getattr(m, f) for m in members], axis=-1) for f in ("markers", "drive")))
+
+
+class Family:
+    """The class of a mechanism with drivers ``columns``, told at a closed position ``here``; ``passive (F, p)`` are passive motions."""
+
+    def __init__(self, here: Configuration, columns: Index, passive: Array) -> None:
+        self.here, self.system, self.columns, self.passive = here, here.system, columns, passive
+        self.free = complement(columns, self.system.n_freedoms)
+        self.rows = self.system.single_rows[columns]
+        par = self.system.par
+        self.target: Array = np.concatenate([par.marker_a, par.marker_b], axis=2).astype(complex)
+
+    @cached_property
+    def loop_algebras(self) -> list[Array]:
+        """For every loop an orthonormal basis ``(6, k)`` of the algebra that its twists generate."""
+        S = self.here.S[:, :, 0]
+        return [generated(S[:, columns]) for columns, _ in self.system.loop_columns]
+
+    @cached_property
+    def algebras(self) -> list[Array]:
+        """For every pair a basis of the motions by which its markers may be moved."""
+        through: list[list[Array]] = [[] for _ in self.system.m.pairs]
+        for algebra, loop in zip(self.loop_algebras, self.system.graph.loops, strict=True):
+            for pair, _ in loop:
+                through[pair].append(algebra)
+        return [common(algebras) for algebras in through]
+
+    @cached_property
+    def moving(self) -> list[Array]:
+        """The same without the motions that the pair does itself, where these are a group: to move a marker so renames coordinates."""
+        S, out = self.here.S[:, :, 0], []
+        for pair, basis in enumerate(self.algebras):
+            own = S[:, self.system.first_column[pair] : self.system.first_column[pair + 1]]
+            own = span(own) if generated(own).shape[1] == own.shape[1] else own[:, :0]
+            out.append(span(basis - own @ (own.T @ basis)))
+        return out
+
+    @property
+    def rank(self) -> int:
+        """Rank of the closure equations of the members."""
+        return sum(algebra.shape[1] for algebra in self.loop_algebras)
+
+    @property
+    def whole(self) -> bool:
+        """Whether no relation is kept: every loop may do all rigid motions."""
+        return self.rank == self.system.n_rows
+
+    @property
+    def unknowns(self) -> int:
+        """Freedoms that the closure equations have to determine."""
+        return len(self.free) - self.passive.shape[1]
+
+    @cached_property
+    def fault(self) -> str:
+        """Why members of the class are no guide to the assemblies of the mechanism, in words; empty where they are."""
+        if self.system.m.couplings:
+            return "couplings of freedoms tie angles beyond a turn"
+        if self.system.moving_batches:
+            return "a pair guides along a curve"
+        S = self.here.S[:, :, 0]
+        if np.abs((S[:3] * S[3:]).sum(axis=0)).max(initial=0.0) > SPAN:
+            return "helical pairs make the closure transcendental"
+        if closure_rank(self.here, self.columns).rank != self.rank or self.unknowns != self.rank:
+            return "its closure rows depend on each other by relations that no known class keeps"
+        return ""
+
+    @cached_property
+    def settled_links(self) -> Index:
+        """Links that no passive motion moves."""
+        V = [self.here.link_twists(rates[:, None]) for rates in self.passive.T]
+        return np.flatnonzero(np.abs(V).max(axis=(0, 1, 3)) < SPAN) if V else np.arange(len(self.system.m.links))
+
+    @cached_property
+    def settled_rows(self) -> tuple[Index, Index]:
+        """State rows of angles and of slides that no passive motion changes."""
+        s = self.system
+        still = (s.single_rows >= 0) & (np.abs(self.passive).max(axis=1, initial=0.0) < SPAN)
+        return s.single_rows[still & ~s.is_length], s.single_rows[still & s.is_length]
+
+    def prints(self, here: Configuration) -> Array:
+        """What tells assemblies apart ``(n, T)``: poses of links that no passive motion moves, coordinates that none changes."""
+        poses = here.poses[:, :, self.settled_links]
+        angles, lengths = (here.x[rows] for rows in self.settled_rows)
+        return np.concatenate([poses.reshape(12 * poses.shape[2], here.T), np.cos(angles), np.sin(angles), lengths])
+
+    def system_with(self, markers: Array) -> System:
+        """The system with other markers ``(3, 4, 2 P, B)``."""
+        P = len(self.system.m.pairs)
+        return self.system.with_parameters(
+            replace(self.system.par, marker_a=markers[:, :, :P], marker_b=markers[:, :, P:])
+        )
+
+    def random_member(self, rng: np.random.Generator, size: float = 0.35) -> Member:
+        """A random complex member."""
+        P = len(self.system.m.pairs)
+        moves = np.zeros((6, 2 * P, 1), dtype=complex)
+        for side in range(2):
+            for k, basis in enumerate(self.moving):
+                parts = rng.normal(size=(basis.shape[1], 2)) @ [1.0, 0.7j]
+                moves[:, side * P + k, 0] = size * (basis @ parts)
+        drive = rng.uniform(-np.pi, np.pi, len(self.columns)) + 0.5j * rng.normal(size=len(self.columns))
+        drive[self.system.is_length[self.columns]] *= 0.3
+        return Member(compose(pose_exp(self._in_links(moves)), self.target), drive[:, None])
+
+    def _in_links(self, moves: Array) -> Array:
+        """Twists ``(6, 2 P, 1)`` given in the global frame at the closed position, in the frames of the links that bear the markers."""
+        X = inverse(self.here.poses[:, :, self._bearers])
+        return move_twist(X, moves)
+
+    @cached_property
+    def _bearers(self) -> Index:
+        """Links that bear the markers."""
+        return np.concatenate([self.system.a, self.system.b])
+
+    def random_closed(self, rng: np.random.Generator) -> tuple[Member, Array] | None:
+        """A random member with an assembly ``x (nx,)`` of it; None where random coordinates cannot be closed within the class."""
+        member, s = self.random_member(rng), self.system
+        dq = rng.uniform(-np.pi, np.pi, s.n_freedoms) + 0.4j * rng.normal(size=s.n_freedoms)
+        dq[s.is_length] = rng.normal(size=(int(s.is_length.sum()), 2)) @ [0.5, 0.3j]
+        x = s.advance(self.here.x, dq[:, None])
+        markers, P = member.markers.copy(), len(s.m.pairs)
+        chords, b = s.chords, s.b[s.chords]
+        for _ in range(3):
+            open_ = Configuration(self.system_with(markers), x)
+            T = open_.poses[:, :, b]
+            moved = compose(pose_exp(open_.chord_errors), compose(T, markers[:, :, P + chords]))
+            markers[:, :, P + chords] = compose(inverse(T), moved)
+        closed = Configuration(self.system_with(markers), x)
+        if not closed.closure[0] < CLOSED or not self._within(markers):
+            return None
+        return Member(markers, x[self.rows]), x[:, 0]
+
+    def _within(self, markers: Array) -> bool:
+        """Whether markers of chords lie in the class."""
+        P = len(self.system.m.pairs)
+        at = P + self.system.chords
+        e = pose_log(compose(markers[:, :, at], inverse(self.target[:, :, at])))
+        e = move_twist(self.here.poses[:, :, self.system.b[self.system.chords]], e)[:, :, 0]
+        for i, chord in enumerate(self.system.chords.tolist()):
+            basis = self.algebras[chord]
+            if np.abs(e[:, i] - basis @ (basis.T @ e[:, i])).max() > 1e3 * CLOSED * max(1.0, np.abs(e[:, i]).max()):
+                return False
+        return True
+
+    def mixing(self, rng: np.random.Generator) -> Array | None:
+        """Random combinations ``(rank, rows)`` of the closure rows; None where all are independent."""
+        if self.whole:
+            return None
+        n = self.system.n_rows
+        Q = np.linalg.qr(rng.normal(size=(n, n)) + 1j * rng.normal(size=(n, n)))[0]
+        return np.asarray(Q[: self.rank])
+
+
+def generated(S: Array) -> Array:
+    """Orthonormal basis ``(6, k)`` of the Lie algebra generated by twists ``S (6, n)``."""
+    basis = span(S)
+    while True:
+        k = basis.shape[1]
+        brackets = cross_twist(np.repeat(basis, k, axis=1), np.tile(basis, (1, k)))
+        larger = span(np.concatenate([basis, brackets], axis=1))
+        if larger.shape[1] == k:
+            return basis
+        basis = larger
+
+
+def span(S: Array) -> Array:
+    """Orthonormal basis of the span of columns."""
+    if not S.size:
+        return np.zeros((6, 0))
+    U, s, _ = np.linalg.svd(S, full_matrices=False)
+    return np.asarray(U[:, s > SPAN * max(1.0, s[0])])
+
+
+def common(spaces: list[Array]) -> Array:
+    """Orthonormal basis of what spans with orthonormal bases ``(6, k)`` share; of none: nothing."""
+    if not spaces:
+        return np.zeros((6, 0))
+    outside, vectors = np.linalg.eigh(sum(np.eye(6) - B @ B.T for B in spaces))
+    return np.asarray(vectors[:, outside < SPAN])

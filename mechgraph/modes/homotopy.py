@@ -1,0 +1,371 @@
+"""Closure equations along a path of members of a class, and the tracks of their assemblies, all in one batch of complex numbers.
+
+On a leg every marker goes from its start to its end on a screw motion ``exp(t eta)``, drivers go straight; ``t`` may be complex. The
+equations are the closure rows of the kernel, mixed at random where they depend on each other; along passive motions nothing moves, so
+that a track is one of assemblies up to these.
+
+A step is predicted from the rates at the last nodes and corrected by two Newton steps; its length is such that the first of them has
+the size wanted (Allgower and Georg, Introduction to Numerical Continuation Methods, 2003, chapter 6).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechgraph.algebra.screw import move_twist
+from mechgraph.algebra.se3 import compose, homogeneous, inverse, pose_log, quaternion_product
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import Index
+from mechgraph.model.factors import screw_terms, screw_values
+from mechgraph.modes.family import Array, Family, Member
+from mechgraph.numerics.linear import complement
+
+Mask = NDArray[np.bool_]
+
+FIRST_STEP = 0.02
+"""First step."""
+LARGEST_STEP = 0.25
+"""Largest step."""
+SMALLEST_STEP = 1e-7
+"""Smallest step."""
+FAR = (25.0, 1e5, 1e3)
+"""Imaginary part of an angle, length over L, and quaternion from which on an assembly is on its way to infinity."""
+SLIDE = 1e-9
+"""Turn of a marker below which it slides."""
+NODES = 4
+"""Nodes from whose rates a step is predicted."""
+POLISHED = 1e-12
+"""Last Newton step at the end of a track."""
+POLISHING = 6
+"""Newton steps at the end of a track, at most."""
+ROUND = 1e-8
+"""Last Newton step, against the size of the state, up to which a track has come to its end."""
+CALMING, CALM = 20, 1e-9
+"""Steps in which passive bodies are turned there, at most, and the step at which that ends."""
+MOST_STEPS = 2000
+"""Steps after which a track is given up."""
+
+
+class Equations:
+    """Closure equations of a class: the closure rows, mixed ``(rank, rows)`` where they depend on each other."""
+
+    def __init__(self, family: Family, mixing: Array | None) -> None:
+        self.family, self.mixing = family, mixing
+        s = family.system
+        self.idle = family.passive.shape[1]
+        self._columns = np.flatnonzero(s.single_rows >= 0)
+        self._rows = s.single_rows[self._columns]
+        self._lengths = s.single_rows[s.is_length]
+        self._angles = np.setdiff1d(self._rows, self._lengths)
+        self._quaternions = complement(self._rows, s.n_state)
+
+    def state_rates(self, x: Array, dq: Array) -> Array:
+        """Rates ``(nx, T)`` of states for rates ``dq (F, T)``: singles are their own, ``Q' = (0, w) Q / 2``."""
+        turns = self.family.system.rotations
+        out = np.empty((self.family.system.n_state, *dq.shape[1:]), dtype=np.result_type(x, dq))
+        out[self._rows] = dq[self._columns]
+        if turns is not None:
+            w = dq[turns[0]]
+            out[turns[1]] = 0.5 * quaternion_product(np.concatenate([np.zeros_like(w[:1]), w]), x[turns[1]])
+        return out
+
+    def normal(self, x: Array) -> Array:
+        """States with unit quaternions."""
+        s = self.family.system
+        if s.rotations is None:
+            return x
+        out, Q = x.copy(), x[s.rotations[1]]
+        out[s.rotations[1]] = Q / np.sqrt((Q * Q).sum(axis=0))
+        return out
+
+    def far(self, x: Array, angle: float = FAR[0]) -> Mask:
+        """Which states are on their way to infinity, angles with an imaginary part above ``angle``."""
+        sizes = (np.abs(x[self._angles].imag), np.abs(x[self._lengths]), np.abs(x[self._quaternions]))
+        out: Mask = np.asarray(~np.isfinite(x).all(axis=0))
+        for size, limit in zip(sizes, (angle, *FAR[1:]), strict=True):
+            out |= size.max(axis=0, initial=0.0) > limit
+        return out
+
+    def wound(self, change: Array) -> Array:
+        """Largest change ``(T,)`` of an angle."""
+        return np.asarray(np.abs(change[self._angles]).max(axis=0, initial=0.0))
+
+    def size(self, x: Array, dq: Array) -> Array:
+        """Largest component ``(T,)`` of increments, those of slides against their size."""
+        s = self.family.system
+        size = np.abs(dq)
+        size[s.is_length] /= 1.0 + np.abs(x[self._lengths])
+        return np.asarray(size.max(axis=0, initial=0.0))
+
+
+class Leg:
+    """The ways between members ``begin`` and ``end``, one or several; ``which (V,)`` says which of them a track follows."""
+
+    def __init__(self, equations: Equations, begin: Member, end: Member, which: Index | None = None) -> None:
+        self.equations, self.family = equations, equations.family
+        eta = pose_log(compose(end.markers, inverse(begin.markers)))
+        turn = np.sqrt((eta[:3] * eta[:3]).sum(axis=0))
+        slides = np.abs(turn) < SLIDE
+        self._turn = np.where(slides, 1.0, turn)
+        unit = eta / self._turn
+        unit[:3] = np.where(slides, 0.0, unit[:3])
+        self._eta = np.where(slides, self._turn * unit, eta)
+        self._paths = np.einsum("ijknt,jlnt->ilknt", screw_terms(unit)[:3], homogeneous(begin.markers))
+        self._begin, self._change = begin.drive, end.drive - begin.drive
+        self._which = which
+
+    def _of(self, values: Array, tracks: Index) -> Array:
+        """Values ``(..., ways)`` for tracks."""
+        return values if self._which is None or values.shape[-1] == 1 else values[..., self._which[tracks]]
+
+    def prints(self, x: Array, t: Array, tracks: Index) -> Array:
+        """What tells assemblies apart, see ``Family.prints``."""
+        return self.family.prints(self.at(x, t, tracks).here)
+
+    def at(self, x: Array, t: Array, tracks: Index) -> Linear:
+        """The equations at states ``x (nx, T)`` of tracks at ``t (T,)``."""
+        x = x.copy()
+        change = self._of(self._change, tracks)
+        x[self.family.rows] = self._of(self._begin, tracks) + t * change
+        paths, values = self._of(self._paths, tracks), screw_values(self._of(self._turn, tracks) * t)
+        one = paths.shape[-1] == 1
+        markers = (
+            np.einsum("ijkn,knt->ijnt", paths[..., 0], values) if one else np.einsum("ijknt,knt->ijnt", paths, values)
+        )
+        here = Configuration(self.family.system_with(markers), x)
+        return Linear(self, here, change, self._of(self._eta, tracks))
+
+
+class Linear:
+    """The equations linearized at a batch of states."""
+
+    def __init__(self, leg: Leg, here: Configuration, change: Array, eta: Array) -> None:
+        self.equations, self.family, self.here, self.change, self._eta = leg.equations, leg.family, here, change, eta
+        self.J = self._mixed(here.J[:, self.family.free])
+
+    def _mixed(self, rows: Array) -> Array:
+        M = self.equations.mixing
+        return rows if M is None else np.tensordot(M, rows, 1)
+
+    def solve(self, idle: Array, right: Array) -> Array:
+        """``dq (F, k, T)`` with ``J dq = right (rank, k, T)``, at rest along the motions ``idle (T, p, free)``; NaN where singular."""
+        n, p, T = self.J.shape[1], idle.shape[1], right.shape[2]
+        A = np.empty((T, n, n), dtype=complex)
+        A[:, : n - p], A[:, n - p :] = self.J.transpose(2, 0, 1), idle
+        b = np.zeros((T, n, right.shape[1]), dtype=complex)
+        b[:, : n - p] = right[: n - p].transpose(2, 0, 1)
+        if len(right) > n - p:
+            b[:, n - p :] = right[n - p :].transpose(2, 0, 1)
+        out = np.zeros((self.family.system.n_freedoms, right.shape[1], T), dtype=complex)
+        out[self.family.free] = _solved(A, b).transpose(1, 2, 0)
+        return out
+
+    def newton(self, idle: Array) -> Array:
+        """The Newton step ``(F, T)``."""
+        return self.solve(idle, -self._mixed(self.here.residual)[:, None])[:, 0]
+
+    def rates(self, idle: Array) -> tuple[Array, Array]:
+        """Rates ``(F, T)`` of the freedoms with ``t``, and the idle motions ``(T, p, free)`` conjugate, of unit size."""
+        s, here = self.family.system, self.here
+        P, p = len(s.m.pairs), idle.shape[1]
+        bearers = np.concatenate([s.a, s.b])
+        V = move_twist(here.poses[:, :, bearers], np.broadcast_to(self._eta, (*self._eta.shape[:2], here.T)))
+        moved = here.loop_sums(V[:, :P] - V[:, P:])
+        moved = moved + (here.J[:, self.family.columns] * self.change).sum(axis=1)
+        right = np.zeros((self.J.shape[1], 1 + p, here.T), dtype=complex)
+        right[: self.J.shape[0], 0] = -self._mixed(moved)
+        right[self.J.shape[0] :, 1:] = np.eye(p)[:, :, None]
+        out = self.solve(idle, right)
+        rates = out[:, 0]
+        rates[self.family.columns] = self.change
+        if not p:
+            return rates, idle
+        motions = out[self.family.free, 1:].transpose(2, 0, 1)
+        return rates, np.linalg.qr(np.where(np.isfinite(motions), motions, 0.0))[0].conj().swapaxes(1, 2)
+
+    def idle(self) -> Array:
+        """The motions ``(T, p, free)`` conjugate, orthonormal, that the equations leave free: passive ones."""
+        J = self.J.transpose(2, 0, 1)
+        return np.linalg.svd(J)[2][:, J.shape[1] :]
+
+
+def _solved(A: Array, b: Array) -> Array:
+    try:
+        return np.linalg.solve(A, b)
+    except np.linalg.LinAlgError:
+        out = np.full(b.shape, np.nan, dtype=complex)
+        for i in range(len(b)):
+            with suppress(np.linalg.LinAlgError):
+                out[i] = np.linalg.solve(A[i], b[i])
+        return out
+
+
+@dataclass
+class Tracked:
+    """Where tracks came to: states ``(nx, V)``, parameters ``s (V,)``, whether they arrived, and whether they went to infinity."""
+
+    x: Array
+    s: Array
+    arrived: Mask
+    infinite: Mask
+
+
+@dataclass(frozen=True)
+class Care:
+    """How carefully tracks are followed: size of the first Newton step that is wanted, and that is still accepted."""
+
+    aim: float = 1e-2
+    most: float = 5e-2
+
+    @property
+    def finer(self) -> Care:
+        """Ten times as careful."""
+        return Care(0.1 * self.aim, 0.1 * self.most)
+
+
+Way = Callable[[Array], tuple[Array, Array]]
+"""``t`` and ``dt/ds`` at ``s (T,)`` in [0, 1]."""
+
+
+def straight(s: Array) -> tuple[Array, Array]:
+    """``t = s``."""
+    return s, np.ones_like(s)
+
+
+def follow(
+    leg: Leg, x: Array, care: Care, way: Way = straight, tracks: Index | None = None, polish: bool = True
+) -> Tracked:
+    """Tracks from states ``x (nx, V)`` at ``s = 0`` to ``s = 1``, at the end polished; ``tracks`` are their numbers on the leg."""
+    V = x.shape[1]
+    every = np.arange(V) if tracks is None else tracks
+    out = Tracked(x.copy(), np.zeros(V), np.zeros(V, dtype=bool), np.zeros(V, dtype=bool))
+    march = _March(leg, x, every, way)
+    for _ in range(MOST_STEPS):
+        if not len(march.who):
+            break
+        ended, infinite = march.step(care)
+        for mask, flag in ((ended, out.arrived), (infinite, out.infinite)):
+            flag[march.who[mask]] = True
+        out.x[:, march.who], out.s[march.who] = march.x, march.s[0]
+        march.keep(~(ended | infinite | (march.h < SMALLEST_STEP)))
+    done = np.flatnonzero(out.arrived)
+    if done.size and polish:
+        out.x[:, done], good = polished(leg, out.x[:, done], way(np.ones(1))[0][0], every[done])
+        out.arrived[done] = good
+    return out
+
+
+class _March:
+    """Tracks on their way: ``who`` they are, states, places and next steps, and the rates at the last nodes, the newest first."""
+
+    def __init__(self, leg: Leg, x: Array, every: Index, way: Way) -> None:
+        V = x.shape[1]
+        self.leg, self.way, self.every = leg, way, every
+        self.who, self.x, self.h = np.arange(V), x.copy(), np.full(V, FIRST_STEP)
+        self.s, self.known = np.zeros((NODES, V)), np.zeros(V, dtype=np.intp)
+        t, dt = way(self.s[0])
+        here = leg.at(self.x, t, every)
+        rates, self.idle = here.rates(here.idle())
+        self.v = np.zeros((NODES, *x.shape), dtype=complex)
+        self.v[0] = leg.equations.state_rates(self.x, rates) * dt
+
+    def step(self, care: Care) -> tuple[Mask, Mask]:
+        """One step of all tracks; which have ended, and which are on their way to infinity."""
+        leg, eq = self.leg, self.leg.equations
+        s = np.minimum(self.s[0] + self.h, 1.0)
+        h = s - self.s[0]
+        tracks = self.every[self.who]
+        with np.errstate(all="ignore"):
+            x = eq.normal(self.x + self._ahead(h))
+            t, dt = self.way(s)
+            here = leg.at(x, t, tracks)
+            one = here.newton(self.idle)
+            x = eq.family.system.advance(here.here.x, one)
+            here = leg.at(x, t, tracks)
+            two = here.newton(self.idle)
+            sizes = [eq.size(x, d) for d in (one, two)]
+            good = (sizes[0] <= care.most) & (sizes[1] <= 0.1 * sizes[0] + 1e-10)
+            rates, idle = here.rates(self.idle)
+            v = eq.state_rates(here.here.x, rates) * dt
+            x = eq.family.system.advance(here.here.x, two)
+        good &= np.isfinite(v).all(axis=0)
+        order = 1.0 / (1.0 + np.minimum(self.known + 1, NODES))
+        grown = h * np.clip((care.aim / np.maximum(sizes[0], 1e-12)) ** order, 0.4, 2.0)
+        self.h = np.where(good, np.minimum(np.where(np.isfinite(grown), grown, h), LARGEST_STEP), 0.4 * h)
+        at = np.flatnonzero(good)
+        for old, new in ((self.s, s), (self.v, v)):
+            old[1:, ..., at] = old[:-1, ..., at]
+            newest = old[0]
+            newest[..., at] = new[..., at]
+        self.known[at] += 1
+        self.x[:, at], self.idle[at] = x[:, at], idle[at]
+        return self.s[0] >= 1.0, eq.far(self.x)
+
+    def _ahead(self, h: Array) -> Array:
+        """Increments ``(nx, T)`` of the states over steps ``h``: the polynomial through the rates of the last nodes, integrated.
+
+        (Adams and Bashforth with steps of their own; an interpolation of states would carry on what no correction touches.)
+        """
+        widths = [self.s[0] - s for s in self.s[1:]]
+        table, out = list(self.v), h * self.v[0]
+        basis = np.array([np.zeros_like(h), np.ones_like(h)])  # coefficients of tau, lowest first
+        for k in range(1, NODES):
+            gap = [np.where(self.known >= k, self.s[i] - self.s[i + k], 1.0) for i in range(NODES - k)]
+            table = [(table[i] - table[i + 1]) / gap[i] for i in range(NODES - k)]
+            powers = h[None] ** np.arange(2, len(basis) + 1)[:, None] / np.arange(2, len(basis) + 1)[:, None]
+            out = out + np.where(self.known >= k, table[0] * (basis[1:] * powers).sum(axis=0), 0.0)
+            lifted = np.concatenate([basis * widths[k - 1], np.zeros_like(h)[None]])
+            lifted[1:] += basis
+            basis = lifted
+        return out
+
+    def keep(self, going: Mask) -> None:
+        """Go on with some of the tracks."""
+        if not going.all():
+            self.idle = self.idle[going]
+            for name in ("who", "x", "h", "s", "known", "v"):
+                setattr(self, name, getattr(self, name)[..., going])
+
+
+def polished(leg: Leg, x: Array, t: complex, tracks: Index) -> tuple[Array, Mask]:
+    """States closed by Newton to rounding at one ``t``, passive bodies turned to where they are least imaginary; which closed."""
+    eq = leg.equations
+    places = np.full(x.shape[1], t)
+    with np.errstate(all="ignore"):
+        for _ in range(CALMING if eq.idle else 0):
+            here = leg.at(x, places, tracks)
+            step = _calming(eq, here)
+            if eq.size(x, step).max(initial=0.0) < CALM:
+                break
+            x = eq.family.system.advance(here.here.x, step)
+            here = leg.at(x, places, tracks)
+            x = eq.family.system.advance(here.here.x, here.newton(here.idle()))
+        last, idle = np.full(x.shape[1], np.inf), None
+        for _ in range(POLISHING):
+            here = leg.at(x, places, tracks)
+            idle = here.idle() if idle is None else idle
+            dq = here.newton(idle)
+            size = eq.size(here.here.x, dq)
+            x = np.where(size < last, eq.family.system.advance(here.here.x, dq), here.here.x)
+            last = np.fmin(size, last)
+            if (last < POLISHED).all():
+                break
+    return x, last < ROUND * np.maximum(1.0, np.abs(x).max(axis=0))
+
+
+def _calming(eq: Equations, here: Linear) -> Array:
+    """Increments ``(F, T)`` along passive motions that take as much of the imaginary part of the states away as can be, at most a half."""
+    s, idle = eq.family.system, here.idle()
+    moves = np.zeros((s.n_freedoms, eq.idle, here.here.T), dtype=complex)
+    moves[eq.family.free] = idle.conj().transpose(2, 1, 0)
+    X = np.stack([eq.state_rates(here.here.x, moves[:, i]) for i in range(eq.idle)], axis=-1).transpose(1, 0, 2)
+    both = np.concatenate([X.imag, X.real], axis=2)
+    c = -(np.linalg.pinv(both, rcond=1e-6) @ here.here.x.imag.T[..., None])[..., 0]
+    c = c[:, : eq.idle] + 1j * c[:, eq.idle :]
+    step = np.einsum("fpt,tp->ft", moves, c)
+    return np.asarray(step * np.minimum(1.0, 0.5 / np.maximum(np.abs(step).max(axis=0, initial=0.0), 1e-300)))

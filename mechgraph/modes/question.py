@@ -1,0 +1,75 @@
+"""What is asked: a mechanism, the freedoms, points or links that are given, and the class in which its assemblies are looked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from mechgraph.closure.assembly import closed_start, named_columns
+from mechgraph.closure.driver_motion import DriverMotion
+from mechgraph.errors import DeclarationError
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.modes.family import Array, Family
+from mechgraph.report.refused import undriven_error
+from mechgraph.structure.mobility import free_motion
+
+
+class Question:
+    """Values given at one position or at several, and a closed position of the mechanism.
+
+    ``m`` is the mechanism with free pairs for points and links that are given (see ``closure.prescription``), ``drive (d, n)`` are the
+    values in internal units; ``batch`` is ``()`` or ``(n,)``.
+
+    Raises
+    ------
+    DeclarationError, AssemblyError, IndeterminateError
+    """
+
+    def __init__(self, m: Mechanism, values: Mapping[str, Any] | None) -> None:
+        given = DriverMotion(m, values)
+        if len(given.batch) > 1:
+            raise DeclarationError(
+                f"assemblies of {m.name!r}",
+                [f"values of shape {given.batch}: expected single values or a list of them"],
+            )
+        self.asked, self.m, self.batch, self.names = m, given.m, given.batch, given.names
+        self.start = closed_start(self.m)
+        if given.free:
+            self.m = given.whole(self.start)
+            self.start = closed_start(self.m)
+        self.system, self.x = self.start.system, self.start.x[:, 0]
+        self.columns, _ = named_columns(self.m, self.system, dict.fromkeys(self.names, 0.0))
+        self.unit = np.where(self.system.is_length[self.columns], self.system.par.L, 1.0)
+        self.values = given.values("position", self.batch)
+        self.drive = self.values / self.unit[:, None]
+        self.freedoms = free_motion(self.system, self.x, self.columns)
+        if self.freedoms.undriven and (self.family.unknowns > self.family.rank or self.family.fault):
+            raise undriven_error(self.m, self.freedoms.undriven)
+
+    @cached_property
+    def family(self) -> Family:
+        """The class."""
+        passive = [p.rates for p in self.freedoms.passive]
+        rates = np.stack(passive, axis=1) if passive else np.zeros((self.system.n_freedoms, 0))
+        return Family(self.start, self.columns, rates)
+
+    def coordinates(self, x: Array) -> Array:
+        """User coordinates ``(M, F)`` of real states ``(nx, M)``: whole turns nearest to the start, given ones exactly as given."""
+        s = self.system
+        start = s.start_coordinates(self.m.start)
+        q = np.stack([s.coordinates_of(x[:, [i]], start)[:, 0] for i in range(x.shape[1])] or [np.zeros(0)])
+        q = q.reshape(x.shape[1], s.n_freedoms)
+        turning = (s.single_rows >= 0) & ~s.is_length
+        turning[self.columns] = False
+        q[:, turning] -= 2 * np.pi * np.round((q - start)[:, turning] / (2 * np.pi))
+        return q
+
+    def complex_coordinates(self, x: Array) -> Array:
+        """User coordinates ``(n, F)`` of complex states ``(nx, n)``."""
+        s = self.system
+        q = s.difference(x, s.state_of(np.zeros((s.n_freedoms, 1))))
+        q[s.is_length] *= s.par.L
+        return q.T

@@ -1,0 +1,77 @@
+"""Start sets kept in a folder of the user, one file for each class of mechanisms; a file is written whole or not at all.
+
+The folder is ``mechgraph`` in that of the user for such files (``XDG_CACHE_HOME`` or ``LOCALAPPDATA`` where they are set, else
+``~/.cache``). Where it cannot be read or written, start sets are worked out anew.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mechgraph.errors import MechgraphError
+from mechgraph.modes.family import Family, Member
+from mechgraph.modes.monodromy import StartSet
+from mechgraph.writing import whole_file
+
+VERSION = 1
+"""Of the files and of what start sets mean."""
+
+
+def folder() -> Path:
+    """Where start sets are kept."""
+    for name in ("XDG_CACHE_HOME", "LOCALAPPDATA"):
+        if os.environ.get(name):
+            return Path(os.environ[name]) / "mechgraph"
+    return Path.home() / ".cache" / "mechgraph"
+
+
+def key(family: Family) -> str:
+    """What a start set serves for: the topology; where relations are kept, the geometry too."""
+    s = family.system
+    types = [[[f.label, *f.twist] for f in pair.type.freedoms] for pair in s.m.pairs]
+    parts: dict[str, Any] = {
+        "version": VERSION,
+        "ends": [s.a.tolist(), s.b.tolist(), s.graph.frame],
+        "types": types,
+        "driven": family.columns.tolist(),
+        "ranks": [h.shape[1] for h in family.loop_algebras],
+        "passive": family.passive.shape[1],
+        "geometry": None if family.whole else np.round(family.target.real, 9).tolist(),
+    }
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+
+
+def kept(family: Family) -> StartSet | None:
+    """The start set of a class, where it is kept and closed."""
+    try:
+        with (folder() / f"start-{key(family)}.npz").open("rb") as handle, np.load(handle, allow_pickle=False) as f:
+            mixing = f["mixing"] if f["mixing"].size else None
+            loops, lost, followed = f["counts"].tolist()
+            found = StartSet(Member(f["markers"], f["drive"]), f["x"], mixing, loops, lost, followed, True)
+    except (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile, TypeError):
+        return None
+    return found if found.fits(family) else None
+
+
+def keep(family: Family, start: StartSet) -> None:
+    """Keep a start set, as far as the folder allows."""
+    try:
+        folder().mkdir(parents=True, exist_ok=True)
+        with whole_file(folder() / f"start-{key(family)}.npz") as temporary, temporary.open("xb") as handle:
+            np.savez_compressed(
+                handle,
+                markers=start.member.markers,
+                drive=start.member.drive,
+                x=start.x,
+                mixing=np.zeros((0, 0)) if start.mixing is None else start.mixing,
+                counts=np.array([start.loops, start.lost, start.followed]),
+            )
+    except (OSError, RuntimeError, MechgraphError):
+        return

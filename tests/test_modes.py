@@ -1,0 +1,208 @@
+"""All assemblies: counts of the literature, nothing outside the set, the same set for any seed, certificates, singular points."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mechanisms import Z, bennett, ring
+
+import mechgraph as mg
+from mechgraph.closure.assembly import close_all, closed_start
+from mechgraph.model.chain import chain_symbols
+from mechgraph.modes import store
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("kept")
+
+
+@pytest.fixture(autouse=True)
+def folder(shared: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Start sets are kept for the tests of this file alone."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(shared))
+
+
+@pytest.fixture
+def empty(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No start set is kept."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+
+
+def general(letters: str, seed: int = 3, **more: object) -> mg.Mechanism:
+    """A loop of pairs placed at random, closed where it is declared."""
+    types, rng = chain_symbols(letters)[0], np.random.default_rng(seed)
+    return ring(types, rng.normal(size=(len(types), 3)), rng.normal(size=(len(types), 3)), **more)
+
+
+def four_bar(crank: float, coupler: float, rocker: float, ground: float, angle: float) -> mg.Mechanism:
+    """A planar four-bar declared link by link, the crank along x at zero."""
+    lengths = (crank, coupler, rocker, ground)
+    names = ("ground", "crank", "coupler", "rocker")
+    ends = list(zip(names, names[1:] + names[:1], (ground, *lengths[:3]), strict=True))
+    pairs = [
+        mg.Pair(f"O{i}", "R", a, b, on_a=mg.Marker((L if i else 0.0, 0, 0), Z), on_b=mg.Marker((0, 0, 0), Z))
+        for i, (a, b, L) in enumerate(ends)
+    ]
+    # the last pair closes on the ground at its other end
+    last = pairs[3]
+    pairs[3] = mg.Pair("O3", "R", last.a, last.b, on_a=last.on_a, on_b=mg.Marker((ground, 0, 0), Z))
+    return mg.Mechanism("four-bar", pairs=pairs, drives=["O0"], frame="ground", start={"O0": angle, "O1": -1.0})
+
+
+COUNTS = [
+    *((letters, 2) for letters in ("R-Sp-R", "P-Sp-R", "R-Sg-C", "R-Sg-R-P", "R-Sg-P-R", "R-Sc-C-P", "R-Sc-P-C", "RSSR", "RCCC")),
+    *((letters, 4) for letters in ("R-Sg-R-R", "RCSR", "RCRCR")),
+    *((letters, 8) for letters in ("R-Sc-C-R", "R-Sc-R-C", "RCRRC")),
+    ("RRRRRRR", 16),
+]  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("letters", "count"), COUNTS)
+def test_general_loops_have_as_many_assemblies_over_c_as_the_literature_says(letters: str, count: int) -> None:
+    modes = mg.assemblies(general(letters), {"O1": 0.2})
+    assert modes.total == count
+    assert len(modes) + len(modes.complex) + modes.infinite == count
+    assert modes.completeness in {"proved", "tested"}
+
+
+@pytest.mark.parametrize("angle", [0.4, 2.0, -1.3])
+def test_a_four_bar_has_the_two_assemblies_of_its_closed_form(angle: float) -> None:
+    a, b, c, d = 1.0, 2.5, 2.0, 3.0
+    modes = mg.assemblies(four_bar(a, b, c, d, 0.5), {"O0": angle})
+    assert modes.completeness == "proved"
+    assert modes.kinds == ("regular", "regular")
+    tip = a * np.exp(1j * angle)
+    way = d - tip
+    along = (b * b - c * c + abs(way) ** 2) / (2 * abs(way))
+    across = np.sqrt(b * b - along * along)
+    expected = sorted([tip + way / abs(way) * (along + s * 1j * across) for s in (1, -1)], key=lambda z: z.imag)
+    coupler = [link.name for link in modes.mechanism.links].index("coupler")
+    rocker = [link.name for link in modes.mechanism.links].index("rocker")
+    found = sorted((complex(*poses[rocker][:2, 3]) for poses in modes.poses), key=lambda z: z.imag)
+    assert np.abs(np.array(found) - expected).max() < 1e-12
+    assert np.abs(modes.poses[:, coupler, :2, 3] - [tip.real, tip.imag]).max() < 1e-12
+
+
+def test_where_a_four_bar_cannot_be_closed_both_assemblies_are_complex() -> None:
+    modes = mg.assemblies(four_bar(2.0, 1.5, 2.5, 3.0, 0.5), {"O0": np.pi})
+    assert len(modes) == 0
+    assert len(modes.complex) == 2
+    assert modes.completeness == "proved"
+
+
+def test_at_its_fold_the_two_assemblies_of_a_four_bar_are_a_double_point() -> None:
+    a, b, c, d = 2.0, 1.5, 2.5, 3.0
+    fold = np.arccos((a * a + d * d - (b + c) ** 2) / (2 * a * d))
+    modes = mg.assemblies(four_bar(a, b, c, d, 0.5), {"O0": fold})
+    assert modes.kinds == ("double",)
+    assert modes.certificates == (None,)
+    assert np.isinf(modes.condition[0])
+
+
+def test_a_parallelogram_folded_flat_is_a_double_point_and_a_kite_that_spins_a_continuum() -> None:
+    flat = mg.assemblies(four_bar(1.0, 2.0, 1.0, 2.0, 0.5), {"O0": 0.0})
+    assert "double" in flat.kinds
+    kite = mg.assemblies(four_bar(2.0, 1.0, 1.0, 2.0, 0.7), {"O0": 0.0})
+    assert "continuum" in kite.kinds
+
+
+def test_every_regular_assembly_of_7r_is_certified_and_goes_on_in_solve() -> None:
+    m = mg.load("7r")
+    modes = mg.assemblies(m, {"O1": 0.3})
+    assert modes.total == 16
+    assert len(modes) >= 2
+    assert modes.completeness == "proved"
+    assert all(sure.proved and sure.error < 1e-9 < sure.radius for sure in modes.certificates)
+    for mode, poses in zip(modes, modes.poses, strict=True):
+        s = mg.kinematics(mode, {"O1": 0.3})
+        assert np.abs(np.array([s.link(link.name).pose for link in m.links]) - poses).max() < 1e-9
+
+
+@pytest.mark.slow
+def test_the_set_and_its_order_do_not_depend_on_the_seed() -> None:
+    m = mg.load("r-sc-c-r")
+    sets = [mg.assemblies(m, {m.drives[0].freedom: 0.3}, seed=seed, cache=False) for seed in range(2)]
+    for other in sets[1:]:
+        assert np.abs(other.poses - sets[0].poses).max() < 1e-9
+        assert len(other.complex) == len(sets[0].complex)
+
+
+@pytest.mark.parametrize("name", ["rcsr", "rssr"])
+def test_newton_from_many_guesses_finds_nothing_outside_the_set(name: str) -> None:
+    m = mg.load(name)
+    driver = m.drives[0].freedom
+    here = closed_start(m)
+    s, rng = here.system, np.random.default_rng(1)
+    column = s.first_column[m.freedom(driver)[0]]
+    value = float(here.x[s.single_rows[column], 0])
+    modes = mg.assemblies(m, {driver: value})
+    guess = s.advance(np.repeat(here.x, 400, axis=1), rng.uniform(-np.pi, np.pi, (s.n_freedoms, 400)))
+    guess[s.single_rows[column]] = value
+    x, error = close_all(s, guess, np.array([column]))
+    x = x[:, error < 1e-10]
+    assert x.shape[1] > 5
+    driven_links = [i for i, link in enumerate(m.links) if link.name != m.frame]
+    known = modes.poses[:, driven_links]
+    for i in range(x.shape[1]):
+        q = s.coordinates_of(x[:, [i]])[:, 0]
+        start = dict(zip(m.freedom_names(), q.tolist(), strict=True))
+        poses = mg.assemblies.__globals__["user_poses"](closed_start(m.replace(start=start)))[:, 0][driven_links]
+        # the coupler of an S-S pair may spin: its origin on the axis and all other links tell
+        gaps = np.abs(known[:, :, :3, :] - poses[:, :3, :]).reshape(len(known), len(driven_links), -1).max(axis=2)
+        assert np.sort(gaps.min(axis=0))[: len(driven_links) - (name == "rssr")].max() < 1e-6
+
+
+def test_several_positions_are_indexed_by_position_then_mode() -> None:
+    modes = mg.assemblies(mg.load("slider-crank"), {"A": [0.1, 0.5, 0.9]})
+    assert len(modes) == 3
+    assert modes.completeness == "proved"
+    assert [len(one) for one in modes] == [2, 2, 2]
+    assert modes[2][0].start["A.Rz"] == 0.9
+
+
+@pytest.mark.usefixtures("empty")
+def test_a_second_call_takes_the_start_set_that_was_kept() -> None:
+    m = general("R-Sp-R", seed=5)
+    first = mg.assemblies(m, {"O1": 0.1}, seed=1)
+    assert len(list(store.folder().glob("start-*.npz"))) == 1
+    said: list[str] = []
+    second = mg.assemblies(general("R-Sp-R", seed=8), {"O1": 0.1}, seed=2, progress=said.append)
+    assert not any("random member" in line for line in said)
+    assert first.total == second.total == 2
+
+
+@pytest.mark.usefixtures("empty")
+def test_a_damaged_start_set_is_worked_out_anew() -> None:
+    m = mg.load("four-bar")
+    mg.assemblies(m, {"A": 0.1})
+    for file in store.folder().glob("start-*.npz"):
+        file.write_bytes(file.read_bytes()[:100])
+    assert len(mg.assemblies(m, {"A": 0.1})) == 2
+
+
+def test_where_no_class_is_known_the_word_is_searched() -> None:
+    for m, why in ((bennett(), "relations"), (mg.load("rchch"), "helical")):
+        modes = mg.assemblies(m, {m.drives[0].freedom: 0.0}, guesses=50)
+        assert modes.completeness == "searched"
+        assert why in modes.evidence[0]
+        assert modes.total is None
+
+
+def test_bad_arguments_are_all_named() -> None:
+    with pytest.raises(mg.DeclarationError) as caught:
+        mg.assemblies(mg.load("four-bar"), {"A": 0.1}, seed=-1, guesses=0, turns=0, progress=3)
+    assert len(caught.value.faults) == 4
+
+
+@pytest.mark.usefixtures("empty")
+def test_progress_may_interrupt() -> None:
+    def stop(line: str) -> None:
+        raise KeyboardInterrupt(line)
+
+    with pytest.raises(KeyboardInterrupt):
+        mg.assemblies(mg.load("four-bar"), {"A": 0.1}, progress=stop)
+    assert not list(store.folder().glob("*"))
