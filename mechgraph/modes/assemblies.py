@@ -33,7 +33,7 @@ AWAY = 1e-2
 """Step along a motion that the rows leave free, after which a continuum is still closed."""
 GUESSES = 400
 """Random guesses where no class is known."""
-TURNS = 1.0
+GUESSED_TURNS = 1.0
 """Turns on either side of the start within which angles are guessed."""
 ORDER = 1e-7
 """Difference of link poses below which the next number decides the order of assemblies."""
@@ -177,7 +177,7 @@ def assemblies(
     *,
     seed: int = 0,
     guesses: int = GUESSES,
-    turns: float = TURNS,
+    turns: float = GUESSED_TURNS,
     cache: bool = True,
     progress: Progress | None = None,
 ) -> Any:

@@ -31,7 +31,7 @@ SPAN = 1e-6
 """Part of a twist outside a span up to which it lies in it."""
 Array = NDArray[Any]
 """Numbers, real or complex."""
-CLOSED = 1e-9
+MEMBER_CLOSED = 1e-9
 """Closure error up to which a member of a class counts as closed."""
 GENERIC = 1e-7
 """Singular value, as part of the largest, below which it counts as zero at random members."""
@@ -176,7 +176,7 @@ class Family:
             moved = compose(pose_exp(open_.chord_errors), compose(T, markers[:, :, P + chords]))
             markers[:, :, P + chords] = compose(inverse(T), moved)
         closed = Configuration(self.system_with(markers), x)
-        if not closed.closure[0] < CLOSED or not self._within(markers):
+        if not closed.closure[0] < MEMBER_CLOSED or not self._within(markers):
             return None
         return Member(markers, x[self.rows]), x[:, 0]
 
@@ -188,7 +188,9 @@ class Family:
         e = move_twist(self.here.poses[:, :, self.system.b[self.system.chords]], e)[:, :, 0]
         for i, chord in enumerate(self.system.chords.tolist()):
             basis = self.algebras[chord]
-            if np.abs(e[:, i] - basis @ (basis.T @ e[:, i])).max() > 1e3 * CLOSED * max(1.0, np.abs(e[:, i]).max()):
+            if np.abs(e[:, i] - basis @ (basis.T @ e[:, i])).max() > 1e3 * MEMBER_CLOSED * max(
+                1.0, np.abs(e[:, i]).max()
+            ):
                 return False
         return True
 

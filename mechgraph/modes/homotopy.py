@@ -33,17 +33,17 @@ LARGEST_STEP = 0.25
 """Largest step."""
 SMALLEST_STEP = 1e-7
 """Smallest step."""
-FAR = (25.0, 1e5, 1e3)
+ENDLESS_STATE = (25.0, 1e5, 1e3)
 """Imaginary part of an angle, length over L, and quaternion from which on an assembly is on its way to infinity."""
 SLIDE = 1e-9
 """Turn of a marker below which it slides."""
-NODES = 4
+RATES_KEPT = 4
 """Nodes from whose rates a step is predicted."""
 POLISHED = 1e-12
 """Last Newton step at the end of a track."""
 POLISHING = 6
 """Newton steps at the end of a track, at most."""
-ROUND = 1e-8
+ARRIVED = 1e-8
 """Last Newton step, against the size of the state, up to which a track has come to its end."""
 CALMING, CALM = 20, 1e-9
 """Steps in which passive bodies are turned there, at most, and the step at which that ends."""
@@ -83,11 +83,11 @@ class Equations:
         out[s.rotations[1]] = Q / np.sqrt((Q * Q).sum(axis=0))
         return out
 
-    def far(self, x: Array, angle: float = FAR[0]) -> Mask:
+    def far(self, x: Array, angle: float = ENDLESS_STATE[0]) -> Mask:
         """Which states are on their way to infinity, angles with an imaginary part above ``angle``."""
         sizes = (np.abs(x[self._angles].imag), np.abs(x[self._lengths]), np.abs(x[self._quaternions]))
         out: Mask = np.asarray(~np.isfinite(x).all(axis=0))
-        for size, limit in zip(sizes, (angle, *FAR[1:]), strict=True):
+        for size, limit in zip(sizes, (angle, *ENDLESS_STATE[1:]), strict=True):
             out |= size.max(axis=0, initial=0.0) > limit
         return out
 
@@ -267,11 +267,11 @@ class _March:
         V = x.shape[1]
         self.leg, self.way, self.every = leg, way, every
         self.who, self.x, self.h = np.arange(V), x.copy(), np.full(V, FIRST_STEP)
-        self.s, self.known = np.zeros((NODES, V)), np.zeros(V, dtype=np.intp)
+        self.s, self.known = np.zeros((RATES_KEPT, V)), np.zeros(V, dtype=np.intp)
         t, dt = way(self.s[0])
         here = leg.at(self.x, t, every)
         rates, self.idle = here.rates(here.idle())
-        self.v = np.zeros((NODES, *x.shape), dtype=complex)
+        self.v = np.zeros((RATES_KEPT, *x.shape), dtype=complex)
         self.v[0] = leg.equations.state_rates(self.x, rates) * dt
 
     def step(self, care: Care) -> tuple[Mask, Mask]:
@@ -294,7 +294,7 @@ class _March:
             v = eq.state_rates(here.here.x, rates) * dt
             x = eq.family.system.advance(here.here.x, two)
         good &= np.isfinite(v).all(axis=0)
-        order = 1.0 / (1.0 + np.minimum(self.known + 1, NODES))
+        order = 1.0 / (1.0 + np.minimum(self.known + 1, RATES_KEPT))
         grown = h * np.clip((care.aim / np.maximum(sizes[0], 1e-12)) ** order, 0.4, 2.0)
         self.h = np.where(good, np.minimum(np.where(np.isfinite(grown), grown, h), LARGEST_STEP), 0.4 * h)
         at = np.flatnonzero(good)
@@ -314,9 +314,9 @@ class _March:
         widths = [self.s[0] - s for s in self.s[1:]]
         table, out = list(self.v), h * self.v[0]
         basis = np.array([np.zeros_like(h), np.ones_like(h)])  # coefficients of tau, lowest first
-        for k in range(1, NODES):
-            gap = [np.where(self.known >= k, self.s[i] - self.s[i + k], 1.0) for i in range(NODES - k)]
-            table = [(table[i] - table[i + 1]) / gap[i] for i in range(NODES - k)]
+        for k in range(1, RATES_KEPT):
+            gap = [np.where(self.known >= k, self.s[i] - self.s[i + k], 1.0) for i in range(RATES_KEPT - k)]
+            table = [(table[i] - table[i + 1]) / gap[i] for i in range(RATES_KEPT - k)]
             powers = h[None] ** np.arange(2, len(basis) + 1)[:, None] / np.arange(2, len(basis) + 1)[:, None]
             out = out + np.where(self.known >= k, table[0] * (basis[1:] * powers).sum(axis=0), 0.0)
             lifted = np.concatenate([basis * widths[k - 1], np.zeros_like(h)[None]])
@@ -355,7 +355,7 @@ def polished(leg: Leg, x: Array, t: complex, tracks: Index) -> tuple[Array, Mask
             last = np.fmin(size, last)
             if (last < POLISHED).all():
                 break
-    return x, last < ROUND * np.maximum(1.0, np.abs(x).max(axis=0))
+    return x, last < ARRIVED * np.maximum(1.0, np.abs(x).max(axis=0))
 
 
 def _calming(eq: Equations, here: Linear) -> Array:

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from mechgraph.closure.configuration import Configuration
-from mechgraph.modes.family import CLOSED, GENERIC, Array, Family, Member
+from mechgraph.modes.family import GENERIC, MEMBER_CLOSED, Array, Family, Member
 from mechgraph.modes.homotopy import Care, Equations, Leg, follow
 from mechgraph.numerics.linear import rank_of, singular_values
 
@@ -25,7 +25,7 @@ BATCH = 48
 """Tracks followed together, of as many loops as it takes."""
 ATTEMPTS = 8
 """Random members tried until one is regular."""
-SAME = 1e-6
+ONE_ASSEMBLY = 1e-6
 """Difference of link poses, against their size, up to which two assemblies are one."""
 
 
@@ -57,7 +57,7 @@ class StartSet:
         if (self.mixing is None) != family.whole or not np.isfinite(self.x).all():
             return False
         closure = Configuration(family.system_with(self.member.markers), self.x).closure
-        return bool(closure.max(initial=0.0) < CLOSED)
+        return bool(closure.max(initial=0.0) < MEMBER_CLOSED)
 
     @property
     def chance(self) -> float:
@@ -78,7 +78,7 @@ def distinct(poses: Array, known: Array | None = None) -> Array:
         if not np.isfinite(p).all():
             continue
         size = max(1.0, float(np.abs(p).max()))
-        if all(np.abs(p - q).max() > SAME * size for q in have):
+        if all(np.abs(p - q).max() > ONE_ASSEMBLY * size for q in have):
             have.append(p)
             out.append(i)
     return np.array(out, dtype=np.intp)

@@ -10,9 +10,9 @@ from mechgraph.closure.assembly import CLOSED, close_all
 from mechgraph.closure.indexing import Index, System
 from mechgraph.modes.family import Array
 
-BLOCK = 200
+GUESSES_TOGETHER = 200
 """Guesses closed together."""
-SPREAD = 1.5
+SLIDE_SPREAD = 1.5
 """Standard deviation of guessed slides, over L."""
 
 
@@ -29,12 +29,12 @@ def searched(
     """Closed states ``(nx, n)`` from ``starts`` random guesses within so many ``turns`` about ``x (nx,)``, drivers at ``drive (d,)``."""
     found = []
     turning = ~system.is_length
-    for i in range(0, starts, BLOCK):
-        n = min(BLOCK, starts - i)
+    for i in range(0, starts, GUESSES_TOGETHER):
+        n = min(GUESSES_TOGETHER, starts - i)
         if progress is not None:
             progress(f"guess {i + 1} to {i + n} of {starts}")
         dq = rng.uniform(-2 * np.pi * turns, 2 * np.pi * turns, (system.n_freedoms, n))
-        dq[~turning] = rng.normal(0.0, SPREAD, (int((~turning).sum()), n))
+        dq[~turning] = rng.normal(0.0, SLIDE_SPREAD, (int((~turning).sum()), n))
         guess = system.advance(np.repeat(x[:, None], n, axis=1), dq)
         guess[system.single_rows[columns]] = drive[:, None]
         closed, error = close_all(system, guess, columns)

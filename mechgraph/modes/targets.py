@@ -20,13 +20,13 @@ from mechgraph.numerics.linear import Index
 
 RUNS = 4
 """Runs of all tracks, at most."""
-TOGETHER = 600
+TRACKS_TOGETHER = 600
 """Tracks followed together."""
 RADIUS = 0.04
 """Distance from its end at which a track is led round."""
-SAMPLES = 12
+ARCS = 12
 """States on a turn round the end."""
-TURNS = 6
+TURNS_ROUND = 6
 """Turns after which a track must be back."""
 BACK = 1e-5
 """Difference up to which it is back."""
@@ -56,7 +56,7 @@ def ends(
     """Ends at driver values ``drive (d, n)``, one after the other."""
     n, N = drive.shape[1], start.x.shape[1]
     out: list[Ends] = []
-    block = max(1, TOGETHER // N)
+    block = max(1, TRACKS_TOGETHER // N)
     for i in range(0, n, block):
         if progress is not None:
             progress(f"{N} tracks to each of positions {i + 1} to {min(i + block, n)} of {n}")
@@ -125,8 +125,8 @@ def _endgame(leg: Leg, x: Array, tracks: Index, care: Care, out: _Run) -> None:
     begin, total = x.copy(), np.zeros_like(x)
     first = leg.prints(begin, np.full(len(kept), 1.0 - RADIUS), tracks)
     alive = np.arange(len(kept))
-    for turn in range(1, TURNS + 1):
-        for k in range(SAMPLES):
+    for turn in range(1, TURNS_ROUND + 1):
+        for k in range(ARCS):
             if not alive.size:
                 return
             total[:, alive] += x[:, alive]
@@ -140,7 +140,7 @@ def _endgame(leg: Leg, x: Array, tracks: Index, care: Care, out: _Run) -> None:
         back = alive[gap < BACK]
         if back.size:
             wound = np.abs(eq.wound(x[:, back] - begin[:, back])) > 1.0
-            mean = total[:, back] / (turn * SAMPLES)
+            mean = total[:, back] / (turn * ARCS)
             endless = wound | eq.far(mean, ENDLESS)
             out.infinite[tracks[back[endless]]] = True
             good = back[~endless]
@@ -155,8 +155,8 @@ def _arc(k: int) -> Callable[[Array], tuple[Array, Array]]:
     """The part ``k`` of the circle round the end."""
 
     def way(s: Array) -> tuple[Array, Array]:
-        turn = RADIUS * np.exp(2j * np.pi * (k + s) / SAMPLES)
-        return 1.0 - turn, -2j * np.pi / SAMPLES * turn
+        turn = RADIUS * np.exp(2j * np.pi * (k + s) / ARCS)
+        return 1.0 - turn, -2j * np.pi / ARCS * turn
 
     return way
 
