@@ -28,6 +28,7 @@ from mechgraph.exchange.files import load, save
 from mechgraph.kinetostatics import assemble, kinematics, solve
 from mechgraph.model.chain import chain
 from mechgraph.model.coupling import Coupling
+from mechgraph.model.curves import Curve
 from mechgraph.model.drive import Drive
 from mechgraph.model.event import Event
 from mechgraph.model.force_law import Damper, ForceLaw, Spring, TorsionSpring
@@ -74,6 +75,7 @@ __all__ = [
     "Component",
     "ContentError",
     "Coupling",
+    "Curve",
     "Damper",
     "DeadPointError",
     "DeclarationError",

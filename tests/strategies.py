@@ -10,6 +10,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 import mechgraph as mg
+from mechgraph.model.travel import Travel
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -294,3 +295,43 @@ def chebyshev_rate(t, values):
     rate = np.polynomial.chebyshev.chebval(x, np.polynomial.chebyshev.chebder(c)).T / half
     tail = n * n * np.abs(c[-3:]).max(initial=0.0) / half
     return rate.reshape(np.shape(values)), float(tail)
+
+
+def curve_through(rng, point):
+    """A random curve of any kind that passes ``point``, open or closed, plane or in space."""
+    angle = np.linspace(0, 2 * np.pi, 25)[:-1]
+    knot = np.stack(
+        [(2 + np.cos(3 * angle)) * np.cos(2 * angle), (2 + np.cos(3 * angle)) * np.sin(2 * angle), np.sin(3 * angle)],
+        axis=1,
+    )
+    axis = unit(rng)
+    curve = [
+        mg.Curve.line(direction=axis),
+        mg.Curve.circle(radius=0.8, axis=axis),
+        mg.Curve.ellipse(a=1.2, b=0.8, axis=axis),
+        mg.Curve.helix(radius=0.7, pitch=0.3, axis=axis),
+        mg.Curve.helix(radius=0.7, pitch=0.3, axis=axis, frame="guided"),
+        mg.Curve.involute(radius=0.8, angles=(0.3, 2.0), axis=axis),
+        mg.Curve.through(points=np.cumsum(rng.normal(size=(9, 3)) * 0.2 + 0.6 * axis, axis=0)),
+        mg.Curve.through(points=0.7 * knot, closed=True, frame="guided", guide=axis + np.array([0, 0, 3])),
+    ][int(rng.integers(8))]
+    travel = Travel(curve)
+    shift = np.eye(3, 4)
+    begin, length = (travel.begin, travel.length) if np.isfinite(travel.begin) else (0.0, 2.0)
+    shift[:, 3] = point - travel.at(np.array(begin + rng.uniform(0.4, 0.6) * length)).x
+    return curve.moved(shift)
+
+
+def with_curves(m, seed):
+    """The mechanism with all its pairs P, C and Sg bent: curves through their points; one more in place of the last pair R."""
+    rng = np.random.default_rng((seed, 6))
+    last = [p.name for p in m.pairs if p.type.symbol == "R"][-1:]
+    pairs = [
+        mg.Pair(
+            p.name, "P" if p.name in last else p.type.symbol, p.a, p.b, point=p.point, curve=curve_through(rng, p.point)
+        )
+        if p.name in last or p.type.symbol in ("P", "C", "Sg")
+        else p
+        for p in m.pairs
+    ]
+    return m.replace(pairs=pairs)

@@ -183,7 +183,10 @@ class Configuration:
                 out.append(evaluation.reciprocal(self.S[:, g.columns], self.frames[number][-1]))
                 continue
             count = len(g.row.reactions) * len(g.pairs)
-            out.append(whole[:, at : at + count].reshape(6, len(g.row.reactions), len(g.pairs), self.T))
+            own = whole[:, at : at + count].reshape(6, len(g.row.reactions), len(g.pairs), self.T)
+            if g.row.computed_reactions:
+                own = evaluation.without_work(own, self.E[:, g.columns], self.S[:, g.columns])
+            out.append(own)
             at += count
         return out
 

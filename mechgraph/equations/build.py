@@ -89,8 +89,8 @@ def _along(draft: _Draft, k: int, kind: str, parts: Iterable[Component], act: li
 
 
 def _components_of(pair: Pair) -> tuple[Component, ...]:
-    """The reaction components; those of a null space are named only."""
-    if pair.type.reactions is not None:
+    """The reaction components; those of a null space, and those combined with efforts, are named only."""
+    if pair.type.reactions is not None and not pair.type.computed_reactions:
         return pair.type.reactions
     return tuple(Component(name, (1.0,) * 6) for name in pair.type.component_names)
 

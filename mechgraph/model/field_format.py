@@ -323,6 +323,43 @@ def _points_fault(value: Any, what: str, minimum: float | None) -> str | None:
     return None
 
 
+def _interval_fault(value: Any, what: str, minimum: float | None) -> str | None:
+    return (
+        None
+        if is_numeric(value, (2,)) and value[0] < value[1]
+        else wrong(value, what, "two finite numbers, the second above the first")
+    )
+
+
+def _point_list_fault(value: Any, what: str, minimum: float | None) -> str | None:
+    array = real_array(value)
+    good = array is not None and array.ndim == 2 and array.shape[1] == 3 and is_numeric(value, array.shape)
+    return None if good else wrong(value, what, "points of three finite numbers each")
+
+
+def _moved_points(value: Any, pose: Array) -> Any:
+    return plain(np.asarray(value) @ pose[:, :3].T + pose[:, 3])
+
+
+def _function_fault(value: Any, what: str, minimum: float | None) -> str | None:
+    return None if callable(value) else wrong(value, what, "a function")
+
+
+@dataclass(frozen=True)
+class MovedShape:
+    """A function that returns a position and its derivatives ``(3, n)``, carried along by a rigid motion of the whole mechanism."""
+
+    function: Callable[..., Any]
+    pose: tuple[tuple[float, ...], ...]
+
+    def __call__(self, *parameters: Array) -> list[Array]:
+        """Position and derivatives after the motion."""
+        G = np.asarray(self.pose)
+        parts = [G[:, :3] @ np.asarray(part) for part in self.function(*parameters)]
+        parts[0] = parts[0] + G[:, 3:]
+        return parts
+
+
 _VECTOR: Schema = {"$ref": "#/$defs/vector"}
 TEXT = Kind("text", {"type": "string"}, str)
 LINK_NAME = Kind("text", {"type": "string"}, str)
@@ -385,6 +422,9 @@ TWO_WHOLE = Kind(
     True,
     _positive_fault((2,), "two whole numbers", whole=True),
 )
+INTERVAL = Kind("2 numbers", {**_TWO, "items": {"type": "number"}}, None, (2,), True, _interval_fault)
+POINT_LIST = Kind("n × 3", {"type": "array", "items": _VECTOR}, None, None, True, _point_list_fault, _moved_points)
+FUNCTION = Kind("function", {"not": {}}, None, None, False, _function_fault, lambda f, pose: MovedShape(f, plain(pose)))
 NUMBERS = Kind("n numbers", {"type": "array", "items": {"type": "number"}})
 FACTS = Kind("table", {"type": "object"}, dict)
 COEFFICIENTS = Kind("table", {"type": "object", "additionalProperties": {"type": "number"}, "minProperties": 1}, dict)

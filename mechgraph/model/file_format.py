@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from mechgraph.model.curves import CURVES, Function
 from mechgraph.model.drive import Drive
 from mechgraph.model.event import Event
 from mechgraph.model.field_format import (
@@ -39,7 +40,9 @@ from mechgraph.model.row_parts import Bookkeeping, Component, Freedom
 from mechgraph.model.stop import Stop
 from mechgraph.units import BASE_UNITS, LENGTH
 
-KINDS: dict[str, Mapping[str, Any]] = {"load": LOADS, "coupling": COUPLINGS}
+WRITABLE = {kind: curve for kind, curve in CURVES.items() if curve is not Function}
+"""Curves that a file can hold."""
+KINDS: dict[str, Mapping[str, Any]] = {"load": LOADS, "coupling": COUPLINGS, "curve": WRITABLE}
 """Tables of which the field ``kind`` says what stands in them: its values, and the classes."""
 USUAL = {"coupling": "linear"}
 """What is meant where ``kind`` is left out."""
@@ -135,6 +138,7 @@ TABLES_OF_FILE: dict[str, Table] = {
     "pair": _table(Pair, words="A kinematic pair from link a to link b."),
     "marker": _table(Marker, words="A marker frame in a link's own frame."),
     "hertz": _table(Hertz, words="What the pressure in a contact takes: materials and shapes of its elements."),
+    **{f"curve {kind}": _table(curve) for kind, curve in WRITABLE.items()},
     **{f"coupling {kind}": _table(coupling) for kind, coupling in COUPLINGS.items()},
     "chain": _table(
         None,

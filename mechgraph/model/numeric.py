@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,22 @@ def _as_tuples(value: Any, depth: int) -> Any:
     if depth < 3:
         return tuple(map(tuple, value)) if depth == 2 else tuple(value) if depth else value
     return tuple([_as_tuples(v, depth - 1) for v in value])
+
+
+@lru_cache
+def second_direction(axis: Any) -> tuple[float, ...]:
+    """The global axis least aligned with ``axis``, made perpendicular to it: what fills ``second`` where it is left out."""
+    length = math.hypot(*axis)
+    if not length > 0:
+        return (1.0, 0.0, 0.0)
+    z = [c / length for c in axis]
+    sizes = [abs(c) for c in z]
+    least = sizes.index(min(sizes))
+    along = z[least]
+    x = [0.0 - along * c for c in z]
+    x[least] = 1.0 - along * along
+    size = math.hypot(*x)
+    return x[0] / size, x[1] / size, x[2] / size
 
 
 def vector_fault(value: Any, what: str, *, direction: bool = False) -> str | None:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.model.contact_rows import ROWS, Contact, curve_faults, in_contact, miss_faults, row_of, takes_curves
+from mechgraph.model.curves import Curve
 from mechgraph.model.field_format import (
     DIRECTION,
     LINK_NAME,
@@ -25,6 +26,7 @@ from mechgraph.model.field_format import (
 )
 from mechgraph.model.hertz import Hertz
 from mechgraph.model.numeric import plain
+from mechgraph.model.numeric import second_direction as second_direction
 from mechgraph.model.pair_table import TABLE
 from mechgraph.model.pair_type import PairType
 from mechgraph.quantities import is_numeric, shown, wrong
@@ -39,22 +41,6 @@ PERPENDICULAR = 1e-6
 def largest_cosine(tol: Any) -> float:
     """The same in a mechanism whose directions are meant to ``tol``: both directions may be off by so much."""
     return max(PERPENDICULAR, 2.0 * tol) if is_numeric(tol, ()) else PERPENDICULAR
-
-
-@lru_cache
-def second_direction(axis: Any) -> tuple[float, ...]:
-    """The global axis least aligned with ``axis``, made perpendicular to it: what fills ``second`` where it is left out."""
-    length = math.hypot(*axis)
-    if not length > 0:
-        return (1.0, 0.0, 0.0)
-    z = [c / length for c in axis]
-    sizes = [abs(c) for c in z]
-    least = sizes.index(min(sizes))
-    along = z[least]
-    x = [0.0 - along * c for c in z]
-    x[least] = 1.0 - along * along
-    size = math.hypot(*x)
-    return x[0] / size, x[1] / size, x[2] / size
 
 
 @dataclass(frozen=True)
@@ -115,10 +101,15 @@ class Pair(Described):
         groove: where it would have to pull, the solution says that b lifts off).
     radius : of the ball or cylinder on link b.
     hertz : Hertz, materials and what else the pressure in a contact takes.
+    curve : a ``Curve`` in the frame of link a, along which the marker travels: of P, C, Sg, and of the types Ps and Kc that need one. Then
+        ``point`` is a place on it (where it begins if left out), and axis and second direction are those of its frame there. With
+        ``on_b`` instead of a point, coordinates are arc lengths from where the curve begins (see ``start``).
+    curve_b : the curve on link b that touches it (Kc); a straight face where left out.
+    roller : radius of a roller that runs on the curve; ``point`` is its centre.
     """
 
     name: Annotated[str, TEXT("freedoms are named NAME.Rz and so on")]
-    type: Annotated[PairType, TEXT("R P H C U S E Sc Sg Cp Sp Tc Fr W, or a `[[pair_type]]`")]
+    type: Annotated[PairType, TEXT("R P H C U S E Sc Sg Cp Sp Tc Fr W, with a curve Ps Kc, or a `[[pair_type]]`")]
     a: Annotated[str, LINK_NAME("first link; groove, plane and slot belong to it; the reaction is that of `a` on `b`")]
     b: Annotated[str, LINK_NAME("second link")]
     point: Annotated[Any, POINT("a point of the pair, global, at the declared configuration", LENGTH)] = None
@@ -152,6 +143,12 @@ class Pair(Described):
     ] = "form"
     radius: Annotated[float | None, POSITIVE("of the ball or cylinder of a contact, on b", LENGTH)] = None
     hertz: Annotated[Hertz | None, NESTED("materials of a contact, for its pressure", table="hertz")] = None
+    curve: Annotated[Curve | None, NESTED("curve on link a along which the marker travels", table="curve")] = None
+    curve_b: Annotated[Curve | None, NESTED("curve on link b, of Kc", table="curve", default="a straight face")] = None
+    roller: Annotated[
+        float | None, POSITIVE("radius of a roller that runs on `curve`; `point` is its centre", LENGTH, default="none")
+    ] = None
+    contact: ClassVar[Contact | None] = None
 
     def __init__(
         self,
@@ -170,15 +167,25 @@ class Pair(Described):
         closed: str = "form",
         radius: float | None = None,
         hertz: Hertz | None = None,
+        curve: Curve | None = None,
+        curve_b: Curve | None = None,
+        roller: float | None = None,
     ) -> None:
-        row = TABLE.get(type, type) if isinstance(type, str) else type
-        point, axis, second = plain(point), plain(axis), plain(second)
+        row = row_of(type, curve)
+        point, axis, second, roller = plain(point), plain(axis), plain(second), plain(roller)
+        object.__setattr__(self, "contact", None)
+        if isinstance(curve, Curve) and not curve_faults(row, curve, curve_b, roller, point, ""):
+            contact = in_contact(row, curve, curve_b, roller, point, axis if point is not None else None)
+            row, (second, _, axis, point) = contact.row, contact.marker.T.tolist()
+            object.__setattr__(self, "contact", contact)
+            if on_b is not None:
+                on_a, point, axis, second = Marker(point, axis, second), None, None, None
         if axis is None and point is not None and isinstance(row, PairType) and not row.directed:
             axis = (0.0, 0.0, 1.0)
         if second is None and is_numeric(axis, (3,)):
             second = second_direction(axis)
-        values: tuple[Any, ...] = (name, row, a, b, point, axis, second, plain(pitch), plain(lead), on_a, on_b)
-        values += (closed, plain(radius), hertz)
+        placed = (plain(point), plain(axis), plain(second), plain(pitch), plain(lead), on_a, on_b)
+        values: tuple[Any, ...] = (name, row, a, b, *placed, closed, plain(radius), hertz, curve, curve_b, roller)
         for key, value in zip(self.formats, values, strict=True):
             object.__setattr__(self, key, value)
 
@@ -190,7 +197,13 @@ class Pair(Described):
     @property
     def says_more(self) -> bool:
         """Whether it says more than its type and where it sits."""
-        return (self.pitch, self.lead, self.radius, self.hertz, self.closed) != (None, None, None, None, "form")
+        said = (self.pitch, self.lead, self.radius, self.hertz, self.curve, self.curve_b, self.roller, self.closed)
+        return said != (*(None,) * 7, "form") or bool(takes_curves(self.type))
+
+    @property
+    def curves(self) -> dict[str, Any]:
+        """What says along which curves it travels."""
+        return {"curve": self.curve, "curve_b": self.curve_b, "roller": self.roller}
 
     @property
     def pitch_per_radian(self) -> float:
@@ -224,7 +237,9 @@ class Pair(Described):
         if not isinstance(self.name, str) or not self.name:
             return [f"{where}the name must be a non-empty text"]
         if not isinstance(self.type, PairType):
-            return [f"{where}unknown type {shown(self.type)}; known: {', '.join(TABLE)}, or pass a PairType"]
+            return [
+                f"{where}unknown type {shown(self.type)}; known: {', '.join({**TABLE, **ROWS})}, or pass a PairType"
+            ]
         found: list[str | None] = [
             wrong(end, where + side, "the name of a link")
             for side, end in (("a", self.a), ("b", self.b))
@@ -232,7 +247,7 @@ class Pair(Described):
         ]
         if isinstance(self.a, str) and isinstance(self.b, str) and self.a == self.b:
             found.append(f"{where}joins link {self.a!r} to itself; a pair joins two links")
-        found += [*self._pitch_faults(where), *self._contact_faults(where)]
+        found += [*self._pitch_faults(where), *self._contact_faults(where), *self._curve_faults(where, tol or 0.0)]
         most = largest_cosine(tol) if self.type.square_second else PARALLEL_COSINE
         if (self.on_a is None) != (self.on_b is None):
             missing = "on_b" if self.on_b is None else "on_a"
@@ -280,6 +295,20 @@ class Pair(Described):
             yield wrong(groove, f"{where}hertz.groove_radius", f"a number above the radius {self.radius:g} of the ball")
         if form.along_line and self.hertz.length is None:
             yield f"{where}hertz.length: {needed}"
+
+    def _curve_faults(self, where: str, tol: float) -> Iterator[str | None]:
+        """What is wrong with its curves, or with the contact on them."""
+        for name, given in (("curve", self.curve), ("curve_b", self.curve_b)):
+            if not isinstance(given, Curve | None):
+                yield wrong(given, where + name, "a Curve, such as mg.Curve.circle(radius=...)")
+        if self.contact is not None:
+            yield from miss_faults(self.contact, (self.curve, self.curve_b), tol, where)
+        elif isinstance(self.curve, Curve):
+            yield from curve_faults(self.type, self.curve, self.curve_b, self.roller, self.point, where)
+        elif self.curve_b is not None or self.roller:
+            yield f"{where}has a curve_b or a roller, but no curve; give curve=, or exchange links a and b"
+        elif takes_curves(self.type) and self.has_geometry:
+            yield f"{where}type {self.type.symbol} needs a curve, such as curve=mg.Curve.circle(radius=...)"
 
     def _pitch_faults(self, where: str) -> Iterator[str | None]:
         given = [(n, v) for n, v in (("pitch", self.pitch), ("lead", self.lead)) if v is not None]

@@ -54,6 +54,10 @@ class Row(Protocol):
     def computed_efforts(self) -> bool:
         """Whether the efforts are combined to be dual to the freedoms."""
 
+    @property
+    def computed_reactions(self) -> bool:
+        """Whether the components are combined with the efforts to do no work."""
+
 
 def places(row: Row) -> list[tuple[slice, slice]]:
     """For every factor of a row the places of its freedoms and of its state numbers."""
@@ -145,10 +149,18 @@ def dual(E: Array, S: Array) -> Array:
     return np.asarray(np.einsum("ignt,ntgf->ifnt", E, np.linalg.inv(unit)))
 
 
+def without_work(W: Array, E: Array, S: Array) -> Array:
+    """``W - E S^T W``: components ``(6, c, n, T)`` less the efforts ``E`` that they take in the freedoms ``S``, to which ``E`` is dual."""
+    return np.asarray(W - np.einsum("ifnt,jfnt,jcnt->icnt", E, S, W))
+
+
 def reactions_of(row: Row, pitch: Array, frames: Sequence[Array], x: Array | None = None) -> Array:
     """Reaction wrenches ``W``, ``(6, 6 - f, n, T)``: the row's components, or the null space of ``S^T``."""
     if row.reactions is not None:
-        return components_of(row.reactions, pitch, frames)
+        W = components_of(row.reactions, pitch, frames)
+        if not row.computed_reactions:
+            return W
+        return without_work(W, efforts_of(row, pitch, frames, x), twists_of(row, pitch, frames, x))
     return reciprocal(twists_of(row, pitch, frames, x), frames[-1])
 
 

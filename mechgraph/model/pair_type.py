@@ -84,6 +84,7 @@ class PairType:
     frame_before: tuple[int, ...]
     computed_efforts: bool
     touching: Touching | None
+    computed_reactions: bool
 
     def __init__(
         self,
@@ -248,6 +249,7 @@ def fill_row(
         "frame_before": before,
         "computed_efforts": False,
         "touching": touching,
+        "computed_reactions": False,
     }
     for key, value in fields.items():
         object.__setattr__(row, key, value)

@@ -16,6 +16,8 @@ import tomli_w
 
 from mechgraph.errors import ContentError, DeclarationError, FileError
 from mechgraph.model.chain import chain
+from mechgraph.model.contact_rows import takes_curves
+from mechgraph.model.curves import Curve
 from mechgraph.model.field_format import BY_FREEDOM, COEFFICIENTS, SIX, STANDS_AS, TABLE, TABLES, Described
 from mechgraph.model.file_format import DEGREES, KINDS, SCHEMA, TABLES_OF_FILE, USUAL
 from mechgraph.model.library import library_names, library_path
@@ -75,7 +77,9 @@ class _Reader:
         fields = self.fields(kind, raw, where)
         for key, value in fields.items():
             if table.fields[key].kind is TABLE:
-                fields[key] = self.item(table.fields[key].table, value, f"{where}.{key}")
+                inner = table.fields[key].table
+                read = self.of_kind if inner in KINDS else self.item
+                fields[key] = read(inner, value, f"{where}.{key}")
             elif table.fields[key].kind is BY_FREEDOM:
                 fields[key] = self.by_freedom(value, f"{where}.{key}")
             elif table.fields[key].kind is TABLES and kind in NESTED:
@@ -272,6 +276,8 @@ def _plain(value: Any, where: str, path: str) -> Any:
         raise FileError(path, f"{where} is a callable; a file holds numbers only. Sample it first")
     if isinstance(value, PairType):
         return value.symbol
+    if isinstance(value, Curve):
+        return _item_data("curve", value, path)
     if isinstance(value, Described):
         return _data(value, path, where)
     if isinstance(value, np.ndarray):
@@ -296,7 +302,9 @@ def _data(item: Described, path: str, where: str) -> dict[str, Any]:
 def to_data(m: Mechanism, path: str = "") -> dict[str, Any]:
     """The content of the TOML file of a mechanism."""
     data: dict[str, Any] = {"schema": SCHEMA}
-    own = {p.type.symbol: p.type for p in m.pairs if PAIR_TABLE.get(p.type.symbol) != p.type}
+    own = {
+        p.type.symbol: p.type for p in m.pairs if not takes_curves(p.type) and PAIR_TABLE.get(p.type.symbol) != p.type
+    }
     if own:
         data["pair_type"] = [_type_data(row, path) for row in own.values()]
     for key, attribute in TABLES_OF_FILE["file"].attributes.items():

@@ -81,11 +81,16 @@ def _user_inertias(here: Configuration) -> Array:
 
 
 def _user_screws(par: Parameters, wrenches: Array, couples: list[bool]) -> Array:
-    """Unit wrenches ``(6, n, T)``: arms in the user's length, about the global origin; unit couples stay."""
+    """Unit wrenches ``(6, n, T)``: arms in the user's length, about the global origin; unit couples stay, forces that go with them are
+    per length.
+    """
     out = wrenches.copy()
     for j in range(out.shape[1]):
-        if not (j < len(couples) and couples[j]):
-            out[:3, j] = par.L * out[:3, j] + cross(par.origin[:, None], out[3:, j])
+        if j < len(couples) and couples[j]:
+            out[3:, j] /= par.L
+        else:
+            out[:3, j] *= par.L
+        out[:3, j] += cross(par.origin[:, None], out[3:, j])
     return out
 
 

@@ -1,0 +1,220 @@
+"""Pairs whose marker travels along curves: rows of data with places for curves, which a pair fills in.
+
+``Pair(..., curve=...)`` takes the row of its type from here. The frames of a row follow the curve, so that its components keep their
+meaning: Fx and Fy of a sphere in a groove act at right angles to it, Fy of two curves in contact along their common normal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+from itertools import count
+from typing import Any
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.model import pair_kinematics as evaluation
+from mechgraph.model.along_curve import AlongCurve, Beside, X, Z
+from mechgraph.model.curves import Curve, Line
+from mechgraph.model.pair_table import TABLE
+from mechgraph.model.pair_type import PairType, fill_row
+from mechgraph.model.travel import Travel, outside, roller_faults, shape_faults
+from mechgraph.quantities import is_numeric
+
+ALONG, FOLLOWING = AlongCurve("Ts", Z), AlongCurve("Ts", X)
+"""Places for a curve on link a, along z and along x of the frame."""
+BESIDE = AlongCurve("Tsb", X, back=True)
+"""A place for a curve on link b."""
+OFF_CURVE = 1e-6
+"""Part of the extent of a curve, or angle, by which the contact may miss it."""
+PLACE_STEP = 1e-12
+"""Part of its length to which a place on a curve is rounded, so that the place of that place is the same."""
+TRIED_PLACES = 16
+"""Places at which it is tried whether components do work."""
+CLOSING_ANGLE = 1e-9
+"""Closing angle of a frame that counts."""
+
+
+def _row(
+    symbol: str, name: str, freedoms: Sequence[object], reactions: Sequence[str], efforts: Sequence[str]
+) -> PairType:
+    row = object.__new__(PairType)
+    fill_row(row, symbol, name, freedoms, reactions, efforts)
+    object.__setattr__(row, "computed_efforts", True)
+    return row
+
+
+ROWS = {
+    row.symbol: row
+    for row in (
+        _row("P", "rail and carriage", [ALONG], ["Fx@1", "Fy@1", "Mx@1", "My@1", "Mz@1"], ["Fz@1"]),
+        _row("C", "round rail and carriage", [ALONG, "Rz"], ["Fx@1", "Fy@1", "Mx@1", "My@1"], ["Fz@1", "Mz@1"]),
+        _row("Sg", "sphere in curved groove", [ALONG, "rotation"], ["Fx@1", "Fy@1"], ["Fz@1", "Mx@1", "My@1", "Mz@1"]),
+        _row("Ps", "pin in curved slot", [FOLLOWING, "Rz"], ["Fy@1", "Fz@1", "Mx@1", "My@1"], ["Fx@1", "Mz@1"]),
+        _row("Kc", "curves in contact", [FOLLOWING, BESIDE], ["Fy@1", "Fz@1", "Mx@1", "My@1"], ["Fx@1", "Mz@1"]),
+    )
+}
+"""The rows by the symbols of their types; of P, C and Sg those with a curve."""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A row with its curves, the marker at coordinates zero on link a ``(3, 4)``, and by how much the contact misses the curves."""
+
+    row: PairType
+    marker: Array
+    misses: tuple[float, ...]
+
+
+def row_of(type: Any, curve: Any) -> Any:
+    """The row of a pair of a type (a symbol or a row) with or without a curve; what is no type is kept."""
+    symbol = type.symbol if isinstance(type, PairType) and (curve is not None or takes_curves(type)) else type
+    if not isinstance(symbol, str):
+        return symbol
+    first, second = (ROWS, TABLE) if curve is not None else (TABLE, ROWS)
+    return first.get(symbol) or second.get(symbol) or type
+
+
+def takes_curves(row: PairType) -> tuple[AlongCurve, ...]:
+    """The places for curves in a row."""
+    return tuple(step for step in row.steps if isinstance(step, AlongCurve))
+
+
+def in_contact(
+    row: PairType,
+    curve: Curve,
+    curve_b: Curve | None = None,
+    roller: float | None = None,
+    point: Sequence[float] | None = None,
+    axis: Sequence[float] | None = None,
+) -> Contact:
+    """A row with its curves put in; coordinates zero where the curves pass ``point`` (where they begin if it is left out).
+
+    ``axis`` says in which sense of two z points; ``roller`` is that of the roller whose centre is the point.
+    """
+    first = takes_curves(row)[0]
+    placed = _placed(first, _path(curve, roller, point), point)
+    marker = placed.start
+    if axis is not None and marker[:, 2] @ np.asarray(axis) < 0:
+        placed = replace(placed, reversed=placed.tangent == Z, turned=placed.tangent == X)
+        marker = placed.start
+    factors, off = [placed], [_off(placed, point)]
+    if len(takes_curves(row)) > 1:
+        other = curve_b or Line(point=tuple(marker[:, 3]), direction=tuple(marker[:, 0]))
+        second = _placed(takes_curves(row)[1], other, marker[:, 3])
+        back = second.start
+        second = replace(
+            second, reversed=bool(back[:, 0] @ marker[:, 0] < 0), turned=bool(back[:, 2] @ marker[:, 2] < 0)
+        )
+        factors.append(second)
+        off += [_off(second, marker[:, 3]), float(np.linalg.norm(np.cross(back[:, 0], marker[:, 0])))]
+    return Contact(_filled(row, factors), marker, tuple(off))
+
+
+def _path(curve: Curve, roller: float | None, point: Sequence[float] | None) -> Curve:
+    """The curve itself, or that of the centre of a roller, on the side of the point, or outside."""
+    return Beside(base=curve, distance=_side(curve, point) * roller) if roller else curve
+
+
+def _side(curve: Curve, point: Sequence[float] | None) -> float:
+    travel: Travel = curve.once(Travel)
+    if point is None:
+        return outside(curve) if curve.is_closed else 1.0
+    s, _ = travel.nearest(np.asarray(point))
+    here = travel.at(np.array(s))
+    return 1.0 if (np.asarray(point) - here.x) @ here.y > 0 else -1.0
+
+
+def _placed(place: AlongCurve, curve: Curve, point: Sequence[float] | Array | None) -> AlongCurve:
+    travel: Travel = curve.once(Travel)
+    begin = travel.begin if np.isfinite(travel.begin) else 0.0
+    home = begin if point is None else travel.nearest(np.asarray(point))[0]
+    return replace(place, curve=curve, home=PLACE_STEP * travel.length * round(home / (PLACE_STEP * travel.length)))
+
+
+def _off(factor: AlongCurve, point: Sequence[float] | Array | None) -> float:
+    return 0.0 if point is None else float(np.linalg.norm(factor.start[:, 3] - point))
+
+
+def _filled(row: PairType, factors: Sequence[AlongCurve]) -> PairType:
+    """The row with factors in the places for curves; components are combined with efforts where they would do work by themselves."""
+    out = copy(row)
+    for name in ("factors", "nx", "has_lengths", "takes_pitch"):
+        vars(out).pop(name, None)
+    left = iter(factors)
+    steps = tuple(next(left) if isinstance(step, AlongCurve) else step for step in row.steps)
+    object.__setattr__(out, "steps", steps)
+    x = evaluation.random_coordinates(out, np.random.default_rng(12345), 1, TRIED_PLACES)
+    for step, (_, numbers) in zip(steps, evaluation.places(out), strict=True):
+        if isinstance(step, AlongCurve):
+            low, high = (end if np.isfinite(end) else np.copysign(step.travel.length, end) for end in step.range)
+            x[numbers] = np.linspace(low, high, TRIED_PLACES)
+    pitch = np.zeros((1, 1))
+    frames = evaluation.frames_of(out, pitch, x)
+    S, W = evaluation.twists_of(out, pitch, frames, x), evaluation.reactions_of(out, pitch, frames, x)
+    work = np.abs(np.einsum("ifnt,icnt->fcnt", S, W)).max(initial=0.0)
+    object.__setattr__(out, "computed_reactions", bool(work > 1e-12 * max(1.0, np.abs(S).max())))
+    return out
+
+
+# --- faults ----------------------------------------------------------------------------------------------------------
+
+
+def curve_faults(row: Any, curve: Curve, curve_b: Any, roller: Any, point: Any, where: str) -> list[str]:
+    """What is wrong with curves in a row, before they are put in."""
+    if not isinstance(row, PairType) or not takes_curves(row):
+        return [f"{where}curve: a pair {getattr(row, 'symbol', '?')} takes none; those that do: {', '.join(ROWS)}"]
+    if (
+        not isinstance(curve_b, Curve | None)
+        or not (roller is None or is_numeric(roller, ()))
+        or not (point is None or is_numeric(point, (3,)))
+    ):
+        return [f"{where}curve: curve_b, roller or point is at fault"]
+    places = takes_curves(row)
+    curves = {name: given for name, given in (("curve", curve), ("curve_b", curve_b)) if given is not None}
+    found = [fault for name, given in curves.items() for fault in _of_shape(given, f"{where}{name}.")]
+    if found:
+        return found
+    if curve_b is not None and len(places) < 2:
+        found.append(
+            f"{where}curve_b: a pair {row.symbol} takes one curve, on link a; exchange a and b for one on link b"
+        )
+    plane = roller or any(place.tangent == X for place in places)
+    found += [
+        f"{where}{name}: is no plane curve, as a pair {row.symbol}{' with a roller' if roller else ''} needs"
+        for name, given in curves.items()
+        if plane and not given.once(Travel).is_plane
+    ]
+    if roller and not found:
+        found += roller_faults(curve, roller, "roller: ", where, _side(curve, point))
+    holds_roll = places[0].tangent == Z and not any(freedom.turns for freedom in row.freedoms)
+    closing = curve.once(Travel).closing
+    if holds_roll and abs(np.sin(closing / 2)) > CLOSING_ANGLE:
+        found.append(
+            f"{where}curve: its frame comes back turned by {np.rad2deg(closing):.6g} degrees about the tangent after one round, and this "
+            "pair holds roll; guide the frame, frame='guided' with a guide, or take a C or Sg"
+        )
+    return found
+
+
+def _of_shape(curve: Curve, where: str) -> list[str]:
+    return curve.faults(where) or shape_faults(curve, where)
+
+
+def miss_faults(contact: Contact, curves: Sequence[Curve | None], tol: float, where: str) -> Iterator[str]:
+    """Contacts that are not on their curves, or where curves cross."""
+    names = iter(("curve", "curve_b", ""))
+    for miss, name, i in zip(contact.misses, names, count()):
+        size = curves[i].once(Travel).length if i < len(curves) and curves[i] is not None else 1.0  # type: ignore[union-attr]
+        if not miss > max(OFF_CURVE, tol) * size:
+            continue
+        if name:
+            at = ", ".join(f"{v:.6g}" for v in contact.marker[:, 3])
+            yield (
+                f"{where}point: is {miss:.6g} off its {name}, which is nearest at ({at}); give that point, or the marker on link b "
+                "(on_b=mg.Marker(...), and no point) to have the mechanism assembled"
+            )
+        else:
+            yield f"{where}curve_b: crosses the curve at {np.rad2deg(miss):.6g} degrees at the point; curves in contact touch"

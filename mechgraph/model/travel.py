@@ -1,0 +1,294 @@
+"""A curve by its arc length: the parameter there, tangent, curvature, and the frame that travels along it.
+
+With arc length s, tangent t = dx/ds and the third axis k of the frame (y = k x t), the frame turns by
+
+    w = t x t' + r t,     r = 0 (minimizing),   r = (d . t) (t' . y) / |d - (d . t) t| (guided by d),
+
+a prime for d/ds. Source: Bishop, There is more than one way to frame a curve, Amer. Math. Monthly 82, 1975 (minimizing frames).
+Parameter and turn of a minimizing frame are integrals, kept as polynomials (Hermite) between points that are close enough.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy
+
+from mechgraph.algebra.se3 import Array, cross
+from mechgraph.model.curves import CLOSED_GAP, ORDERS, Curve, Pieces
+from mechgraph.model.numeric import second_direction
+from mechgraph.quantities import shown
+
+STRAIGHT, IN_PLANE = 1e-9, 1e-9
+"""Spread of the tangents across a direction, and across a plane, up to which a curve is straight or plane."""
+STANDSTILL = 1e-7
+"""Part of its greatest speed below which a curve stands still."""
+GUIDES_TRIED = 200
+"""Directions that are tried as guide of a minimizing frame."""
+COMPLEX_STEP = 1e-30
+"""Imaginary step of a derivative."""
+NEAREST_STEPS = 40
+"""Steps of Newton's method to the nearest point, at most."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """A curve at arc lengths ``(...)``: position, tangent and its rates by the arc length ``(3, ...)``, axes y and k, rates of turning."""
+
+    x: Array
+    t: Array
+    dt: Array
+    y: Array
+    k: Array
+    w: Array
+    dw: Array
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return np.asarray((a * b).sum(axis=0))
+
+
+class Travel:
+    """Arc length and frames of a curve without faults."""
+
+    def __init__(self, curve: Curve) -> None:
+        self.curve = curve
+        u = curve.breaks
+        self.speed = curve.speed
+        if self.speed is not None:
+            s = self.speed * (u - (curve.ends[0] if np.isfinite(curve.ends[0]) else 0.0))
+        else:
+            s = np.concatenate([[0.0], np.cumsum(_lengths(curve, u))])
+            self._parameter = Pieces.meeting(s, [u, *_parameter_rates(curve.at(u))])
+        self.s = s
+        self.begin, self.end = (float(s[0]), float(s[-1])) if np.isfinite(curve.ends[0]) else (-np.inf, np.inf)
+        self.length = float(s[-1] - s[0])
+        self.is_closed = curve.is_closed
+        self.guide, self.is_plane = self._guide()
+        self.minimizing = curve.frame == "minimizing"
+        self.closing = 0.0
+        self._turn: Pieces | None = None
+        if self.minimizing and not self.is_plane:
+            self._find_turn()
+
+    def _guide(self) -> tuple[Array, bool]:
+        """The direction near which the third axis of the frame stays, and whether the curve lies in a plane at right angles to it."""
+        t = self._rates(self._parameter_at(self.s))[1]
+        axes = np.linalg.svd(t @ t.T)[0]
+        given = self.curve.guide if self.curve.frame == "guided" else None
+        if given is not None:
+            d = np.asarray(given, dtype=float) / np.linalg.norm(given)
+            return d, bool(np.abs(d @ t).max() < IN_PLANE)
+        if np.abs(t - t[:, :1]).max() < STRAIGHT:
+            return np.cross(t[:, 0], second_direction(tuple(t[:, 0].tolist()))), True
+        axis = self.curve.normal
+        if axis is not None and (self.curve.frame == "guided" or np.abs(axis @ t).max() < IN_PLANE):
+            return axis, bool(np.abs(axis @ t).max() < IN_PLANE)
+        normal = axes[:, 2]
+        if np.abs(normal @ t).max() < IN_PLANE:
+            return _right_handed(normal, self.curve.at(self.curve.breaks)[0]), True
+        if self.curve.frame == "guided":
+            return _right_handed(normal, self.curve.at(self.curve.breaks)[0]), False
+        return _far_from(t), False
+
+    # --- by arc length -----------------------------------------------------------------------------------------------
+
+    def _parameter_at(self, s: Array) -> Array:
+        """The parameter at arc lengths; beyond the ends of an open curve at the speed that it has there."""
+        begin = self.curve.ends[0] if np.isfinite(self.curve.ends[0]) else 0.0
+        if self.speed is not None:
+            return np.asarray(begin + s / self.speed)
+        inside = (
+            s.real - self._rounds(s.real) * self.length if self.is_closed else np.clip(s.real, self.begin, self.end)
+        )
+        u = self._parameter.at(inside, 1)[0]
+        beyond = s - s.real if self.is_closed else s - inside
+        return np.asarray(u + beyond * _parameter_rates(self.curve.at(u))[0]) if np.any(beyond) else u
+
+    def _rounds(self, s: Array) -> Array:
+        return np.floor((s - self.begin) / self.length)
+
+    def _rates(self, u: Array) -> tuple[Array, Array, Array, Array]:
+        """Position and its first three derivatives by the arc length, ``(3, ...)`` each."""
+        x = self.curve.at(u)
+        u1, u2, u3 = _parameter_rates(x)
+        return x[0], x[1] * u1, x[2] * u1**2 + x[1] * u2, x[3] * u1**3 + 3 * x[2] * u1 * u2 + x[1] * u3
+
+    def guided(self, s: Array) -> tuple[Array, ...]:
+        """``x, t, t', t'', y, k, r, r'`` of the frame guided by the direction."""
+        x, t, dt, ddt = self._rates(self._parameter_at(s))
+        d = np.broadcast_to(self.guide.reshape(3, *(1,) * s.ndim), t.shape)
+        c, dc = _dot(d, t), _dot(d, dt)
+        m = np.sqrt(1.0 - c * c)
+        k = (d - c * t) / m
+        y = cross(k, t)
+        bend = _dot(dt, y)
+        r = c * bend / m
+        dy = cross(cross(t, dt) + r * t, y)
+        dr = (dc * bend + c * (_dot(ddt, y) + _dot(dt, dy))) / m + c * c * dc * bend / m**3
+        return x, t, dt, ddt, y, k, r, dr
+
+    def at(self, s: Array) -> Place:
+        """Position and frame at arc lengths ``(...)``, real or complex."""
+        x, t, dt, ddt, y, k, r, dr = self.guided(s)
+        w, dw = cross(t, dt), cross(t, ddt)
+        if not self.minimizing:
+            w, dw = w + r * t, dw + dr * t + r * dt
+        if self._turn is not None:
+            rounds = self._rounds(s.real) if self.is_closed else np.zeros(s.shape)
+            a = self._turn.at(s.real - rounds * self.length, 1)[0] + rounds * self.closing - (s - s.real) * r
+            y, k = np.cos(a) * y + np.sin(a) * k, np.cos(a) * k - np.sin(a) * y
+        return Place(x, t, dt, y, k, w, dw)
+
+    def _find_turn(self) -> None:
+        """The angle by which the minimizing frame is turned about the tangent against the guided one: ``a' = -r``."""
+        nodes, weights = np.polynomial.legendre.leggauss(10)
+        half = np.diff(self.s) / 2
+        rates = self.guided(self.s[:-1, None] + half[:, None] * (1 + nodes))[6]
+        a = -np.concatenate([[0.0], np.cumsum((rates @ weights) * half)])
+        *_, r, dr = self.guided(self.s)
+        self._turn = Pieces.meeting(self.s, [a, -r, -dr, -self._turn_rate(dr)])
+        self.closing = float(a[-1]) if self.is_closed else 0.0
+
+    def _turn_rate(self, dr: Array) -> Array:
+        """``r''``, of which the fourth derivative of the curve is part: by a complex step, or a spline where that is not known."""
+        if self.curve.orders < ORDERS:
+            spline: Any = scipy.interpolate.make_interp_spline(self.s, dr, 5)
+            return np.asarray(spline(self.s, 1))
+        ahead: Array = self.s + 1j * COMPLEX_STEP  # type: ignore[assignment]
+        return np.asarray(self.guided(ahead)[7].imag / COMPLEX_STEP)
+
+    # --- facts -------------------------------------------------------------------------------------------------------
+
+    def curvature(self, s: Array) -> Array:
+        """Curvature ``|t'|``; of a plane curve with the sign of ``t' . y``, positive where it bends towards y."""
+        here = self.at(s)
+        return _dot(here.dt, here.y) if self.is_plane else np.asarray(np.sqrt(_dot(here.dt, here.dt)))
+
+    def nearest(self, p: Array) -> tuple[float, float]:
+        """Arc length of the point of the curve that is nearest to ``p (3,)``, and its distance."""
+        s: Any = self._first(p)
+        for _ in range(NEAREST_STEPS):
+            x, t, dt, _ = self._rates(self._parameter_at(np.array([s])))
+            off = (x - p[:, None])[:, 0]
+            slope = 1.0 + off @ dt[:, 0]
+            step = float(off @ t[:, 0]) / (slope if slope > 0.1 else 1.0)
+            s = s - step if self.is_closed else min(max(s - step, self.begin), self.end)
+            if np.abs(step) < 1e-15 * self.length:
+                break
+        if self.is_closed:
+            s -= float(self._rounds(np.array(s))) * self.length
+        x = self._rates(self._parameter_at(np.array([s])))[0][:, 0]
+        return float(s), float(np.linalg.norm(x - p))
+
+    def _first(self, p: Array) -> float:
+        """A guess of the nearest arc length; of an endless curve by its advance."""
+        s = self.s
+        if np.isinf(self.begin):
+            x = self._rates(self._parameter_at(s))[0]
+            chord = x[:, -1] - x[:, 0]
+            s = s + (p - x.mean(axis=1)) @ chord / (chord @ chord) * self.length
+        x = self._rates(self._parameter_at(s))[0]
+        return float(s[np.argmin(np.linalg.norm(x - p[:, None], axis=0))])
+
+
+def _parameter_rates(x: Array) -> tuple[Array, Array, Array]:
+    """Three derivatives of the parameter by the arc length, from position and derivatives ``(5, 3, ...)`` by the parameter."""
+    u1 = 1.0 / np.sqrt(_dot(x[1], x[1]))
+    a, b = _dot(x[1], x[2]), _dot(x[2], x[2]) + _dot(x[1], x[3])
+    return u1, -a * u1**4, -b * u1**5 + 4 * a**2 * u1**7
+
+
+def _lengths(curve: Curve, u: Array) -> Array:
+    """Arc lengths between parameters, by Gauss's rule."""
+    nodes, weights = np.polynomial.legendre.leggauss(10)
+    half = np.diff(u) / 2
+    x = curve.at(u[:-1, None] + half[:, None] * (1 + nodes))[1]
+    return np.asarray((np.sqrt(_dot(x, x)) @ weights) * half)
+
+
+def _right_handed(normal: Array, x: Array) -> Array:
+    """The normal about which points ``(3, n)`` are passed in the positive sense."""
+    about = np.cross(x[:, :-1] - x[:, :1], np.diff(x), axis=0).sum(axis=1) @ normal
+    if abs(about) < 1e-9 * np.ptp(x, axis=1).max() ** 2:
+        about = normal[np.argmax(np.abs(normal))]
+    return normal if about > 0 else -normal
+
+
+def _far_from(t: Array) -> Array:
+    """The direction that keeps farthest from all tangents ``(3, n)`` and their opposites, of many on a spiral over the sphere."""
+    i = np.arange(GUIDES_TRIED) + 0.5
+    z, angle = 1 - i / GUIDES_TRIED, np.pi * (1 + np.sqrt(5.0)) * i
+    tried = np.stack([np.sqrt(1 - z * z) * np.cos(angle), np.sqrt(1 - z * z) * np.sin(angle), z])
+    return np.asarray(tried[:, np.argmin(np.abs(tried.T @ t).max(axis=1))])
+
+
+def shape_faults(curve: Curve, where: str) -> list[str]:
+    """Places where a curve cannot be followed: cusps, gaps of one that must be closed, a guide along the tangent."""
+    x = curve.at(curve.breaks)
+    v = np.sqrt(_dot(x[1], x[1]))
+    turns = _dot(x[1][:, 1:], x[1][:, :-1]) <= 0
+    slow = np.flatnonzero((v < STANDSTILL * v.max()) | np.append(turns, False))
+    if slow.size:
+        return [
+            f"{where}has a cusp at {_point(x[0][:, slow[0]])} (parameter {curve.breaks[slow[0]]:.6g}); end it before that"
+        ]
+    if curve.roller:
+        found = roller_faults(curve, curve.roller, "undercut: ", where)
+        if found:
+            return found
+    if not curve.is_closed:
+        return _guide_faults(curve, x[1] / v, x[0], where)
+    gap, turn = np.linalg.norm(x[0][:, -1] - x[0][:, 0]), np.linalg.norm(x[1][:, -1] / v[-1] - x[1][:, 0] / v[0])
+    if gap > 1e3 * CLOSED_GAP * np.ptp(x[0], axis=1).max() or turn > 1e-6:
+        return [
+            f"{where}is not closed: its ends are {gap:.3g} apart, their tangents differ by {turn:.3g} rad; let it end where it begins, "
+            "or declare it open"
+        ]
+    return _guide_faults(curve, x[1] / v, x[0], where)
+
+
+def outside(curve: Curve) -> float:
+    """1 where the normal y of a closed plane curve points outwards, -1 where it points inwards."""
+    travel = curve.once(Travel)
+    here = travel.at(travel.s)
+    about = _dot(
+        cross(here.x[:, :-1] - here.x[:, :1], np.diff(here.x)),
+        np.broadcast_to(travel.guide[:, None], here.x[:, 1:].shape),
+    )
+    return -1.0 if about.sum() > 0 else 1.0
+
+
+def roller_faults(curve: Curve, radius: float, what: str, where: str, side: float | None = None) -> list[str]:
+    """Where a roller is larger than the radius of curvature of the path of its centre (``side`` None: that path is ``curve``, on the
+    outside of the shape) or of the curve on which it runs, with its centre on the side of the normal y (1) or the other (-1).
+    """
+    travel = curve.once(Travel)
+    towards = -outside(curve) if side is None else side
+    bend = towards * travel.curvature(travel.s)
+    worst = int(np.argmax(bend))
+    if radius * bend[worst] < 1 - STANDSTILL:
+        return []
+    return [
+        f"{where}{what}the roller of radius {radius:.6g} is larger than the radius of curvature {1 / bend[worst]:.6g} at "
+        f"{_point(travel.at(travel.s[worst : worst + 1]).x[:, 0])}; make it smaller, or the curve rounder"
+    ]
+
+
+def _guide_faults(curve: Curve, t: Array, x: Array, where: str) -> list[str]:
+    if curve.frame != "guided" or curve.guide is None:
+        return []
+    d = np.asarray(curve.guide) / np.linalg.norm(curve.guide)
+    along = np.abs(d @ t)
+    worst = int(np.argmax(along))
+    if along[worst] < 1 - 1e-6:
+        return []
+    return [
+        f"{where}guide = {shown(curve.guide)}: is the direction of the curve at {_point(x[:, worst])}; give another, or frame='minimizing'"
+    ]
+
+
+def _point(x: Array) -> str:
+    return "(" + ", ".join(f"{v:.6g}" for v in x) + ")"

@@ -1,0 +1,309 @@
+"""Markers that travel along curves: limits that are other pairs, identities of mechanics, and what is said of curves that will not do."""
+
+import pickle
+
+import numpy as np
+import pytest
+import strategies
+from identities.test_complex_step import closed, holds
+from identities.test_engines import assert_engines_agree
+from numpy.testing import assert_allclose
+
+import mechgraph as mg
+from mechgraph.model.curves import CURVES
+from mechgraph.model.travel import Travel
+
+T = np.linspace(0.0, 1.0, 7)
+ANGLE = np.linspace(0, 2 * np.pi, 37)
+
+
+def cam(**more):
+    lift = {"lift": 0.2 * (1 - np.cos(ANGLE)), "slope": 0.2 * np.sin(ANGLE), "bend": 0.2 * np.cos(ANGLE)}
+    return mg.Curve.cam(**{"angle": ANGLE, "base_radius": 1.0, **lift, **more})
+
+
+def spiral(u):
+    """``(r cos u, r sin u, h u)`` of a growing radius, with three derivatives."""
+    c, s, r = np.cos(u), np.sin(u), 1 + 0.1 * u
+    rings = [
+        (r * c, r * s),
+        (0.1 * c - r * s, 0.1 * s + r * c),
+        (-0.2 * s - r * c, 0.2 * c - r * s),
+        (r * s - 0.3 * c, -r * c - 0.3 * s),
+    ]
+    return [np.stack([x, y, h + 0 * u]) for (x, y), h in zip(rings, (0.3 * u, 0.3, 0, 0), strict=True)]
+
+
+KNOT = np.stack(
+    [(2 + np.cos(1.5 * ANGLE)) * np.cos(ANGLE), (2 + np.cos(1.5 * ANGLE)) * np.sin(ANGLE), np.sin(1.5 * ANGLE)], axis=1
+)
+TREFOIL = np.stack(
+    [(2 + np.cos(3 * ANGLE)) * np.cos(2 * ANGLE), (2 + np.cos(3 * ANGLE)) * np.sin(2 * ANGLE), np.sin(3 * ANGLE)],
+    axis=1,
+)
+LOBES = {"lift": 0.4 * (1 - np.cos(3 * ANGLE)), "slope": 1.2 * np.sin(3 * ANGLE), "bend": 3.6 * np.cos(3 * ANGLE)}
+SAMPLE = {
+    "line": mg.Curve.line(point=(1, 2, 3), direction=(1, 1, 0)),
+    "circle": mg.Curve.circle(radius=2.0, axis=(1, 2, 3)),
+    "arc": mg.Curve.circle(radius=2.0, axis=(1, 2, 3), angles=(0.1, 1.0)),
+    "ellipse": mg.Curve.ellipse(a=2.0, b=1.0),
+    "helix": mg.Curve.helix(radius=1.0, pitch=0.3),
+    "guided": mg.Curve.helix(radius=1.0, pitch=0.3, frame="guided"),
+    "involute": mg.Curve.involute(radius=1.0, angles=(0.2, 1.5), mirrored=True),
+    "points": mg.Curve.through(points=KNOT[:20]),
+    "closed": mg.Curve.through(points=TREFOIL, closed=True),
+    "function": mg.Curve.function(position=spiral, ends_at=(0.0, 5.0)),
+    "roller": cam(roller_radius=0.2, offset=0.1),
+    "flat": cam(follower="flat"),
+}
+
+
+def rotation_of(here):
+    return np.stack([here.t, here.y, here.k], axis=1)
+
+
+@pytest.mark.parametrize("name", SAMPLE)
+def test_a_curve_by_its_arc_length(name):
+    """Tangent, curvature and turning of the frame are the derivatives of position and frame: complex step, and differences."""
+    travel = Travel(SAMPLE[name])
+    begin, end = max(travel.begin, -5.0), min(travel.end, 5.0)
+    s = begin + (end - begin) * np.array([0.05, 0.3, 0.52, 0.81, 0.93])
+    here, there = travel.at(s), travel.at(s + 1e-30j)
+    assert_allclose((here.t * here.t).sum(axis=0), 1, atol=1e-14)
+    assert_allclose(there.x.imag / 1e-30, here.t, atol=1e-13)
+    assert_allclose(there.t.imag / 1e-30, here.dt, atol=1e-13)
+    assert_allclose(there.w.imag / 1e-30, here.dw, atol=1e-12)
+    h = 1e-3
+    x = [travel.at(s + k * h) for k in (-2, -1, 1, 2)]
+    weights = np.array([1, -8, 8, -1]) / (12 * h)
+    assert_allclose(sum(w * p.x for w, p in zip(weights, x, strict=True)), here.t, atol=1e-9)
+    R, dR = rotation_of(here), sum(w * rotation_of(p) for w, p in zip(weights, x, strict=True))
+    W = np.einsum("ijt,kjt->ikt", dR, R)
+    assert_allclose(np.stack([W[2, 1], W[0, 2], W[1, 0]]), here.w, atol=1e-8)
+    if travel.minimizing:
+        assert_allclose((here.w * here.t).sum(axis=0), 0, atol=1e-14)
+    nearest, distance = travel.nearest(here.x[:, 2] + 0.01 * here.k[:, 2])
+    assert nearest == pytest.approx(s[2], abs=1e-10)
+    assert distance == pytest.approx(0.01)
+
+
+def test_the_length_of_an_ellipse():
+    """``4 a E(1 - b^2 / a^2)`` = 9.688448220547675 for half axes 2 and 1."""
+    assert Travel(SAMPLE["ellipse"]).length == pytest.approx(9.688448220547675, rel=1e-14)
+
+
+# --- limits ----------------------------------------------------------------------------------------------------------
+
+
+def ring(special, seed=3, n=6):
+    """A ring of ``n`` pairs R and a ``special`` one, loaded; the last link carries it to the frame."""
+    rng = np.random.default_rng(seed)
+    links = [mg.Link("frame"), *(strategies.body(rng, f"b{k}", rng.uniform(-1, 1, 3)) for k in range(n))]
+    names = [link.name for link in links]
+    pairs = [
+        mg.Pair(f"J{k}", "R", names[k], names[k + 1], point=rng.uniform(-1, 1, 3), axis=rng.normal(size=3))
+        for k in range(n)
+    ]
+    loads = [mg.Gravity((1, 2, -9.81)), mg.Wrench(names[-1], force=(1, 2, 3), moment=(0.1, 0.2, 0.3), point=(1, 0, 0))]
+    return mg.Mechanism("ring", links, [*pairs, special(names[-1])], ["J0"], loads)
+
+
+def assert_same_motion(one, other, scale, atol=1e-10):
+    """Two forms of a mechanism: motion of all links, reactions, the drive; ``scale`` is the ratio of the coordinates of X."""
+    move = mg.Motion(0.05 * T, 1.3, 0.7)
+    for how in ({"method": "loop_wrench"}, {"method": "newton_euler"}, {"engine": "sparse"}):
+        a, b = mg.solve(one, {"J0": move}, **how), mg.solve(other, {"J0": move}, **how)
+        assert a.checks.power.max() < 1e-12
+        for link in one.link_names():
+            for name in ("pose", "twist", "acceleration"):
+                x, y = getattr(a.link(link), name), getattr(b.link(link), name)
+                assert_allclose(x, y, atol=atol * max(1.0, np.abs(y).max()))
+        for pair in (p.name for p in one.pairs):
+            y = b[pair].reaction
+            assert_allclose(a[pair].reaction, y, atol=atol * np.abs(y).max())
+        assert_allclose(a["J0"].effort, b["J0"].effort, atol=atol * np.abs(b["J0"].effort).max())
+        assert_allclose(a["X"].position[..., 0], scale * b["X"].position[..., 0], atol=1e-10)
+
+
+CENTER, AXIS = np.array([0.2, -0.3, 0.4]), np.array([0.3, 0.5, 0.8]) / np.sqrt(0.98)
+
+
+def test_a_carriage_on_a_circle_is_a_revolute():
+    circle = mg.Curve.circle(radius=0.8, center=CENTER, axis=AXIS)
+    at = Travel(circle).at(np.array(1.7)).x
+    assert_same_motion(
+        ring(lambda b: mg.Pair("X", "P", "frame", b, point=at, curve=circle)),
+        ring(lambda b: mg.Pair("X", "R", "frame", b, point=CENTER, axis=AXIS)),
+        0.8,
+    )
+
+
+def test_a_carriage_guided_along_a_helix_is_a_screw():
+    helix = mg.Curve.helix(radius=0.8, pitch=0.3, center=CENTER, axis=AXIS, frame="guided")
+    at = Travel(helix).at(np.array(0.9)).x
+    assert_same_motion(
+        ring(lambda b: mg.Pair("X", "P", "frame", b, point=at, curve=helix)),
+        ring(lambda b: mg.Pair("X", "H", "frame", b, point=CENTER, axis=AXIS, pitch=0.3)),
+        np.hypot(0.8, 0.3),
+    )
+
+
+@pytest.mark.parametrize(("symbol", "n"), [("P", 6), ("C", 5), ("Sg", 3)])
+def test_a_straight_curve_is_a_straight_groove(symbol, n):
+    line = mg.Curve.line(point=CENTER, direction=AXIS)
+    one = ring(lambda b: mg.Pair("X", symbol, "frame", b, point=CENTER + 0.3 * AXIS, curve=line), n=n)
+    bare = ring(lambda b: mg.Pair("X", symbol, "frame", b, point=CENTER + 0.3 * AXIS, axis=AXIS), n=n)
+    first = one.pairs[-1].type.freedoms[0].name
+    place = [f.name for f in bare.pairs[-1].type.freedoms].index("Tz")
+    a, b = (mg.solve(m, {"J0": mg.Motion(0.05 * T, 1.3, 0.7)}) for m in (one, bare))
+    assert first == "Ts"
+    assert_allclose(a["X"].position[:, 0], b["X"].position[:, place], atol=1e-12)
+    assert_allclose(a["X"].reaction, b["X"].reaction, atol=1e-11 * np.abs(b["X"].reaction).max())
+    for name, values in b["X"].components.items():
+        if name[0] == "F":  # those of P and C are moments about where they stand at coordinates zero
+            assert_allclose(a["X"].components[name], values, atol=1e-11 * np.abs(b["X"].reaction).max())
+
+
+def test_a_sphere_in_a_circular_groove_is_a_rod_with_a_hinge():
+    """The centre of a ball in a circular groove is that of an S at the end of a link that turns about the axis of the circle."""
+    circle = mg.Curve.circle(radius=0.8, center=CENTER, axis=AXIS)
+    at = Travel(circle).at(np.array(1.7)).x
+    one = ring(lambda b: mg.Pair("X", "Sg", "frame", b, point=at, curve=circle), n=3)
+    rod = [mg.Pair("Y", "R", "frame", "rod", point=CENTER, axis=AXIS), mg.Pair("X", "S", "rod", "b2", point=at)]
+    other = one.replace(links=[*one.links, mg.Link("rod")], pairs=[*one.pairs[:-1], *rod])
+    a, b = (mg.solve(m, {"J0": mg.Motion(0.05 * T, 1.3, 0.7)}) for m in (one, other))
+    assert_allclose(a.link("b2").pose, b.link("b2").pose, atol=1e-12)
+    assert_allclose(a.link("b2").acceleration, b.link("b2").acceleration, atol=1e-10)
+    assert_allclose(a["X"].reaction, b["X"].reaction, atol=1e-10 * np.abs(b["X"].reaction).max())
+    assert_allclose(a["X"].position[:, 0], 0.8 * b["Y"].position[:, 0], atol=1e-12)
+
+
+# --- identities ------------------------------------------------------------------------------------------------------
+
+
+def bent(seed):
+    """A random mechanism with curves."""
+    return strategies.with_curves(strategies.closed_mechanism(seed), seed)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_mechanisms_with_curves(seed):
+    """The Jacobian, its rate, and what they are made of, by complex step; reactions do no work, efforts are dual to the freedoms."""
+    system, x = closed(bent(seed), seed, 0.02)
+    holds(system, x, seed)
+
+
+@pytest.mark.parametrize("seed", [3, 4, 8, 9, 12])
+def test_random_mechanisms_with_curves_at_work(seed):
+    """Both engines and both methods agree, power balances, and a position does not depend on which others are asked for."""
+    m = strategies.with_drives(bent(seed), seed)
+    if m is None:
+        pytest.skip("no drives make it determinate")
+    m = strategies.with_loads(m, seed)
+    given = strategies.motions(m, seed, T, size=0.03)
+    assert_engines_agree(m, given)
+    a, b = (
+        mg.solve(m, given, method=how, on_reach="flag", redundant="minimum_norm")
+        for how in ("loop_wrench", "newton_euler")
+    )
+    assert np.nanmax(a.checks.power) < 1e-12
+    for pair in m.pairs:
+        size = np.nanmax(np.abs(a[pair.name].total))
+        assert_allclose(a[pair.name].total, b[pair.name].total, atol=1e-9 * size)
+    few = {name: mg.Motion(v.position[::3], v.velocity[::3], v.acceleration[::3]) for name, v in given.items()}
+    some = mg.solve(m, few)
+    for link in m.link_names():
+        assert_allclose(some.link(link).pose, a.link(link).pose[::3], atol=1e-9)
+
+
+def test_what_follows_a_mechanism_with_curves(tmp_path):
+    """Files, pickles, rigid motions, units, the printed equations, the report."""
+    m = strategies.with_loads(bent(4).replace(drives=[]), 4, constant=True)
+    assert any(p.curve is not None for p in m.pairs)
+    mg.save(m, tmp_path / "m.toml")
+    for same in (mg.load(tmp_path / "m.toml"), pickle.loads(pickle.dumps(m))):
+        assert same == m
+    report = mg.check(m)
+    moved = m.moved(strategies.pose(np.random.default_rng(0), 3.0))
+    scaled = m.replace(units={"length": "m", "mass": "kg", "time": "s"}).to_units(length="mm")
+    for other in (moved, scaled):
+        assert (mg.check(other).mobility, mg.check(other).redundancy) == (report.mobility, report.redundancy)
+
+
+@pytest.mark.parametrize("name", set(SAMPLE) - {"function"})
+def test_every_curve_in_a_file(name, tmp_path):
+    curve = SAMPLE[name]
+    m = mg.Mechanism("m", None, [mg.Pair("X", "Sg", "frame", "body", curve=curve)])
+    mg.save(m, tmp_path / "m.toml")
+    assert mg.load(tmp_path / "m.toml") == m
+    assert curve.kind in CURVES
+
+
+@pytest.mark.parametrize("symbol", ["P", "Sg", "C"])
+def test_the_printed_equations_hold(symbol):
+    """The assembled equations of a formulation are met by the reactions that were solved for."""
+    circle = mg.Curve.circle(radius=0.8, center=CENTER, axis=AXIS)
+    n = {"P": 6, "C": 5, "Sg": 3}[symbol]
+    m = ring(lambda b: mg.Pair("X", symbol, "frame", b, point=Travel(circle).at(np.array(1.7)).x, curve=circle), n=n)
+    m = m.replace(units={"length": "m", "mass": "kg", "time": "s"}).to_units(length="mm")
+    s = mg.solve(m, {"J0": mg.Motion(0.05 * T, 1.3, 0.7)})
+    f = mg.formulate(m, bookkeeping="minimal")
+    A, b = f.assemble(s.state(3))
+    x = np.linalg.solve(A.toarray(), b)
+    for unknown, value in zip(f.unknowns, x, strict=True):
+        if unknown.owner == "X":
+            name = unknown.meaning.split()[0]
+            assert value == pytest.approx(s["X"].components[name][3], rel=1e-8, abs=1e-8 * np.abs(x).max())
+
+
+# --- what will not do ------------------------------------------------------------------------------------------------
+
+
+def refused(**given):
+    with pytest.raises(mg.DeclarationError) as error:
+        mg.Mechanism("m", None, [mg.Pair("X", **{"type": "Sg", "a": "frame", "b": "body", **given})])
+    return str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (
+            {"curve": mg.Curve.circle(radius=1.0), "point": (1.01, 0, 0)},
+            "is 0.01 off its curve, which is nearest at (1, 0, 0)",
+        ),
+        ({"curve": mg.Curve.circle(radius=-1.0)}, "curve.radius = -1.0"),
+        ({"curve": mg.Curve.through(points=KNOT[:3])}, "3 given; a curve with a continuous curvature takes 4"),
+        ({"curve": mg.Curve.function(position=spiral, ends_at=(0, 5), closed=True)}, "its ends are"),
+        ({"curve": mg.Curve.function(position=lambda u: spiral(u)[:1] * 4, ends_at=(0, 5))}, "derivative 1 differs"),
+        ({"curve": mg.Curve.involute(radius=1.0, angles=(0.0, 1.0))}, "cusp at angle 0"),
+        (
+            {"curve": mg.Curve.helix(radius=1.0, pitch=0.1, frame="guided", guide=(0, 1, 0.1))},
+            "is the direction of the curve at",
+        ),
+        ({"curve": "circle"}, "a Curve, such as"),
+        ({"curve": mg.Curve.circle(radius=1.0), "type": "R"}, "a pair R takes none; those that do: P, C, Sg"),
+        ({"curve": cam(roller_radius=1.0, base_radius=0.3, **LOBES)}, "undercut: the roller of radius 1 is larger"),
+        ({"curve": cam(follower="flat", base_radius=0.1, bend=-3 * np.cos(ANGLE))}, "has a cusp at"),
+        ({"curve": cam(lift=ANGLE)}, "lift: is 0 at angle 0 and 6.28319 at 2 pi; the cam is not closed"),
+    ],
+)
+def test_curves_that_will_not_do(given, words):
+    assert words in refused(**given)
+
+
+def test_a_frame_that_comes_back_turned_is_refused_where_roll_is_held():
+    """The closing angle is that of the spherical image: here it is found by following the frame in small steps, too."""
+    curve = SAMPLE["closed"]
+    s = np.linspace(0, Travel(curve).length, 20001)
+    t = Travel(mg.Curve.through(points=curve.points, closed=True, frame="guided", guide=(0, 0, 1))).at(s)
+    y = t.y[:, 0]
+    for i in range(1, len(s)):
+        y = y - (y @ t.t[:, i]) * t.t[:, i]
+        y /= np.linalg.norm(y)
+    angle = np.arctan2(y @ t.k[:, -1], y @ t.y[:, -1])
+    found = Travel(curve).closing
+    assert np.cos(found - angle) == pytest.approx(1, abs=1e-8)
+    assert f"turned by {np.rad2deg(found):.6g} degrees" in refused(type="P", curve=curve)
+    for symbol in ("C", "Sg"):
+        mg.Mechanism("m", None, [mg.Pair("X", symbol, "frame", "body", curve=curve)])
