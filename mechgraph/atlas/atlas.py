@@ -12,6 +12,7 @@ from mechgraph.atlas.generate import Wanted, chains
 from mechgraph.errors import DeclarationError, FileError
 from mechgraph.model.pair_table import TABLE
 from mechgraph.quantities import wrong
+from mechgraph.writing import write_whole
 
 MOST_JOINTS = 60
 """Pairs beyond which no chain is looked for: of more, no one could read the list."""
@@ -79,7 +80,7 @@ def _fits(wanted: Wanted) -> bool:
 def save_chains(chains: Iterable[Chain], path: str | PathLike[str]) -> int:
     """Write chains to a file, one a line (JSON); how many."""
     lines = [json.dumps({name: getattr(c, name) for name in FIELDS}) for c in chains]
-    Path(path).write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
+    write_whole(path, (f"{line}\n" for line in lines))
     return len(lines)
 
 
