@@ -25,8 +25,8 @@ from mechgraph.data import plain
 from mechgraph.document import Document, Paragraph, Shown
 from mechgraph.errors import DeclarationError, MechgraphWarning
 from mechgraph.kinetostatics import solve
+from mechgraph.model.contact import Contact
 from mechgraph.model.load import Effort
-from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import wrong
 from mechgraph.result.numbers import ranges
 from mechgraph.result.places import Places
@@ -154,16 +154,10 @@ def _wrenches(s: Solution, link: str, guide: str) -> list[tuple[Array, Array, Ar
             p = X[..., :3, :3] @ np.asarray(pair.markers[1].point) + X[..., :3, 3]
             found.append((total[..., 3:], total[..., :3] - np.cross(p, total[..., 3:]), p))
     for coupling in m.couplings:
-        if coupling.steps and link in _gears(m, coupling.steps):
+        if isinstance(coupling, Contact) and link in coupling.gears(m):
             result = s.coupling(coupling.name)
             found.append((result.force, np.zeros_like(result.force), result.point))
     return found
-
-
-def _gears(m: Mechanism, steps: Any) -> tuple[str, str]:
-    """The links of both gears of a contact."""
-    first, last = (m.pairs[steps[i].pair] for i in (0, -1))
-    return (first.a if steps[0].sense > 0 else first.b), (last.b if steps[-1].sense > 0 else last.a)
 
 
 def _size(v: Array) -> Array:

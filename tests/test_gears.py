@@ -387,3 +387,14 @@ def test_links_cut_free_feel_the_teeth(name):
     s = solved(MACHINES[name]())
     for link in s.mechanism.links[1:]:
         assert mg.free_body(s, link.name).balance < 1e-10
+
+
+def test_gears_roll_and_worms_slide():
+    """Spur gears do not slide at the pitch point; a worm slides along its thread with ``w r / cos(lead angle)``."""
+    assert np.abs(solved(two(spur())).coupling("g").sliding).max() < 1e-14
+    worm = mg.WormGear("g", "A", "B", teeth=(2, 40), radius=0.02)
+    s = solved(two(worm, b=(0.1, 0, 0), axis=(0, 1, 0)))
+    lead = np.arctan(2 * 0.08 / (40 * 0.02))
+    c = s.coupling("g")
+    np.testing.assert_allclose(np.linalg.norm(c.sliding, axis=-1), 2.0 * 0.02 / np.cos(lead), rtol=1e-12)
+    np.testing.assert_allclose((c.force * c.sliding).sum(axis=-1), 0.0, atol=1e-12)

@@ -1,9 +1,13 @@
 """Transmission and deviation angles: planar four-bar, slider-crank, the three-link mechanisms of the papers, gears."""
 
+import json
+
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import mechgraph as mg
+from mechgraph.cli import app
 
 
 def apex(s: mg.Solution, pair: str) -> np.ndarray:
@@ -121,3 +125,19 @@ def test_bad_outputs() -> None:
         mg.transmission(s, "X")
     with pytest.raises(mg.DeclarationError, match="another freedom than a driver"):
         mg.transmission(s, "A")
+
+
+def test_on_the_command_line() -> None:
+    result = CliRunner().invoke(app, ["solve", "four-bar", "--transmission", "D"])
+    assert result.exit_code == 0, result.output
+    assert "From A.Rz to D.Rz, links at rest and without mass." in result.stdout
+    told = json.loads(CliRunner().invoke(app, ["solve", "four-bar", "--transmission", "D", "--json"]).stdout)
+    angles = mg.transmission(mg.solve(mg.load("four-bar")), "D").transmission_angle
+    assert told["transmission"] == [
+        {
+            "drivers": ["A.Rz"],
+            "output": "D.Rz",
+            "least": pytest.approx(angles.min()),
+            "greatest": pytest.approx(angles.max()),
+        }
+    ]

@@ -21,6 +21,7 @@ from mechgraph.cli.options import (
     Named,
     OnReach,
     Out,
+    Outputs,
     OverTime,
     Redundant,
     Tolerance,
@@ -47,6 +48,7 @@ def solve(
     redundant: Redundant = "nan",
     on_reach: OnReach = "raise",
     engine: Engine = "auto",
+    transmission: Outputs = None,
     compared: Compare = False,
     tol: Tolerance = None,
     over_time: OverTime = False,
@@ -70,8 +72,13 @@ def solve(
         how: dict[str, Any] = {"method": method, "redundant": redundant, "on_reach": on_reach, "engine": engine}
         s = mg.solve(m, motions or None, actuate=actuate, tol=tol, progress=moved, **how)
     with working(f"summary of {m.name}"):
-        told = _told(s, out, tuple(include or ()), json, over_time)
-    _tell("solve", *told)
+        told, written = _told(s, out, tuple(include or ()), json, over_time)
+        angles = [mg.transmission(s, name) for name in transmission or ()]
+        if isinstance(told, dict):
+            told |= {"transmission": [found.to_dict() for found in angles]}
+        else:
+            told += [found.document() for found in angles]
+    _tell("solve", told, written)
     if compared:
         show_compared(mechanism)
     if not (np.asarray(s.status) == "ok").any():

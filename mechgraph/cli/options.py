@@ -106,6 +106,15 @@ Include = Annotated[
     list[str] | None,
     typer.Option("--include", metavar="WHAT", help=f"More columns for --out (repeat): {', '.join(MORE)}."),
 ]
+Outputs = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--transmission",
+        metavar="FREEDOM",
+        autocompletion=freedom_names,
+        help="Also how well the drivers move this output: its transmission and deviation angle (repeat).",
+    ),
+]
 
 Compare = Annotated[
     bool, typer.Option("--compare", help="Also the results stored in a FreeCAD assembly (.asmt) beside ours.")

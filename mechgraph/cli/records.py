@@ -19,6 +19,7 @@ from mechgraph.result.over_time import OverTimeData
 from mechgraph.result.record import SolutionData
 from mechgraph.structure.decomposition import Group
 from mechgraph.structure.families import Families
+from mechgraph.transmission import TransmissionData
 
 
 @dataclass(frozen=True)
@@ -312,7 +313,12 @@ COMMANDS: dict[str, Callable[[Json], Json]] = {
     "list": _record(ListData),
     "check": _check,
     "equations": _record(EquationsData),
-    "solve": _record(SolutionData, over_time=OverTimeData | None, written=Written | None),
+    "solve": _record(
+        SolutionData,
+        over_time=OverTimeData | None,
+        transmission=Annotated[tuple[TransmissionData, ...], "of the outputs that were named"],
+        written=Written | None,
+    ),
     "respond": _record(ResponseData, over_time=OverTimeData | None, written=Written | None),
     "save": _record(FileData),
     "report": _record(FileData),

@@ -208,6 +208,12 @@ class Contact(BaseCoupling):
         object.__setattr__(out, "steps", steps)
         return out
 
+    def gears(self, m: Any) -> tuple[str, str]:
+        """The links of gear a and gear b of a placed contact."""
+        first, last = (m.pairs[self.steps[i].pair] for i in (0, -1))
+        before, behind = self.steps[0].sense > 0, self.steps[-1].sense > 0
+        return (first.a if before else first.b), (last.b if behind else last.a)
+
     def _velocities(self, axes: Axes, P: Array) -> tuple[Array, Array]:
         """Velocities ``(3, T)`` of both gears at a point for unit rates."""
         return cross(axes.za, P - axes.pa), axes.zb if self.slides else cross(axes.zb, P - axes.pb)

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from mechgraph.algebra.se3 import Array
 from mechgraph.document import Document, Shown
 from mechgraph.errors import DeclarationError
+from mechgraph.model.contact import Contact
 from mechgraph.model.numeric import vector_fault
 from mechgraph.model.pair_type import PairType
 from mechgraph.result.describe import coupling_document, link_document, pair_document
@@ -148,6 +151,18 @@ class CouplingResult(Shown):
     def point(self) -> Array:
         """The point ``(..., 3)`` at which it acts."""
         return self._values.contact(self._index)[1]
+
+    @property
+    def sliding(self) -> Array:
+        """Velocity ``(..., 3)`` of the second of two gears relative to the first where they touch: zero for gears that roll on each other.
+
+        Of a belt it is the difference of the velocities that both pulleys have there, though they are apart.
+        """
+        m, point = self._values.whole, self.point
+        coupling = m.couplings[self._index]
+        assert isinstance(coupling, Contact)
+        Va, Vb = (self._values.link(m.place_of_link(name))[1] for name in coupling.gears(m))
+        return np.asarray(Vb[..., 3:] - Va[..., 3:] + np.cross(Vb[..., :3] - Va[..., :3], point))
 
 
 class LinkResult(Shown):
