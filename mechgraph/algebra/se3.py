@@ -25,6 +25,11 @@ def multiplied(A: Array, B: Array, out: Array | None = None) -> Array:
     return np.asarray(np.einsum("ijnt,jknt->iknt", A, B, out=out))
 
 
+def batch_last(M: Array) -> Array:
+    """Matrices ``(..., n, m)`` as ``(n, m, ...)``, so that products run along the batch (up to ten times as fast in ``einsum``)."""
+    return np.ascontiguousarray(np.moveaxis(M, (-2, -1), (0, 1)))
+
+
 SMALL_CROSS = 2000
 """Numbers up to which a vector product is faster with its factors written out turned (fewer calls) than row by row (less memory)."""
 LEFT_FACTORS, RIGHT_FACTORS = np.array([1, 2, 0, 2, 0, 1]), np.array([2, 0, 1, 1, 2, 0])

@@ -73,10 +73,12 @@ class States(Places):
 
     def advance(self, x: Array, dq: Array) -> Array:
         """States after increments ``dq (F, ...)``."""
-        shape = np.broadcast_shapes(x.shape[1:], dq.shape[1:])
-        out = np.empty((self.n_state, *shape), dtype=np.result_type(x, dq))
         columns, rows = self._singles
-        out[rows] = x[rows] + dq[columns]
+        singles = x[rows] + dq[columns]
+        if self.rotations is None and isinstance(rows, slice):
+            return np.asarray(singles)
+        out = np.empty((self.n_state, *singles.shape[1:]), dtype=singles.dtype)
+        out[rows] = singles
         if self.rotations is not None:
             turns, turned = self.rotations
             out[turned] = evaluation.turned(x[turned], dq[turns])
@@ -84,19 +86,20 @@ class States(Places):
 
     def difference(self, x1: Array, x0: Array) -> Array:
         """Increments ``(F, ...)`` from ``x0`` to ``x1``."""
-        shape = np.broadcast_shapes(x1.shape[1:], x0.shape[1:])
-        out = np.empty((self.n_freedoms, *shape), dtype=np.result_type(x1, x0))
         columns, rows = self._singles
-        out[columns] = x1[rows] - x0[rows]
-        if self.rotations is not None:
-            turns, turned = self.rotations
-            out[turns] = evaluation.turn_between(x1[turned], x0[turned])
+        singles = x1[rows] - x0[rows]
+        if self.rotations is None:
+            return np.asarray(singles)
+        out = np.empty((self.n_freedoms, *singles.shape[1:]), dtype=singles.dtype)
+        out[columns] = singles
+        turns, turned = self.rotations
+        out[turns] = evaluation.turn_between(x1[turned], x0[turned])
         return out
 
     def tangent(self, dq: Array, rates: Array) -> Array:
         """Rates of increments ``dq (F, ...)`` at the state that they lead to, from the rates of the freedoms there."""
-        out = rates.copy()
-        if self.rotations is not None:
-            turns, _ = self.rotations
-            out[turns] = evaluation.turn_tangent(dq[turns], rates[turns])
+        if self.rotations is None:
+            return rates
+        out, (turns, _) = rates.copy(), self.rotations
+        out[turns] = evaluation.turn_tangent(dq[turns], rates[turns])
         return out

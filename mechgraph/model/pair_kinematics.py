@@ -15,6 +15,7 @@ import numpy as np
 from mechgraph.algebra.screw import move_constant, move_twist
 from mechgraph.algebra.se3 import (
     Array,
+    batch_last,
     compose,
     cross,
     identity,
@@ -146,7 +147,7 @@ def efforts_of(row: Row, pitch: Array, frames: Sequence[Array], x: Array | None 
 def dual(E: Array, S: Array) -> Array:
     """The combinations ``E (S^T E)^-1`` of efforts ``(6, f, n, T)`` that are dual to the twists ``S``."""
     unit = np.einsum("ifnt,ignt->ntfg", S, E)
-    return np.asarray(np.einsum("ignt,ntgf->ifnt", E, np.linalg.inv(unit)))
+    return np.asarray(np.einsum("ignt,gfnt->ifnt", E, batch_last(np.linalg.inv(unit))))
 
 
 def without_work(W: Array, E: Array, S: Array) -> Array:

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from mechgraph.algebra.screw import shift_wrench
-from mechgraph.algebra.se3 import Array, cross
+from mechgraph.algebra.se3 import Array, batch_last, cross
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
 from mechgraph.numerics.tolerances import STRESSES
@@ -66,9 +66,9 @@ def orthonormal_stress(here: Configuration, states: Array, multipliers: Array, a
         return stress
     reactions, efforts = stress.wrenches, stress.efforts
     flat = at_pair_points(here, reactions).transpose(3, 0, 1, 2).reshape(here.T, 6 * states.shape[1], s)
-    mix = _orthonormal(flat, np.concatenate([efforts, multipliers]).transpose(2, 0, 1))
-    mixed = (np.einsum("fit,tij->fjt", values, mix) for values in (efforts, multipliers))
-    return Stress(np.einsum("cpit,tij->cpjt", reactions, mix), *mixed)
+    mix = batch_last(_orthonormal(flat, np.concatenate([efforts, multipliers]).transpose(2, 0, 1)))
+    mixed = (np.einsum("fit,ijt->fjt", values, mix) for values in (efforts, multipliers))
+    return Stress(np.einsum("cpit,ijt->cpjt", reactions, mix), *mixed)
 
 
 def _orthonormal(reactions: Array, efforts: Array) -> Array:
@@ -120,7 +120,7 @@ class PairFrames:
         local = at_pair_points(self.here, wrenches)
         out = []
         for g, inverse in zip(self.here.system.groups, self.dual, strict=True):
-            values = np.einsum("ntij,jn...t->in...t", inverse, local[:, g.pairs])
+            values = np.einsum("ijnt,jn...t->in...t", batch_last(inverse), local[:, g.pairs])
             out.append(values[: 6 - g.row.f])
         return out
 
@@ -133,4 +133,4 @@ class PairFrames:
         local = np.concatenate([basis[:3] - cross(point[:, None], basis[3:]), basis[3:]])
         inverse = np.linalg.inv(np.moveaxis(local, 2, 0))
         shifted = shift_wrench(wrenches, point.reshape(3, *(1,) * (wrenches.ndim - 2), here.T))
-        return np.asarray(np.einsum("tij,j...t->i...t", inverse, shifted)[: 6 - g.row.f])
+        return np.asarray(np.einsum("ijt,j...t->i...t", batch_last(inverse), shifted)[: 6 - g.row.f])
