@@ -1,9 +1,9 @@
 """Families: the freedoms that no link has over a finite motion, of the mechanism and of every loop; textbook counts beside the rank.
 
-The twists of all pairs that move, at positions along the motion, span a space of dimension d, whatever the frame: the family is f = 6 - d;
-of a loop, seen from one of its links. (The links themselves may do less, as where balls turn in one plane only: the dimension that the
-twists of the links span stands in the mobility table.) Dobrovolski's count for n moving links and c_j pairs of class j, which leave 6 - j
-freedoms:
+The twists of all pairs that move, at positions along the motion, span a space of dimension d, whatever the frame: the family is f = 6 - d,
+seen from that link from which it is least (a plane may turn with another link). The links themselves may do less, as where balls turn in
+one plane only; the dimension that the twists of the links span stands in the mobility table. Dobrovolski's count for n moving links and
+c_j pairs of class j, which leave 6 - j freedoms:
 
     M = (6 - f) n - sum_{j > f} (j - f) c_j,
 
@@ -148,18 +148,18 @@ def families(freedoms: Freedoms, driven: Index, motion: FiniteMotion) -> Familie
     moving = np.array([c for k in range(len(m.pairs)) if k not in still for c in position.columns(k)], dtype=np.intp)
     loops = []
     for loop, (columns, _) in zip(position.graph.loops, position.declared.system.loop_columns, strict=True):
-        seen_from = position.graph.ends[loop[0][0]][0]
+        links = sorted({link for k, _ in loop for link in position.graph.ends[k]})
         loops.append(
             LoopFamily(
                 tuple(m.pairs[k].name for k, _ in loop),
-                6 - _span(positions, np.intersect1d(columns, moving), seen_from),
+                6 - _span(positions, np.intersect1d(columns, moving), links),
                 max(rank_of(singular_values(f.position.rows.S[:, columns])) for f in positions),
                 tuple(m.pairs[k].name for k, _ in loop if k in still),
             )
         )
     return Families(
         rows,
-        6 - _span(positions, moving, position.graph.frame),
+        6 - _span(positions, moving, range(len(names))),
         tuple(loops),
         _classes(freedoms, range(len(m.pairs))),
         len(names) - 1,
@@ -169,14 +169,17 @@ def families(freedoms: Freedoms, driven: Index, motion: FiniteMotion) -> Familie
     )
 
 
-def _span(positions: Sequence[Freedoms], columns: Index, seen_from: int) -> int:
-    """Dimension that twists of freedoms span at all positions, seen from a link."""
-    seen = []
-    for f in positions:
-        S, pose = f.position.rows.S[:, columns], f.position.declared.poses[:, :, seen_from, 0]
-        moved = S[3:] + np.cross(S[:3], pose[:, 3], axis=0)
-        seen.append(np.concatenate([pose[:, :3].T @ S[:3], pose[:, :3].T @ moved]))
-    return _rank(np.concatenate(seen, axis=1))
+def _span(positions: Sequence[Freedoms], columns: Index, links: Sequence[int] | range) -> int:
+    """Dimension that twists of freedoms span at all positions, seen from that one of the links from which it is least."""
+    least = 6
+    for link in links:
+        seen = []
+        for f in positions:
+            S, pose = f.position.rows.S[:, columns], f.position.declared.poses[:, :, link, 0]
+            moved = S[3:] + np.cross(S[:3], pose[:, 3], axis=0)
+            seen.append(np.concatenate([pose[:, :3].T @ S[:3], pose[:, :3].T @ moved]))
+        least = min(least, _rank(np.concatenate(seen, axis=1)))
+    return least
 
 
 def _classes(freedoms: Freedoms, pairs: Sequence[int] | range) -> tuple[int, int, int, int, int]:
