@@ -20,8 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.numerics.certificate import between, smooth
-from mechgraph.numerics.hermite import cubic, divided_differences, newton_form
-from mechgraph.numerics.newton import Newton, Problem, Work
+from mechgraph.numerics.hermite import divided_differences, newton_form
+from mechgraph.numerics.marching import March, Marching, next_step
+from mechgraph.numerics.newton import Problem, Work
 from mechgraph.numerics.tolerances import PATH
 from mechgraph.numerics.tracks import Nodes, Paths
 
@@ -49,14 +50,13 @@ class Tracks:
     work: Work
 
 
-class Follower:
+class Follower(Marching):
     """Follows the tracks of a problem; see the head of this file."""
 
-    def __init__(self, problem: Problem, leads: bool = True) -> None:
+    def __init__(self, problem: Problem, leads: bool = True, work: Work | None = None) -> None:
         """``leads``: whether tracks may be followed behind their starts, see ``with_lead``."""
-        self.problem, self.leads = problem, leads
-        self.work = Work()
-        self.newton = Newton(problem, self.work)
+        super().__init__(problem, work or Work())
+        self.leads = leads
 
     def follow(
         self, x: Array, paths: Paths, first: float = PATH.first, which: Index | None = None, careful: bool = True
@@ -100,78 +100,23 @@ class Follower:
         Z = self.problem.sensitivity(point, f)
         return Nodes(point.x, Z, drive, tracks, np.zeros(len(tracks)), which, f.condition, np.ones(len(tracks), bool))
 
-    def _renewed(self, nodes: Nodes) -> Nodes:
-        """The same nodes in better forms where theirs are poor."""
-        poor = (nodes.condition > PATH.fair).nonzero()[0]
-        if not poor.size:
-            return nodes
-        few = nodes.take(poor)
-        point = self.problem.at(few.x, few.drive, few.track)
-        which = self.problem.chosen(point, few.which)
-        f = self.problem.factored(point, which)
-        Z, condition = nodes.Z.copy(), nodes.condition.copy()
-        Z[:, :, poor], condition[poor] = self.problem.sensitivity(point, f), f.condition
-        new = nodes.which.copy()
-        new[poor] = which
-        return replace(nodes, Z=Z, condition=condition, which=new)
-
-    # --- prediction ------------------------------------------------------------------------------------------------------
-
-    def _ahead(self, last: Nodes, before: Nodes, known: Mask, at: Array, drive: Array) -> tuple[Array, Array]:
-        """Increments ``(F, n)`` from the last nodes to path values, and the order of their error in the step.
-
-        Where the track goes straight on from the node before (``known``) in steps of fair size: Hermite interpolation through both,
-        extrapolated; behind a corner the change of the sensitivity over the last step; else the sensitivity alone.
-        """
-        h, change = at - last.place, drive - last.drive
-        dq = np.add.reduce(last.Z * change, axis=1)
-        order = np.full(len(h), 2.0)
-        came = last.drive - before.drive
-        back = last.place - before.place
-        ratio = h / np.where(back > 0, back, 1.0)
-        along, came2, change2 = (np.add.reduce(a * b) for a, b in ((came, change), (came, came), (change, change)))
-        known = known & (back > 0) & (ratio < 16.0) & (along > 0)
-        straight = known & (along > (1 - 1e-9) * np.sqrt(came2 * change2)) & (ratio > 0.25)
-        two = straight.nonzero()[0]
-        every = two.size == len(h)
-        if two.size:
-            mine = slice(None) if every else two
-            a, b = (before, last) if every else (before.take(two), last.take(two))
-            y = self.problem.difference(a.x, b.x)
-            there = self.problem.tangent(y, np.add.reduce(a.Z * (change[:, mine] / h[mine]), axis=1))
-            dq[:, mine] = cubic(y, dq[:, mine] / h[mine], there, a.place - b.place, h[mine])
-            order[mine] = 4.0
-        if not every:
-            bent = (known & ~straight & (ratio < 4.0)).nonzero()[0]
-            dq[:, bent] += 0.5 * ratio[bent] * ((last.Z - before.Z)[:, :, bent] * change[:, bent]).sum(axis=1)
-            order[bent] = 3.0
-        return self.problem.corrigible(dq, last.which), order
-
-    def _longest(self, last: Nodes, new: Nodes, drive: Array) -> Array | float:
-        """The longest next steps, by the pace of the tracks at both ends of the last one."""
-        if not self.problem.paced:
-            return PATH.longest
-        change = (drive - last.drive) / np.maximum(new.place - last.place, PATH.shortest)
-        paces = [self.problem.pace(node.x, (node.Z * change).sum(axis=1)) for node in (last, new)]
-        return PATH.longest / np.maximum(np.maximum(*paces), np.finfo(float).tiny)
-
     # --- the quick march -------------------------------------------------------------------------------------------------
 
     def _quick(self, start: Nodes, first: float) -> Nodes:
         """Nodes behind the starts, most of them closed by one Newton step only; ends early where that does not do."""
         out: list[Nodes] = []
-        march = _March(start, start, np.zeros(len(start), dtype=bool), np.full(len(start), first))
+        march = March(start, start, np.zeros(len(start), dtype=bool), np.full(len(start), first))
         while len(march.last):
             last = march.last
-            at, drive, x, order = self._predicted(march)
+            at, drive, x, order = self.predicted(march)
             found = self.newton.nodes(x, drive, last.track, last.which, PATH.quick)
             good = found.done & (found.correction <= PATH.correction) & (found.condition <= PATH.singular)
             new = Nodes.closed(found, drive, last.track, at, sure=False)
-            longest = PATH.ahead * self._longest(last, new, drive)
-            march.h = _next_step(at - last.place, found.correction, order, good, longest)
+            longest = PATH.ahead * self.longest(last, new, drive)
+            march.h = next_step(at - last.place, found.correction, order, good, longest)
             kept = good.nonzero()[0]
             moved = (new, last) if len(kept) == len(good) else (new.take(kept), last.take(kept))
-            out += self._moved(march, *moved, kept)
+            out += self.moved(march, *moved, kept)
             self._spend(march, PATH.quick_steps)
             track = march.last.track
             march.keep(
@@ -179,23 +124,7 @@ class Follower:
             )
         return Nodes.join(out) if out else start.take(np.zeros(0, dtype=np.intp))
 
-    def _predicted(self, march: _March) -> tuple[Array, Array, Array, Array]:
-        """Where the next steps lead: places, path values, states predicted there, and the order of their error in the step."""
-        last = march.last
-        at = self.paths.step(last.track, last.place, march.h)
-        drive = self.paths.drive(last.track, at)
-        dq, order = self._ahead(last, march.before, march.known, at, drive)
-        return at, drive, self.problem.advance(last.x, dq, last.track), order
-
-    def _moved(self, march: _March, new: Nodes, before: Nodes, at: Index) -> list[Nodes]:
-        """The tracks ``at`` of a march moved on to new nodes, each in a better form where its own is poor; the nodes made."""
-        renewed = self._renewed(new)
-        march.move(renewed, before, at)
-        changed = (renewed.which != new.which).nonzero()[0]
-        march.known[at[changed]] = False
-        return [new, renewed.take(changed)] if changed.size else [new]
-
-    def _spend(self, march: _March, most: int) -> None:
+    def _spend(self, march: March, most: int) -> None:
         """Count a step of a march, and give up its tracks that have taken more than ``most``."""
         march.steps += 1
         if march.steps > most:
@@ -206,7 +135,7 @@ class Follower:
         """The nodes with others between them, interpolated, where steps are too long for the certificate."""
         left, right = nodes.steps
         a, b = nodes.take(left), nodes.take(right)
-        parts = np.ceil((b.place - a.place) / self._longest(a, b, b.drive)).astype(np.intp)
+        parts = np.ceil((b.place - a.place) / self.longest(a, b, b.drive)).astype(np.intp)
         step = np.repeat(np.arange(len(a)), np.maximum(parts - 1, 0))
         if not step.size:
             return nodes
@@ -289,7 +218,7 @@ class Follower:
         """Tracks taken up at their last nodes, every step closed and certified by itself, to their ends or to what ends them."""
         first, end = (np.searchsorted(nodes.track, tracks, side=side) for side in ("left", "right"))
         last, before = nodes.take(end - 1), nodes.take(np.maximum(end - 2, first))
-        march = _March(last, before, before.place < last.place, np.full(len(tracks), PATH.shortest_quick))
+        march = March(last, before, before.place < last.place, np.full(len(tracks), PATH.shortest_quick))
         # beyond this condition rounding moves a state by as much as branches that cross are apart (a fold is far beyond its limit there)
         worst = np.zeros(len(self.paths.end))
         worst[tracks] = np.maximum(PATH.crossing, 1e3 * nodes.condition[first])
@@ -306,10 +235,10 @@ class Follower:
             march.keep((march.last.place < self.paths.end[march.last.track]) & ~ended[march.last.track])
         return Nodes.join(found)
 
-    def _careful_step(self, march: _March, worst: Array, found: list[Nodes]) -> Mask:
+    def _careful_step(self, march: March, worst: Array, found: list[Nodes]) -> Mask:
         """One step of every track that is on its way, put to the nodes ``found`` where it is certified; which are."""
         last = march.last
-        at, drive, x, order = self._predicted(march)
+        at, drive, x, order = self.predicted(march)
         step = self.newton.nodes(x, drive, last.track, last.which, PATH.node)
         new = Nodes.closed(step, drive, last.track, at, sure=True)
         good = step.done & (step.correction <= PATH.correction) & (step.condition <= worst[last.track])
@@ -319,7 +248,7 @@ class Follower:
             pairs, left = Nodes.join([last.take(trial), new.take(trial)]), 2 * np.arange(trial.size)
             ok, middle = self._certified(pairs, left, left + 1)
             good[trial], middle = ok, middle.take(ok)
-        march.h = _next_step(at - last.place, step.correction, order, good, self._longest(last, new, drive))
+        march.h = next_step(at - last.place, step.correction, order, good, self.longest(last, new, drive))
         kept = np.flatnonzero(good)
         if kept.size:
             self.work.careful += kept.size
@@ -329,10 +258,10 @@ class Follower:
             left_over = 0.5 * (new.place - middle.place) / np.where(grown > 0, grown, 1.0)
             h = np.where(grown > 0, np.maximum(np.minimum(march.h[kept], left_over), PATH.shortest), march.h[kept])
             march.h[kept] = h
-            found += [middle, *self._moved(march, new, middle, kept)]
+            found += [middle, *self.moved(march, new, middle, kept)]
         return good
 
-    def _passed(self, nodes: Nodes, march: _March, i: int) -> Nodes:
+    def _passed(self, nodes: Nodes, march: March, i: int) -> Nodes:
         """All nodes, with the one behind the crossing where the track ``i`` of a march is stuck; as they are where it does not go on."""
         track = int(march.last.track[i])
         mine = nodes.take(nodes.track == track)
@@ -357,8 +286,7 @@ class Follower:
             direction = self.paths.drive(np.array([track]), np.array([PATH.first]))[:, 0] - starts[:, track]
             points = list(starts.T[:, :, None])
             points[track] = np.stack([starts[:, track], starts[:, track] - LEAD / PATH.first * direction], axis=1)
-            back = Follower(self.problem, leads=False)
-            back.work = back.newton.work = self.work
+            back = Follower(self.problem, leads=False, work=self.work)
             found = back.follow(self._x, Paths(points)).nodes
             found = found.take((found.track == track) & (found.place > 0.0))
             self._leads[track] = Nodes.join([replace(found, place=-found.place)])
@@ -415,7 +343,7 @@ class Follower:
             ahead = self.problem.corrigible(newton_form(*form, at - base.place), base.which)
             x = self.problem.advance(base.x, ahead, base.track)
             step = self.newton.nodes(x, drive, base.track, base.which, PATH.node)
-            new = self._renewed(Nodes.closed(step, drive, base.track, at, sure=True))
+            new = self.renewed(Nodes.closed(step, drive, base.track, at, sure=True))
             turn = np.abs((step.Z - base.Z) * direction).max() / max(1.0, float(np.abs(base.Z).max()))
             as_regular = step.condition[0] <= 4.0 * base.condition[0]
             if step.done[0] and step.correction[0] <= 1e-2 * distance and turn <= PATH.smooth and as_regular:
@@ -432,35 +360,3 @@ def _spread(places: Array, crossing: float, distance: float) -> Index:
     """A few nodes before a crossing at distances that grow, the nearest last."""
     wanted = crossing - distance * np.array([16.0, 8.0, 4.0, 2.0, 1.0])
     return np.unique(np.clip(np.searchsorted(places, wanted), 0, len(places) - 1))
-
-
-def _next_step(h: Array, correction: Array, order: Array, good: Mask, longest: Array | float) -> Array:
-    """The step that aims at the wanted correction, at most the ``longest``; half of one that failed."""
-    grown = h * np.minimum(np.maximum((PATH.aim / np.maximum(correction, 1e-9)) ** (1 / order), 0.5), 2.0)
-    return np.where(good, np.minimum(np.maximum(grown, 10 * PATH.shortest), longest), 0.5 * h)
-
-
-@dataclass
-class _March:
-    """Tracks on their way: the last node of each, the one ``before`` (``known`` where the last came straight from it), the next step
-    ``h``, and the number of ``steps`` taken.
-    """
-
-    last: Nodes
-    before: Nodes
-    known: Mask
-    h: Array
-    steps: int = 0
-
-    def move(self, new: Nodes, before: Nodes, at: Index) -> None:
-        """Go on to new nodes of the tracks ``at``."""
-        every = len(at) == len(self.last)
-        self.last = new if every else self.last.replaced(new, at)
-        self.before = before if every else self.before.replaced(before, at)
-        self.known[at] = True
-
-    def keep(self, going: Mask) -> None:
-        """Go on with some of the tracks."""
-        if not going.all():
-            self.last, self.before = self.last.take(going), self.before.take(going)
-            self.known, self.h = self.known[going], self.h[going]
