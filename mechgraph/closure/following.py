@@ -13,9 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.driver_path import DriverPath, Legs, Positions, Request
+from mechgraph.closure.driver_path import DriverPath, Positions, Request
 from mechgraph.closure.gaps import along_polygons_with_gaps
 from mechgraph.closure.indexing import Index
+from mechgraph.closure.legs import Legs
 from mechgraph.numerics.continuation import Follower
 from mechgraph.numerics.tracks import Nodes, Paths
 

@@ -14,8 +14,9 @@ from itertools import pairwise
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.driver_path import DriverPath, Positions, Request, along_polygons
+from mechgraph.closure.driver_path import DriverPath, Positions, Request
 from mechgraph.closure.indexing import Index
+from mechgraph.closure.legs import along_polygons
 from mechgraph.numerics.continuation import End, Follower
 from mechgraph.numerics.hermite import STRAIGHT_ON, Interpolation
 from mechgraph.numerics.tolerances import PATH

@@ -20,7 +20,7 @@ from bench_core import best, seven_r
 
 import mechgraph as mg
 from mechgraph import kinetostatics, pipeline
-from mechgraph.closure import driver_path
+from mechgraph.closure import legs
 from mechgraph.force import block
 from mechgraph.force.dalembert import METHODS
 from mechgraph.numerics.continuation import Follower
@@ -33,8 +33,8 @@ STAGES = (
     ("nodes closed", Follower, "_settled"),
     ("certificate", Follower, "_certified_all"),
     ("careful march", Follower, "_careful"),
-    ("nodes between", driver_path, "refined"),
-    ("interpolation, Newton", driver_path.Legs, "_closed"),
+    ("nodes between", legs, "refined"),
+    ("interpolation, Newton", legs.Legs, "_closed"),
     ("rates", pipeline, "rates"),
     ("loads", block.Site, "collect"),
     ("inertia", block, "inertia_wrenches"),
