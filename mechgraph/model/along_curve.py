@@ -63,6 +63,16 @@ class AlongCurve(Factor):
             return -np.inf, np.inf
         return (-high, -low) if self.reversed else (low, high)
 
+    @property
+    def sideways(self) -> float:
+        """1 where y of the frame is the normal y of the curve, -1 where it is opposite."""
+        return (-1.0 if self.reversed else 1.0) * (-1.0 if self.turned else 1.0)
+
+    def curvature(self, x: Array) -> Array:
+        """Curvature towards y of the frame at coordinates ``(...)``."""
+        here = self.travel.at(self._arc(x[None]))
+        return self.sideways * (here.dt * here.y).sum(axis=0)
+
     def _arc(self, x: Array) -> Array:
         return self.home + (-self.unit if self.reversed else self.unit) * x[0]
 

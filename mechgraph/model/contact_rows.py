@@ -20,6 +20,7 @@ from mechgraph.model.along_curve import AlongCurve, Beside, X, Z
 from mechgraph.model.curves import Curve, Line
 from mechgraph.model.pair_table import TABLE
 from mechgraph.model.pair_type import PairType, fill_row
+from mechgraph.model.row_parts import Touching
 from mechgraph.model.travel import Travel, outside, roller_faults, shape_faults
 from mechgraph.quantities import is_numeric
 
@@ -38,10 +39,15 @@ CLOSING_ANGLE = 1e-9
 
 
 def _row(
-    symbol: str, name: str, freedoms: Sequence[object], reactions: Sequence[str], efforts: Sequence[str]
+    symbol: str,
+    name: str,
+    freedoms: Sequence[object],
+    reactions: Sequence[str],
+    efforts: Sequence[str],
+    touching: Touching | None = None,
 ) -> PairType:
     row = object.__new__(PairType)
-    fill_row(row, symbol, name, freedoms, reactions, efforts)
+    fill_row(row, symbol, name, freedoms, reactions, efforts, touching=touching)
     object.__setattr__(row, "computed_efforts", True)
     return row
 
@@ -51,9 +57,30 @@ ROWS = {
     for row in (
         _row("P", "rail and carriage", [ALONG], ["Fx@1", "Fy@1", "Mx@1", "My@1", "Mz@1"], ["Fz@1"]),
         _row("C", "round rail and carriage", [ALONG, "Rz"], ["Fx@1", "Fy@1", "Mx@1", "My@1"], ["Fz@1", "Mz@1"]),
-        _row("Sg", "sphere in curved groove", [ALONG, "rotation"], ["Fx@1", "Fy@1"], ["Fz@1", "Mx@1", "My@1", "Mz@1"]),
-        _row("Ps", "pin in curved slot", [FOLLOWING, "Rz"], ["Fy@1", "Fz@1", "Mx@1", "My@1"], ["Fx@1", "Mz@1"]),
-        _row("Kc", "curves in contact", [FOLLOWING, BESIDE], ["Fy@1", "Fz@1", "Mx@1", "My@1"], ["Fx@1", "Mz@1"]),
+        _row(
+            "Sg",
+            "sphere in curved groove",
+            [ALONG, "rotation"],
+            ["Fx@1", "Fy@1"],
+            ["Fz@1", "Mx@1", "My@1", "Mz@1"],
+            Touching(("Fx", "Fy"), a=(0.0, -1.0), b=(1.0, 1.0), curved=True),
+        ),
+        _row(
+            "Ps",
+            "pin in curved slot",
+            [FOLLOWING, "Rz"],
+            ["Fy@1", "Fz@1", "Mx@1", "My@1"],
+            ["Fx@1", "Mz@1"],
+            Touching(("Fy",), a=(0.0, 0.0), b=(0.0, 1.0), curved=True),
+        ),
+        _row(
+            "Kc",
+            "curves in contact",
+            [FOLLOWING, BESIDE],
+            ["Fy@1", "Fz@1", "Mx@1", "My@1"],
+            ["Fx@1", "Mz@1"],
+            Touching(("Fy",), a=(0.0, 0.0), b=(0.0, 0.0), curved=True),
+        ),
     )
 }
 """The rows by the symbols of their types; of P, C and Sg those with a curve."""
@@ -75,6 +102,21 @@ def row_of(type: Any, curve: Any) -> Any:
         return symbol
     first, second = (ROWS, TABLE) if curve is not None else (TABLE, ROWS)
     return first.get(symbol) or second.get(symbol) or type
+
+
+def pressing(row: PairType) -> float:
+    """1 where link a, which is only pushed against, presses on b along y of the frame that travels on its curve, -1 where against it.
+
+    A roller is pushed away from the curve beside which it runs, what touches a closed curve away from its inside, all else along y.
+    """
+    place = takes_curves(row)[0]
+    curve = place.curve
+    assert curve is not None
+    if isinstance(curve, Beside):
+        side = 1.0 if curve.distance > 0 else -1.0
+    else:
+        side = outside(curve) if curve.is_closed else 1.0
+    return side * place.sideways
 
 
 def takes_curves(row: PairType) -> tuple[AlongCurve, ...]:

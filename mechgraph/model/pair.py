@@ -206,6 +206,12 @@ class Pair(Described):
         return {"curve": self.curve, "curve_b": self.curve_b, "roller": self.roller}
 
     @property
+    def radius_b(self) -> float | None:
+        """Radius of the ball, roller or cylinder on link b, where it is known."""
+        rolls = self.roller or self.curve.roller if isinstance(self.curve, Curve) else None
+        return rolls or self.radius
+
+    @property
     def pitch_per_radian(self) -> float:
         """Advance per radian; 0 where the type takes none."""
         if self.lead is not None:
@@ -279,7 +285,10 @@ class Pair(Described):
                 have = ", ".join(symbol for symbol, row in TABLE.items() if row.touching)
                 yield f"{where}{', '.join(said)}: type {self.type.symbol} is no contact of two elements; {have} are"
             return
-        yield None if self.radius is None else self.formats["radius"].fault(self.radius, f"{where}radius")
+        if self.radius is not None:
+            yield self.formats["radius"].fault(self.radius, f"{where}radius")
+            if not any(form.b) or self.radius_b != self.radius:
+                yield f"{where}radius: the curves and their roller say it; leave it out"
         if self.hertz is None:
             return
         if not isinstance(self.hertz, Hertz):
@@ -289,9 +298,11 @@ class Pair(Described):
         if faults:
             return
         groove, needed = self.hertz.groove_radius, "the pressure depends on it; give it"
-        if self.radius is None:
+        if any(form.b) and self.radius_b is None:
             yield f"{where}radius: {needed}"
-        elif any(form.a) and (groove is None or not groove > self.radius):
+        elif any(form.a) and form.curved:
+            yield f"{where}hertz: the pressure in a curved groove is not known; leave it out"
+        elif self.radius is not None and any(form.a) and (groove is None or not groove > self.radius):
             yield wrong(groove, f"{where}hertz.groove_radius", f"a number above the radius {self.radius:g} of the ball")
         if form.along_line and self.hertz.length is None:
             yield f"{where}hertz.length: {needed}"

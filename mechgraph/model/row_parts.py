@@ -60,13 +60,15 @@ class Touching:
 
     ``forces``: the components of the normal force; where a force closes the pair, a presses on b with a positive first one. ``a``, ``b``:
     the curvatures of the elements along the groove (or line) and across it, times their radii: (0, -1) is a groove, (1, 1) a ball,
-    (0, 1) a cylinder, (0, 0) a plane. ``tilting``: of a line the couple that moves the force along it.
+    (0, 1) a cylinder, (0, 0) a plane, or curves that say theirs. ``tilting``: of a line the couple that moves the force along it.
+    ``curved``: whether the elements are curves.
     """
 
     forces: tuple[str, ...]
     a: tuple[float, float]
     b: tuple[float, float]
     tilting: str | None = None
+    curved: bool = False
 
     @property
     def along_line(self) -> bool:

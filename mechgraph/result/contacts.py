@@ -1,12 +1,12 @@
 """Facts of contacts: where the elements of a pair touch, with what force, how they slide and roll, and where a force would have to pull.
 
-With the origin c of marker B (centre of a ball, a point of the axis of a cylinder), its radius r and the normal n in which a presses on b:
+With the origin c of the frame of the normal force (centre of a ball or roller, point of a curve), the radius r and the normal n in which a
+presses on b:
 
-    p = c - r n,   sliding v_b(p) - v_a(p) = v + w x (-r n),   travel over a: v,   over b: w x r n,   rolling: the mean of both,
+    p = c - r n,   sliding v = v_b(p) - v_a(p),   travel over a: u, over b: u - v,   rolling: the mean of both,
 
-v and w the velocity of c and the angular velocity of b seen from a. The normal is taken to stand still on a, which is exact for a plane;
-in a groove the place across it also moves with the direction of the force, which counts as neither. Where the radius is not declared it
-counts as zero.
+u the velocity of p as a place of that frame, seen from a. In a groove p also moves across with the direction of the force, which counts as
+neither. Where the radius is not declared it counts as zero.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.document import Block, Document, Paragraph, Shown
 from mechgraph.errors import DeclarationError
+from mechgraph.model.contact_rows import pressing, takes_curves
 from mechgraph.model.hertz import Pressed, pressed, pressed_along_line
 from mechgraph.model.pair import Pair
 from mechgraph.model.row_parts import Touching
@@ -116,6 +117,17 @@ class ContactResult(Shown):
         return self._pair.type.touching
 
     @cached_property
+    def _sense(self) -> float:
+        """1 where a presses on b along the first direction of the pair, -1 where against it."""
+        row = self._pair.type
+        return pressing(row) if self._form.curved and len(self._form.forces) == 1 else 1.0
+
+    @property
+    def _frame(self) -> int:
+        """The frame of the pair in which the normal force acts."""
+        return next(c.frame for c in self._pair.type.reactions or () if c.name == self._form.forces[0])
+
+    @cached_property
     def _bodies(self) -> tuple[Array, Array, Array, Array]:
         """Poses and twists of both links."""
         m = self._values.whole
@@ -142,7 +154,7 @@ class ContactResult(Shown):
     @cached_property
     def normal(self) -> Array:
         """Unit direction ``(..., 3)`` in which a presses on b: the way the force acts; without forces the first direction of the pair."""
-        first = self._directions[..., 0]
+        first = self._sense * self._directions[..., 0]
         if not self._values.has_forces:
             return first
         force = (self._directions * self._parts[..., None, :]).sum(axis=-1)
@@ -154,7 +166,7 @@ class ContactResult(Shown):
     @property
     def point(self) -> Array:
         """Where they touch ``(..., 3)``, global; of a line its middle."""
-        return self._marker(1)[1] - (self._pair.radius or 0.0) * self.normal
+        return self._values.frame_origin(self._index, self._frame) - (self._pair.radius_b or 0.0) * self.normal
 
     @property
     def path_a(self) -> Array:
@@ -179,18 +191,18 @@ class ContactResult(Shown):
         Of a pair held on both sides it is positive where it acts along the axis, negative on the other side; in a groove its size.
         """
         if len(self._form.forces) == 1:
-            return self._parts[..., 0]
+            return self._sense * self._parts[..., 0]
         size = np.linalg.norm(self._parts, axis=-1)
         return np.where(self.lifts, -size, size) if self._pair.closed == "force" else size
 
     @property
     def lifts(self) -> Mask:
         """Where a contact that is only pushed would have to pull ``(...)``: b lifts off there, and the reactions are not real."""
-        pressing = np.asarray(self._parts[..., 0])
+        pushed = np.asarray(self._sense * self._parts[..., 0])
         if self._pair.closed == "form":
-            return np.zeros(pressing.shape, dtype=bool)
+            return np.zeros(pushed.shape, dtype=bool)
         least = PULL * float(np.nanmax(np.linalg.norm(self._parts, axis=-1), initial=0.0))
-        return np.asarray(pressing < -least)
+        return np.asarray(pushed < -least)
 
     @cached_property
     def lift_off(self) -> tuple[LiftOff, ...]:
@@ -206,7 +218,8 @@ class ContactResult(Shown):
         return tuple(self._range(int(a), int(b) - 1, row) for a, b in ends.reshape(-1, 2))
 
     def _range(self, first: int, last: int, row: int) -> LiftOff:
-        values, force, units = self._values, self._parts[..., 0].reshape(-1), self._values.mechanism.units
+        values, units = self._values, self._values.mechanism.units
+        force = self._sense * self._parts[..., 0].reshape(-1)
         places = Places(values)
         of = dict(zip(places.drivers, places.driver_values, strict=True))
         if values.t is not None:
@@ -242,14 +255,16 @@ class ContactResult(Shown):
         DeclarationError
             where the pair has none.
         """
-        data, form, radius = self._pair.hertz, self._form, self._pair.radius
-        if data is None or radius is None:
+        data, form, radius = self._pair.hertz, self._form, self._pair.radius_b or np.inf
+        if data is None:
             raise DeclarationError(
                 f"contact {self._pair.name!r}", ["no materials: give the pair hertz=mg.Hertz(moduli=(E_a, E_b))"]
             )
         force = np.abs(self.normal_force) if self._pair.closed == "form" else self.normal_force
         groove = data.groove_radius or np.inf
         along, across = (np.asarray(a / groove + b / radius) for a, b in zip(form.a, form.b, strict=True))
+        if form.curved:
+            across = self._bends(radius)
         if not form.along_line:
             return pressed(force, (along, across), data.modulus)
         assert data.length is not None
@@ -257,16 +272,20 @@ class ContactResult(Shown):
             off = self._values.components(self._index)[form.tilting] / force if form.tilting else np.zeros(force.shape)
         return pressed_along_line(force, np.nan_to_num(off), data.length, across, data.modulus)
 
+    def _bends(self, radius: float) -> Array:
+        """Relative curvature ``(...)`` of two profiles: of a's, beside which the centre of a roller travels, and of the roller or b's."""
+        row, x = self._pair.type, self._values.coordinates(self._index)[0]
+        places = takes_curves(row)
+        path = -self._sense * places[0].curvature(x[..., 0])
+        profile = path / (1.0 - radius * path) if np.isfinite(radius) else path
+        other = self._sense * places[1].curvature(x[..., 1]) if len(places) > 1 else 1.0 / radius
+        return np.asarray(profile + other)
+
     # --- motion --------------------------------------------------------------------------------------------------------
 
     def _velocity(self, link: int, point: Array) -> Array:
         V = self._bodies[2 * link + 1]
         return V[..., 3:] + np.cross(V[..., :3], point)
-
-    @property
-    def _turning(self) -> Array:
-        """Angular velocity of b seen from a."""
-        return np.asarray(self._bodies[3][..., :3] - self._bodies[1][..., :3])
 
     @property
     def sliding(self) -> Array:
@@ -276,13 +295,16 @@ class ContactResult(Shown):
     @property
     def rolling(self) -> Array:
         """Mean velocity ``(..., 3)`` with which the contact travels over both elements, as it draws oil in; global directions."""
-        over_b = np.cross(self._turning, (self._pair.radius or 0.0) * self.normal)
-        return 0.5 * (self.sliding + 2 * over_b)
+        k = self._frame
+        rates = self._values.coordinates(self._index)[1][..., None, :k]
+        V = (self._values.screws(self._index)[..., :k] * rates).sum(axis=-1)
+        return V[..., 3:] + np.cross(V[..., :3], self.point) - 0.5 * self.sliding
 
     @property
     def spin(self) -> Array:
         """Angular velocity ``(...)`` of b relative to a about the normal."""
-        return np.asarray((self._turning * self.normal).sum(axis=-1))
+        turning = self._bodies[3][..., :3] - self._bodies[1][..., :3]
+        return np.asarray((turning * self.normal).sum(axis=-1))
 
     def pressure_angle(self, link: str) -> Array:
         """Angle ``(...)`` from 0 to pi/2 between the normal and the velocity of a link where they touch; NaN where that stands still.

@@ -41,6 +41,13 @@ class Trajectory(PairForces):
             self._out(unit * self._of("ddq")[columns]),
         )
 
+    def frame_origin(self, pair: int, k: int) -> Array:
+        """Origin of frame k of a pair."""
+        number, i = self._system.place_of(pair)
+        par = self._system.par
+        found = self._evaluated(lambda block: block.here.frames[number][k][:, 3, i])
+        return self._out(par.L * found + par.origin.reshape(3, 1))
+
     def screws(self, pair: int) -> Array:
         """Twists of the freedoms at unit rates."""
         columns = self._columns(pair)

@@ -181,6 +181,9 @@ class Values(Protocol):
     def screws(self, pair: int) -> Array:
         """Twists of the freedoms of a pair at unit rates about the global origin, ``(..., 6, f)``."""
 
+    def frame_origin(self, pair: int, k: int) -> Array:
+        """Origin of frame k of a pair, global, ``(..., 3)``."""
+
     def unique(self, pair: int) -> dict[str, Array]:
         """Which reaction components and efforts of drives are unique, by name, ``(...)``."""
 
