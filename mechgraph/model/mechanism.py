@@ -267,8 +267,22 @@ class Mechanism(Parts, Shown):
         DeclarationError, AssemblyError
             where the mechanism has no geometry, or its loops do not close to ``tol``.
         """
-        # this and view() call up to a room above: a user looks for them here
+        # this, equivalent() and view() call up to a room above: a user looks for them here
         made: Mechanism = importlib.import_module("mechgraph.structure.snapping").snapped(self, tol)
+        return made
+
+    def equivalent(self, at: Mapping[str, float] | None = None, *, rollers: str = "removed") -> Mechanism:
+        """The planar mechanism with links and lower pairs in place of higher pairs, gears and belts, with freedoms at values ``at``.
+
+        It has the same velocities and accelerations there (see ``mechgraph.equivalent``). ``rollers="kept"`` keeps a roller on a pin as a
+        link that spins passively; it is otherwise itself the link that takes the place of its contact.
+
+        Raises
+        ------
+        DeclarationError
+            where it is not planar, or has couplings without a line of contact.
+        """
+        made: Mechanism = importlib.import_module("mechgraph.equivalent").equivalent(self, at, rollers=rollers)
         return made
 
     def view(self) -> Any:
