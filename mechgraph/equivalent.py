@@ -36,7 +36,7 @@ from mechgraph.structure.position import Position
 
 FLAT = 1e-8
 """Curvature (times L) below which a side of a contact is straight."""
-SAME = 1e-8
+ONE_POINT = 1e-8
 """Distance (over L) below which two points are one, and misfit of the circle up to which there is one."""
 NAMES = ("{}_link", "{}_a", "{}_b")
 """Names of the link that takes the place of a higher pair, and of its pairs."""
@@ -131,12 +131,12 @@ def _in_place_of_pair(parts: _Parts, rows: LinkRows, k: int, remove: bool) -> li
     if abs(buu) > FLAT:
         length = -1.0 / buu
         s = length * (1.0 - bwu) / 2.0
-        if abs(length * (bww - s) + s * s) > SAME * max(1.0, length * length):
+        if abs(length * (bww - s) + s * s) > ONE_POINT * max(1.0, length * length):
             return [f"pair {pair.name}: no link with two pairs moves as it does"]
         ends = [("R", P + (s - length) * n, parts.normal), ("R", P + s * n, parts.normal)]
-    elif abs(bwu - 1.0) < SAME:
+    elif abs(bwu - 1.0) < ONE_POINT:
         ends = [("P", P + bww * n, t), ("R", P + bww * n, parts.normal)]
-    elif abs(bwu + 1.0) < SAME:
+    elif abs(bwu + 1.0) < ONE_POINT:
         ends = [("R", P - bww * n, parts.normal), ("P", P - bww * n, t)]
     else:
         return [f"pair {pair.name}: both sides are straight, which no link with two pairs can be in place of"]
@@ -161,7 +161,7 @@ def _is_roller(parts: _Parts, link: str, centre: Array, k: int) -> bool:
     row = m.pairs[others[0]].type
     off = here.pair_points[:, others[0], 0] - centre
     off = off - parts.normal * (parts.normal @ off)
-    return row.f == 1 and row.freedoms[0].turns and float(np.linalg.norm(off)) < SAME
+    return row.f == 1 and row.freedoms[0].turns and float(np.linalg.norm(off)) < ONE_POINT
 
 
 def _second_order(parts: _Parts, rows: LinkRows, k: int) -> tuple[Array, Array, tuple[float, float, float]]:

@@ -168,6 +168,7 @@ def test_the_check_finds_a_circle(source: str) -> None:
 
 UPWARD = {
     ("model/mechanism.py", "snapped", "mechgraph.structure.snapping"),
+    ("model/mechanism.py", "equivalent", "mechgraph.equivalent"),
     ("model/mechanism.py", "view", "mechgraph.show.page.widget"),
     ("result/solution.py", "view", "mechgraph.show.page.widget"),
 }
