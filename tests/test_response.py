@@ -383,3 +383,66 @@ def test_the_spin_of_a_rod_between_spheres_is_held_by_a_slotted_one():
         assert r.work.coordinates == coordinates
         assert np.abs(r.energy.balance).max() < 1e-8 * r.energy.kinetic.max()
     assert mg.check(free).mobility == mg.check(held).mobility + 1 == 2
+
+
+def coupled(m):
+    """RSSR with a coupler whose centre and inertia are off its line, free to move."""
+    links = [
+        link
+        if link.name == m.frame
+        else link.replace(mass=1.0, center=(0.1, 0.2, 0.3), inertia=np.diag([0.3, 0.2, 0.1]))
+        for link in m.links
+    ]
+    return m.replace(links=links, drives=[], loads=[mg.Gravity((0, -G, 0))])
+
+
+def between(r, *names):
+    """From the point of one pair to that of another, both of one link, in space."""
+    link = r.link("coupler").pose
+    pairs = [r.mechanism.pair(name) for name in names]
+    p, q = (np.asarray(pair.markers[[pair.a, pair.b].index("coupler")].point) for pair in pairs)
+    return link[:, :3, :3] @ (q - p)
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
+def test_passive_freedoms_held_as_in_kinetostatics(engine):
+    """The same motion prescribed takes no effort, and the same couple holds the coupler; free, its spin takes energy."""
+    m = coupled(mg.load("rssr"))
+    given = {"rates": {"A": 3.0}, "rtol": 1e-10, "atol": 1e-12, "engine": engine}
+    r = mg.respond(m, np.linspace(0, 0.4, 9), passive="held", **given)
+    assert np.abs(r.energy.balance).max() < 1e-9
+    a = r["A"]
+    motion = mg.Motion(a.position[:, 0], a.velocity[:, 0], a.acceleration[:, 0])
+    s = mg.solve(m.replace(drives=["A"]), {"A": motion})
+    np.testing.assert_allclose(s["A"].effort, 0.0, atol=1e-10)
+    assert np.abs(r.passive_effort["coupler"]).max() > 0.1
+    np.testing.assert_allclose(s.passive_effort["coupler"], r.passive_effort["coupler"], atol=1e-10)
+    for p in m.pairs:
+        np.testing.assert_allclose(s[p.name].force, r[p.name].force, atol=1e-9)
+    np.testing.assert_allclose((r.link("coupler").twist[:, :3] * between(r, "B", "C")).sum(axis=1), 0.0, atol=1e-12)
+    free = mg.respond(m, np.linspace(0, 0.4, 9), **given)
+    assert np.abs(free["A"].position - a.position).max() > 1e-3
+    assert not free.warnings
+
+
+def test_a_held_passive_freedom_that_carries_load_is_said():
+    m = coupled(mg.load("rssr"))
+    with pytest.warns(mg.MechgraphWarning, match="load-bearing passive freedom"):
+        mg.respond(m, (0, 0.1), passive="held")
+    with pytest.raises(mg.DeclarationError, match="with the passive freedoms at rest, which lets"):
+        mg.respond(m, (0, 0.1), rates={"B.Rx": 3.0, "A": 0.0}, passive="held")
+    with pytest.raises(mg.DeclarationError, match="passive = 'no': expected"):
+        mg.respond(m, (0, 0.1), passive="no")
+
+
+@pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
+def test_held_passive_freedoms_and_stops():
+    """The crank falls on its stop and rests there, the coupler at rest in its spin."""
+    m = coupled(mg.load("rssr"))
+    r = mg.respond(m, np.linspace(0, 1.5, 31), passive="held", stops=mg.Stop("A", lower=-0.5, restitution=0.3))
+    assert r["A"].position.min() > -0.5 - 1e-8
+    assert any("A" in str(one) for one in r.events)
+    lost = np.diff(r.energy.kinetic + r.energy.potential)
+    assert lost.max() < 1e-8
+    np.testing.assert_allclose((r.link("coupler").twist[:, :3] * between(r, "B", "C")).sum(axis=1), 0.0, atol=1e-12)

@@ -140,6 +140,9 @@ def respond(
         float | None,
         typer.Option(help="Absolute tolerance (radians, lengths / L, and their rates), 1e-10 by itself."),
     ] = None,
+    passive: Annotated[
+        Literal["free", "held"] | None, typer.Option(help="Whether passive freedoms move freely, or are held at rest.")
+    ] = None,
     engine: Engine = "auto",
     over_time: OverTime = False,
     json: AsJson = False,
@@ -164,9 +167,10 @@ def respond(
     else:
         refuse("respond", "how long? Give --for TIME; the mechanism has no [response] that says it")
     t = np.linspace(times[0], times[-1], points) if points else times
-    with progress(f"moving {m.name}", float(times[-1])) as moved:
+    with progress(f"moving {m.name}", float(times[-1])) as moved, warnings.catch_warnings():
+        warnings.simplefilter("ignore", mg.MechgraphWarning)  # the summary has them
         r = mg.respond(
-            m, t, start=begin or None, rates=rates or None, rtol=rtol, atol=atol, method=method, engine=engine,
+            m, t, start=begin or None, rates=rates or None, rtol=rtol, atol=atol, method=method, passive=passive, engine=engine,
             on_stop="return", progress=moved,
         )  # fmt: skip
     with working(f"summary of {m.name}"):

@@ -73,6 +73,8 @@ class ForceTask:
     batch: tuple[int, ...]
     t: object
     redundant: str
+    idle: Index | None = None
+    """Fixed freedoms, by their places, whose unit rates are the passive motions; None where these are the motions left free."""
 
 
 def forces_of_block(
@@ -87,7 +89,8 @@ def forces_of_block(
     held: Array | None = None
     holds = hold_terms = np.zeros((0, here.T))
     if task.passive:
-        held, holds, hold_terms = hold(here, task.passive, f.motions(), loads, given, site.largest)
+        passive = f.motions() if task.idle is None else f.sensitivity()[:, task.idle]
+        held, holds, hold_terms = hold(here, task.passive, passive, loads, given, site.largest)
         loads = loads + held
     wrenches = METHODS[task.method](ForceProblem(here, loads, given, task.driven, f))
     lines = ContactLines(here)

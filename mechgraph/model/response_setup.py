@@ -23,6 +23,7 @@ from mechgraph.units import LENGTH, PURE, TIME, factor_of
 
 MethodName = Literal["auto", "RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"]
 METHODS: tuple[MethodName, ...] = get_args(MethodName)
+PassiveName = Literal["free", "held"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +58,9 @@ class ResponseSetup(Described):
     rtol: Annotated[float, NUMBER("relative tolerance of a step")] = 1e-8
     atol: Annotated[float, NUMBER("absolute tolerance: radians, lengths / L, and their rates")] = 1e-10
     method: Annotated[MethodName, TEXT("stepper of `scipy.integrate`", choices=METHODS)] = "auto"
+    passive: Annotated[
+        PassiveName, TEXT("what passive freedoms do: move freely, or stay at rest", choices=get_args(PassiveName))
+    ] = "free"
     events: Annotated[Any, TABLES("events that are watched", key="event", table="event", default="none")] = ()
     stops: Annotated[Any, TABLES("limits of freedoms", key="stop", table="stop", default="none")] = ()
 
@@ -105,6 +109,8 @@ class ResponseSetup(Described):
         found += tolerance_faults(self.rtol, self.atol)
         if self.method not in METHODS:
             found.append(wrong(self.method, "method", f"one of {', '.join(map(repr, METHODS))}"))
+        if self.passive not in get_args(PassiveName):
+            found.append(wrong(self.passive, "passive", "'free' or 'held'"))
         for what, kind in (("motions", Drive), ("events", Event), ("stops", Stop)):
             items = items_of(getattr(self, what), what, found)
             found += [

@@ -16,6 +16,7 @@ import scipy
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index, System
+from mechgraph.closure.passive_motion import PassiveMotion
 from mechgraph.closure.rank import closure_rank
 from mechgraph.closure.solver import ClosureSolver, FactoredClosure, closure_solver
 from mechgraph.numerics.tolerances import PATH
@@ -30,27 +31,53 @@ LAST_STEP = 1e-13
 """Newton step from which on a state counts as closed; the step before it was a millionth, so that only rounding is left."""
 LOST = 1.0
 """Correction above which closing is given up: the step was too long."""
+UNMOVED_BY_SPIN = 1e-9
+"""Rate of a freedom, or twist of a link, in a unit passive motion below which it has no part in it."""
+
+
+class Stopped(Exception):
+    """The motion cannot be followed on; the message says why."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """Passive motions that are held at rest, and the ``places`` of the independent freedoms that stand for them in a chart."""
+
+    motions: tuple[PassiveMotion, ...]
+    places: Index
 
 
 @dataclass(frozen=True)
 class Closed:
-    """A closed state: evaluated, factored, and which positions were closed ``(T,)``."""
+    """A closed state: evaluated, factored, which positions were closed ``(T,)``, and the passive motions held."""
 
     here: Configuration
     f: FactoredClosure
     done: Array
+    held: Held | None = None
 
 
 class Chart:
-    """Independent freedoms ``free`` beside the ``prescribed`` ones, from the closed state ``x0 (nx,)``."""
+    """Independent freedoms ``free`` beside the ``prescribed`` ones, from the closed state ``x0 (nx,)``.
 
-    def __init__(self, system: System, x0: Array, prescribed: Index, engine: Literal["dense", "sparse"]) -> None:
+    Those that are ``moving`` have rates of their own; the others stand for the passive motions ``held``, whose rates follow.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        x0: Array,
+        prescribed: Index,
+        engine: Literal["dense", "sparse"],
+        held: tuple[PassiveMotion, ...] = (),
+    ) -> None:
         self.system, self.x0, self.prescribed = system, x0, prescribed
         here = Configuration(system, x0[:, None])
         null = closure_rank(here, prescribed, engine).motions
-        n = null.shape[1]
-        _, _, order = scipy.linalg.qr(null.T, mode="economic", pivoting=True) if n else (0, 0, np.zeros(0, dtype=int))
-        self.free: Index = np.sort(order[:n]).astype(np.intp)
+        passive, moving = _apart(here, null, held) if held else (np.zeros(0, dtype=np.intp), _leading(null))
+        self.free: Index = np.sort(np.append(passive, moving)).astype(np.intp)
+        self.moving: Index = np.sort(moving)
+        self.held = Held(held, np.flatnonzero(np.isin(self.free, passive))) if held else None
         self.solver: ClosureSolver = closure_solver(engine, np.concatenate([self.free, prescribed]))
         self.which = self.solver.chosen(here, np.full(1, -1))
         self.start = here
@@ -111,4 +138,27 @@ class Chart:
             if closed.all() or not np.isfinite(size).all() or (total > LOST).any():
                 break
             x = s.advance(x, step)
-        return Closed(here, f, closed & (here.closure <= PATH.accepted))
+        return Closed(here, f, closed & (here.closure <= PATH.accepted), self.held)
+
+
+def _leading(null: Array) -> Index:
+    """As many freedoms as there are motions ``null (F, n)``, by pivots: with them all others move at like rates."""
+    n = null.shape[1]
+    order = scipy.linalg.qr(null.T, mode="economic", pivoting=True)[2] if n else np.zeros(0)
+    return np.asarray(order[:n], dtype=np.intp)
+
+
+def _apart(here: Configuration, null: Array, held: tuple[PassiveMotion, ...]) -> tuple[Index, Index]:
+    """Freedoms that stand for the passive motions among ``null (F, n)``, and those for the others, which no passive motion moves."""
+    links = sorted({link for motion in held for link in motion.links})
+    twists = np.stack([np.delete(here.link_twists(v[:, None])[..., 0], links, axis=1).ravel() for v in null.T], axis=1)
+    _, sigma, Vt = np.linalg.svd(np.linalg.qr(twists, mode="r"))
+    passive = null @ Vt[int((sigma > UNMOVED_BY_SPIN).sum()) :].T
+    still = np.flatnonzero(np.abs(passive).max(axis=1, initial=0.0) < UNMOVED_BY_SPIN)
+    others = null[still]
+    count = null.shape[1] - len(held)
+    moving = still[_leading(others)[:count]] if count else still[:0]
+    rank = np.linalg.matrix_rank(null[moving]) if count else 0
+    if passive.shape[1] != len(held) or rank < count:
+        raise Stopped("the passive freedoms cannot be told from the others here, so that they cannot be held")
+    return _leading(passive), moving

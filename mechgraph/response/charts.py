@@ -9,6 +9,7 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.indexing import Index, System
+from mechgraph.closure.passive_motion import PassiveMotion
 from mechgraph.force.applied_loads import kinetic_energy
 from mechgraph.response.chart import Chart, Closed
 from mechgraph.response.motion_equations import Loads, Moved, moved
@@ -17,13 +18,18 @@ from mechgraph.response.prescribed import Prescribed
 
 @dataclass(frozen=True)
 class Task:
-    """What moves: the scaled system, its loads, the prescribed freedoms and their columns, and the engine."""
+    """What moves: the scaled system, its loads, the prescribed freedoms and their columns, the engine, passive motions held."""
 
     system: System
     loads: Loads
     prescribed: Prescribed
     columns: Index
     engine: Literal["dense", "sparse"]
+    held: tuple[PassiveMotion, ...] = ()
+
+    def chart(self, x: Array) -> Chart:
+        """A chart laid out at a closed state ``x (nx,)``."""
+        return Chart(self.system, x, self.columns, self.engine, self.held)
 
     def prescribed_at(self, t: Array) -> Array:
         """Prescribed positions, velocities, accelerations ``(3, p, T)``, internal units."""
@@ -51,9 +57,9 @@ class ChartStage:
 
     def __init__(self, task: Task, t: float, x: Array, dq: Array) -> None:
         self.task = task
-        self.chart = Chart(task.system, x, task.columns, task.engine)
+        self.chart = task.chart(x)
         self.n = len(self.chart.free)
-        self._first = np.concatenate([np.zeros(self.n), dq[self.chart.free], [0.0]])
+        self._first = np.concatenate([np.zeros(self.n), dq[self.chart.moving], [0.0]])
         self._last = _Known(t, x, dq, np.zeros_like(dq))
         self._path = [self._last]
         found = self._found(t, self._first)
@@ -73,7 +79,7 @@ class ChartStage:
         if found is None:
             return np.full(len(y), np.nan)
         du = self.chart.rates_of_coordinates(found.rates.here.x, found.rates.dq)
-        return np.concatenate([du[:, 0], found.rates.ddq[self.chart.free, 0], found.power])
+        return np.concatenate([du[:, 0], found.rates.ddq[self.chart.moving, 0], found.power])
 
     def accepted(self, t: float, y: Array) -> bool:
         """See ``Stage``."""
@@ -93,7 +99,7 @@ class ChartStage:
         guess = np.concatenate(
             [self._path[i].ahead(self.task.system, t[before == i]) for i in dict.fromkeys(before.tolist())], axis=1
         )
-        return self.chart.close(guess, y[: self.n], self.task.prescribed_at(t)[0]), y[self.n : 2 * self.n]
+        return self.chart.close(guess, y[: self.n], self.task.prescribed_at(t)[0]), y[self.n : -1]
 
     def _found(self, t: float, y: Array) -> Moved | None:
         """Rates and accelerations at a time; None where no closed state is found near the last ones."""
@@ -103,7 +109,7 @@ class ChartStage:
         closed = self.chart.close(near.ahead(self.task.system, at), y[:n, None], p[0])
         if not closed.done[0]:
             return None
-        found = moved(closed.here, closed.f, y[n : 2 * n, None], p[1:], self.task.loads, at)
+        found = moved(closed, y[n:-1, None], p[1:], self.task.loads, at)
         rates = found.rates
         self._last = _Known(t, closed.here.x[:, 0], rates.dq[:, 0], rates.ddq[:, 0])
         self._f, self._y = closed.f, y

@@ -183,7 +183,7 @@ class Course:
         out = np.empty((2, self.task.system.n_freedoms, len(t)))
         for places, task, closed, v, _ in self._states(t):
             at = t[places]
-            rates = moved(closed.here, closed.f, v, task.prescribed_at(at)[1:], task.loads, at).rates
+            rates = moved(closed, v, task.prescribed_at(at)[1:], task.loads, at).rates
             out[0][:, places], out[1][:, places] = rates.dq, rates.ddq
         return out
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import scipy
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import assembled_at, named_columns
@@ -18,6 +19,7 @@ from mechgraph.numerics.linear import rank_of, singular_values
 from mechgraph.numerics.tolerances import MOTIONS
 from mechgraph.quantities import is_numeric, without_units, wrong
 from mechgraph.response.charts import Task
+from mechgraph.response.motion_equations import Columns
 from mechgraph.response.prescribed import Prescribed
 
 AGREEING = 1e-9
@@ -85,18 +87,30 @@ def start_rates(m: Mechanism, task: Task, x: Array, rates: Mapping[str, float], 
     columns = np.array([int(s.first_column[k]) + j for k, j in places], dtype=np.intp)
     wanted = np.array(values) / np.where(s.is_length[columns], s.par.L, 1.0)
     N = closure_rank(Configuration(s, x[:, None]), engine=task.engine).motions
+    if task.held:
+        N = _at_rest(task, x)
     if not len(names):
         return np.zeros(s.n_freedoms)
     a = np.linalg.lstsq(N[columns], wanted, rcond=MOTIONS.dependent)[0]
     left = np.abs(N[columns] @ a - wanted)
     if left.max() > AGREEING * max(1.0, float(np.abs(wanted).max())):
         rank = rank_of(singular_values(N[columns]), MOTIONS.dependent)
+        held = " with the passive freedoms at rest" if task.held else ""
         closed = ", ".join(f"{n} {v:.6g}" for n, v in zip(names, (N[columns] @ a).tolist(), strict=True))
         raise DeclarationError(
             f"respond {m.name!r}",
             [
-                f"rates of {', '.join(names)}: contradict the closure, which lets {rank} of these {len(names)} move independently; nearest "
-                f"rates that it allows (radians, or lengths / {s.par.L:.4g}, a unit of time): {closed}"
+                f"rates of {', '.join(names)}: contradict the closure{held}, which lets {rank} of these {len(names)} move independently; "
+                f"nearest rates that it allows (radians, or lengths / {s.par.L:.4g}, a unit of time): {closed}"
             ],
         )
     return np.asarray(N @ a)
+
+
+def _at_rest(task: Task, x: Array) -> Array:
+    """Orthonormal motions that leave the passive links at rest."""
+    chart = task.chart(x)
+    f = chart.solver.factored(chart.start, chart.which)
+    columns = Columns(chart.start, f, len(chart.free), chart.held)
+    Z = np.concatenate([columns.Z, columns.Zp], axis=1)[..., 0]
+    return np.asarray(scipy.linalg.orth(Z))

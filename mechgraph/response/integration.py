@@ -17,9 +17,8 @@ import scipy
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.indexing import Index
 from mechgraph.errors import counted
-from mechgraph.response.chart import Closed
+from mechgraph.response.chart import Closed, Stopped
 from mechgraph.response.charts import Task
-from mechgraph.response.motion_equations import Stopped
 
 
 class Stage(Protocol):

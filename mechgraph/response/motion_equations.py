@@ -23,10 +23,12 @@ from mechgraph.algebra.se3 import Array, cross, rotate, rotate_back
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_path import BLOCK
 from mechgraph.closure.indexing import System
+from mechgraph.closure.passive_motion import PassiveMotions
 from mechgraph.closure.rates import Rates, Velocities
 from mechgraph.closure.solver import FactoredClosure
 from mechgraph.force.applied_loads import Site, inertia_wrenches
 from mechgraph.model.load_base import Load
+from mechgraph.response.chart import Closed, Held, Stopped
 from mechgraph.response.saddle import saddle_accelerations
 
 MASSLESS = 1e-12
@@ -76,10 +78,6 @@ def _inertia(here: Configuration, V: Array, A: Array) -> Array:
     return inertia_wrenches(here, SimpleNamespace(V=V, A=A))  # type: ignore[arg-type]
 
 
-class Stopped(Exception):
-    """The motion cannot be followed on; the message says why."""
-
-
 NO_INERTIA = (
     "loads act along a motion that no inertia resists, so that its acceleration has no bound. Give mass or inertia to what moves "
     "so, or prescribe its motion"
@@ -111,12 +109,18 @@ def _momenta(here: Configuration, V: Array) -> Array:
 class Columns:
     """What the motions of unit rates do at closed states: ``Z (F, n, T)`` of the independent columns and ``Zp`` of the prescribed ones.
 
-    The factors ``f`` have the ``n`` independent columns fixed, and behind them the prescribed ones.
+    The factors ``f`` have the ``n`` independent columns fixed, and behind them the prescribed ones. Where passive motions are ``held``,
+    only the others of them count, each with the passive motions that leave it at rest in these.
     """
 
-    def __init__(self, here: Configuration, f: FactoredClosure, n: int) -> None:
+    def __init__(self, here: Configuration, f: FactoredClosure, n: int, held: Held | None = None) -> None:
         self.here, self.f, self.n = here, f, n
         self.Z, self.Zp = np.split(f.sensitivity(), [n], axis=1)
+        self.rest: PassiveMotions | None = None
+        if held is not None:
+            self.rest = rest = PassiveMotions(here, held.motions, self.Z[:, held.places])
+            self.n = n - len(held.places)
+            self.Z, self.Zp = (_at_rest(here, rest, Z) for Z in (np.delete(self.Z, held.places, axis=1), self.Zp))
 
     @cached_property
     def V(self) -> Array:
@@ -169,6 +173,9 @@ class Columns:
         here, velocities = self.here, Velocities(self.here, dq)
         free = self.f.solve(-here.closure_bias(velocities.bias)[:, None])[:, 0]
         ddq = free if ddq is None else free + ddq
+        if self.rest is not None:
+            A = here.accelerations_with(ddq, velocities.bias)
+            ddq = ddq + self.rest.still_at_rest(self.f, dq, velocities.V, velocities.bias, A)
         return velocities, ddq, _inertia(here, velocities.V, here.accelerations_with(ddq, velocities.bias))
 
     def applied(self, loads: tuple[Load, ...], velocities: Velocities, t: Array) -> tuple[Array, Array]:
@@ -181,12 +188,21 @@ class Columns:
         return site.applied(), site.scaled_efforts()
 
 
-def moved(here: Configuration, f: FactoredClosure, v: Array, p: Array, loads: Loads, t: Array) -> Moved:
+def _at_rest(here: Configuration, rest: PassiveMotions, Z: Array) -> Array:
+    """Motions ``(F, k, T)`` with what leaves the passive links at rest."""
+    out = Z.copy()
+    for i in range(Z.shape[1]):
+        out[:, i] += rest.at_rest(here.link_twists(Z[:, i]))
+    return out
+
+
+def moved(closed: Closed, v: Array, p: Array, loads: Loads, t: Array) -> Moved:
     """Accelerations at closed states with independent rates ``v (n, T)`` and prescribed rates and accelerations ``p (2, p, T)``.
 
-    ``f`` as in ``Columns``.
+    The factors as in ``Columns``.
     """
-    columns = Columns(here, f, len(v))
+    here, held = closed.here, closed.held
+    columns = Columns(here, closed.f, len(v) + (0 if held is None else len(held.places)), held)
     Z, Zp = columns.Z, columns.Zp
     dq = (Z * v).sum(axis=1) + (Zp * p[0]).sum(axis=1)
     velocities, ddq, inertia = columns.bound(dq, (Zp * p[1]).sum(axis=1))

@@ -34,14 +34,15 @@ def trajectory_of(task: Task, m: Mechanism, times: Array, blocks: Iterable[Block
     for places, _, closed, _ in blocks:
         x[:, places] = closed.here.x
     coordinates = s.coordinates_of(x, s.start_coordinates(m.start))
-    out = Trajectory(s, partial(_same, s), times.shape, times, task.columns, coordinates, True)
+    out = Trajectory(s, partial(_same, s), times.shape, times, task.columns, coordinates, True, task.held)
     out.engine, out.method = task.engine, "loop_wrench"
     kinetic, potential = np.zeros(t.size), np.zeros(t.size)
     for places, own, closed, v in blocks:
         # the batch of a block is its own: loads are functions of time here, not arrays over positions
         at, count, q = t[places], len(places), coordinates[:, places]
-        rates = moved(closed.here, closed.f, v, own.prescribed_at(at)[1:], own.loads, at).rates
-        force_task = ForceTask(out.method, m.loads, own.columns, (), (count,), at, "nan")
+        rates = moved(closed, v, own.prescribed_at(at)[1:], own.loads, at).rates
+        idle = None if closed.held is None else closed.held.places
+        force_task = ForceTask(out.method, m.loads, own.columns, own.held, (count,), at, "nan", idle)
         forces = forces_of_block(force_task, rates, closed.f, q, np.arange(count))
         held = np.setdiff1d(own.columns, task.columns)
         given = forces.given.copy()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, Literal, get_args
 
@@ -13,23 +15,32 @@ from mechgraph.arguments import items_of, option_faults
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.rank import closure_rank
 from mechgraph.closure.solver import ENGINES, EngineName, engine_for
-from mechgraph.errors import AssemblyError, DeclarationError, ResponseError
+from mechgraph.errors import AssemblyError, DeclarationError, MechgraphWarning, ResponseError
 from mechgraph.model.declaration import mapping_faults
 from mechgraph.model.event import Event
 from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism, check_mechanism
-from mechgraph.model.response_setup import METHODS, MethodName, ResponseSetup, read_times, tolerance_faults
+from mechgraph.model.response_setup import (
+    METHODS,
+    MethodName,
+    PassiveName,
+    ResponseSetup,
+    read_times,
+    tolerance_faults,
+)
 from mechgraph.model.stop import Stop
 from mechgraph.report.report import hinted
 from mechgraph.response.along_path import Arc, PathStage
+from mechgraph.response.chart import Stopped
 from mechgraph.response.charts import ChartStage, Task
 from mechgraph.response.course import Course, Response
 from mechgraph.response.events import Occurrence, Watch, read_events
 from mechgraph.response.initial import read_rates, read_start, start_rates, started
 from mechgraph.response.integration import Integration, Stage
-from mechgraph.response.motion_equations import Loads, Stopped
+from mechgraph.response.motion_equations import Loads
 from mechgraph.response.prescribed import OVER_POSITIONS, read_motions
 from mechgraph.response.stops import Stops, read_stops
+from mechgraph.structure.mobility import free_motion
 from mechgraph.structure.snapping import meant
 
 OnStopName = Literal["raise", "return"]
@@ -54,6 +65,7 @@ def respond(
     events: Iterable[Event] | Event | None = None,
     stops: Iterable[Stop] | Stop | None = None,
     on_stop: OnStopName = "raise",
+    passive: PassiveName | None = None,
     tol: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Response:
@@ -80,6 +92,8 @@ def respond(
     stops : ``Stop``s, limits of freedoms that they strike, rest on and leave; what a stop exerts is an ``applied_effort``.
     on_stop : where the motion cannot be followed to its end, or is interrupted: ``"raise"``, or ``"return"`` what there is, with
         ``stopped`` saying why.
+    passive : what passive freedoms do, such as the spin of a coupler between two spheres: ``"free"``, they move by their inertia and the
+        loads, or ``"held"``, they are at rest as in ``solve``, and ``passive_effort`` is what that takes.
     tol : as in ``solve``.
     progress : called with the time reached after every step.
 
@@ -91,10 +105,11 @@ def respond(
     """
     check_mechanism(m, "respond")
     given = {"t": t, "start": start, "rates": rates, "motions": motions, "rtol": rtol, "atol": atol, "method": method}
-    how = _how(m, given | {"events": events, "stops": stops})
+    how = _how(m, given | {"events": events, "stops": stops, "passive": passive})
     faults = option_faults(
         {
             "method": (how.method, METHODS),
+            "passive": (how.passive, get_args(PassiveName)),
             "engine": (engine, ENGINES),
             "on_stop": (on_stop, get_args(OnStopName)),
         }
@@ -126,6 +141,8 @@ def respond(
             hinted(declared, error)
         raise
     task = Task(system, Loads.of(m.loads), prescribed, columns, engine_for(system.n_rows, 1, engine))
+    if how.passive == "held":
+        task = replace(task, held=free_motion(system, x, columns, task.engine).passive)
     dq = start_rates(m, task, x, wanted_rates, begin)
     standing = Stops.of(m, task, limits)
     faults = standing.faults(x)
@@ -172,6 +189,8 @@ def _followed(
         out = course.outputs(last)
     assert out is not None
     out.stopped, out.events = why, tuple(happened)
+    for warning in out.warnings:
+        warnings.warn(f"mechanism {course.mechanism.name!r}: {warning}", MechgraphWarning, stacklevel=3)
     return out
 
 

@@ -27,10 +27,10 @@ from mechgraph.model.event import Event
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.stop import Stop
 from mechgraph.quantities import wrong
-from mechgraph.response.chart import Chart
+from mechgraph.response.chart import Closed, Stopped
 from mechgraph.response.charts import Task
 from mechgraph.response.events import Occurrence, first_root
-from mechgraph.response.motion_equations import NO_INERTIA, UNOPPOSED, Stopped, accelerations, moved
+from mechgraph.response.motion_equations import NO_INERTIA, UNOPPOSED, accelerations, moved
 from mechgraph.response.prescribed import Prescribed
 
 IMMOVABLE = 1e-12
@@ -212,14 +212,15 @@ class _Free:
     """The equations of motion at a state, nothing held: what closed limits do."""
 
     def __init__(self, task: Task, t: float, x: Array, dq: Array, closed: tuple[_Limit, ...]) -> None:
-        self.chart = Chart(task.system, x, task.columns, task.engine)
+        self.chart = task.chart(x)
         f = self.chart.solver.factored(self.chart.start, self.chart.which)
+        at = Closed(self.chart.start, f, np.ones(1, dtype=bool), self.chart.held)
         p = task.prescribed_at(np.array([t]))[1:]
-        found = moved(self.chart.start, f, dq[self.chart.free][:, None], p, task.loads, np.array([t]))
+        found = moved(at, dq[self.chart.moving][:, None], p, task.loads, np.array([t]))
         self.dq, self.mass = dq, found.columns.mass
         self.columns = np.array([limit.column for limit in closed])
         self.sign = np.array([limit.sign for limit in closed])
-        self.Z = f.sensitivity()[:, : len(self.chart.free), 0]
+        self.Z = found.columns.Z[..., 0]
         G = self.sign[:, None] * self.Z[self.columns]
         self.moves = np.abs(G).max(axis=1, initial=0.0) > IMMOVABLE
         self.impulse_to_rate, left = np.zeros(G.T.shape), np.zeros(G.T.shape)
