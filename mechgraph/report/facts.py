@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -26,7 +26,8 @@ from mechgraph.structure.finite_motion import FiniteMotion, finite_motion
 from mechgraph.structure.generic import Generic, generic
 from mechgraph.structure.kind import Kind, kind_of, kind_of_mechanism
 from mechgraph.structure.mobility import Freedoms, freedoms_at
-from mechgraph.structure.pair_changes import LARGEST_FOR_SETS, Effect
+from mechgraph.structure.pair_changes import LARGEST_FOR_SETS, Effect, effect
+from mechgraph.structure.self_aligning import self_aligning_sets
 from mechgraph.structure.self_stress import SelfStress
 from mechgraph.structure.uniqueness import Uniqueness, uniqueness
 from mechgraph.topology.linkgraph import LinkGraph
@@ -404,6 +405,20 @@ class Facts:
             *drives,
             *(Advice(e.text, tuple(item for item, *_ in e.changes), effect=e, mechanism=m) for e in self.effects),
         )
+
+    def self_aligning(self, most: int = 3) -> Iterator[Advice]:
+        """All sets of up to ``most`` wider pairs that leave no redundancy and the mobility as it is, the easiest to build first.
+
+        Each can be applied. Sets that add passive freedoms (a rod between two balls) are not among them; see ``advice`` for these.
+        """
+        g = self.geometry
+        if g is None:
+            return
+        m = at_position(self.mechanism, g.system, g.x)
+        for chosen in self_aligning_sets(g.freedoms, most):
+            e = effect(g.freedoms, g.driven, chosen, self.asked)
+            if e.redundancy[1] == 0 and e.mobility[1] == e.mobility[0]:
+                yield Advice(e.text, tuple(item for item, *_ in e.changes), effect=e, mechanism=m)
 
 
 def counted_ledger(m: Mechanism, bookkeeping: str) -> Ledger:
