@@ -398,3 +398,6 @@ def test_gears_roll_and_worms_slide():
     c = s.coupling("g")
     np.testing.assert_allclose(np.linalg.norm(c.sliding, axis=-1), 2.0 * 0.02 / np.cos(lead), rtol=1e-12)
     np.testing.assert_allclose((c.force * c.sliding).sum(axis=-1), 0.0, atol=1e-12)
+    columns = s.columns(["contacts"])
+    np.testing.assert_allclose(columns["g force"], np.linalg.norm(c.force, axis=-1))
+    np.testing.assert_allclose(columns["g sliding speed"], 2.0 * 0.02 / np.cos(lead), rtol=1e-12)

@@ -11,9 +11,9 @@ neither. Where the radius is not declared it counts as zero.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from mechgraph.quantities import wrong
 from mechgraph.result.numbers import bracket, number, ranges, with_unit
 from mechgraph.result.places import OK, Places, driver_value
 from mechgraph.result.values import Mask, Values
+from mechgraph.result.views import CouplingResult
 from mechgraph.units import FORCE, LENGTH, PRESSURE, TIME, unit_of
 
 PULL = 1e-10
@@ -336,7 +337,12 @@ def lift_offs(values: Values) -> tuple[LiftOff, ...]:
     return tuple(found for k in forced for found in ContactResult(values, k).lift_off)
 
 
-def contact_columns(values: Values) -> Any:
-    """Columns of the table: ``B path on plane:x``, ``B normal force``, ``B sliding speed``, ..."""
+def contact_columns(values: Values) -> Iterator[tuple[str, Array, tuple[int, int, int]]]:
+    """Columns of the table: ``B path on plane:x``, ``B normal force``, ``B sliding speed``, ...; of gears force and sliding speed."""
     for name, contact in contacts_of(values).items():
         yield from ((f"{name} {fact}", value, dimension) for fact, value, dimension in contact.columns())
+    for k, coupling in enumerate(values.whole.couplings):
+        if coupling.steps and values.has_forces:
+            gears = CouplingResult(values, k)
+            yield f"{coupling.name} force", np.linalg.norm(gears.force, axis=-1), FORCE
+            yield f"{coupling.name} sliding speed", np.linalg.norm(gears.sliding, axis=-1), (1, 0, -1)
