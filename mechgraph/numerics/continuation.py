@@ -117,19 +117,18 @@ class Follower(Marching):
             kept = good.nonzero()[0]
             moved = (new, last) if len(kept) == len(good) else (new.take(kept), last.take(kept))
             out += self.moved(march, *moved, kept)
-            self._spend(march, PATH.quick_steps)
-            track = march.last.track
-            march.keep(
-                (march.last.place < self.paths.end[track]) & (march.h >= PATH.shortest_quick) & ~self.given_up[track]
-            )
+            going = self._spend(march, PATH.quick_steps) & (march.h >= PATH.shortest_quick)
+            march.keep(going & (march.last.place < self.paths.end[march.last.track]))
         return Nodes.join(out) if out else start.take(np.zeros(0, dtype=np.intp))
 
-    def _spend(self, march: March, most: int) -> None:
-        """Count a step of a march, and give up its tracks that have taken more than ``most``."""
+    def _spend(self, march: March, most: int) -> Mask | bool:
+        """Count a step of a march, and give up its tracks that have taken more than ``most``; which may go on."""
         march.steps += 1
-        if march.steps > most:
-            tracks = march.last.track
-            self.given_up[tracks] |= march.steps > most + PATH.steps_a_point * self.paths.count[tracks]
+        if march.steps <= most:
+            return True
+        tracks = march.last.track
+        self.given_up[tracks] |= march.steps > most + PATH.steps_a_point * self.paths.count[tracks]
+        return np.asarray(~self.given_up[tracks])
 
     def _filled(self, nodes: Nodes) -> Nodes:
         """The nodes with others between them, interpolated, where steps are too long for the certificate."""
@@ -230,9 +229,9 @@ class Follower(Marching):
                 for i in np.flatnonzero(stuck):
                     nodes = self._passed(nodes, march, int(i))
                 found = [nodes]
-            self._spend(march, PATH.careful_steps)
-            ended = self.given_up | np.array([end is not End.REACHED for end in self.ends])
-            march.keep((march.last.place < self.paths.end[march.last.track]) & ~ended[march.last.track])
+            going, track = self._spend(march, PATH.careful_steps), march.last.track
+            reached = np.array([self.ends[v] is End.REACHED for v in track])
+            march.keep(going & reached & (march.last.place < self.paths.end[track]))
         return Nodes.join(found)
 
     def _careful_step(self, march: March, worst: Array, found: list[Nodes]) -> Mask:

@@ -51,7 +51,7 @@ class Marching:
     def __init__(self, problem: Problem, work: Work) -> None:
         self.problem, self.work, self.newton = problem, work, Newton(problem, work)
 
-    def predicted(self, march: March) -> tuple[Array, Array, Array, Array]:
+    def predicted(self, march: March) -> tuple[Array, Array, Array, Array | float]:
         """Where the next steps lead: places, path values, states predicted there, and the order of their error in the step."""
         last = march.last
         at = self.paths.step(last.track, last.place, march.h)
@@ -63,9 +63,11 @@ class Marching:
         """The tracks ``at`` of a march moved on to new nodes, each in a better form where its own is poor; the nodes made."""
         renewed = self.renewed(new)
         march.move(renewed, before, at)
+        if renewed is new:
+            return [new]
         changed = (renewed.which != new.which).nonzero()[0]
         march.known[at[changed]] = False
-        return [new, renewed.take(changed)] if changed.size else [new]
+        return [new, renewed.take(changed)]
 
     def renewed(self, nodes: Nodes) -> Nodes:
         """The same nodes in better forms where theirs are poor."""
@@ -82,35 +84,36 @@ class Marching:
         new[poor] = which
         return replace(nodes, Z=Z, condition=condition, which=new)
 
-    def _ahead(self, last: Nodes, before: Nodes, known: Mask, at: Array, drive: Array) -> tuple[Array, Array]:
+    def _ahead(self, last: Nodes, before: Nodes, known: Mask, at: Array, drive: Array) -> tuple[Array, Array | float]:
         """Increments ``(F, n)`` from the last nodes to path values, and the order of their error in the step.
 
         Where the track goes straight on from the node before (``known``) in steps of fair size: Hermite interpolation through both,
         extrapolated; behind a corner the change of the sensitivity over the last step; else the sensitivity alone.
         """
         h, change = at - last.place, drive - last.drive
+        came, back = last.drive - before.drive, last.place - before.place
+        along, sizes = np.add.reduce(came * change), np.add.reduce(came * came) * np.add.reduce(change * change)
+        straight = known & (along > (1 - 1e-9) * np.sqrt(sizes)) & (h < 16.0 * back) & (h > 0.25 * back)
+        if straight.all():
+            return self.problem.corrigible(self._through(before, last, change, h), last.which), 4.0
         dq = np.add.reduce(last.Z * change, axis=1)
         order = np.full(len(h), 2.0)
-        came = last.drive - before.drive
-        back = last.place - before.place
-        ratio = h / np.where(back > 0, back, 1.0)
-        along, came2, change2 = (np.add.reduce(a * b) for a, b in ((came, change), (came, came), (change, change)))
-        known = known & (back > 0) & (ratio < 16.0) & (along > 0)
-        straight = known & (along > (1 - 1e-9) * np.sqrt(came2 * change2)) & (ratio > 0.25)
         two = straight.nonzero()[0]
-        every = two.size == len(h)
         if two.size:
-            mine = slice(None) if every else two
-            a, b = (before, last) if every else (before.take(two), last.take(two))
-            y = self.problem.difference(a.x, b.x)
-            there = self.problem.tangent(y, np.add.reduce(a.Z * (change[:, mine] / h[mine]), axis=1))
-            dq[:, mine] = cubic(y, dq[:, mine] / h[mine], there, a.place - b.place, h[mine])
-            order[mine] = 4.0
-        if not every:
-            bent = (known & ~straight & (ratio < 4.0)).nonzero()[0]
-            dq[:, bent] += 0.5 * ratio[bent] * ((last.Z - before.Z)[:, :, bent] * change[:, bent]).sum(axis=1)
-            order[bent] = 3.0
+            dq[:, two] = self._through(before.take(two), last.take(two), change[:, two], h[two])
+            order[two] = 4.0
+        bent = (known & ~straight & (along > 0) & (h < 4.0 * back)).nonzero()[0]
+        turn = ((last.Z - before.Z)[:, :, bent] * change[:, bent]).sum(axis=1)
+        dq[:, bent] += 0.5 * h[bent] / back[bent] * turn
+        order[bent] = 3.0
         return self.problem.corrigible(dq, last.which), order
+
+    def _through(self, a: Nodes, b: Nodes, change: Array, h: Array) -> Array:
+        """Increments ``(F, n)`` from nodes ``b`` of Hermite's cubics through ``a`` and them, where path values have changed on."""
+        direction = change / h
+        y = self.problem.difference(a.x, b.x)
+        here, there = (np.add.reduce(node.Z * direction, axis=1) for node in (b, a))
+        return cubic(y, here, self.problem.tangent(y, there), a.place - b.place, h)
 
     def longest(self, last: Nodes, new: Nodes, drive: Array) -> Array | float:
         """The longest next steps, by the pace of the tracks at both ends of the last one."""
@@ -121,7 +124,7 @@ class Marching:
         return PATH.longest / np.maximum(np.maximum(*paces), np.finfo(float).tiny)
 
 
-def next_step(h: Array, correction: Array, order: Array, good: Mask, longest: Array | float) -> Array:
+def next_step(h: Array, correction: Array, order: Array | float, good: Mask, longest: Array | float) -> Array:
     """The step that aims at the wanted correction, at most the ``longest``; half of one that failed."""
     grown = h * np.minimum(np.maximum((PATH.aim / np.maximum(correction, 1e-9)) ** (1 / order), 0.5), 2.0)
     return np.where(good, np.minimum(np.maximum(grown, 10 * PATH.shortest), longest), 0.5 * h)

@@ -185,7 +185,8 @@ class _Run:
         self.x, self.drive, self.tracks, self.which = x.copy(), drive, tracks, which.copy()
         self.step_goal, self.goal = step_goal, goal
         self.total, self.Z, self.condition = np.zeros((F, n)), np.zeros((F, d, n)), np.full(n, np.inf)
-        self.done, self.before, self.fresh = np.zeros(n, dtype=bool), np.full(n, np.inf), np.ones(n, dtype=bool)
+        self.before = self.condition.copy()
+        self.done, self.chosen_again = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
         self.active = np.arange(n)
 
     def closed(self) -> Closed:
@@ -247,14 +248,14 @@ class _Run:
         going = ~small if finite is None else finite & ~small
         unmet = self._unmet(small, step, size)
         if unmet is not None:
-            again = unmet & self.fresh[mine]
+            again = unmet & ~self.chosen_again[mine]
             self._choose_again(np.flatnonzero(again))
             small, going = small & ~unmet, (going & ~unmet) | again
-        if small.any():
-            at, those = (mine, EVERY) if small.all() else (self.active[small], small)
+        if count := np.count_nonzero(small):
+            at, those = (mine, EVERY) if count == self.active.size else (self.active[small], small)
             self.Z[:, :, at] = self.problem.sensitivity(self.point, f)[:, :, those]
             self.condition[at], self.done[at] = f.condition[those], True
-        if going.any():
+        if count < self.active.size:
             going &= largest(self.total[:, mine]) <= PATH.lost
         self.active = self.active[going]
 
@@ -280,7 +281,7 @@ class _Run:
         if again.size:
             at = self.active[again]
             self.which[at] = self.problem.chosen(self.point.part(again), np.full(again.size, -1))
-            self.fresh[at] = False
+            self.chosen_again[at] = True
 
 
 def least_norm_steps(J: Array, r: Array, tolerance: float) -> Array:
