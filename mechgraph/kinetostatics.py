@@ -27,6 +27,7 @@ from mechgraph.force.dalembert import METHODS, MethodName
 from mechgraph.model.declaration import mapping_faults
 from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism, check_mechanism
+from mechgraph.model.parameters import declared
 from mechgraph.pipeline import Options, Outcome, Pipeline
 from mechgraph.quantities import wrong
 from mechgraph.report.report import check, hinted
@@ -119,9 +120,10 @@ def _solve(
     options: Options,
     actuate: Iterable[str] | None = None,
     tol: float | None = None,
+    quiet: bool = False,
 ) -> Solution:
     try:
-        return _solved(meant(m, tol, "solve"), motions, on_reach, options, actuate)
+        return _solved(meant(m, tol, "solve"), motions, on_reach, options, actuate, quiet)
     except (AssemblyError, DeadPointError, IndeterminateError, ReachError) as error:
         if tol is None and m.tol is None:
             hinted(m, error)
@@ -129,21 +131,33 @@ def _solve(
 
 
 def _solved(
-    m: Mechanism, motions: Mapping[str, Any] | None, on_reach: str, options: Options, actuate: Iterable[str] | None
+    m: Mechanism,
+    motions: Mapping[str, Any] | None,
+    on_reach: str,
+    options: Options,
+    actuate: Iterable[str] | None,
+    quiet: bool,
 ) -> Solution:
     line = Pipeline(DriverMotion(m, motions, actuate), options)
     outcome = line.run()
     _check_drivers(line, outcome)
     _check_actuators(line, outcome)
     if isinstance(m, SnappedMechanism):
-        outcome.trajectory.as_declared(partial(declared_closure, m, line.system.par), m.changes.tol)
+        outcome.trajectory.as_declared(partial(declared_closure, line.system, declared(m.declared)), m.changes.tol)
     solution = Solution(outcome.trajectory)
-    for warning in solution.warnings:
+    for warning in () if quiet else solution.warnings:
         warnings.warn(f"mechanism {m.name!r}: {warning}", MechgraphWarning, stacklevel=4)
     error = _unreached(line, outcome, solution) if on_reach == "raise" else None
     if error is not None:
         raise error
     return solution
+
+
+def solve_quietly(
+    m: Mechanism, motions: Mapping[str, Any], options: Options, actuate: Iterable[str] | None
+) -> Solution:
+    """One of many: positions out of reach flagged, and what ``Solution.warnings`` says not said as Python warnings."""
+    return _solve(m, motions, "flag", options, actuate, quiet=True)
 
 
 def kinematics(

@@ -267,6 +267,32 @@ def test_a_study_takes_every_variant_as_meant() -> None:
     assert (study.status == "ok").all()
 
 
+@pytest.mark.parametrize("started", [False, True])
+def test_a_study_looks_at_the_closure_along_the_path(started: bool) -> None:
+    """Every variant has the statuses and closure errors that it has alone; followed together, or from a start of its own.
+
+    Lengths are over the mean radius of the first variant where they are followed together.
+    """
+    m = rounded(mechanisms.bennett(), 3)
+    tol = m.snapped(5e-3).changes.largest
+    point, path = m.pair("O2").point, np.linspace(0, 3, 8)
+
+    def variant(x: float) -> mg.Mechanism:
+        pairs = [p.replace(point=(x, *point[1:])) if p.name == "O2" else p for p in m.pairs]
+        return m.replace(pairs=pairs, start={"O1": 1e-3 * (x - point[0])} if started else {})
+
+    levels = [point[0] + 1e-4]
+    study = mg.study(
+        variant, {"x": levels}, ["O2.position", "closure"], 1, sampling="grid", motions={"O1": path}, tol=tol
+    )
+    for i, x in enumerate(levels):
+        alone = mg.kinematics(variant(x), {"O1": path}, tol=tol, on_reach="flag")
+        assert 0 < (alone.status == "beyond tolerance").sum() < len(path)
+        np.testing.assert_array_equal(study.status[i], alone.status)
+        np.testing.assert_allclose(study.outputs["closure"][i], alone.checks.closure, rtol=1e-4, atol=1e-12)
+        np.testing.assert_array_equal(np.isnan(study.outputs["O2.position"][i]), alone.status != "ok")
+
+
 @pytest.mark.parametrize("cosine", [-1e-3, 5e-4, 3e-6])
 def test_second_directions_are_perpendicular_to_the_tolerance_of_the_mechanism(cosine: float, tmp_path) -> None:
     """Of types of which it is a true direction; taken as meant then, and refused without a tolerance or with a smaller one."""

@@ -102,6 +102,17 @@ class Declared:
         count = np.bincount(ends, minlength=len(m.links))
         return np.stack([np.bincount(ends, row, minlength=len(m.links)) for row in points]) / count
 
+    def with_rest(self, m: Mechanism) -> Declared:
+        """The numbers with those of the pairs of ``m`` behind theirs (free pairs, which do not vary)."""
+        P = self.pitch.shape[0]
+        if len(m.pairs) == P:
+            return self
+        rest, joined = declared(m), {}
+        for name in ("point", "axis", "second", "pitch"):
+            mine, theirs = getattr(self, name), getattr(rest, name)[..., P:, :]
+            joined[name] = np.concatenate([mine, np.repeat(theirs, mine.shape[-1], axis=-1)], axis=-2)
+        return replace(self, **joined)
+
     def parameters(self, m: Mechanism, offset: Array, origin: Array, L: float) -> Parameters:
         """The arrays that kernels read, about ``origin (3,)`` with lengths over ``L`` and link frames moved by ``offset (3, N)``."""
         frame_link = m.link_index[m.frame]

@@ -17,6 +17,7 @@ from mechgraph.data import plain
 from mechgraph.document import Bullets, Document, Heading, Paragraph, Shown
 from mechgraph.errors import DeclarationError, ResponseError
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.parameters import declared
 from mechgraph.quantities import real_array, wrong
 from mechgraph.response.chart import Closed
 from mechgraph.response.charts import Task
@@ -156,7 +157,7 @@ class Course:
         trajectory, kinetic, potential = trajectory_of(self.task, m, times, blocks)
         trajectory.work = self.integration.work
         if isinstance(m, SnappedMechanism):
-            trajectory.as_declared(partial(declared_closure, m, system.par), m.changes.tol)
+            trajectory.as_declared(partial(declared_closure, system, declared(m.declared)), m.changes.tol)
         return trajectory, kinetic, potential, works * system.par.L**2
 
     def _states(self, flat: Array) -> Iterator[tuple[Index, Task, Closed, Array, Array]]:

@@ -141,13 +141,13 @@ class Kept:
         """Say why positions are not solved."""
         self._status[places] = status
 
-    def as_declared(self, closure: Callable[[Array], Array], tol: float) -> None:
-        """Let ``checks`` give closure errors ``closure(x)`` of the declared geometry; positions beyond ``tol`` do not count as solved."""
+    def as_declared(self, closure: Callable[[Array, Index], Array], tol: float) -> None:
+        """Let ``checks`` give errors ``closure(x, places)`` of the declared geometry; positions beyond ``tol`` do not count as solved."""
         places = np.flatnonzero(self._solved)
         if not places.size:
             return
         error = np.full(self._count, np.nan)
-        error[places] = closure(self._of("x")[:, places])
+        error[places] = closure(self._of("x")[:, places], places)
         beyond = error > tol
         if beyond.any():
             self._motions = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,12 +11,12 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import closed_start
 from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.indexing import System
+from mechgraph.closure.indexing import Index, System
 from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.numeric import tolerance_fault
-from mechgraph.model.parameters import Parameters, parameters
+from mechgraph.model.parameters import Declared
 from mechgraph.numerics.linear import singular_values
 from mechgraph.structure.least_change import MOST_ROWS, least_change, weakness
 from mechgraph.structure.near_relations import Relation, Relations
@@ -95,8 +96,6 @@ def snapped(m: Mechanism, tol: float) -> SnappedMechanism:
     placed = Placed(here)
     change, met, dropped, mobile = least_change(placed, tol)
     pairs = placed.pairs(change)
-    kept = {k: getattr(m, k) for k in m.formats}
-    out = SnappedMechanism(**{**kept, "pairs": pairs, "start": placed.start, "tol": tol})
     L, moved = here.system.par.L, placed.moved(change)
     rows = [
         Change(pair.name, float(angle) if angle > EXACT else 0.0, float(shift * L) if shift > EXACT else 0.0)
@@ -106,9 +105,23 @@ def snapped(m: Mechanism, tol: float) -> SnappedMechanism:
     changes = Changes(
         tol, tuple(rows), met, dropped, float(np.max(moved, initial=0.0)), float(here.closure[0]), mobile, L
     )
+    return _made(m, changes, pairs=pairs, start=placed.start, tol=tol)
+
+
+def _made(m: Mechanism, changes: Changes, like: Mechanism | None = None, **fields: Any) -> SnappedMechanism:
+    """What was made of ``m`` by changes: ``like`` it (left out, like ``m``) with other fields."""
+    kept = like or m
+    out = SnappedMechanism(**{**{k: getattr(kept, k) for k in kept.formats}, **fields})
     object.__setattr__(out, "changes", changes)
     object.__setattr__(out, "declared", m)
     return out
+
+
+def started(m: Mechanism, start: Mapping[str, float]) -> Mechanism:
+    """The same with another start; what was snapped stays so."""
+    if isinstance(m, SnappedMechanism):
+        return _made(m.declared, m.changes, like=m, start=start)
+    return m.replace(start=start)
 
 
 def meant(m: Mechanism, tol: float | None, call: str) -> Mechanism:
@@ -133,7 +146,8 @@ def candidates(m: Mechanism, tol: float) -> Array:
     return np.array([*sizes, *(weak * tol / weakness(here.system, tol)).tolist()])
 
 
-def declared_closure(m: SnappedMechanism, par: Parameters, x: Array) -> Array:
-    """Closure errors ``(T,)`` of the geometry as declared at states ``(nx, T)`` of a snapped mechanism with the numbers ``par``."""
-    own = parameters(m.declared).rescaled(par.origin, par.L)
-    return Configuration(System(m).with_parameters(own), x).closure
+def declared_closure(system: System, numbers: Declared, x: Array, which: Index) -> Array:
+    """Closure errors ``(T,)`` at states ``x (nx, T)`` of what was snapped, with the ``numbers`` as declared of variants ``which (T,)``."""
+    par = system.par
+    own = numbers.with_rest(system.m).parameters(system.m, par.offset, par.origin, par.L)
+    return Configuration(system.with_parameters(own).cases(which), x).closure

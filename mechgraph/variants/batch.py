@@ -19,13 +19,13 @@ from mechgraph.closure.driver_path import DriverPath
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.solver import FactoredClosure, closure_solver
 from mechgraph.errors import DeclarationError
-from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
-from mechgraph.model.parameters import Declared, Parameters, declared
+from mechgraph.model.parameters import Parameters
 from mechgraph.numerics.continuation import End, Follower, Tracks
 from mechgraph.numerics.tracks import Paths
 from mechgraph.pipeline import Options, Pipeline, Starts
 from mechgraph.result.solution import Solution
+from mechgraph.structure.snapping import declared_closure
 from mechgraph.variants.fields import Variants
 
 Mask = NDArray[np.bool_]
@@ -49,7 +49,7 @@ class NumbersPath(DriverPath):
         if self._known is None or self._known[0] != key:
             par, m = self.system.par, self._line.m
             numbers = self._numbers_at(part, variants).numbers
-            made = _behind(numbers, self._line.m).parameters(m, par.offset, par.origin, par.L)
+            made = numbers.with_rest(m).parameters(m, par.offset, par.origin, par.L)
             # one array with all variants says how many there are
             mass = np.broadcast_to(made.mass, (len(m.links), len(part)))
             self._known = key, self.system.with_parameters(dataclasses.replace(made, mass=mass))
@@ -94,18 +94,6 @@ class Together:
     starts: Array
 
 
-def _behind(numbers: Declared, m: Mechanism) -> Declared:
-    """The numbers of variants with those of the pairs of ``m`` behind theirs (free pairs, which do not vary)."""
-    P = numbers.pitch.shape[0]
-    if len(m.pairs) == P:
-        return numbers
-    rest, joined = declared(m), {}
-    for name in ("point", "axis", "second", "pitch"):
-        mine, theirs = getattr(numbers, name), getattr(rest, name)[..., P:, :]
-        joined[name] = np.concatenate([mine, np.repeat(theirs, mine.shape[-1], axis=-1)], axis=-2)
-    return dataclasses.replace(numbers, **joined)
-
-
 def solve_together(
     numbers_at: NumbersAt,
     count: int,
@@ -137,6 +125,10 @@ def solve_together(
         outcome = line.run(starts, np.broadcast_shapes((V, 1), line.drive.batch))
     except DeclarationError:
         return Together(None, np.ones(V, dtype=bool), q)
+    numbers, tol = variants.declared, line.m.tol
+    if numbers is not None and tol is not None:
+        variant = np.arange(int(np.prod(outcome.batch))) // outcome.batch[-1]
+        outcome.trajectory.as_declared(lambda x, at: declared_closure(line.system, numbers, x, variant[at]), tol)
     alone = ~begun | outcome.contradicting.reshape(V, -1).any(axis=1)
     return Together(Solution(outcome.trajectory), alone, np.broadcast_to(q, nothing.shape))
 

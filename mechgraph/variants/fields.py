@@ -19,6 +19,7 @@ from mechgraph.model.numeric import PerCase
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.parameters import Declared, coupling_places, declared
 from mechgraph.quantities import is_numeric
+from mechgraph.structure.snapping import SnappedMechanism
 from mechgraph.variants.number_names import MARKER, AnyField, ChainField, Field, LoadField, find_field
 
 __all__ = ["AnyField", "Variants", "clashes", "field_values", "find_field", "stacked", "topology_of", "varied"]
@@ -28,7 +29,8 @@ __all__ = ["AnyField", "Variants", "clashes", "field_values", "find_field", "sta
 class Variants:
     """``count`` variants of one mechanism: declared numbers and loads with a batch axis (``PerCase`` where a load varies).
 
-    Those ``missing`` could not be built; the numbers of the mechanism itself stand in their places.
+    Those ``missing`` could not be built; the numbers of the mechanism itself stand in their places. ``declared``: the numbers of what
+    was declared, where variants are taken as they are meant with a tolerance.
     """
 
     mechanism: Mechanism
@@ -36,6 +38,7 @@ class Variants:
     loads: tuple[Load, ...]
     count: int
     missing: tuple[int, ...] = ()
+    declared: Declared | None = None
 
     def valid(self) -> NDArray[np.bool_]:
         """Which variants are physical: finite numbers, no negative mass, axes of some length, possible inertias, ``(count,)``."""
@@ -217,12 +220,18 @@ def stacked(m: Mechanism, mechanisms: Sequence[Mechanism | None]) -> Variants:
     """Variants from mechanisms of the topology of ``m``; those that are None or differ in more than numbers are ``missing``."""
     same = [other is not None and topology_of(other) == topology_of(m) and _alike(m, other) for other in mechanisms]
     used = [other if ok and other is not None else m for other, ok in zip(mechanisms, same, strict=True)]
-    every = [declared(other) for other in used]
-    numbers = Declared(
+    loads = tuple(_stacked_loads(group) for group in zip(*(other.loads for other in used), strict=True))
+    missing = tuple(i for i, ok in enumerate(same) if not ok)
+    before = [other.declared for other in used if isinstance(other, SnappedMechanism)]
+    return Variants(m, _side_by_side(used), loads, len(used), missing, _side_by_side(before) if before else None)
+
+
+def _side_by_side(mechanisms: Sequence[Mechanism]) -> Declared:
+    """The declared numbers of mechanisms as one batch."""
+    every = [declared(m) for m in mechanisms]
+    return Declared(
         **{f.name: np.concatenate([getattr(n, f.name) for n in every], axis=-1) for f in dataclasses.fields(Declared)}
     )
-    loads = tuple(_stacked_loads(group) for group in zip(*(other.loads for other in used), strict=True))
-    return Variants(m, numbers, loads, len(used), tuple(i for i, ok in enumerate(same) if not ok))
 
 
 def topology_of(m: Mechanism) -> tuple[Any, ...]:

@@ -17,7 +17,7 @@ from mechgraph.model.motion import Motion
 from mechgraph.result.numbers import number
 from mechgraph.variants.outputs import Output, unit_of_output
 from mechgraph.variants.sampling import deviation, reach
-from mechgraph.variants.work import STATUSES, Part, Source
+from mechgraph.variants.work import STATUSES, Part, Source, worst
 from mechgraph.writing import optional
 
 if TYPE_CHECKING:
@@ -38,6 +38,7 @@ class Study(Shown):
     nominal : name -> array ``(...)`` of the mechanism itself (with the motion of the first variant, where each has its own).
     units : name -> unit of an output, one for every entry of its last axis where they differ; empty where it is not known.
     messages : variant -> why it could not be solved.
+    warnings : what makes reactions doubtful, as in ``Solution.warnings``, with the greatest effort in all variants.
     """
 
     def __init__(
@@ -69,6 +70,7 @@ class Study(Shown):
         self.units: Mapping[str, str | tuple[str, ...]] = {
             name: unit_of_output(source.mechanism, what) for name, what in names.items()
         }
+        self.warnings = worst(warning for part in [near, *parts] for warning in part.warnings)
         self.messages: dict[int, str] = {}
         first = 0
         for part in parts:
@@ -98,6 +100,8 @@ class Study(Shown):
                 ("output", "mechanism itself", "least", "mean", "greatest"), list(map(self._row, self.outputs)), "lrrrr"
             ),
         ]
+        if self.warnings:
+            blocks += [Heading("Reactions that rest on what no part supplies", 2), Bullets([*map(str, self.warnings)])]
         if self.messages:
             told = [f"variant {i}: {text}" for i, text in list(self.messages.items())[:VARIANTS_LISTED]]
             more = (

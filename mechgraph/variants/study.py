@@ -5,6 +5,7 @@ from __future__ import annotations
 import concurrent.futures
 import os
 import pickle
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
@@ -14,7 +15,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.arguments import option_faults
 from mechgraph.closure.driver_motion import Motions, actuators, driven
 from mechgraph.closure.solver import ENGINES, EngineName
-from mechgraph.errors import DeclarationError
+from mechgraph.errors import DeclarationError, MechgraphWarning
 from mechgraph.force.dalembert import METHODS, MethodName
 from mechgraph.kinetostatics import REDUNDANT, RedundantName
 from mechgraph.model.mechanism import Mechanism
@@ -125,7 +126,10 @@ def study(
     tasks = [task(near, slice(0, 1))]
     tasks += [task(values[:, i : i + size], slice(i, i + size)) for i in range(0, values.shape[1], size)]
     parts = _all_solved(tasks, executor, progress)
-    return Study(source, ways, values, steps, kept, paths, parts[0], parts[1:])
+    found = Study(source, ways, values, steps, kept, paths, parts[0], parts[1:])
+    for warning in found.warnings:
+        warnings.warn(f"study of {source.mechanism.name!r}: {warning}", MechgraphWarning, stacklevel=2)
+    return found
 
 
 def _argument_faults(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,12 +15,13 @@ from mechgraph.closure.driver_path import Status
 from mechgraph.closure.solver import EngineName
 from mechgraph.errors import DeclarationError, MechgraphError
 from mechgraph.force.dalembert import MethodName
-from mechgraph.kinetostatics import RedundantName, solve
+from mechgraph.kinetostatics import RedundantName, solve_quietly
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.pipeline import Options
 from mechgraph.result.solution import Solution
-from mechgraph.structure.snapping import SnappedMechanism, meant
+from mechgraph.result.values import LoadBearing
+from mechgraph.structure.snapping import SnappedMechanism, meant, started
 from mechgraph.variants.batch import solve_together
 from mechgraph.variants.fields import AnyField, Variants, stacked, topology_of, varied
 from mechgraph.variants.outputs import Output, quantity
@@ -62,7 +63,7 @@ class Source:
             raise DeclarationError("study", [f"the function gave {type(made).__name__}; expected a Mechanism"])
         if self.redriven:
             made = made.replace(drives=self.mechanism.drives)
-        if topology_of(made) != topology_of(self.mechanism):
+        if topology_of(made) != topology_of(self._as_declared):
             raise DeclarationError(
                 f"study of {self.mechanism.name!r}",
                 ["a variant differs in links, pairs, drives or loads from the first; only numbers may differ"],
@@ -71,8 +72,12 @@ class Source:
 
     def _varied(self, values: Array) -> Variants:
         assert self.fields is not None
-        m = self.mechanism.declared if isinstance(self.mechanism, SnappedMechanism) else self.mechanism
-        return varied(m, self.fields, values)
+        return varied(self._as_declared, self.fields, values)
+
+    @property
+    def _as_declared(self) -> Mechanism:
+        """The mechanism itself as it was declared."""
+        return self.mechanism.declared if isinstance(self.mechanism, SnappedMechanism) else self.mechanism
 
     def variants(self, values: Array, part: Array) -> Variants:
         """Variants at a ``part (count,)`` of the way from the mechanism itself (0) to ``values (parameters, count)`` (1, or a bit more)."""
@@ -108,12 +113,22 @@ class Task:
 @dataclass(frozen=True)
 class Part:
     """What came of a task: outputs ``(count, ...)`` (None where no variant could be solved), messages, and for every position
-    ``(count, N)`` the number of its outcome in ``STATUSES``.
+    ``(count, N)`` the number of its outcome in ``STATUSES``; what makes reactions doubtful, of all variants.
     """
 
     outputs: dict[str, Array] | None
     status: NDArray[np.int8]
     messages: dict[int, str]
+    warnings: tuple[LoadBearing, ...] = ()
+
+
+def worst(found: Iterable[LoadBearing]) -> tuple[LoadBearing, ...]:
+    """Of every passive freedom the warning with the greatest effort."""
+    out: dict[str, LoadBearing] = {}
+    for warning in found:
+        if warning.name not in out or out[warning.name].effort < warning.effort:
+            out[warning.name] = warning
+    return tuple(out.values())
 
 
 def solved(task: Task) -> Part:
@@ -133,7 +148,7 @@ def solved(task: Task) -> Part:
     if together.solution is not None:
         status[~alone] = together.solution.status[~alone]
         found = {name: _writable(quantity(together.solution, name, what)) for name, what in task.outputs.items()}
-    messages = {}
+    messages, warnings = {}, [] if together.solution is None else [*together.solution.warnings]
     for i in np.flatnonzero(alone):
         try:
             s = _solved_alone(task, int(i), together.starts[:, i])
@@ -142,6 +157,7 @@ def solved(task: Task) -> Part:
             s = None
         if s is not None:
             status[i] = s.status[0]
+            warnings += s.warnings
             values = {name: quantity(s, name, what) for name, what in task.outputs.items()}
             found = found or {name: np.full((count, *v.shape[1:]), np.nan) for name, v in values.items()}
             for name, v in values.items():
@@ -149,7 +165,7 @@ def solved(task: Task) -> Part:
         elif found is not None:
             for v in found.values():
                 v[i] = np.nan
-    return Part(found, numbered(status), messages)
+    return Part(found, numbered(status), messages, worst(warnings))
 
 
 def numbered(status: NDArray[np.str_]) -> NDArray[np.int8]:
@@ -173,7 +189,7 @@ def _solved_alone(task: Task, i: int, start: Array) -> Solution:
     except Exception as error:
         raise DeclarationError("study", [f"the function failed: {type(error).__name__}: {error}"]) from error
     if np.isfinite(start).all():
-        m = m.replace(start=dict(zip(m.freedom_names(), start.tolist(), strict=True)))
+        m = started(m, dict(zip(m.freedom_names(), start.tolist(), strict=True)))
     motions = Motions({name: motion_of_case(motion, i) for name, motion in task.motions.items()}, task.motions.free)
     own = {m.full_name(d.freedom): d.motion for d in m.drives if d.motion is not None}
     for name in task.source.stored:
@@ -182,8 +198,7 @@ def _solved_alone(task: Task, i: int, start: Array) -> Solution:
                 "study", [f"the motion stored with drive {name!r} has other positions than that of the first"]
             )
         motions[name] = as_rows(own[name])
-    how: dict[str, Any] = {"method": task.method, "redundant": task.redundant, "engine": task.engine}
-    return solve(m, motions, actuate=task.actuate, on_reach="flag", **how)
+    return solve_quietly(m, motions, Options(task.method, task.redundant, task.engine), task.actuate)
 
 
 def as_rows(motion: Motion) -> Motion:

@@ -85,6 +85,27 @@ def test_a_torque_on_a_shaft_that_nothing_drives_is_named_everywhere(tmp_path) -
     assert not run.stderr
 
 
+@pytest.mark.parametrize("together", [True, False])
+def test_a_study_warns_of_what_bears_load_in_any_variant(together: bool) -> None:
+    """The greatest couple of all variants, also of those that are solved alone."""
+    m, value = rsss(), [0.25, 0.75, 1.5]
+
+    def variant(mass: float) -> mg.Mechanism:
+        links = [link.replace(mass=mass) if link.name == "rod1" else link for link in m.links]
+        return m.replace(links=links, start={} if together else {"A": 1e-3 * mass})
+
+    with pytest.warns(mg.MechgraphWarning, match=r"study of 'rsss': rod1.*: load-bearing passive freedom") as seen:
+        study = mg.study(variant, {"mass": value}, ["D.force"], 1, sampling="grid", motions={"A": [0.0, 0.1]})
+    with pytest.warns(mg.MechgraphWarning):
+        alone = mg.solve(variant(1.5), {"A": [0.0, 0.1]})
+    assert [w.name for w in study.warnings] == [w.name for w in alone.warnings] == ["rod1", "rod1 and rod2"]
+    assert len(seen) == 2
+    for found, own in zip(study.warnings, alone.warnings, strict=True):
+        assert found.effort == pytest.approx(own.effort, rel=1e-9)
+        assert found.text in " ".join(str(study).split())
+    assert not mg.study(m.replace(loads=[]), {"rod1.mass": value}, ["D.force"], 1, motions={"A": 0.1}).warnings
+
+
 def test_torques_in_balance_leave_the_shaft_idle() -> None:
     """Three torques whose sum is rounding: nothing has to hold the shaft, and nothing warns."""
     m = shaft(*(mg.Wrench("shaft", moment=(0, 0, value)) for value in (0.1, 0.2, -0.3)))
