@@ -179,14 +179,15 @@ class _Carried:
         first, last = np.flatnonzero(self._first), np.flatnonzero(np.append(self._first[1:], True))
         of_track = np.cumsum(self._first) - 1
         u = np.concatenate([here.u[:, left, None], between.u.reshape(3, n, GAUSS), here.u[:, right, None]], axis=2)
-        # one sense along every track
-        within = np.cumprod(np.where((u[:, :, 1:] * u[:, :, :-1]).sum(axis=0) < 0, -1.0, 1.0), axis=1)
-        sense = np.cumprod(np.concatenate([[1.0], within[:-1, -1]]))
-        u *= (sense * sense[first][of_track])[:, None] * np.concatenate([np.ones((n, 1)), within], axis=1)
+        # one sense along every track; two nodes at one place, of other forms, may have other senses as well
+        every = u.reshape(3, -1)
+        turned = np.concatenate([[1.0], np.where((every[:, 1:] * every[:, :-1]).sum(axis=0) < 0, -1.0, 1.0)])
+        sense = np.cumprod(turned).reshape(n, -1)
+        u *= sense * sense[first, :1][of_track]
         e = _perpendicular(u[:, :, 0])
         c = rotate_back(here.R[:, :, left], e)
-        every = [np.repeat(references, GAUSS, axis=1) for references in (e, c)]
-        rate = between.in_sense(u[:, :, 1:-1].reshape(3, -1)).amount_rate(every[0], every[1], V, change)
+        repeated = [np.repeat(references, GAUSS, axis=1) for references in (e, c)]
+        rate = between.in_sense(u[:, :, 1:-1].reshape(3, -1)).amount_rate(repeated[0], repeated[1], V, change)
         series = self._h[:, None] * (rate.reshape(n, GAUSS) @ TO_SERIES)
 
         def amount(nodes: Index, steps: Index, side: int) -> Array:

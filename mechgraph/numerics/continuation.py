@@ -312,7 +312,7 @@ class Follower(Marching):
             return None
         reference = int(earlier[-1])
         away = max(int(np.searchsorted(nodes.place, last.place[0] - PATH.away)) - 1, 0)
-        if size[-1] > PATH.steeper * size[away]:
+        if size[-1] > PATH.steeper * size[away:].min():  # a path may come back to the fold beside which it began
             self.ends[track] = End.FOLD
             return None
         self.ends[track] = End.CROSSING

@@ -34,6 +34,7 @@ def at_a_dead_point(seed):
         still = {name: mg.Motion(np.zeros(len(at)), velocity=0.0) for name in drives if name != leader}
         return {leader: mg.Motion(np.asarray(at), velocity=1.0), **still}
 
+    idle = {name for found in mg.check(m).passive for name in found.freedoms}
     way = np.linspace(0.0, rng.choice([-2.5, 2.5]), 51)
     try:
         rates_of(m, moved(way), leader)
@@ -41,7 +42,7 @@ def at_a_dead_point(seed):
         return None
     for p in m.pairs:
         for name, able in zip(p.freedom_names, p.type.drivable, strict=True):
-            if not able or name in drives:
+            if not able or name in drives or name in idle:
                 continue
             _, rate, _ = rates_of(m, moved(way), name)
             turns = np.flatnonzero(rate[:-2] * rate[1:-1] < 0)
@@ -65,7 +66,10 @@ def test_started_next_to_a_dead_point(seed: int) -> None:
     m, leader, turned, at, end, curvature, drives = found
     before = 10.0 ** -np.random.default_rng((seed, 78)).uniform(3, 9)
     others = dict.fromkeys((name for name in drives if name != leader), 0.0)
-    near = mg.assemble(m, {leader: at - np.sign(at) * np.sqrt(2 * before / abs(curvature)), **others})
+    away = np.sqrt(2 * before / abs(curvature))
+    for _ in range(3):  # the next term counts where that is not near
+        near = mg.assemble(m, {leader: at - np.sign(at) * away, **others})
+        away *= np.sqrt(before / abs(near.start[turned] - end))
     driven, begin = near.replace(drives=[turned, *others]), near.start[turned]
     inwards = np.sign(begin - end)
     assert abs(begin - end) == pytest.approx(before, rel=0.1, abs=3e-10)
@@ -87,3 +91,9 @@ def test_started_next_to_a_dead_point(seed: int) -> None:
     regular = mg.kinematics(near, {leader: [near.start[leader], reached], **dict.fromkeys(others, np.zeros(2))})
     again = np.concatenate([regular[p.name].position.T for p in m.pairs])
     np.testing.assert_allclose(again[:, 1], states[1][:, 1], atol=1e-8)
+
+
+@pytest.mark.parametrize("seed", [10049, 10093])
+def test_a_polygon_that_comes_back_to_the_dead_point_beside_which_it_starts(seed: int) -> None:
+    """The start is no reference for how much rates have grown towards it."""
+    test_started_next_to_a_dead_point(seed)
