@@ -27,7 +27,7 @@ from mechgraph.closure.driver_path import (
 )
 from mechgraph.closure.following import follow
 from mechgraph.closure.indexing import Index, System
-from mechgraph.closure.passive_motion import PassiveMotion
+from mechgraph.closure.passive_motion import PassiveMotion, are_alone
 from mechgraph.closure.passive_rest import unspun
 from mechgraph.closure.rates import Rates, Velocities, at_dead_points, disagreement, distance_to_dead_point, rates
 from mechgraph.closure.solver import ClosureSolver, FactoredClosure, closure_solver, engine_for, solver_at_start
@@ -233,6 +233,7 @@ class Pipeline:
         variant = np.zeros(T, dtype=np.intp) if one and not shared else np.arange(T) // batch[-1]
         followed = (1, batch[-1]) if shared else batch
         path = DriverPath(self.system, self.solver, starts.system_of, start)
+        path.carries = are_alone(self.passive)
         found = follow(
             path, requests(starts.x, self.values("position", followed)[self.lead], followed), int(np.prod(followed))
         )

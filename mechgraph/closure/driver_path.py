@@ -77,6 +77,8 @@ class DriverPath:
         self.rows = system.single_rows[self.columns]
         self.size = (system.n_freedoms, len(self.columns))
         self.paced = bool(system.is_length[self.columns].any())
+        self.carries = True
+        """Whether what is left free can be carried on by periods of the motion."""
         self._system_of, self._start = system_of, start
         self.variant_of: Index = np.zeros(0, dtype=np.intp)
 

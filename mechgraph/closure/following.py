@@ -125,7 +125,11 @@ def _shift(path: DriverPath, follower: Follower, node: Nodes, start: Nodes, cros
     left = gained - shift
     if free.shape[1]:
         # what is left free is not followed but carried; beside a change point it is not
-        left = np.full_like(left, np.inf) if crossed else left - free @ np.linalg.lstsq(free, left, rcond=None)[0]
+        left = (
+            np.full_like(left, np.inf)
+            if crossed or not path.carries
+            else left - free @ np.linalg.lstsq(free, left, rcond=None)[0]
+        )
     turned = start.x.copy()
     turned[system.single_rows[turning]] += shift[turning][:, None]
     again = path.at(turned, turned[path.rows], start.track)

@@ -39,12 +39,18 @@ class PassiveMotion:
         return bool(np.abs(self.twist[:3]).max() > TURNING)
 
 
+def are_alone(passive: Sequence[PassiveMotion]) -> bool:
+    """Whether no link has several of these motions."""
+    links = [link for motion in passive for link in motion.links]
+    return len(links) == len(set(links))
+
+
 class PassiveMotions:
     """The passive motions at a batch of positions, and the twists that are at rest in them.
 
     Attributes
     ----------
-    links : the links that have passive motions; ``alone (p,)`` whether those of a motion have no other.
+    links : the links that have passive motions.
     rates, twists : the motions ``(F, p, T)``, in the order of those at the start, and the twists ``(6, n, p, T)`` of the links.
     points : for every link the point ``(3, n, T)`` whose velocity counts. On the axis where one passive turn is all it has (the foot from
         the origin of the link), so that only the spin counts; else the origin of the link.
@@ -59,7 +65,6 @@ class PassiveMotions:
             self.rates = np.einsum("fpt,tpq->fqt", self.rates, mixes)
             self.twists = np.einsum("cnpt,tpq->cnqt", self.twists, mixes)
         mine = [[i for i, motion in enumerate(passive) if link in motion.links] for link in self.links]
-        self.alone = [all(len(mine[self.links.index(link)]) == 1 for link in motion.links) for motion in passive]
         self._on_axis = np.array([len(some) == 1 and passive[some[0]].turns for some in mine])
         self._first = [some[0] for some in mine]
         self._origins = here.poses[:, 3, self.links]

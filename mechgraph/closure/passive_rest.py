@@ -12,20 +12,15 @@ import numpy as np
 from mechgraph.algebra.se3 import Array, cross, rotate, rotate_back
 from mechgraph.closure.driver_path import DriverPath, Positions, Status, in_blocks
 from mechgraph.closure.indexing import Index
-from mechgraph.closure.passive_motion import PassiveMotion, PassiveMotions
+from mechgraph.closure.passive_motion import PassiveMotion, PassiveMotions, are_alone
+from mechgraph.closure.passive_steps import PassiveSteps
 from mechgraph.closure.rates import Velocities
 from mechgraph.closure.solver import FactoredClosure
 from mechgraph.numerics.continuation import Follower
 from mechgraph.numerics.hermite import Interpolation
+from mechgraph.numerics.legendre import GAUSS, PLACES, POINTS, TO_SERIES, integrals
 from mechgraph.numerics.tracks import Nodes
 
-GAUSS = 8
-"""Points of Gauss and Legendre a step between nodes: what is integrated over it is exact to rounding."""
-POINTS, WEIGHTS = np.polynomial.legendre.leggauss(GAUSS)
-PLACES = np.concatenate([[-1.0], POINTS, [1.0]])
-"""The points of a step and its ends."""
-TO_SERIES = WEIGHTS[:, None] * np.polynomial.legendre.legvander(POINTS, GAUSS - 1) * (np.arange(GAUSS) + 0.5)
-"""Coefficients of Legendre's series from values at the points."""
 MOST_TURNS = 8
 """Most repetitions of the turn that takes the spin out."""
 UNTURNED = 1e-13
@@ -38,22 +33,27 @@ def unspun(path: DriverPath, found: Positions, passive: tuple[PassiveMotion, ...
     Along a track some freedom of every passive motion is held, so that its links are turned about their axis ``u`` (or displaced along
     it) by an amount of no meaning. Where they are at rest follows from what does not depend on this amount: the ways of the axis in space
     and in a link, and the spins of the links against each other. They are integrated by Gauss and Legendre's rule in every step between
-    nodes, so that it does not hang on which positions were asked for. Links with several passive motions are left as they are.
+    nodes, so that it does not hang on which positions were asked for. Links with several passive motions: see ``passive_steps``.
     Source: Bishop, There is more than one way to frame a curve, Amer. Math. Monthly 82, 1975 (vectors carried along an axis).
     """
     nodes, good = found.tracks.nodes, np.flatnonzero((found.status == Status.OK) & (found.near < 0))
     interpolation = Interpolation(path, nodes)
     if not len(interpolation.left) or not good.size:
         return found
-    carried = _Carried(path, interpolation, found.follower, passive)
+    how = _Carried if are_alone(passive) else PassiveSteps
+    carried = how(path, interpolation, found.follower, passive)
     x = found.x.copy()
     turns = np.zeros(found.x.shape[1], dtype=np.intp) if found.turns is None else found.turns
     for at in in_blocks(good):
         x[:, at] = carried.turned(found.x[:, at], found.which[at], found.track[at], found.place[at], turns[at])
-    turned = carried.turned_nodes(nodes)
-    tracks = replace(found.tracks, nodes=replace(nodes, x=turned))
-    crossings = [replace(c, sides=replace(c.sides, x=carried.turned_nodes(c.sides))) for c in found.crossings]
-    spin = None if found.turns is None else carried.spin(tracks.nodes)
+
+    def turned(some: Nodes) -> Nodes:
+        still = np.zeros(len(some), dtype=np.intp)
+        return replace(some, x=carried.turned(some.x, some.which, some.track, some.place, still))
+
+    tracks = replace(found.tracks, nodes=turned(nodes))
+    crossings = [replace(c, sides=turned(c.sides)) for c in found.crossings]
+    spin = carried.spin(tracks.nodes) if found.turns is not None and isinstance(carried, _Carried) else None
     return replace(found, x=x, here=None, tracks=tracks, crossings=crossings, spin=spin)
 
 
@@ -129,7 +129,7 @@ class _Course:
         """Amounts ``(n,)`` that are missing to rest in steps at ``t`` from -1 to 1, so many periods later; their increments ``(F, n)``."""
         nearest = np.argmin(np.abs(t[:, None] - PLACES), axis=1)
         at = at.in_sense(self.u[:, step, nearest])
-        amount = self.begin[step] + (self.series[step] * _integrals(t)).sum(axis=1) + turns * self.period[step]
+        amount = self.begin[step] + (self.series[step] * integrals(t)).sum(axis=1) + turns * self.period[step]
         amount = amount - at.amount(self.e[:, step], self.c[:, step])
         amount = _wrapped(amount) if at.turns else amount
         return amount, at.unit * amount
@@ -151,7 +151,6 @@ class _Carried:
         self._courses = {
             i: self._course(_At.of(here, i), _At.of(between, i), V[:, here.first(i)], change[:, here.first(i), i])
             for i in range(len(passive))
-            if here.alone[i]
         }
 
     def _motions(self, x: Array, which: Index, track: Index) -> tuple[PassiveMotions, FactoredClosure]:
@@ -215,10 +214,6 @@ class _Carried:
             x = self.follower.newton.close(self.path.advance(x, dq, track), x[self.path.rows], track, which).x
         return x
 
-    def turned_nodes(self, nodes: Nodes) -> Array:
-        """States of nodes on the tracks."""
-        return self.turned(nodes.x, nodes.which, nodes.track, nodes.place, np.zeros(len(nodes), dtype=np.intp))
-
     def spin(self, nodes: Nodes) -> Array:
         """Increments ``(F, nodes)`` from nodes to one period later."""
         return self._missing(nodes.x, nodes.which, nodes.track, nodes.place, np.ones(len(nodes), dtype=np.intp))[1]
@@ -243,16 +238,6 @@ def _turning(e: Array, u: Array, du: Array) -> Array:
     """Rate at which the part of ``e`` across ``u`` turns about it where ``u`` changes by ``du``: ``n' . (u x n)``."""
     n, length = _across(e, u)
     return np.asarray(-(e * u).sum(axis=0) * (du * cross(u, n)).sum(axis=0) / length)
-
-
-def _integrals(t: Array) -> Array:
-    """Half the integrals of Legendre's polynomials from -1 to ``t (n,)``, ``(n, GAUSS)``."""
-    P = np.polynomial.legendre.legvander(t, GAUSS)
-    out = np.empty((len(t), GAUSS))
-    out[:, 0] = 0.5 * (t + 1.0)
-    k = np.arange(1, GAUSS)
-    out[:, 1:] = 0.5 * (P[:, 2:] - P[:, : GAUSS - 1]) / (2 * k + 1)
-    return out
 
 
 def _perpendicular(u: Array) -> Array:

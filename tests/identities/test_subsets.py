@@ -167,6 +167,21 @@ CARRIED = {
 """Passive links that move against each other, or that slide: what keeps them at rest is no matter of one body's axis."""
 
 
+SHORTLY = chebyshev_times(0.0, 0.01, 8)
+
+
+def assert_rates_are_derivatives(s):
+    """Twists and accelerations of all links, at ``SHORTLY`` of a driver at unit rate."""
+    for k in s.mechanism.link_names():
+        pose, twist = s.link(k).pose, s.link(k).twist
+        rate, tail = chebyshev_rate(SHORTLY, pose)
+        spin = rate @ np.linalg.inv(pose)
+        found = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0], *spin[:, :3, 3].T], axis=1)
+        np.testing.assert_allclose(twist, found, atol=1e-9 + 10 * tail)
+        rate, tail = chebyshev_rate(SHORTLY, twist)
+        np.testing.assert_allclose(s.link(k).acceleration, rate, atol=1e-8 + 10 * tail)
+
+
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize("case", CARRIED)
 def test_passive_links_that_move_against_each_other_or_slide(case, engine):
@@ -174,15 +189,32 @@ def test_passive_links_that_move_against_each_other_or_slide(case, engine):
     m = with_drives(closed_mechanism(**CARRIED[case], masses=False), CARRIED[case]["seed"])
     drive = m.drives[0].freedom
     assert_subsets_agree(m, drive, np.linspace(-0.4, 0.3, 6), np.random.default_rng(44), engine=engine)
-    t = chebyshev_times(0.0, 0.01, 8)
-    s = mg.kinematics(m, {drive: mg.Motion(t, velocity=1.0)}, engine=engine)
-    for k in m.link_names():
-        rate, tail = chebyshev_rate(t, s.link(k).pose)
-        spin = rate @ np.linalg.inv(s.link(k).pose)
-        twist = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0], *spin[:, :3, 3].T], axis=1)
-        np.testing.assert_allclose(s.link(k).twist, twist, atol=1e-9 + 10 * tail)
-        rate, tail = chebyshev_rate(t, s.link(k).twist)
-        np.testing.assert_allclose(s.link(k).acceleration, rate, atol=1e-8 + 10 * tail)
+    assert_rates_are_derivatives(mg.kinematics(m, {drive: mg.Motion(SHORTLY, 1.0)}, engine=engine))
+
+
+def carried_ring(kind):
+    """A ring between two coaxial pairs of an arm on a crank: it turns and slides, or moves in a plane, idly."""
+    axis, at = np.array([1.0, 0.5, 0.7]) / np.linalg.norm([1.0, 0.5, 0.7]), np.array([0.3, 0.2, 0.5])
+    pairs = [
+        mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=Z),
+        mg.Pair("B", "R", "crank", "arm", point=(0.4, 0.1, 0), axis=(0, 1, 0.2)),
+        mg.Pair("C", kind, "arm", "ring", point=at, axis=axis),
+        mg.Pair("D", kind, "arm", "ring", point=at + 0.3 * axis, axis=axis),
+    ]
+    gears = [mg.Coupling({"A": 2.0, "B": -1.0}, name="g")]
+    return mg.Mechanism("ring", None, pairs, ["A"], couplings=gears)
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.parametrize("kind", ["C", "E"])
+def test_links_with_several_passive_motions(kind, engine):
+    """At rest in all of them, at the same place for any positions, far ones too; no spin, and no slide of the point on the axis."""
+    m = carried_ring(kind)
+    assert_subsets_agree(m, "A", np.linspace(-0.4, 0.7, 3), np.random.default_rng(45), engine=engine)
+    assert_rates_are_derivatives(mg.kinematics(m, {"A": mg.Motion(SHORTLY, 1.0)}, engine=engine))
+    if engine == "dense":
+        far, near = (mg.kinematics(m, {"A": q}).link("ring").pose[-1] for q in ([15.0], np.linspace(0.0, 15.0, 3)))
+        np.testing.assert_allclose(far, near, atol=1e-9)
 
 
 @pytest.mark.parametrize("engine", ["dense", "sparse"])

@@ -1,0 +1,84 @@
+"""Links with several passive motions at rest (a ring on a bar, a washer between planes), integrated step by step along the path.
+
+How far such a link has gone along one of its motions changes what rest is in the others, so that no rate of an angle can be
+integrated by itself: the states of the whole mechanism are.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.closure.driver_path import DriverPath
+from mechgraph.closure.indexing import Index
+from mechgraph.closure.passive_motion import PassiveMotion, PassiveMotions
+from mechgraph.numerics.continuation import Follower
+from mechgraph.numerics.hermite import Interpolation
+from mechgraph.numerics.legendre import GAUSS, POINTS, TO_SERIES, integrals
+
+MOST_TIMES = 30
+"""Most repetitions of a step: each leaves a small part of what was wrong along the passive motions."""
+REPEATED = 1e-14
+"""Change of the increments of a step that is rounding."""
+
+
+class PassiveSteps:
+    """States at rest in all passive motions: in every step between nodes ``x(t) = x_0 + int q' dt``, closed.
+
+    The rates ``q'`` at rest are those at Gauss and Legendre's points of the step itself, found by repetition.
+    Source: Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, 1993, section II.7 (collocation).
+    """
+
+    def __init__(
+        self, path: DriverPath, interpolation: Interpolation, follower: Follower, passive: tuple[PassiveMotion, ...]
+    ) -> None:
+        self.path, self.interpolation, self.follower, self.passive = path, interpolation, follower, passive
+        nodes, left, right = interpolation.nodes, interpolation.left, interpolation.right
+        self._h = nodes.place[right] - nodes.place[left]
+        self._series = np.zeros((path.size[0], len(left), GAUSS))
+        self._begin = nodes.x[:, left]
+        number = np.arange(len(left)) - np.searchsorted(nodes.track[left], nodes.track[left])
+        for k in range(int(number.max(initial=-1)) + 1):
+            steps = np.flatnonzero(number == k)
+            if k:
+                before = steps - 1
+                drive = nodes.drive[:, right[before]]
+                self._begin[:, steps] = self._at(before, np.ones(len(steps)), drive, nodes.which[left[steps]])[0]
+            self._follow(steps)
+
+    def _at(self, step: Index, t: Array, drive: Array, which: Index) -> tuple[Array, Index]:
+        """Closed states in steps at ``t`` from -1 to 1, and their forms."""
+        dq = np.einsum("fng,ng->fn", self._series[:, step], integrals(t))
+        track = self.interpolation.nodes.track[self.interpolation.left[step]]
+        closed = self.follower.newton.close(self.path.advance(self._begin[:, step], dq, track), drive, track, which)
+        return closed.x, closed.which
+
+    def _follow(self, steps: Index) -> None:
+        """Find the increments of some steps, of different tracks."""
+        nodes, left = self.interpolation.nodes, self.interpolation.left[steps]
+        many, t = np.repeat(steps, GAUSS), np.tile(POINTS, len(steps))
+        place = nodes.place[np.repeat(left, GAUSS)] + 0.5 * (t + 1.0) * self._h[many]
+        track, which = nodes.track[np.repeat(left, GAUSS)], nodes.which[np.repeat(left, GAUSS)]
+        drive = self.follower.paths.drive(track, place)
+        for _ in range(MOST_TIMES):
+            x, forms = self._at(many, t, drive, which)
+            here = self.path.at(x, drive, track)
+            f = self.path.factored(here, forms)
+            dq = (f.sensitivity() * self.interpolation.slope[:, many]).sum(axis=1)
+            dq += PassiveMotions(here, self.passive, f.motions()).at_rest(here.link_twists(dq))
+            rates = self.path.tangent(self.path.difference(x, self._begin[:, many]), dq)
+            series = self._h[steps, None] * (rates.reshape(-1, len(steps), GAUSS) @ TO_SERIES)
+            change = np.abs(series - self._series[:, steps]).max(initial=0.0)
+            self._series[:, steps] = series
+            if change < REPEATED * max(1.0, float(np.abs(series).max(initial=0.0))):
+                break
+
+    def turned(self, x: Array, which: Index, track: Index, place: Array, turns: Index) -> Array:
+        """States at rest at places of the tracks, as far as these have steps; their motion is followed all the way, without ``turns``."""
+        nodes, left = self.interpolation.nodes, self.interpolation.left
+        moved = np.flatnonzero(np.isin(track, nodes.track[left]))
+        step = self.interpolation.find(track[moved], place[moved])
+        t = 2.0 * (place[moved] - nodes.place[left[step]]) / self._h[step] - 1.0
+        out = x.copy()
+        out[:, moved] = self._at(step, t, x[self.path.rows][:, moved], which[moved])[0]
+        return out
