@@ -19,6 +19,7 @@ from mechgraph.kinetostatics import RedundantName, solve_quietly
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.pipeline import Options
+from mechgraph.result.contacts import LiftOff
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import LoadBearing
 from mechgraph.structure.snapping import SnappedMechanism, meant, started
@@ -26,6 +27,8 @@ from mechgraph.variants.batch import solve_together
 from mechgraph.variants.fields import AnyField, Variants, stacked, topology_of, varied
 from mechgraph.variants.outputs import Output, quantity
 
+Doubt = LoadBearing | LiftOff
+"""What makes reactions doubtful."""
 Build = Callable[..., Mechanism]
 NOT_SOLVED = "not solved"
 """Status of a variant that could not be built or assembled; its message says why."""
@@ -119,16 +122,20 @@ class Part:
     outputs: dict[str, Array] | None
     status: NDArray[np.int8]
     messages: dict[int, str]
-    warnings: tuple[LoadBearing, ...] = ()
+    warnings: tuple[Doubt, ...] = ()
 
 
-def worst(found: Iterable[LoadBearing]) -> tuple[LoadBearing, ...]:
-    """Of every passive freedom the warning with the greatest effort."""
-    out: dict[str, LoadBearing] = {}
+def worst(found: Iterable[Doubt]) -> tuple[Doubt, ...]:
+    """Of every passive freedom the warning with the greatest effort, of every contact that with the greatest pull."""
+    out: dict[tuple[bool, str], tuple[float, Doubt]] = {}
     for warning in found:
-        if warning.name not in out or out[warning.name].effort < warning.effort:
-            out[warning.name] = warning
-    return tuple(out.values())
+        if isinstance(warning, LoadBearing):
+            key, size = (True, warning.name), warning.effort
+        else:
+            key, size = (False, warning.pair), warning.force
+        if size >= out.get(key, (size, warning))[0]:
+            out[key] = size, warning
+    return tuple(warning for _, warning in out.values())
 
 
 def solved(task: Task) -> Part:
