@@ -282,3 +282,50 @@ def test_what_is_no_contact_is_named() -> None:
         _ = s.contact("B").hertz
     with pytest.raises(mg.DeclarationError, match=r"link = 'frame': expected 'wedge' or 'follower'"):
         s.contact("B").pressure_angle("frame")
+
+
+def test_in_a_response_the_times_are_named() -> None:
+    """A wedge that swings freely on a spring under the follower."""
+    m = wedge(closed="force").replace(
+        drives=[], loads=[mg.Gravity((0, 0, -G)), mg.TorsionSpring("A", stiffness=400.0, free=0.1)]
+    )
+    m = m.replace(
+        links=[link.replace(mass=2.0, center=(0, 0, -0.1)) if link.name == "wedge" else link for link in m.links]
+    )
+    with pytest.warns(mg.MechgraphWarning, match=r"follower lifts off wedge from t = .* s to t = .* s"):
+        r = mg.respond(m, np.linspace(0, 1, 201), start={"A": -0.05})
+    found = r.contact("B").lift_off
+    assert [set(gap.begins) for gap in found] == [{"t"}] * len(found)
+    for gap in found:
+        inside = (gap.begins["t"] < r.t) & (gap.ends["t"] > r.t)
+        assert r.contact("B").lifts[inside].all()
+
+
+def test_a_motion_alone_and_what_is_not_solved_or_not_unique() -> None:
+    k = mg.kinematics(mg.load("r-sg-c"))
+    assert "normal force" not in str(k.contact("B"))
+    assert not [name for name in k.columns(["contacts"]) if "force" in name]
+    with pytest.raises(mg.MechgraphError, match="has no forces"):
+        _ = k.contact("B").normal_force
+    m = mg.load("r-sg-r-r")
+    s = mg.solve(
+        m.replace(pairs=[p.replace(closed="force") if p.name == "B" else p for p in m.pairs]),
+        {"A": 1.0},
+        on_reach="flag",
+    )
+    assert s.warnings == ()
+    assert "no value" in str(s.contact("B")) or np.isnan(s.contact("B").sliding).all()
+    ball = mg.Mechanism(
+        "ball",
+        pairs=[
+            mg.Pair("A", "P", "frame", "cart", point=(0, 0, 0.2), axis=(1, 0, 0)),
+            mg.Pair("R", "R", "cart", "ball", point=(0, 0, 0.05), axis=(0, 1, 0)),
+            mg.Pair("B", "Sp", "frame", "ball", point=(0, 0, 0.05), axis=(0, 0, 1), closed="force"),
+        ],
+        drives=["A", "R"],
+        loads=[mg.Wrench("ball", force=(0, 0, -5.0), point=(0, 0, 0.05))],
+    )
+    redundant = mg.solve(ball, {"A": [0.0, 0.1], "R": [0.0, 2.0]})  # what bears the ball, its shaft or the plane?
+    assert np.isnan(redundant.contact("B").normal_force).all()
+    assert redundant.warnings == ()
+    assert "not unique" in redundant.summary()

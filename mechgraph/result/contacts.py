@@ -40,7 +40,7 @@ class LiftOff:
     """A range of positions in which a contact that only pushes would have to pull.
 
     ``first``, ``last``: flat positions; ``begins``, ``ends``: values of the drivers (and the time ``t``) where the force is zero, between
-    positions by a straight line, at the ends of the motion those there; ``force``: the greatest pull.
+    positions by a straight line, at the ends of the motion those there; ``force``: the greatest pull, in a groove that against its opening.
     """
 
     pair: str
@@ -85,7 +85,7 @@ class ContactResult(Shown):
         blocks: list[Block] = [
             Paragraph(f"{pair.type.name}, {pair.a} on {pair.b}, {held}."),
             ranges(rows, Places(self._values).name),
-            *(Paragraph(found.text) for found in self.lift_off),
+            *(Paragraph(found.text) for found in (self.lift_off if self._values.has_forces else ())),
         ]
         return Document(f"Contact {pair.name} of {self._values.mechanism.name}", tuple(blocks))
 
