@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
@@ -11,9 +11,9 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array, cross
 from mechgraph.model.curves import ORDERS, Curve
-from mechgraph.model.factors import Factor
+from mechgraph.model.factors import Factor, PoseStack, Stack, entries
 from mechgraph.model.row_parts import UNIT_TWISTS, Freedom
-from mechgraph.model.travel import COMPLEX_STEP, Travel
+from mechgraph.model.travel import COMPLEX_STEP, Place, Travel
 
 X, Z = 0, 2
 """Axes of the frame that may be the tangent."""
@@ -70,11 +70,8 @@ class AlongCurve(Factor):
 
     def curvature(self, x: Array) -> Array:
         """Curvature towards y of the frame at coordinates ``(...)``."""
-        here = self.travel.at(self._arc(x[None]))
+        here = self.here(x[None])
         return self.sideways * (here.dt * here.y).sum(axis=0)
-
-    def _arc(self, x: Array) -> Array:
-        return self.home + (-self.unit if self.reversed else self.unit) * x[0]
 
     def _axes(self, t: Array, y: Array, k: Array) -> Array:
         """The frame ``(3, 3, ...)``, columns its axes."""
@@ -88,42 +85,88 @@ class AlongCurve(Factor):
         here = self.travel.at(np.array(self.home))
         return np.column_stack([self._axes(here.t, here.y, here.k), here.x])
 
+    def here(self, x: Array) -> Place:
+        """The curve where the coordinate is ``x (1, ...)``, lengths in its own unit."""
+        return self.travel.at(self.home + (-self.unit if self.reversed else self.unit) * x[0])
+
     def pose(self, x: Array, pitch: Array) -> Array:
         """Value of the motion."""
-        here = self.travel.at(self._arc(x))
-        R = np.einsum("ji,jk...->ik...", self.start[:, :3], self._axes(here.t, here.y, here.k))
-        p = np.einsum("ji,j...->i...", self.start[:, :3], (here.x - self.start[:, 3:, None]) / self.unit)
+        return self.pose_at(self.here(x))
+
+    def pose_at(self, here: Place) -> Array:
+        """The pose where the curve is ``here``."""
+        R0, p0 = self.start[:, :3], self.start[:, 3].reshape(3, *(1,) * (here.x.ndim - 1))
+        out = np.empty((3, 4, *here.x.shape[1:]), dtype=here.x.dtype)
         if self.back:
-            R = R.swapaxes(0, 1)
-            p = -np.einsum("ij...,j...->i...", R, p)
-        return np.concatenate([R, p[:, None]], axis=1)
+            R = self._axes(here.t, here.y, here.k)
+            out[:, :3] = np.einsum("ji...,jk->ik...", R, R0)
+            out[:, 3] = (R * ((p0 - here.x) / self.unit)[:, None]).sum(axis=0)
+        else:
+            out[:, :3] = np.tensordot(R0, self._axes(here.t, here.y, here.k), (0, 0))
+            out[:, 3] = np.tensordot(R0, (here.x - p0) / self.unit, (0, 0))
+        return out
 
     def twists(self, x: Array, pitch: Array) -> Array:
         """``(w, t + w x (p - x))``, p the origin of the frame before it; on the side of link b minus ``(R^T w, R^T t)``."""
-        here = self.travel.at(self._arc(x))
-        w, v, R = self.unit * here.w, here.t, self.start[:, :3, None, None]
-        if self.back:
-            w, v, R = -w, -v, self._axes(here.t, here.y, here.k)
-        else:
-            v = v - cross(w, (here.x - self.start[:, 3:, None]) / self.unit)
-        sense = -1.0 if self.reversed else 1.0
-        return sense * np.concatenate([np.einsum("ji...,j...->i...", R, part) for part in (w, v)])[:, None]
+        return self.twists_at(self.here(x))
+
+    def twists_at(self, here: Place) -> Array:
+        """The twists where the curve is ``here``."""
+        w, sense = self.unit * here.w, -1.0 if self.reversed != self.back else 1.0
+        return sense * self._screw(here, w, here.t)[:, None]
 
     def twist_rates(self, x: Array, dq: Array, pitch: Array) -> Array:
         """Their derivatives by the coordinate, times the rate squared."""
-        here = self.travel.at(self._arc(x))
-        w, dw, dt = self.unit * here.w, self.unit**2 * here.dw, self.unit * here.dt
-        dv, R = dt - cross(w, here.t), self.start[:, :3, None, None]
+        return self.twist_rates_at(self.here(x), dq)
+
+    def twist_rates_at(self, here: Place, dq: Array) -> Array:
+        """The rates where the curve is ``here``."""
+        w, dw = self.unit * here.w, self.unit**2 * here.dw
+        sense = -1.0 if self.back else 1.0
+        return sense * dq[0] ** 2 * self._screw(here, dw, self.unit * here.dt - cross(w, here.t))
+
+    def _screw(self, here: Place, w: Array, v: Array) -> Array:
+        """A screw at the point of the curve, seen from the frame before the factor ``(6, ...)``."""
         if self.back:
-            dw, dv, R = -dw, -dv, self._axes(here.t, here.y, here.k)
-        else:
-            dv = dv - cross(dw, (here.x - self.start[:, 3:, None]) / self.unit)
-        out = np.concatenate([np.einsum("ji...,j...->i...", R, part) for part in (dw, dv)])
-        return np.asarray(out * dq[0] ** 2)
+            R = self._axes(here.t, here.y, here.k)
+            return np.concatenate([(R * part[:, None]).sum(axis=0) for part in (w, v)])
+        p0 = self.start[:, 3].reshape(3, *(1,) * (here.x.ndim - 1))
+        v = v - cross(w, (here.x - p0) / self.unit)
+        return np.concatenate([np.tensordot(self.start[:, :3], part, (0, 0)) for part in (w, v)])
+
+    def stack(self, factors: Sequence[Factor], counts: Sequence[int]) -> Stack:
+        """Copies evaluated together."""
+        return CurveStack(self)
 
     def scaled(self, L: float) -> Factor:
         """With lengths over ``L``."""
         return self if self.curve is None else replace(self, unit=self.unit * L)
+
+
+class CurveStack(PoseStack):
+    """Copies of one of them; the place on the curve serves poses, twists and rates at the same coordinates."""
+
+    def __init__(self, factor: AlongCurve) -> None:
+        super().__init__(factor)
+        self.along = factor
+        self._last: tuple[Array, Place] | None = None
+
+    def _here(self, x: Array) -> Place:
+        if self._last is None or not np.array_equal(self._last[0], x):
+            self._last = x, self.along.here(x)
+        return self._last[1]
+
+    def values(self, x: Array) -> Array:
+        """Entries of the pose and of its inverse."""
+        return entries(self.along.pose_at(self._here(x)))
+
+    def twists(self, x: Array, pitch: Array) -> Array:
+        """Those of the factor."""
+        return self.along.twists_at(self._here(x))
+
+    def twist_rates(self, x: Array, dq: Array, pitch: Array) -> Array:
+        """Those of the factor."""
+        return self.along.twist_rates_at(self._here(x), dq)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -158,7 +201,7 @@ class Beside(Curve):
     @property
     def orders(self) -> int:
         """Three derivatives."""
-        return ORDERS - 1
+        return ORDERS
 
     @property
     def is_closed(self) -> bool:

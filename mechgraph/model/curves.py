@@ -1,6 +1,6 @@
 """Curves along which a marker travels: by name, through points, by a function with its derivatives, or the shape of a cam.
 
-    x(u), u in (begin, end): position in the frame of the link that bears the curve, with four derivatives by the parameter u.
+    x(u), u in (begin, end): position in the frame of the link that bears the curve, with three derivatives by the parameter u.
 
 Arc length, direction and frame are found from these (``travel``). Arguments may be complex, as in all kernels.
 """
@@ -34,8 +34,8 @@ from mechgraph.model.field_format import (
 from mechgraph.model.numeric import second_direction
 from mechgraph.units import LENGTH
 
-ORDERS = 5
-"""Position and derivatives that a curve gives."""
+ORDERS = 4
+"""Position and derivatives that a curve gives: to the third."""
 CLOSED_GAP = 1e-9
 """Gap over its extent up to which a curve is closed."""
 WHOLE_TURN = 2.0 * np.pi
@@ -76,7 +76,7 @@ class Curve(Described):
 
     @abstractmethod
     def at(self, u: Array) -> Array:
-        """Position and four derivatives by ``u (...)``, ``(5, 3, ...)``."""
+        """Position and three derivatives by ``u (...)``, ``(4, 3, ...)``."""
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -106,8 +106,8 @@ class Curve(Described):
 
     @property
     def orders(self) -> int:
-        """How many of position and derivatives are known."""
-        return ORDERS
+        """How many of position and derivatives are known, that of complex arguments counted."""
+        return ORDERS + 1
 
     @property
     def roller(self) -> float:
@@ -193,16 +193,16 @@ class Centred(Curve):
         return np.column_stack([x, np.cross(z, x), z])
 
     def _placed(self, parts: Array) -> Array:
-        """Position and derivatives ``(5, 3, ...)`` from those in the own axes."""
+        """Position and derivatives ``(4, 3, ...)`` from those in the own axes."""
         out = np.asarray(np.einsum("ij,kj...->ki...", self._basis, parts))
         out[0] += np.asarray(self.center).reshape(3, *(1,) * (parts.ndim - 2))
         return out
 
 
 def _turning(u: Array) -> tuple[Array, Array]:
-    """Cosine and sine with four derivatives, ``(5, ...)`` each."""
+    """Cosine and sine with three derivatives, ``(4, ...)`` each."""
     c, s = np.cos(u), np.sin(u)
-    return np.stack([c, -s, -c, s, c]), np.stack([s, c, -s, -c, s])
+    return np.array([c, -s, -c, s]), np.array([s, c, -s, -c])
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -292,8 +292,8 @@ class Involute(Centred):
     def at(self, u: Array) -> Array:
         """``radius ((cos u + u sin u) e1 + (sin u - u cos u) e2)``."""
         c, s = np.cos(u), np.sin(u)
-        f = [c + u * s, u * c, c - u * s, -2 * s - u * c, -3 * c + u * s]
-        g = [s - u * c, u * s, s + u * c, 2 * c - u * s, -3 * s - u * c]
+        f = [c + u * s, u * c, c - u * s, -2 * s - u * c]
+        g = [s - u * c, u * s, s + u * c, 2 * c - u * s]
         hand = -1.0 if self.mirrored else 1.0
         return self._placed(
             self.radius * np.stack([[*f], [hand * part for part in g], [0 * part for part in f]], axis=1)
@@ -323,18 +323,27 @@ class Pieces:
     breaks: Array
     coefficients: Array
 
+    @cached_property
+    def _terms(self) -> Array:
+        """Coefficients of value and derivatives, ``(pieces, orders, components, degree + 1)``, lowest power first."""
+        c = self.coefficients[::-1].reshape(len(self.coefficients), len(self.breaks) - 1, -1)
+        out = np.zeros((ORDERS + 1, *c.shape))
+        for order in range(ORDERS + 1):
+            for power in range(order, len(c)):
+                out[order, power - order] = math.perm(power, order) * c[power]
+        return np.ascontiguousarray(out.transpose(2, 0, 3, 1))
+
     def at(self, u: Array, orders: int) -> Array:
         """Values and derivatives ``(orders, ..., *u.shape)``; of the first and last piece beyond the ends."""
-        piece = np.clip(np.searchsorted(self.breaks, u.real, side="right") - 1, 0, len(self.breaks) - 2)
-        c = self.coefficients[:, piece]
-        c = np.moveaxis(c, range(1, 1 + u.ndim), range(c.ndim - u.ndim, c.ndim))
-        d = u - self.breaks[piece]
-        out = np.zeros((orders, *c.shape[1:]), dtype=np.result_type(c, u))
-        for k in range(len(c)):  # Horner's rule for the value and all derivatives
-            for order in range(min(k, orders - 1), 0, -1):
-                out[order] = out[order] * d + order * out[order - 1]
-            out[0] = out[0] * d + c[k]
-        return out
+        flat = u.reshape(-1)
+        piece = self.breaks[1:-1].searchsorted(flat.real, side="right")
+        terms = self._terms[:, :orders].take(piece, axis=0)
+        powers = np.empty((flat.size, 1, terms.shape[3], 1), dtype=u.dtype)
+        powers[:, 0, 0, 0] = 1.0
+        beyond = np.broadcast_to((flat - self.breaks[piece])[:, None], (flat.size, terms.shape[3] - 1))
+        np.multiply.accumulate(beyond, axis=1, out=powers[:, 0, 1:, 0])
+        out = (terms @ powers)[..., 0].transpose(1, 2, 0)
+        return np.asarray(out.reshape(orders, *self.coefficients.shape[2:], *u.shape))
 
     @classmethod
     def meeting(cls, breaks: Array, values: Sequence[Array]) -> Pieces:
@@ -407,7 +416,7 @@ def _parted(breaks: Array, parts: int) -> Array:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Function(Curve):
-    """A curve ``x(u)`` by a function: position and first three derivatives (four, for a roller) at ``u (n,)``, ``(3, n)`` each."""
+    """A curve ``x(u)`` by a function: position and first three derivatives (four, to be exact) at ``u (n,)``, ``(3, n)`` each."""
 
     kind = "function"
     position: Annotated[Any, FUNCTION("u -> (x, x', x'', x'''), each (3, n)")]
@@ -417,20 +426,16 @@ class Function(Curve):
     def at(self, u: Array) -> Array:
         """What the function returns; for complex ``u`` by Taylor's series about its real part."""
         real = np.asarray(u.real, dtype=float).ravel()
-        given = np.stack([np.broadcast_to(part, (3, real.size)) for part in self.position(real)])
-        known = np.zeros((ORDERS, 3, real.size))
-        known[: len(given)] = given[:ORDERS]
-        known = known.reshape(ORDERS, 3, *u.shape)
-        if not np.iscomplexobj(u):
-            return known
-        out = known.astype(complex)
-        out[:-1] += 1j * u.imag * known[1:]
-        return out
+        known = np.zeros((ORDERS + 1, 3, real.size))
+        for order, part in enumerate(self.position(real)[: ORDERS + 1]):
+            known[order] = part
+        known = known.reshape(ORDERS + 1, 3, *u.shape)
+        return known[:-1] + 1j * u.imag * known[1:] if np.iscomplexobj(u) else known[:-1]
 
     @cached_property
     def orders(self) -> int:
         """As many as it returns."""
-        return min(len(self.position(np.array([self.ends[0]]))), ORDERS)
+        return len(self.position(np.array([self.ends[0]])))
 
     @property
     def ends(self) -> tuple[float, float]:

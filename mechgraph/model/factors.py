@@ -278,6 +278,11 @@ class RotationStack:
         """None: the turns are constant."""
 
 
+def entries(X: Array) -> Array:
+    """Entries of homogeneous poses and of their inverses, ``(32, n, T)``."""
+    return np.concatenate([homogeneous(Y).reshape(16, *X.shape[2:]) for Y in (X, inverse(X))])
+
+
 class PoseStack:
     """Copies of one factor of any kind, by its pose: the values are the entries of the pose and of its inverse.
 
@@ -289,8 +294,7 @@ class PoseStack:
 
     def values(self, x: Array) -> Array:
         """Entries of the homogeneous pose and of its inverse, ``(32, n, T)``."""
-        X = self.factor.pose(x, np.zeros((x.shape[1], 1)))
-        return np.concatenate([homogeneous(Y).reshape(16, *X.shape[2:]) for Y in (X, inverse(X))])
+        return entries(self.factor.pose(x, np.zeros((x.shape[1], 1))))
 
     def coefficients(self, pitch: Array, back: Flags) -> Array:
         """Ones: the first sixteen values are the entries of the pose, the others those of its inverse."""

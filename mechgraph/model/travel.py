@@ -10,6 +10,7 @@ Parameter and turn of a minimizing frame are integrals, kept as polynomials (Her
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,6 +30,8 @@ GUIDES_TRIED = 200
 """Directions that are tried as guide of a minimizing frame."""
 COMPLEX_STEP = 1e-30
 """Imaginary step of a derivative."""
+INTEGRAL_ERROR, INTEGRAL_HALVINGS = 1e-15, 8
+"""Error of an integral over its range that is rounding, and times that an interval is halved for it."""
 NEAREST_STEPS = 40
 """Steps of Newton's method to the nearest point, at most."""
 
@@ -47,7 +50,7 @@ class Place:
 
 
 def _dot(a: Array, b: Array) -> Array:
-    return np.asarray((a * b).sum(axis=0))
+    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
 class Travel:
@@ -55,13 +58,11 @@ class Travel:
 
     def __init__(self, curve: Curve) -> None:
         self.curve = curve
-        u = curve.breaks
         self.speed = curve.speed
         if self.speed is not None:
-            s = self.speed * (u - (curve.ends[0] if np.isfinite(curve.ends[0]) else 0.0))
+            s = self.speed * (curve.breaks - (curve.ends[0] if np.isfinite(curve.ends[0]) else 0.0))
         else:
-            s = np.concatenate([[0.0], np.cumsum(_lengths(curve, u))])
-            self._parameter = Pieces.meeting(s, [u, *_parameter_rates(curve.at(u))])
+            s, self._parameter = _by_arc_length(curve)
         self.s = s
         self.begin, self.end = (float(s[0]), float(s[-1])) if np.isfinite(curve.ends[0]) else (-np.inf, np.inf)
         self.length = float(s[-1] - s[0])
@@ -113,8 +114,11 @@ class Travel:
     def _rates(self, u: Array) -> tuple[Array, Array, Array, Array]:
         """Position and its first three derivatives by the arc length, ``(3, ...)`` each."""
         x = self.curve.at(u)
+        if self.speed is not None:
+            return x[0], x[1] / self.speed, x[2] / self.speed**2, x[3] / self.speed**3
         u1, u2, u3 = _parameter_rates(x)
-        return x[0], x[1] * u1, x[2] * u1**2 + x[1] * u2, x[3] * u1**3 + 3 * x[2] * u1 * u2 + x[1] * u3
+        square = u1 * u1
+        return x[0], x[1] * u1, x[2] * square + x[1] * u2, x[3] * (square * u1) + 3 * x[2] * (u1 * u2) + x[1] * u3
 
     def guided(self, s: Array) -> tuple[Array, ...]:
         """``x, t, t', t'', y, k, r, r'`` of the frame guided by the direction."""
@@ -132,6 +136,10 @@ class Travel:
 
     def at(self, s: Array) -> Place:
         """Position and frame at arc lengths ``(...)``, real or complex."""
+        if self.is_plane:
+            x, t, dt, ddt = self._rates(self._parameter_at(s))
+            k = np.broadcast_to(self.guide.reshape(3, *(1,) * s.ndim), t.shape)
+            return Place(x, t, dt, cross(k, t), k, cross(t, dt), cross(t, ddt))
         x, t, dt, ddt, y, k, r, dr = self.guided(s)
         w, dw = cross(t, dt), cross(t, ddt)
         if not self.minimizing:
@@ -144,20 +152,25 @@ class Travel:
 
     def _find_turn(self) -> None:
         """The angle by which the minimizing frame is turned about the tangent against the guided one: ``a' = -r``."""
-        nodes, weights = np.polynomial.legendre.leggauss(10)
-        half = np.diff(self.s) / 2
-        rates = self.guided(self.s[:-1, None] + half[:, None] * (1 + nodes))[6]
-        a = -np.concatenate([[0.0], np.cumsum((rates @ weights) * half)])
-        *_, r, dr = self.guided(self.s)
-        self._turn = Pieces.meeting(self.s, [a, -r, -dr, -self._turn_rate(dr)])
+        s = self.s
+        for _ in range(INTEGRAL_HALVINGS):
+            a = -np.concatenate([[0.0], np.cumsum(_integrals(lambda at: self.guided(at)[6], s))])
+            *_, r, dr = self.guided(s)
+            self._turn = Pieces.meeting(s, [a, -r, -dr, -self._turn_rate(s, dr)])
+            middle = 0.5 * (s[:-1] + s[1:])
+            half = -_integrals(lambda at: self.guided(at)[6], s, 0.5)
+            bad = np.abs(self._turn.at(middle, 1)[0] - a[:-1] - half) > INTEGRAL_ERROR * 2 * np.pi
+            if not bad.any():
+                break
+            s = np.sort(np.concatenate([s, middle[bad]]))
         self.closing = float(a[-1]) if self.is_closed else 0.0
 
-    def _turn_rate(self, dr: Array) -> Array:
+    def _turn_rate(self, s: Array, dr: Array) -> Array:
         """``r''``, of which the fourth derivative of the curve is part: by a complex step, or a spline where that is not known."""
-        if self.curve.orders < ORDERS:
-            spline: Any = scipy.interpolate.make_interp_spline(self.s, dr, 5)
-            return np.asarray(spline(self.s, 1))
-        ahead: Array = self.s + 1j * COMPLEX_STEP  # type: ignore[assignment]
+        if self.curve.orders <= ORDERS:
+            spline: Any = scipy.interpolate.make_interp_spline(s, dr, 5)
+            return np.asarray(spline(s, 1))
+        ahead: Array = s + 1j * COMPLEX_STEP  # type: ignore[assignment]
         return np.asarray(self.guided(ahead)[7].imag / COMPLEX_STEP)
 
     # --- facts -------------------------------------------------------------------------------------------------------
@@ -195,18 +208,38 @@ class Travel:
 
 
 def _parameter_rates(x: Array) -> tuple[Array, Array, Array]:
-    """Three derivatives of the parameter by the arc length, from position and derivatives ``(5, 3, ...)`` by the parameter."""
+    """Three derivatives of the parameter by the arc length, from position and derivatives ``(4, 3, ...)`` by the parameter."""
     u1 = 1.0 / np.sqrt(_dot(x[1], x[1]))
-    a, b = _dot(x[1], x[2]), _dot(x[2], x[2]) + _dot(x[1], x[3])
-    return u1, -a * u1**4, -b * u1**5 + 4 * a**2 * u1**7
+    square = u1 * u1
+    a, b = _dot(x[1], x[2]) * square, (_dot(x[2], x[2]) + _dot(x[1], x[3])) * square
+    return u1, -a * square, (4 * a * a - b) * square * u1
 
 
-def _lengths(curve: Curve, u: Array) -> Array:
-    """Arc lengths between parameters, by Gauss's rule."""
+def _speed(curve: Curve, u: Array) -> Array:
+    x = curve.at(u)[1]
+    return np.asarray(np.sqrt(_dot(x, x)))
+
+
+def _integrals(f: Callable[[Array], Array], grid: Array, part: float = 1.0) -> Array:
+    """Integrals over the intervals of a grid, or over their first ``part``, by Gauss's rule."""
     nodes, weights = np.polynomial.legendre.leggauss(10)
-    half = np.diff(u) / 2
-    x = curve.at(u[:-1, None] + half[:, None] * (1 + nodes))[1]
-    return np.asarray((np.sqrt(_dot(x, x)) @ weights) * half)
+    half = part * np.diff(grid) / 2
+    return np.asarray((f(grid[:-1, None] + half[:, None] * (1 + nodes)) @ weights) * half)
+
+
+def _by_arc_length(curve: Curve) -> tuple[Array, Pieces]:
+    """Arc lengths on a grid, and the parameter by the arc length: intervals in which that is not exact in the middle are halved."""
+    u = curve.breaks
+    for _ in range(INTEGRAL_HALVINGS):
+        s = np.concatenate([[0.0], np.cumsum(_integrals(lambda at: _speed(curve, at), u))])
+        pieces = Pieces.meeting(s, [u, *_parameter_rates(curve.at(u))])
+        middle = 0.5 * (u[:-1] + u[1:])
+        half = _integrals(lambda at: _speed(curve, at), u, 0.5)
+        bad = np.abs(pieces.at(s[:-1] + half, 1)[0] - middle) > INTEGRAL_ERROR * (u[-1] - u[0])
+        if not bad.any():
+            break
+        u = np.sort(np.concatenate([u, middle[bad]]))
+    return s, pieces
 
 
 def _right_handed(normal: Array, x: Array) -> Array:

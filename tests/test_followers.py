@@ -1,0 +1,198 @@
+"""Cams and their followers, pins in slots, curves in contact: limits that are linkages and gears."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import mechgraph as mg
+
+Z, I3 = (0, 0, 1), np.diag([0.1, 0.2, 0.3])
+TURN = mg.Motion(np.linspace(0, 6, 13), 3.0, 2.0)
+CENTER = np.array([0.3, 0, 0])
+CIRCLE = mg.Curve.circle(radius=1.0, center=CENTER)
+
+
+def driven_cam(*pairs, point, more=()):
+    """A cam that turns about the origin and what follows it, the last link loaded."""
+    links = [
+        mg.Link("frame"),
+        mg.Link("cam", mass=2.0, center=CENTER, inertia=I3),
+        mg.Link("follower", mass=1.0, center=point, inertia=I3),
+    ]
+    loads = [mg.Wrench("follower", force=(0, -5, 0), point=point)]
+    pairs = [mg.Pair("A", "R", "frame", "cam", point=(0, 0, 0), axis=Z), *pairs]
+    return mg.Mechanism("cam", [*links, *map(mg.Link, more)], pairs, ["A"], loads)
+
+
+def assert_same_plane_forces(one, other, given, pairs):
+    """Motion of cam and follower, forces in the plane, moments about its normal, the drive; nothing along the tangent."""
+    a, b = mg.solve(one, given), mg.solve(other, given)
+    assert a.checks.power.max() < 1e-12
+    for link in (link.name for link in one.links[1:]):
+        for name in ("pose", "twist", "acceleration"):
+            assert_allclose(getattr(a.link(link), name), getattr(b.link(link), name), atol=1e-10)
+    size = np.abs(b["A"].effort).max()
+    assert_allclose(a["A"].effort, b["A"].effort, atol=1e-10 * size)
+    for mine, theirs in pairs.items():
+        x, y = a[mine].reaction[:, [2, 3, 4]], b[theirs].reaction[:, [2, 3, 4]]
+        assert_allclose(x, y, atol=1e-10 * np.abs(y).max())
+    return a
+
+
+ROLLER = 0.25
+
+
+@pytest.mark.parametrize("swings", [False, True])
+def test_an_eccentric_with_a_roller_is_a_slider_crank_or_a_four_bar(swings):
+    """The centre of the roller keeps its distance, radius plus radius, from that of the circle."""
+    at = np.array([0.1, np.sqrt((1 + ROLLER) ** 2 - 0.2**2), 0])
+    bearing = (
+        mg.Pair("F", "R", "frame", "follower", point=(1.5, 1.0, 0), axis=Z)
+        if swings
+        else mg.Pair("F", "P", "frame", "follower", point=at, axis=(0, 1, 0))
+    )
+    cam = driven_cam(bearing, mg.Pair("K", "Ps", "cam", "follower", curve=CIRCLE, roller=ROLLER, point=at), point=at)
+    rod = [
+        mg.Pair("D", "R", "cam", "rod", point=CENTER, axis=Z),
+        mg.Pair("E", "R", "rod", "follower", point=at, axis=Z),
+    ]
+    s = assert_same_plane_forces(
+        cam, driven_cam(bearing, *rod, point=at, more=["rod"]), {"A": TURN}, {"A": "A", "F": "F", "K": "E"}
+    )
+    normal = s.link("cam").point(CENTER)[0] - s.link("follower").point(at)[0]
+    force = s["K"].force
+    assert np.abs(force[:, 0] * normal[:, 1] - force[:, 1] * normal[:, 0]).max() < 1e-11 * np.abs(force[:, :2]).max()
+    assert_allclose(np.abs(s["K"].components["Fy"]), np.linalg.norm(force[:, :2], axis=1), rtol=1e-10)
+
+
+def test_a_flat_face_on_an_eccentric_is_a_scotch_yoke():
+    at = CENTER + np.array([0, 1.0, 0])
+    bearing = mg.Pair("F", "P", "frame", "follower", point=at, axis=(0, 1, 0))
+    flat = driven_cam(bearing, mg.Pair("K", "Kc", "cam", "follower", curve=CIRCLE, point=at), point=at)
+    block = [
+        mg.Pair("D", "R", "cam", "block", point=CENTER, axis=Z),
+        mg.Pair("E", "P", "block", "follower", point=CENTER, axis=(1, 0, 0)),
+    ]
+    s = assert_same_plane_forces(
+        flat, driven_cam(bearing, *block, point=at, more=["block"]), {"A": TURN}, {"A": "A", "K": "E"}
+    )
+    assert_allclose(s["F"].position[:, 0], 0.3 * np.sin(TURN.position), atol=1e-12)
+    assert np.abs(s["K"].force[:, 0]).max() < 1e-11
+
+
+def involutes(share):
+    """Two spur gears of 20 and 30 teeth that touch at a ``share`` of the line of action, as flanks and as a coupling."""
+    teeth, module, pressure = (20, 30), 0.1, np.deg2rad(20)
+    pitch = [module * z / 2 for z in teeth]
+    radius = [p * np.cos(pressure) for p in pitch]
+    other = np.array([sum(pitch), 0, 0])
+    way = sum(pitch) * np.sin(pressure)
+    along, turn = (
+        np.array([np.sin(pressure), -np.cos(pressure), 0]),
+        [share * way / radius[0], (1 - share) * way / radius[1]],
+    )
+    at = radius[0] * np.array([np.cos(pressure), np.sin(pressure), 0]) + share * way * along
+    angle = [pressure - turn[0], pressure + np.pi - turn[1]]
+    flanks = [
+        mg.Curve.involute(radius=r, angles=(0.05, 1.2), center=c, second=(np.cos(a), np.sin(a), 0))
+        for r, c, a in zip(radius, ((0, 0, 0), other), angle, strict=True)
+    ]
+    links = [
+        mg.Link("frame"),
+        mg.Link("g1", mass=1.0, center=(0.1, 0, 0), inertia=I3),
+        mg.Link("g2", mass=3.0, center=other, inertia=I3),
+    ]
+    pairs = [
+        mg.Pair("A", "R", "frame", "g1", point=(0, 0, 0), axis=Z),
+        mg.Pair("B", "R", "frame", "g2", point=other, axis=Z),
+    ]
+    contact = mg.Pair("K", "Kc", "g1", "g2", curve=flanks[0], curve_b=flanks[1], point=at)
+    loads, gears = (
+        [mg.Effort("B", -7.0)],
+        [mg.SpurGears("g", "A", "B", teeth=teeth, module=module, pressure_angle=pressure)],
+    )
+    return mg.Mechanism("flanks", links, [*pairs, contact], ["A"], loads), mg.Mechanism(
+        "gears", links, pairs, ["A"], loads, couplings=gears
+    )
+
+
+def test_involute_flanks_in_contact_are_gears():
+    """Ratio, and the force along the line of action, wherever on it the flanks touch."""
+    flanks, gears = involutes(0.45)
+    given = {"A": mg.Motion(np.linspace(0, 0.1, 6), 3.0, 2.0)}
+    s = assert_same_plane_forces(flanks, gears, given, {"A": "A", "B": "B"})
+    force = s["K"].force[:, :2]
+    pressure = np.deg2rad(20)
+    assert np.abs(force @ [np.cos(pressure), np.sin(pressure)]).max() < 1e-11 * np.abs(force).max()
+
+
+def test_flanks_that_cross_are_refused():
+    flanks, _ = involutes(0.45)
+    pair = flanks.pairs[-1]
+    tilted = pair.curve_b.replace(second=(np.cos(3.0), np.sin(3.0), 0))
+    with pytest.raises(mg.DeclarationError, match=r"point: is \S+ off its curve_b"):
+        flanks.replace(pairs=[*flanks.pairs[:-1], pair.replace(curve_b=tilted)])
+    crossing = mg.Curve.line(point=pair.point, direction=(1, 0, 0))
+    with pytest.raises(mg.DeclarationError, match="crosses the curve at"):
+        flanks.replace(pairs=[*flanks.pairs[:-1], pair.replace(curve_b=crossing)])
+
+
+ANGLE = np.linspace(0, 2 * np.pi, 361)
+
+
+def law():
+    """Rise by a polynomial, dwell, cycloidal return."""
+    up = mg.Motion.law("poly345", 0.4, 2.0, ANGLE)
+    down = mg.Motion.law("cycloidal", -0.4, 2.5, ANGLE - 3.0)
+    return mg.Motion(
+        up.position + down.position, up.velocity + down.velocity, up.acceleration + down.acceleration, t=ANGLE
+    )
+
+
+@pytest.mark.parametrize("follower", ["roller", "flat"])
+def test_a_cam_of_a_law_lifts_by_it(follower):
+    """The cam turns at the rate 3: the follower has the law's lift, slope times 3, and bend times 9, at angles between those given too."""
+    shape = {"follower": "flat"} if follower == "flat" else {"roller_radius": 0.2, "offset": 0.15}
+    curve = mg.Curve.cam.of(law(), 0.9, second=(0, 1, 0), **shape)
+    at = curve.at(np.array(0.0))[0]
+    kind = "Kc" if follower == "flat" else "Ps"
+    m = driven_cam(
+        mg.Pair("F", "P", "frame", "follower", point=at, axis=(0, 1, 0)),
+        mg.Pair("K", kind, "cam", "follower", curve=curve, point=at),
+        point=at,
+    )
+    given, fine = ANGLE[::10], law()
+    s = mg.solve(m, {"A": mg.Motion(given, 3.0, 0.0)})
+    for found, expected, tolerance in (
+        (s["F"].position, fine.position, 1e-11),
+        (s["F"].velocity, 3 * fine.velocity, 1e-10),
+        (s["F"].acceleration, 9 * fine.acceleration, 1e-8),
+    ):
+        assert_allclose(found[:, 0], expected[::10], atol=tolerance)
+    assert s.checks.power.max() < 1e-12
+    between = mg.solve(m, {"A": ANGLE[:-1] + 0.5 * np.diff(ANGLE)})["F"].position[:, 0]
+    half = mg.Motion.law("poly345", 0.4, 2.0, ANGLE[:100] + 0.5 * ANGLE[1])
+    assert_allclose(between[:100], half.position, atol=1e-9)
+
+
+def test_a_roller_larger_than_the_radius_of_curvature_is_refused():
+    hollow = mg.Curve.ellipse(a=1.0, b=0.3)
+    pair = mg.Pair("K", "Ps", "a", "b", curve=hollow, roller=0.2, point=(0.75, 0, 0))
+    with pytest.raises(
+        mg.DeclarationError, match=r"the roller of radius 0\.2 is larger than the radius of curvature 0\.09 at \(1, "
+    ):
+        mg.Mechanism("m", None, [pair])
+    outside = mg.Mechanism("m", None, [pair.replace(point=(1.2, 0, 0))])
+    assert outside.pairs[0].point == pytest.approx((1.2, 0, 0))
+
+
+def test_a_slot_must_be_plane_and_a_contact_needs_a_curve():
+    helix = mg.Curve.helix(radius=1.0, pitch=0.2)
+    with pytest.raises(mg.DeclarationError, match="is no plane curve, as a pair Ps needs"):
+        mg.Mechanism("m", None, [mg.Pair("K", "Ps", "a", "b", curve=helix)])
+    with pytest.raises(mg.DeclarationError, match="type Kc needs a curve"):
+        mg.Mechanism("m", None, [mg.Pair("K", "Kc", "a", "b", point=(0, 0, 0), axis=(0, 0, 1))])
+    assert (
+        mg.check(mg.Mechanism("m", None, [mg.Pair("K", "Kc", "a", "b"), mg.Pair("A", "R", "a", "b")])).mobility_by_count
+        == -3
+    )
