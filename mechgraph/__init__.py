@@ -47,6 +47,7 @@ from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.model.row_parts import Bookkeeping, Component, Freedom
 from mechgraph.model.stop import Stop
 from mechgraph.modes.assemblies import Assemblies, AssembliesOver, assemblies
+from mechgraph.modes.branches import Branches, branches
 from mechgraph.report.report import DeterminacyReport, check
 from mechgraph.report.structure import Structure, groups, structure
 from mechgraph.response.course import Response
@@ -71,6 +72,7 @@ __all__ = [
     "Belt",
     "BevelGears",
     "Bookkeeping",
+    "Branches",
     "Chain",
     "Component",
     "ContentError",
@@ -125,6 +127,7 @@ __all__ = [
     "assemble",
     "assemblies",
     "atlas",
+    "branches",
     "chain",
     "check",
     "equilibrium",

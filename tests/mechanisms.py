@@ -355,3 +355,18 @@ def unclosable_four_bar() -> mg.Mechanism:
         mg.Pair("C", "R", "coupler", "rocker", on_a=ends["coupler"], on_b=mg.Marker((1, 0, 0), z)),
         mg.Pair("D", "R", "frame", "rocker", on_a=mg.Marker((5, 0, 0), z), on_b=base),
     ], drives=["A"])  # fmt: skip
+
+
+def linked_four_bar(crank: float, coupler: float, rocker: float, ground: float, angle: float) -> mg.Mechanism:
+    """A planar four-bar declared link by link, the crank along x at zero."""
+    lengths = (crank, coupler, rocker, ground)
+    names = ("ground", "crank", "coupler", "rocker")
+    ends = list(zip(names, names[1:] + names[:1], (ground, *lengths[:3]), strict=True))
+    pairs = [
+        mg.Pair(f"O{i}", "R", a, b, on_a=mg.Marker((L if i else 0.0, 0, 0), Z), on_b=mg.Marker((0, 0, 0), Z))
+        for i, (a, b, L) in enumerate(ends)
+    ]
+    # the last pair closes on the ground at its other end
+    last = pairs[3]
+    pairs[3] = mg.Pair("O3", "R", last.a, last.b, on_a=last.on_a, on_b=mg.Marker((ground, 0, 0), Z))
+    return mg.Mechanism("four-bar", pairs=pairs, drives=["O0"], frame="ground", start={"O0": angle, "O1": -1.0})

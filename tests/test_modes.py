@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mechanisms import Z, bennett, ring
+from mechanisms import bennett, linked_four_bar, ring
 
 import mechgraph as mg
 from mechgraph.closure.assembly import close_all, closed_start
@@ -37,21 +37,6 @@ def general(letters: str, seed: int = 3, **more: object) -> mg.Mechanism:
     return ring(types, rng.normal(size=(len(types), 3)), rng.normal(size=(len(types), 3)), **more)
 
 
-def four_bar(crank: float, coupler: float, rocker: float, ground: float, angle: float) -> mg.Mechanism:
-    """A planar four-bar declared link by link, the crank along x at zero."""
-    lengths = (crank, coupler, rocker, ground)
-    names = ("ground", "crank", "coupler", "rocker")
-    ends = list(zip(names, names[1:] + names[:1], (ground, *lengths[:3]), strict=True))
-    pairs = [
-        mg.Pair(f"O{i}", "R", a, b, on_a=mg.Marker((L if i else 0.0, 0, 0), Z), on_b=mg.Marker((0, 0, 0), Z))
-        for i, (a, b, L) in enumerate(ends)
-    ]
-    # the last pair closes on the ground at its other end
-    last = pairs[3]
-    pairs[3] = mg.Pair("O3", "R", last.a, last.b, on_a=last.on_a, on_b=mg.Marker((ground, 0, 0), Z))
-    return mg.Mechanism("four-bar", pairs=pairs, drives=["O0"], frame="ground", start={"O0": angle, "O1": -1.0})
-
-
 COUNTS = [
     *((letters, 2) for letters in ("R-Sp-R", "P-Sp-R", "R-Sg-C", "R-Sg-R-P", "R-Sg-P-R", "R-Sc-C-P", "R-Sc-P-C", "RSSR", "RCCC")),
     *((letters, 4) for letters in ("R-Sg-R-R", "RCSR", "RCRCR")),
@@ -72,7 +57,7 @@ def test_general_loops_have_as_many_assemblies_over_c_as_the_literature_says(let
 @pytest.mark.parametrize("angle", [0.4, 2.0, -1.3])
 def test_a_four_bar_has_the_two_assemblies_of_its_closed_form(angle: float) -> None:
     a, b, c, d = 1.0, 2.5, 2.0, 3.0
-    modes = mg.assemblies(four_bar(a, b, c, d, 0.5), {"O0": angle})
+    modes = mg.assemblies(linked_four_bar(a, b, c, d, 0.5), {"O0": angle})
     assert modes.completeness == "proved"
     assert modes.kinds == ("regular", "regular")
     tip = a * np.exp(1j * angle)
@@ -88,7 +73,7 @@ def test_a_four_bar_has_the_two_assemblies_of_its_closed_form(angle: float) -> N
 
 
 def test_where_a_four_bar_cannot_be_closed_both_assemblies_are_complex() -> None:
-    modes = mg.assemblies(four_bar(2.0, 1.5, 2.5, 3.0, 0.5), {"O0": np.pi})
+    modes = mg.assemblies(linked_four_bar(2.0, 1.5, 2.5, 3.0, 0.5), {"O0": np.pi})
     assert len(modes) == 0
     assert len(modes.complex) == 2
     assert modes.completeness == "proved"
@@ -97,16 +82,16 @@ def test_where_a_four_bar_cannot_be_closed_both_assemblies_are_complex() -> None
 def test_at_its_fold_the_two_assemblies_of_a_four_bar_are_a_double_point() -> None:
     a, b, c, d = 2.0, 1.5, 2.5, 3.0
     fold = np.arccos((a * a + d * d - (b + c) ** 2) / (2 * a * d))
-    modes = mg.assemblies(four_bar(a, b, c, d, 0.5), {"O0": fold})
+    modes = mg.assemblies(linked_four_bar(a, b, c, d, 0.5), {"O0": fold})
     assert modes.kinds == ("double",)
     assert modes.certificates == (None,)
     assert np.isinf(modes.condition[0])
 
 
 def test_a_parallelogram_folded_flat_is_a_double_point_and_a_kite_that_spins_a_continuum() -> None:
-    flat = mg.assemblies(four_bar(1.0, 2.0, 1.0, 2.0, 0.5), {"O0": 0.0})
+    flat = mg.assemblies(linked_four_bar(1.0, 2.0, 1.0, 2.0, 0.5), {"O0": 0.0})
     assert "double" in flat.kinds
-    kite = mg.assemblies(four_bar(2.0, 1.0, 1.0, 2.0, 0.7), {"O0": 0.0})
+    kite = mg.assemblies(linked_four_bar(2.0, 1.0, 1.0, 2.0, 0.7), {"O0": 0.0})
     assert "continuum" in kite.kinds
 
 

@@ -63,6 +63,7 @@ def things() -> dict[str, Any]:
         "belt": mg.Belt("g", "A", "B", radii=(1, 2)), "stop": mg.Stop("A0", lower=0.1), "equilibrium": hanging,
         "linearized": mg.linearize(hanging),
         "assemblies": mg.assemblies(m, {"A": 0.3}, cache=False), "at several": mg.assemblies(m, {"A": THETA}, cache=False),
+        "branches": mg.branches(m, "A", samples=4, points=12, cache=False),
         "chain": next(mg.atlas(6)), "identity": mg.identify(mg.load("four-bar")), "system group": next(mg.system_groups(1)),
         "structure": mg.structure(mg.load("four-bar")), "groups": mg.groups(mg.load("four-bar")),
         "group": mg.groups(mg.load("four-bar")).groups[1], "families": mg.check(mg.load("four-bar")).families,

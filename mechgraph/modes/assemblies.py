@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import importlib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, cmp_to_key
 from typing import Any
@@ -27,6 +28,8 @@ from mechgraph.quantities import wrong
 
 REAL = 1e-6
 """Imaginary part of link poses up to which an assembly counts as real."""
+REAL_SINGULAR, REAL_CLOSED = 1e-3, 1e-9
+"""The same at singular ends, which are known to the root of rounding only; closure error of what is real."""
 SINGULAR = 1e-5
 """Smallest singular value of the closure rows, as part of the largest, below which an assembly is no regular point."""
 AWAY = 1e-2
@@ -36,7 +39,7 @@ GUESSES = 400
 GUESSED_TURNS = 1.0
 """Turns on either side of the start within which angles are guessed."""
 ORDER = 1e-7
-"""Difference of link poses below which the next number decides the order of assemblies."""
+"""Difference of link poses (and coordinates) below which the next number decides the order of assemblies."""
 
 Progress = Callable[[str], None]
 
@@ -114,6 +117,10 @@ class Assemblies(Shown, Sequence[Mechanism]):
             (Table(header, tuple(rows)), Paragraph(f"Completeness: {self.completeness}. " + " ".join(self.evidence))),
         )
 
+    def plot(self) -> Any:
+        """A picture of all assemblies side by side; the figure."""
+        return importlib.import_module("mechgraph.show.modes").draw_assemblies(self)
+
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain data."""
         return {
@@ -153,7 +160,7 @@ class AssembliesOver(Shown, Sequence[Assemblies]):
     @property
     def completeness(self) -> str:
         """The weakest of all positions."""
-        return max((p.completeness for p in self.positions), key=("proved", "tested", "searched").index)
+        return weakest(p.completeness for p in self.positions)
 
     def document(self) -> Document:
         """How many assemblies there are at every position."""
@@ -169,6 +176,15 @@ class AssembliesOver(Shown, Sequence[Assemblies]):
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain data."""
         return {"positions": [p.to_dict() for p in self.positions]}
+
+
+WORDS = ("proved", "tested", "searched")
+"""What completeness may be, the strongest first."""
+
+
+def weakest(words: Iterable[str]) -> str:
+    """The weakest of words for completeness."""
+    return max(words, key=WORDS.index)
 
 
 def assemblies(
@@ -217,6 +233,18 @@ def assemblies(
     return AssembliesOver(tuple(found)) if question.batch else found[0]
 
 
+@dataclass(frozen=True)
+class _Solutions:
+    """Real states ``(nx, M)`` at a position and ``others`` that are not real, with what is said of them (see ``Assemblies``)."""
+
+    x: Array
+    others: Array
+    word: str
+    evidence: tuple[str, ...]
+    total: int | None
+    infinite: int
+
+
 class Finder:
     """Finds the assemblies of a question."""
 
@@ -242,39 +270,44 @@ class Finder:
             keep(self.family, made)
         return made
 
-    def positions(self, guesses: int, turns: float) -> list[Assemblies]:
-        """The assemblies at all positions."""
+    def solutions(self, guesses: int = GUESSES, turns: float = GUESSED_TURNS) -> list[_Solutions]:
+        """What is found at all positions."""
         q = self.question
         if self.start is None:
-            return [self._searched(q.drive[:, i], i, guesses, turns) for i in range(q.drive.shape[1])]
+            return [self._searched(q.drive[:, i], guesses, turns) for i in range(q.drive.shape[1])]
         found = ends(self.family, self.start, q.drive, self.rng, self.progress)
         return [self._tracked(one, self.start, i) for i, one in enumerate(found)]
 
-    def _searched(self, drive: Array, i: int, guesses: int, turns: float) -> Assemblies:
+    def positions(self, guesses: int, turns: float) -> list[Assemblies]:
+        """The assemblies at all positions."""
+        return [self._result(found, i) for i, found in enumerate(self.solutions(guesses, turns))]
+
+    def _distinct(self, x: Array) -> Array:
+        return x[:, distinct(self.family.prints(Configuration(self.question.system, x)))]
+
+    def _searched(self, drive: Array, guesses: int, turns: float) -> _Solutions:
         q = self.question
         x = searched(q.system, q.x, q.columns, drive, guesses, turns, self.rng, self.progress)
         x = np.concatenate([x, *([q.start.x] if np.allclose(q.start.x[self.family.rows, 0], drive) else [])], axis=1)
-        x = x[:, distinct(self.family.prints(Configuration(q.system, x)))]
         why = (
             f"No class is known: {self.fault}. Searched from {guesses} random guesses within {turns:g} turns of the start; "
             "others may exist."
         )
-        return self._result(x, np.zeros((q.system.n_state, 0), dtype=complex), i, "searched", (why,), None, 0)
-
-    def _tracked(self, found: Ends, start: StartSet, i: int) -> Assemblies:
-        q, N = self.question, start.x.shape[1]
-        imaginary = np.abs(found.poses.imag).max(axis=0, initial=0.0) / np.maximum(
-            1.0, np.abs(found.poses).max(axis=0, initial=0.0)
+        return _Solutions(
+            self._distinct(x), np.zeros((q.system.n_state, 0), dtype=complex), "searched", (why,), None, 0
         )
-        real = imaginary < np.where(found.singular, 1e-3, REAL)
+
+    def _tracked(self, found: Ends, start: StartSet, i: int) -> _Solutions:
+        q, N = self.question, start.x.shape[1]
+        size = np.maximum(1.0, np.abs(found.poses).max(axis=0, initial=0.0))
+        imaginary = np.abs(found.poses.imag).max(axis=0, initial=0.0) / size
+        real = imaginary < np.where(found.singular, REAL_SINGULAR, REAL)
         x, error = close_all(q.system, found.x[:, real].real, q.columns)
-        x = x[:, error < 1e-9]
-        x = x[:, distinct(self.family.prints(Configuration(q.system, x)))]
+        x = self._distinct(x[:, error < REAL_CLOSED])
         if (self._irregular(found.x[:, ~real])).any():
             x = np.concatenate([x, self._of_continuum(i)], axis=1)
-        known = bound(self.family)
-        word, evidence = _completeness(found, start, N, known)
-        return self._result(x, found.x[:, ~real], i, word, evidence, N, found.infinite)
+        word, evidence = _completeness(found, start, N, bound(self.family))
+        return _Solutions(x, found.x[:, ~real], word, evidence, N, found.infinite)
 
     def _irregular(self, x: Array) -> Array:
         """Which assemblies that are not real are no regular points."""
@@ -291,13 +324,11 @@ class Finder:
         found = [j for j in near.tolist() if self._point(x[:, [j]])[0] == "continuum"]
         return x[:, found[:1]]
 
-    def _result(
-        self, x: Array, others: Array, i: int, word: str, evidence: tuple[str, ...], total: int | None, infinite: int
-    ) -> Assemblies:
-        q, m = self.question, self.question.asked
+    def _result(self, found: _Solutions, i: int) -> Assemblies:
+        q, m, x = self.question, self.question.asked, found.x
         here = Configuration(q.system, x)
         poses = np.moveaxis(user_poses(here), 1, 0)
-        order = _ordered(poses.reshape(len(poses), 16 * poses.shape[1]))
+        order = _ordered(self.family.prints(here).T)
         x, poses = x[:, order], poses[order]
         coordinates = q.coordinates(x)
         coordinates[:, q.columns] = q.values[:, i]
@@ -311,7 +342,7 @@ class Finder:
         modes = tuple(
             m.replace(start=dict(zip(m.freedom_names(), row[own].tolist(), strict=True))) for row in coordinates
         )
-        away = Configuration(q.system, others)
+        away = Configuration(q.system, found.others)
         return Assemblies(
             m,
             dict(zip(q.names, q.values[:, i].tolist(), strict=True)),
@@ -321,11 +352,11 @@ class Finder:
             tuple(kinds),
             np.array(conditions),
             tuple(sure),
-            ComplexModes(q.complex_coordinates(others)[:, own], np.moveaxis(user_poses(away), 1, 0)),
-            word,
-            evidence,
-            total,
-            infinite,
+            ComplexModes(q.complex_coordinates(found.others)[:, own], np.moveaxis(user_poses(away), 1, 0)),
+            found.word,
+            found.evidence,
+            found.total,
+            found.infinite,
         )
 
     def _point(self, x: Array) -> tuple[str, float, Certificate | None]:
@@ -368,8 +399,8 @@ def _completeness(found: Ends, start: StartSet, N: int, known: Bound | None) -> 
         f"(chance of one missed {start.chance:.1g} where all permutations are as likely), {start.lost} of {start.followed} tracks lost."
     )
     tracks = (
-        f"{counted(N, 'track')} to this position in {counted(found.runs, 'run')}: {found.x.shape[1]} ends, "
-        f"{found.infinite} at infinity, {found.lost} lost."
+        f"{counted(N, 'track')} to this position in {counted(found.runs, 'run')}: {found.x.shape[1]} different ends, "
+        f"{found.infinite} at infinity, {found.lost} lost in the best run."
     )
     if not start.whole or not found.clean:
         return "searched", (loops, tracks, "Tracks that are lost, or meet, leave open whether these are all.")

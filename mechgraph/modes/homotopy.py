@@ -41,6 +41,10 @@ RATES_KEPT = 4
 """Nodes from whose rates a step is predicted."""
 POLISHED = 1e-12
 """Last Newton step at the end of a track."""
+NOISE = 3e-14
+"""Rounding of a Newton step, against the third power of the largest number in a pose (poses multiply along loops)."""
+MOST_NOISE = 1e-5
+"""Rounding with which a track may end."""
 POLISHING = 6
 """Newton steps at the end of a track, at most."""
 ARRIVED = 1e-8
@@ -164,6 +168,11 @@ class Linear:
         out = np.zeros((self.family.system.n_freedoms, right.shape[1], T), dtype=complex)
         out[self.family.free] = _solved(A, b).transpose(1, 2, 0)
         return out
+
+    @property
+    def noise(self) -> Array:
+        """Rounding ``(T,)`` to be expected of a Newton step."""
+        return np.asarray(NOISE * np.abs(self.here.poses).max(axis=(0, 1, 2)) ** 3)
 
     def newton(self, idle: Array) -> Array:
         """The Newton step ``(F, T)``."""
@@ -289,7 +298,8 @@ class _March:
             here = leg.at(x, t, tracks)
             two = here.newton(self.idle)
             sizes = [eq.size(x, d) for d in (one, two)]
-            good = (sizes[0] <= care.most) & (sizes[1] <= 0.1 * sizes[0] + 1e-10)
+            noise = here.noise
+            good = (sizes[0] <= care.most) & (sizes[1] <= 0.1 * sizes[0] + np.clip(noise, 1e-10, care.aim))
             rates, idle = here.rates(self.idle)
             v = eq.state_rates(here.here.x, rates) * dt
             x = eq.family.system.advance(here.here.x, two)
@@ -355,7 +365,8 @@ def polished(leg: Leg, x: Array, t: complex, tracks: Index) -> tuple[Array, Mask
             last = np.fmin(size, last)
             if (last < POLISHED).all():
                 break
-    return x, last < ARRIVED * np.maximum(1.0, np.abs(x).max(axis=0))
+        noise = np.minimum(here.noise, MOST_NOISE)
+    return x, last < ARRIVED * np.maximum(1.0, np.abs(x).max(axis=0)) + noise
 
 
 def _calming(eq: Equations, here: Linear) -> Array:

@@ -17,12 +17,15 @@ from mechgraph.modes.family import GENERIC, MEMBER_CLOSED, Array, Family, Member
 from mechgraph.modes.homotopy import Care, Equations, Leg, follow
 from mechgraph.numerics.linear import rank_of, singular_values
 
-MISSED = 1e-6
-"""Chance of an assembly having been missed at which loops of members end, where every permutation is as likely as any other."""
+MISSED, MISSED_AGAIN = 1e-4, 1e-6
+"""Chance of an assembly having been missed at which loops of members end, where every permutation is as likely as any other: at the
+first member, and at the one that is kept."""
 MOST_FOUND = 1200
 """Assemblies of one member from which on they are not looked for any further."""
 BATCH = 48
 """Tracks followed together, of as many loops as it takes."""
+CANDIDATES = 6
+"""Members of which the best one is kept."""
 ATTEMPTS = 8
 """Random members tried until one is regular."""
 ONE_ASSEMBLY = 1e-6
@@ -37,13 +40,15 @@ class Irregular(Exception):
 class StartSet:
     """All assemblies ``x (nx, N)`` known of a member, and the mixing of its rows.
 
-    ``loops`` is the number of loops of members that brought no further assembly, ``lost`` the tracks that did not come back.
+    ``loops`` is the number of loops of members that brought no further assembly, ``chance`` that of one having been missed by them, were
+    every permutation as likely; ``lost`` of the tracks ``followed`` did not come to the end of their leg.
     """
 
     member: Member
     x: Array
     mixing: Array | None
     loops: int
+    chance: float
     lost: int
     followed: int
     whole: bool
@@ -58,11 +63,6 @@ class StartSet:
             return False
         closure = Configuration(family.system_with(self.member.markers), self.x).closure
         return bool(closure.max(initial=0.0) < MEMBER_CLOSED)
-
-    @property
-    def chance(self) -> float:
-        """Chance that an assembly was missed, were every permutation of the assemblies as likely as any other."""
-        return float((self.x.shape[1] + 1.0) ** -self.loops)
 
 
 def fingerprints(family: Family, member: Member, x: Array) -> Array:
@@ -108,24 +108,67 @@ def start_set(family: Family, rng: np.random.Generator, progress: Callable[[str]
 def _permuted(
     equations: Equations, base: Member, x: Array, rng: np.random.Generator, progress: Callable[[str], None] | None
 ) -> StartSet:
-    """The assemblies to which loops of members lead from one, until more loops than chance can explain bring none."""
-    family, care = equations.family, Care()
-    found = x[:, None]
-    known = fingerprints(family, base, found)
-    quiet = lost = followed = 0
-    while (N := found.shape[1]) < MOST_FOUND and (N + 1.0) ** -quiet > MISSED:
-        if progress is not None:
-            progress(f"{N} assemblies of a random member, {quiet} loops without a further one")
-        loops = max(1, BATCH // N)
-        corners = [base, *(Member.joined([family.random_member(rng) for _ in range(loops)]) for _ in range(2)), base]
-        there, which = np.tile(found, loops), np.repeat(np.arange(loops), N)
-        for begin, end in pairwise(corners):
-            tracked = follow(Leg(equations, begin, end, which), there, care)
-            lost += int((~tracked.arrived).sum())
-            followed += there.shape[1]
+    """The assemblies to which loops of members lead from one, until more loops than chance can explain bring none.
+
+    They begin at one member and then at another: what is hard to reach at the first, large numbers in its poses, is not at the second.
+    """
+    group = _Group(equations, base, x[:, None])
+    group.grow(MISSED, rng, progress)
+    group.move(*_tame(equations, group.base, group.x, rng))
+    group.grow(MISSED_AGAIN, rng, progress)
+    whole = group.x.shape[1] < MOST_FOUND
+    return StartSet(group.base, group.x, equations.mixing, group.quiet, group.chance, group.lost, group.followed, whole)
+
+
+class _Group:
+    """Assemblies ``x (nx, N)`` known of a member ``base``, and the loops that brought no further one."""
+
+    def __init__(self, equations: Equations, base: Member, x: Array) -> None:
+        self.equations, self.lost, self.followed = equations, 0, 0
+        self.move(base, x)
+
+    def move(self, base: Member, x: Array) -> None:
+        """Go on at another member."""
+        self.base, self.x, self.known = base, x, fingerprints(self.equations.family, base, x)
+        self.quiet, self.chance = 0, 1.0
+
+    def grow(self, missed: float, rng: np.random.Generator, progress: Callable[[str], None] | None) -> None:
+        """Loops until the chance of one having been missed is small."""
+        family = self.equations.family
+        while (N := self.x.shape[1]) < MOST_FOUND and self.chance > missed:
+            if progress is not None:
+                progress(f"{N} assemblies of a random member, {self.quiet} loops without a further one")
+            loops = max(1, BATCH // N)
+            there = self._round(family, loops, rng)
+            poses = fingerprints(family, self.base, there)
+            new = distinct(poses, self.known)
+            # a further one stays outside where the loop leaves it where it is, or where its track is lost
+            outside = min(1.0 / (N + 1.0) + (1.0 - there.shape[1] / (N * loops)), 1.0)
+            self.quiet, self.chance = (0, 1.0) if new.size else (self.quiet + loops, self.chance * outside**loops)
+            self.x = np.concatenate([self.x, there[:, new]], axis=1)
+            self.known = np.concatenate([self.known, poses[:, new]], axis=1)
+
+    def _round(self, family: Family, loops: int, rng: np.random.Generator) -> Array:
+        """Where all assemblies come to on several loops through two random members each."""
+        corners = [Member.joined([family.random_member(rng) for _ in range(loops)]) for _ in range(2)]
+        there, which = np.tile(self.x, loops), np.repeat(np.arange(loops), self.x.shape[1])
+        for begin, end in pairwise([self.base, *corners, self.base]):
+            tracked = follow(Leg(self.equations, begin, end, which), there, Care())
+            self.lost += int((~tracked.arrived).sum())
+            self.followed += there.shape[1]
             there, which = tracked.x[:, tracked.arrived], which[tracked.arrived]
-        poses = fingerprints(family, base, there)
-        new = distinct(poses, known)
-        quiet = 0 if new.size else quiet + loops
-        found, known = np.concatenate([found, there[:, new]], axis=1), np.concatenate([known, poses[:, new]], axis=1)
-    return StartSet(base, found, equations.mixing, quiet, lost, followed, N < MOST_FOUND)
+        return there
+
+
+def _tame(equations: Equations, base: Member, x: Array, rng: np.random.Generator) -> tuple[Member, Array]:
+    """Of some random members that with the smallest numbers in its assemblies, from which tracks are the least likely to be lost."""
+    family, N = equations.family, x.shape[1]
+    best, least = (base, x), np.abs(fingerprints(family, base, x)).max()
+    for _ in range(CANDIDATES):
+        member = family.random_member(rng)
+        there = follow(Leg(equations, base, member), x, Care())
+        poses = fingerprints(family, member, there.x)
+        size = np.abs(poses).max() if there.arrived.all() and len(distinct(poses)) == N else np.inf
+        if size < least:
+            best, least = (member, there.x), size
+    return best

@@ -20,7 +20,7 @@ from mechgraph.modes.family import Family, Member
 from mechgraph.modes.monodromy import StartSet
 from mechgraph.writing import whole_file
 
-VERSION = 1
+VERSION = 3
 """Of the files and of what start sets mean."""
 
 
@@ -54,7 +54,8 @@ def kept(family: Family) -> StartSet | None:
         with (folder() / f"start-{key(family)}.npz").open("rb") as handle, np.load(handle, allow_pickle=False) as f:
             mixing = f["mixing"] if f["mixing"].size else None
             loops, lost, followed = f["counts"].tolist()
-            found = StartSet(Member(f["markers"], f["drive"]), f["x"], mixing, loops, lost, followed, True)
+            chance = float(f["chance"])
+            found = StartSet(Member(f["markers"], f["drive"]), f["x"], mixing, loops, chance, lost, followed, True)
     except (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile, TypeError):
         return None
     return found if found.fits(family) else None
@@ -71,6 +72,7 @@ def keep(family: Family, start: StartSet) -> None:
                 drive=start.member.drive,
                 x=start.x,
                 mixing=np.zeros((0, 0)) if start.mixing is None else start.mixing,
+                chance=np.array(start.chance),
                 counts=np.array([start.loops, start.lost, start.followed]),
             )
     except (OSError, RuntimeError, MechgraphError):

@@ -163,16 +163,18 @@ def _arc(k: int) -> Callable[[Array], tuple[Array, Array]]:
 
 def _account(family: Family, at: Member, known: Ends, run: _Run, lost_before: int) -> None:
     """Put the ends of a run to those that are known."""
-    x, singular = run.x.copy(), run.singular.copy()
+    x, singular, infinite = run.x.copy(), run.singular.copy(), int(run.infinite.sum())
     if singular.any():
         some = np.flatnonzero(singular)
         x[:, some], closed = _settled(family, at, x[:, some])
         singular[some[~closed]] = False
+        # a track that is bounded near its end has an assembly there: this one is not
+        infinite += int((~closed).sum())
     good = np.flatnonzero(run.regular | singular)
     poses = fingerprints(family, at, x[:, good])
     new = distinct(poses, known.poses if known.runs else None)
     own = distinct(poses[:, run.regular[good]])
-    lost = len(run.regular) - len(good) - int(run.infinite.sum()) + lost_before
+    lost = len(run.regular) - len(good) - infinite + lost_before
     met = int(run.regular.sum()) - len(own)
     best = not known.runs or lost + met <= known.lost + known.met
     known.x = np.concatenate([known.x, x[:, good[new]]], axis=1)
@@ -180,8 +182,9 @@ def _account(family: Family, at: Member, known: Ends, run: _Run, lost_before: in
     known.singular = np.concatenate([known.singular, singular[good[new]]])
     known.runs += 1
     if best:
-        known.lost, known.met, known.infinite = lost, met, int(run.infinite.sum())
-    known.clean = lost == 0 and met == 0
+        known.lost, known.met, known.infinite = lost, met, infinite
+    # all are accounted for on one run without a loss, or by different ends of several
+    known.clean = (lost == 0 and met == 0) or known.x.shape[1] >= len(run.regular) + lost_before
 
 
 def _settled(family: Family, at: Member, x: Array) -> tuple[Array, Array]:

@@ -1,0 +1,364 @@
+"""Branches of a mechanism over the range of one driver: what a user calls, and what comes back."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from mechgraph.closure.configuration import Configuration
+from mechgraph.document import Document, Paragraph, Shown, Table
+from mechgraph.errors import DeclarationError, counted
+from mechgraph.model.mechanism import Mechanism, check_mechanism
+from mechgraph.modes.assemblies import Finder, weakest
+from mechgraph.modes.family import Array
+from mechgraph.modes.question import Question
+from mechgraph.modes.tracing import Map, Tracer
+from mechgraph.quantities import is_numeric, wrong
+
+SAMPLES_A_TURN = 24
+"""Positions of the driver at which all assemblies are found."""
+POINTS = 720
+"""Positions in all."""
+STROKE = 2.0
+"""Range of a driven slide to both sides of the start, over L, where none is given."""
+
+
+@dataclass(frozen=True)
+class Branch:
+    """An assembly followed as far as the driver goes: driver ``values (n,)``, rising, and ``coordinates (n, F)`` of all freedoms.
+
+    ``interval`` is that of the driver, up to the folds at its ends; ``turns`` of the driver bring it back where it is a ``full_turn``.
+    """
+
+    values: Array
+    coordinates: Array
+    interval: tuple[float, float]
+    full_turn: bool
+    turns: int
+    circuit: int
+    prints: Array = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Where two branches meet and the driver has to turn back: a limit from above (``sense`` 1) or from below (-1).
+
+    ``fastest`` is the freedom that moves most there, while the driver stands still.
+    """
+
+    value: float
+    sense: int
+    branches: tuple[int, int]
+    fastest: str
+
+
+@dataclass(frozen=True)
+class Bifurcation:
+    """Where branches cross: all that meet there."""
+
+    value: float
+    branches: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Defects:
+    """Why positions cannot be met one after the other: the branch and circuit of each, and whether these, or their order, are wrong."""
+
+    branches: tuple[int, ...]
+    circuits: tuple[int, ...]
+    branch: bool
+    circuit: bool
+    order: bool
+
+
+@dataclass(frozen=True, repr=False)
+class Branches(Shown):
+    """All branches of a mechanism over the range of one driver.
+
+    Attributes
+    ----------
+    mechanism, driver : what moves, and by what.
+    branches, folds, bifurcations : see there; folds by driver value.
+    circuits : numbers of the branches of each: what can be run through without taking the mechanism apart.
+    completeness : of the assemblies at the samples, see ``Assemblies``.
+    resolution : distance of the samples; a branch that begins and ends between two of them is not seen.
+    open_ends : ends of branches that are neither a fold nor another sample's assembly; 0 where the map is whole.
+    """
+
+    mechanism: Mechanism
+    driver: str
+    branches: tuple[Branch, ...]
+    folds: tuple[Fold, ...]
+    bifurcations: tuple[Bifurcation, ...]
+    circuits: tuple[tuple[int, ...], ...]
+    completeness: str
+    resolution: float
+    open_ends: int
+
+    def __len__(self) -> int:
+        return len(self.branches)
+
+    @property
+    def intervals(self) -> tuple[tuple[float, float], ...]:
+        """Driver interval of every branch."""
+        return tuple(b.interval for b in self.branches)
+
+    @property
+    def full_turn(self) -> tuple[bool, ...]:
+        """Whether the driver turns right round on every branch."""
+        return tuple(b.full_turn for b in self.branches)
+
+    @property
+    def ranges(self) -> tuple[dict[str, tuple[float, float]], ...]:
+        """Smallest and largest value of every freedom on every branch."""
+        names = self.mechanism.freedom_names()
+        return tuple(
+            {name: (float(q.min()), float(q.max())) for name, q in zip(names, b.coordinates.T, strict=True)}
+            for b in self.branches
+        )
+
+    def defects(self, positions: Iterable[Mechanism | Mapping[str, float]]) -> Defects:
+        """Branch, circuit and order defects of positions, given as assemblies or as coordinates of all freedoms, in their order."""
+        m, places = self.mechanism, []
+        for position in positions:
+            start = position.start if isinstance(position, Mechanism) else position
+            places.append(self._place(m.replace(start={m.full_name(k): float(v) for k, v in start.items()})))
+        numbers = tuple(number for number, _ in places)
+        circuits = tuple(self.branches[number].circuit for number in numbers)
+        return Defects(numbers, circuits, len(set(numbers)) > 1, len(set(circuits)) > 1, self._disordered(places))
+
+    def _place(self, m: Mechanism) -> tuple[int, float]:
+        """The branch of a position, and the driver value there."""
+        question = Question(m, {self.driver: m.start.get(self.driver, 0.0)})
+        mine = question.family.prints(question.start)
+        value = float(question.start.x[question.family.rows[0], 0]) * float(question.unit[0])
+        best = [
+            (
+                float(np.abs(b.prints - mine).max(axis=0).min()),
+                i,
+                float(b.values[np.abs(b.prints - mine).max(axis=0).argmin()]),
+            )
+            for i, b in enumerate(self.branches)
+        ]
+        _, number, near = min(best)
+        turns = m.turns(self.driver)
+        return number, value + (2 * np.pi * round((near - value) / (2 * np.pi)) if turns else 0.0)
+
+    def _disordered(self, places: list[tuple[int, float]]) -> bool:
+        """Whether the driver would have to turn back between positions of one branch."""
+        if len({number for number, _ in places}) != 1:
+            return False
+        branch, steps = self.branches[places[0][0]], np.diff([value for _, value in places])
+        if not branch.full_turn:
+            return bool((steps > 0).any() and (steps < 0).any())
+        period = 2 * np.pi * branch.turns
+        return bool(min(np.mod(steps, period).sum(), np.mod(-steps, period).sum()) >= period)
+
+    def plot(self, output: str | None = None, *, ax: Any = None, current: int | None = None) -> Any:
+        """A picture: ``output`` (a freedom) over the driver, all branches, folds marked, branch ``current`` highlighted; the axes."""
+        return importlib.import_module("mechgraph.show.modes").draw_branches(self, output, ax=ax, current=current)
+
+    def document(self) -> Document:
+        """Branches and folds as tables."""
+        rows = tuple(
+            (str(i), str(b.circuit), f"{b.interval[0]:.6g} .. {b.interval[1]:.6g}", _turns(b))
+            for i, b in enumerate(self.branches)
+        )
+        folds = tuple(
+            (f"{f.value:.9g}", "upper" if f.sense > 0 else "lower", f"{f.branches[0]}, {f.branches[1]}", f.fastest)
+            for f in self.folds
+        )
+        words = [
+            f"Completeness of the assemblies at the samples: {self.completeness}; samples every {self.resolution:.3g}. A branch that "
+            "begins and ends between two samples is not seen."
+        ]
+        if self.open_ends:
+            words.append(f"{counted(self.open_ends, 'end')} of branches could not be told: the map is not whole.")
+        words += [
+            f"Branches {', '.join(map(str, b.branches))} cross at {self.driver} = {b.value:.9g}."
+            for b in self.bifurcations
+        ]
+        title = f"{self.mechanism.name}: {counted(len(self), 'branch')} over {self.driver}".replace(
+            "branchs", "branches"
+        )
+        return Document(
+            title,
+            (
+                Table(("branch", "circuit", f"interval of {self.driver}", "full turn"), rows),
+                *((Table(("fold", "limit", "branches", "moves most"), folds),) if folds else ()),
+                Paragraph(" ".join(words)),
+            ),
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything but the curves as plain data."""
+        return {
+            "mechanism": self.mechanism.name,
+            "driver": self.driver,
+            "completeness": self.completeness,
+            "resolution": self.resolution,
+            "open_ends": self.open_ends,
+            "branches": [
+                {
+                    "interval": list(b.interval),
+                    "full_turn": b.full_turn,
+                    "turns": b.turns,
+                    "circuit": b.circuit,
+                    "ranges": {k: list(v) for k, v in r.items()},
+                }
+                for b, r in zip(self.branches, self.ranges, strict=True)
+            ],
+            "folds": [{**vars(f), "branches": list(f.branches)} for f in self.folds],
+            "bifurcations": [{"value": f.value, "branches": list(f.branches)} for f in self.bifurcations],
+            "circuits": [list(c) for c in self.circuits],
+        }
+
+
+def _turns(b: Branch) -> str:
+    if not b.full_turn:
+        return "no"
+    return "yes" if b.turns == 1 else f"yes, back after {b.turns} turns"
+
+
+def branches(
+    m: Mechanism,
+    driver: str,
+    *,
+    over: tuple[float, float] | None = None,
+    samples: int = SAMPLES_A_TURN,
+    points: int = POINTS,
+    seed: int = 0,
+    cache: bool = True,
+    progress: Callable[[str], None] | None = None,
+) -> Branches:
+    """Every assembly followed over the whole range of a driver: branches, folds, bifurcations, circuits, full turns, ranges.
+
+    At ``samples`` values of the driver all assemblies are found (see ``assemblies``); from each, the path follower of ``solve`` goes to
+    both neighbours, so that a fold is where ``solve`` ends.
+
+    Parameters
+    ----------
+    driver : a freedom; other declared drives stay at their start.
+    over : range of the driver; left out, a whole turn, or twice the mean radius of the mechanism to both sides for a slide.
+    samples, points : values of the driver at which assemblies are found, and in all.
+    seed, cache, progress : as for ``assemblies``.
+
+    Raises
+    ------
+    DeclarationError, AssemblyError, IndeterminateError
+    """
+    check_mechanism(m, "branches")
+    why = m.freedom_fault(driver, single=True)
+    faults = [f"driver {driver!r}: {why}"] if why else []
+    for name, number, least in (("samples", samples, 3), ("points", points, 3)):
+        if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < least:
+            faults.append(wrong(number, name, f"a whole number, {least} or more"))
+    if over is not None and not (is_numeric(over, (2,)) and over[0] < over[1]):
+        faults.append(wrong(over, "over", "the smallest and the largest value"))
+    if faults:
+        raise DeclarationError(f"branches of {m.name!r}", faults)
+    return _Mapper(m, m.full_name(driver), over, samples, points).mapped(seed, cache, progress)
+
+
+class _Mapper:
+    """Samples of the driver, and what comes of them."""
+
+    def __init__(self, m: Mechanism, driver: str, over: tuple[float, float] | None, samples: int, points: int) -> None:
+        probe = Question(m, _at(m, driver, [0.0]))
+        begin = float(probe.start.x[probe.family.rows[probe.names.index(driver)], 0])
+        L = probe.system.par.L
+        self.closed = over is None and m.turns(driver)
+        low, high = over or (
+            (begin, begin + 2 * np.pi) if self.closed else (L * (begin - STROKE), L * (begin + STROKE))
+        )
+        self.samples = np.linspace(low, high, samples + 1 - self.closed, endpoint=not self.closed)
+        self.between = max(1, round(points / samples))
+        self.m, self.driver = m, driver
+
+    def mapped(self, seed: int, cache: bool, progress: Callable[[str], None] | None) -> Branches:
+        """The map."""
+        q = Question(self.m, _at(self.m, self.driver, self.samples.tolist()))
+        finder = Finder(q, seed, cache, progress)
+        solutions = finder.solutions()
+        states = [found.x for found in solutions]
+        if progress is not None:
+            progress(f"following {sum(x.shape[1] for x in states)} assemblies")
+        place = q.names.index(self.driver)
+        self.q, self.unit = q, float(q.unit[place])
+        tracer = Tracer(q, finder.family, q.drive[place], states, self.between, self.closed, place)
+        self.found, self.states, self.family = Map(tracer.pieces(), states), states, finder.family
+        circuits = sorted(sorted(c) for c in self.found.circuits())
+        number = {branch: i for i, c in enumerate(circuits) for branch in c}
+        return Branches(
+            self.m,
+            self.driver,
+            tuple(self._branch(i, number[i]) for i in range(len(self.found.chains))),
+            tuple(sorted((self._fold(a, b) for a, b in self.found.folds), key=lambda f: (f.value, f.branches))),
+            tuple(self._bifurcation(value, pieces) for value, pieces in self.found.crossings),
+            tuple(tuple(c) for c in circuits),
+            weakest(found.word for found in solutions),
+            float(self.samples[1] - self.samples[0]),
+            self.found.open,
+        )
+
+    def _branch(self, i: int, circuit: int) -> Branch:
+        """The states of a branch, one after the other, with the driver rising."""
+        found, chain = self.found, self.found.chains[i]
+        step, cyclic = self.samples[1] - self.samples[0], self.found.cyclic(i)
+        first = found.piece.get((*chain[0], -1))
+        values, states = [], []
+        if first is not None and first.arrives < 0:
+            values.append(self.unit * first.values[::-1])
+            states.append(first.x[:, ::-1])
+        for k, node in enumerate(chain):
+            begin = self.samples[chain[0][0]] + k * step
+            values.append(np.array([begin]))
+            states.append(self.states[node[0]][:, [node[1]]])
+            piece = found.piece.get((*node, 1))
+            if piece is not None:
+                ahead = self.unit * piece.values - self.samples[node[0]] + begin
+                # where it arrives the next assembly stands already
+                stop = len(ahead) - (piece.arrives >= 0 and (k + 1 < len(chain)))
+                values.append(ahead[:stop])
+                states.append(piece.x[:, :stop])
+        x, along = np.concatenate(states, axis=1), np.concatenate(values)
+        s = self.q.system
+        q = s.coordinates_of(x, s.start_coordinates(self.m.start)).T
+        turning = (s.single_rows >= 0) & ~s.is_length
+        q[:, turning] = np.unwrap(q[:, turning], axis=0)
+        prints = self.family.prints(Configuration(s, x))
+        turns = round(len(chain) / len(self.samples)) if cyclic else 0
+        if self.closed and not cyclic:
+            # whole turns of the driver such that the middle of the interval is nearest to the start
+            shift = 2 * np.pi * np.round((0.5 * (along[0] + along[-1]) - self.samples[0]) / (2 * np.pi))
+            along = along - shift
+            q[:, self.q.columns[self.q.names.index(self.driver)]] -= shift
+        return Branch(along, q, (float(along[0]), float(along[-1])), cyclic, turns, circuit, prints)
+
+    def _fold(self, a: Any, b: Any) -> Fold:
+        s = self.q.system
+        gone = (
+            np.abs(s.difference(a.x[:, -1:], b.x[:, -1:]))[:, 0]
+            if a.x.shape[1] and b.x.shape[1]
+            else np.zeros(s.n_freedoms)
+        )
+        value = 0.5 * (a.end + b.end) * self.unit
+        if self.closed:
+            value -= 2 * np.pi * np.round((value - self.samples[0]) / (2 * np.pi))
+        fastest = self.m.freedom_names()[int(np.argmax(gone))]
+        one, other = sorted((self.found.branch(a), self.found.branch(b)))
+        return Fold(value, a.sense, (one, other), fastest)
+
+    def _bifurcation(self, value: float, pieces: list[Any]) -> Bifurcation:
+        return Bifurcation(value * self.unit, tuple(sorted({self.found.branch(p) for p in pieces})))
+
+
+def _at(m: Mechanism, driver: str, values: list[float]) -> dict[str, Any]:
+    """Values of all drives: the driver's own, the others at their start."""
+    names = [m.full_name(d.freedom) for d in m.drives]
+    others = {name: m.start.get(name, 0.0) for name in names if name != driver} if driver in names else {}
+    return {driver: values, **others}

@@ -1,0 +1,98 @@
+"""Branches over a driver: folds, circuits and full turns of four-bars by their closed forms, and as solve meets them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mechanisms import linked_four_bar
+
+import mechgraph as mg
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("kept")
+
+
+@pytest.fixture(autouse=True)
+def folder(shared: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Start sets are kept for the tests of this file alone."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(shared))
+
+
+def angle_at(a: float, d: float, reach: float) -> float:
+    """Crank angle at which its tip is ``reach`` away from the other fixed pivot."""
+    return float(np.arccos((a * a + d * d - reach * reach) / (2 * a * d)))
+
+
+def test_the_crank_of_a_crank_rocker_turns_right_round_on_two_circuits() -> None:
+    b = mg.branches(linked_four_bar(1.0, 2.5, 2.0, 3.0, 0.5), "O0", samples=12, points=120)
+    assert b.full_turn == (True, True)
+    assert b.circuits == ((0,), (1,))
+    assert b.folds == ()
+    assert b.open_ends == 0
+    assert all(np.isclose(high - low, 2 * np.pi) for low, high in b.intervals)
+    # the rocker swings between the positions in which crank and coupler are in line
+    a, coupler, c, d = 1.0, 2.5, 2.0, 3.0
+    swing = np.arccos((c * c + d * d - (coupler + a) ** 2) / (2 * c * d)) - np.arccos(
+        (c * c + d * d - (coupler - a) ** 2) / (2 * c * d)
+    )
+    for ranges in b.ranges:
+        low, high = ranges["O3.Rz"]
+        assert np.isclose(high - low, swing, atol=2e-3)  # of 120 positions the extreme ones are not met exactly
+
+
+def test_a_double_rocker_turns_back_where_coupler_and_follower_are_in_line_and_is_one_circuit() -> None:
+    a, coupler, c, d = 2.0, 1.5, 2.5, 3.0
+    m = linked_four_bar(a, coupler, c, d, 0.9)
+    b = mg.branches(m, "O0", samples=12, points=120)
+    upper = angle_at(a, d, coupler + c)
+    assert b.full_turn == (False, False)
+    assert b.circuits == ((0, 1),)
+    folds = np.sort([np.angle(np.exp(1j * f.value)) for f in b.folds])
+    assert np.allclose(folds, [-upper, upper], rtol=0, atol=1e-8)
+    assert sorted(f.sense for f in b.folds) == [-1, 1]
+    with pytest.raises(mg.ReachError) as caught:
+        mg.kinematics(m, {"O0": np.linspace(0.9, 3.0, 40)})
+    assert abs(caught.value.value["O0.Rz"] - upper) < 1e-8
+
+
+def test_a_parallelogram_has_its_branches_cross_and_all_are_one_circuit() -> None:
+    b = mg.branches(linked_four_bar(1.0, 2.0, 1.0, 2.0, 0.5), "O0", samples=12, points=120)
+    assert len(b.circuits) == 1
+    assert sorted(round(np.cos(x.value), 6) for x in b.bifurcations) == [-1.0, 1.0]
+    assert all(x.branches == (0, 1) for x in b.bifurcations)
+
+
+def test_circuits_are_what_solve_runs_through() -> None:
+    m = mg.load("rssr")
+    b = mg.branches(m, "A", samples=8, points=64)
+    assert b.open_ends == 0
+    for one in b.branches:
+        start = dict(zip(m.freedom_names(), one.coordinates[0].tolist(), strict=True))
+        s = mg.kinematics(m.replace(start=start), {"A": one.values})
+        rocker = m.freedom_names().index("D.Rz")
+        assert np.abs(s["D"].position[:, 0] - one.coordinates[:, rocker]).max() < 1e-8
+
+
+def test_branch_circuit_and_order_defects_are_told() -> None:
+    m = linked_four_bar(1.0, 2.5, 2.0, 3.0, 0.5)
+    b = mg.branches(m, "O0", samples=12, points=120)
+    positions = mg.assemblies(m, {"O0": [0.3, 1.0, 2.0, 4.0]})
+    first = b.defects([positions[0][0]]).branches[0]
+    mine = [next(p for p in at if b.defects([p]).branches == (first,)) for at in positions]
+    other = next(p for p in positions[1] if b.defects([p]).branches != (first,))
+    good = b.defects(mine)
+    assert (good.branch, good.circuit, good.order) == (False, False, False)
+    assert b.defects([mine[0], mine[2], mine[1], mine[3]]).order
+    assert not b.defects([mine[2], mine[3], mine[0], mine[1]]).order
+    wrong = b.defects([mine[0], other])
+    assert (wrong.branch, wrong.circuit) == (True, True)
+
+
+def test_bad_arguments_of_a_map_are_all_named() -> None:
+    with pytest.raises(mg.DeclarationError) as caught:
+        mg.branches(mg.load("four-bar"), "Q", samples=1, points=0, over=(1.0, 0.0))
+    assert len(caught.value.faults) == 4
