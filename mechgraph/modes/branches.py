@@ -21,9 +21,9 @@ from mechgraph.quantities import is_numeric, wrong
 
 SAMPLES_A_TURN = 24
 """Positions of the driver at which all assemblies are found."""
-POINTS = 720
+MAP_POINTS = 720
 """Positions in all."""
-STROKE = 2.0
+SLIDE_STROKE = 2.0
 """Range of a driven slide to both sides of the start, over L, where none is given."""
 
 
@@ -230,7 +230,7 @@ def branches(
     *,
     over: tuple[float, float] | None = None,
     samples: int = SAMPLES_A_TURN,
-    points: int = POINTS,
+    points: int = MAP_POINTS,
     seed: int = 0,
     cache: bool = True,
     progress: Callable[[str], None] | None = None,
@@ -273,7 +273,7 @@ class _Mapper:
         L = probe.system.par.L
         self.closed = over is None and m.turns(driver)
         low, high = over or (
-            (begin, begin + 2 * np.pi) if self.closed else (L * (begin - STROKE), L * (begin + STROKE))
+            (begin, begin + 2 * np.pi) if self.closed else (L * (begin - SLIDE_STROKE), L * (begin + SLIDE_STROKE))
         )
         self.samples = np.linspace(low, high, samples + 1 - self.closed, endpoint=not self.closed)
         self.between = max(1, round(points / samples))

@@ -41,7 +41,7 @@ RATES_KEPT = 4
 """Nodes from whose rates a step is predicted."""
 POLISHED = 1e-12
 """Last Newton step at the end of a track."""
-NOISE = 3e-14
+STEP_NOISE = 3e-14
 """Rounding of a Newton step, against the third power of the largest number in a pose (poses multiply along loops)."""
 MOST_NOISE = 1e-5
 """Rounding with which a track may end."""
@@ -172,7 +172,7 @@ class Linear:
     @property
     def noise(self) -> Array:
         """Rounding ``(T,)`` to be expected of a Newton step."""
-        return np.asarray(NOISE * np.abs(self.here.poses).max(axis=(0, 1, 2)) ** 3)
+        return np.asarray(STEP_NOISE * np.abs(self.here.poses).max(axis=(0, 1, 2)) ** 3)
 
     def newton(self, idle: Array) -> Array:
         """The Newton step ``(F, T)``."""

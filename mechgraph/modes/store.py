@@ -20,7 +20,7 @@ from mechgraph.modes.family import Family, Member
 from mechgraph.modes.monodromy import StartSet
 from mechgraph.writing import whole_file
 
-VERSION = 3
+START_SET_VERSION = 3
 """Of the files and of what start sets mean."""
 
 
@@ -37,7 +37,7 @@ def key(family: Family) -> str:
     s = family.system
     types = [[[f.label, *f.twist] for f in pair.type.freedoms] for pair in s.m.pairs]
     parts: dict[str, Any] = {
-        "version": VERSION,
+        "version": START_SET_VERSION,
         "ends": [s.a.tolist(), s.b.tolist(), s.graph.frame],
         "types": types,
         "driven": family.columns.tolist(),
