@@ -10,6 +10,7 @@ import pytest
 import mechgraph as mg
 from mechgraph.atlas.canonical import least_orders, symmetries
 from mechgraph.atlas.contracted import contracted_graphs
+from mechgraph.show import draw_chains, draw_structure
 
 
 def test_orders_are_those_of_all_symmetries() -> None:
@@ -237,3 +238,28 @@ def test_system_groups_have_mobility_zero() -> None:
         assert sum(g.pairs) - g.links == g.contours == 4
     with pytest.raises(mg.DeclarationError, match="contours = 0"):
         mg.system_groups(0)
+
+
+def test_a_page_of_the_atlas() -> None:
+    """Every chain on axes of its own: as many polygons as links with more than two joints, a circle for each joint."""
+    chains = list(mg.atlas(8))
+    page = draw_chains(chains)
+    assert len(page.axes) == 16
+    for chain, ax in zip(chains, page.axes, strict=True):
+        assert len(ax.patches) == sum(degree > 2 for degree in chain.degrees)
+        assert len(ax.lines) == chain.degrees.count(2)
+        assert len(ax.collections[0].get_offsets()) == len(chain.joints) == 10
+    with pytest.raises(mg.DeclarationError, match="0 chains in 6 columns"):
+        draw_chains([])
+
+
+def test_the_structural_diagram_has_a_colour_for_each_group() -> None:
+    m = mg.load("windows-2")
+    groups = mg.groups(m)
+    ax = draw_structure(m, groups=groups)
+    of_link = {line.get_gid(): line.get_color() for line in ax.lines}
+    tones = [{of_link[f"link {link}"] for link in g.links} for g in groups.groups]
+    assert [len(t) for t in tones] == [1, 1, 1]
+    assert len(set.union(*tones)) == 3
+    ax.figure.draw_without_rendering()
+    assert {"1 c0", "5 c2", "D10: r0, c1"} <= {text.get_text() for text in ax.texts}

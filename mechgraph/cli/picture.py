@@ -53,6 +53,7 @@ KINDS: dict[str, _Picture] = {
     "skeleton": _Picture(lambda s, a: show.draw_skeleton(s, a.position, forces=a.forces, highlight=a.of)),
     "graph": _Picture(lambda m, a: show.draw_graph(m), moves=False),
     "structure": _Picture(lambda m, a: show.draw_structure(m), moves=False),
+    "groups": _Picture(lambda m, a: show.draw_structure(m, groups=mg.groups(m)), moves=False),
     "equations": _Picture(lambda m, a: show.draw_sparsity(mg.formulate(m)), moves=False),
     "efforts": _Picture(lambda s, a: show.effort_curve(s, a.of or None, over=a.over), forces=True),
     "reaction": _Picture(

@@ -1,6 +1,7 @@
 """Pictures of mechanisms, solutions, formulations and studies; matplotlib (the ``plot`` extra) is imported only when one is drawn."""
 
 from mechgraph.show.animation import animate, save_picture
+from mechgraph.show.chains import draw_chains
 from mechgraph.show.curves import effort_curve, margin_curve, reaction_curve
 from mechgraph.show.diagrams import draw_graph, draw_sparsity, draw_structure
 from mechgraph.show.forces import polar_force, reaction_ranges
@@ -10,6 +11,7 @@ from mechgraph.show.studies import study_bands, study_histogram, study_tornado
 
 __all__ = [
     "animate",
+    "draw_chains",
     "draw_graph",
     "draw_skeleton",
     "draw_sparsity",

@@ -14,6 +14,7 @@ from mechgraph.equations.formulation import Formulation
 from mechgraph.model.mechanism import Mechanism, check_mechanism
 from mechgraph.show.canvas import FAINT, HATCH, INK, MUTED, PALETTE, bare, colours, new_axes, said
 from mechgraph.show.painting import FlatPainter, inside
+from mechgraph.structure.decomposition import Decomposition
 from mechgraph.topology.linkgraph import link_graph
 
 STRAND = 0.035
@@ -86,10 +87,11 @@ def _edges(m: Mechanism, at: dict[str, Array]) -> Iterator[tuple[str, Array]]:
         yield pair.name, (1 - u) * p + u * q + 4 * u * (1 - u) * BULGE * side * across
 
 
-def draw_structure(m: Mechanism, *, ax: Any = None) -> Any:
-    """Draw the structural diagram: links as lines between two pairs and as polygons between more, pairs as circles. Returns the axes.
+def draw_structure(m: Mechanism, *, groups: Decomposition | None = None, ax: Any = None) -> Any:
+    """Draw the structural diagram: links as lines between two pairs and as polygons between more, pairs as crossed circles.
 
-    The frame is hatched, a dotted line ties the pairs of a coupling. Nothing is to scale: it is the graph alone.
+    Returns the axes. The frame is hatched, a dotted line ties the pairs of a coupling. Nothing is to scale: it is the graph alone. With
+    ``groups`` (those of ``mg.groups``) the links are numbered and have a colour for each driver link and group, which the legend names.
     """
     from mechgraph.show.layout import places
 
@@ -97,20 +99,28 @@ def draw_structure(m: Mechanism, *, ax: Any = None) -> Any:
     of_link = {name: [p.name for p in m.pairs if name in (p.a, p.b)] for name in m.link_names()}
     at = places((p.name for p in m.pairs), chain.from_iterable(combinations(names, 2) for names in of_link.values()))
     canvas = _Canvas(ax, np.array(list(at.values())))
-    colour = colours(m)
+    colour, legend = colours(m), list[tuple[str, str]]()
+    if groups is not None:
+        legend = [(f"{g.name}: {', '.join(g.links)}", PALETTE[i % len(PALETTE)]) for i, g in enumerate(groups.groups)]
+        colour |= {link: legend[i][1] for i, g in enumerate(groups.groups) for link in g.links}
+        colour |= dict.fromkeys(groups.free, FAINT)
     for link, names in of_link.items():
         corners = np.array([at[name] for name in names]).reshape(-1, 2)
         if not len(corners):
             continue
         middle = _draw_link(canvas, link, corners, colour[link], link == m.frame)
-        canvas.name(link, middle, colour[link] if link != m.frame else INK)
+        told = link if groups is None or link.isdecimal() else f"{groups.numbers[link]} {link}"
+        canvas.name(told, middle, colour[link] if link != m.frame else INK)
     for c in m.couplings:
         canvas.coupling(c.name, [at[m.pairs[m.freedom(q)[0]].name] for q in c.freedoms])
     for pair in m.pairs:
         x, y = at[pair.name]
         canvas.ax.scatter(x, y, s=130, facecolor="white", edgecolor=INK, linewidth=1.5, zorder=4)
+        canvas.ax.scatter(x, y, s=60, marker="x", color=INK, linewidth=1.1, zorder=5)
         canvas.name(f"{pair.name} ({pair.type.symbol})", at[pair.name], INK, weight="bold")
-    canvas.finish([])
+    canvas.finish(
+        [(line, tone) for text, tone in legend for line in wrap(text, LEGEND_LETTERS, subsequent_indent="    ")]
+    )
     return canvas.ax
 
 
