@@ -16,9 +16,7 @@ RATIO = np.sin(np.pi / SLOTS)  # of the crank to the distance: the pin enters al
 CRANK = RATIO * DISTANCE
 ENTRY = np.pi / 2 - np.pi / SLOTS  # crank angle before the line of centres
 Z = (0.0, 0.0, 1.0)
-SLOT = mg.PairType(
-    "PinInSlot", "pin in a slot", freedoms=["Tx", "Rz"], reactions=["Fy@1", "Fz", "Mx", "My"]
-)  # Fy at the pin
+PIN = 0.006  # radius of the pin
 
 
 def links() -> list[mg.Link]:
@@ -35,7 +33,10 @@ def shafts() -> list[mg.Pair]:
 
 def engaged() -> mg.Mechanism:
     """The pin in the slot on the line of centres; the wheel turns against friction while it turns."""
-    pin = mg.Pair("C", SLOT, "wheel", "crank", point=(CRANK, 0, 0), axis=Z, second=(1, 0, 0))
+    slot = mg.Curve.line(
+        point=(DISTANCE, 0, 0), direction=(-1, 0, 0), ends_at=(0.02, 0.08)
+    )  # from the axis of the wheel
+    pin = mg.Pair("C", "Ps", "wheel", "crank", curve=slot, point=(CRANK, 0, 0), radius=PIN)
     friction = mg.Effort("B", FRICTION)  # the wheel turns clockwise, seen along -z
     return mg.Mechanism("geneva, engaged", links(), [*shafts(), pin], drives=["A"], loads=[friction])
 
@@ -64,18 +65,23 @@ def indexing() -> tuple[mg.Solution, np.ndarray]:
     needed = (INERTIA * second + FRICTION) * rate / SPEED
     assert np.allclose(s["A"].effort[part, 0], needed, atol=1e-11)
     arm = DISTANCE * np.sqrt(below)  # from the wheel's axis to the pin
-    assert np.allclose(s["C"].components["Fy"][part], -(INERTIA * second + FRICTION) / arm, atol=1e-8)
-    path = -s["C"].position[part, 0]
+    pin = s.contact("C")
+    assert np.allclose(
+        pin.normal_force[part], -(INERTIA * second + FRICTION) / arm, atol=1e-8
+    )  # negative: on the other wall
+    path = s["C"].position[part, 0]
+    turns = np.rad2deg(b[-1] - b[0])
     print(
-        f"engaged from {-np.rad2deg(ENTRY):.0f} to {np.rad2deg(ENTRY):.0f} deg: the wheel turns by {np.rad2deg(b[-1] - b[0]):.6f} deg, ",
+        f"engaged from {-np.rad2deg(ENTRY):.0f} to {np.rad2deg(ENTRY):.0f} deg: the wheel turns by {turns:.6f} deg, at most ",
         end="",
     )
+    print(f"{rate.max():.3f} rad/s and {second.max():.1f} rad/s2, {np.abs(second[0]):.1f} rad/s2 as the pin enters")
+    force, slides = pin.normal_force[part], np.linalg.norm(pin.sliding[part], axis=1)
     print(
-        f"at most {rate.max():.3f} rad/s and {second.max():.1f} rad/s2, {np.abs(second[0]):.1f} rad/s2 as the pin enters"
+        f"the pin uses {1e3 * np.ptp(path):.2f} mm of the slot, slides at {slides.max():.3f} m/s at most, and presses with ",
+        end="",
     )
-    print(
-        f"the slot is {1e3 * np.ptp(path):.2f} mm long, the pin presses with {np.abs(s['C'].components['Fy']).max():.1f} N at most"
-    )
+    print(f"{force.max():.1f} N on one wall, {-force.min():.1f} N on the other")
     assert np.isclose(b[-1] - b[0], 2 * np.pi / SLOTS, rtol=1e-12)
     assert np.isclose(np.ptp(path), arm.max() - arm.min(), rtol=1e-9)
     assert np.isclose(np.abs(second[0]), SPEED**2 * np.tan(np.pi / SLOTS), rtol=1e-10)

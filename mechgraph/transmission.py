@@ -29,7 +29,7 @@ from mechgraph.model.contact import Contact
 from mechgraph.model.load import Effort
 from mechgraph.quantities import wrong
 from mechgraph.result.numbers import ranges
-from mechgraph.result.places import Places
+from mechgraph.result.places import OK, Places
 from mechgraph.result.solution import Solution
 
 UNMOVED = 1e-12
@@ -108,22 +108,26 @@ def transmission(s: Solution, output: str, driver: str | None = None) -> Transmi
         raise DeclarationError(
             f"transmission of {m.name!r}", [wrong(output, "output", "another freedom than a driver")]
         )
-    light = m.replace(
-        links=[link.replace(mass=0.0, inertia=None) for link in m.links], loads=[Effort(output, 1.0)], response=None
-    )
-    places = Places(s._values)
+    index = _index(_held(s, output, drivers), output, drivers)
+    return Transmission(s, drivers, output, np.where((s.status == OK), index, np.nan))
+
+
+def _held(s: Solution, output: str, drivers: tuple[str, ...]) -> Solution:
+    """The links at rest and without mass at the positions of a solution: the drivers hold a unit effort in the output."""
+    m, places = s.mechanism, Places(s._values)
     known = np.flatnonzero(places.solved)
     if not known.size or not s.prescribed:
         raise DeclarationError(f"transmission of {m.name!r}", ["no position with prescribed motion; solve one first"])
+    light = m.replace(
+        links=[link.replace(mass=0.0, inertia=None) for link in m.links], loads=[Effort(output, 1.0)], response=None
+    )
     # where a position was not solved the motion waits at one that was
     at = known[np.clip(np.searchsorted(known, np.arange(places.solved.size), side="right") - 1, 0, None)]
     motions = {name: of[at].reshape(s.batch) for name, of in zip(places.drivers, places.driver_values, strict=True)}
     actuate = None if set(drivers) == set(s.prescribed) else drivers
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MechgraphWarning)  # a contact transmits either way here
-        still = solve(light, motions, actuate=actuate, redundant="minimum_norm", on_reach="flag")
-    index = _index(still, output, drivers)
-    return Transmission(s, drivers, output, np.where(places.solved.reshape(s.batch), index, np.nan))
+        return solve(light, motions, actuate=actuate, redundant="minimum_norm", on_reach="flag")
 
 
 def _index(s: Solution, output: str, drivers: tuple[str, ...]) -> Array:
