@@ -8,10 +8,9 @@ from strategies import closed_mechanism, with_drives
 import mechgraph as mg
 
 
-def rates_of(m, given, name):
+def rates_of(s, name):
     """Position, rate and acceleration of a freedom, ``(3, n)`` up to the first position that is not solved."""
-    s = mg.kinematics(m, given, on_reach="flag")
-    pair = next(p for p in m.pairs if name in p.freedom_names)
+    pair = next(p for p in s.mechanism.pairs if name in p.freedom_names)
     i, ok = pair.freedom_names.index(name), np.append(s.status == "ok", False)
     r = s[pair.name]
     return np.stack([r.position[:, i], r.velocity[:, i], r.acceleration[:, i]])[:, : int(np.argmin(ok))]
@@ -37,18 +36,18 @@ def at_a_dead_point(seed):
     idle = {name for found in mg.check(m).passive for name in found.freedoms}
     way = np.linspace(0.0, rng.choice([-2.5, 2.5]), 51)
     try:
-        rates_of(m, moved(way), leader)
+        along = mg.kinematics(m, moved(way), on_reach="flag")
     except mg.MechgraphError:
         return None
     for p in m.pairs:
         for name, able in zip(p.freedom_names, p.type.drivable, strict=True):
             if not able or name in drives or name in idle:
                 continue
-            _, rate, _ = rates_of(m, moved(way), name)
+            _, rate, _ = rates_of(along, name)
             turns = np.flatnonzero(rate[:-2] * rate[1:-1] < 0)
             at = way[turns[0]] if len(turns) else np.nan
             for _ in range(12 * len(turns[:1])):
-                found = rates_of(m, moved([at]), name)
+                found = rates_of(mg.kinematics(m, moved([at]), on_reach="flag"), name)
                 if not found.size or abs(found[1, 0]) < 1e-13:
                     break
                 at = at - float(np.clip(found[1, 0] / found[2, 0], -0.05, 0.05))
@@ -68,7 +67,7 @@ def test_started_next_to_a_dead_point(seed: int) -> None:
     others = dict.fromkeys((name for name in drives if name != leader), 0.0)
     away = np.sqrt(2 * before / abs(curvature))
     for _ in range(3):  # the next term counts where that is not near
-        near = mg.assemble(m, {leader: at - np.sign(at) * away, **others})
+        near = mg.assemble(m, {leader: at - np.copysign(away, at), **others})
         away *= np.sqrt(before / abs(near.start[turned] - end))
     driven, begin = near.replace(drives=[turned, *others]), near.start[turned]
     inwards = np.sign(begin - end)
