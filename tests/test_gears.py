@@ -401,3 +401,26 @@ def test_gears_roll_and_worms_slide():
     columns = s.columns(["contacts"])
     np.testing.assert_allclose(columns["g force"], np.linalg.norm(c.force, axis=-1))
     np.testing.assert_allclose(columns["g sliding speed"], 2.0 * 0.02 / np.cos(lead), rtol=1e-12)
+
+
+def test_a_gear_has_one_module():
+    """A ring of 61 teeth about sun 24 and planet 18: each pair of gears would fit with a module of its own, the planet with neither."""
+
+    def train(ring, **more):
+        r = 0.002 * (24 + 18) / 2
+        pairs = [
+            mg.Pair("S", "R", "frame", "sun", point=(0, 0, 0), axis=Z),
+            mg.Pair("C", "R", "frame", "arm", point=(0, 0, 0), axis=Z),
+            mg.Pair("P", "R", "arm", "planet", point=(r, 0, 0), axis=Z),
+        ]
+        inner = mg.SpurGears("inner", "S", "P", teeth=(24, 18), **more)
+        outer = mg.SpurGears(
+            "outer", "C", "P", teeth=(ring, 18), internal=True, **({"module": 0.042 / 21.5} if more else {})
+        )
+        return mg.Mechanism("train", pairs=pairs, couplings=[inner, outer], drives=["S"])
+
+    assert train(60).couplings
+    said = "the 18 teeth on 'P' would have the module 0.002 in one and 0.001953488 in the other"
+    with pytest.raises(mg.DeclarationError, match=said):
+        train(61)
+    assert train(61, module=0.002).couplings  # two rims, as is said

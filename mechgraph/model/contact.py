@@ -129,7 +129,7 @@ class Contact(BaseCoupling):
         if any(not pair.has_geometry or pair.faults() for pair in m.pairs):
             return []
         placed = self._axes(m, steps)
-        wrong = [placed] if isinstance(placed, str) else self.misfits(placed[0], _fitting(m))
+        wrong = [placed] if isinstance(placed, str) else self.misfits(placed[0], fitting_of(m))
         return [where + fault for fault in wrong]
 
     def _way(self, m: Any) -> tuple[Step, ...] | str:
@@ -170,7 +170,7 @@ class Contact(BaseCoupling):
         between them, seen along that of gear a; or what is wrong with them.
         """
         pairs: list[Pair] = [m.pairs[step.pair] for step in steps]
-        fitting, senses = _fitting(m), []
+        fitting, senses = fitting_of(m), []
         p, z = _line(_marker(pairs[0], steps[0], behind=True))
         for pair, step in zip(pairs[1:-1], steps[1:-1], strict=True):
             q, w = _line(_marker(pair, step, behind=False))
@@ -227,7 +227,8 @@ class Contact(BaseCoupling):
         return self.in_units((length, 1.0, 1.0))
 
 
-def _fitting(m: Any) -> float:
+def fitting_of(m: Any) -> float:
+    """Part of a length, or angle, by which gears may miss their place in a mechanism."""
     return max(FITTING, 2.0 * (m.tol or 0.0))
 
 

@@ -5,13 +5,14 @@ Source: Litvin and Fuentes, Gear Geometry and Applied Theory, 2004, chapters 10 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, cross
-from mechgraph.model.contact import Axes, Contact, Lines, teeth_lines, unit
+from mechgraph.model.contact import Axes, Contact, Lines, fitting_of, teeth_lines, unit
 from mechgraph.model.coupling import BaseCoupling, Coupling
 from mechgraph.model.field_format import FLAG, NUMBER, POSITIVE, TWO_POSITIVE, TWO_WHOLE
 from mechgraph.quantities import wrong
@@ -75,6 +76,35 @@ class SpurGears(Contact):
             ]
         return []
 
+    def faults(self, m: Any) -> list[str]:
+        """See ``Contact``; also gears whose teeth would have two modules, because the distances of the axes ask for it."""
+        return super().faults(m) or list(self._shared(m))
+
+    def _shared(self, m: Any) -> Iterator[str]:
+        place = next(i for i, c in enumerate(m.couplings) if c is self)
+        for other in m.couplings[place + 1 :]:
+            if not isinstance(other, SpurGears) or (self.module and other.module) or Contact.faults(other, m):
+                continue
+            mine, yours = self._module(m), other._module(m)
+            for q, teeth in zip((self.a, self.b), self.teeth, strict=True):
+                ends = zip((other.a, other.b), other.teeth, strict=True)
+                if (m.full_name(q), teeth) in [(m.full_name(p), n) for p, n in ends] and not _near(mine, yours, m):
+                    yield (
+                        f"couplings {self.name!r} and {other.name!r}: the {teeth:g} teeth on {q!r} would have the module {mine:.7g} in one "
+                        f"and {yours:.7g} in the other, as the distances of the axes ask for; change the teeth or the places, or give "
+                        "module= in both where the gear has two rims"
+                    )
+
+    def _module(self, m: Any) -> float:
+        """The normal module, that which the distance of the axes asks for where none is given."""
+        if self.module is not None:
+            return float(self.module)
+        steps = self._way(m)
+        assert not isinstance(steps, str)
+        placed = self._axes(m, steps)
+        assert not isinstance(placed, str)
+        return float(2 * np.linalg.norm(placed[0].across) * np.cos(self.helix_angle) / self._sum)
+
     def lines(self, axes: Axes) -> Lines:
         """See ``Contact``."""
         across = axes.across
@@ -87,6 +117,10 @@ class SpurGears(Contact):
         t = cross(axes.za, unit(out - axes.za * (out * axes.za).sum(axis=0)))
         trace = np.cos(self.helix_angle) * axes.za + np.sin(self.helix_angle) * t
         return teeth_lines(P, away, trace, self.pressure_angle)
+
+
+def _near(one: float, other: float, m: Any) -> bool:
+    return abs(one - other) <= fitting_of(m) * max(one, other)
 
 
 @dataclass(frozen=True)
