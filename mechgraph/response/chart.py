@@ -32,7 +32,7 @@ LAST_STEP = 1e-13
 LOST = 1.0
 """Correction above which closing is given up: the step was too long."""
 UNMOVED_BY_SPIN = 1e-9
-"""Rate of a freedom, or twist of a link, in a unit passive motion below which it has no part in it."""
+"""Rate of a freedom in a unit passive motion below which it has no part in it."""
 
 
 class Stopped(Exception):
@@ -60,7 +60,7 @@ class Closed:
 class Chart:
     """Independent freedoms ``free`` beside the ``prescribed`` ones, from the closed state ``x0 (nx,)``.
 
-    Those that are ``moving`` have rates of their own; the others stand for the passive motions ``held``, whose rates follow.
+    Those that are ``moving`` have rates of their own; the others stand for the passive motions ``held`` at that state, whose rates follow.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class Chart:
         self.system, self.x0, self.prescribed = system, x0, prescribed
         here = Configuration(system, x0[:, None])
         null = closure_rank(here, prescribed, engine).motions
-        passive, moving = _apart(here, null, held) if held else (np.zeros(0, dtype=np.intp), _leading(null))
+        passive, moving = _apart(null, held) if held else (np.zeros(0, dtype=np.intp), _leading(null))
         self.free: Index = np.sort(np.append(passive, moving)).astype(np.intp)
         self.moving: Index = np.sort(moving)
         self.held = Held(held, np.flatnonzero(np.isin(self.free, passive))) if held else None
@@ -148,17 +148,14 @@ def _leading(null: Array) -> Index:
     return np.asarray(order[:n], dtype=np.intp)
 
 
-def _apart(here: Configuration, null: Array, held: tuple[PassiveMotion, ...]) -> tuple[Index, Index]:
+def _apart(null: Array, held: tuple[PassiveMotion, ...]) -> tuple[Index, Index]:
     """Freedoms that stand for the passive motions among ``null (F, n)``, and those for the others, which no passive motion moves."""
-    links = sorted({link for motion in held for link in motion.links})
-    twists = np.stack([np.delete(here.link_twists(v[:, None])[..., 0], links, axis=1).ravel() for v in null.T], axis=1)
-    _, sigma, Vt = np.linalg.svd(np.linalg.qr(twists, mode="r"))
-    passive = null @ Vt[int((sigma > UNMOVED_BY_SPIN).sum()) :].T
-    still = np.flatnonzero(np.abs(passive).max(axis=1, initial=0.0) < UNMOVED_BY_SPIN)
-    others = null[still]
+    passive = np.stack([motion.rates / np.linalg.norm(motion.rates) for motion in held], axis=1)
+    still = np.flatnonzero(np.abs(passive).max(axis=1) < UNMOVED_BY_SPIN)
     count = null.shape[1] - len(held)
-    moving = still[_leading(others)[:count]] if count else still[:0]
-    rank = np.linalg.matrix_rank(null[moving]) if count else 0
-    if passive.shape[1] != len(held) or rank < count:
-        raise Stopped("the passive freedoms cannot be told from the others here, so that they cannot be held")
+    moving = still[_leading(null[still])[:count]]
+    if np.linalg.matrix_rank(null[moving]) < count:
+        raise Stopped(
+            "no freedoms that the passive motions leave alone tell where the mechanism stands, so that these cannot be held"
+        )
     return _leading(passive), moving

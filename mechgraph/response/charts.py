@@ -11,9 +11,10 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.passive_motion import PassiveMotion
 from mechgraph.force.applied_loads import kinetic_energy
-from mechgraph.response.chart import Chart, Closed
+from mechgraph.response.chart import Chart, Closed, Stopped
 from mechgraph.response.motion_equations import Loads, Moved, moved
 from mechgraph.response.prescribed import Prescribed
+from mechgraph.structure.mobility import free_motion
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,19 @@ class Task:
 
     def chart(self, x: Array) -> Chart:
         """A chart laid out at a closed state ``x (nx,)``."""
-        return Chart(self.system, x, self.columns, self.engine, self.held)
+        return Chart(self.system, x, self.columns, self.engine, self._held_at(x))
+
+    def _held_at(self, x: Array) -> tuple[PassiveMotion, ...]:
+        """The passive motions that are held, at a closed state."""
+        if not self.held:
+            return ()
+        here = free_motion(self.system, x, self.columns, self.engine).passive
+        found = [next((motion for motion in here if motion.links == held.links), None) for held in self.held]
+        if len({motion.links for motion in self.held}) < len(found):
+            raise Stopped("several passive freedoms of the same links cannot be held; give passive='free'")
+        if None in found:
+            raise Stopped("the passive freedoms are not those of the start here, so that they cannot be held on")
+        return tuple(motion for motion in found if motion is not None)
 
     def prescribed_at(self, t: Array) -> Array:
         """Prescribed positions, velocities, accelerations ``(3, p, T)``, internal units."""

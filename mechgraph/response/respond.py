@@ -143,7 +143,10 @@ def respond(
     task = Task(system, Loads.of(m.loads), prescribed, columns, engine_for(system.n_rows, 1, engine))
     if how.passive == "held":
         task = replace(task, held=free_motion(system, x, columns, task.engine).passive)
-    dq = start_rates(m, task, x, wanted_rates, begin)
+    try:
+        dq = start_rates(m, task, x, wanted_rates, begin)
+    except Stopped as stop:
+        raise ResponseError(f"mechanism {m.name!r}: {stop}") from None
     standing = Stops.of(m, task, limits)
     faults = standing.faults(x)
     if faults:
