@@ -79,6 +79,8 @@ def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exceptio
         miss=misses[first],
         most=np.max(misses, where=np.isfinite(misses), initial=0.0),
     )
+    if outcome.found.left[first]:
+        why = f"is out of reach: {outcome.found.left[first]} comes to the end of its curve or surface. {FLAG}"
     asked = _listed(zip(line.drive.names, wanted, strict=True))
     text = f"mechanism {line.m.name!r}: position {first} ({asked}) {why}"
     if not dead:

@@ -29,6 +29,7 @@ from mechgraph.closure.following import follow
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.passive_motion import PassiveMotion, are_alone
 from mechgraph.closure.passive_rest import unspun
+from mechgraph.closure.ranges import end_at_ranges
 from mechgraph.closure.rates import Rates, Velocities, at_dead_points, disagreement, distance_to_dead_point, rates
 from mechgraph.closure.solver import ClosureSolver, FactoredClosure, closure_solver, engine_for, solver_at_start
 from mechgraph.errors import DeclarationError, IndeterminateError
@@ -240,6 +241,7 @@ class Pipeline:
         if self.passive:
             found = unspun(path, found, self.passive)
             found.interpolate()
+        end_at_ranges(path, found)
         return Outcome(self, starts, batch, variant, found, path)
 
 

@@ -307,3 +307,32 @@ def test_a_frame_that_comes_back_turned_is_refused_where_roll_is_held():
     assert f"turned by {np.rad2deg(found):.6g} degrees" in refused(type="P", curve=curve)
     for symbol in ("C", "Sg"):
         mg.Mechanism("m", None, [mg.Pair("X", symbol, "frame", "body", curve=curve)])
+
+
+@pytest.mark.parametrize("reversed_", [False, True])
+def test_the_end_of_an_open_curve_ends_the_reach_by_name(reversed_):
+    """A slide driven along an arc of 1 rad and radius 2 from its middle: 1 forth and 1 back."""
+    arc = mg.Curve.circle(radius=2.0, angles=(0.0, 1.0))
+    m = mg.Mechanism(
+        "m",
+        None,
+        [
+            mg.Pair("A", "R", "frame", "arm", point=(0, 0, 0), axis=(0, 0, 1)),
+            mg.Pair(
+                "X",
+                "P",
+                "frame",
+                "arm",
+                point=arc.at(np.array(0.5))[0],
+                curve=arc,
+                axis=(1, -1, 0) if reversed_ else None,
+            ),
+        ],
+        ["A"],
+    )
+    with pytest.raises(mg.ReachError, match=r"X\.Ts comes to the end of its curve"):
+        mg.solve(m, {"A": np.linspace(0, 0.7, 8)})
+    s = mg.solve(m, {"A": np.linspace(-0.7, 0.7, 15)}, on_reach="flag")
+    assert s.status.tolist() == ["out of reach"] * 2 + ["ok"] * 11 + ["out of reach"] * 2
+    assert_allclose(np.abs(s["X"].position[2:-2, 0]), 2 * np.abs(np.linspace(-0.5, 0.5, 11)), atol=1e-12)
+    assert np.isnan(s.link("arm").pose[-1]).any()

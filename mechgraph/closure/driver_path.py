@@ -8,8 +8,9 @@ start -> first -> second ...
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -184,6 +185,11 @@ class Positions:
     turns: Index | None = None
     gained: Array | None = None
     spin: Array | None = None
+    left: NDArray[Any] = field(init=False)
+    """The freedom that leaves its range before a position, or an empty text."""
+
+    def __post_init__(self) -> None:
+        self.left = np.full(len(self.status), "", dtype=object)
 
     @property
     def moved(self) -> Mask:

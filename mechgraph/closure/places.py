@@ -173,6 +173,17 @@ class Places:
             out[g.columns] = np.array([not f.turns for f in g.row.freedoms], dtype=bool)[:, None]
         return out
 
+    @sized
+    def limits(self) -> tuple[Index, Array, Array]:
+        """The single freedoms whose coordinates have a range, and least and greatest values."""
+        ranges = np.full((self.n_freedoms, 2), (-np.inf, np.inf))
+        for g in self.groups:
+            ranges[g.columns] = (
+                np.array([end for step in g.row.steps for end in step.ranges])[:, None] if g.row.f else 0.0
+            )
+        columns = np.flatnonzero(np.isfinite(ranges).any(axis=1))
+        return columns, ranges[columns, 0], ranges[columns, 1]
+
     def place_of(self, pair: int) -> tuple[int, int]:
         """Number of the group of a pair, and its place there."""
         number = int(self._types[1][pair])

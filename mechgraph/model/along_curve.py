@@ -56,12 +56,12 @@ class AlongCurve(Factor):
         return self.curve.once(Travel)
 
     @property
-    def range(self) -> tuple[float, float]:
-        """Least and greatest coordinate; infinite where the curve does not end."""
+    def ranges(self) -> tuple[tuple[float, float], ...]:
+        """The ends of an open curve."""
         low, high = ((end - self.home) / self.unit for end in (self.travel.begin, self.travel.end))
         if self.travel.is_closed:
-            return -np.inf, np.inf
-        return (-high, -low) if self.reversed else (low, high)
+            return ((-np.inf, np.inf),)
+        return ((-high, -low) if self.reversed else (low, high),)
 
     @property
     def sideways(self) -> float:

@@ -191,7 +191,7 @@ def _filled(row: PairType, factors: Sequence[AlongCurve]) -> PairType:
     x = evaluation.random_coordinates(out, np.random.default_rng(12345), 1, TRIED_PLACES)
     for step, (_, numbers) in zip(steps, evaluation.places(out), strict=True):
         if isinstance(step, AlongCurve):
-            low, high = (end if np.isfinite(end) else np.copysign(step.travel.length, end) for end in step.range)
+            low, high = (end if np.isfinite(end) else np.copysign(step.travel.length, end) for end in step.ranges[0])
             x[numbers] = np.linspace(low, high, TRIED_PLACES)
     pitch = np.zeros((1, 1))
     frames = evaluation.frames_of(out, pitch, x)

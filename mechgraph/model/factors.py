@@ -39,6 +39,11 @@ class Factor(ABC):
         return False
 
     @property
+    def ranges(self) -> tuple[tuple[float, float], ...]:
+        """Least and greatest value of every coordinate; infinite where it does not end."""
+        return ((-np.inf, np.inf),) * len(self.freedoms)
+
+    @property
     def n_state(self) -> int:
         """Number of state numbers."""
         return 4 if self.holds_rotation else len(self.freedoms)
