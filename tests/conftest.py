@@ -53,6 +53,12 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
     return report
 
 
+@pytest.fixture(scope="session", autouse=True)
+def start_sets(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Start sets of assemblies are kept for these tests alone, not in the folder of the user."""
+    os.environ["MECHGRAPH_CACHE"] = str(tmp_path_factory.mktemp("start_sets"))
+
+
 @pytest.fixture
 def golden(request: pytest.FixtureRequest) -> Callable[[str, str], None]:
     """Compare a text with ``tests/golden/<name>``, or write it where ``--update-golden`` asks."""

@@ -14,21 +14,10 @@ from mechgraph.model.chain import chain_symbols
 from mechgraph.modes import store
 
 
-@pytest.fixture(scope="module")
-def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("kept")
-
-
-@pytest.fixture(autouse=True)
-def folder(shared: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Start sets are kept for the tests of this file alone."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(shared))
-
-
 @pytest.fixture
 def empty(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """No start set is kept."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setenv("MECHGRAPH_CACHE", str(tmp_path))
 
 
 def general(letters: str, seed: int = 3, **more: object) -> mg.Mechanism:

@@ -27,6 +27,7 @@ CALLS = [
     ("loads", "7r", "link3", "--drive", "O1=0:360:30deg@10", "--at", "all"), ("loads", "four-bar", "coupler"),
     ("solve", "7r", "--drive", "O1=0:360:5deg@10", "--over-time"), ("respond", "windows-2", "--for", "1s", "--over-time"),
     ("structure", "windows-2", "--driver", "A1"), ("structure", "bennett"),
+    ("assemblies", "four-bar", "--at", "A=30deg"), ("branches", "four-bar", "--driver", "A"),
     ("respond", "haug-slider-crank", "--for", "100ms", "--rate", "A=6"),
 ]  # fmt: skip
 

@@ -3,6 +3,7 @@
 from mechgraph.cli.determinacy import check
 from mechgraph.cli.formulation import equations
 from mechgraph.cli.library import list_library, save
+from mechgraph.cli.modes import assemblies, branches
 from mechgraph.cli.motion import respond, solve
 from mechgraph.cli.page import report
 from mechgraph.cli.picture import plot
@@ -22,3 +23,5 @@ app.command("save")(save)
 app.command("plot")(plot)
 app.command("loads")(loads)
 app.command("report")(report)
+app.command("assemblies")(assemblies)
+app.command("branches")(branches)

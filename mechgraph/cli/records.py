@@ -11,6 +11,7 @@ from mechgraph.cli.output import write
 from mechgraph.data import VERSION, Json, json_text, object_schema, patch, plain, schema_of
 from mechgraph.equations.symbols import written
 from mechgraph.model.toml import to_data
+from mechgraph.modes.record import AssembliesData, BranchesData
 from mechgraph.report.data import AdviceData, schemas
 from mechgraph.report.rounding import Rounding
 from mechgraph.report.sections import KEYS
@@ -325,6 +326,8 @@ COMMANDS: dict[str, Callable[[Json], Json]] = {
     "loads": _record(LoadsData),
     "plot": _record(PlotData),
     "structure": _record(StructureData),
+    "assemblies": _record(AssembliesData, file=Annotated[str | None, "the picture that was drawn"]),
+    "branches": _record(BranchesData, file=Annotated[str | None, "the picture that was drawn"]),
 }
 """The schema of what every command prints."""
 

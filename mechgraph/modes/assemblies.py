@@ -12,6 +12,7 @@ import numpy as np
 
 from mechgraph.closure.assembly import close_all
 from mechgraph.closure.configuration import Configuration
+from mechgraph.data import plain
 from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, counted
 from mechgraph.force.applied_loads import user_poses
@@ -21,6 +22,7 @@ from mechgraph.modes.certificate import Certificate, certificate
 from mechgraph.modes.family import Array
 from mechgraph.modes.monodromy import Irregular, StartSet, distinct, start_set
 from mechgraph.modes.question import Question
+from mechgraph.modes.record import AssembliesData, ModeData
 from mechgraph.modes.search import searched
 from mechgraph.modes.store import keep, kept
 from mechgraph.modes.targets import Ends, ends
@@ -32,6 +34,8 @@ REAL_SINGULAR, REAL_CLOSED = 1e-3, 1e-9
 """The same at singular ends, which are known to the root of rounding only; closure error of what is real."""
 SINGULAR = 1e-5
 """Smallest singular value of the closure rows, as part of the largest, below which an assembly is no regular point."""
+LARGE_STATE = 10.0
+"""Size of a state that is not real from which on small singular values are a matter of scale."""
 AWAY = 1e-2
 """Step along a motion that the rows leave free, after which a continuum is still closed."""
 GUESSES = 400
@@ -121,28 +125,24 @@ class Assemblies(Shown, Sequence[Mechanism]):
         """A picture of all assemblies side by side; the figure."""
         return importlib.import_module("mechgraph.show.modes").draw_assemblies(self)
 
+    @property
+    def data(self) -> AssembliesData:
+        """Everything but arrays as a record."""
+        modes = zip(self.modes, self.kinds, self.condition.tolist(), self.certificates, strict=True)
+        return AssembliesData(
+            self.mechanism.name,
+            self.at,
+            self.completeness,
+            self.evidence,
+            self.total,
+            self.infinite,
+            len(self.complex),
+            tuple(ModeData(mode.start, kind, condition, sure) for mode, kind, condition, sure in modes),
+        )
+
     def to_dict(self) -> dict[str, Any]:
-        """Everything as plain data."""
-        return {
-            "mechanism": self.mechanism.name,
-            "at": dict(self.at),
-            "completeness": self.completeness,
-            "evidence": list(self.evidence),
-            "total": self.total,
-            "infinite": self.infinite,
-            "complex": len(self.complex),
-            "modes": [
-                {
-                    "start": dict(mode.start),
-                    "kind": kind,
-                    "condition": float(condition) if np.isfinite(condition) else None,
-                    "certificate": None if sure is None else dict(vars(sure)),
-                }
-                for mode, kind, condition, sure in zip(
-                    self.modes, self.kinds, self.condition, self.certificates, strict=True
-                )
-            ],
-        }
+        """The same as plain data."""
+        return plain(self.data)
 
 
 @dataclass(frozen=True, repr=False)
@@ -314,7 +314,8 @@ class Finder:
         J = Configuration(self.question.system, x).J[:, self.family.free].transpose(2, 0, 1)
         sigma = np.linalg.svd(J, compute_uv=False)
         least = len(self.family.free) - self.family.passive.shape[1] - 1
-        return np.asarray(sigma[:, least] < SINGULAR * sigma[:, 0])
+        large = np.abs(x).max(axis=0, initial=0.0) > LARGE_STATE
+        return np.asarray((sigma[:, least] < SINGULAR * sigma[:, 0]) & ~large)
 
     def _of_continuum(self, i: int) -> Array:
         """A real assembly ``(nx, 1)`` of a continuum that tracks met at complex points, the nearest to the start; or none."""

@@ -10,12 +10,14 @@ from typing import Any
 import numpy as np
 
 from mechgraph.closure.configuration import Configuration
+from mechgraph.data import plain
 from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, counted
 from mechgraph.model.mechanism import Mechanism, check_mechanism
 from mechgraph.modes.assemblies import Finder, weakest
 from mechgraph.modes.family import Array
 from mechgraph.modes.question import Question
+from mechgraph.modes.record import BifurcationData, BranchData, BranchesData, FoldData
 from mechgraph.modes.tracing import Map, Tracer
 from mechgraph.quantities import is_numeric, wrong
 
@@ -194,28 +196,27 @@ class Branches(Shown):
             ),
         )
 
+    @property
+    def data(self) -> BranchesData:
+        """Everything but the curves as a record."""
+        return BranchesData(
+            self.mechanism.name,
+            self.driver,
+            self.completeness,
+            self.resolution,
+            self.open_ends,
+            tuple(
+                BranchData(b.interval, b.full_turn, b.turns, b.circuit, ranges)
+                for b, ranges in zip(self.branches, self.ranges, strict=True)
+            ),
+            tuple(FoldData(f.value, f.sense, f.branches, f.fastest) for f in self.folds),
+            tuple(BifurcationData(b.value, b.branches) for b in self.bifurcations),
+            self.circuits,
+        )
+
     def to_dict(self) -> dict[str, Any]:
-        """Everything but the curves as plain data."""
-        return {
-            "mechanism": self.mechanism.name,
-            "driver": self.driver,
-            "completeness": self.completeness,
-            "resolution": self.resolution,
-            "open_ends": self.open_ends,
-            "branches": [
-                {
-                    "interval": list(b.interval),
-                    "full_turn": b.full_turn,
-                    "turns": b.turns,
-                    "circuit": b.circuit,
-                    "ranges": {k: list(v) for k, v in r.items()},
-                }
-                for b, r in zip(self.branches, self.ranges, strict=True)
-            ],
-            "folds": [{**vars(f), "branches": list(f.branches)} for f in self.folds],
-            "bifurcations": [{"value": f.value, "branches": list(f.branches)} for f in self.bifurcations],
-            "circuits": [list(c) for c in self.circuits],
-        }
+        """The same as plain data."""
+        return plain(self.data)
 
 
 def _turns(b: Branch) -> str:

@@ -1,7 +1,7 @@
 """Start sets kept in a folder of the user, one file for each class of mechanisms; a file is written whole or not at all.
 
-The folder is ``mechgraph`` in that of the user for such files (``XDG_CACHE_HOME`` or ``LOCALAPPDATA`` where they are set, else
-``~/.cache``). Where it cannot be read or written, start sets are worked out anew.
+The folder is ``MECHGRAPH_CACHE`` where that is set, else ``mechgraph`` in that of the user for such files (``XDG_CACHE_HOME``,
+``LOCALAPPDATA`` or ``~/.cache``). Where it cannot be read or written, start sets are worked out anew.
 """
 
 from __future__ import annotations
@@ -26,6 +26,8 @@ START_SET_VERSION = 3
 
 def folder() -> Path:
     """Where start sets are kept."""
+    if os.environ.get("MECHGRAPH_CACHE"):
+        return Path(os.environ["MECHGRAPH_CACHE"])
     for name in ("XDG_CACHE_HOME", "LOCALAPPDATA"):
         if os.environ.get(name):
             return Path(os.environ[name]) / "mechgraph"
