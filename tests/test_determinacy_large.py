@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
@@ -328,3 +329,13 @@ def test_the_kind_of_many_pairs_takes_no_more_memory_than_their_twists(kind: str
         np.testing.assert_allclose(np.abs(found.place @ np.cross(a, b)), 1.0, atol=1e-12)
     elif kind == "spherical":
         np.testing.assert_allclose(found.place, p[:, 0], atol=1e-12)
+
+
+def test_near_relations_by_chance_do_not_hold_up_the_report_of_a_long_ring() -> None:
+    """Of 200 axes that stand anyhow hundreds of pairs come near something special; taking them so is minutes of work for no hint."""
+    rng = np.random.default_rng(0)
+    report = mg.check(known.ring("R" * 200, rng.normal(size=(200, 3)), rng.normal(size=(200, 3))))
+    begin = time.process_time()
+    assert report.rounding is None
+    assert "mobility 194" in str(report)
+    assert time.process_time() - begin < 15

@@ -24,6 +24,8 @@ CLOSE = 1e-3
 """Change of a pair up to which numbers of any number of digits are taken for rounded: of random mechanisms hardly one comes so near."""
 MOST_PAIRS = 300
 """Pairs up to which rounding is looked for without being asked."""
+BY_CHANCE = (60, 1.5)
+"""Relations within a tolerance, in all and a pair, above which they are no rounding: of many pairs some come near any relation."""
 SAFE = 4.0
 """Tolerance that is advised, in largest changes of a pair: closure errors add up along a loop."""
 CHANGES_NAMED = 3
@@ -65,6 +67,8 @@ def rounding(m: Mechanism, verdict: Callable[[Mechanism], tuple[Any, ...]]) -> R
     except MechgraphError:  # the loops do not close to that either
         return None
     for tol in _decades(sizes):
+        if (sizes <= tol).sum() > max(BY_CHANCE[0], BY_CHANCE[1] * len(m.pairs)):
+            break
         try:
             exact = snapped(m, tol)
         except MechgraphError:
