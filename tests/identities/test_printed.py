@@ -17,7 +17,12 @@ import mechgraph as mg
 pytestmark = pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
 """Random loads move passive freedoms; ``test_passive_loads`` looks at what is said of it."""
 
-MOVING = tuple(name for name in mg.library() if mg.load(name).expected.get("mobility", 0) > 0)
+MOVING = tuple(
+    name
+    for name in mg.library()
+    if mg.load(name).expected.get("mobility", 0) > 0 and not any(pair.curve for pair in mg.load(name).pairs)
+)
+"""Without those on curves: the evaluation of printed texts below knows constant screws alone."""
 BOOKKEEPINGS = ("lee", "minimal")
 LETTERS = dict(zip("XYA", np.eye(3), strict=True))
 PART = r"[A-Za-z]\w*?'*0?_[\w,]+?(?:\([^()]*\))?"
