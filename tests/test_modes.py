@@ -6,12 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mechanisms import bennett, linked_four_bar, ring
+from mechanisms import Z, bennett, linked_four_bar, ring
 
 import mechgraph as mg
 from mechgraph.closure.assembly import close_all, closed_start
 from mechgraph.model.chain import chain_symbols
 from mechgraph.modes import store
+from mechgraph.modes.bounds import bound
+from mechgraph.modes.question import Question
 
 
 @pytest.fixture
@@ -180,3 +182,73 @@ def test_progress_may_interrupt() -> None:
     with pytest.raises(KeyboardInterrupt):
         mg.assemblies(mg.load("four-bar"), {"A": 0.1}, progress=stop)
     assert not list(store.folder().glob("*"))
+
+
+def planar(name: str, driver: str, **pairs: tuple[str, str, float, float]) -> mg.Mechanism:
+    """Revolute pairs in a plane, ``A=(link, link, x, y)``."""
+    made = [mg.Pair(k, "R", a, b, point=(x, y, 0.0), axis=(0, 0, 1)) for k, (a, b, x, y) in pairs.items()]
+    return mg.Mechanism(name, pairs=made, drives=[driver], frame="ground")
+
+
+FOUR = {
+    "A": ("ground", "crank", 0, 0),
+    "B": ("crank", "coupler", 0.5, 0.9),
+    "C": ("coupler", "rocker", 2.4, 1.5),
+    "D": ("ground", "rocker", 2.6, 0.1),
+}
+WATT = FOUR | {
+    "E": ("rocker", "link5", 3.1, 1.2),
+    "F": ("link5", "link6", 4.6, 1.9),
+    "G": ("ground", "link6", 5.0, -0.2),
+}
+STEPHENSON = FOUR | {
+    "E": ("coupler", "link5", 1.5, 2.4),
+    "F": ("link5", "link6", 3.9, 2.2),
+    "G": ("ground", "link6", 4.4, 0.3),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("pairs", "driver", "count"), [(WATT, "A", 4), (STEPHENSON, "A", 4), (STEPHENSON, "G", 6)])
+def test_six_bars_have_four_assemblies_or_six_where_a_triad_is_left(
+    pairs: dict[str, tuple[str, str, float, float]], driver: str, count: int
+) -> None:
+    """Stephenson's driven outside its four-bar: the coupler hangs on three legs."""
+    modes = mg.assemblies(planar("six-bar", driver, **pairs), {driver: 0.1})
+    assert modes.total == count
+    assert modes.completeness == "proved"
+    assert len(modes) + len(modes.complex) + modes.infinite == count
+
+
+@pytest.mark.slow
+def test_the_inverse_kinematics_of_general_arms_has_sixteen_solutions() -> None:
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        points, axes = rng.normal(size=(6, 3)), rng.normal(size=(6, 3))
+        pairs = [mg.Pair(f"A{i}", "R", f"L{i}", f"L{i + 1}", point=points[i], axis=axes[i]) for i in range(6)]
+        arm = mg.Mechanism("arm", pairs=pairs)
+        angles = {f"A{i}": value for i, value in enumerate(rng.uniform(-1, 1, 6))}
+        hand = mg.kinematics(arm, angles).link("L6").pose
+        modes = mg.assemblies(arm, {"L6": hand})
+        assert (modes.total, modes.completeness) == (16, "proved")
+        assert len(modes) + len(modes.complex) == 16
+        assert np.abs(modes.poses[:, -1] - hand).max() < 1e-9
+        wanted = np.array(list(angles.values()))
+        gaps = np.abs(np.angle(np.exp(1j * (modes.coordinates - wanted)))).max(axis=1)
+        assert gaps.min() < 1e-9
+
+
+def test_a_platform_of_six_legs_has_the_bound_of_forty() -> None:
+    rng, pairs = np.random.default_rng(0), []
+    for i in range(6):
+        foot, head = rng.normal(size=3), rng.normal(size=3) + 3 * Z
+        pairs += [
+            mg.Pair(f"A{i}", "S", "base", f"lower{i}", point=foot),
+            mg.Pair(f"P{i}", "P", f"lower{i}", f"upper{i}", point=foot, axis=head - foot),
+            mg.Pair(f"B{i}", "S", f"upper{i}", "platform", point=head),
+        ]
+    m = mg.Mechanism("platform", pairs=pairs, frame="base")
+    family = Question(m, {f"P{i}": 0.0 for i in range(6)}).family
+    found = bound(family)
+    assert found is not None
+    assert (found.count, family.passive.shape[1], family.fault) == (40, 6, "")

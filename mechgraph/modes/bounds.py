@@ -11,20 +11,28 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechgraph.modes.family import Family
+from mechgraph.topology.components import components_of_edges, members
 
 LOOPS: tuple[tuple[int, str, int, str], ...] = (
-    (3, "RRR", 2, "two circles meet in two points, or two great circles' arcs in two (dyad, Chiang 1988, chapter 3)"),
+    (3, "RRR", 2, "two circles in a plane or on a sphere meet in two points"),
     (3, "RRT", 2, "a circle and a line meet in two points"),
-    (3, "RTT", 1, "directions of a triangle are known"),
-    (6, "RRRRRR", 16, "the general 6R chain has 16 postures (Primrose, Mech. Mach. Theory 21, 1986)"),
+    (3, "RTT", 1, "the sides of a triangle follow from their directions"),
     (
         6,
-        "RRRRRT",
+        "RRRRRR",
         16,
-        "the general 5R-P chain has 16 postures (Pieper and Roth; Duffy and Crane, Mech. Mach. Theory 15, 1980)",
+        "Primrose, On the input-output equation of the general 7R-mechanism, Mech. Mach. Theory 21, 1986",
     ),
+    (6, "RRRRRT", 16, "Raghavan and Roth, Inverse kinematics of the general 6R manipulator, J. Mech. Des. 115, 1993"),
 )
 """Dimension of the group, freedoms still unknown (R turns, T slides), the bound, and its source."""
+
+
+LEGS: tuple[tuple[int, int, int, str], ...] = (
+    (6, 6, 40, "Ronga and Vust, Stewart platforms without computer?, Real Analytic and Algebraic Geometry, 1995"),
+    (3, 3, 6, "Gosselin, Sefrioui and Richard, planar manipulators with three legs, Mech. Mach. Theory 27, 1992"),
+)
+"""Dimension of the group of all loops, number of legs that keep a distance between two bodies, the bound, and its source."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +44,12 @@ class Bound:
 
 
 def bound(family: Family) -> Bound | None:
-    """The bound for a class, where the table has one for every loop."""
+    """The bound for a class, where the tables have one."""
+    return _of_legs(family) or _of_loops(family)
+
+
+def _of_loops(family: Family) -> Bound | None:
+    """The product over loops solved one after the other, where the table has one for each of them."""
     s = family.system
     known = np.zeros(s.n_freedoms, dtype=bool)
     known[family.columns] = True
@@ -69,3 +82,34 @@ def _entry(dimension: int, letters: str) -> Bound | None:
         if group == dimension and (known in turned or known[::-1] in turned):
             return Bound(count, source)
     return None
+
+
+def _of_legs(family: Family) -> Bound | None:
+    """The bound of two bodies joined by legs, links that turn about a point of either; links between which all is driven are one."""
+    s, P = family.system, range(len(family.system.m.pairs))
+    driven = set(family.columns.tolist())
+    columns = [range(s.first_column[k], s.first_column[k + 1]) for k in P]
+    locked = [k for k in P if driven.issuperset(columns[k])]
+    body = np.empty(len(s.m.links), dtype=np.intp)
+    for number, links in enumerate(members(components_of_edges(len(body), [s.graph.ends[k] for k in locked]))):
+        body[links] = number
+    joints: dict[int, list[int]] = {}
+    for k in P:
+        one, other = (int(body[link]) for link in s.graph.ends[k])
+        if k in locked:
+            continue
+        if (
+            s.is_length[columns[k]].any()
+            or any(np.any(f.twist[3:]) for f in s.m.pairs[k].type.freedoms)
+            or one == other
+        ):
+            return None
+        joints.setdefault(one, []).append(other)
+        joints.setdefault(other, []).append(one)
+    ends = {number for number, others in joints.items() if len(others) > 2}
+    legs = [others for number, others in joints.items() if number not in ends]
+    if len(ends) != 2 or any(set(others) != ends for others in legs):
+        return None
+    dimensions = {h.shape[1] for h in family.loop_algebras}
+    found = (Bound(count, source) for group, n, count, source in LEGS if {group} == dimensions and n == len(legs))
+    return next(found, None)
