@@ -46,6 +46,7 @@ from mechgraph.model.pair_type import PairType
 from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.model.row_parts import Bookkeeping, Component, Freedom
 from mechgraph.model.stop import Stop
+from mechgraph.model.surfaces import Surface
 from mechgraph.modes.assemblies import Assemblies, AssembliesOver, assemblies
 from mechgraph.modes.branches import Branches, branches
 from mechgraph.report.report import DeterminacyReport, check
@@ -119,6 +120,7 @@ __all__ = [
     "Stop",
     "Structure",
     "Study",
+    "Surface",
     "SystemGroup",
     "TorsionSpring",
     "Transmission",

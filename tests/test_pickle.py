@@ -56,7 +56,8 @@ def things() -> dict[str, Any]:
         "DeadPointError": mg.DeadPointError("dead", {"A": 1.0}), "ReachError": mg.ReachError("far", {"A": 1.0}, s),
         "response": mg.respond(mg.load("windows-2"), (0, 0.2)), "response in charts": mg.respond(pushed, (0, 0.2)),
         "ResponseError": mg.ResponseError("stopped", s), "event": mg.Event("A0", 0.1),
-        "curve": mg.Curve.circle(radius=0.1), "on a curve": mg.Pair("X", "Sg", "a", "b", curve=mg.Curve.ellipse(a=0.2, b=0.1)),
+        "surface": mg.Surface.sphere(radius=0.1), "curve": mg.Curve.circle(radius=0.1),
+        "on a curve": mg.Pair("X", "Sg", "a", "b", curve=mg.Curve.ellipse(a=0.2, b=0.1)),
         "spur": mg.SpurGears("g", "A", "B", teeth=(20, 40)), "bevel": mg.BevelGears("g", "A", "B", teeth=(20, 40), module=0.1),
         "worm": mg.WormGear("g", "A", "B", teeth=(1, 40), radius=0.1), "rack": mg.Rack("g", "A", "B", radius=0.1),
         "hertz": mg.Hertz((2.1e11, 2.1e11)), "transmission": mg.transmission(s, "D"),
@@ -109,7 +110,7 @@ def test_every_public_class_is_among_them() -> None:
     public = {kind for kind in map(mg.__dict__.get, mg.__all__) if isinstance(kind, type)}
     here = [type(thing) for thing in things().values()]
     parts = {mg.Component, mg.Freedom, mg.Bookkeeping}  # of the rows of pair types
-    bases = {mg.MechgraphError, mg.Curve}
+    bases = {mg.MechgraphError, mg.Curve, mg.Surface}
     assert public - set(here) <= parts | bases
 
 

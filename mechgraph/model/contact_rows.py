@@ -21,6 +21,7 @@ from mechgraph.model.curves import Curve, Line
 from mechgraph.model.pair_table import TABLE
 from mechgraph.model.pair_type import PairType, fill_row
 from mechgraph.model.row_parts import Touching
+from mechgraph.model.surfaces import OnSurface, Surface
 from mechgraph.model.travel import Travel, outside, roller_faults, shape_faults
 from mechgraph.quantities import is_numeric
 
@@ -86,6 +87,12 @@ ROWS = {
 """The rows by the symbols of their types; of P, C and Sg those with a curve."""
 
 
+SURFACE_ROWS = {
+    "Sp": _row("Sp", "sphere on surface", [OnSurface(), "rotation"], ["Fz@2"], ["Fx@2", "Fy@2", "Mx@2", "My@2", "Mz@2"])
+}
+"""The same of those that take a surface."""
+
+
 @dataclass(frozen=True)
 class Contact:
     """A row with its curves, the marker at coordinates zero on link a ``(3, 4)``, and by how much the contact misses the curves."""
@@ -95,13 +102,14 @@ class Contact:
     misses: tuple[float, ...]
 
 
-def row_of(type: Any, curve: Any) -> Any:
-    """The row of a pair of a type (a symbol or a row) with or without a curve; what is no type is kept."""
-    symbol = type.symbol if isinstance(type, PairType) and (curve is not None or takes_curves(type)) else type
+def row_of(type: Any, curve: Any, surface: Any = None) -> Any:
+    """The row of a pair of a type (a symbol or a row) with or without a curve or surface; what is no type is kept."""
+    bent = curve is not None or surface is not None
+    symbol = type.symbol if isinstance(type, PairType) and (bent or travels(type)) else type
     if not isinstance(symbol, str):
         return symbol
-    first, second = (ROWS, TABLE) if curve is not None else (TABLE, ROWS)
-    return first.get(symbol) or second.get(symbol) or type
+    rows = {**TABLE, **SURFACE_ROWS} if surface is not None else {**TABLE, **ROWS} if bent else {**ROWS, **TABLE}
+    return rows.get(symbol, type)
 
 
 def pressing(row: PairType) -> float:
@@ -122,6 +130,45 @@ def pressing(row: PairType) -> float:
 def takes_curves(row: PairType) -> tuple[AlongCurve, ...]:
     """The places for curves in a row."""
     return tuple(step for step in row.steps if isinstance(step, AlongCurve))
+
+
+def travels(row: PairType) -> bool:
+    """Whether a row has a place for a curve or a surface."""
+    return any(isinstance(step, AlongCurve | OnSurface) for step in row.steps)
+
+
+def on_surface(row: PairType, surface: Surface, point: Sequence[float] | None, axis: Sequence[float] | None) -> Contact:
+    """A row with its surface put in; coordinates zero at ``point`` (in the middle where it is left out), z towards ``axis``."""
+    middle = tuple(
+        0.5 * (low + high) if np.isfinite(low + high) else 1.0 if np.isfinite(low) else 0.0
+        for low, high in surface.ends
+    )
+    home = middle if point is None else surface.nearest(np.asarray(point))
+    placed = OnSurface(surface, tuple(PLACE_STEP * round(at / PLACE_STEP) for at in home))  # type: ignore[arg-type]
+    if axis is not None and placed.start[:, 2] @ np.asarray(axis) < 0:
+        placed = replace(placed, turned=True)
+    off = 0.0 if point is None else float(np.linalg.norm(placed.start[:, 3] - point))
+    return Contact(_filled(row, [placed]), placed.start, (off,))
+
+
+def surface_faults(row: Any, surface: Surface, point: Any, where: str) -> list[str]:
+    """What is wrong with a surface in a row, before it is put in."""
+    if not isinstance(row, PairType) or not any(isinstance(step, OnSurface) for step in row.steps):
+        return [
+            f"{where}surface: a pair {getattr(row, 'symbol', '?')} takes none; those that do: {', '.join(SURFACE_ROWS)}"
+        ]
+    if not (point is None or is_numeric(point, (3,))):
+        return [f"{where}surface: point is at fault"]
+    found = surface.faults(f"{where}surface.")
+    if found or point is None:
+        return found
+    x = surface.at(*np.array(surface.nearest(np.asarray(point)))[:, None])[:, :, 0]
+    normal, sizes = np.linalg.norm(np.cross(x[1], x[2])), np.linalg.norm(x[1:3], axis=1)
+    if normal <= 1e-9 * sizes.max() ** 2 + 1e-300:
+        return [
+            f"{where}surface: has no normal at ({', '.join(f'{v:.6g}' for v in x[0])}), as at a pole or an apex; take another point"
+        ]
+    return []
 
 
 def in_contact(
@@ -180,19 +227,21 @@ def _off(factor: AlongCurve, point: Sequence[float] | Array | None) -> float:
     return 0.0 if point is None else float(np.linalg.norm(factor.start[:, 3] - point))
 
 
-def _filled(row: PairType, factors: Sequence[AlongCurve]) -> PairType:
-    """The row with factors in the places for curves; components are combined with efforts where they would do work by themselves."""
+def _filled(row: PairType, factors: Sequence[AlongCurve | OnSurface]) -> PairType:
+    """The row with factors in the places for curves and surfaces; components that would do work are combined with efforts."""
     out = copy(row)
     for name in ("factors", "nx", "has_lengths", "takes_pitch"):
         vars(out).pop(name, None)
     left = iter(factors)
-    steps = tuple(next(left) if isinstance(step, AlongCurve) else step for step in row.steps)
+    steps = tuple(next(left) if isinstance(step, AlongCurve | OnSurface) else step for step in row.steps)
     object.__setattr__(out, "steps", steps)
     x = evaluation.random_coordinates(out, np.random.default_rng(12345), 1, TRIED_PLACES)
     for step, (_, numbers) in zip(steps, evaluation.places(out), strict=True):
         if isinstance(step, AlongCurve):
             low, high = (end if np.isfinite(end) else np.copysign(step.travel.length, end) for end in step.ranges[0])
             x[numbers] = np.linspace(low, high, TRIED_PLACES)
+        elif isinstance(step, OnSurface):
+            x[numbers] = 0.0
     pitch = np.zeros((1, 1))
     frames = evaluation.frames_of(out, pitch, x)
     S, W = evaluation.twists_of(out, pitch, frames, x), evaluation.reactions_of(out, pitch, frames, x)
@@ -243,6 +292,17 @@ def curve_faults(row: Any, curve: Curve, curve_b: Any, roller: Any, point: Any, 
 
 def _of_shape(curve: Curve, where: str) -> list[str]:
     return curve.faults(where) or shape_faults(curve, where)
+
+
+def surface_miss(contact: Contact, tol: float, where: str) -> Iterator[str]:
+    """A contact that is not on its surface."""
+    size = 1.0 + float(np.linalg.norm(contact.marker[:, 3]))
+    if contact.misses[0] > max(OFF_CURVE, tol) * size:
+        at = ", ".join(f"{v:.6g}" for v in contact.marker[:, 3])
+        yield (
+            f"{where}point: is {contact.misses[0]:.6g} off its surface, which is nearest at ({at}); give that point, or the marker on "
+            "link b (on_b=mg.Marker(...), and no point) to have the mechanism assembled"
+        )
 
 
 def miss_faults(contact: Contact, curves: Sequence[Curve | None], tol: float, where: str) -> Iterator[str]:

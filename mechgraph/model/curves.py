@@ -72,7 +72,7 @@ class Curve(Described):
 
     def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
         """What is declared alone: all else is found again."""
-        return _remade, (type(self), {f.name: getattr(self, f.name) for f in fields(self)})
+        return remade_from(self)
 
     @abstractmethod
     def at(self, u: Array) -> Array:
@@ -130,7 +130,12 @@ class Curve(Described):
         return self.value_faults(where)
 
 
-def _remade(kind: type[Curve], values: dict[str, Any]) -> Curve:
+def remade_from(shape: Any) -> tuple[Any, tuple[Any, ...]]:
+    """How a shape is copied and pickled: from its fields alone."""
+    return _remade, (type(shape), {f.name: getattr(shape, f.name) for f in fields(shape)})
+
+
+def _remade(kind: Callable[..., Any], values: dict[str, Any]) -> Any:
     return kind(**values)
 
 

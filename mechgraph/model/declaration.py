@@ -15,7 +15,7 @@ import scipy
 
 from mechgraph.algebra.inertia import physical
 from mechgraph.algebra.se3 import Array
-from mechgraph.model.contact_rows import takes_curves
+from mechgraph.model.contact_rows import travels
 from mechgraph.model.coupling import BaseCoupling
 from mechgraph.model.drive import Drive
 from mechgraph.model.link import Link
@@ -124,7 +124,7 @@ def _symbol_faults(m: Parts) -> list[str]:
     faults = []
     by_symbol: dict[str, PairType] = {}
     for pair in m.pairs:
-        if isinstance(pair.type, PairType) and not takes_curves(pair.type):
+        if isinstance(pair.type, PairType) and not travels(pair.type):
             first = by_symbol.setdefault(pair.type.symbol, pair.type)
             if first is not pair.type and first != pair.type:
                 faults.append(

@@ -38,11 +38,19 @@ from mechgraph.model.pair_type import PairType
 from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.model.row_parts import Bookkeeping, Component, Freedom
 from mechgraph.model.stop import Stop
+from mechgraph.model.surfaces import SURFACES, ByFunction
 from mechgraph.units import BASE_UNITS, LENGTH
 
 WRITABLE = {kind: curve for kind, curve in CURVES.items() if curve is not Function}
 """Curves that a file can hold."""
-KINDS: dict[str, Mapping[str, Any]] = {"load": LOADS, "coupling": COUPLINGS, "curve": WRITABLE}
+WRITABLE_SURFACES = {kind: surface for kind, surface in SURFACES.items() if surface is not ByFunction}
+"""The same of surfaces."""
+KINDS: dict[str, Mapping[str, Any]] = {
+    "load": LOADS,
+    "coupling": COUPLINGS,
+    "curve": WRITABLE,
+    "surface": WRITABLE_SURFACES,
+}
 """Tables of which the field ``kind`` says what stands in them: its values, and the classes."""
 USUAL = {"coupling": "linear"}
 """What is meant where ``kind`` is left out."""
@@ -139,6 +147,7 @@ TABLES_OF_FILE: dict[str, Table] = {
     "marker": _table(Marker, words="A marker frame in a link's own frame."),
     "hertz": _table(Hertz, words="What the pressure in a contact takes: materials and shapes of its elements."),
     **{f"curve {kind}": _table(curve) for kind, curve in WRITABLE.items()},
+    **{f"surface {kind}": _table(surface) for kind, surface in WRITABLE_SURFACES.items()},
     **{f"coupling {kind}": _table(coupling) for kind, coupling in COUPLINGS.items()},
     "chain": _table(
         None,

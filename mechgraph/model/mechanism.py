@@ -16,7 +16,7 @@ import numpy as np
 from mechgraph.arguments import items_of
 from mechgraph.document import Document, Shown
 from mechgraph.errors import DeclarationError
-from mechgraph.model.contact_rows import ROWS, row_of
+from mechgraph.model.contact_rows import row_of, travels
 from mechgraph.model.coupling import BaseCoupling
 from mechgraph.model.declaration import declaration_faults, flat_start, item_faults, mapping_faults
 from mechgraph.model.describe import mechanism_document
@@ -215,7 +215,7 @@ class Mechanism(Parts, Shown):
             second=old.second,
             on_a=old.on_a,
             on_b=old.on_b,
-            **(old.curves if row_of(type, old.curve) in ROWS.values() else {}),
+            **(old.curves if travels(row_of(type, old.curve, old.surface)) else {}),
         )
         if not isinstance(new.type, PairType):
             raise DeclarationError(f"mechanism {self.name!r}", new.faults())

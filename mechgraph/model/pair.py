@@ -10,7 +10,19 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.model.contact_rows import ROWS, Contact, curve_faults, in_contact, miss_faults, row_of, takes_curves
+from mechgraph.model.contact_rows import (
+    ROWS,
+    Contact,
+    curve_faults,
+    in_contact,
+    miss_faults,
+    on_surface,
+    row_of,
+    surface_faults,
+    surface_miss,
+    takes_curves,
+    travels,
+)
 from mechgraph.model.curves import Curve
 from mechgraph.model.field_format import (
     DIRECTION,
@@ -29,6 +41,7 @@ from mechgraph.model.numeric import plain
 from mechgraph.model.numeric import second_direction as second_direction
 from mechgraph.model.pair_table import TABLE
 from mechgraph.model.pair_type import PairType
+from mechgraph.model.surfaces import Surface
 from mechgraph.quantities import is_numeric, shown, wrong
 from mechgraph.units import LENGTH
 
@@ -105,6 +118,7 @@ class Pair(Described):
         ``point`` is a place on it (where it begins if left out), and axis and second direction are those of its frame there. With
         ``on_b`` instead of a point, coordinates are arc lengths from where the curve begins (see ``start``).
     curve_b : the curve on link b that touches it (Kc); a straight face where left out.
+    surface : a ``Surface`` in the frame of link a, on which the marker of Sp travels; ``point`` is a place on it.
     roller : radius of a roller that runs on the curve; ``point`` is its centre.
     """
 
@@ -148,6 +162,9 @@ class Pair(Described):
     roller: Annotated[
         float | None, POSITIVE("radius of a roller that runs on `curve`; `point` is its centre", LENGTH, default="none")
     ] = None
+    surface: Annotated[
+        Surface | None, NESTED("surface on link a on which the centre of a sphere travels, of Sp", table="surface")
+    ] = None
     contact: ClassVar[Contact | None] = None
 
     def __init__(
@@ -170,14 +187,19 @@ class Pair(Described):
         curve: Curve | None = None,
         curve_b: Curve | None = None,
         roller: float | None = None,
+        surface: Surface | None = None,
     ) -> None:
-        row = row_of(type, curve)
+        row = row_of(type, curve, surface)
         point, axis, second, roller = plain(point), plain(axis), plain(second), plain(roller)
         object.__setattr__(self, "contact", None)
         if isinstance(curve, Curve) and not curve_faults(row, curve, curve_b, roller, point, ""):
-            contact = in_contact(row, curve, curve_b, roller, point, axis if point is not None else None)
+            object.__setattr__(
+                self, "contact", in_contact(row, curve, curve_b, roller, point, axis if point is not None else None)
+            )
+        elif curve is None and isinstance(surface, Surface) and not surface_faults(row, surface, point, ""):
+            object.__setattr__(self, "contact", on_surface(row, surface, point, axis if point is not None else None))
+        if (contact := self.contact) is not None:
             row, (second, _, axis, point) = contact.row, contact.marker.T.tolist()
-            object.__setattr__(self, "contact", contact)
             if on_b is not None:
                 on_a, point, axis, second = Marker(point, axis, second), None, None, None
         if axis is None and point is not None and isinstance(row, PairType) and not row.directed:
@@ -185,7 +207,20 @@ class Pair(Described):
         if second is None and is_numeric(axis, (3,)):
             second = second_direction(axis)
         placed = (plain(point), plain(axis), plain(second), plain(pitch), plain(lead), on_a, on_b)
-        values: tuple[Any, ...] = (name, row, a, b, *placed, closed, plain(radius), hertz, curve, curve_b, roller)
+        values: tuple[Any, ...] = (
+            name,
+            row,
+            a,
+            b,
+            *placed,
+            closed,
+            plain(radius),
+            hertz,
+            curve,
+            curve_b,
+            roller,
+            surface,
+        )
         for key, value in zip(self.formats, values, strict=True):
             object.__setattr__(self, key, value)
 
@@ -197,13 +232,23 @@ class Pair(Described):
     @property
     def says_more(self) -> bool:
         """Whether it says more than its type and where it sits."""
-        said = (self.pitch, self.lead, self.radius, self.hertz, self.curve, self.curve_b, self.roller, self.closed)
-        return said != (*(None,) * 7, "form") or bool(takes_curves(self.type))
+        said = (
+            self.pitch,
+            self.lead,
+            self.radius,
+            self.hertz,
+            self.curve,
+            self.curve_b,
+            self.roller,
+            self.surface,
+            self.closed,
+        )
+        return said != (*(None,) * 8, "form") or travels(self.type)
 
     @property
     def curves(self) -> dict[str, Any]:
         """What says along which curves it travels."""
-        return {"curve": self.curve, "curve_b": self.curve_b, "roller": self.roller}
+        return {"curve": self.curve, "curve_b": self.curve_b, "roller": self.roller, "surface": self.surface}
 
     @property
     def radius_b(self) -> float | None:
@@ -312,7 +357,15 @@ class Pair(Described):
         for name, given in (("curve", self.curve), ("curve_b", self.curve_b)):
             if not isinstance(given, Curve | None):
                 yield wrong(given, where + name, "a Curve, such as mg.Curve.circle(radius=...)")
-        if self.contact is not None:
+        if not isinstance(self.surface, Surface | None):
+            yield wrong(self.surface, where + "surface", "a Surface, such as mg.Surface.sphere(radius=...)")
+        elif self.surface is not None and self.curve is not None:
+            yield f"{where}has a curve and a surface; give one of them"
+        elif self.surface is not None and self.contact is not None:
+            yield from surface_miss(self.contact, tol, where)
+        elif self.surface is not None:
+            yield from surface_faults(self.type, self.surface, self.point, where)
+        elif self.contact is not None:
             yield from miss_faults(self.contact, (self.curve, self.curve_b), tol, where)
         elif isinstance(self.curve, Curve):
             yield from curve_faults(self.type, self.curve, self.curve_b, self.roller, self.point, where)

@@ -16,7 +16,7 @@ import tomli_w
 
 from mechgraph.errors import ContentError, DeclarationError, FileError
 from mechgraph.model.chain import chain
-from mechgraph.model.contact_rows import takes_curves
+from mechgraph.model.contact_rows import travels
 from mechgraph.model.curves import Curve
 from mechgraph.model.field_format import BY_FREEDOM, COEFFICIENTS, SIX, STANDS_AS, TABLE, TABLES, Described
 from mechgraph.model.file_format import DEGREES, KINDS, SCHEMA, TABLES_OF_FILE, USUAL
@@ -24,6 +24,7 @@ from mechgraph.model.library import library_names, library_path
 from mechgraph.model.mechanism import Mechanism, check_mechanism
 from mechgraph.model.pair_table import TABLE as PAIR_TABLE
 from mechgraph.model.pair_type import PairType
+from mechgraph.model.surfaces import Surface
 from mechgraph.model.sweep import swept
 from mechgraph.quantities import is_numeric, real_array, shown, wrong
 from mechgraph.reading import text_of, toml_of
@@ -276,8 +277,8 @@ def _plain(value: Any, where: str, path: str) -> Any:
         raise FileError(path, f"{where} is a callable; a file holds numbers only. Sample it first")
     if isinstance(value, PairType):
         return value.symbol
-    if isinstance(value, Curve):
-        return _item_data("curve", value, path)
+    if isinstance(value, Curve | Surface):
+        return _item_data("curve" if isinstance(value, Curve) else "surface", value, path)
     if isinstance(value, Described):
         return _data(value, path, where)
     if isinstance(value, np.ndarray):
@@ -302,9 +303,7 @@ def _data(item: Described, path: str, where: str) -> dict[str, Any]:
 def to_data(m: Mechanism, path: str = "") -> dict[str, Any]:
     """The content of the TOML file of a mechanism."""
     data: dict[str, Any] = {"schema": SCHEMA}
-    own = {
-        p.type.symbol: p.type for p in m.pairs if not takes_curves(p.type) and PAIR_TABLE.get(p.type.symbol) != p.type
-    }
+    own = {p.type.symbol: p.type for p in m.pairs if not travels(p.type) and PAIR_TABLE.get(p.type.symbol) != p.type}
     if own:
         data["pair_type"] = [_type_data(row, path) for row in own.values()]
     for key, attribute in TABLES_OF_FILE["file"].attributes.items():

@@ -1,0 +1,157 @@
+"""Spheres and points on surfaces: limits that are other pairs, derivatives, and the ends of surfaces."""
+
+import pickle
+
+import numpy as np
+import pytest
+import strategies
+from identities.test_complex_step import closed, holds
+from numpy.testing import assert_allclose
+from test_curves import AXIS, CENTER, T, ring
+
+import mechgraph as mg
+from mechgraph.model.surfaces import OnSurface
+
+GRID = np.array([(i, j, 0.3 * np.sin(0.7 * i) * np.cos(0.5 * j)) for i in range(7) for j in range(8)], dtype=float)
+
+
+def saddle(u, v):
+    """``(u, v, u^2 v / 3)`` and its derivatives."""
+    z, one = 0 * u, 1 + 0 * u
+    rows = [
+        (u, v, u * u * v / 3),
+        (one, z, 2 * u * v / 3),
+        (z, one, u * u / 3),
+        (z, z, 2 * v / 3),
+        (z, z, 2 * u / 3),
+        (z, z, z),
+    ]
+    return [np.stack(row) for row in (*rows, (z, z, z), (z, z, 2 / 3 * one), (z, z, z), (z, z, z))]
+
+
+SAMPLE = {
+    "plane": mg.Surface.plane(center=CENTER, axis=AXIS),
+    "sphere": mg.Surface.sphere(radius=0.8, center=CENTER, axis=AXIS),
+    "cylinder": mg.Surface.cylinder(radius=0.8, center=CENTER, axis=AXIS),
+    "cone": mg.Surface.cone(half_angle=0.5, center=CENTER, axis=AXIS),
+    "torus": mg.Surface.torus(radius=0.9, tube=0.3, center=CENTER, axis=AXIS),
+    "revolution": mg.Surface.revolution(profile=mg.Curve.ellipse(a=0.3, b=0.2, center=(1.0, 0, 0), axis=(0, 1, 0))),
+    "patch": mg.Surface.patch(points=GRID, rows=7),
+    "function": mg.Surface.function(position=saddle, ends_u=(-2, 2), ends_v=(-2, 2)),
+}
+INSIDE = {"patch": (0.4, 0.6)}
+
+
+def place(name):
+    return SAMPLE[name].at(*np.array(INSIDE.get(name, (0.7, 0.4)))[:, None])[0][:, 0]
+
+
+@pytest.mark.parametrize("name", SAMPLE)
+def test_derivatives_of_a_surface_and_its_nearest_point(name):
+    surface, (u, v) = SAMPLE[name], np.array(INSIDE.get(name, (0.7, 0.4)))[:, None]
+    x = surface.at(u, v)
+    by_u, by_v = (surface.at(u + 1e-30j * (i == 0), v + 1e-30j * (i == 1)).imag / 1e-30 for i in (0, 1))
+    assert_allclose(by_u[:3], x[[1, 3, 4]], atol=1e-13)
+    assert_allclose(by_v[:3], x[[2, 4, 5]], atol=1e-13)
+    normal = np.cross(x[1, :, 0], x[2, :, 0])
+    at = surface.nearest(x[0, :, 0] + 0.02 * normal / np.linalg.norm(normal))
+    assert_allclose(surface.at(*np.array(at)[:, None])[0], x[0], atol=1e-10)
+
+
+def on(surface, point, symbol="Sp", **more):
+    return lambda b: mg.Pair("X", symbol, "frame", b, point=point, surface=surface, **more)
+
+
+def solved(m, **how):
+    return mg.solve(m, {"J0": mg.Motion(0.05 * T, 1.3, 0.7)}, **how)
+
+
+def test_a_sphere_on_a_plane_is_its_own_row():
+    """Positions, reaction, and its component, the normal force."""
+    at = CENTER + np.cross(AXIS, [0.3, 0.2, 0.1])
+    one, two = (
+        ring(on(SAMPLE["plane"], at), n=2),
+        ring(lambda b: mg.Pair("X", "Sp", "frame", b, point=at, axis=AXIS), n=2),
+    )
+    a, b = solved(one), solved(two)
+    for link in ("b0", "b1"):
+        assert_allclose(a.link(link).acceleration, b.link(link).acceleration, atol=1e-10)
+    assert_allclose(a["X"].components["Fz"], b["X"].components["Fz"], rtol=1e-10)
+    assert_allclose(a["X"].reaction, b["X"].reaction, atol=1e-10 * np.abs(b["X"].reaction).max())
+
+
+def test_a_sphere_on_a_sphere_is_a_rod_between_spheres():
+    at = place("sphere")
+    one = ring(on(SAMPLE["sphere"], at), n=2)
+    rod = [mg.Pair("Y", "S", "frame", "rod", point=CENTER), mg.Pair("X", "S", "rod", "b1", point=at)]
+    two = one.replace(links=[*one.links, mg.Link("rod")], pairs=[*one.pairs[:-1], *rod])
+    a, b = solved(one), solved(two)
+    for how in ({"method": "newton_euler"}, {"engine": "sparse"}):
+        assert_allclose(solved(one, **how)["X"].reaction, a["X"].reaction, atol=1e-10 * np.abs(a["X"].reaction).max())
+    for link in ("b0", "b1"):
+        for what in ("pose", "twist", "acceleration"):
+            assert_allclose(getattr(a.link(link), what), getattr(b.link(link), what), atol=1e-10)
+    assert_allclose(a["X"].reaction, b["X"].reaction, atol=1e-10 * np.abs(b["X"].reaction).max())
+    assert a.checks.power.max() < 1e-12
+    radial = a.link("b1").point(at)[0] - CENTER
+    assert np.abs(np.cross(a["X"].force, radial)).max() < 1e-11 * np.abs(a["X"].force).max()
+
+
+@pytest.mark.parametrize("name", SAMPLE)
+def test_everything_holds_on_every_surface(name, tmp_path):
+    """Jacobian and bias by complex step; power; normal force; files, pickles."""
+    m = ring(on(SAMPLE[name], place(name)), n=2)
+    holds(*closed(m, 1, 0.02))
+    s = solved(m)
+    assert s.checks.power.max() < 1e-12
+    if name != "function":
+        mg.save(m, tmp_path / "m.toml")
+        assert mg.load(tmp_path / "m.toml") == m
+        assert pickle.loads(pickle.dumps(m)) == m
+    moved = m.moved(strategies.pose(np.random.default_rng(0), 2.0))
+    assert_allclose(solved(moved.replace(loads=[]))["X"].position, solved(m.replace(loads=[]))["X"].position, atol=1e-9)
+
+
+def test_a_parameter_that_leaves_its_range_ends_the_reach_by_name():
+    """A point carried over the edge of a patch of a plane, at u = 1: half a length from where it starts."""
+    flat = mg.Surface.patch(points=[(i / 4, j / 4, 0.0) for i in range(5) for j in range(5)], rows=5)
+    m = mg.Mechanism(
+        "m",
+        None,
+        [
+            mg.Pair("A", "P", "frame", "slide", point=(0.5, 0.5, 0), axis=(1, 0, 0)),
+            mg.Pair("X", "Sp", "frame", "slide", point=(0.5, 0.5, 0), surface=flat),
+        ],
+        ["A"],
+    )
+    s = mg.kinematics(m, {"A": np.linspace(0, 0.7, 8)}, on_reach="flag")
+    assert s.status.tolist() == ["ok"] * 6 + ["out of reach"] * 2
+    with pytest.raises(mg.ReachError, match=r"X\.Tu comes to the end"):
+        mg.kinematics(m, {"A": np.linspace(0, 0.7, 8)})
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"point": (0, 0, 0.9)}, "is 0.1 off its surface, which is nearest at ("),
+        ({"surface": mg.Surface.sphere(radius=-1.0)}, "surface.radius = -1.0"),
+        ({"surface": mg.Surface.torus(radius=1.0, tube=2.0)}, "surface.tube = 2.0"),
+        ({"surface": mg.Surface.patch(points=GRID, rows=5)}, "make no grid"),
+        ({"type": "Sg"}, "a pair Sg takes none; those that do: Sp"),
+        ({"surface": mg.Curve.circle(radius=1.0)}, "a Surface, such as"),
+        ({"curve": mg.Curve.circle(radius=1.0)}, "has a curve and a surface"),
+        (
+            {"surface": mg.Surface.sphere(radius=1.0, axis=(1, 0, 0)), "point": (1.0, 0, 0)},
+            "has no normal at (1, ",
+        ),
+    ],
+)
+def test_surfaces_that_will_not_do(given, words):
+    whole = {"type": "Sp", "surface": mg.Surface.sphere(radius=1.0, axis=(0, 1, 0)), **given}
+    with pytest.raises(mg.DeclarationError) as error:
+        mg.Mechanism("m", None, [mg.Pair("X", a="frame", b="body", **whole)])
+    assert words in str(error.value)
+
+
+def test_a_place_for_a_surface_counts_as_a_row():
+    assert len(OnSurface().freedoms) == 2
