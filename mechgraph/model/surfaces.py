@@ -29,7 +29,7 @@ from mechgraph.units import LENGTH, PURE
 
 NEAREST_GRID = 33
 """Values of each parameter from which the nearest point of a surface is sought."""
-ENDLESS = (-np.inf, np.inf)
+NO_ENDS = (-np.inf, np.inf)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -60,7 +60,7 @@ class Surface(Described):
     @property
     def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Least and greatest values of both parameters; infinite where the surface goes on or closes."""
-        return ENDLESS, ENDLESS
+        return NO_ENDS, NO_ENDS
 
     def grid(self, p: Array) -> tuple[Array, Array]:
         """Parameters among which one is near to a point ``(3,)``."""
@@ -167,7 +167,7 @@ class Turned(AboutAxis):
     @property
     def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Those of the meridian."""
-        return ENDLESS, ENDLESS if self._curve.is_closed else self._curve.ends
+        return NO_ENDS, NO_ENDS if self._curve.is_closed else self._curve.ends
 
     def grid(self, p: Array) -> tuple[Array, Array]:
         """A whole turn, and the meridian."""
@@ -222,7 +222,7 @@ class Cone(Turned):
     @property
     def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """The apex."""
-        return ENDLESS, (0.0, np.inf)
+        return NO_ENDS, (0.0, np.inf)
 
     def faults(self, where: str) -> list[str]:
         """An angle that makes no cone."""
