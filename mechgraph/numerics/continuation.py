@@ -189,12 +189,15 @@ class Follower(Marching):
 
     def _certified_all(self, nodes: Nodes) -> Nodes:
         """Nodes with those in the middle of all steps; steps that could not be certified are halved a few times."""
-        for _ in range(PATH.finest):
+        most = np.inf
+        for halvings in range(PATH.finest):
             left, right = nodes.steps
             open_ = ~nodes.sure[right]
             left, right = left[open_], right[open_]
-            if not left.size:
+            # at a jump one half of a step stays open; beside a singular point more and more, which the careful march takes
+            if not left.size or (halvings >= PATH.halvings and left.size > most):
                 break
+            most = left.size
             ok, middle = self._certified(nodes, left, right)
             sure = nodes.sure.copy()
             sure[right[ok]] = True
