@@ -68,6 +68,7 @@ def test_mobility_tables(m: mg.Mechanism, family: int, table: dict[str, str]) ->
     assert {link: found[link] for link in table} == table
     assert (f.family, f.dobrovolski, f.mobility) == (family, 1, 1)
     assert r.redundancy == family * len(r.loops)
+    assert r.family == family
     assert not f.why
 
 

@@ -204,3 +204,21 @@ def test_the_structure_prints() -> None:
     for part in ("Watt II", "Dobrovolski's count gives M = 1", "R - D10 - D10 - 3 + 0", "With another driver"):
         assert part in text
     assert repr(mg.structure(mg.load("four-bar"))) == "Structure('four-bar': R - D10; print it)"
+
+
+@pytest.mark.slow
+def test_numbers_of_assemblies_multiply() -> None:
+    """Two dyads: two assemblies of the first, and for each two of the second."""
+    found = mg.assemblies(mg.load("marghitu-2-7"), {"A": 0.3}, seed=0)
+    first, second = mg.groups(mg.load("marghitu-2-7")).groups[1:]
+    links = mg.load("marghitu-2-7").link_names()
+    poses = np.asarray(found.poses)
+
+    def different(names: tuple[str, ...]) -> int:
+        rows = poses[:, [links.index(n) for n in names]].reshape(len(poses), -1)
+        return len(np.unique(np.round(rows, 6), axis=0))
+
+    assert found.completeness == "proved"
+    assert len(found) == 4
+    assert different(first.links) == 2
+    assert different((*first.links, *second.links)) == 4

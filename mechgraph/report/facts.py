@@ -26,7 +26,7 @@ from mechgraph.structure.finite_motion import FiniteMotion, finite_motion
 from mechgraph.structure.generic import Generic, generic
 from mechgraph.structure.kind import Kind, kind_of, kind_of_mechanism
 from mechgraph.structure.mobility import Freedoms, freedoms_at
-from mechgraph.structure.pair_changes import LARGEST_FOR_SETS, Effect, effect
+from mechgraph.structure.pair_changes import LARGEST_FOR_SETS, Effect, changes_of, effect
 from mechgraph.structure.self_aligning import self_aligning_sets
 from mechgraph.structure.self_stress import SelfStress
 from mechgraph.structure.uniqueness import Uniqueness, uniqueness
@@ -197,6 +197,11 @@ class Facts:
         """Mobility table, families of mechanism and loops, the counts of the textbooks."""
         g = self.geometry
         return families(g.freedoms, g.driven, self.motion) if g and self.motion else None
+
+    @property
+    def family(self) -> int | None:
+        """The family: freedoms that no pair has along the motion (see ``families``)."""
+        return self.families.family if self.families else None
 
     @cached_property
     def groups(self) -> Decomposition | None:
@@ -415,7 +420,7 @@ class Facts:
         if g is None:
             return
         m = at_position(self.mechanism, g.system, g.x)
-        for chosen in self_aligning_sets(g.freedoms, most):
+        for chosen in self_aligning_sets(changes_of(g.freedoms), g.freedoms.redundancy, most):
             e = effect(g.freedoms, g.driven, chosen, self.asked)
             if e.redundancy[1] == 0 and e.mobility[1] == e.mobility[0]:
                 yield Advice(e.text, tuple(item for item, *_ in e.changes), effect=e, mechanism=m)

@@ -177,6 +177,10 @@ def _loops(r: Facts) -> Iterator[Block]:
         rows.append(("...", f"and {len(r.loops) - LISTED} more (see report.to_dict())", "", "", ""))
     if rows:
         yield Table(("loop", "links and pairs", "freedoms", "rank", "excess"), tuple(rows), align="rlrrr")
+    if rows and r.geometry:
+        yield Paragraph(
+            "The excess of a loop whose pairs all move is its family, where its rank is the same all along."
+        )
 
 
 def _count(r: Facts) -> Iterator[Block]:

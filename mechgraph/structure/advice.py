@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import islice
 
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.rank import EngineName
 from mechgraph.structure.change_sets import CYLINDER, between_balls, cylinders, mixed, relieving, spread
 from mechgraph.structure.mobility import Freedoms
 from mechgraph.structure.pair_changes import CHANGES_SHOWN, PLANE, Effect, changes_of, effect
+from mechgraph.structure.self_aligning import self_aligning_sets
 from mechgraph.structure.splines import splines
 
 SPLINE = 1
 """How hard a spline is to build (see ``pair_changes.EFFORTS``)."""
 FREEING = 3
 """Changes reported that let a structure move."""
+FEW, SEARCHED = 80, 3
+"""Changes up to which all sets of so many are searched for the best one, some hundredths of a second; of more, a beam of them."""
 
 
 def advice(freedoms: Freedoms, driven: Index, finite_mobility: int, engine: EngineName = "auto") -> tuple[Effect, ...]:
@@ -31,8 +35,11 @@ def advice(freedoms: Freedoms, driven: Index, finite_mobility: int, engine: Engi
         singles, complete = relieving(position, changes, freedoms.redundancy)
         found: list[tuple[int, Effect]] = []
         on_balls = between_balls(position, changes, freedoms.redundancy)
-        for chosen in dict.fromkeys((*on_balls, *mixed(complete), *singles)):
+        best = islice(self_aligning_sets(changes, freedoms.redundancy, SEARCHED), 1) if len(changes) <= FEW else ()
+        for chosen in dict.fromkeys((*on_balls, *best, *mixed(complete), *singles)):
             new = effect(freedoms, driven, chosen, engine)
+            if any(new == other for _, other in found):
+                continue
             if new.inputs[1] == new.inputs[0] and new.redundancy[1] < new.redundancy[0] and new not in effects:
                 found.append((max(c.effort for c in chosen), new))
         found += [(SPLINE, new) for new in splines(freedoms, driven, engine)]

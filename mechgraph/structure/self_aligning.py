@@ -7,14 +7,13 @@ Mechanisms, 1982.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.numerics.tolerances import STRESSES
-from mechgraph.structure.mobility import Freedoms
-from mechgraph.structure.pair_changes import LARGEST_FOR_SETS, Change, changes_of
+from mechgraph.structure.pair_changes import LARGEST_FOR_SETS, Change
 
 
 def rank_key(chosen: tuple[Change, ...]) -> tuple[int, int, int, tuple[int, ...]]:
@@ -23,14 +22,11 @@ def rank_key(chosen: tuple[Change, ...]) -> tuple[int, int, int, tuple[int, ...]
     return max(c.effort for c in chosen), len(chosen), widest, tuple(c.item for c in chosen)
 
 
-def self_aligning_sets(freedoms: Freedoms, most: int) -> Iterator[tuple[Change, ...]]:
-    """The sets of up to ``most`` changes, the best first."""
-    redundancy = freedoms.redundancy
+def self_aligning_sets(changes: Iterable[Change], redundancy: int, most: int) -> Iterator[tuple[Change, ...]]:
+    """The sets of up to ``most`` of the changes that remove the whole redundancy, the best first."""
     if not 0 < redundancy <= LARGEST_FOR_SETS:
         return
-    exact = sorted(
-        (c for c in changes_of(freedoms) if c.pair is not None and c.added == c.relief), key=lambda c: c.item
-    )
+    exact = sorted((c for c in changes if c.pair is not None and c.added == c.relief), key=lambda c: c.item)
     bases = [np.linalg.svd(c.power, full_matrices=False)[2][: c.added] for c in exact]
     found = [tuple(exact[i] for i in s) for size in range(1, most + 1) for s in _sets(exact, bases, redundancy, size)]
     yield from sorted(found, key=rank_key)
