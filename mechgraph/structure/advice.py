@@ -17,7 +17,7 @@ SPLINE = 1
 """How hard a spline is to build (see ``pair_changes.EFFORTS``)."""
 FREEING = 3
 """Changes reported that let a structure move."""
-FEW, SEARCHED = 80, 3
+FEW_CHANGES, LARGEST_SET = 80, 3
 """Changes up to which all sets of so many are searched for the best one, some hundredths of a second; of more, a beam of them."""
 
 
@@ -35,7 +35,11 @@ def advice(freedoms: Freedoms, driven: Index, finite_mobility: int, engine: Engi
         singles, complete = relieving(position, changes, freedoms.redundancy)
         found: list[tuple[int, Effect]] = []
         on_balls = between_balls(position, changes, freedoms.redundancy)
-        best = islice(self_aligning_sets(changes, freedoms.redundancy, SEARCHED), 1) if len(changes) <= FEW else ()
+        best = (
+            islice(self_aligning_sets(changes, freedoms.redundancy, LARGEST_SET), 1)
+            if len(changes) <= FEW_CHANGES
+            else ()
+        )
         for chosen in dict.fromkeys((*on_balls, *best, *mixed(complete), *singles)):
             new = effect(freedoms, driven, chosen, engine)
             if any(new == other for _, other in found):
