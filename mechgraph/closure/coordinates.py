@@ -8,6 +8,9 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.driver_path import DriverPath, Positions
 from mechgraph.closure.indexing import Index
 
+TOGETHER = 10_000
+"""Nodes of as many periods as are continued together."""
+
 
 def continued(path: DriverPath, found: Positions) -> Array:
     """User coordinates ``(F, T)`` of all positions, rotation vectors continued along their tracks from the start."""
@@ -24,15 +27,21 @@ def continued(path: DriverPath, found: Positions) -> Array:
         spin = np.zeros((s.n_freedoms, len(nodes)))
         if found.spin is not None:
             spin = found.spin[:, found.tracks.nodes.track == track]
-        for turn in range(int(turns[good[mine]].max()) + 1):
-            at = good[mine][turns[good[mine]] == turn]
-            place = np.concatenate([nodes.place, found.place[at]])
-            order = np.argsort(place, kind="stable")
-            on_the_way = path.advance(nodes.x, turn * spin, nodes.track) if turn else nodes.x
+        mine = good[mine]
+        span, together = float(max(nodes.place.max(), found.place[mine].max())) + 1.0, max(1, TOGETHER // len(nodes))
+        for first in range(0, int(turns[mine].max()) + 1, together):
+            some = np.arange(first, min(first + together, int(turns[mine].max()) + 1))
+            number = np.repeat(some, len(nodes))
+            shift = number * np.tile(spin, len(some))
+            on_the_way = path.advance(np.tile(nodes.x, len(some)), shift, np.tile(nodes.track, len(some)))
+            at = mine[np.isin(turns[mine], some)]
+            # periods apart, each with its own places
+            key = np.concatenate([number * span + np.tile(nodes.place, len(some)), turns[at] * span + found.place[at]])
+            order = np.argsort(key, kind="stable")
             q = s.coordinates_of(np.concatenate([on_the_way, found.x[:, at]], axis=1)[:, order], near)
             back = np.empty_like(order)
             back[order] = np.arange(len(order))
-            out[:, at], near = q[:, back[len(nodes) :]], q[:, -1]
+            out[:, at], near = q[:, back[len(number) :]], q[:, -1]
     return out if found.gained is None else out + found.gained
 
 

@@ -6,6 +6,7 @@ from mechanisms import Z
 
 import mechgraph as mg
 from mechgraph.closure import following
+from mechgraph.closure.driver_path import DriverPath
 
 
 def geared():
@@ -53,3 +54,14 @@ def test_a_thousand_radians_take_one_period(name):
     s = mg.kinematics(m, {m.drives[0].freedom: [1000.0]})
     assert s.work.nodes < 200
     np.testing.assert_allclose(s[m.drives[0].freedom.split(".")[0]].position[0, 0], 1000.0, rtol=1e-15)
+
+
+def test_periods_of_a_rod_that_turns_are_continued_many_together(monkeypatch):
+    """Rotation vectors of the ball joints over 16,000 turns of the crank: in some hundred batches, not one a turn."""
+    calls, advance = [], DriverPath.advance
+    monkeypatch.setattr(DriverPath, "advance", lambda *given: calls.append(1) or advance(*given))
+    m = mg.load("rssr")
+    s = mg.kinematics(m, {"A": [1e5]})
+    assert len(calls) < 1000
+    near = mg.kinematics(m, {"A": [1e5 - 2 * np.pi * np.floor(1e5 / (2 * np.pi))]})
+    np.testing.assert_allclose(s["D"].position % (2 * np.pi), near["D"].position % (2 * np.pi), atol=1e-8)
