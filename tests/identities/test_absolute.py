@@ -316,13 +316,16 @@ def coordinates(found, reference, s, at, i, condition):
 def at_rest(found, reference, s, at, i, V, A, left, size, big, condition):
     """Bodies that could turn idly do not: where one motion moves a link, and turns it, there is no spin along it.
 
-    Where it turns several links (halves of a body, links that a driver moves) their mean spin vanishes.
+    Where it turns several links (halves of a body, links that a driver moves) their mean spin vanishes; so does its rate where they have
+    one angular velocity, along which their axis does not turn out of them (``test_subsets`` has the others, by derivatives).
     """
     if len(left) == 1:
         turns = left.reshape(-1, 6)[:, :3]
-        if (np.linalg.norm(turns, axis=1)[np.abs(left.reshape(-1, 6)).max(axis=1) > 1e-8] > 1e-6).all():
+        part = np.abs(left.reshape(-1, 6)).max(axis=1) > 1e-8
+        if (np.linalg.norm(turns, axis=1)[part] > 1e-6).all():
             found.see("mean spin", (V[reference.moving, :3] * turns).sum(), 0.0, size, condition, f"at {i}")
-            found.see("mean spin up", (A[reference.moving, :3] * turns).sum(), 0.0, big, condition**2, f"at {i}")
+            if np.ptp(V[reference.moving, :3][part], axis=0).max() <= 1e-9 * size:
+                found.see("mean spin up", (A[reference.moving, :3] * turns).sum(), 0.0, big, condition**2, f"at {i}")
     for j, name in enumerate(reference.m.link_names()):
         if name == reference.m.frame:
             continue
