@@ -32,7 +32,7 @@ def continued(path: DriverPath, found: Positions) -> Array:
         for first in range(0, int(turns[mine].max()) + 1, together):
             some = np.arange(first, min(first + together, int(turns[mine].max()) + 1))
             number = np.repeat(some, len(nodes))
-            shift = number * np.tile(spin, len(some))
+            shift = np.tile(spin, len(some)) * number.astype(float)
             on_the_way = path.advance(np.tile(nodes.x, len(some)), shift, np.tile(nodes.track, len(some)))
             at = mine[np.isin(turns[mine], some)]
             # periods apart, each with its own places
