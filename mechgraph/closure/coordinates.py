@@ -8,7 +8,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.driver_path import DriverPath, Positions
 from mechgraph.closure.indexing import Index
 
-TOGETHER = 10_000
+CONTINUED_TOGETHER = 10_000
 """Nodes of as many periods as are continued together."""
 
 
@@ -28,7 +28,10 @@ def continued(path: DriverPath, found: Positions) -> Array:
         if found.spin is not None:
             spin = found.spin[:, found.tracks.nodes.track == track]
         mine = good[mine]
-        span, together = float(max(nodes.place.max(), found.place[mine].max())) + 1.0, max(1, TOGETHER // len(nodes))
+        span, together = (
+            float(max(nodes.place.max(), found.place[mine].max())) + 1.0,
+            max(1, CONTINUED_TOGETHER // len(nodes)),
+        )
         for first in range(0, int(turns[mine].max()) + 1, together):
             some = np.arange(first, min(first + together, int(turns[mine].max()) + 1))
             number = np.repeat(some, len(nodes))
