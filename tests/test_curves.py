@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose
 import mechgraph as mg
 from mechgraph.model.curves import CURVES
 from mechgraph.model.travel import Travel
+from mechgraph.show.symbols import symbol
 
 T = np.linspace(0.0, 1.0, 7)
 ANGLE = np.linspace(0, 2 * np.pi, 37)
@@ -305,8 +306,8 @@ def test_a_frame_that_comes_back_turned_is_refused_where_roll_is_held():
     found = Travel(curve).closing
     assert np.cos(found - angle) == pytest.approx(1, abs=1e-8)
     assert f"turned by {np.rad2deg(found):.6g} degrees" in refused(type="P", curve=curve)
-    for symbol in ("C", "Sg"):
-        mg.Mechanism("m", None, [mg.Pair("X", symbol, "frame", "body", curve=curve)])
+    for freer in ("C", "Sg"):
+        mg.Mechanism("m", None, [mg.Pair("X", freer, "frame", "body", curve=curve)])
 
 
 @pytest.mark.parametrize("reversed_", [False, True])
@@ -336,3 +337,22 @@ def test_the_end_of_an_open_curve_ends_the_reach_by_name(reversed_):
     assert s.status.tolist() == ["out of reach"] * 2 + ["ok"] * 11 + ["out of reach"] * 2
     assert_allclose(np.abs(s["X"].position[2:-2, 0]), 2 * np.abs(np.linspace(-0.5, 0.5, 11)), atol=1e-12)
     assert np.isnan(s.link("arm").pose[-1]).any()
+
+
+def test_curves_and_surfaces_are_drawn_where_they_are():
+    """The symbol of a pair shows its curve as a line through the marker, on link b that of its own; no straight guide beside it."""
+    round_, open_ = mg.Curve.ellipse(a=2.0, b=1.0), mg.Curve.line(point=(2, 0, 0), direction=(0, 1, 0), ends_at=(-1, 1))
+    pair = mg.Pair("K", "Kc", "a", "b", point=(2, 0, 0), curve=round_, curve_b=open_)
+    lines = [e for e in symbol(pair.type, 0.0, 0.1, [(-1, 1), (-1, 1)]) if e.role == "axis"]
+    assert [e.frame for e in lines] == [0, 2]
+    marker = pair.markers[0].pose()
+    first, second = (e.shape.vertices @ marker[:, :3].T + marker[:, 3] for e in lines)
+    assert_allclose((first[:, 0] / 2) ** 2 + first[:, 1] ** 2, 1, atol=1e-12)
+    assert_allclose(np.abs(second[:, 1]).max(), 1, atol=1e-12)
+    assert_allclose(second[:, 0], 2, atol=1e-12)
+    ball = mg.Pair("X", "Sp", "a", "b", point=(1, 0, 0), surface=mg.Surface.sphere(radius=1.0))
+    drawn = symbol(ball.type, 0.0, 0.1, [(0, 0)] * 5)
+    grid = np.concatenate([e.shape.vertices for e in drawn if e.role == "axis"])
+    marker = ball.markers[0].pose()
+    assert_allclose(np.linalg.norm(grid @ marker[:, :3].T + marker[:, 3], axis=1), 1, atol=1e-12)
+    assert not any(e.role == "guide" for e in drawn)

@@ -19,6 +19,10 @@ X, Z = 0, 2
 """Axes of the frame that may be the tangent."""
 
 
+OUTLINE = 181
+"""Points by which a curve is drawn."""
+
+
 @dataclass(frozen=True)
 class AlongCurve(Factor):
     """A frame that travels along a curve by the arc length ``q``, from where it is the frame before the factor.
@@ -62,6 +66,17 @@ class AlongCurve(Factor):
         if self.travel.is_closed:
             return ((-np.inf, np.inf),)
         return ((-high, -low) if self.reversed else (low, high),)
+
+    @property
+    def outline(self) -> tuple[Array, ...]:
+        """The curve, seen from the frame at coordinate zero: the one before the factor, or on the side of link b the one behind it.
+
+        Endless ones have none.
+        """
+        if self.curve is None or np.isinf(self.travel.begin):
+            return ()
+        x = self.travel.at(np.linspace(self.travel.s[0], self.travel.s[-1], OUTLINE)).x
+        return (((x.T - self.start[:, 3]) / self.unit) @ self.start[:, :3],)
 
     @property
     def sideways(self) -> float:

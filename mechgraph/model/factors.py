@@ -44,6 +44,11 @@ class Factor(ABC):
         return ((-np.inf, np.inf),) * len(self.freedoms)
 
     @property
+    def outline(self) -> tuple[Array, ...]:
+        """Lines ``(n, 3)`` by which its path is drawn, in the frame before it; none where its twists say it all."""
+        return ()
+
+    @property
     def n_state(self) -> int:
         """Number of state numbers."""
         return 4 if self.holds_rotation else len(self.freedoms)

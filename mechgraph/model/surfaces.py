@@ -29,6 +29,8 @@ from mechgraph.units import LENGTH, PURE
 
 NEAREST_GRID = 33
 """Values of each parameter from which the nearest point of a surface is sought."""
+LINES = 9
+"""Lines each way by which a surface is drawn."""
 NO_ENDS = (-np.inf, np.inf)
 
 
@@ -390,6 +392,18 @@ class OnSurface(Factor):
         assert self.surface is not None
         parts = zip(self.surface.ends, self.home, self.sizes / self.unit, strict=True)
         return tuple(((low - at) * size, (high - at) * size) for (low, high), at, size in parts)
+
+    @property
+    def outline(self) -> tuple[Array, ...]:
+        """Lines of the surface about the frame at coordinates zero, on both sides of it as far as it goes, at most its size at home."""
+        if self.surface is None:
+            return ()
+        ranges = [(max(low, -size), min(high, size)) for (low, high), size in zip(self.ranges, self.sizes, strict=True)]
+        u, v = (np.linspace(*ends, LINES) for ends in ranges)
+        x = np.stack(np.meshgrid(u, v))
+        p = self._here(x)[0] - self.start[:, 3].reshape(3, 1, 1)
+        grid = np.tensordot(p, self.start[:, :3], (0, 0)) / self.unit
+        return (*grid, *grid.swapaxes(0, 1))
 
     def _here(self, x: Array) -> tuple[Array, Array, Array]:
         """Position, axes ``(3, 3, ...)`` and twists about the point ``(6, 2, ...)``, in the frame of the link."""

@@ -17,7 +17,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.model.pair_type import PairType
 from mechgraph.model.row_parts import Freedom
-from mechgraph.show.shapes import ROUND, Shape, ball, frame_along, prism, thread
+from mechgraph.show.shapes import ROUND, Shape, ball, frame_along, polyline, prism, thread
 
 GUIDE, BODY, PIN = 0.95, 0.62, 0.24
 """Radii of guides, of what runs in them, and of pins, over the size of a symbol."""
@@ -26,7 +26,7 @@ PAD = 1.6
 PARALLEL_SINE = 1e-6
 """Sine below which two directions are parallel."""
 
-Role = Literal["guide", "body", "dark"]
+Role = Literal["guide", "body", "dark", "axis"]
 
 
 @dataclass(frozen=True)
@@ -67,8 +67,12 @@ def _line(freedom: Freedom, frame: int, pitch: float) -> Line:
 def symbol(row: PairType, pitch: float, size: float, strokes: Sequence[tuple[float, float]]) -> list[Element]:
     """The pieces of a symbol of half width ``size``; ``strokes`` are least and greatest value of every coordinate."""
     lines = lines_of(row, pitch)
-    groups = [list(part) for _, part in groupby(range(row.f), key=lambda j: lines[j].turns)]
-    slides = [j for j in range(row.f) if not lines[j].turns]
+    drawn = [(step.outline, columns) for step, columns in zip(row.steps, row.factors, strict=True)]
+    bent = {j for outline, columns in drawn if outline for j in columns}
+    groups = [
+        list(part) for _, part in groupby((j for j in range(row.f) if j not in bent), key=lambda j: lines[j].turns)
+    ]
+    slides = [j for j in range(row.f) if not lines[j].turns and j not in bent]
     touches = all(len(part) < 3 for part in groups if not lines[part[0]].turns)
     out = []
     for part in groups:
@@ -80,6 +84,12 @@ def symbol(row: PairType, pitch: float, size: float, strokes: Sequence[tuple[flo
             out += list(
                 _turn_elements([lines[j] for j in part], strokes[part[0]], [lines[j] for j in slides], size, row.f)
             )
+    for outline, columns in drawn:
+        # a curve on link b goes with the frame behind all freedoms
+        frame = row.f if columns and columns[0] and outline else row.frame_before[columns[0]] if columns else 0
+        out += [Element("axis", frame, polyline(line)) for line in outline]
+    if bent and all(j in bent for j in range(row.f)):
+        out.append(Element("body", row.f, prism(4, 0.5 * size, -0.5 * size, 0.5 * size)))
     if not row.f:
         out.append(Element("dark", 0, prism(4, 0.5 * size, -0.5 * size, 0.5 * size)))
     return [Element(e.role, e.frame, e.shape, not touches) for e in out]
