@@ -19,7 +19,7 @@ X, Z = 0, 2
 """Axes of the frame that may be the tangent."""
 
 
-OUTLINE = 181
+CURVE_POINTS = 181
 """Points by which a curve is drawn."""
 
 
@@ -75,7 +75,7 @@ class AlongCurve(Factor):
         """
         if self.curve is None or np.isinf(self.travel.begin):
             return ()
-        x = self.travel.at(np.linspace(self.travel.s[0], self.travel.s[-1], OUTLINE)).x
+        x = self.travel.at(np.linspace(self.travel.s[0], self.travel.s[-1], CURVE_POINTS)).x
         return (((x.T - self.start[:, 3]) / self.unit) @ self.start[:, :3],)
 
     @property

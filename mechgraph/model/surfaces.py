@@ -29,7 +29,7 @@ from mechgraph.units import LENGTH, PURE
 
 NEAREST_GRID = 33
 """Values of each parameter from which the nearest point of a surface is sought."""
-LINES = 9
+SURFACE_LINES = 9
 """Lines each way by which a surface is drawn."""
 NO_ENDS = (-np.inf, np.inf)
 
@@ -399,7 +399,7 @@ class OnSurface(Factor):
         if self.surface is None:
             return ()
         ranges = [(max(low, -size), min(high, size)) for (low, high), size in zip(self.ranges, self.sizes, strict=True)]
-        u, v = (np.linspace(*ends, LINES) for ends in ranges)
+        u, v = (np.linspace(*ends, SURFACE_LINES) for ends in ranges)
         x = np.stack(np.meshgrid(u, v))
         p = self._here(x)[0] - self.start[:, 3].reshape(3, 1, 1)
         grid = np.tensordot(p, self.start[:, :3], (0, 0)) / self.unit
