@@ -50,6 +50,10 @@ class Tracks:
     work: Work
 
 
+SPREAD = 4
+"""Times as many steps as after the first halvings that may be open, for halvings to go on."""
+
+
 class Follower(Marching):
     """Follows the tracks of a problem; see the head of this file."""
 
@@ -194,10 +198,10 @@ class Follower(Marching):
             left, right = nodes.steps
             open_ = ~nodes.sure[right]
             left, right = left[open_], right[open_]
-            # at a jump one half of a step stays open; beside a singular point more and more, which the careful march takes
-            if not left.size or (halvings >= PATH.halvings and left.size > most):
+            # at jumps some more steps are open for a while; beside a singular point twice as many each time, which the careful march takes
+            if not left.size or left.size > SPREAD * most:
                 break
-            most = left.size
+            most = left.size if halvings == PATH.halvings else most
             ok, middle = self._certified(nodes, left, right)
             sure = nodes.sure.copy()
             sure[right[ok]] = True
