@@ -50,7 +50,7 @@ class Tracks:
     work: Work
 
 
-SPREAD = 4
+OPEN_STEPS = 4
 """Times as many steps as after the first halvings that may be open, for halvings to go on."""
 
 
@@ -199,7 +199,7 @@ class Follower(Marching):
             open_ = ~nodes.sure[right]
             left, right = left[open_], right[open_]
             # at jumps some more steps are open for a while; beside a singular point twice as many each time, which the careful march takes
-            if not left.size or left.size > SPREAD * most:
+            if not left.size or left.size > OPEN_STEPS * most:
                 break
             most = left.size if halvings == PATH.halvings else most
             ok, middle = self._certified(nodes, left, right)
