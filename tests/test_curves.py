@@ -282,6 +282,7 @@ def refused(**given):
             {"curve": mg.Curve.helix(radius=1.0, pitch=0.1, frame="guided", guide=(0, 1, 0.1))},
             "is the direction of the curve at",
         ),
+        ({"curve": mg.Curve.helix(radius=1.0, pitch=0.0), "point": (1, 0, 0)}, "pitch = 0: an endless helix advances"),
         ({"curve": "circle"}, "a Curve, such as"),
         ({"curve": mg.Curve.circle(radius=1.0), "type": "R"}, "a pair R takes none; those that do: P, C, Sg"),
         ({"curve": cam(roller_radius=1.0, base_radius=0.3, **LOBES)}, "undercut: the roller of radius 1 is larger"),

@@ -58,6 +58,30 @@ def test_derivatives_of_a_surface_and_its_nearest_point(name):
     assert_allclose(surface.at(*np.array(at)[:, None])[0], x[0], atol=1e-10)
 
 
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize(
+    ("make", "v"),
+    [
+        (lambda L: mg.Surface.cone(half_angle=0.5, center=L * CENTER, axis=AXIS), (1e-4, 0.01, 1.0)),
+        (lambda L: mg.Surface.sphere(radius=L, center=L * CENTER, axis=AXIS), (-1.5707, -1.56, 1.5, 1.57079)),
+        (lambda L: mg.Surface.torus(radius=2 * L, tube=L, axis=AXIS), (-3.0, -1.3, 0.2, 3.1)),
+        (
+            lambda L: mg.Surface.revolution(profile=mg.Curve.circle(center=(3 * L, 0, 0), radius=L, axis=(0, 1, 0))),
+            (2.5, 5.0),
+        ),
+    ],
+    ids=["cone", "sphere", "torus", "revolution"],
+)
+def test_the_nearest_point_beside_a_pole_and_at_any_size(make, v, size):
+    """A point of the surface is its own nearest one, however near it lies to a pole or an apex."""
+    surface = make(size)
+    v = np.array(v) * (size if surface.kind == "cone" else 1.0)
+    for u in (-2.5, 0.1, 3.0):
+        for x in surface.at(np.full(v.shape, u), v)[0].T:
+            found = surface.at(*np.array(surface.nearest(x))[:, None])[0][:, 0]
+            assert np.linalg.norm(found - x) < 1e-12 * size
+
+
 def on(surface, point, symbol="Sp", **more):
     return lambda b: mg.Pair("X", symbol, "frame", b, point=point, surface=surface, **more)
 

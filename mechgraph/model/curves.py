@@ -284,6 +284,12 @@ class Helix(Centred):
         """``sqrt(radius^2 + pitch^2)``."""
         return float(np.hypot(self.radius, self.pitch))
 
+    def faults(self, where: str) -> list[str]:
+        """An endless one that does not advance: it would come back to where it was."""
+        found = super().faults(where)
+        round_ = not found and self.pitch == 0 and self.angles is None
+        return [f"{where}pitch = 0: an endless helix advances; take Curve.circle"] if round_ else found
+
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Involute(Centred):

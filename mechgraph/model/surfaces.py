@@ -82,7 +82,7 @@ class Surface(Described):
             metric = first @ first.T
             bend = np.array([[off @ xuu, off @ xuv], [off @ xuv, off @ xvv]])
             H = metric + bend if np.linalg.eigvalsh(metric + bend)[0] > 0 else metric
-            step = np.linalg.solve(H, first @ off)
+            step = np.linalg.lstsq(H, first @ off)[0]
             at = np.clip(at - step, *np.transpose(self.ends))
             if np.abs(step).max() < 1e-15:
                 break
@@ -94,8 +94,9 @@ class Surface(Described):
 
 
 def _between(ends: tuple[float, float], size: float) -> Array:
-    """Values between two ends, of which infinite ones count as ``size``."""
-    return np.linspace(max(ends[0], -size), min(ends[1], size), NEAREST_GRID)
+    """Middles of equal parts between two ends, of which infinite ones count as ``size``: at the ends there may be no normal."""
+    low, high = (end if np.isfinite(end) else np.copysign(size, end) for end in ends)
+    return low + (high - low) * (np.arange(NEAREST_GRID) + 0.5) / NEAREST_GRID
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -172,9 +173,10 @@ class Turned(AboutAxis):
         return NO_ENDS, NO_ENDS if self._curve.is_closed else self._curve.ends
 
     def grid(self, p: Array) -> tuple[Array, Array]:
-        """A whole turn, and the meridian."""
-        size = 1.0 + 2.0 * float(np.linalg.norm(p - np.asarray(self.center)))
-        u, v = np.meshgrid(np.linspace(0, WHOLE_TURN, NEAREST_GRID), _between(self._curve.ends, size))
+        """A whole turn, and the meridian; of an endless one no farther from where it begins than the point."""
+        center, begin = np.asarray(self.center), self._curve.at(np.zeros(1))[0][:, 0]
+        size = float(np.linalg.norm(p - center) + np.linalg.norm(begin - center))
+        u, v = np.meshgrid(_between((0.0, WHOLE_TURN), size), _between(self._curve.ends, size))
         return u.ravel(), v.ravel()
 
     def _circle(self, radius: float, away: float = 0.0, **more: Any) -> Circle:
