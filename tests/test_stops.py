@@ -186,3 +186,26 @@ def test_stops_of_prescribed_freedoms_are_refused():
     turning = {"A": lambda t: (-t, -1.0, 0.0)}
     with pytest.raises(mg.ResponseError, match="moved against its stop by prescribed motions"):
         mg.respond(square(), (0, 2), motions=turning, stops=mg.Stop("D", lower=-0.5))
+
+
+def bead(**more):
+    """A bead on the lower half of a circle of radius 1, its coordinate the length of the arc."""
+    arc = mg.Curve.circle(radius=1.0, axis=(0, 0, 1), angles=(np.pi, 2 * np.pi))
+    links = [mg.Link("frame"), mg.Link("bead", mass=1.0, center=(-1, 0, 0))]
+    pair = mg.Pair("A", "P", "frame", "bead", point=(-1, 0, 0), axis=(0, -1, 0), curve=arc)
+    m = mg.Mechanism("bead", links, [pair], loads=[mg.Gravity((0, -9.81, 0))])
+    return mg.respond(m, (0, 3), start={"A": 0.3}, rates={"A": 4.0}, **more)
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_the_end_of_a_curve_ends_the_motion():
+    """Where it comes to the end is told, with the speed of the closed form there; a stop before it keeps the bead on the curve."""
+    with pytest.raises(mg.ResponseError, match="is at the end of its curve or surface") as caught:
+        bead()
+    r = caught.value.solution
+    assert r["A"].position[-1, 0] == pytest.approx(np.pi, abs=1e-6)
+    assert r["A"].velocity[-1, 0] == pytest.approx(np.sqrt(16 - 2 * 9.81 * np.sin(0.3)), rel=1e-6)
+    stopped = bead(stops=mg.Stop("A", lower=0.2, upper=3.0, restitution=0.5))
+    assert stopped.events
+    assert (stopped["A"].position <= 3.0 + 1e-9).all()
+    assert stopped.t[-1] == 3.0

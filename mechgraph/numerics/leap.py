@@ -40,6 +40,8 @@ def leapt(follower: Follower, nodes: Nodes) -> tuple[Crossing, Nodes] | None:
     last = last.take(np.arange(max(0, len(last) - NODES), len(last)))
     if len(last) < 3:
         return None
+    if not last.condition[-3:].all():  # without loops nothing is singular
+        return None
     inverse, place = 1.0 / last.condition[-3:], last.place[-3:]
     fall = np.diff(inverse) / np.diff(place)
     if not (fall < 0).all():

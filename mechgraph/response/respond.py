@@ -13,6 +13,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.arguments import items_of, option_faults
 from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.ranges import BEYOND_END, beyond
 from mechgraph.closure.rank import closure_rank
 from mechgraph.closure.solver import ENGINES, EngineName, engine_for
 from mechgraph.errors import AssemblyError, DeclarationError, MechgraphWarning, ResponseError
@@ -34,12 +35,12 @@ from mechgraph.response.along_path import Arc, PathStage
 from mechgraph.response.chart import Stopped
 from mechgraph.response.charts import ChartStage, Task
 from mechgraph.response.course import Course, Response
-from mechgraph.response.events import Occurrence, Watch, read_events
+from mechgraph.response.events import Occurrence, Watch, first_root, read_events
 from mechgraph.response.initial import read_rates, read_start, start_rates, started
 from mechgraph.response.integration import Integration, Stage
 from mechgraph.response.motion_equations import Loads
 from mechgraph.response.prescribed import OVER_POSITIONS, read_motions
-from mechgraph.response.stops import Stops, read_stops
+from mechgraph.response.stops import LOOKS_IN_STEP, Stops, read_stops
 from mechgraph.structure.mobility import free_motion
 from mechgraph.structure.snapping import meant
 
@@ -212,6 +213,7 @@ def _occurrences(
             if progress is not None:
                 progress(segment.end)
             met = stops.met(course, segment.begin, segment.end) if stops.limits else None
+            _end_at_ranges(course, segment.begin, segment.end if met is None else met)
             if met is not None:
                 crowd = crowd + 1 if met - segment.begin < SOON * (end - t) else 0
                 it.cut(met)
@@ -227,6 +229,24 @@ def _occurrences(
         dq, lost, first, found = stops.after(t, x, dq)
         it.done -= lost
         yield from found
+
+
+def _end_at_ranges(course: Course, begin: float, end: float) -> None:
+    """End the motion where a pair comes to the end of its curve or surface."""
+    system = course.task.system
+    columns = system.limits[0]
+    if not columns.size:
+        return
+    looks = begin + (end - begin) * LOOKS_IN_STEP
+    over = beyond(system, course.positions(looks)) - BEYOND_END
+    outside = np.flatnonzero((over > 0.0).any(axis=0))
+    if outside.size:
+        k, first = int(np.argmax(over[:, outside[0]])), int(outside[0])
+        before = looks[first - 1] if first else begin
+        root = first_root(lambda t: beyond(system, course.positions(t))[k] - BEYOND_END, before, looks[first])
+        course.integration.cut(root)
+        name = system.m.freedom_names()[int(columns[k])]
+        raise Stopped(f"{name} is at the end of its curve or surface; give a Stop there, or a longer one")
 
 
 def _first_stage(it: Integration, task: Task, begin: float, x: Array, dq: Array) -> Stage:
