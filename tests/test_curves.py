@@ -257,6 +257,29 @@ def test_the_printed_equations_hold(symbol):
             assert value == pytest.approx(s["X"].components[name][3], rel=1e-8, abs=1e-8 * np.abs(x).max())
 
 
+@pytest.mark.parametrize(
+    ("symbol", "curve"),
+    [("Ps", mg.Curve.circle(radius=0.8, center=CENTER, axis=AXIS)), ("C", SAMPLE["guided"])],
+)
+def test_a_driven_turn_on_a_curve_takes_a_force_with_its_couple(symbol, curve):
+    """Where the frame turns with the travel, the effort dual to the turn in it is a couple and a force: all methods agree."""
+    at = Travel(curve).at(np.array(1.7)).x
+    m = ring(lambda b: mg.Pair("X", symbol, "frame", b, point=at, curve=curve), n=5).replace(drives=["X.Rz"])
+    assert mg.check(m).determinate
+    given = {"X.Rz": mg.Motion(0.05 * T, 1.3, 0.7)}
+    a = mg.solve(m, given)
+    assert np.abs(a["X"].effort[:, 1]).min() > 0.1
+    for method in ("newton_euler", "printed"):
+        b = mg.solve(m, given, method=method)
+        assert b.checks.equilibrium.max() < 1e-12
+        for pair in m.pairs:
+            size = np.abs(a[pair.name].total).max()
+            assert_allclose(b[pair.name].total, a[pair.name].total, atol=1e-10 * size)
+    f = mg.formulate(m)
+    found = dict(zip([u.freedom for u in f.unknowns], f.solve(a.state(3)), strict=True))
+    assert found["X.Rz"] == pytest.approx(a["X"].effort[3, 1], rel=1e-9)
+
+
 # --- what will not do ------------------------------------------------------------------------------------------------
 
 

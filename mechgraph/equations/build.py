@@ -95,6 +95,12 @@ def _components_of(pair: Pair) -> tuple[Component, ...]:
     return tuple(Component(name, (1.0,) * 6) for name in pair.type.component_names)
 
 
+def _effort_of(pair: Pair, j: int) -> Component:
+    """The effort in a freedom; one that is combined with others (a couple then has a force with it) is named only."""
+    part = pair.type.efforts[j]
+    return Component(part.name, (1.0,) * 6) if pair.type.computed_efforts else part
+
+
 def _minimal(draft: _Draft, k: int) -> None:
     act: list[Term] = []
     printed = _along(draft, k, "reactions", _components_of(draft.m.pairs[k]), act)
@@ -144,8 +150,7 @@ def _driver_efforts(draft: _Draft, efforts: tuple[str, ...]) -> None:
         k, j = draft.m.freedom(full)
         pair = draft.m.pairs[k]
         freedom = pair.freedom_names[j]
-        part = pair.type.efforts[j]
-        couple, along = part.is_couple, direction(k, part).letter
+        couple, along = pair.type.efforts[j].is_couple, direction(k, _effort_of(pair, j)).letter
         size = Symbol("M" if couple else "F", "IN", along=along, name="" if len(efforts) == 1 else full)
         unknown = draft.unknown(size, pair.name, "driver", couple, f"effort in {freedom}", freedom)
         _exert(draft, (k, j), unknown, replace(size, letter="F", along="", kind="dual"), "effort", pair.name)
@@ -192,7 +197,7 @@ def _exert(
 ) -> None:
     """The unknown acts as effort in a freedom: ``F_IN = e MA_IN A_1``, ``F_C(g,A.Rz) = 2 e M_C(g) A_1`` with the number of a coupling."""
     k, j = place
-    part = draft.m.pairs[k].type.efforts[j]
+    part = _effort_of(draft.m.pairs[k], j)
     line = direction(k, part)
     draft.carry(draft.acts[k], unknown, draft.screw("efforts", k, j, part, line), coupling)
     draft.driven.append((k, exerted))
