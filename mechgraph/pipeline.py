@@ -146,7 +146,7 @@ class Pipeline:
         free = self.freedoms.undriven
         if len(self.columns) and not self.freedoms.mobility:
             raise structure_error(self.drive.m, self.drive.names)
-        still = np.sqrt((self.freedoms.null[self.columns] ** 2).sum(axis=1)) < PATH.independent
+        still = self.freedoms.still(self.columns)
         if free and still.any() and len(self.columns) <= self.freedoms.mobility:
             names = [name for name, rests in zip(self.drive.names, still, strict=True) if rests]
             raise dead_point_error(self.drive.m, names, self._begin, self._standing())

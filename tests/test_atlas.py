@@ -181,6 +181,8 @@ def test_saved_and_read_again(tmp_path: Path) -> None:
         ({"links": 6, "types": ("Q",)}, "types = 'Q': expected symbols of the pair table"),
         ({"links": 6, "types": ("S",)}, "types 'S': has 3 freedoms; a pair of a chain of family 3 has 1 to 2"),
         ({"links": 6, "types": ()}, "types: is empty"),
+        ({"links": 6, "family": 9}, "family = 9: expected a whole number from 0 to 5"),
+        ({"links": 6, "family": 4, "types": ("S",)}, "types 'S': has 3 freedoms; a pair of a chain of family 4 has 1$"),
     ],
 )
 def test_what_cannot_be_asked(options: dict[str, object], fault: str) -> None:
@@ -197,6 +199,8 @@ def test_a_chain_has_no_gears() -> None:
         ],
         couplings=[mg.Coupling({"A": 1.0, "B": 2.0}, name="mesh")],
     )
+    with pytest.raises(mg.DeclarationError, match=r"family = 7: expected a whole number(.|\n)*couplings mesh"):
+        mg.identify(m, 7)
     with pytest.raises(mg.DeclarationError, match="couplings mesh"):
         mg.identify(m)
 

@@ -18,6 +18,9 @@ T = np.linspace(0.0, 1.0, 7)
 ANGLE = np.linspace(0, 2 * np.pi, 37)
 
 
+TWICE = {"lift": 0.2 * (1 - np.cos(2 * ANGLE)), "slope": 0.4 * np.sin(2 * ANGLE), "bend": 0.8 * np.cos(2 * ANGLE)}
+
+
 def cam(**more):
     lift = {"lift": 0.2 * (1 - np.cos(ANGLE)), "slope": 0.2 * np.sin(ANGLE), "bend": 0.2 * np.cos(ANGLE)}
     return mg.Curve.cam(**{"angle": ANGLE, "base_radius": 1.0, **lift, **more})
@@ -309,12 +312,55 @@ def refused(**given):
         ({"curve": "circle"}, "a Curve, such as"),
         ({"curve": mg.Curve.circle(radius=1.0), "type": "R"}, "a pair R takes none; those that do: P, C, Sg"),
         ({"curve": cam(roller_radius=1.0, base_radius=0.3, **LOBES)}, "undercut: the roller of radius 1 is larger"),
-        ({"curve": cam(follower="flat", base_radius=0.1, bend=-3 * np.cos(ANGLE))}, "has a cusp at"),
+        ({"curve": cam(follower="flat", base_radius=0.1, **TWICE)}, "curve has a cusp at"),
+        ({"curve": cam(slope=-0.2 * np.sin(ANGLE))}, "curve.slope: is not the derivative of lift"),
+        ({"curve": cam(slope=0.2 * np.sin(ANGLE) * np.pi / 180)}, "curve.slope: is not the derivative of lift"),
+        ({"curve": cam(bend=0 * ANGLE)}, "curve.bend: is not the derivative of slope"),
+        ({"curve": mg.Curve.circle(radius=1.0), "type": "Ps", "roller": "wide"}, "curve: roller at fault"),
         ({"curve": cam(lift=ANGLE)}, "lift: is 0 at angle 0 and 6.28319 at 2 pi; the cam is not closed"),
     ],
 )
 def test_curves_that_will_not_do(given, words):
     assert words in refused(**given)
+
+
+def test_a_faulty_curve_is_the_only_fault():
+    """The curve says the axis: one that is at fault asks for no axis as well."""
+    words = refused(type="Ps", curve=mg.Curve.circle(radius=0.0), point=(1, 0, 0))
+    assert words == "mechanism 'm': 1 fault\n  pair 'X': curve.radius = 0.0: expected a finite number above 0"
+
+
+def test_a_cam_is_made_of_a_motion_with_times():
+    for motion in (0.3, mg.Motion([0.0, 0.1])):
+        with pytest.raises(mg.DeclarationError, match=r"motion = .*: expected an mg\.Motion with times"):
+            mg.Curve.cam.of(motion, base_radius=1.0)
+
+
+@pytest.mark.parametrize("bodies", ["P", "C"])
+def test_a_ball_in_an_endless_helix_goes_on_turn_after_turn(bodies):
+    """A ball screw: the nut goes back by the pitch times the angle, the torque is force times pitch, however far it turns."""
+    z, at, pitch = (0, 0, 1), (0.02, 0, 0), 0.01
+    pairs = [
+        mg.Pair("A", "R", "frame", "screw", point=(0, 0, 0), axis=z),
+        mg.Pair("B", bodies, "frame", "nut", point=(0, 0, 0), axis=z),
+        mg.Pair("G", "Sg", "screw", "nut", point=at, curve=mg.Curve.helix(radius=0.02, pitch=pitch)),
+    ]
+    if bodies == "C":
+        pairs.append(mg.Pair("E", "Sp", "frame", "nut", point=(0.03, 0, 0), axis=(0, 1, 0)))
+    m = mg.Mechanism("ball screw", None, pairs, drives=["A"], loads=[mg.Wrench("nut", force=(0, 0, -100), point=at)])
+    angle = np.array([-50.0, -8.0, 7.5, 40.0])
+    s = mg.solve(m, {"A": mg.Motion(angle, 3.0)})
+    assert_allclose(s["B"].position[:, -1], -pitch * angle, atol=1e-11)
+    assert_allclose(s["A"].effort[:, 0], -100 * pitch, rtol=1e-9)
+    assert s.checks.power.max() < 1e-10
+
+
+def test_the_frame_of_an_endless_helix_turns_as_little_as_possible_beyond_its_grid():
+    travel = Travel(mg.Curve.helix(radius=0.8, pitch=0.3))
+    s, step = np.linspace(-9.3, 9.3, 41) * travel.length, 1e-5
+    here, ahead, behind = travel.at(s), travel.at(s + step), travel.at(s - step)
+    turning = ((ahead.y - behind.y) / (2 * step) * here.k).sum(axis=0)
+    assert_allclose(turning, 0.0, atol=1e-8)
 
 
 def test_a_frame_that_comes_back_turned_is_refused_where_roll_is_held():

@@ -252,3 +252,14 @@ def test_a_platform_of_six_legs_has_the_bound_of_forty() -> None:
     found = bound(family)
     assert found is not None
     assert (found.count, family.passive.shape[1], family.fault) == (40, 6, "")
+
+
+def test_a_driver_at_its_dead_point_where_the_mechanism_is_declared_is_named() -> None:
+    """A slide cannot tell which way a stretched slider crank goes; no driver is missing."""
+    pins = {"A": ("frame", "crank", 0), "B": ("crank", "rod", 1), "C": ("rod", "slider", 4)}
+    pairs = [mg.Pair(name, "R", a, b, point=(x, 0, 0), axis=(0, 0, 1)) for name, (a, b, x) in pins.items()]
+    m = mg.Mechanism("stretched", None, [*pairs, mg.Pair("D", "P", "frame", "slider", point=(4, 0, 0), axis=(1, 0, 0))])
+    for ask in (lambda m: mg.assemblies(m, {"D": -1.0}), lambda m: mg.branches(m, "D")):
+        with pytest.raises(mg.DeadPointError, match="dead point where it was assembled: D"):
+            ask(m)
+        assert ask(mg.assemble(m.replace(drives=["A"]), {"A": 0.6}))

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from os import PathLike
 from pathlib import Path
 
-from mechgraph.atlas.chain import Chain
+from mechgraph.atlas.chain import Chain, family_faults
 from mechgraph.atlas.generate import Wanted, chains
-from mechgraph.errors import DeclarationError, FileError
+from mechgraph.errors import DeclarationError, FileError, counted
 from mechgraph.model.pair_table import TABLE
 from mechgraph.quantities import wrong
 from mechgraph.writing import write_whole
@@ -47,18 +47,20 @@ def atlas(
     DeclarationError
         with all faults at once.
     """
-    whole = {"links": (links, 2), "mobility": (mobility, 0), "family": (family, 0), "joints": (joints, 1)}
+    whole = {"links": (links, 2), "mobility": (mobility, 0), "joints": (joints, 1)}
     faults = [
         wrong(value, name, f"a whole number from {least}")
         for name, (value, least) in whole.items()
         if not (name == "joints" and value is None) and not (type(value) is int and value >= least)
     ]
+    faults += family_faults(family)
     symbols = (types,) if isinstance(types, str) else tuple(types)
     faults += [wrong(t, "types", f"symbols of the pair table: {', '.join(TABLE)}") for t in symbols if t not in TABLE]
     if not faults:
         most = 6 - family
+        have = {1: "none", 2: "1"}.get(most, f"1 to {most - 1}")
         faults += [
-            f"types {t!r}: has {TABLE[t].f} freedoms; a pair of a chain of family {family} has 1 to {most - 1}"
+            f"types {t!r}: has {counted(TABLE[t].f, 'freedom')}; a pair of a chain of family {family} has {have}"
             for t in symbols
             if not 0 < TABLE[t].f < most
         ]

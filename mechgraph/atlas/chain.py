@@ -13,12 +13,20 @@ from mechgraph.model.link import Link
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.model.pair_table import TABLE
+from mechgraph.quantities import wrong
 
 if TYPE_CHECKING:
     import networkx as nx
 
 Code = tuple[Any, ...]
 Edge = tuple[int, int, Hashable]
+FAMILIES = range(6)
+"""Freedoms that no link may have, of the six in space."""
+
+
+def family_faults(family: Any) -> list[str]:
+    """What is wrong with a family, one line or none."""
+    return [] if type(family) is int and family in FAMILIES else [wrong(family, "family", "a whole number from 0 to 5")]
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from mechgraph.atlas.atlas import atlas
-from mechgraph.atlas.chain import Chain
+from mechgraph.atlas.chain import Chain, family_faults
 from mechgraph.errors import DeclarationError, counted
 from mechgraph.model.mechanism import Mechanism, check_mechanism
 
@@ -124,15 +124,15 @@ def identify(m: Mechanism, family: int = 3) -> Identity:
     Raises
     ------
     DeclarationError
-        for a mechanism with couplings (gears): a chain has pairs alone.
+        for a mechanism with couplings (gears), since a chain has pairs alone, and for a family that is none.
     """
     check_mechanism(m, "identify")
+    faults = family_faults(family)
     if m.couplings:
         names = ", ".join(c.name for c in m.couplings)
-        raise DeclarationError(
-            f"identify {m.name!r}",
-            [f"couplings {names}: a kinematic chain has pairs alone; put links with lower pairs in their place first"],
-        )
+        faults.append(f"couplings {names}: a kinematic chain has pairs alone; put m.equivalent() in their place first")
+    if faults:
+        raise DeclarationError(f"identify {m.name!r}", faults)
     place = m.link_index
     joints = tuple((place[p.a], place[p.b]) for p in m.pairs)
     chain = Chain(len(m.links), joints, tuple(p.type.symbol for p in m.pairs), family)

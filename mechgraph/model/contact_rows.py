@@ -257,12 +257,13 @@ def curve_faults(row: Any, curve: Curve, curve_b: Any, roller: Any, point: Any, 
     """What is wrong with curves in a row, before they are put in."""
     if not isinstance(row, PairType) or not takes_curves(row):
         return [f"{where}curve: a pair {getattr(row, 'symbol', '?')} takes none; those that do: {', '.join(ROWS)}"]
-    if (
-        not isinstance(curve_b, Curve | None)
-        or not (roller is None or is_numeric(roller, ()))
-        or not (point is None or is_numeric(point, (3,)))
-    ):
-        return [f"{where}curve: curve_b, roller or point is at fault"]
+    fit = {
+        "curve_b": isinstance(curve_b, Curve | None),
+        "roller": roller is None or is_numeric(roller, ()),
+        "point": point is None or is_numeric(point, (3,)),
+    }
+    if not all(fit.values()):
+        return [f"{where}curve: {', '.join(name for name, fits in fit.items() if not fits)} at fault"]
     places = takes_curves(row)
     curves = {name: given for name, given in (("curve", curve), ("curve_b", curve_b)) if given is not None}
     found = [fault for name, given in curves.items() for fault in _of_shape(given, f"{where}{name}.")]

@@ -18,6 +18,7 @@ import numpy as np
 import scipy
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.errors import DeclarationError
 from mechgraph.model.field_format import (
     DIRECTION,
     FLAG,
@@ -32,6 +33,7 @@ from mechgraph.model.field_format import (
     Described,
 )
 from mechgraph.model.numeric import second_direction
+from mechgraph.quantities import wrong
 from mechgraph.units import LENGTH
 
 ORDERS = 4
@@ -505,14 +507,11 @@ class Cam(Centred):
     @classmethod
     def of(cls, motion: Any, base_radius: float, **more: Any) -> Cam:
         """The cam of a ``Motion`` whose times are the angles of the cam, ``mg.Motion.law(..., t=angle)``."""
-        return cls(
-            angle=motion.t,
-            lift=motion.position,
-            slope=motion.velocity,
-            bend=motion.acceleration,
-            base_radius=base_radius,
-            **more,
-        )
+        if getattr(motion, "t", None) is None:
+            wanted = "an mg.Motion with times, which are the angles, such as mg.Motion.law(..., t=angle)"
+            raise DeclarationError("cam", [wrong(motion, "motion", wanted)])
+        rates = {"lift": motion.position, "slope": motion.velocity, "bend": motion.acceleration}
+        return cls(angle=motion.t, base_radius=base_radius, **rates, **more)
 
     @cached_property
     def _lift(self) -> Pieces:
@@ -566,6 +565,12 @@ class Cam(Centred):
         for name, v in zip(names[1:], values, strict=True):
             if abs(v[-1] - v[0]) > 1e-6 * size:
                 found.append(f"{where}{name}: is {v[0]:.6g} at angle 0 and {v[-1]:.6g} at 2 pi; the cam is not closed")
+        if not found:
+            found += [
+                f"{where}{rate}: is not the derivative of {name} by the angle in radians; {name} changes otherwise between the samples"
+                for name, rate, y, dy, most in zip(names[1:], names[2:], values, values[1:], (0.5, 0.8), strict=False)
+                if _strays(angle, y / size, dy / size, most)
+            ]
         if self.follower == "roller" and abs(self.offset) >= self.base_radius + self.roller_radius:
             found.append(f"{where}offset = {self.offset!r}: must be below base_radius + roller_radius")
         if self.follower == "flat" and self.offset:
@@ -573,6 +578,15 @@ class Cam(Centred):
                 f"{where}offset = {self.offset!r}: does not change the shape for a flat follower; leave it out"
             )
         return found
+
+
+def _strays(u: Array, y: Array, rate: Array, most: float) -> bool:
+    """Whether samples change otherwise than the mean of the rates at both ends of each interval, by more than the part ``most`` in all.
+
+    Between coarse samples, and where a bend jumps, true rates stray too; of another unit, sign, or left zero they stray by 1 and more.
+    """
+    change, y = np.diff(u) * (rate[1:] + rate[:-1]) / 2, np.diff(y)
+    return bool(np.abs(y - change).sum() > most * max(np.abs(y).sum(), np.abs(change).sum()) + 1e-6)
 
 
 CURVES: dict[str, type[Curve]] = {

@@ -272,11 +272,10 @@ class Belt(Contact):
         """See ``Contact``."""
         if np.abs(cross(axes.za, axes.zb)).max() > fitting:
             return ["the axes are not parallel"]
-        distance, needed = (
-            float(np.linalg.norm(axes.across)),
-            abs(self.radii[0] + (1 if self.crossed else -1) * self.radii[1]),
-        )
-        return [] if distance > needed else [f"the axes are {distance:.7g} apart; expected more than {needed:.7g}"]
+        distance, needed = float(np.linalg.norm(axes.across)), sum(self.radii)
+        if distance > needed:
+            return []
+        return [f"the axes are {distance:.7g} apart, and the pulleys overlap; expected more than {needed:.7g}"]
 
     def lines(self, axes: Axes) -> Lines:
         """See ``Contact``."""

@@ -298,7 +298,8 @@ class Pair(Described):
         ]
         if isinstance(self.a, str) and isinstance(self.b, str) and self.a == self.b:
             found.append(f"{where}joins link {self.a!r} to itself; a pair joins two links")
-        found += [*self._pitch_faults(where), *self._contact_faults(where), *self._curve_faults(where, tol or 0.0)]
+        curved = [*self._curve_faults(where, tol or 0.0)]
+        found += [*self._pitch_faults(where), *self._contact_faults(where), *curved]
         most = largest_cosine(tol) if self.type.square_second else PARALLEL_COSINE
         if (self.on_a is None) != (self.on_b is None):
             missing = "on_b" if self.on_b is None else "on_a"
@@ -314,7 +315,7 @@ class Pair(Described):
         elif self.has_geometry:
             if self.point is None:
                 found.append(f"{where}has an axis but no point; give point=(x, y, z)")
-            if self.axis is None:
+            if self.axis is None and not curved:  # a curve or a surface in order says the axis
                 found.append(f"{where}has a point but no axis; type {self.type.symbol} needs axis=(x, y, z)")
             if self.point is not None and self.axis is not None:
                 found += Marker(self.point, self.axis, self.second).faults(where, most)
@@ -327,8 +328,9 @@ class Pair(Described):
             said = [name for name, value in given.items() if value is not None]
             said += ["closed"] if self.closed == "force" else []
             if said:
-                have = ", ".join(symbol for symbol, row in TABLE.items() if row.touching)
-                yield f"{where}{', '.join(said)}: type {self.type.symbol} is no contact of two elements; {have} are"
+                have = ", ".join(symbol for symbol, row in {**TABLE, **ROWS}.items() if row.touching)
+                here = " on a surface" if self.surface is not None else ""
+                yield f"{where}{', '.join(said)}: type {self.type.symbol}{here} is no contact of two elements; {have} are"
             return
         if self.radius is not None:
             yield self.formats["radius"].fault(self.radius, f"{where}radius")

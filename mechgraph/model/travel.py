@@ -109,7 +109,7 @@ class Travel:
         return np.asarray(u + beyond * _parameter_rates(self.curve.at(u))[0]) if np.any(beyond) else u
 
     def _rounds(self, s: Array) -> Array:
-        return np.floor((s - self.begin) / self.length)
+        return np.floor((s - self.s[0]) / self.length)
 
     def _rates(self, u: Array) -> tuple[Array, Array, Array, Array]:
         """Position and its first three derivatives by the arc length, ``(3, ...)`` each."""
@@ -145,8 +145,11 @@ class Travel:
         if not self.minimizing:
             w, dw = w + r * t, dw + dr * t + r * dt
         if self._turn is not None:
-            rounds = self._rounds(s.real) if self.is_closed else np.zeros(s.shape)
-            a = self._turn.at(s.real - rounds * self.length, 1)[0] + rounds * self.closing - (s - s.real) * r
+            again = self.is_closed or np.isinf(
+                self.begin
+            )  # endless curves repeat what the grid holds, two turns of a helix
+            rounds = self._rounds(s.real) if again else np.zeros(s.shape)
+            a = self._turn.at(s.real - rounds * self.length, 1)[0] + rounds * self._gain - (s - s.real) * r
             y, k = np.cos(a) * y + np.sin(a) * k, np.cos(a) * k - np.sin(a) * y
         return Place(x, t, dt, y, k, w, dw)
 
@@ -163,7 +166,8 @@ class Travel:
             if not bad.any():
                 break
             s = np.sort(np.concatenate([s, middle[bad]]))
-        self.closing = float(a[-1]) if self.is_closed else 0.0
+        self._gain = float(a[-1])
+        self.closing = self._gain if self.is_closed else 0.0
 
     def _turn_rate(self, s: Array, dr: Array) -> Array:
         """``r''``, of which the fourth derivative of the curve is part: by a complex step, or a spline where that is not known."""
@@ -260,13 +264,13 @@ def _far_from(t: Array) -> Array:
 
 def shape_faults(curve: Curve, where: str) -> list[str]:
     """Places where a curve cannot be followed: cusps, gaps of one that must be closed, a guide along the tangent."""
-    x = curve.at(curve.breaks)
+    x, name = curve.at(curve.breaks), where.removesuffix(".")
     v = np.sqrt(_dot(x[1], x[1]))
     turns = _dot(x[1][:, 1:], x[1][:, :-1]) <= 0
     slow = np.flatnonzero((v < STANDSTILL * v.max()) | np.append(turns, False))
     if slow.size:
         return [
-            f"{where}has a cusp at {_point(x[0][:, slow[0]])} (parameter {curve.breaks[slow[0]]:.6g}); end it before that"
+            f"{name} has a cusp at {_point(x[0][:, slow[0]])} (parameter {curve.breaks[slow[0]]:.6g}); end it before that"
         ]
     if curve.roller:
         found = roller_faults(curve, curve.roller, "undercut: ", where)
@@ -277,7 +281,7 @@ def shape_faults(curve: Curve, where: str) -> list[str]:
     gap, turn = np.linalg.norm(x[0][:, -1] - x[0][:, 0]), np.linalg.norm(x[1][:, -1] / v[-1] - x[1][:, 0] / v[0])
     if gap > 1e3 * CLOSED_GAP * np.ptp(x[0], axis=1).max() or turn > 1e-6:
         return [
-            f"{where}is not closed: its ends are {gap:.3g} apart, their tangents differ by {turn:.3g} rad; let it end where it begins, "
+            f"{name} is not closed: its ends are {gap:.3g} apart, their tangents differ by {turn:.3g} rad; let it end where it begins, "
             "or declare it open"
         ]
     return _guide_faults(curve, x[1] / v, x[0], where)

@@ -13,7 +13,7 @@ from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.family import Array, Family
-from mechgraph.report.refused import undriven_error
+from mechgraph.report.refused import dead_point_error, undriven_error
 from mechgraph.structure.mobility import free_motion
 
 
@@ -25,7 +25,7 @@ class Question:
 
     Raises
     ------
-    DeclarationError, AssemblyError, IndeterminateError
+    DeclarationError, AssemblyError, IndeterminateError, DeadPointError
     """
 
     def __init__(self, m: Mechanism, values: Mapping[str, Any] | None) -> None:
@@ -47,7 +47,14 @@ class Question:
         self.drive = self.values / self.unit[:, None]
         self.freedoms = free_motion(self.system, self.x, self.columns)
         if self.freedoms.undriven and (self.family.unknowns > self.family.rank or self.family.fault):
-            raise undriven_error(self.m, self.freedoms.undriven)
+            self._refuse()
+
+    def _refuse(self) -> None:
+        """What is given leaves motions free where the mechanism is declared, from where the class is read."""
+        names = [name for name, rests in zip(self.names, self.freedoms.still(self.columns), strict=True) if rests]
+        if names and len(self.names) <= self.freedoms.mobility:
+            raise dead_point_error(self.m, names, {name: self.m.start.get(name, 0.0) for name in names}, None)
+        raise undriven_error(self.m, self.freedoms.undriven)
 
     @cached_property
     def family(self) -> Family:

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
@@ -62,6 +63,10 @@ class Freedoms:
             return self.null
         P, _ = np.linalg.qr(np.stack([p.rates for p in self.passive], axis=1))
         return np.asarray(self.null - P @ (P.T @ self.null))
+
+    def still(self, columns: Index) -> NDArray[np.bool_]:
+        """Which of the drivers ``columns`` stand still in all motions, as at a dead point."""
+        return np.asarray(np.linalg.norm(self.null[columns], axis=1) < PATH.independent)
 
     def leading(self, columns: Index) -> Index:
         """Places of the drivers that lead among ``columns``: as many as can move independently, taken in their order."""
