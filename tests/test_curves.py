@@ -426,3 +426,13 @@ def test_curves_and_surfaces_are_drawn_where_they_are():
     marker = ball.markers[0].pose()
     assert_allclose(np.linalg.norm(grid @ marker[:, :3].T + marker[:, 3], axis=1), 1, atol=1e-12)
     assert not any(e.role == "guide" for e in drawn)
+
+
+def test_an_endless_helix_is_drawn_a_turn_to_either_side():
+    helix, at = mg.Curve.helix(radius=0.5, pitch=0.1), np.array([0.5, 0, 0.2 * np.pi * 3])
+    pair = mg.Pair("X", "Sg", "a", "b", point=at, curve=helix)
+    (line,) = (e for e in symbol(pair.type, 0.0, 0.1, [(-1, 1)] * 4) if e.role == "axis")
+    marker = pair.markers[0].pose()
+    x = line.shape.vertices @ marker[:, :3].T + marker[:, 3] - at
+    assert_allclose(x[[0, len(x) // 2, -1]], [[0, 0, -0.2 * np.pi], [0, 0, 0], [0, 0, 0.2 * np.pi]], atol=0.02)
+    assert_allclose(np.hypot(x[:, 0] + 0.5, x[:, 1]), 0.5, atol=1e-12)

@@ -71,11 +71,12 @@ class AlongCurve(Factor):
     def outline(self) -> tuple[Array, ...]:
         """The curve, seen from the frame at coordinate zero: the one before the factor, or on the side of link b the one behind it.
 
-        Endless ones have none.
+        Endless lines have none; of an endless helix it is one turn to either side.
         """
-        if self.curve is None or np.isinf(self.travel.begin):
+        if self.curve is None or ((endless := np.isinf(self.travel.begin)) and self.travel.is_plane):
             return ()
-        x = self.travel.at(np.linspace(self.travel.s[0], self.travel.s[-1], CURVE_POINTS)).x
+        s = np.linspace(self.travel.s[0], self.travel.s[-1], CURVE_POINTS) + (self.home if endless else 0.0)
+        x = self.travel.at(s).x
         return (((x.T - self.start[:, 3]) / self.unit) @ self.start[:, :3],)
 
     @property
