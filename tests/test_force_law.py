@@ -211,7 +211,7 @@ def test_other_units() -> None:
     np.testing.assert_allclose(effort(mm, 1e3 * AT, 2.0), 1e-3 * effort(m, AT, 2.0))
     turn = wheel(mg.ForceLaw("A", law=mg.ForceTable(x=[-1, 1], force=[3, -3]))).replace(units=SI)
     assert turn.to_units(length="mm").loads[0].law == mg.ForceTable(x=[-1, 1], force=[3e6, -3e6])  # type: ignore[union-attr]
-    with pytest.raises(mg.DeclarationError, match="law of a load is a callable"):
+    with pytest.raises(mg.DeclarationError, match="law of a ForceLaw is a callable"):
         block(mg.ForceLaw("P", law=len), units=SI).to_units(length="mm")
 
 

@@ -206,9 +206,8 @@ class Described(Formatted):
             if isinstance(value, Described):
                 changes[name] = value.in_units(base, turns)
             elif callable(value):
-                raise DeclarationError(
-                    "to_units", [f"{name} of a load is a callable; convert it yourself, or sample it first"]
-                )
+                what = f"{name} of a {type(self).__name__}"
+                raise DeclarationError("to_units", [f"{what} is a callable; convert it yourself, or sample it first"])
             elif value is not None and about.kind.numeric:
                 factor = factor_of(about.turn if turns else about.slide, base)
                 if factor != 1.0 and not isinstance(value, str):
