@@ -190,14 +190,14 @@ def bent(seed):
     return strategies.with_curves(strategies.closed_mechanism(seed), seed)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.seeds(4)
 def test_random_mechanisms_with_curves(seed):
     """The Jacobian, its rate, and what they are made of, by complex step; reactions do no work, efforts are dual to the freedoms."""
     system, x = closed(bent(seed), seed, 0.02)
     holds(system, x, seed)
 
 
-@pytest.mark.parametrize("seed", [3, 4, 8, 9, 12])
+@pytest.mark.parametrize("seed", [4, 8, 12])
 def test_random_mechanisms_with_curves_at_work(seed):
     """Both engines and both methods agree, power balances, and a position does not depend on which others are asked for."""
     m = strategies.with_drives(bent(seed), seed)

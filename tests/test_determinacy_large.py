@@ -198,7 +198,7 @@ def test_lattice_reports_do_not_depend_on_the_engine(kind: str, links: int) -> N
     assert_same_report(LATTICES[kind](links))
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(st.integers(0, 10**6))
 @example(64911)  # near a dead point
 def test_random_reports_do_not_depend_on_the_engine(seed: int) -> None:

@@ -28,7 +28,9 @@ Picture = Annotated[
 def assemblies(mechanism: Named, at: At = None, out: Picture = None, json: AsJson = False) -> None:
     """Find all real assemblies with drivers at given values, and say how sure it is that these are all.
 
-    Without --at the declared drives stay at their start. Example: mechgraph assemblies 7r --at O1=30deg
+    Without --at the declared drives stay at their start.
+
+    Example: mechgraph assemblies four-bar --at A=30deg
 
     Exit status: 0 done; 1 where there is no real assembly; 2 wrong usage or bad input.
     """

@@ -132,9 +132,9 @@ def takes_curves(row: PairType) -> tuple[AlongCurve, ...]:
     return tuple(step for step in row.steps if isinstance(step, AlongCurve))
 
 
-def travels(row: PairType) -> bool:
+def travels(row: Any) -> bool:
     """Whether a row has a place for a curve or a surface."""
-    return any(isinstance(step, AlongCurve | OnSurface) for step in row.steps)
+    return isinstance(row, PairType) and any(isinstance(step, AlongCurve | OnSurface) for step in row.steps)
 
 
 def on_surface(row: PairType, surface: Surface, point: Sequence[float] | None, axis: Sequence[float] | None) -> Contact:

@@ -60,7 +60,7 @@ class LoopFamily:
     locked: tuple[str, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Families:
     """The families of a mechanism, the counts made of them, and the mobility by rank.
 
@@ -83,6 +83,9 @@ class Families:
     welded: tuple[int, int, int, int, int]
     mobility: int
     passive: int
+
+    def __repr__(self) -> str:
+        return f"Families(family {self.family}, Dobrovolski {self.dobrovolski}, mobility by rank {self.mobility})"
 
     @property
     def dobrovolski(self) -> int:

@@ -1,5 +1,7 @@
 """Identities of the pair table, for every row of it and for rows of a user. Frames are A (marker on a) and B (marker on b)."""
 
+from copy import copy
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -96,7 +98,9 @@ def test_rows_of_the_table_pass_the_checks_of_a_user_row(row):
         directed=row.directed,
         square_second=row.square_second,
     )
-    assert tried == row
+    told = copy(row)
+    object.__setattr__(told, "touching", None)  # contacts are told by the table alone
+    assert tried == told
 
 
 @each_row

@@ -205,8 +205,7 @@ def carried_ring(kind):
     return mg.Mechanism("ring", None, pairs, ["A"], couplings=gears)
 
 
-@pytest.mark.parametrize("engine", ["dense", "sparse"])
-@pytest.mark.parametrize("kind", ["C", "E"])
+@pytest.mark.parametrize(("kind", "engine"), [("C", "dense"), ("E", "sparse")])
 def test_links_with_several_passive_motions(kind, engine):
     """At rest in all of them, at the same place for any positions, far ones too; no spin, and no slide of the point on the axis."""
     m = carried_ring(kind)
