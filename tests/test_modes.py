@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -263,3 +264,10 @@ def test_a_driver_at_its_dead_point_where_the_mechanism_is_declared_is_named() -
         with pytest.raises(mg.DeadPointError, match="dead point where it was assembled: D"):
             ask(m)
         assert ask(mg.assemble(m.replace(drives=["A"]), {"A": 0.6}))
+
+
+def test_the_table_of_assemblies_shows_their_coordinates() -> None:
+    modes = mg.assemblies(mg.load("four-bar"), {"A": 0.3})
+    for i, mode in enumerate(modes):
+        angles = " +".join(f"{np.rad2deg(mode.start[name]):.6g}" for name in ("B.Rz", "C.Rz", "D.Rz"))
+        assert re.search(rf"^{i} +{angles} +regular", str(modes), re.MULTILINE)

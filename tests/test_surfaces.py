@@ -179,3 +179,19 @@ def test_surfaces_that_will_not_do(given, words):
 
 def test_a_place_for_a_surface_counts_as_a_row():
     assert len(OnSurface().freedoms) == 2
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+def test_a_point_may_miss_its_surface_by_a_part_of_its_size(size):
+    """Whatever the unit of length: a millionth, no more."""
+
+    def ball(off):
+        point = (size * (1 + off), 0.0, 0.0)
+        return mg.Pair("E", "Sp", "f", "b", point=point, surface=mg.Surface.sphere(radius=size))
+
+    assert mg.Mechanism("on", pairs=[ball(1e-7)]).pairs
+    with pytest.raises(mg.DeclarationError, match="off its surface"):
+        mg.Mechanism("off", pairs=[ball(1e-5)])
+    assert mg.Mechanism(
+        "plane", pairs=[mg.Pair("E", "Sp", "f", "b", point=(0, 0, 1e-17), surface=mg.Surface.plane())]
+    ).pairs

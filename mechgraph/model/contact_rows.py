@@ -24,6 +24,7 @@ from mechgraph.model.row_parts import Touching
 from mechgraph.model.surfaces import OnSurface, Surface
 from mechgraph.model.travel import Travel, outside, roller_faults, shape_faults
 from mechgraph.quantities import is_numeric
+from mechgraph.units import LENGTH
 
 ALONG, FOLLOWING = AlongCurve("Ts", Z), AlongCurve("Ts", X)
 """Places for a curve on link a, along z and along x of the frame."""
@@ -31,6 +32,8 @@ BESIDE = AlongCurve("Tsb", X, back=True)
 """A place for a curve on link b."""
 OFF_CURVE = 1e-6
 """Part of the extent of a curve, or angle, by which the contact may miss it."""
+UNIT_ROUNDING = 1e-12
+"""Miss (in the unit of length) that is rounding at any size of a mechanism, as of a point in a plane through the origin."""
 PLACE_STEP = 1e-12
 """Part of its length to which a place on a curve is rounded, so that the place of that place is the same."""
 TRIED_PLACES = 16
@@ -297,7 +300,11 @@ def _of_shape(curve: Curve, where: str) -> list[str]:
 
 def surface_miss(contact: Contact, tol: float, where: str) -> Iterator[str]:
     """A contact that is not on its surface."""
-    size = 1.0 + float(np.linalg.norm(contact.marker[:, 3]))
+    surface = next(
+        step.surface for step in contact.row.steps if isinstance(step, OnSurface) and step.surface is not None
+    )
+    lengths = [np.abs(getattr(surface, name)).max() for name, of in surface.formats.items() if of.slide == LENGTH]
+    size = max(float(np.linalg.norm(contact.marker[:, 3])), *lengths, UNIT_ROUNDING / OFF_CURVE)
     if contact.misses[0] > max(OFF_CURVE, tol) * size:
         at = ", ".join(f"{v:.6g}" for v in contact.marker[:, 3])
         yield (

@@ -12,7 +12,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, TypeVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import scipy
@@ -33,6 +33,7 @@ from mechgraph.model.field_format import (
     Described,
 )
 from mechgraph.model.numeric import second_direction
+from mechgraph.model.once import Once
 from mechgraph.quantities import wrong
 from mechgraph.units import LENGTH
 
@@ -43,11 +44,9 @@ CLOSED_GAP = 1e-9
 WHOLE_TURN = 2.0 * np.pi
 FRAMES = ("minimizing", "guided")
 
-Made = TypeVar("Made")
-
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Curve(Described):
+class Curve(Described, Once):
     """A curve in the frame of a link; ``Curve.circle(...)`` and so on make one.
 
     Its frame has the tangent as one direction. ``minimizing`` turns as little as possible about it (a plane curve keeps its normal);
@@ -115,17 +114,6 @@ class Curve(Described):
     def roller(self) -> float:
         """Radius of the roller whose centre the curve is the path of, on the outside of the shape."""
         return 0.0
-
-    def once(self, make: Callable[[Any], Made]) -> Made:
-        """``make(self)``, made once and kept."""
-        if make not in self._kept:
-            self._kept[make] = make(self)
-        made: Made = self._kept[make]
-        return made
-
-    @cached_property
-    def _kept(self) -> dict[Callable[..., Any], Any]:
-        return {}
 
     def faults(self, where: str) -> list[str]:
         """What is wrong with what is declared, one line each."""

@@ -7,9 +7,8 @@ import importlib
 import itertools
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +23,7 @@ from mechgraph.model.drive import Drive
 from mechgraph.model.link import Link
 from mechgraph.model.load_base import Load
 from mechgraph.model.numeric import plain, same_fields
+from mechgraph.model.once import Once
 from mechgraph.model.pair import Pair
 from mechgraph.model.pair_type import PairType
 from mechgraph.model.parts import Parts
@@ -31,11 +31,9 @@ from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.quantities import is_numeric, shown, wrong
 from mechgraph.units import base_factors
 
-Made = TypeVar("Made")
-
 
 @dataclass(frozen=True, eq=False)
-class Mechanism(Parts, Shown):
+class Mechanism(Parts, Once, Shown):
     """A mechanism: a graph whose nodes are links and whose edges are kinematic pairs.
 
     Parameters
@@ -165,17 +163,6 @@ class Mechanism(Parts, Shown):
     def freedom_names(self) -> tuple[str, ...]:
         """Full names of all freedoms, ``"B.Tz"``, in the order of the pairs."""
         return self.once(Parts.freedom_names)
-
-    def once(self, make: Callable[[Mechanism], Made]) -> Made:
-        """``make(self)`` of a function of links, pairs, couplings and frame alone: made once and kept, for copies with other drives too."""
-        if make not in self._kept:
-            self._kept[make] = make(self)
-        made: Made = self._kept[make]
-        return made
-
-    @cached_property
-    def _kept(self) -> dict[Callable[..., Any], Any]:
-        return {}
 
     # --- changed copies ----------------------------------------------------------------------------------------------
 

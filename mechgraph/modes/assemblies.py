@@ -42,6 +42,8 @@ GUESSES = 400
 """Random guesses where no class is known."""
 GUESSED_TURNS = 1.0
 """Turns on either side of the start within which angles are guessed."""
+COORDINATES = 5
+"""Most coordinates of an assembly in its table; all are in ``start`` of the mode."""
 ORDER = 1e-7
 """Difference of link poses (and coordinates) below which the next number decides the order of assemblies."""
 
@@ -104,15 +106,26 @@ class Assemblies(Shown, Sequence[Mechanism]):
     def document(self) -> Document:
         """A table of the assemblies, and how sure it is that these are all."""
         m = self.mechanism
-        angles = [i for i, name in enumerate(m.freedom_names()) if self.coordinates.shape[1] > i and "." not in name]
-        names = [m.freedom_names()[i] for i in angles]
+        single = [
+            name for pair in m.pairs for name, one in zip(pair.freedom_names, pair.type.drivable, strict=True) if one
+        ]
+        shown = [name for name in single if name not in self.at][:COORDINATES]
+        places = [m.freedom_names().index(name) for name in shown]
+        units = [180.0 / np.pi if m.turns(name) else 1.0 for name in shown]
+        names = [f"{name} [deg]" if m.turns(name) else name for name in shown]
         header = ("mode", *names, "kind", "condition", "certificate")
         rows = []
         for i, kind in enumerate(self.kinds):
             sure = self.certificates[i]
             word = "none" if sure is None else f"unique within {sure.radius:.2g}" if sure.proved else "not proved"
             rows.append(
-                (str(i), *(f"{self.coordinates[i, k]:.6g}" for k in angles), kind, f"{self.condition[i]:.3g}", word)
+                (
+                    str(i),
+                    *(f"{u * self.coordinates[i, k]:.6g}" for k, u in zip(places, units, strict=True)),
+                    kind,
+                    f"{self.condition[i]:.3g}",
+                    word,
+                )
             )
         at = ", ".join(f"{name} = {value:.6g}" for name, value in self.at.items())
         title = f"{m.name}: {counted(len(self), 'mode')} at {at}"
