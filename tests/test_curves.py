@@ -10,7 +10,7 @@ from identities.test_engines import assert_engines_agree
 from numpy.testing import assert_allclose
 
 import mechgraph as mg
-from mechgraph.model.curves import CURVES
+from mechgraph.model.given_curves import CURVES
 from mechgraph.model.travel import Travel
 from mechgraph.show.symbols import symbol
 

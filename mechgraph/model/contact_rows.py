@@ -18,10 +18,11 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.model.along_curve import AlongCurve, Beside, X, Z
 from mechgraph.model.curves import Curve, Line
+from mechgraph.model.on_surface import OnSurface
 from mechgraph.model.pair_table import TABLE
 from mechgraph.model.pair_type import PairType, fill_row
 from mechgraph.model.row_parts import Touching
-from mechgraph.model.surfaces import OnSurface, Surface
+from mechgraph.model.surfaces import Surface
 from mechgraph.model.travel import Travel, outside, roller_faults, shape_faults
 from mechgraph.quantities import is_numeric
 from mechgraph.units import LENGTH

@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from mechgraph.model.curves import CURVES, Function
 from mechgraph.model.drive import Drive
 from mechgraph.model.event import Event
 from mechgraph.model.field_format import (
@@ -28,6 +27,8 @@ from mechgraph.model.field_format import (
 )
 from mechgraph.model.force_table import ForceTable
 from mechgraph.model.gears import COUPLINGS
+from mechgraph.model.given_curves import CURVES, Function
+from mechgraph.model.given_surfaces import SURFACES, ByFunction
 from mechgraph.model.hertz import Hertz
 from mechgraph.model.link import Link
 from mechgraph.model.load import LOADS
@@ -38,7 +39,6 @@ from mechgraph.model.pair_type import PairType
 from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.model.row_parts import Bookkeeping, Component, Freedom
 from mechgraph.model.stop import Stop
-from mechgraph.model.surfaces import SURFACES, ByFunction
 from mechgraph.units import BASE_UNITS, LENGTH
 
 WRITABLE = {kind: curve for kind, curve in CURVES.items() if curve is not Function}

@@ -1,4 +1,4 @@
-"""Surfaces on which a point or the centre of a sphere travels, by two parameters; and the factor of a frame that lies on one.
+"""Surfaces on which a point or the centre of a sphere travels, by two parameters: what they share, and those about an axis.
 
     x(u, v): position in the frame of the link that bears the surface, with its first and second derivatives.
 
@@ -8,29 +8,22 @@ The normal is ``x_u x x_v``. Arguments may be complex, as in all kernels.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Hashable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-import scipy
 
 from mechgraph.algebra.se3 import Array, cross
 from mechgraph.model.curves import WHOLE_TURN, Circle, Curve, Line, remade_from
-from mechgraph.model.factors import Factor
-from mechgraph.model.field_format import DIRECTION, FUNCTION, INTEGER, INTERVAL, POINT, POINT_LIST, POSITIVE, Described
+from mechgraph.model.field_format import DIRECTION, POINT, POSITIVE, Described
 from mechgraph.model.field_format import TABLE as NESTED
 from mechgraph.model.numeric import second_direction
-from mechgraph.model.row_parts import UNIT_TWISTS, Freedom
-from mechgraph.model.travel import COMPLEX_STEP
 from mechgraph.quantities import wrong
 from mechgraph.units import LENGTH, PURE
 
 NEAREST_GRID = 33
 """Values of each parameter from which the nearest point of a surface is sought."""
-SURFACE_LINES = 9
-"""Lines each way by which a surface is drawn."""
 NO_ENDS = (-np.inf, np.inf)
 
 
@@ -274,186 +267,3 @@ class Revolution(Turned):
         if not isinstance(self.profile, Curve):
             return [wrong(self.profile, where + "profile", "a Curve")]
         return super().faults(where) + self.profile.faults(f"{where}profile.")
-
-
-def _ahead(known: Array, u: Array, v: Array) -> Array:
-    """Position and derivatives at complex parameters from ten up to the third at their real parts, by Taylor's series."""
-    if not (np.iscomplexobj(u) or np.iscomplexobj(v)):
-        return known[:6]
-    by_u, by_v = known[[1, 3, 4, 6, 7, 8]], known[[2, 4, 5, 7, 8, 9]]
-    return np.asarray(known[:6] + 1j * (u.imag * by_u + v.imag * by_v))
-
-
-ORDERS_UV = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3))
-"""Derivatives by u and v, in their order."""
-
-
-@dataclass(frozen=True, kw_only=True, repr=False)
-class Patch(Surface):
-    """The surface through a grid of points: a spline of degree 5 (3 where there are few) in both directions, parameters 0 to 1."""
-
-    kind = "patch"
-    points: Annotated[Any, POINT_LIST("points, row by row", LENGTH)]
-    rows: Annotated[int, INTEGER("number of rows; u counts them")]
-
-    @cached_property
-    def _splines(self) -> tuple[Any, list[Any]]:
-        grid = np.array(self.points).reshape(self.rows, -1, 3)
-        n, m = grid.shape[:2]
-        u, v = np.linspace(0, 1, n), np.linspace(0, 1, m)
-        bases = [scipy.interpolate.make_interp_spline(at, np.eye(len(at)), 5 if len(at) > 5 else 3) for at in (u, v)]
-        return grid, [[basis.derivative(k) if k else basis for k in range(4)] for basis in bases]
-
-    def at(self, u: Array, v: Array) -> Array:
-        """The spline."""
-        grid, (along_u, along_v) = self._splines
-        U, V = (
-            [one(np.asarray(at.real, dtype=float).ravel()) for one in basis]
-            for basis, at in ((along_u, u), (along_v, v))
-        )
-        known = np.stack([np.einsum("ti,tj,ijc->ct", U[i], V[j], grid, optimize=True) for i, j in ORDERS_UV])
-        return _ahead(known.reshape(10, 3, *u.shape), u, v)
-
-    @property
-    def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """The edges."""
-        return (0.0, 1.0), (0.0, 1.0)
-
-    def faults(self, where: str) -> list[str]:
-        """A grid that makes no surface."""
-        found = super().faults(where)
-        n = len(self.points) if not found else 0
-        if not found and (self.rows < 4 or n % self.rows or n // self.rows < 4):
-            found.append(f"{where}rows = {self.rows}: {n} points make no grid of 4 or more rows and columns")
-        return found
-
-
-@dataclass(frozen=True, kw_only=True, repr=False)
-class ByFunction(Surface):
-    """A surface by a function of ``u, v (n,)``: position and its nine derivatives up to the third, ``x, x_u, x_v, x_uu, x_uv, ...``."""
-
-    kind = "function"
-    position: Annotated[
-        Any, FUNCTION("u, v -> ten arrays (3, n): x, x_u, x_v, x_uu, x_uv, x_vv, x_uuu, x_uuv, x_uvv, x_vvv")
-    ]
-    ends_u: Annotated[Any, INTERVAL("least and greatest u")]
-    ends_v: Annotated[Any, INTERVAL("least and greatest v")]
-
-    def at(self, u: Array, v: Array) -> Array:
-        """What the function returns."""
-        given = self.position(*(np.asarray(at.real, dtype=float).ravel() for at in (u, v)))
-        known = np.stack([np.broadcast_to(part, (3, u.size)) for part in given])
-        return _ahead(known.reshape(10, 3, *u.shape), u, v)
-
-    @property
-    def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """As declared."""
-        return tuple(self.ends_u), tuple(self.ends_v)
-
-
-SURFACES: dict[str, type[Surface]] = {
-    kind.kind: kind for kind in (Plane, Sphere, Cylinder, Cone, Torus, Revolution, Patch, ByFunction)
-}
-"""Surfaces by the names that they have in files."""
-Surface.plane, Surface.sphere, Surface.cylinder, Surface.cone = Plane, Sphere, Cylinder, Cone
-Surface.torus, Surface.revolution, Surface.patch, Surface.function = Torus, Revolution, Patch, ByFunction
-
-
-@dataclass(frozen=True)
-class OnSurface(Factor):
-    """A frame that lies on a surface: z its normal, x along u; coordinates are lengths along u and v where they are zero.
-
-    D(q) = F(home)^-1 F(home + q / sizes), ``sizes`` being ``|x_u|`` and ``|x_v|`` at home; ``turned`` has the normal the other way round.
-    Without a surface it is a place for one: it can be counted, not evaluated.
-    """
-
-    surface: Surface | None = None
-    home: tuple[float, float] = (0.0, 0.0)
-    turned: bool = False
-    unit: float = 1.0
-
-    @property
-    def freedoms(self) -> tuple[Freedom, ...]:
-        """Slides along both parameters."""
-        return Freedom("Tu", UNIT_TWISTS["Tx"]), Freedom("Tv", UNIT_TWISTS["Ty"])
-
-    @property
-    def kind(self) -> Hashable:
-        """Each by itself."""
-        return self
-
-    @cached_property
-    def sizes(self) -> Array:
-        """Lengths per parameter at home."""
-        assert self.surface is not None
-        return np.linalg.norm(self.surface.at(*np.array(self.home)[:, None])[1:3, :, 0], axis=1)
-
-    @property
-    def ranges(self) -> tuple[tuple[float, float], ...]:
-        """The ends of the surface."""
-        assert self.surface is not None
-        parts = zip(self.surface.ends, self.home, self.sizes / self.unit, strict=True)
-        return tuple(((low - at) * size, (high - at) * size) for (low, high), at, size in parts)
-
-    @property
-    def outline(self) -> tuple[Array, ...]:
-        """Lines of the surface about the frame at coordinates zero, on both sides of it as far as it goes, at most its size at home."""
-        if self.surface is None:
-            return ()
-        ranges = [(max(low, -size), min(high, size)) for (low, high), size in zip(self.ranges, self.sizes, strict=True)]
-        u, v = (np.linspace(*ends, SURFACE_LINES) for ends in ranges)
-        x = np.stack(np.meshgrid(u, v))
-        p = self._here(x)[0] - self.start[:, 3].reshape(3, 1, 1)
-        grid = np.tensordot(p, self.start[:, :3], (0, 0)) / self.unit
-        return (*grid, *grid.swapaxes(0, 1))
-
-    def _here(self, x: Array) -> tuple[Array, Array, Array]:
-        """Position, axes ``(3, 3, ...)`` and twists about the point ``(6, 2, ...)``, in the frame of the link."""
-        assert self.surface is not None
-        su, sv = self.sizes
-        J = self.surface.at(self.home[0] + self.unit / su * x[0], self.home[1] + self.unit / sv * x[1])
-        x_, xu, xv = J[0], J[1] / su, J[2] / sv
-        second = self.unit * np.stack([J[3] / su**2, J[4] / (su * sv), J[5] / sv**2])
-        lu, N = np.sqrt((xu * xu).sum(axis=0)), cross(xu, xv)
-        ln, up = np.sqrt((N * N).sum(axis=0)), -1.0 if self.turned else 1.0
-        e1, n = xu / lu, up * N / ln
-        axes = (e1, cross(n, e1), n)
-        twists = []
-        for xa, xua, xva in ((xu, second[0], second[1]), (xv, second[1], second[2])):
-            de1 = (xua - e1 * (e1 * xua).sum(axis=0)) / lu
-            dN = up * (cross(xua, xv) + cross(xu, xva))
-            dn = (dN - n * (n * dN).sum(axis=0)) / ln
-            rates = (de1, cross(dn, e1) + cross(n, de1), dn)
-            w = 0.5 * sum(cross(e, de) for e, de in zip(axes, rates, strict=True))
-            twists.append(np.concatenate([w, xa]))
-        return x_, np.stack(axes, axis=1), np.stack(twists, axis=1)
-
-    @cached_property
-    def start(self) -> Array:
-        """The frame at coordinates zero on its link ``(3, 4)``."""
-        x, R, _ = self._here(np.zeros((2, 1)))
-        return np.concatenate([R, x[:, None]], axis=1)[..., 0]
-
-    def pose(self, x: Array, pitch: Array) -> Array:
-        """Value of the motion."""
-        p, R, _ = self._here(x)
-        R0, p0 = self.start[:, :3], self.start[:, 3].reshape(3, *(1,) * (p.ndim - 1))
-        return np.concatenate(
-            [np.tensordot(R0, R, (0, 0)), np.tensordot(R0, (p - p0) / self.unit, (0, 0))[:, None]], axis=1
-        )
-
-    def twists(self, x: Array, pitch: Array) -> Array:
-        """``(w, x_a + w x (p - x))`` for both parameters, p the origin of the frame before it."""
-        p, _, S = self._here(x)
-        off = ((p - self.start[:, 3].reshape(3, *(1,) * (p.ndim - 1))) / self.unit)[:, None]
-        v = S[3:] - cross(S[:3], np.broadcast_to(off, S[:3].shape))
-        return np.concatenate([np.tensordot(self.start[:, :3], part, (0, 0)) for part in (S[:3], v)])
-
-    def twist_rates(self, x: Array, dq: Array, pitch: Array) -> Array:
-        """The derivative of ``sum_j S_j q'_j`` along ``q'``, by a complex step: exact."""
-        ahead: Array = x.real + 1j * COMPLEX_STEP * dq.real
-        return np.asarray((self.twists(ahead, pitch) * dq).sum(axis=1).imag / COMPLEX_STEP)
-
-    def scaled(self, L: float) -> Factor:
-        """With lengths over ``L``."""
-        return self if self.surface is None else replace(self, unit=self.unit * L)

@@ -18,8 +18,9 @@ import numpy as np
 import scipy
 
 from mechgraph.algebra.se3 import Array, cross
-from mechgraph.model.curves import CLOSED_GAP, ORDERS, Curve, Pieces
+from mechgraph.model.curves import CLOSED_GAP, ORDERS, Curve
 from mechgraph.model.numeric import second_direction
+from mechgraph.model.pieces import Pieces
 from mechgraph.quantities import shown
 
 STRAIGHT, IN_PLANE = 1e-9, 1e-9

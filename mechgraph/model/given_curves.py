@@ -1,0 +1,139 @@
+"""Curves of which a user gives the shape: points to pass, or a function with its derivatives; and the table of all curves."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated, Any
+
+import numpy as np
+import scipy
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.model.cam import Cam
+from mechgraph.model.curves import CLOSED_GAP, ORDERS, Circle, Curve, Ellipse, Helix, Involute, Line
+from mechgraph.model.field_format import FLAG, FUNCTION, INTERVAL, POINT_LIST
+from mechgraph.model.pieces import Pieces, parted
+from mechgraph.units import LENGTH
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Through(Curve):
+    """The curve through points: a spline of degree 5 (3 through fewer than six points) over the lengths of the chords."""
+
+    kind = "points"
+    points: Annotated[Any, POINT_LIST("points passed, in order", LENGTH)]
+    closed: Annotated[
+        bool, FLAG("whether it returns to the first point, with the direction and curvature that it has there")
+    ] = False
+
+    @cached_property
+    def _spline(self) -> Pieces:
+        given = np.array(self.points)
+        if self.closed and np.linalg.norm(given[-1] - given[0]) > CLOSED_GAP * np.ptp(given, axis=0).max():
+            given = np.concatenate([given, given[:1]])
+        elif self.closed:
+            given[-1] = given[0]
+        lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(given, axis=0), axis=1))])
+        degree = 5 if len(given) > 5 else 3
+        ends: Any = "periodic" if self.closed else None
+        made: Any = scipy.interpolate.make_interp_spline(lengths, given, degree, bc_type=ends)
+        breaks = np.unique(np.clip(made.t, lengths[0], lengths[-1]))
+        terms = [made.derivative(k)(breaks[:-1]) / math.factorial(k) for k in range(degree, 0, -1)]
+        return Pieces(breaks, np.stack([*terms, made(breaks[:-1])]))
+
+    def at(self, u: Array) -> Array:
+        """The spline."""
+        return self._spline.at(u, ORDERS)
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Zero, and the length of all chords."""
+        return float(self._spline.breaks[0]), float(self._spline.breaks[-1])
+
+    @property
+    def is_closed(self) -> bool:
+        """As declared."""
+        return self.closed
+
+    @cached_property
+    def breaks(self) -> Array:
+        """Parts of the pieces of the spline."""
+        return parted(self._spline.breaks, max(8, 400 // len(self._spline.breaks)))
+
+    def faults(self, where: str) -> list[str]:
+        """Points that make no curve."""
+        found = super().faults(where)
+        if found:
+            return found
+        gaps = np.linalg.norm(np.diff(np.array(self.points), axis=0), axis=1)
+        if len(self.points) < 4:
+            return [f"{where}points: {len(self.points)} given; a curve with a continuous curvature takes 4 or more"]
+        same = np.flatnonzero(gaps <= 1e-12 * gaps.max())
+        return [f"{where}points: points {i} and {i + 1} are the same; leave one out" for i in same.tolist()]
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Function(Curve):
+    """A curve ``x(u)`` by a function: position and first three derivatives (four, to be exact) at ``u (n,)``, ``(3, n)`` each."""
+
+    kind = "function"
+    position: Annotated[Any, FUNCTION("u -> (x, x', x'', x'''), each (3, n)")]
+    ends_at: Annotated[Any, INTERVAL("least and greatest u")]
+    closed: Annotated[bool, FLAG("whether it returns to where it begins")] = False
+
+    def at(self, u: Array) -> Array:
+        """What the function returns; for complex ``u`` by Taylor's series about its real part."""
+        real = np.asarray(u.real, dtype=float).ravel()
+        known = np.zeros((ORDERS + 1, 3, real.size))
+        for order, part in enumerate(self.position(real)[: ORDERS + 1]):
+            known[order] = part
+        known = known.reshape(ORDERS + 1, 3, *u.shape)
+        return known[:-1] + 1j * u.imag * known[1:] if np.iscomplexobj(u) else known[:-1]
+
+    @cached_property
+    def orders(self) -> int:
+        """As many as it returns."""
+        return len(self.position(np.array([self.ends[0]])))
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """As declared."""
+        begin, end = self.ends_at
+        return begin, end
+
+    @property
+    def is_closed(self) -> bool:
+        """As declared."""
+        return self.closed
+
+    def faults(self, where: str) -> list[str]:
+        """A function that does not do, or whose derivatives are not those of its positions."""
+        found = super().faults(where)
+        if found:
+            return found
+        u = np.linspace(*self.ends, 7)
+        try:
+            x = self.at(u)
+        except (TypeError, ValueError, IndexError) as error:
+            return [f"{where}position: does not take u (n,) and return (3, n) arrays: {error}"]
+        if len(self.position(u)) < 4 or not np.isfinite(x).all():
+            return [f"{where}position: must return finite position and three derivatives, each (3, n)"]
+        h = 1e-4 * (u[-1] - u[0])
+        for order in range(3):
+            slope = (self.at(u[1:-1] + h)[order] - self.at(u[1:-1] - h)[order]) / (2 * h)
+            miss, size = np.abs(slope - x[order + 1][:, 1:-1]).max(), np.abs(x[order : order + 2]).max()
+            if miss > 1e-3 * size / min(1.0, u[-1] - u[0]):
+                found.append(
+                    f"{where}position: derivative {order + 1} differs from the slope of what is before it by {miss:.3g}"
+                )
+        return found
+
+
+CURVES: dict[str, type[Curve]] = {
+    kind.kind: kind for kind in (Line, Circle, Ellipse, Helix, Involute, Through, Function, Cam)
+}
+"""Curves by the names that they have in files."""
+Curve.line, Curve.circle, Curve.ellipse, Curve.helix = Line, Circle, Ellipse, Helix
+Curve.involute, Curve.through, Curve.function, Curve.cam = Involute, Through, Function, Cam

@@ -1,0 +1,118 @@
+"""The factor of a frame that lies on a surface."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array, cross
+from mechgraph.model.factors import Factor
+from mechgraph.model.row_parts import UNIT_TWISTS, Freedom
+from mechgraph.model.surfaces import Surface
+from mechgraph.model.travel import COMPLEX_STEP
+
+SURFACE_LINES = 9
+"""Lines each way by which a surface is drawn."""
+
+
+@dataclass(frozen=True)
+class OnSurface(Factor):
+    """A frame that lies on a surface: z its normal, x along u; coordinates are lengths along u and v where they are zero.
+
+    D(q) = F(home)^-1 F(home + q / sizes), ``sizes`` being ``|x_u|`` and ``|x_v|`` at home; ``turned`` has the normal the other way round.
+    Without a surface it is a place for one: it can be counted, not evaluated.
+    """
+
+    surface: Surface | None = None
+    home: tuple[float, float] = (0.0, 0.0)
+    turned: bool = False
+    unit: float = 1.0
+
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        """Slides along both parameters."""
+        return Freedom("Tu", UNIT_TWISTS["Tx"]), Freedom("Tv", UNIT_TWISTS["Ty"])
+
+    @property
+    def kind(self) -> Hashable:
+        """Each by itself."""
+        return self
+
+    @cached_property
+    def sizes(self) -> Array:
+        """Lengths per parameter at home."""
+        assert self.surface is not None
+        return np.linalg.norm(self.surface.at(*np.array(self.home)[:, None])[1:3, :, 0], axis=1)
+
+    @property
+    def ranges(self) -> tuple[tuple[float, float], ...]:
+        """The ends of the surface."""
+        assert self.surface is not None
+        parts = zip(self.surface.ends, self.home, self.sizes / self.unit, strict=True)
+        return tuple(((low - at) * size, (high - at) * size) for (low, high), at, size in parts)
+
+    @property
+    def outline(self) -> tuple[Array, ...]:
+        """Lines of the surface about the frame at coordinates zero, on both sides of it as far as it goes, at most its size at home."""
+        if self.surface is None:
+            return ()
+        ranges = [(max(low, -size), min(high, size)) for (low, high), size in zip(self.ranges, self.sizes, strict=True)]
+        u, v = (np.linspace(*ends, SURFACE_LINES) for ends in ranges)
+        x = np.stack(np.meshgrid(u, v))
+        p = self._here(x)[0] - self.start[:, 3].reshape(3, 1, 1)
+        grid = np.tensordot(p, self.start[:, :3], (0, 0)) / self.unit
+        return (*grid, *grid.swapaxes(0, 1))
+
+    def _here(self, x: Array) -> tuple[Array, Array, Array]:
+        """Position, axes ``(3, 3, ...)`` and twists about the point ``(6, 2, ...)``, in the frame of the link."""
+        assert self.surface is not None
+        su, sv = self.sizes
+        J = self.surface.at(self.home[0] + self.unit / su * x[0], self.home[1] + self.unit / sv * x[1])
+        x_, xu, xv = J[0], J[1] / su, J[2] / sv
+        second = self.unit * np.stack([J[3] / su**2, J[4] / (su * sv), J[5] / sv**2])
+        lu, N = np.sqrt((xu * xu).sum(axis=0)), cross(xu, xv)
+        ln, up = np.sqrt((N * N).sum(axis=0)), -1.0 if self.turned else 1.0
+        e1, n = xu / lu, up * N / ln
+        axes = (e1, cross(n, e1), n)
+        twists = []
+        for xa, xua, xva in ((xu, second[0], second[1]), (xv, second[1], second[2])):
+            de1 = (xua - e1 * (e1 * xua).sum(axis=0)) / lu
+            dN = up * (cross(xua, xv) + cross(xu, xva))
+            dn = (dN - n * (n * dN).sum(axis=0)) / ln
+            rates = (de1, cross(dn, e1) + cross(n, de1), dn)
+            w = 0.5 * sum(cross(e, de) for e, de in zip(axes, rates, strict=True))
+            twists.append(np.concatenate([w, xa]))
+        return x_, np.stack(axes, axis=1), np.stack(twists, axis=1)
+
+    @cached_property
+    def start(self) -> Array:
+        """The frame at coordinates zero on its link ``(3, 4)``."""
+        x, R, _ = self._here(np.zeros((2, 1)))
+        return np.concatenate([R, x[:, None]], axis=1)[..., 0]
+
+    def pose(self, x: Array, pitch: Array) -> Array:
+        """Value of the motion."""
+        p, R, _ = self._here(x)
+        R0, p0 = self.start[:, :3], self.start[:, 3].reshape(3, *(1,) * (p.ndim - 1))
+        return np.concatenate(
+            [np.tensordot(R0, R, (0, 0)), np.tensordot(R0, (p - p0) / self.unit, (0, 0))[:, None]], axis=1
+        )
+
+    def twists(self, x: Array, pitch: Array) -> Array:
+        """``(w, x_a + w x (p - x))`` for both parameters, p the origin of the frame before it."""
+        p, _, S = self._here(x)
+        off = ((p - self.start[:, 3].reshape(3, *(1,) * (p.ndim - 1))) / self.unit)[:, None]
+        v = S[3:] - cross(S[:3], np.broadcast_to(off, S[:3].shape))
+        return np.concatenate([np.tensordot(self.start[:, :3], part, (0, 0)) for part in (S[:3], v)])
+
+    def twist_rates(self, x: Array, dq: Array, pitch: Array) -> Array:
+        """The derivative of ``sum_j S_j q'_j`` along ``q'``, by a complex step: exact."""
+        ahead: Array = x.real + 1j * COMPLEX_STEP * dq.real
+        return np.asarray((self.twists(ahead, pitch) * dq).sum(axis=1).imag / COMPLEX_STEP)
+
+    def scaled(self, L: float) -> Factor:
+        """With lengths over ``L``."""
+        return self if self.surface is None else replace(self, unit=self.unit * L)

@@ -1,0 +1,58 @@
+"""Polynomials in pieces, with their derivatives: what splines, cams and arc lengths are evaluated by."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy
+
+from mechgraph.algebra.se3 import Array
+
+DERIVATIVES = 4
+"""The highest derivative that is asked for."""
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Polynomials ``(degree + 1, pieces, ...)``, highest power first, between ``breaks``: evaluated for complex arguments too."""
+
+    breaks: Array
+    coefficients: Array
+
+    @cached_property
+    def _terms(self) -> Array:
+        """Coefficients of value and derivatives, ``(pieces, orders, components, degree + 1)``, lowest power first."""
+        c = self.coefficients[::-1].reshape(len(self.coefficients), len(self.breaks) - 1, -1)
+        out = np.zeros((DERIVATIVES + 1, *c.shape))
+        for order in range(DERIVATIVES + 1):
+            for power in range(order, len(c)):
+                out[order, power - order] = math.perm(power, order) * c[power]
+        return np.ascontiguousarray(out.transpose(2, 0, 3, 1))
+
+    def at(self, u: Array, orders: int) -> Array:
+        """Values and derivatives ``(orders, ..., *u.shape)``; of the first and last piece beyond the ends."""
+        flat = u.reshape(-1)
+        piece = self.breaks[1:-1].searchsorted(flat.real, side="right")
+        terms = self._terms[:, :orders].take(piece, axis=0)
+        powers = np.empty((flat.size, 1, terms.shape[3], 1), dtype=u.dtype)
+        powers[:, 0, 0, 0] = 1.0
+        beyond = np.broadcast_to((flat - self.breaks[piece])[:, None], (flat.size, terms.shape[3] - 1))
+        np.multiply.accumulate(beyond, axis=1, out=powers[:, 0, 1:, 0])
+        out = (terms @ powers)[..., 0].transpose(1, 2, 0)
+        return np.asarray(out.reshape(orders, *self.coefficients.shape[2:], *u.shape))
+
+    @classmethod
+    def meeting(cls, breaks: Array, values: Sequence[Array]) -> Pieces:
+        """The polynomials that meet values and derivatives ``(n, ...)`` at the breaks (Hermite)."""
+        made = scipy.interpolate.BPoly.from_derivatives(breaks, np.stack(values, axis=1))
+        return cls(np.asarray(breaks), scipy.interpolate.PPoly.from_bernstein_basis(made).c)
+
+
+def parted(breaks: Array, parts: int) -> Array:
+    """Every interval in equal parts."""
+    fine = breaks[:-1, None] + np.diff(breaks)[:, None] * np.arange(parts) / parts
+    return np.append(fine.ravel(), breaks[-1])
