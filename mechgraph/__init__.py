@@ -23,6 +23,7 @@ from mechgraph.errors import (
     MissingExtraError,
     ReachError,
     ResponseError,
+    ShapeError,
 )
 from mechgraph.exchange.files import load, save
 from mechgraph.kinetostatics import assemble, kinematics, solve
@@ -111,6 +112,7 @@ __all__ = [
     "PairType",
     "Rack",
     "ReachError",
+    "ShapeError",
     "Response",
     "ResponseError",
     "ResponseSetup",

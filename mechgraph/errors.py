@@ -75,6 +75,23 @@ class DeclarationError(MechgraphError):
         super().__init__("\n".join(lines + [f"  and {more} more (in .faults)"] * (more > 0)))
 
 
+class ShapeError(DeclarationError):
+    """A function given for a curve or a surface raised (that is the cause of the error), or returned what is none.
+
+    Attributes
+    ----------
+    text : what it did, and at which parameters.
+    """
+
+    def __init__(self, text: str, pair: str | None = None) -> None:
+        self.text = text
+        super().__init__("a curve or surface by a function" if pair is None else f"pair {pair!r}", [text])
+
+    def of(self, pair: str) -> ShapeError:
+        """The same error with the name of the pair."""
+        return ShapeError(self.text, pair)
+
+
 class MechgraphWarning(UserWarning):
     """A result that holds only under an assumption, e.g. that something holds a passive freedom that carries load."""
 

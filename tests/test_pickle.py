@@ -54,6 +54,7 @@ def things() -> dict[str, Any]:
         "MechgraphWarning": mg.MechgraphWarning("a freedom carries load"), "warnings": s.warnings,
         "AssemblyError": mg.AssemblyError("open", 0.5, {"A": 1.0}), "MissingExtraError": mg.MissingExtraError("typer", "cli"),
         "DeadPointError": mg.DeadPointError("dead", {"A": 1.0}), "ReachError": mg.ReachError("far", {"A": 1.0}, s),
+        "ShapeError": mg.ShapeError("raised", "A"),
         "response": mg.respond(mg.load("windows-2"), (0, 0.2)), "response in charts": mg.respond(pushed, (0, 0.2)),
         "ResponseError": mg.ResponseError("stopped", s), "event": mg.Event("A0", 0.1),
         "surface": mg.Surface.sphere(radius=0.1), "curve": mg.Curve.circle(radius=0.1),

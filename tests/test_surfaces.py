@@ -1,5 +1,6 @@
 """Spheres and points on surfaces: limits that are other pairs, derivatives, and the ends of surfaces."""
 
+import math
 import pickle
 
 import numpy as np
@@ -39,6 +40,95 @@ SAMPLE = {
     "patch": mg.Surface.patch(points=GRID, rows=7),
     "function": mg.Surface.function(position=saddle, ends_u=(-2, 2), ends_v=(-2, 2)),
 }
+
+
+def given(function, **ends):
+    """A sphere on a surface, or a pin in a slot, by the function."""
+    if "ends_at" in ends:
+        shape = {"type": "Sg", "curve": mg.Curve.function(position=function, **ends)}
+    else:
+        shape = {"type": "Sp", "surface": mg.Surface.function(position=function, **ends)}
+    turn = mg.Pair("A", "R", "frame", "crank", point=(0.2, 0, 0), axis=(0, 0, 1))
+    return [turn, mg.Pair("K", a="frame", b="crank", point=(0, 0, 0), **shape)]
+
+
+FLAT = {"ends_u": (-2, 2), "ends_v": (-2, 2)}
+
+
+def straight(u):
+    return [np.stack([u, 0 * u, 0 * u]), np.array([[1.0], [0], [0]]), np.zeros((3, 1)), np.zeros((3, 1))]
+
+
+@pytest.mark.parametrize(
+    ("function", "ends", "words"),
+    [
+        (lambda u, v: [[1.0 / int(u[0] - u[0])]], FLAT, "raised ZeroDivisionError: .* at u = "),
+        (lambda u: [math.sqrt(4 - u * u)], {"ends_at": (-1, 1)}, "raised TypeError: .* at u = -0.666667"),
+        (
+            lambda u: straight(u)[:3],
+            {"ends_at": (-1, 1)},
+            r"curve.position: returned 3 arrays, expected 4 arrays \(3, n\)",
+        ),
+        (lambda u, v: [part[:2] for part in saddle(u, v)], FLAT, r"surface.position: returned an array \(2, 25\)"),
+        (
+            lambda u: [x + 0 / (abs(u) > 0.01) for x in straight(u)],
+            {"ends_at": (-1, 1)},
+            "a number that is not finite at u = 0",
+        ),
+        (
+            lambda u, v: [*saddle(u, v)[:5], *saddle(u, v)[4:9]],
+            FLAT,
+            "surface.position: x_vv differs from the slope of x_v",
+        ),
+    ],
+    ids=["raises", "one number", "few", "flat", "nan", "slope"],
+)
+def test_what_is_wrong_with_a_function_is_said_with_pair_and_parameter(function, ends, words):
+    with np.errstate(all="ignore"), pytest.raises(mg.DeclarationError, match=f"(?s)pair 'K'.*{words}") as error:
+        mg.Mechanism("m", None, given(function, **ends), ["A"])
+    assert ("raised" in words) == (error.value.__cause__ is not None)
+
+
+@pytest.mark.parametrize("how", ["raises", "nan"])
+def test_a_function_that_fails_on_the_way_is_named_with_its_pair(how):
+    """Inside its range the pin comes to where the function has no value; what it raised is the cause."""
+
+    def broken(u):
+        if begun and how == "raises" and (np.abs(u - 0.31) < 0.005).any():
+            raise RuntimeError("no value here")
+        near = np.abs(u - 0.31) < 0.005 if begun and how == "nan" else np.zeros(u.shape, dtype=bool)
+        return [np.where(near, np.nan, x) for x in straight(u)]
+
+    begun = False
+    slide = mg.Pair("A", "P", "frame", "block", point=(0, 0, 0), axis=(1, 0, 0))
+    pin = mg.Pair(
+        "K", "Ps", "frame", "block", curve=mg.Curve.function(position=broken, ends_at=(-1, 1)), point=(0, 0, 0)
+    )
+    m = mg.Mechanism("m", None, [slide, pin], ["A"])
+    begun = True
+    words = "raised RuntimeError: no value here at u = 0.3" if how == "raises" else "not finite at u = 0.3"
+    with pytest.raises(mg.ShapeError, match=f"(?s)pair 'K'.*{words}") as error:
+        mg.kinematics(m, {"A": np.linspace(0, 0.6, 601)})
+    assert isinstance(error.value.__cause__, RuntimeError if how == "raises" else None.__class__)
+
+
+def test_a_function_is_asked_inside_its_ends_alone():
+    """Beyond them Taylor's series serves, of curve and surface, real and complex."""
+
+    def asked(*at):
+        assert all(np.abs(part).max() <= 2 for part in at)
+        return saddle(*at)
+
+    surface = mg.Surface.function(position=asked, **FLAT)
+    u, v = np.array([2.1, 0.3]), np.array([0.5, -2.2])
+    assert_allclose(surface.at(u, v), saddle(u, v)[:6], atol=1e-14)
+    curve = mg.Curve.function(
+        position=lambda s: asked(s, 1.0 + 0 * s)[0:1] + asked(s, 1.0 + 0 * s)[1:7:2], ends_at=(-2, 2)
+    )
+    x = [saddle(u, 1.0 + 0 * u)[k] for k in (0, 1, 3, 5)]
+    assert_allclose(curve.at(u), x, atol=1e-14)
+
+
 INSIDE = {"patch": (0.4, 0.6)}
 
 

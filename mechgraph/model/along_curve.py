@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, cross
+from mechgraph.errors import ShapeError
 from mechgraph.model.curves import ORDERS, Curve
 from mechgraph.model.factors import Factor, PoseStack, Stack, entries
 from mechgraph.model.row_parts import UNIT_TWISTS, Freedom
@@ -31,7 +32,7 @@ class AlongCurve(Factor):
 
     The tangent is the axis ``tangent`` of the frame (x: y is the normal in the plane and z that of the plane; z: x and y are those).
     ``reversed`` travels against the arc length of the curve, ``turned`` has the normal of the plane the other way round; ``unit`` is the
-    length that counts as one. Without a curve it is a place for one: it can be counted, not evaluated.
+    length that counts as one, ``pair`` the name for messages. Without a curve it is a place for one: it can be counted, not evaluated.
     """
 
     name: str
@@ -42,6 +43,7 @@ class AlongCurve(Factor):
     reversed: bool = False
     turned: bool = False
     unit: float = 1.0
+    pair: str = field(default="", compare=False)
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
@@ -103,7 +105,10 @@ class AlongCurve(Factor):
 
     def here(self, x: Array) -> Place:
         """The curve where the coordinate is ``x (1, ...)``, lengths in its own unit."""
-        return self.travel.at(self.home + (-self.unit if self.reversed else self.unit) * x[0])
+        try:
+            return self.travel.at(self.home + (-self.unit if self.reversed else self.unit) * x[0])
+        except ShapeError as error:
+            raise error.of(self.pair) from error.__cause__
 
     def pose(self, x: Array, pitch: Array) -> Array:
         """Value of the motion."""

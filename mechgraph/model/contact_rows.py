@@ -6,7 +6,7 @@ meaning: Fx and Fy of a sphere in a groove act at right angles to it, Fy of two 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from itertools import count
@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.errors import ShapeError
 from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.model.along_curve import AlongCurve, Beside, X, Z
 from mechgraph.model.curves import Curve, Line
@@ -141,8 +142,10 @@ def travels(row: Any) -> bool:
     return isinstance(row, PairType) and any(isinstance(step, AlongCurve | OnSurface) for step in row.steps)
 
 
-def on_surface(row: PairType, surface: Surface, point: Sequence[float] | None, axis: Sequence[float] | None) -> Contact:
-    """A row with its surface put in; coordinates zero at ``point`` (in the middle where it is left out), z towards ``axis``."""
+def on_surface(
+    row: PairType, surface: Surface, point: Sequence[float] | None, axis: Sequence[float] | None, pair: str
+) -> Contact:
+    """A row of a ``pair`` with its surface put in; coordinates zero at ``point`` (in the middle if left out), z towards ``axis``."""
     middle = tuple(
         0.5 * (low + high) if np.isfinite(low + high) else 1.0 if np.isfinite(low) else 0.0
         for low, high in surface.ends
@@ -152,7 +155,7 @@ def on_surface(row: PairType, surface: Surface, point: Sequence[float] | None, a
     if axis is not None and placed.start[:, 2] @ np.asarray(axis) < 0:
         placed = replace(placed, turned=True)
     off = 0.0 if point is None else float(np.linalg.norm(placed.start[:, 3] - point))
-    return Contact(_filled(row, [placed]), placed.start, (off,))
+    return Contact(_filled(row, [placed], pair), placed.start, (off,))
 
 
 def surface_faults(row: Any, surface: Surface, point: Any, where: str) -> list[str]:
@@ -163,7 +166,7 @@ def surface_faults(row: Any, surface: Surface, point: Any, where: str) -> list[s
         ]
     if not (point is None or is_numeric(point, (3,))):
         return [f"{where}surface: point is at fault"]
-    found = surface.faults(f"{where}surface.")
+    found = _of_function(lambda: surface.faults(f"{where}surface."), f"{where}surface.")
     if found or point is None:
         return found
     x = surface.at(*np.array(surface.nearest(np.asarray(point)))[:, None])[:, :, 0]
@@ -182,8 +185,9 @@ def in_contact(
     roller: float | None = None,
     point: Sequence[float] | None = None,
     axis: Sequence[float] | None = None,
+    pair: str = "",
 ) -> Contact:
-    """A row with its curves put in; coordinates zero where the curves pass ``point`` (where they begin if it is left out).
+    """A row of a ``pair`` with its curves put in; coordinates zero where the curves pass ``point`` (where they begin if it is left out).
 
     ``axis`` says in which sense of two z points; ``roller`` is that of the roller whose centre is the point.
     """
@@ -203,7 +207,7 @@ def in_contact(
         )
         factors.append(second)
         off += [_off(second, marker[:, 3]), float(np.linalg.norm(np.cross(back[:, 0], marker[:, 0])))]
-    return Contact(_filled(row, factors), marker, tuple(off))
+    return Contact(_filled(row, factors, pair), marker, tuple(off))
 
 
 def _path(curve: Curve, roller: float | None, point: Sequence[float] | None) -> Curve:
@@ -231,12 +235,12 @@ def _off(factor: AlongCurve, point: Sequence[float] | Array | None) -> float:
     return 0.0 if point is None else float(np.linalg.norm(factor.start[:, 3] - point))
 
 
-def _filled(row: PairType, factors: Sequence[AlongCurve | OnSurface]) -> PairType:
+def _filled(row: PairType, factors: Sequence[AlongCurve | OnSurface], pair: str) -> PairType:
     """The row with factors in the places for curves and surfaces; components that would do work are combined with efforts."""
     out = copy(row)
     for name in ("factors", "nx", "has_lengths", "takes_pitch"):
         vars(out).pop(name, None)
-    left = iter(factors)
+    left = (replace(factor, pair=pair) for factor in factors)
     steps = tuple(next(left) if isinstance(step, AlongCurve | OnSurface) else step for step in row.steps)
     object.__setattr__(out, "steps", steps)
     x = evaluation.random_coordinates(out, np.random.default_rng(12345), 1, TRIED_PLACES)
@@ -296,7 +300,17 @@ def curve_faults(row: Any, curve: Curve, curve_b: Any, roller: Any, point: Any, 
 
 
 def _of_shape(curve: Curve, where: str) -> list[str]:
-    return curve.faults(where) or shape_faults(curve, where)
+    return _of_function(lambda: curve.faults(where) or shape_faults(curve, where), where)
+
+
+def _of_function(faults: Callable[[], list[str]], where: str) -> list[str]:
+    """Faults of a shape, also that its function returns what is none; what the function raises goes on, with its cause."""
+    try:
+        return faults()
+    except ShapeError as error:
+        if error.__cause__ is not None:
+            raise
+        return [where + error.text]
 
 
 def surface_miss(contact: Contact, tol: float, where: str) -> Iterator[str]:

@@ -11,6 +11,7 @@ import numpy as np
 import scipy
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.model.asked import asked, inner, slope_faults
 from mechgraph.model.cam import Cam
 from mechgraph.model.curves import CLOSED_GAP, ORDERS, Circle, Curve, Ellipse, Helix, Involute, Line
 from mechgraph.model.field_format import FLAG, FUNCTION, INTERVAL, POINT_LIST
@@ -84,13 +85,16 @@ class Function(Curve):
     closed: Annotated[bool, FLAG("whether it returns to where it begins")] = False
 
     def at(self, u: Array) -> Array:
-        """What the function returns; for complex ``u`` by Taylor's series about its real part."""
-        real = np.asarray(u.real, dtype=float).ravel()
-        known = np.zeros((ORDERS + 1, 3, real.size))
-        for order, part in enumerate(self.position(real)[: ORDERS + 1]):
-            known[order] = part
-        known = known.reshape(ORDERS + 1, 3, *u.shape)
-        return known[:-1] + 1j * u.imag * known[1:] if np.iscomplexobj(u) else known[:-1]
+        """What the function returns; beyond the ends, and for complex ``u``, by Taylor's series."""
+        inside = np.clip(u.real, *self.ends)
+        known = asked(self.position, [inside.ravel()], ORDERS, ORDERS + 1).reshape(ORDERS + 1, 3, *u.shape)
+        beyond = u - inside
+        if not np.any(beyond):
+            return known[:-1]
+        out = known[:-1] + beyond * known[1:]
+        for order in range(2, ORDERS + 1):
+            out[: ORDERS + 1 - order] += beyond**order / math.factorial(order) * known[order:]
+        return np.asarray(out)
 
     @cached_property
     def orders(self) -> int:
@@ -113,22 +117,9 @@ class Function(Curve):
         found = super().faults(where)
         if found:
             return found
-        u = np.linspace(*self.ends, 7)
-        try:
-            x = self.at(u)
-        except (TypeError, ValueError, IndexError) as error:
-            return [f"{where}position: does not take u (n,) and return (3, n) arrays: {error}"]
-        if len(self.position(u)) < 4 or not np.isfinite(x).all():
-            return [f"{where}position: must return finite position and three derivatives, each (3, n)"]
-        h = 1e-4 * (u[-1] - u[0])
-        for order in range(3):
-            slope = (self.at(u[1:-1] + h)[order] - self.at(u[1:-1] - h)[order]) / (2 * h)
-            miss, size = np.abs(slope - x[order + 1][:, 1:-1]).max(), np.abs(x[order : order + 2]).max()
-            if miss > 1e-3 * size / min(1.0, u[-1] - u[0]):
-                found.append(
-                    f"{where}position: derivative {order + 1} differs from the slope of what is before it by {miss:.3g}"
-                )
-        return found
+        steps = [(order + 1, order, 0) for order in range(ORDERS - 1)]
+        words = ("position", "derivative 1", "derivative 2", "derivative 3")
+        return slope_faults(self.at, [inner(self.ends)], steps, words, where)
 
 
 CURVES: dict[str, type[Curve]] = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any
@@ -10,21 +11,25 @@ import numpy as np
 import scipy
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.model.asked import asked, inner, slope_faults
 from mechgraph.model.field_format import FUNCTION, INTEGER, INTERVAL, POINT_LIST
 from mechgraph.model.surfaces import Cone, Cylinder, Plane, Revolution, Sphere, Surface, Torus
 from mechgraph.units import LENGTH
 
-
-def _ahead(known: Array, u: Array, v: Array) -> Array:
-    """Position and derivatives at complex parameters from ten up to the third at their real parts, by Taylor's series."""
-    if not (np.iscomplexobj(u) or np.iscomplexobj(v)):
-        return known[:6]
-    by_u, by_v = known[[1, 3, 4, 6, 7, 8]], known[[2, 4, 5, 7, 8, 9]]
-    return np.asarray(known[:6] + 1j * (u.imag * by_u + v.imag * by_v))
-
-
 ORDERS_UV = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3))
 """Derivatives by u and v, in their order."""
+
+
+def _continued(known: Array, u: Array, v: Array) -> Array:
+    """Position and derivatives up to the second a bit (complex, too) beyond where ten up to the third are known, by Taylor's series."""
+    if not (np.any(u) or np.any(v)):
+        return known[:6]
+    out = np.zeros((6, *known.shape[1:]), dtype=np.result_type(known, u, v))
+    for own, (i, j) in zip(out, ORDERS_UV, strict=False):
+        for part, (a, b) in zip(known, ORDERS_UV, strict=True):
+            if a >= i and b >= j:
+                own += part * (u ** (a - i) * v ** (b - j) / (math.factorial(a - i) * math.factorial(b - j)))
+    return out
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -51,7 +56,7 @@ class Patch(Surface):
             for basis, at in ((along_u, u), (along_v, v))
         )
         known = np.stack([np.einsum("ti,tj,ijc->ct", U[i], V[j], grid, optimize=True) for i, j in ORDERS_UV])
-        return _ahead(known.reshape(10, 3, *u.shape), u, v)
+        return _continued(known.reshape(10, 3, *u.shape), u - u.real, v - v.real)
 
     @property
     def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -79,15 +84,31 @@ class ByFunction(Surface):
     ends_v: Annotated[Any, INTERVAL("least and greatest v")]
 
     def at(self, u: Array, v: Array) -> Array:
-        """What the function returns."""
-        given = self.position(*(np.asarray(at.real, dtype=float).ravel() for at in (u, v)))
-        known = np.stack([np.broadcast_to(part, (3, u.size)) for part in given])
-        return _ahead(known.reshape(10, 3, *u.shape), u, v)
+        """What the function returns; beyond the ends, and for complex parameters, by Taylor's series."""
+        inside = [np.clip(at.real, *ends) for at, ends in zip((u, v), self.ends, strict=True)]
+        known = self._known(*(at.ravel() for at in inside)).reshape(10, 3, *u.shape)
+        return _continued(known, u - inside[0], v - inside[1])
+
+    def _known(self, u: Array, v: Array) -> Array:
+        return asked(self.position, [u, v], len(ORDERS_UV), len(ORDERS_UV))
 
     @property
     def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """As declared."""
         return tuple(self.ends_u), tuple(self.ends_v)
+
+    def faults(self, where: str) -> list[str]:
+        """A function that does not do, or whose derivatives are not those of its positions."""
+        found = super().faults(where)
+        if found:
+            return found
+        at = [part.ravel() for part in np.meshgrid(*map(inner, self.ends))]
+        steps = [
+            (k, ORDERS_UV.index((i - (i > 0), j - (i == 0))), int(i == 0)) for k, (i, j) in enumerate(ORDERS_UV) if k
+        ]
+        return slope_faults(
+            self._known, at, steps, ["x" + "_"[: i + j] + "u" * i + "v" * j for i, j in ORDERS_UV], where
+        )
 
 
 SURFACES: dict[str, type[Surface]] = {

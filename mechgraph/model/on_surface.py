@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, cross
+from mechgraph.errors import ShapeError
 from mechgraph.model.factors import Factor
 from mechgraph.model.row_parts import UNIT_TWISTS, Freedom
 from mechgraph.model.surfaces import Surface
@@ -22,7 +23,8 @@ SURFACE_LINES = 9
 class OnSurface(Factor):
     """A frame that lies on a surface: z its normal, x along u; coordinates are lengths along u and v where they are zero.
 
-    D(q) = F(home)^-1 F(home + q / sizes), ``sizes`` being ``|x_u|`` and ``|x_v|`` at home; ``turned`` has the normal the other way round.
+    D(q) = F(home)^-1 F(home + q / sizes), ``sizes`` being ``|x_u|`` and ``|x_v|`` at home; ``turned`` has the normal the other way round;
+    ``pair`` is the name for messages.
     Without a surface it is a place for one: it can be counted, not evaluated.
     """
 
@@ -30,6 +32,7 @@ class OnSurface(Factor):
     home: tuple[float, float] = (0.0, 0.0)
     turned: bool = False
     unit: float = 1.0
+    pair: str = field(default="", compare=False)
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
@@ -70,7 +73,10 @@ class OnSurface(Factor):
         """Position, axes ``(3, 3, ...)`` and twists about the point ``(6, 2, ...)``, in the frame of the link."""
         assert self.surface is not None
         su, sv = self.sizes
-        J = self.surface.at(self.home[0] + self.unit / su * x[0], self.home[1] + self.unit / sv * x[1])
+        try:
+            J = self.surface.at(self.home[0] + self.unit / su * x[0], self.home[1] + self.unit / sv * x[1])
+        except ShapeError as error:
+            raise error.of(self.pair) from error.__cause__
         x_, xu, xv = J[0], J[1] / su, J[2] / sv
         second = self.unit * np.stack([J[3] / su**2, J[4] / (su * sv), J[5] / sv**2])
         lu, N = np.sqrt((xu * xu).sum(axis=0)), cross(xu, xv)

@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.errors import ShapeError
 from mechgraph.model.contact_rows import (
     ROWS,
     Contact,
@@ -191,13 +192,10 @@ class Pair(Described):
     ) -> None:
         row = row_of(type, curve, surface)
         point, axis, second, roller = plain(point), plain(axis), plain(second), plain(roller)
-        object.__setattr__(self, "contact", None)
-        if isinstance(curve, Curve) and not curve_faults(row, curve, curve_b, roller, point, ""):
-            object.__setattr__(
-                self, "contact", in_contact(row, curve, curve_b, roller, point, axis if point is not None else None)
-            )
-        elif curve is None and isinstance(surface, Surface) and not surface_faults(row, surface, point, ""):
-            object.__setattr__(self, "contact", on_surface(row, surface, point, axis if point is not None else None))
+        try:
+            object.__setattr__(self, "contact", self._placed(name, row, curve, curve_b, roller, surface, point, axis))
+        except ShapeError as error:
+            raise error.of(name) from error.__cause__
         if (contact := self.contact) is not None:
             row, (second, _, axis, point) = contact.row, contact.marker.T.tolist()
             if on_b is not None:
@@ -223,6 +221,18 @@ class Pair(Described):
         )
         for key, value in zip(self.formats, values, strict=True):
             object.__setattr__(self, key, value)
+
+    @staticmethod
+    def _placed(
+        name: str, row: Any, curve: Any, curve_b: Any, roller: Any, surface: Any, point: Any, axis: Any
+    ) -> Contact | None:
+        """The row with the curves or the surface that are given; None without, or with faults."""
+        towards = axis if point is not None else None
+        if isinstance(curve, Curve) and not curve_faults(row, curve, curve_b, roller, point, ""):
+            return in_contact(row, curve, curve_b, roller, point, towards, name)
+        if curve is None and isinstance(surface, Surface) and not surface_faults(row, surface, point, ""):
+            return on_surface(row, surface, point, towards, name)
+        return None
 
     @property
     def has_geometry(self) -> bool:
