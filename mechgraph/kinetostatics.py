@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from mechgraph.arguments import items_of, option_faults
-from mechgraph.closure.assembly import assembled_at
+from mechgraph.closure.assembly import assembled_at, last_closed
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.closure.driver_path import Status
@@ -65,11 +65,16 @@ def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exceptio
         return None
     first = int(bad[0])
     status = Status(solution.status.reshape(-1)[first])
-    last = outcome.found.reached[:, first] * line.unit[line.lead]
-    reached = dict(zip([line.drive.names[i] for i in line.lead], last.tolist(), strict=True))
     wanted = (line.values("position", outcome.batch)[:, first] * line.unit).tolist()
     dead = status in (Status.DEAD_POINT, Status.BEYOND_DEAD_POINT)
     nodes = outcome.found.nodes_of(int(outcome.found.track[first]))
+    last, still = outcome.found.reached[:, first], False
+    way = nodes.take(nodes.place <= outcome.found.place[first])
+    if len(way) > 1 and not dead:
+        end = last_closed(line.system, way, line.leading)
+        still = not end.place[0]
+        last = end.drive[:, 0] if end.place[0] < way.place[-1] else last
+    reached = dict(zip([line.drive.names[i] for i in line.lead], (last * line.unit[line.lead]).tolist(), strict=True))
     meets = dead and len(nodes)
     ways = branches(line.system, nodes.x[:, np.argmax(nodes.place)], line.leading) if meets else ()
     misses = solution.checks.closure.reshape(-1)
@@ -79,6 +84,8 @@ def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exceptio
         miss=misses[first],
         most=np.max(misses, where=np.isfinite(misses), initial=0.0),
     )
+    if still:
+        why = f"is out of reach: the loops do not stay closed over any stroke from {_listed(reached.items())} (see mechgraph.check)"
     if outcome.found.left[first]:
         why = f"is out of reach: {outcome.found.left[first]} comes to the end of its curve or surface. {FLAG}"
     asked = _listed(zip(line.drive.names, wanted, strict=True))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -21,6 +22,7 @@ from mechgraph.model.pair import Marker
 from mechgraph.numerics.linear import compact, complement
 from mechgraph.numerics.newton import closest_zeros, least_norm_steps
 from mechgraph.numerics.tolerances import PATH
+from mechgraph.numerics.tracks import Nodes
 from mechgraph.quantities import is_numeric, shown, wrong
 
 CLOSED = 1e-10
@@ -135,6 +137,23 @@ def close_all(
     return x, Configuration(system, x).closure
 
 
+def last_closed(system: System, nodes: Nodes, columns: Index) -> Nodes:
+    """The last of the nodes of a track at which all loops close, the coordinates ``columns`` kept; at least its start.
+
+    A path follows independent rows. Those that depend on them at the start of a shaky mechanism open with the square of the way, which
+    the nodes, being closed coarsely, do not show at once.
+    """
+    order = np.argsort(nodes.place, kind="stable")
+
+    def open_at(i: int) -> bool:
+        return close(system, nodes.x[:, order[i]], columns)[1] > CLOSED
+
+    last = len(order) - 1
+    if last and open_at(last):
+        last = max(bisect_left(range(last), True, lo=1, key=open_at) - 1, 0)
+    return nodes.take(order[last : last + 1])
+
+
 def led(system: System, x: Array, columns: Index, goal: Array) -> tuple[Array, bool]:
     """A closed state followed until the coordinates ``columns`` have the values ``goal``; whether it came to them.
 
@@ -144,8 +163,7 @@ def led(system: System, x: Array, columns: Index, goal: Array) -> tuple[Array, b
     found = follow(path, [Request(x, 0, goal[:, None], np.zeros(1, dtype=np.intp))], 1)
     if found.status[0] is Status.OK:
         return found.x[:, 0], True
-    nodes = found.tracks.nodes
-    last = nodes.x[:, int(np.argmax(nodes.place))]
+    last = last_closed(system, found.tracks.nodes, columns).x[:, 0]
     if np.abs(last[path.rows] - goal).max() > PATH.dead_zone:
         return last, False
     begin = last.copy()

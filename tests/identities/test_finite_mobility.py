@@ -143,6 +143,20 @@ def test_shaky_and_singular_positions(build: object, mobility: int, finite: int,
     assert (report.mobility, report.finite_mobility) == (mobility, finite)
 
 
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.parametrize("value", [0.1, -0.1, 0.001])
+def test_no_position_of_a_shaky_mechanism_is_said_to_be_reached(value: float, engine: str) -> None:
+    """A flat triangle: its loop opens by the square of the way, 1e-6 after a thousandth of a radian."""
+    pairs = known.ring("RRR", [(0, 0, 0), (1, 0, 0), (2, 0, 0)], [Z] * 3, name="flat triangle").pairs
+    m = mg.Mechanism("flat triangle", None, pairs, [pairs[0].name])
+    with pytest.raises(mg.ReachError, match="the loops do not stay closed over any stroke from") as error:
+        mg.solve(m, {pairs[0].name: [0.0, value]}, engine=engine)  # type: ignore[arg-type]
+    assert list(error.value.value.values()) == [0.0]
+    assert error.value.solution.status.tolist()[0] == "ok"
+    with pytest.raises(mg.AssemblyError, match=f"came to {pairs[0].name} = 0,"):
+        mg.assemble(m, {pairs[0].name: value})
+
+
 def test_a_shaky_part_on_a_moving_mechanism_is_not_counted() -> None:
     """A flat triangle of hinges on the coupler of a four-bar: nullity 2 all along, of which 1 moves on."""
     corners = ((0, 0, 0), (0.3, 1, 0), (1.4, 1.2, 0), (1.1, 0.1, 0))

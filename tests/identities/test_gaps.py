@@ -253,3 +253,17 @@ def test_a_polygon_misses_nothing_that_is_reached_alone(seed):
     more = mg.kinematics(m, {"A": finer[0], "E": finer[1]}, on_reach="flag", engine=engine)
     assert more.status[1::2].tolist() == s.status.tolist()
     np.testing.assert_allclose(more["C"].position[1::2], s["C"].position, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", [3, 5])
+def test_both_engines_say_the_same_of_positions_out_of_reach(seed):
+    """A five-bar with both cranks driven to random angles, most of them out of reach or behind a gap."""
+    rng = np.random.default_rng((seed, 21))
+    corners = np.array([[0, 0], [0.3, 1], [1.2, 1.6], [2.1, 0.9], [1.8, 0]]) + 0.3 * rng.normal(size=(5, 2))
+    names = ["frame", "a", "b", "c", "d", "frame"]
+    pairs = [mg.Pair("ABCDE"[i], "R", names[i], names[i + 1], point=(*corners[i], 0), axis=Z) for i in range(5)]
+    wanted = dict(zip("AE", rng.uniform(-2.5, 2.5, (2, 6)), strict=True))
+    m = mg.Mechanism("five-bar", None, pairs, ["A", "E"])
+    dense, sparse = (mg.solve(m, wanted, on_reach="flag", engine=e) for e in ("dense", "sparse"))
+    assert dense.status.tolist() == sparse.status.tolist()
+    assert len(set(dense.status.tolist())) > 1
