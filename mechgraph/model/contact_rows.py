@@ -100,11 +100,15 @@ SURFACE_ROWS = {
 
 @dataclass(frozen=True)
 class Contact:
-    """A row with its curves, the marker at coordinates zero on link a ``(3, 4)``, and by how much the contact misses the curves."""
+    """A row with its curves, the markers at coordinates zero on links a and b ``(3, 4)``, and by how much each misses its curve.
+
+    ``marker_b`` is None where no curve of link b says it; a pair without a place for one has it where it likes.
+    """
 
     row: PairType
     marker: Array
     misses: tuple[float, ...]
+    marker_b: Array | None = None
 
 
 def row_of(type: Any, curve: Any, surface: Any = None) -> Any:
@@ -143,7 +147,12 @@ def travels(row: Any) -> bool:
 
 
 def on_surface(
-    row: PairType, surface: Surface, point: Sequence[float] | None, axis: Sequence[float] | None, pair: str
+    row: PairType,
+    surface: Surface,
+    point: Sequence[float] | None,
+    axis: Sequence[float] | None,
+    pair: str,
+    on_b: Array | None = None,
 ) -> Contact:
     """A row of a ``pair`` with its surface put in; coordinates zero at ``point`` (in the middle if left out), z towards ``axis``."""
     middle = tuple(
@@ -154,7 +163,7 @@ def on_surface(
     placed = OnSurface(surface, tuple(PLACE_STEP * round(at / PLACE_STEP) for at in home))  # type: ignore[arg-type]
     if axis is not None and placed.start[:, 2] @ np.asarray(axis) < 0:
         placed = replace(placed, turned=True)
-    off = 0.0 if point is None else float(np.linalg.norm(placed.start[:, 3] - point))
+    off = 0.0 if point is None or on_b is not None else float(np.linalg.norm(placed.start[:, 3] - point))
     return Contact(_filled(row, [placed], pair), placed.start, (off,))
 
 
@@ -186,28 +195,32 @@ def in_contact(
     point: Sequence[float] | None = None,
     axis: Sequence[float] | None = None,
     pair: str = "",
+    on_b: Array | None = None,
 ) -> Contact:
     """A row of a ``pair`` with its curves put in; coordinates zero where the curves pass ``point`` (where they begin if it is left out).
 
-    ``axis`` says in which sense of two z points; ``roller`` is that of the roller whose centre is the point.
+    ``axis`` says in which sense of two z points; ``roller`` is that of the roller whose centre is the point. Where the marker ``on_b``
+    ``(3, 4)`` is given apart, the point is only near the curve, and the curve of link b touches at that marker.
     """
-    first = takes_curves(row)[0]
+    first, *others = takes_curves(row)
     placed = _placed(first, _path(curve, roller, point), point)
     marker = placed.start
     if axis is not None and marker[:, 2] @ np.asarray(axis) < 0:
         placed = replace(placed, reversed=placed.tangent == Z, turned=placed.tangent == X)
         marker = placed.start
-    factors, off = [placed], [_off(placed, point)]
-    if len(takes_curves(row)) > 1:
-        other = curve_b or Line(point=tuple(marker[:, 3]), direction=tuple(marker[:, 0]))
-        second = _placed(takes_curves(row)[1], other, marker[:, 3])
+    factors, off = [placed], [0.0 if on_b is not None else _off(placed, point)]
+    beside, back = marker if on_b is None else on_b, None
+    for place in others:
+        other = curve_b or Line(point=tuple(beside[:, 3]), direction=tuple(beside[:, 0]))
+        second = _placed(place, other, beside[:, 3])
         back = second.start
         second = replace(
-            second, reversed=bool(back[:, 0] @ marker[:, 0] < 0), turned=bool(back[:, 2] @ marker[:, 2] < 0)
+            second, reversed=bool(back[:, 0] @ beside[:, 0] < 0), turned=bool(back[:, 2] @ beside[:, 2] < 0)
         )
         factors.append(second)
-        off += [_off(second, marker[:, 3]), float(np.linalg.norm(np.cross(back[:, 0], marker[:, 0])))]
-    return Contact(_filled(row, factors, pair), marker, tuple(off))
+        back = second.start
+        off += [_off(second, beside[:, 3]), float(np.linalg.norm(np.cross(back[:, 0], beside[:, 0])))]
+    return Contact(_filled(row, factors, pair), marker, tuple(off), back if on_b is not None else None)
 
 
 def _path(curve: Curve, roller: float | None, point: Sequence[float] | None) -> Curve:
@@ -228,7 +241,9 @@ def _placed(place: AlongCurve, curve: Curve, point: Sequence[float] | Array | No
     travel: Travel = curve.once(Travel)
     begin = travel.begin if np.isfinite(travel.begin) else 0.0
     home = begin if point is None else travel.nearest(np.asarray(point))[0]
-    return replace(place, curve=curve, home=PLACE_STEP * travel.length * round(home / (PLACE_STEP * travel.length)))
+    steps = round(home / (PLACE_STEP * travel.length))
+    again = round(1 / PLACE_STEP) if travel.is_closed else 0  # the end of a closed curve is where it begins
+    return replace(place, curve=curve, home=PLACE_STEP * travel.length * (0 if steps == again else steps))
 
 
 def _off(factor: AlongCurve, point: Sequence[float] | Array | None) -> float:
@@ -336,7 +351,8 @@ def miss_faults(contact: Contact, curves: Sequence[Curve | None], tol: float, wh
         if not miss > max(OFF_CURVE, tol) * size:
             continue
         if name:
-            at = ", ".join(f"{v:.6g}" for v in contact.marker[:, 3])
+            marker = contact.marker_b if contact.marker_b is not None and i else contact.marker
+            at = ", ".join(f"{v:.6g}" for v in marker[:, 3])
             yield (
                 f"{where}point: is {miss:.6g} off its {name}, which is nearest at ({at}); give that point, or the marker on link b "
                 "(on_b=mg.Marker(...), and no point) to have the mechanism assembled"

@@ -117,7 +117,8 @@ class Pair(Described):
     hertz : Hertz, materials and what else the pressure in a contact takes.
     curve : a ``Curve`` in the frame of link a, along which the marker travels: of P, C, Sg, and of the types Ps and Kc that need one. Then
         ``point`` is a place on it (where it begins if left out), and axis and second direction are those of its frame there. With
-        ``on_b`` instead of a point, coordinates are arc lengths from where the curve begins (see ``start``).
+        ``on_b`` instead of a point, coordinates are arc lengths from where the curve is nearest to that of ``on_a`` (where it begins if
+        left out; see ``start``).
     curve_b : the curve on link b that touches it (Kc); a straight face where left out.
     surface : a ``Surface`` in the frame of link a, on which the marker of Sp travels; ``point`` is a place on it.
     roller : radius of a roller that runs on the curve; ``point`` is its centre.
@@ -192,14 +193,21 @@ class Pair(Described):
     ) -> None:
         row = row_of(type, curve, surface)
         point, axis, second, roller = plain(point), plain(axis), plain(second), plain(roller)
+        if (curve is not None or surface is not None) and point is None and isinstance(on_a, Marker):
+            point, axis = on_a.point, on_a.axis
+        apart = on_b.pose() if isinstance(on_b, Marker) and not on_b.faults("", 1.0) else None
         try:
-            object.__setattr__(self, "contact", self._placed(name, row, curve, curve_b, roller, surface, point, axis))
+            contact = self._placed(name, row, curve, curve_b, roller, surface, point, axis, apart)
         except ShapeError as error:
             raise error.of(name) from error.__cause__
-        if (contact := self.contact) is not None:
+        object.__setattr__(self, "contact", contact)
+        if contact is not None:
             row, (second, _, axis, point) = contact.row, contact.marker.T.tolist()
             if on_b is not None:
                 on_a, point, axis, second = Marker(point, axis, second), None, None, None
+            if contact.marker_b is not None:
+                x, _, z, at = contact.marker_b.T.tolist()
+                on_b = Marker(at, z, x)
         if axis is None and point is not None and isinstance(row, PairType) and not row.directed:
             axis = (0.0, 0.0, 1.0)
         if second is None and is_numeric(axis, (3,)):
@@ -224,14 +232,14 @@ class Pair(Described):
 
     @staticmethod
     def _placed(
-        name: str, row: Any, curve: Any, curve_b: Any, roller: Any, surface: Any, point: Any, axis: Any
+        name: str, row: Any, curve: Any, curve_b: Any, roller: Any, surface: Any, point: Any, axis: Any, on_b: Any
     ) -> Contact | None:
         """The row with the curves or the surface that are given; None without, or with faults."""
         towards = axis if point is not None else None
         if isinstance(curve, Curve) and not curve_faults(row, curve, curve_b, roller, point, ""):
-            return in_contact(row, curve, curve_b, roller, point, towards, name)
+            return in_contact(row, curve, curve_b, roller, point, towards, name, on_b)
         if curve is None and isinstance(surface, Surface) and not surface_faults(row, surface, point, ""):
-            return on_surface(row, surface, point, towards, name)
+            return on_surface(row, surface, point, towards, name, on_b)
         return None
 
     @property

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy
 
 from mechgraph.algebra.se3 import Array
 
@@ -47,9 +46,21 @@ class Pieces:
 
     @classmethod
     def meeting(cls, breaks: Array, values: Sequence[Array]) -> Pieces:
-        """The polynomials that meet values and derivatives ``(n, ...)`` at the breaks (Hermite)."""
-        made = scipy.interpolate.BPoly.from_derivatives(breaks, np.stack(values, axis=1))
-        return cls(np.asarray(breaks), scipy.interpolate.PPoly.from_bernstein_basis(made).c)
+        """The polynomials that meet values and derivatives ``(n, ...)`` at the breaks."""
+        ends = [y[:-1] for y in values], [y[1:] for y in values]
+        return cls(np.asarray(breaks), hermite(np.diff(breaks), *ends)[::-1])
+
+
+def hermite(length: Array, begin: Sequence[Array], end: Sequence[Array]) -> Array:
+    """The polynomials over ``(0, length (n,))`` that meet ``k`` values and derivatives ``(n, ...)`` at both ends, ``(2 k, n, ...)``.
+
+    Coefficients, lowest power first: the lower half is Taylor's series at the beginning, the upper half follows from the end.
+    """
+    k, h = len(begin), length.reshape(-1, *(1,) * (begin[0].ndim - 1))
+    low, there = (np.stack([h**j / math.factorial(j) * y for j, y in enumerate(values)]) for values in (begin, end))
+    choose = np.array([[math.comb(m, j) for m in range(2 * k)] for j in range(k)], dtype=float)
+    high = np.tensordot(np.linalg.inv(choose[:, k:]), there - np.tensordot(choose[:, :k], low, 1), 1)
+    return np.concatenate([low, high]) / np.stack([h**m for m in range(2 * k)])
 
 
 def parted(breaks: Array, parts: int) -> Array:

@@ -20,7 +20,7 @@ import scipy
 from mechgraph.algebra.se3 import Array, cross
 from mechgraph.model.curves import CLOSED_GAP, ORDERS, Curve
 from mechgraph.model.numeric import second_direction
-from mechgraph.model.pieces import Pieces
+from mechgraph.model.pieces import Pieces, hermite
 from mechgraph.quantities import shown
 
 STRAIGHT, IN_PLANE = 1e-9, 1e-9
@@ -156,17 +156,22 @@ class Travel:
 
     def _find_turn(self) -> None:
         """The angle by which the minimizing frame is turned about the tangent against the guided one: ``a' = -r``."""
-        s = self.s
-        for _ in range(INTEGRAL_HALVINGS):
-            a = -np.concatenate([[0.0], np.cumsum(_integrals(lambda at: self.guided(at)[6], s))])
+
+        def rate(s: Array) -> Array:
+            return -self.guided(s)[6]
+
+        def rates(s: Array) -> tuple[Array, ...]:
             *_, r, dr = self.guided(s)
-            self._turn = Pieces.meeting(s, [a, -r, -dr, -self._turn_rate(s, dr)])
-            middle = 0.5 * (s[:-1] + s[1:])
-            half = -_integrals(lambda at: self.guided(at)[6], s, 0.5)
-            bad = np.abs(self._turn.at(middle, 1)[0] - a[:-1] - half) > INTEGRAL_ERROR * 2 * np.pi
-            if not bad.any():
-                break
-            s = np.sort(np.concatenate([s, middle[bad]]))
+            return -r, -dr, -self._turn_rate(s, dr)
+
+        def strays(begin: Array, end: Array) -> Array:
+            half, whole = _integrals(rate, begin, 0.5 * (begin + end)), _integrals(rate, begin, end)
+            made = hermite(end - begin, [0 * whole, *rates(begin)], [whole, *rates(end)])
+            return np.asarray(np.abs(_value(made, 0.5 * (end - begin)) - half) > INTEGRAL_ERROR * 2 * np.pi)
+
+        s = _refined(self.s, strays)
+        a = np.concatenate([[0.0], np.cumsum(_integrals(rate, s[:-1], s[1:]))])
+        self._turn = Pieces.meeting(s, [a, *rates(s)])
         self._gain = float(a[-1])
         self.closing = self._gain if self.is_closed else 0.0
 
@@ -220,31 +225,49 @@ def _parameter_rates(x: Array) -> tuple[Array, Array, Array]:
     return u1, -a * square, (4 * a * a - b) * square * u1
 
 
-def _speed(curve: Curve, u: Array) -> Array:
-    x = curve.at(u)[1]
-    return np.asarray(np.sqrt(_dot(x, x)))
-
-
-def _integrals(f: Callable[[Array], Array], grid: Array, part: float = 1.0) -> Array:
-    """Integrals over the intervals of a grid, or over their first ``part``, by Gauss's rule."""
+def _integrals(f: Callable[[Array], Array], begin: Array, end: Array) -> Array:
+    """Integrals over intervals, by Gauss's rule."""
     nodes, weights = np.polynomial.legendre.leggauss(10)
-    half = part * np.diff(grid) / 2
-    return np.asarray((f(grid[:-1, None] + half[:, None] * (1 + nodes)) @ weights) * half)
+    half = (end - begin) / 2
+    return np.asarray((f(begin[:, None] + half[:, None] * (1 + nodes)) @ weights) * half)
+
+
+def _refined(grid: Array, strays: Callable[[Array, Array], Array]) -> Array:
+    """The grid with intervals halved as long as ``strays(begin, end)`` says so of them."""
+    begin, end, cuts = grid[:-1], grid[1:], [grid]
+    for _ in range(INTEGRAL_HALVINGS):
+        bad = strays(begin, end)
+        begin, end = begin[bad], end[bad]
+        cuts.append(middle := 0.5 * (begin + end))
+        begin, end = np.concatenate([begin, middle]), np.concatenate([middle, end])
+        if not begin.size:
+            break
+    return np.sort(np.concatenate(cuts))
+
+
+def _value(coefficients: Array, x: Array) -> Array:
+    """Values ``(n,)`` of polynomials ``(degree + 1, n)``, lowest power first, each at its own ``x (n,)``."""
+    return np.asarray(np.polynomial.polynomial.polyval(x, coefficients, tensor=False))
 
 
 def _by_arc_length(curve: Curve) -> tuple[Array, Pieces]:
     """Arc lengths on a grid, and the parameter by the arc length: intervals in which that is not exact in the middle are halved."""
-    u = curve.breaks
-    for _ in range(INTEGRAL_HALVINGS):
-        s = np.concatenate([[0.0], np.cumsum(_integrals(lambda at: _speed(curve, at), u))])
-        pieces = Pieces.meeting(s, [u, *_parameter_rates(curve.at(u))])
-        middle = 0.5 * (u[:-1] + u[1:])
-        half = _integrals(lambda at: _speed(curve, at), u, 0.5)
-        bad = np.abs(pieces.at(s[:-1] + half, 1)[0] - middle) > INTEGRAL_ERROR * (u[-1] - u[0])
-        if not bad.any():
-            break
-        u = np.sort(np.concatenate([u, middle[bad]]))
-    return s, pieces
+
+    def speed(u: Array) -> Array:
+        x = curve.at(u)[1]
+        return np.asarray(np.sqrt(_dot(x, x)))
+
+    def strays(begin: Array, end: Array) -> Array:
+        middle = 0.5 * (begin + end)
+        half = _integrals(speed, begin, middle)
+        rates = [_parameter_rates(curve.at(u)) for u in (begin, end)]
+        made = hermite(half + _integrals(speed, middle, end), [0 * half, *rates[0]], [end - begin, *rates[1]])
+        return np.asarray(np.abs(_value(made, half) - (middle - begin)) > most)
+
+    most = INTEGRAL_ERROR * (curve.breaks[-1] - curve.breaks[0])
+    u = _refined(curve.breaks, strays)
+    s = np.concatenate([[0.0], np.cumsum(_integrals(speed, u[:-1], u[1:]))])
+    return s, Pieces.meeting(s, [u, *_parameter_rates(curve.at(u))])
 
 
 def _right_handed(normal: Array, x: Array) -> Array:
