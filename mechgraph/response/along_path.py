@@ -3,14 +3,22 @@
 On the path every state is a function of one coordinate ``u``, that of the freedom which moves fastest, and with loads that depend on
 positions, and on rates no more than linearly,
 
-    M(u) u'' = Q_0(u) + Q_1(u) u' + Q_2(u) u'^2.
+    (M(u) u'^2 / 2)' = Q(u, u') u',    Q = Q_0(u) + P_1(u) + P_2(u) u'
+
+and with the rate ``w = sqrt(M / M_0) u'``, in which the mass is that at the start, M_0,
+
+    u' = w / sqrt(M / M_0),    w' = Q / sqrt(M M_0).
+
+No derivative of the mass is needed, which is the accelerations of the mechanism: beside a change point these magnify rounding by the
+cube of the distance, rates by the square.
 
 The path is followed by the follower that kinetostatics uses, so that change points are passed on the branch of continuous velocity,
-with certificates. Between pieces of the path the quotients ``Q_i / M`` are Chebyshev series.
+with certificates. In pieces of the path the terms are Chebyshev series.
 """
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from typing import Any
 
@@ -22,7 +30,6 @@ from mechgraph.closure.driver_path import DriverPath
 from mechgraph.closure.indexing import System
 from mechgraph.closure.rank import closure_rank
 from mechgraph.closure.solver import closure_solver
-from mechgraph.force.applied_loads import kinetic_energy
 from mechgraph.response.chart import Closed
 from mechgraph.response.charts import Task
 from mechgraph.response.motion_equations import along_one
@@ -34,7 +41,7 @@ TURN = 2.0 * np.pi
 UNEVEN = 0.37
 """Where in its part of a turn loads are compared with those a turn later: not at the quarters, where change points often are."""
 PERIODIC = 1e-9
-"""Difference of poses (and part of the quotients) after a turn of the coordinate up to which the path has come back."""
+"""Difference of poses (and part of the largest term) after a turn of the coordinate up to which the path has come back."""
 
 
 class Arc:
@@ -111,8 +118,7 @@ class Arc:
         further = Configuration(s, around.here.x + sense * out[:, None])
         loads, factored = self.task.loads, self.path.solver.factored(further, around.f.which)
         now, then = along_one(around.here, around.f, loads), along_one(further, factored, loads)
-        same = all(np.abs(a - b).max() <= PERIODIC * np.abs(a).max(initial=1.0) for a, b in zip(now, then, strict=True))
-        return out if same else None
+        return out if np.abs(now - then).max() <= PERIODIC * np.abs(now).max() else None
 
 
 class PathStage:
@@ -122,25 +128,21 @@ class PathStage:
         self.arc, self.task, self._first = arc, arc.task, np.array([u, v, 0.0])
         self._piece: Piece | None = None
         self._turns = 0.0
-        here = arc.close(np.array([u])) if arc.piece(u) is not None else None
-        self.energy = 1.0
-        if here is not None:
-            V = here.here.link_twists(here.f.sensitivity()[:, 0])
-            mass = 2.0 * float(kinetic_energy(here.here, V)[0])
-            force = abs(self._quotients(u)[0]) * mass
-            self.energy = 0.5 * mass * v * v + force or 1.0
+        self._mass, force = self._terms(u)[:2].tolist()
+        self.energy = 0.5 * self._mass * v * v + abs(force) or 1.0
 
     def begin(self) -> Array:
         """See ``Stage``."""
         return self._first
 
-    def _quotients(self, u: float) -> Array:
+    def _terms(self, u: float) -> Array:
+        """Values of the series at a place."""
         piece, turns = self._piece, self._turns
         w = u - TURN * turns
         if piece is None or not min(piece.begin, piece.end) <= w <= max(piece.begin, piece.end):
             found = self.arc.piece(u)
             if found is None:
-                return np.full(5, np.nan)
+                return np.full(4, np.nan)
             self._piece, self._turns = piece, turns = found
             w = u - TURN * turns
         z = (2.0 * w - piece.begin - piece.end) / (piece.end - piece.begin)
@@ -150,25 +152,29 @@ class PathStage:
 
     def rates(self, t: float, y: Array) -> Array:
         """See ``Stage``."""
-        u, v = float(y[0]), float(y[1])
-        q0, q1, q2, p1, p2 = self._quotients(u).tolist()
-        return np.array([v, q0 + v * (q1 + v * q2), v * (p1 + v * p2)])
+        u, w = float(y[0]), float(y[1])
+        mass, stored, p1, p2 = self._terms(u).tolist()
+        size = math.sqrt(mass / self._mass)
+        v = w / size
+        rest = p1 + v * p2
+        return np.array([v, (stored + rest) / (size * self._mass), v * rest])
 
     def accepted(self, t: float, y: Array) -> bool:
         """See ``Stage``."""
-        self._quotients(float(y[0]))
+        self._terms(float(y[0]))
         return self._piece is not None and self._piece.steepness <= FAST
 
     def following(self, t: float, y: Array) -> PathStage:
         """See ``Stage``."""
-        closed = self.arc.close(y[:1])
-        dq = closed.f.sensitivity()[:, 0, 0] * y[1]
+        closed, v = self.states(np.array([t]), y[:, None])
+        dq = closed.f.sensitivity()[:, 0, 0] * v[0, 0]
         arc = Arc(self.arc.task, closed.here.x[:, 0])
         return PathStage(arc, arc.begin, float(dq[arc.column]))
 
     def states(self, t: Array, y: Array) -> tuple[Closed, Array]:
         """See ``Stage``."""
-        return self.arc.close(y[0]), y[1:2]
+        mass = np.array([self._terms(u)[0] for u in y[0].tolist()])
+        return self.arc.close(y[0]), y[1:2] / np.sqrt(mass / self._mass)
 
 
 def _same(system: System, variants: Any) -> System:

@@ -222,21 +222,20 @@ def moved(closed: Closed, v: Array, p: Array, loads: Loads, t: Array) -> Moved:
     return Moved(Rates(velocities, ddq + further, np.zeros(here.T)), columns, columns.force(wrenches, efforts), power)
 
 
-def along_one(here: Configuration, f: FactoredClosure, loads: Loads) -> tuple[Array, Array]:
-    """Of mobility 1: ``(Q_0, Q_1, Q_2) / M (3, T)`` of ``M u'' = Q_0 + Q_1 u' + Q_2 u'^2``, and ``(P_1, P_2) (2, T)`` of the power
-    ``P_1 u' + P_2 u'^2`` of loads without a potential energy, which may depend on rates linearly.
+def along_one(here: Configuration, f: FactoredClosure, loads: Loads) -> Array:
+    """Of mobility 1: ``(M, Q_0, P_1, P_2) (4, T)`` of the energy's rate ``(M u'^2 / 2)' = Q_0 u' + P_1 u' + P_2 u'^2``.
+
+    ``Q_0`` is the force of the loads with a potential energy, ``P_1 + P_2 u'`` that of the others, which may depend on rates linearly.
     """
     columns, t = Columns(here, f, 1), np.zeros(here.T)
     if not (columns.mass > 0.0).all():
         raise Stopped(NO_INERTIA)
-    forward, _, inertia = columns.bound(columns.Z[:, 0])
-    still, back = (Velocities(here, factor * columns.Z[:, 0]) for factor in (0.0, -1.0))
-    nothing = np.zeros((here.system.n_freedoms, here.T))
-    stored = columns.force(*columns.applied(loads.stored, still, t))[0]
-    gyroscopic = columns.force(inertia, nothing)[0]
-    ahead, behind = (columns.force(*columns.applied(loads.rest, way, t))[0] for way in (forward, back))
-    constant, linear = 0.5 * (ahead + behind), 0.5 * (ahead - behind)
-    return np.stack([stored + constant, linear, gyroscopic]) / columns.mass[0], np.stack([constant, linear])
+    still, ahead, back = (Velocities(here, factor * columns.Z[:, 0]) for factor in (0.0, 1.0, -1.0))
+    stored, forth, behind = (
+        columns.force(*columns.applied(some, way, t))[0]
+        for some, way in ((loads.stored, still), (loads.rest, ahead), (loads.rest, back))
+    )
+    return np.stack([columns.mass[0, 0], stored, 0.5 * (forth + behind), 0.5 * (forth - behind)])
 
 
 def accelerations(mass: Array, force: Array) -> tuple[Array, Array]:

@@ -51,7 +51,7 @@ NOISE = 1e-9
 
 @dataclass(frozen=True)
 class Piece:
-    """The path between two values of its coordinate: Chebyshev series ``(POINTS, 5)`` of ``Q_0/M, Q_1/M, Q_2/M`` and ``P_1, P_2``.
+    """The path between two values of its coordinate: Chebyshev series ``(POINTS, 4)`` of ``M, Q_0, P_1, P_2``.
 
     ``steepness``: the largest rate of another freedom for a unit rate of the coordinate.
     """
@@ -207,7 +207,7 @@ class Way:
         x, which = self.states(at)
         here = Configuration(self.path.system, x)
         f = self.path.solver.factored(here, which)
-        values = np.concatenate(along_one(here, f, self.loads)).T.reshape(len(spans), POINTS, 5)
+        values = along_one(here, f, self.loads).T.reshape(len(spans), POINTS, 4)
         T = np.polynomial.chebyshev.chebvander(nodes, POINTS - 1) * (2.0 / POINTS)
         T[:, 0] *= 0.5
         singles = self.path.system.single_rows >= 0
@@ -218,9 +218,11 @@ class Way:
 
 
 def _coarse(c: Array, noise: float) -> bool:
-    """Whether series ``(POINTS, 5)`` leave more out than rounding, which stays however short the piece is."""
+    """Whether series ``(POINTS, 4)`` leave more out than rounding, which stays however short the piece is."""
     late, last = np.abs(c[-8:-4]).max(axis=0), np.abs(c[-4:]).max(axis=0)
     tail, size = np.abs(c[-2:]).max(axis=0), np.abs(c).max(axis=0)
-    rounding = (last > NOT_FALLING * late) & (last < NOISE * size[:3].max())
-    small = tail <= max(SERIES_TAIL, noise) * np.maximum(size, 1e-3 * size[:3].max())
+    # the mass beside itself, forces beside what gives the mass an acceleration of one as well
+    largest = np.append(size[0], np.full(3, size[:2].max()))
+    rounding = (last > NOT_FALLING * late) & (last < NOISE * largest)
+    small = tail <= max(SERIES_TAIL, noise) * np.maximum(size, 1e-3 * largest)
     return bool(not (small | rounding).all())
