@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.numerics.certificate import between, smooth
-from mechgraph.numerics.hermite import divided_differences, newton_form
+from mechgraph.numerics.hermite import through
 from mechgraph.numerics.marching import March, Marching, next_step
 from mechgraph.numerics.newton import Problem, Work
 from mechgraph.numerics.tolerances import PATH
@@ -352,11 +352,7 @@ class Follower(Marching):
             base = picked.take(np.array([-1]))
             drive = self.paths.drive(base.track, at)
             direction = (drive - base.drive) / (at - base.place)
-            dq = self.problem.difference(picked.x, base.x)
-            rates = self.problem.tangent(dq, (picked.Z * direction).sum(axis=1))
-            form = divided_differences((picked.place - base.place)[:, None], dq.T[:, :, None], rates.T[:, :, None])
-            ahead = self.problem.corrigible(newton_form(*form, at - base.place), base.which)
-            x = self.problem.advance(base.x, ahead, base.track)
+            x = through(self.problem, picked, base, direction[:, 0], at)
             step = self.newton.nodes(x, drive, base.track, base.which, PATH.node)
             new = self.renewed(Nodes.closed(step, drive, base.track, at, sure=True))
             turn = np.abs((step.Z - base.Z) * direction).max() / max(1.0, float(np.abs(base.Z).max()))

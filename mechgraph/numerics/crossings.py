@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.numerics.continuation import Follower
-from mechgraph.numerics.hermite import divided_differences, newton_form
+from mechgraph.numerics.hermite import through
 from mechgraph.numerics.newton import Problem
 from mechgraph.numerics.tolerances import PATH
 from mechgraph.numerics.tracks import Nodes
@@ -83,15 +83,10 @@ def passed(follower: Follower, nodes: Nodes, track: int, place: float) -> Crossi
     picked = mine.take(np.unique([int(np.argmin(np.abs(mine.place - at))) for at in wanted]))
     picked = picked.take(np.unique(picked.place, return_index=True)[1])
     base = picked.take(np.full(len(SIDES), np.searchsorted(picked.place, place) - 1))
-    dq = problem.difference(picked.x, base.x[:, :1])
-    rates = problem.tangent(dq, (picked.Z * direction[:, None]).sum(axis=1))
-    form = divided_differences((picked.place - base.place[0])[:, None], dq.T[:, :, None], rates.T[:, :, None])
-    coefficients, places = (np.repeat(values, len(SIDES), axis=-1) for values in form)
     for span in SPANS:
         at = place + span * SIDES
         drives = drive[:, None] + direction[:, None] * (at - place)
-        ahead = problem.corrigible(newton_form(coefficients, places, at - base.place), base.which)
-        x = problem.advance(base.x, ahead, base.track)
+        x = through(problem, picked, base, direction, at)
         found = follower.newton.nodes(x, drives, base.track, base.which, PATH.node)
         nearness = found.condition * np.abs(at - place)
         regular = nearness.max() <= SCATTER * nearness.min()

@@ -56,6 +56,19 @@ def cubic(values: Array, rates: Array, rates_there: Array, width: Array, at: Arr
     return np.asarray(values * (s * s * (1.0 + 2.0 * left)) + (at * left) * (left * rates - s * rates_there))
 
 
+def through(problem: Problem, nodes: Nodes, base: Nodes, direction: Array, at: Array) -> Array:
+    """States ``(nx, n)`` at places ``at (n,)`` of the polynomial through nodes of one track, path values changing in a ``direction (d,)``.
+
+    ``base``: ``n`` times the node from which increments are measured.
+    """
+    dq = problem.difference(nodes.x, np.repeat(base.x[:, :1], len(nodes), axis=1))
+    rates = problem.tangent(dq, (nodes.Z * direction[:, None]).sum(axis=1))
+    form = divided_differences((nodes.place - base.place[0])[:, None], dq.T[:, :, None], rates.T[:, :, None])
+    coefficients, places = (np.repeat(values, len(at), axis=-1) for values in form)
+    ahead = problem.corrigible(newton_form(coefficients, places, at - base.place), base.which)
+    return problem.advance(base.x, ahead, base.track)
+
+
 class Interpolation:
     """States between nodes of tracks: Hermite interpolation through the nodes beside a step, as far as a track goes straight on.
 

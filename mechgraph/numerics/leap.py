@@ -9,12 +9,14 @@ crossing that a small change of the dimensions has opened), they leave ``g^2``; 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.numerics.continuation import Follower
 from mechgraph.numerics.crossings import Crossing, passed
-from mechgraph.numerics.hermite import divided_differences, newton_form
+from mechgraph.numerics.hermite import through
 from mechgraph.numerics.tolerances import PATH
 from mechgraph.numerics.tracks import Nodes
 
@@ -22,6 +24,8 @@ Array = NDArray[np.float64]
 
 NODES = 5
 """Nodes from which the branch is extrapolated."""
+APART = 0.05
+"""Distance between them."""
 LONGEST_LEAP = 0.2
 """Distance of a crossing behind the last node up to which it is leapt at."""
 BEHIND = np.array([0.02, 0.05, 0.09])
@@ -37,7 +41,6 @@ CLOSES = 1e-12
 def leapt(follower: Follower, nodes: Nodes) -> tuple[Crossing, Nodes] | None:
     """The crossing ahead of the last of the nodes of one track, and nodes behind it; None where the branch does not lead to any."""
     last = nodes.take(np.unique(nodes.place, return_index=True)[1])
-    last = last.take(np.arange(max(0, len(last) - NODES), len(last)))
     if len(last) < 3:
         return None
     if not last.condition[-3:].all():  # without loops nothing is singular
@@ -50,13 +53,23 @@ def leapt(follower: Follower, nodes: Nodes) -> tuple[Crossing, Nodes] | None:
     crossing = float(place[-1] + ahead)
     if not ahead < LONGEST_LEAP:
         return None
-    behind = _behind(follower, last, crossing)
+    # steps are short where they had to be halved: nodes as far apart as those behind
+    spread = np.unique([int(np.argmin(np.abs(last.place - at))) for at in last.place[-1] - APART * np.arange(NODES)])
+    behind = _behind(follower, last.take(spread), crossing)
     if behind is None:
         return None
+    crossing = _singular_between(last.take(np.array([-1])), behind.take(np.array([0])))
     found = passed(follower, Nodes.join([nodes, behind]), int(last.track[0]), crossing)
     if found is None or not _closes(found):
         return None
-    return found, behind
+    middle = len(found.sides) // 2
+    crossing = _singular_between(*(found.sides.take(np.array([i])) for i in (middle - 1, middle)))
+    return replace(found, place=crossing, drive=found.drives(np.array([crossing]))[:, 0]), behind
+
+
+def _singular_between(a: Nodes, b: Nodes) -> float:
+    """Where the inverse of the condition, proportional to the distance, falls to zero between two nodes."""
+    return float((a.place * a.condition + b.place * b.condition)[0] / (a.condition + b.condition)[0])
 
 
 def _behind(follower: Follower, last: Nodes, crossing: float) -> Nodes | None:
@@ -65,13 +78,8 @@ def _behind(follower: Follower, last: Nodes, crossing: float) -> Nodes | None:
     base = last.take(np.full(n, len(last) - 1))
     at = crossing + BEHIND
     drive = follower.paths.drive(base.track, at)
-    direction = (drive[:, :1] - base.drive[:, :1]) / (at[0] - base.place[0])
-    dq = problem.difference(last.x, np.repeat(base.x[:, :1], len(last), axis=1))
-    rates = problem.tangent(dq, (last.Z * direction).sum(axis=1))
-    form = divided_differences((last.place - base.place[0])[:, None], dq.T[:, :, None], rates.T[:, :, None])
-    coefficients, places = (np.repeat(values, n, axis=-1) for values in form)
-    ahead = problem.corrigible(newton_form(coefficients, places, at - base.place), base.which)
-    x = problem.advance(base.x, ahead, base.track)
+    direction = (drive[:, 0] - base.drive[:, 0]) / (at[0] - base.place[0])
+    x = through(problem, last, base, direction, at)
     found = follower.newton.nodes(x, drive, base.track, base.which, PATH.node)
     if not found.done.all() or (found.correction > OFF * BEHIND).any():
         return None

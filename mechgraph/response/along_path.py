@@ -45,9 +45,12 @@ PERIODIC = 1e-9
 
 
 class Arc:
-    """The path around a closed state ``x (nx,)``, by the coordinate of one freedom; extended both ways as far as it is asked for."""
+    """The path around a closed state ``x (nx,)``, by the coordinate of one freedom; extended both ways as far as it is asked for.
 
-    def __init__(self, task: Task, x: Array) -> None:
+    It begins there with the ``rate`` that the coordinate has at rates ``dq (F,)``.
+    """
+
+    def __init__(self, task: Task, x: Array, dq: Array) -> None:
         self.task = task
         s = task.system
         motion = closure_rank(Configuration(s, x[:, None]), engine=task.engine).motions[:, 0]
@@ -55,7 +58,8 @@ class Arc:
         self.column = int(singles[np.argmax(np.abs(motion[singles]))])
         columns = np.array([self.column], dtype=np.intp)
         self.path = DriverPath(s, closure_solver(task.engine, columns), partial(_same, s))
-        self.begin = float(x[s.single_rows[self.column]])
+        self.begin, self.rate = float(x[s.single_rows[self.column]]), float(dq[self.column])
+        self._first_way = math.copysign(1.0, self.rate)
         self._ways = {sense: Way(self.path, task.loads, x, sense) for sense in (1.0, -1.0)}
         self._advance: Array | None = None
         self._sense = 1.0
@@ -64,7 +68,7 @@ class Arc:
         """The piece in which a place lies, and the whole turns by which the place is further on; None where the table ends before."""
         turns = float(self._turns(np.array([u]))[0])
         u -= TURN * turns
-        way = self._ways[1.0 if u >= self.begin else -1.0]
+        way = self._ways[float(np.sign(u - self.begin)) or self._first_way]
         at = way.sense * (u - self.begin)
         while (at > way.length or not way.length) and not way.closed:
             self._extend(way)
@@ -85,7 +89,7 @@ class Arc:
         home = u - TURN * turns
         x, which = np.empty((s.n_state, len(u))), np.empty(len(u), dtype=np.intp)
         for way in self._ways.values():
-            mine = (home >= self.begin) == (way.sense > 0)
+            mine = np.where(home == self.begin, self._first_way, np.sign(home - self.begin)) == way.sense
             if mine.any():
                 if not way.length:
                     self._extend(way)
@@ -168,8 +172,8 @@ class PathStage:
         """See ``Stage``."""
         closed, v = self.states(np.array([t]), y[:, None])
         dq = closed.f.sensitivity()[:, 0, 0] * v[0, 0]
-        arc = Arc(self.arc.task, closed.here.x[:, 0])
-        return PathStage(arc, arc.begin, float(dq[arc.column]))
+        arc = Arc(self.arc.task, closed.here.x[:, 0], dq)
+        return PathStage(arc, arc.begin, arc.rate)
 
     def states(self, t: Array, y: Array) -> tuple[Closed, Array]:
         """See ``Stage``."""

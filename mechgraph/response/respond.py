@@ -261,8 +261,8 @@ def _first_stage(it: Integration, task: Task, begin: float, x: Array, dq: Array)
         and not len(task.columns)
         and all(load.smooth for load in (*task.loads.stored, *task.loads.rest))
     ):
-        arc = Arc(task, x)
+        arc = Arc(task, x, dq)
         it.work.coordinates = "along the path"
-        return PathStage(arc, arc.begin, float(dq[arc.column]))
+        return PathStage(arc, arc.begin, arc.rate)
     it.work.coordinates = "in independent freedoms"
     return ChartStage(task, begin, x, dq)
