@@ -196,3 +196,16 @@ def test_a_slot_must_be_plane_and_a_contact_needs_a_curve():
         mg.check(mg.Mechanism("m", None, [mg.Pair("K", "Kc", "a", "b"), mg.Pair("A", "R", "a", "b")])).mobility_by_count
         == -3
     )
+
+
+@pytest.mark.parametrize("direction", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1e-17, 1, 0)])
+@pytest.mark.parametrize("turn", [0.0, 0.3, np.pi / 2])
+def test_a_straight_slot_has_the_plane_that_its_axis_asks_for(direction, turn):
+    """A straight curve lies in many planes; the pin's axis is the one given, and the slot's normal follows."""
+    t = np.array(direction, dtype=float) / np.linalg.norm(direction)
+    n = np.cross(t, np.eye(3)[np.argmin(np.abs(t))])
+    n /= np.linalg.norm(n)
+    axis = np.cos(turn) * n + np.sin(turn) * np.cross(t, n)
+    pair = mg.Pair("K", "Ps", "frame", "pin", curve=mg.Curve.line(direction=direction), point=(0, 0, 0), axis=axis)
+    assert_allclose(pair.axis, axis, atol=1e-14)
+    assert not pair.faults()

@@ -19,7 +19,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array, cross
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
-from mechgraph.model.contact import Axes, Contact
+from mechgraph.model.contact import Axes, Contact, Lines
 
 
 class ContactLines:
@@ -48,7 +48,7 @@ class ContactLines:
         S = [here.S[:, columns[i]] for i in (0, -1)]
         along = S[1][3:] if contact.slides else S[1][:3]
         axes = Axes(here.pair_points[:, first], S[0][:3], here.pair_points[:, last], along, here.system.par.L)
-        P, n = contact.lines(axes)
+        P, n = self._lines(g, axes)
         line = np.concatenate([cross(P, n), n])
         power = contact.steps[0].sense * (line * S[0][:, None]).sum(axis=0)
         size = here.system.coupling_matrix[g, columns[0]] / power
@@ -58,6 +58,18 @@ class ContactLines:
         places = np.arange(here.T)
         G = np.stack([(line * size)[:, pick[i], places] for i in range(2)], axis=1)
         return G, np.stack([P[:, pick[i], places] for i in range(2)], axis=1)
+
+    def _lines(self, g: int, axes: Axes) -> Lines:
+        """Points and directions of the force; of variants with gears of their own those of each."""
+        own = self.here.system.par.items[g]
+        if len(own) == 1:
+            return own[0].lines(axes)
+        P, n = np.empty((3, 2, self.here.T)), np.empty((3, 2, self.here.T))
+        first, same = np.unique([id(gears) for gears in own], return_index=True, return_inverse=True)[1:]
+        for i, gears in enumerate(own[first]):
+            at = np.flatnonzero(same == i)
+            P[..., at], n[..., at] = gears.lines(axes.at(at))
+        return P, n
 
     def on_gear(self, multipliers: Array, flank: Array) -> list[Array]:
         """For every contact the wrench on gear b ``(6, ..., T)`` for multipliers ``(n, ..., T)`` of all couplings.

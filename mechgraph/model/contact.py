@@ -36,6 +36,10 @@ class Axes(NamedTuple):
     zb: Array
     unit: float = 1.0
 
+    def at(self, places: Any) -> Axes:
+        """Those at some positions."""
+        return Axes(self.pa[:, places], self.za[:, places], self.pb[:, places], self.zb[:, places], self.unit)
+
     @property
     def across(self) -> Array:
         """From axis a to axis b, at right angles to axis a, ``(3, T)``."""

@@ -203,7 +203,7 @@ def in_contact(
     ``(3, 4)`` is given apart, the point is only near the curve, and the curve of link b touches at that marker.
     """
     first, *others = takes_curves(row)
-    placed = _placed(first, _path(curve, roller, point), point)
+    placed = _placed(first, _path(_across(curve, first, axis), roller, point), point)
     marker = placed.start
     if axis is not None and marker[:, 2] @ np.asarray(axis) < 0:
         placed = replace(placed, reversed=placed.tangent == Z, turned=placed.tangent == X)
@@ -212,7 +212,7 @@ def in_contact(
     beside, back = marker if on_b is None else on_b, None
     for place in others:
         other = curve_b or Line(point=tuple(beside[:, 3]), direction=tuple(beside[:, 0]))
-        second = _placed(place, other, beside[:, 3])
+        second = _placed(place, _across(other, place, beside[:, 2]), beside[:, 3])
         back = second.start
         second = replace(
             second, reversed=bool(back[:, 0] @ beside[:, 0] < 0), turned=bool(back[:, 2] @ beside[:, 2] < 0)
@@ -221,6 +221,27 @@ def in_contact(
         back = second.start
         off += [_off(second, beside[:, 3]), float(np.linalg.norm(np.cross(back[:, 0], beside[:, 0])))]
     return Contact(_filled(row, factors, pair), marker, tuple(off), back if on_b is not None else None)
+
+
+def _across(curve: Curve, place: AlongCurve, z: Sequence[float] | Array | None) -> Curve:
+    """The curve; a straight one, which lies in many planes, in that at right angles to ``z`` where the frame has one."""
+    travel: Travel = curve.once(Travel)
+    if place.tangent != X or z is None or not travel.is_straight or curve.guide is not None:
+        return curve
+    t = travel.at(np.zeros(1)).t[:, 0]
+    across = np.asarray(z, dtype=float) - (t @ np.asarray(z)) * t
+    return curve if np.linalg.norm(across) < OFF_CURVE else curve.replace(frame="guided", guide=tuple(across))
+
+
+def kept_side(row: PairType, curve: Curve, roller: float | None, point: Sequence[float]) -> Sequence[float]:
+    """Where the centre of a roller, which stood at ``point``, stands beside another curve: on the same side, nearest to its old foot."""
+    path = takes_curves(row)[0].curve if takes_curves(row) else None
+    if not isinstance(path, Beside) or not roller or _of_shape(curve, ""):
+        return point
+    old, new = path.base.once(Travel), curve.once(Travel)
+    foot = old.at(np.array([old.nearest(np.asarray(point))[0]])).x[:, 0]
+    here = new.at(np.array([new.nearest(foot)[0]]))
+    return tuple((here.x + np.sign(path.distance) * roller * here.y)[:, 0].tolist())
 
 
 def _path(curve: Curve, roller: float | None, point: Sequence[float] | None) -> Curve:

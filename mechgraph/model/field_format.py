@@ -34,7 +34,8 @@ class Kind:
 
     ``words`` name it in tables, ``schema`` is its JSON Schema, ``stands_as`` the type of a value in a file where a reader can tell
     (None: the constructor tells); ``shape`` that of a number, vector or tensor (None for all else); ``fault(value, what, minimum)``
-    says what is wrong with a value; ``moved(value, pose)`` is the value after a rigid motion ``(3, 4)`` of the whole mechanism.
+    says what is wrong with a value; ``moved(value, pose)`` is the value after a rigid motion ``(3, 4)`` of the whole mechanism; ``names``
+    are those of the components where they are not x, y, z; ``entry`` is the kind of one entry of a list.
     """
 
     words: str
@@ -44,6 +45,8 @@ class Kind:
     numeric: bool = False
     fault: Callable[[Any, str, float | None], str | None] | None = None
     moved: Callable[[Any, Array], Any] | None = None
+    names: tuple[str, ...] = ()
+    entry: Kind | None = None
 
     def __call__(
         self, meaning: str, dimension: Dimension = PURE, turn: Dimension | None = None, **more: Any
@@ -55,8 +58,8 @@ class Kind:
         """Names of the components as studies spell them, and the places of each in the array; a number has one, named ``""``."""
         if self.shape == ():
             return {"": ((),)}
-        if self.shape == (3,):
-            return {name: ((i,),) for i, name in enumerate(XYZ)}
+        if self.shape is not None and len(self.shape) == 1:
+            return {name: ((i,),) for i, name in enumerate(self.names or XYZ)}
         if self.shape == (3, 3):
             places = {a + b: [(i, j), (j, i)] for i, a in enumerate(XYZ) for j, b in enumerate(XYZ)}
             return {name: tuple(dict.fromkeys(both)) for name, both in places.items()}
@@ -405,13 +408,20 @@ SERIES = Kind("number(s)", {"$ref": "#/$defs/series"}, None, (), True, _series_f
 VECTOR_SERIES = Kind(
     "3 numbers (series)", {"$ref": "#/$defs/vector_series"}, None, (3,), True, _series_fault(3), _turned
 )
-SAMPLES = Kind("n numbers", {"$ref": "#/$defs/series"}, None, None, True, _samples_fault)
+SAMPLES = Kind("n numbers", {"$ref": "#/$defs/series"}, None, None, True, _samples_fault, entry=NUMBER)
 _ABOVE_0: Schema = {"type": "number", "exclusiveMinimum": 0}
+_AB, _ENDS = ("a", "b"), ("begin", "end")
 _TWO: Schema = {"type": "array", "minItems": 2, "maxItems": 2}
 POSITIVE = Kind("number > 0", _ABOVE_0, None, (), True, _positive_fault((), "a finite number"))
-TWO = Kind("2 numbers", {**_TWO, "items": {"type": "number"}}, None, (2,), True, _two_fault)
+TWO = Kind("2 numbers", {**_TWO, "items": {"type": "number"}}, None, (2,), True, _two_fault, names=_AB)
 TWO_POSITIVE = Kind(
-    "2 numbers > 0", {**_TWO, "items": _ABOVE_0}, None, (2,), True, _positive_fault((2,), "two finite numbers")
+    "2 numbers > 0",
+    {**_TWO, "items": _ABOVE_0},
+    None,
+    (2,),
+    True,
+    _positive_fault((2,), "two finite numbers"),
+    names=_AB,
 )
 TWO_WHOLE = Kind(
     "2 integers > 0",
@@ -420,9 +430,12 @@ TWO_WHOLE = Kind(
     (2,),
     True,
     _positive_fault((2,), "two whole numbers", whole=True),
+    names=_AB,
 )
-INTERVAL = Kind("2 numbers", {**_TWO, "items": {"type": "number"}}, None, (2,), True, _interval_fault)
-POINT_LIST = Kind("n × 3", {"type": "array", "items": _VECTOR}, None, None, True, _point_list_fault, _moved_points)
+INTERVAL = Kind("2 numbers", {**_TWO, "items": {"type": "number"}}, None, (2,), True, _interval_fault, names=_ENDS)
+POINT_LIST = Kind(
+    "n × 3", {"type": "array", "items": _VECTOR}, None, None, True, _point_list_fault, _moved_points, entry=POINT
+)
 FUNCTION = Kind("function", {"not": {}}, None, None, False, _function_fault, lambda f, pose: MovedShape(f, plain(pose)))
 NUMBERS = Kind("n numbers", {"type": "array", "items": {"type": "number"}})
 FACTS = Kind("table", {"type": "object"}, dict)

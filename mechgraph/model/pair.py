@@ -16,6 +16,7 @@ from mechgraph.model.contact_rows import (
     Contact,
     curve_faults,
     in_contact,
+    kept_side,
     miss_faults,
     on_surface,
     row_of,
@@ -241,6 +242,17 @@ class Pair(Described):
         if curve is None and isinstance(surface, Surface) and not surface_faults(row, surface, point, ""):
             return on_surface(row, surface, point, towards, name, on_b)
         return None
+
+    def reshaped(self, **changes: Any) -> Pair:
+        """The same pair with fields changed; with another curve or surface its marker on b stays, that on a goes to the nearest place."""
+        if self.contact is None or not changes.keys() & self.curves.keys():
+            return self.replace(**changes)
+        on_a, on_b = self.markers
+        begins = self.on_b is not None and self.replace(on_a=None).type == self.type
+        if on_a is not None and isinstance(curve := changes.get("curve", self.curve), Curve):
+            on_a = on_a.replace(point=kept_side(self.type, curve, changes.get("roller", self.roller), on_a.point))
+        placed = {"point": None, "axis": None, "second": None, "on_a": None if begins else on_a, "on_b": on_b}
+        return self.replace(**placed, **changes)
 
     @property
     def has_geometry(self) -> bool:

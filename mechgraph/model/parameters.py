@@ -21,6 +21,7 @@ from mechgraph.algebra.se3 import Array, cross
 from mechgraph.model.mechanism import Mechanism
 
 Index = NDArray[np.intp]
+Items = NDArray[np.object_]
 
 
 @dataclass(frozen=True)
@@ -28,8 +29,8 @@ class Parameters:
     """Arrays of one mechanism (or of many variants of it).
 
     ``marker_a, marker_b (3, 4, P, B)``, ``pitch (P, B)``, ``mass (N, B)``, ``center (3, N, B)``, ``inertia (3, 3, N, B)``,
-    ``couplings (K, B)`` as in ``Declared``, ``offset (3, N)`` origin of the internal link frame in the declared one,
-    ``frame (3, 4, 1)`` pose of the frame link; ``origin (3,)`` global position of the internal origin, ``L`` its unit of length.
+    ``couplings (K, B)``, ``items (couplings, B)`` as in ``Declared``, ``offset (3, N)`` origin of the internal link frame in the
+    declared one, ``frame (3, 4, 1)`` pose of the frame link; ``origin (3,)`` global position of the internal origin, ``L`` its unit.
     """
 
     marker_a: Array
@@ -39,6 +40,7 @@ class Parameters:
     center: Array
     inertia: Array
     couplings: Array
+    items: Items
     offset: Array
     frame: Array
     origin: Array
@@ -73,7 +75,7 @@ class Parameters:
         )
 
 
-BATCHED = ("marker_a", "marker_b", "pitch", "mass", "center", "inertia", "couplings")
+BATCHED = ("marker_a", "marker_b", "pitch", "mass", "center", "inertia", "couplings", "items")
 """The arrays that differ between variants."""
 
 
@@ -83,7 +85,7 @@ class Declared:
 
     ``point, axis, second (2, 3, P, B)`` of the markers on ``a`` and ``b`` in the frames of their links, ``pitch (P, B)`` per
     radian, ``mass (N, B)``, ``center (3, N, B)``, ``inertia (3, 3, N, B)``, ``couplings (K, B)`` (see ``coupling_places``); zeros
-    where nothing is declared.
+    where nothing is declared. ``items (couplings, B)``: the couplings themselves, of which gears have numbers of their own.
     """
 
     point: Array
@@ -94,6 +96,7 @@ class Declared:
     center: Array
     inertia: Array
     couplings: Array
+    items: Items
 
     def offset(self, m: Mechanism) -> Array:
         """Middle of the markers of every link in its frame, ``(3, N)``: of the first variant."""
@@ -130,6 +133,7 @@ class Declared:
             center=center / L,
             inertia=self.inertia / L**2,
             couplings=self.couplings,
+            items=self.items,
             offset=offset,
             frame=frame,
             origin=np.asarray(origin, dtype=float),
@@ -199,6 +203,7 @@ def declared(m: Mechanism) -> Declared:
         np.ascontiguousarray(center)[..., None],
         np.ascontiguousarray(inertia)[..., None],
         np.array([x for c in m.couplings for x in (*c.coefficients, c.constant or 0.0)], dtype=float)[:, None],
+        np.fromiter(m.couplings, object, len(m.couplings))[:, None],
     )
 
 

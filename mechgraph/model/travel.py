@@ -79,11 +79,12 @@ class Travel:
         """The direction near which the third axis of the frame stays, and whether the curve lies in a plane at right angles to it."""
         t = self._rates(self._parameter_at(self.s))[1]
         axes = np.linalg.svd(t @ t.T)[0]
+        self.is_straight = bool(np.abs(t - t[:, :1]).max() < STRAIGHT)
         given = self.curve.guide if self.curve.frame == "guided" else None
         if given is not None:
             d = np.asarray(given, dtype=float) / np.linalg.norm(given)
             return d, bool(np.abs(d @ t).max() < IN_PLANE)
-        if np.abs(t - t[:, :1]).max() < STRAIGHT:
+        if self.is_straight:
             return np.cross(t[:, 0], second_direction(tuple(t[:, 0].tolist()))), True
         axis = self.curve.normal
         if axis is not None and (self.curve.frame == "guided" or np.abs(axis @ t).max() < IN_PLANE):

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mechgraph.algebra.inertia import physical
 from mechgraph.algebra.se3 import Array
+from mechgraph.errors import DeclarationError
 from mechgraph.model.chain import chain_numbers, markers_of_chain
 from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism
@@ -20,7 +21,7 @@ from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.parameters import Declared, coupling_places, declared
 from mechgraph.quantities import is_numeric
 from mechgraph.structure.snapping import SnappedMechanism
-from mechgraph.variants.number_names import MARKER, AnyField, ChainField, Field, LoadField, find_field
+from mechgraph.variants.number_names import MARKER, AnyField, ChainField, Field, ItemField, LoadField, find_field
 
 __all__ = ["AnyField", "Variants", "clashes", "field_values", "find_field", "stacked", "topology_of", "varied"]
 
@@ -30,7 +31,8 @@ class Variants:
     """``count`` variants of one mechanism: declared numbers and loads with a batch axis (``PerCase`` where a load varies).
 
     Those ``missing`` could not be built; the numbers of the mechanism itself stand in their places. ``declared``: the numbers of what
-    was declared, where variants are taken as they are meant with a tolerance.
+    was declared, where variants are taken as they are meant with a tolerance; ``own``: numbers that items keep to themselves, with their
+    values ``(count,)``.
     """
 
     mechanism: Mechanism
@@ -39,6 +41,7 @@ class Variants:
     count: int
     missing: tuple[int, ...] = ()
     declared: Declared | None = None
+    own: tuple[tuple[ItemField, Array], ...] = ()
 
     def valid(self) -> NDArray[np.bool_]:
         """Which variants are physical: finite numbers, no negative mass, axes of some length, possible inertias, ``(count,)``."""
@@ -47,6 +50,8 @@ class Variants:
         ok[list(self.missing)] = False
         for field in dataclasses.fields(n):
             values = getattr(n, field.name)
+            if values.dtype == object:
+                continue
             ok &= np.isfinite(values).all(axis=tuple(range(values.ndim - 1)))
         ok &= (n.mass >= 0).all(axis=0)
         ok &= ((n.axis**2).sum(axis=1) > 1e-24).all(axis=(0, 1))
@@ -94,6 +99,9 @@ class Variants:
             for c, own in zip(m.couplings, coupling_places(m), strict=True)
         ]
         loads = [_load_of(load, i) for load in self.loads]
+        for field, values in self.own:
+            items: list[Any] = pairs if field.what == "pairs" else couplings
+            items[field.index] = field.changed(items[field.index], float(values[i]))
         return m.replace(links=links, pairs=pairs, couplings=couplings, loads=loads)
 
 
@@ -130,6 +138,8 @@ def field_values(m: Mechanism, fields: Mapping[str, AnyField]) -> dict[str, floa
     for name, field in fields.items():
         if isinstance(field, Field):
             out[name] = field.read(numbers)
+        elif isinstance(field, ItemField):
+            out[name] = field.read(m)
         elif isinstance(field, ChainField):
             assert chained is not None
             out[name] = float(chained[field.kind, field.index])
@@ -157,7 +167,36 @@ def varied(m: Mechanism, fields: Mapping[str, AnyField], values: Array) -> Varia
                 arrays[field.array][place] = field.scale * row
         elif isinstance(field, LoadField):
             loads[field.index] = _varied_load(loads[field.index], field, row)
-    return Variants(m, Declared(**arrays), tuple(loads), count)
+    own = tuple((field, row) for field, row in rows if isinstance(field, ItemField))
+    made = Variants(m, Declared(**arrays), tuple(loads), count, own=own)
+    placed = any(
+        isinstance(field, ChainField) or (isinstance(field, Field) and field.array in MARKER) for field, _ in rows
+    )
+    if not own:
+        return made
+    if placed or any(field.what == "pairs" for field, _ in own):
+        return replace(made, missing=tuple(range(count)))
+    return _with_gears(made)
+
+
+def _with_gears(of: Variants) -> Variants:
+    """Variants with the gears that each has; those with faults are missing."""
+    n, m = of.numbers, of.mechanism
+    items: Any = np.repeat(n.items, of.count // n.items.shape[1], axis=1)
+    coefficients: Array = np.repeat(n.couplings, of.count // n.couplings.shape[1], axis=1)
+    missing = []
+    for i in range(of.count):
+        changed = list(m.couplings)
+        for field, values in of.own:
+            changed[field.index] = field.changed(changed[field.index], float(values[i]))
+        try:
+            items[:, i] = m.replace(couplings=changed).couplings
+        except DeclarationError:
+            missing.append(i)
+            continue
+        for g in {field.index for field, _ in of.own}:
+            coefficients[coupling_places(m)[g], i] = items[g, i].coefficients
+    return replace(of, numbers=replace(n, items=items, couplings=coefficients), missing=tuple(missing))
 
 
 def _chain_markers(
@@ -189,6 +228,8 @@ def clashes(m: Mechanism, fields: Mapping[str, AnyField]) -> list[str]:
     out = []
     for name, field in fields.items():
         mine: list[Any] = [("load", field.index, field.name, field.component)] if isinstance(field, LoadField) else []
+        if isinstance(field, ItemField):
+            mine = [(field.what, field.index, field.path, field.place)]
         if isinstance(field, ChainField):
             mine = [("chain", field.kind, field.index)]
         if isinstance(field, Field):
@@ -239,7 +280,7 @@ def topology_of(m: Mechanism) -> tuple[Any, ...]:
     return (
         m.link_names(),
         m.frame,
-        tuple((p.name, p.type, p.a, p.b, p.on_a is None) for p in m.pairs),
+        tuple((p.name, p.type if p.contact is None else p.type.symbol, p.a, p.b, p.on_a is None) for p in m.pairs),
         tuple((c.name, c.freedoms, c.constant is None) for c in m.couplings),
         tuple(d.freedom for d in m.drives),
         tuple(
@@ -255,6 +296,9 @@ def _alike(m: Mechanism, other: Mechanism) -> bool:
     """Whether start, stored motions, named points, and all of the loads that is no number are the same, so that only numbers differ."""
     points = [[link.points for link in one.links] for one in (m, other)]
     if dict(m.start) != dict(other.start) or m.drives != other.drives or points[0] != points[1]:
+        return False
+    kept = [[(p.type, p.closed, p.radius, p.hertz) for p in one.pairs] for one in (m, other)]
+    if kept[0] != kept[1]:
         return False
     for one, two in zip(m.loads, other.loads, strict=True):
         for f in dataclasses.fields(one):

@@ -2,8 +2,10 @@
 
 A number is named as it is declared: ``crank.mass``, ``crank.center.x``, ``crank.inertia.xy``, ``B.point.x``, ``B.axis.z``,
 ``B.on_a.point.y``, ``B.pitch``, ``loads[0].stiffness``, ``loads[1].force.x``; of a coupling ``g.A`` and ``g.constant``, or
-``couplings[0].A``; of a chain ``length[2]``, ``twist[0]``, ``offset[1]`` (as in ``mg.chain``, counted from 0). Which fields of a link,
-pair or load are numbers, and of which components, their annotations say (``model.field_format``).
+``couplings[0].A``; of gears, curves, surfaces and contacts ``g.module``, ``g.teeth.a``, ``K.curve.radius``, ``K.curve.points[3].x``,
+``K.curve.lift[12]``, ``K.surface.center.z``, ``K.roller``, ``K.hertz.moduli.b``; of a chain ``length[2]``, ``twist[0]``,
+``offset[1]`` (as in ``mg.chain``, counted from 0). Which fields of a link, pair, coupling or load are numbers, and of which components,
+their annotations say (``model.field_format``).
 """
 
 from __future__ import annotations
@@ -12,6 +14,8 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 from mechgraph.model.chain import NUMBERS_OF_CHAIN, chain_numbers
 from mechgraph.model.coupling import BaseCoupling
@@ -22,6 +26,8 @@ from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.parameters import Declared, coupling_places
 from mechgraph.quantities import is_numeric
 
+PLACED = (*Marker.formats, "pitch")
+"""Numbers of a pair that the kernels read."""
 MARKER = tuple(Marker.formats)
 """Numbers of a marker."""
 SIDES = [name for name, about in Pair.formats.items() if about.table == "marker"]
@@ -61,7 +67,40 @@ class LoadField:
     component: int | None
 
 
-AnyField = Field | ChainField | LoadField
+@dataclass(frozen=True)
+class ItemField:
+    """A number that an item keeps to itself: the ``index``-th of ``what``, the fields on the way to it, and its place in the last one."""
+
+    what: str
+    index: int
+    path: tuple[str, ...]
+    place: Place
+
+    def read(self, m: Mechanism) -> float:
+        """The declared value."""
+        item = getattr(m, self.what)[self.index]
+        for name in self.path:
+            item = getattr(item, name)
+        return float(np.asarray(item, dtype=float)[self.place])
+
+    def changed(self, item: Any, value: float) -> Any:
+        """The item with another value."""
+        return _changed(item, self.path, self.place, value)
+
+
+def _changed(item: Any, path: tuple[str, ...], place: Place, value: float) -> Any:
+    name, *rest = path
+    old = getattr(item, name)
+    if rest:
+        new = _changed(old, tuple(rest), place, value)
+    else:
+        new = np.array(old, dtype=float)
+        new[place] = value
+        new = new.tolist()
+    return item.reshaped(**{name: new}) if isinstance(item, Pair) else item.replace(**{name: new})
+
+
+AnyField = Field | ChainField | LoadField | ItemField
 Finder = Callable[[Mechanism, int, str], AnyField | str | None]
 """Finds the number of the i-th link, pair, ... by the rest of its name; or says what is wrong with it."""
 
@@ -95,6 +134,17 @@ def find_field(m: Mechanism, name: str) -> AnyField | str:
 def _component(item: Described, rest: str) -> tuple[tuple[str, ...], FieldFormat, tuple[Place, ...]] | None:
     """Path, format and places of ``center.x`` or ``on_a.point.x`` in an item; None where it declares no such number."""
     what, _, at = rest.partition(".")
+    listed = _INDEXED.fullmatch(what)
+    if (
+        listed
+        and (about := item.formats.get(listed["what"]))
+        and about.kind.entry
+        and at in about.kind.entry.components()
+    ):
+        value, i = getattr(item, listed["what"]), int(listed["index"])
+        fits = is_numeric(value, np.shape(value)) and i < len(value)
+        places = about.kind.entry.components()[at]
+        return ((listed["what"],), about, tuple((i, *place) for place in places)) if fits else None
     if what not in item.formats:
         return None
     about, value = item.formats[what], getattr(item, what)
@@ -117,14 +167,20 @@ def _link_field(m: Mechanism, i: int, rest: str) -> Field | str | None:
     return Field(what, tuple((*place, i) for place in places))
 
 
-def _pair_field(m: Mechanism, k: int, rest: str) -> Field | None:
-    found = _component(m.pairs[k], rest)
+def _pair_field(m: Mechanism, k: int, rest: str) -> Field | ItemField | str | None:
+    pair = m.pairs[k]
+    found = _component(pair, rest)
     if found is None:
         return None
-    (*side, what), about, places = found
+    path, about, places = found
+    *side, what = path
     array, scale = about.held_in or (what, 1.0)
-    where: Place = () if array not in MARKER else (SIDES.index(side[0]),) if side else (slice(None),)
-    return Field(array, tuple((*where, *place, k) for place in places), scale)
+    if pair.contact is None and len(path) <= 2 and array in PLACED:
+        where: Place = () if array not in MARKER else (SIDES.index(side[0]),) if side else (slice(None),)
+        return Field(array, tuple((*where, *place, k) for place in places), scale)
+    if pair.contact is not None and path[0] in (*MARKER, SIDES[0]):
+        return f"'{pair.name}.{rest}': follows from its curve or surface; vary numbers of that, or of {SIDES[1]}"
+    return ItemField("pairs", k, path, places[0])
 
 
 def _chain_field(m: Mechanism, name: str, what: str, index: int) -> ChainField | str:
@@ -147,17 +203,30 @@ def _load_field(m: Mechanism, index: int, rest: str) -> LoadField | str:
     return f"'loads[{index}].{rest}': no number of that name in load {index} ({load.kind}: {known}; vectors with .x, .y, .z)"
 
 
-def _coupling_field(m: Mechanism, index: int, rest: str) -> Field | str:
+def _coupling_field(m: Mechanism, index: int, rest: str) -> Field | ItemField | str:
     c, own = m.couplings[index], coupling_places(m)[index]
     if rest == "constant" and c.constant is not None:
         return Field("couplings", ((own.stop,),))
     if rest == "constant":
         return f"'{c.name}.constant': coupling {c.name!r} keeps the value that it has at the start; declare constant="
     if not c.varies:
-        return f"'{c.name}.{rest}': the numbers of coupling {c.name!r} follow from its teeth; vary m.replace(couplings=...) yourself"
+        found = _component(c, rest)
+        if found is not None:
+            return ItemField("couplings", index, found[0], found[2][0])
+        return f"'{c.name}.{rest}': coupling {c.name!r} has the numbers {', '.join(_numbers_of(c))}"
     if m.freedom_fault(rest, single=True) is None and m.full_name(rest) in c.freedoms:
         return Field("couplings", ((own.start + c.freedoms.index(m.full_name(rest)),),))
     return f"'{c.name}.{rest}': coupling {c.name!r} has the numbers {', '.join(c.freedoms)} and constant"
+
+
+def _numbers_of(item: Described) -> list[str]:
+    """Names of the numbers that are declared."""
+    return [
+        f"{name}.{part}".rstrip(".")
+        for name, about in item.formats.items()
+        for part in about.kind.components()
+        if _component(item, f"{name}.{part}".rstrip(".")) is not None
+    ]
 
 
 INDEXED: dict[str, Callable[[Mechanism, int, str], AnyField | str]] = {
