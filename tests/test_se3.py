@@ -92,7 +92,9 @@ def test_quaternions_multiply_as_their_matrices(a, b):
     qa, qb = se3.quaternion_exp(a), se3.quaternion_exp(b)
     product = se3.quaternion_matrix(se3.quaternion_product(qa, qb))
     np.testing.assert_allclose(product, se3.quaternion_matrix(qa) @ se3.quaternion_matrix(qb), atol=1e-14)
-    np.testing.assert_allclose(se3.quaternion_product(qa, se3.quaternion_inverse(qa)), [1, 0, 0, 0], atol=1e-15)
+    np.testing.assert_allclose(
+        se3.quaternion_product(qa, qa * np.array([1.0, -1.0, -1.0, -1.0])), [1, 0, 0, 0], atol=1e-15
+    )
 
 
 @given(VECTORS, st.one_of(ANGLES, st.floats(3.0, 3.3)))
@@ -126,3 +128,44 @@ def test_every_function_of_a_batch_is_the_function_of_each():
             np.testing.assert_allclose(se3.cross(s[:3], u[:3])[:, i, t], np.cross(s[:3, i, t], u[:3, i, t]), atol=1e-15)
             np.testing.assert_allclose(se3.rotate(X[:, :3], s[:3])[:, i, t], x[:, :3] @ s[:3, i, t], atol=1e-14)
             np.testing.assert_allclose(se3.rotate_back(X[:, :3], s[:3])[:, i, t], x[:, :3].T @ s[:3, i, t], atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("formula", "widths"),
+    [
+        (se3.quaternion_product, (4, 4)),
+        (se3.quaternion_exp, (3,)),
+        (se3.quaternion_log, (4,)),
+        (se3.turned, (4, 3)),
+        (se3.turn_between, (4, 4)),
+        (se3.turn_tangent, (3, 3)),
+    ],
+)
+@pytest.mark.parametrize("kind", [float, complex])
+def test_a_formula_gives_the_same_with_plain_numbers_as_with_arrays(formula, widths, kind):
+    rng = np.random.default_rng(5)
+    vectors = []
+    for width in widths:
+        v = rng.normal(size=(width, 40)) * 10.0 ** rng.uniform(-9, 0.3, 40) + (
+            1e-3j * rng.normal(size=(width, 40)) if kind is complex else 0.0
+        )
+        v[:, :2] = np.eye(width, 2)
+        vectors.append(v if width == 3 else v / np.sqrt((v * v).sum(axis=0)))
+    together = formula(*vectors)
+    assert together.dtype == kind
+    apart = np.stack([formula(*(v[:, t] for v in vectors)) for t in range(40)], axis=1)
+    np.testing.assert_allclose(apart, together, rtol=1e-12, atol=1e-15)
+
+
+def test_a_formula_has_the_values_of_arrays_where_plain_numbers_have_none():
+    endless = np.full((3, 40), np.inf)
+    with np.errstate(invalid="ignore"):
+        np.testing.assert_array_equal(se3.quaternion_exp(endless[:, 0]), se3.quaternion_exp(endless)[:, 0])
+    assert np.isnan(se3.quaternion_log(np.full(4, np.nan))).all()
+
+
+@given(RATES, RATES, VECTORS, VECTORS)
+def test_the_finite_twist_of_a_motion_takes_the_one_point_to_the_other(w1, w2, to, start):
+    R = se3.rotation_exp(w1)
+    X = np.column_stack([R, to - R @ start])
+    np.testing.assert_allclose(se3.finite_twist(R, to, start), se3.pose_log(X), atol=1e-11)

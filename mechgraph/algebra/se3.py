@@ -6,11 +6,15 @@ Source: Murray, Li and Sastry, A Mathematical Introduction to Robotic Manipulati
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mechgraph.algebra.components import Array as Array
+from mechgraph.algebra.components import Library, by_components
 
+Components = tuple[Any, ...]
 
 SMALL_BATCH = 32
 """Number of small matrices up to which ``matmul`` multiplies them faster than ``einsum`` (measured): the one has less to set up,
@@ -105,41 +109,73 @@ def to_matrix(X: Array) -> Array:
     return np.moveaxis(homogeneous(X), (0, 1), (-2, -1)).copy()
 
 
-def quaternion_product(a: Array, b: Array) -> Array:
+@by_components
+def quaternion_product(
+    lib: Library, a0: Any, a1: Any, a2: Any, a3: Any, b0: Any, b1: Any, b2: Any, b3: Any
+) -> Components:
     """Product of quaternions ``(4, ...)``, scalar part first."""
-    out = np.empty(np.broadcast_shapes(a.shape, b.shape), dtype=np.result_type(a, b))
-    out[0] = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]
-    out[1:] = a[0] * b[1:] + b[0] * a[1:] + cross(a[1:], b[1:])
-    return out
+    return (
+        a0 * b0 - a1 * b1 - a2 * b2 - a3 * b3,
+        a0 * b1 + a1 * b0 + a2 * b3 - a3 * b2,
+        a0 * b2 + a2 * b0 + a3 * b1 - a1 * b3,
+        a0 * b3 + a3 * b0 + a1 * b2 - a2 * b1,
+    )
 
 
-def quaternion_exp(v: Array) -> Array:
-    """Unit quaternion of a rotation vector ``(3, ...)``: ``(cos |v|/2, sin(|v|/2) v/|v|)``."""
-    half = 0.5 * np.sqrt((v * v).sum(axis=0))
+@by_components
+def quaternion_exp(lib: Library, x: Any, y: Any, z: Any) -> Components:
+    """Unit quaternion of a rotation vector ``v (3, ...)``: ``(cos |v|/2, sin(|v|/2) v/|v|)``."""
+    half = 0.5 * lib.sqrt(x * x + y * y + z * z)
     zero = half == 0.0
-    out = np.empty((4, *v.shape[1:]), dtype=half.dtype)
-    out[0] = np.cos(half)
-    np.multiply(v, 0.5 * (np.sin(half) + zero) / (half + zero), out=out[1:])
-    return out
+    part = 0.5 * (lib.sin(half) + zero) / (half + zero)
+    return lib.cos(half), part * x, part * y, part * z
 
 
-def quaternion_log(q: Array) -> Array:
+@by_components
+def quaternion_log(lib: Library, w: Any, x: Any, y: Any, z: Any) -> Components:
     """Rotation vector of a unit quaternion, of length at most pi (of its real part, where it is complex).
 
     ``2 atan(s / q_0) q_v / s`` with ``s = sqrt(q_v . q_v)``, near a half turn ``(pi - 2 atan(q_0 / s)) q_v / s``: both analytic.
     """
-    q = np.where(q[0].real < 0.0, -q, q)
-    sine = np.sqrt((q[1:] * q[1:]).sum(axis=0))
-    small, beyond = np.abs(sine) < 1e-12, np.abs(sine) > np.abs(q[0])
-    safe = np.where(small, 1.0, sine)
-    half = np.arctan(np.where(beyond, q[0], safe) / np.where(beyond, safe, q[0]))
-    factor = np.where(small, 2.0, np.where(beyond, np.pi - 2.0 * half, 2.0 * half) / safe)
-    return np.asarray(factor * q[1:])
+    sign = lib.where(w.real < 0.0, -1.0, 1.0)
+    w = sign * w
+    sine = lib.sqrt(x * x + y * y + z * z)
+    small, beyond = abs(sine) < 1e-12, abs(sine) > abs(w)
+    safe = lib.where(small, 1.0, sine)
+    half = lib.arctan(lib.where(beyond, w, safe) / lib.where(beyond, safe, w))
+    part = sign * lib.where(small, 2.0, lib.where(beyond, math.pi - 2.0 * half, 2.0 * half) / safe)
+    return part * x, part * y, part * z
 
 
-def quaternion_inverse(q: Array) -> Array:
-    """Inverse of unit quaternions: the conjugate."""
-    return q * np.array([1.0, -1.0, -1.0, -1.0]).reshape(4, *(1,) * (q.ndim - 1))
+@by_components
+def turned(lib: Library, w: Any, x: Any, y: Any, z: Any, a: Any, b: Any, c: Any) -> Components:
+    """Unit quaternions ``q (4, ...)`` after rotation vectors ``v (3, ...)``: ``exp(v) q``, made unit again."""
+    w, x, y, z = quaternion_product.formula(lib, *quaternion_exp.formula(lib, a, b, c), w, x, y, z)
+    size = lib.sqrt(w * w + x * x + y * y + z * z)
+    return w / size, x / size, y / size, z / size
+
+
+@by_components
+def turn_between(lib: Library, w1: Any, x1: Any, y1: Any, z1: Any, w0: Any, x0: Any, y0: Any, z0: Any) -> Components:
+    """Rotation vector from ``q0`` to ``q1`` (the first argument) by the short way."""
+    return quaternion_log.formula(lib, *quaternion_product.formula(lib, w1, x1, y1, z1, w0, -x0, -y0, -z0))
+
+
+@by_components
+def turn_tangent(lib: Library, x: Any, y: Any, z: Any, a: Any, b: Any, c: Any) -> Components:
+    """``dexp^-1(v) w = w - v x w / 2 + (1 - (a / 2) cot(a / 2)) / a^2  v x (v x w)`` with ``a = |v|``, below two turns."""
+    p, q, r = y * c - z * b, z * a - x * c, x * b - y * a
+    square = x * x + y * y + z * z
+    small = abs(square) < 1e-2
+    part = 1 / 12 + square * (1 / 720 + square * (1 / 30240 + square / 1209600))
+    if not lib.all(small):
+        half = 0.5 * lib.sqrt(lib.where(small, 1.0, square))
+        part = lib.where(small, part, (1.0 - half * lib.cos(half) / lib.sin(half)) / (4.0 * half * half))
+    return (
+        a - 0.5 * p + part * (y * r - z * q),
+        b - 0.5 * q + part * (z * p - x * r),
+        c - 0.5 * r + part * (x * q - y * p),
+    )
 
 
 def quaternion_matrix(q: Array) -> Array:
@@ -180,39 +216,62 @@ HALF_TANGENT = np.zeros((4, 9))
 """From the nine entries of a rotation matrix to ``2 sin(angle) axis`` and ``trace = 1 + 2 cos(angle)``."""
 HALF_TANGENT[(0, 1, 2, 3, 3, 3), (7, 2, 3, 0, 4, 8)] = 1.0
 HALF_TANGENT[(0, 1, 2), (5, 6, 1)] = -1.0
-NEAR = 4e-4
-"""``3 - trace = 2 - 2 cos(angle)`` up to which the series of ``_arctan_parts`` are exact to rounding (0.02 radians)."""
+NEAR = 1e-4
+"""``tan(angle/2)^2`` up to which the series of ``_arctan_parts`` are exact to rounding (0.02 radians)."""
 WIDE = 3.0
-"""The same at 120 degrees: beyond, a rotation vector is found through quaternions."""
+"""``3 - trace = 2 - 2 cos(angle)`` at 120 degrees: beyond, a rotation vector is found through quaternions."""
 
 
-def _half_tangents(R: Array) -> tuple[Array, float]:
-    """``2 sin(angle) axis`` and ``trace``, ``(4, ...)``, of rotation matrices, and the largest ``|3 - trace|``."""
-    parts = HALF_TANGENT.dot(R.reshape(9, -1)).reshape(4, *R.shape[2:])
-    return parts, np.maximum.reduce(np.abs(parts[3] - 3.0), axis=None, initial=0.0)
+class WideTurn(ArithmeticError):
+    """A rotation so wide that ``tan(angle/2)`` does not serve."""
 
 
-def _arctan_parts(u: Array, near: bool) -> tuple[Array, Array]:
+def _arctan_parts(lib: Library, u: Any) -> Components:
     """``g = atan(t) / t`` and ``h = (1 - g) / u`` for ``u = t^2``: analytic in ``u``, a series where ``u`` is small."""
     h = 1 / 3 + u * (u * (1 / 7) - 1 / 5)
-    if near:
-        return 1.0 - u * h, h
-    small = np.abs(u) <= NEAR / 4
-    t = np.sqrt(np.where(small, 1.0, u))
-    g = np.where(small, 1.0 - u * h, np.arctan(t) / t)
-    return g, np.where(small, h, (1.0 - g) / t**2)
+    g = 1.0 - u * h
+    small = abs(u) <= NEAR
+    if lib.all(small):
+        return g, h
+    safe = lib.where(small, 1.0, u)
+    t = lib.sqrt(safe)
+    g = lib.where(small, g, lib.arctan(t) / t)
+    return g, lib.where(small, h, (1.0 - g) / safe)
+
+
+@by_components
+def _finite_twist(
+    lib: Library, a: Any, b: Any, c: Any, trace: Any, x1: Any, y1: Any, z1: Any, x0: Any, y0: Any, z0: Any
+) -> Components:
+    """``finite_twist`` from ``2 sin(angle) axis``, ``trace``, ``to`` and ``start``."""
+    if not lib.all(abs(trace - 3.0) < WIDE):
+        raise WideTurn
+    more = trace + 1.0
+    a, b, c = a / more, b / more, c / more
+    x, y, z = x1 + x0, y1 + y0, z1 + z0
+    x, y, z = x1 - x0 - (b * z - c * y), y1 - y0 - (c * x - a * z), z1 - z0 - (a * y - b * x)
+    g, h = _arctan_parts(lib, a * a + b * b + c * c)
+    along = h * (a * x + b * y + c * z)
+    return 2.0 * g * a, 2.0 * g * b, 2.0 * g * c, g * x + along * a, g * y + along * b, g * z + along * c
+
+
+def finite_twist(R: Array, to: Array, start: Array) -> Array:
+    """Finite twist ``(w, v)`` of the motion that turns by ``R (3, 3, ...)`` and takes the point ``start`` to the point ``to (3, ...)``.
+
+    With ``tau = tan(angle/2) axis = 2 sin(angle) axis / (1 + trace)``, rational in the entries of ``R``, Cayley's
+    ``c = to - start - tau x (to + start)``, ``g = atan(|tau|) / |tau|`` and ``h = (1 - g) / |tau|^2``:
+    ``w = 2 g tau``, ``v = g c + h (tau . c) tau``.
+    Near a half turn, where ``tau`` has no bound, through quaternions. Comparisons choose a formula; each of them is analytic.
+    """
+    try:
+        return _finite_twist(HALF_TANGENT.dot(R.reshape(9, -1)).reshape(4, *R.shape[2:]), to, start)
+    except WideTurn:
+        return _wide_finite_twist(R, to - rotate(R, start))
 
 
 def rotation_log(R: Array) -> Array:
-    """Rotation vector of rotation matrices, of length at most pi: ``2 atan(|tau|) tau / |tau|`` with ``tau = tan(angle/2) axis``.
-
-    Through quaternions where an angle comes near pi. Comparisons choose a formula; each of them is analytic in the entries.
-    """
-    parts, width = _half_tangents(R)
-    if not width < WIDE:
-        return quaternion_log(matrix_quaternion(R))
-    tau = parts[:3] / (parts[3] + 1.0)
-    return np.asarray(2.0 * _arctan_parts(np.add.reduce(tau * tau), width <= NEAR)[0] * tau)
+    """Rotation vector of rotation matrices, of length at most pi."""
+    return pose_log(np.concatenate([R, np.zeros_like(R[:, :1])], axis=1))[:3]
 
 
 def pose_exp(s: Array) -> Array:
@@ -232,33 +291,8 @@ def pose_exp(s: Array) -> Array:
 
 
 def pose_log(X: Array) -> Array:
-    """Finite twist ``(w, v)`` with ``exp(w, v) = X``: the closure error of a loop."""
-    return finite_twist(X[:, :3], X[:, 3])
-
-
-def finite_twist(R: Array, p: Array) -> Array:
-    """Finite twist of the pose with rotation ``R (3, 3, ...)`` and position ``p (3, ...)``.
-
-    With ``tau = tan(angle/2) axis = 2 sin(angle) axis / (1 + trace)``, rational in the entries of ``R``,
-    ``g = atan(|tau|) / |tau|`` and ``h = (1 - g) / |tau|^2``:
-    ``w = 2 g tau``, ``v = g (p - tau x p) + h (tau . p) tau``.
-    Near a half turn, where ``tau`` has no bound, through quaternions.
-    """
-    parts, width = _half_tangents(R)
-    if not width < WIDE:
-        return _wide_finite_twist(R, p)
-    out = np.empty((2, *p.shape), dtype=parts.dtype if parts.dtype == p.dtype else np.result_type(parts, p))
-    w, v = out
-    np.divide(parts[:3], parts[3] + 1.0, out=w)
-    v[:] = p
-    u, advance = np.add.reduce(out * w, axis=1)
-    g, h = _arctan_parts(u, width <= NEAR)
-    along = w * (h * advance)
-    v -= cross(w, v)
-    out *= g
-    v += along
-    w += w
-    return out.reshape(6, *p.shape[1:])
+    """Finite twist ``(w, v)`` with ``exp(w, v) = X``."""
+    return finite_twist(X[:, :3], X[:, 3], np.zeros_like(X[:, 3]))
 
 
 def _wide_finite_twist(R: Array, p: Array) -> Array:

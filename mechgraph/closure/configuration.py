@@ -132,24 +132,27 @@ class Configuration:
 
     # --- screws ------------------------------------------------------------------------------------------------------
 
-    def _screws(self, local: Array, nodes: Index, bound: int, points: Array | None = None) -> Array:
-        """Screws in the outer frame ``(6, K, T)`` from their parts in nodes, ``(3, 2, K, B)``.
-
-        Part ``bound`` (0 in a twist, 1 in a wrench) has a line through the origins of the nodes, or through ``points (3, K, T)``
-        where given: ``(R line, R free + p x R line)``.
-        """
-        K, dtype = len(nodes), self._nodes.dtype if local.dtype == float else np.result_type(local, self._nodes)
-        out = np.empty((2, 3, K, self.T), dtype=dtype)
+    def _turned(self, local: Array, nodes: Index) -> tuple[Array, Array]:
+        """Both parts of screws in outer directions ``(2, 3, K, T)`` from those in nodes ``(3, 2, K, B)``, and origins of the nodes."""
+        dtype = self._nodes.dtype if local.dtype == float else np.result_type(local, self._nodes)
+        out = np.empty((2, 3, len(nodes), self.T), dtype=dtype)
         X = self._nodes.take(nodes, axis=2)
         multiplied(X[:, :3], local, out=out.swapaxes(0, 1))
-        out[1 - bound] += cross(X[:, 3] if points is None else points, out[bound])
-        return out.reshape(6, K, self.T)
+        return out, X[:, 3]
+
+    @kept
+    def _twists(self) -> tuple[Array, Array]:
+        """Turns and displacements of all freedoms ``(2, 3, F, T)`` about the origins of their nodes, and these origins ``(3, F, T)``."""
+        s = self.system
+        return self._turned(self._local_twists if s.moving_batches else s.numbers.twists, s.column_nodes)
 
     @kept
     def S(self) -> Array:
-        """Twists of all freedoms ``(6, F, T)``."""
-        s = self.system
-        return self._screws(self._local_twists if s.moving_batches else s.numbers.twists, s.column_nodes, 0)
+        """Twists of all freedoms ``(6, F, T)``: ``(R line, R free + p x R line)``."""
+        parts, origins = self._twists
+        out = parts.copy()
+        out[1] += cross(origins, parts[0])
+        return out.reshape(6, *out.shape[2:])
 
     @kept
     def _local_twists(self) -> Array:
@@ -192,13 +195,11 @@ class Configuration:
 
     def _wrenches(self, table: ScrewTable, local: Array) -> Array:
         """Wrenches ``(6, K, T)`` of components, moment first."""
-        if not table.b_places.size:
-            return self._screws(local, table.nodes, 1)
-        points = self.pair_points.take(table.pairs, axis=1)
-        if table.b_places.size < len(table.nodes):
-            own = np.flatnonzero(~table.at_b)
-            points[:, own] = self._nodes[:, 3].take(table.nodes[own], axis=1)
-        return self._screws(local, table.nodes, 1, points)
+        out, points = self._turned(local, table.nodes)
+        if table.b_places.size:
+            points[:, table.b_places] = self.pair_points.take(table.pairs[table.b_places], axis=1)
+        out[0] += cross(points, out[1])
+        return out.reshape(6, *out.shape[2:])
 
     @kept
     def lee_screws(self) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
@@ -221,10 +222,9 @@ class Configuration:
     @kept
     def chord_errors(self) -> Array:
         """Closure errors ``(6, chords, T)``: finite twist from marker B reached through b to that reached through a, about the origin."""
-        ends, links = self.system.chord_nodes
-        reached, declared = self._nodes[:, :, ends], self._nodes[:, :, links]
+        reached, declared = (self._nodes.take(nodes, axis=2) for nodes in self.system.chord_nodes)
         R = multiplied(reached[:, :3], declared[:, :3].swapaxes(0, 1))
-        return finite_twist(R, reached[:, 3] - multiplied(R, declared[:, 3:])[:, 0])
+        return finite_twist(R, reached[:, 3], declared[:, 3])
 
     @property
     def chord_gaps(self) -> Array:
@@ -235,12 +235,12 @@ class Configuration:
     @property
     def loop_errors(self) -> Array:
         """Closure errors of the loops about their middles, stacked ``(6 loops, T)``."""
-        s = self.system
+        s, errors = self.system, self.chord_errors
         if s.many_loops:
-            per_pair = np.zeros((6, len(s.m.pairs), self.T), dtype=self.chord_errors.dtype)
-            per_pair[:, s.chords] = self.chord_errors
+            per_pair = np.zeros((6, len(s.m.pairs), self.T), dtype=errors.dtype)
+            per_pair[:, s.chords] = errors
             return self.loop_sums(per_pair)
-        return self._about_middles(_combined(s.loops_of_chords, self.chord_errors))
+        return self._about_middles(errors.copy() if s.loops_of_chords is None else s.loops_of_chords @ errors)
 
     @kept
     def middles(self) -> Array:
@@ -254,13 +254,12 @@ class Configuration:
         return np.asarray(s.loop_averages @ self.pair_points)
 
     def _about_middles(self, twists: Array) -> Array:
-        """Twists ``(6 loops, T)`` about the internal origin taken about the middle of their loop, in place.
+        """Twists ``(6, loops, T)`` about the internal origin taken about the middle of their loop, in place; stacked ``(6 loops, T)``.
 
         So the rows of a loop are as good anywhere: about a fixed point their condition would grow with the square of its distance.
         """
-        parts = twists.reshape(self.system.graph.n_loops, 2, 3, self.T).transpose(1, 2, 0, 3)
-        parts[1] += cross(parts[0], self.middles)
-        return twists
+        twists[3:] += cross(twists[:3], self.middles)
+        return twists.swapaxes(0, 1).reshape(6 * self.system.graph.n_loops, self.T)
 
     @kept
     def closure(self) -> Array:
@@ -283,15 +282,20 @@ class Configuration:
         """Closure Jacobian ``(n_rows, F, T)``; of the loops ``J = (C x I6) diag(S_k)``."""
         return _stacked([part.jacobian(self) for part in self.system.rows])
 
-    def stacked(self, S: Array) -> Array:
-        """Columns ``(6, F, T)`` placed with their signs into the rows of every loop, about its middle."""
+    @property
+    def loop_jacobian(self) -> Array:
+        """Twists of the freedoms about the middles of the loops, with their signs in the rows of every loop, ``(6 loops, F, T)``."""
         s, e = self.system, self.system.entries
-        parts = S.take(e.column, axis=1)
-        parts *= e.sign[:, None]
-        parts[3:] += cross(parts[:3], self.middles.take(e.loop, axis=1))
-        out = np.zeros((s.graph.n_loops, 6, s.n_freedoms, S.shape[2]), dtype=S.dtype)
-        out[e.loop, :, e.column] = parts.swapaxes(0, 1)
-        return out.reshape(out.shape[0] * out.shape[1], *out.shape[2:])
+        twists, origins = self._twists
+        parts = twists[:, :, e.columns] * e.signs
+        parts[1] += cross(origins[:, e.columns] - self.middles[:, e.loops], parts[0])
+        rows = parts.reshape(6, *parts.shape[2:])
+        if s.entry_places is None:
+            return rows
+        n = 6 * s.graph.n_loops
+        out = np.zeros((n * s.n_freedoms, self.T), dtype=parts.dtype)
+        out[s.entry_places] = rows
+        return out.reshape(n, s.n_freedoms, self.T)
 
     def closure_rates(self, dq: Array) -> Array:
         """``J q' (n_rows, T)`` for rates ``dq (F, T)``, without forming ``J``."""
@@ -354,9 +358,9 @@ class Configuration:
         s = self.system
         if s.many_loops:
             flat = per_pair.transpose(1, 0, 2).reshape(per_pair.shape[1], 6 * per_pair.shape[2])
-            sums = np.asarray(s.graph.sparse_loop_matrix @ flat).reshape(6 * s.graph.n_loops, per_pair.shape[2])
-            return self._about_middles(sums)
-        return self._about_middles(_combined(s.loop_matrix, per_pair))
+            sums = np.asarray(s.graph.sparse_loop_matrix @ flat).reshape(s.graph.n_loops, 6, per_pair.shape[2])
+            return self._about_middles(sums.swapaxes(0, 1))
+        return self._about_middles(s.loop_matrix @ per_pair)
 
     def pair_wrenches(self, x: Array) -> Array:
         """Pair wrenches ``(6, P, k, T)`` of the loop rows of ``x (n_rows, k, T)``: ``w = C^T x``, taken about the internal origin."""
@@ -386,9 +390,3 @@ class Configuration:
 def _stacked(parts: list[Array]) -> Array:
     """Rows of several contributors, one below the other."""
     return parts[0] if len(parts) == 1 else np.concatenate(parts)
-
-
-def _combined(matrix: Array, terms: Array) -> Array:
-    """Combinations ``(6 rows, T)`` of terms ``(6, n, T)`` by a matrix ``(rows, n)``."""
-    sums = matrix @ terms
-    return sums.swapaxes(0, 1).reshape(sums.shape[0] * sums.shape[1], terms.shape[2])

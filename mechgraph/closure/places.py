@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -69,6 +70,27 @@ class Entries:
     column: Index
     sign: Array
     first: Index
+
+    @cached_property
+    def columns(self) -> Place:
+        """The columns, as a slice where that can be."""
+        return compact(self.column)
+
+    @cached_property
+    def loops(self) -> Place:
+        """The loops; of one loop alone, one place for all."""
+        return self.loop if len(self.first) > 2 else slice(0, 1)
+
+    @cached_property
+    def signs(self) -> Array:
+        """The signs, ``(entries, 1)``."""
+        return self.sign[:, None]
+
+    def places(self, n_columns: int) -> Index | None:
+        """Places ``(6, entries)`` of the entries in a matrix of six rows a loop, by rows; None where they fill one loop in order."""
+        if len(self.first) == 2 and np.array_equal(self.column, np.arange(n_columns)):
+            return None
+        return (6 * self.loop + np.arange(6)[:, None]) * n_columns + self.column
 
 
 def entries_of(graph: LinkGraph, first_column: Index) -> Entries:
@@ -232,9 +254,9 @@ class Places:
         return [b for b in self.batches if b.stack.constant_twists(self.par.pitch[b.pairs]) is None]
 
     @shared
-    def chord_nodes(self) -> tuple[Place, Place]:
+    def chord_nodes(self) -> tuple[Index, Index]:
         """For every chord the node in which it ends, and that of its link b."""
-        return compact(self.walk.end_node[self.chords]), compact(self.walk.link_node[self.b[self.chords]])
+        return self.walk.end_node[self.chords], self.walk.link_node[self.b[self.chords]]
 
     @shared
     def column_nodes(self) -> Index:
@@ -322,6 +344,12 @@ class Places:
         return entries_of(self.graph, self.first_column)
 
     @shared
-    def loops_of_chords(self) -> Array:
-        """Which chord closures make up a loop, ``(loops, chords)`` with signs."""
-        return self.graph.loop_matrix[:, self.chords]
+    def entry_places(self) -> Index | None:
+        """Where they stand in the Jacobian of the loops, see ``Entries.places``."""
+        return self.entries.places(self.n_freedoms)
+
+    @shared
+    def loops_of_chords(self) -> Array | None:
+        """Which chord closures make up a loop, ``(loops, chords)`` with signs; None where each loop has one of its own, in order."""
+        found = self.graph.loop_matrix[:, self.chords]
+        return None if np.array_equal(found, np.eye(len(found))) else found

@@ -36,8 +36,9 @@ class Evaluated(Protocol):
     def loop_errors(self) -> Array:
         """Closure errors of the loops about their middles, stacked ``(6 loops, T)``."""
 
-    def stacked(self, S: Array) -> Array:
-        """Columns ``(6, F, T)`` in the rows of every loop, about its middle."""
+    @property
+    def loop_jacobian(self) -> Array:
+        """Twists of the freedoms in the rows of every loop, about its middle, ``(6 loops, F, T)``."""
 
     def pair_sums(self, terms: Array) -> Array:
         """``(6, F, T)`` -> ``(6, P, T)``."""
@@ -103,7 +104,7 @@ class LoopRows:
 
     def jacobian(self, here: Evaluated) -> Array:
         """``(C x I6) diag(S_k)``."""
-        return here.stacked(here.S)
+        return here.loop_jacobian
 
     def sparse_jacobian(self, t: int) -> None:
         """None: ``closure.loop_rows`` makes it."""

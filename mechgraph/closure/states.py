@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array
+from mechgraph.algebra.se3 import Array, turn_between, turn_tangent, turned
 from mechgraph.closure.batches import Index
 from mechgraph.closure.places import Places, shared
 from mechgraph.model import pair_kinematics as evaluation
@@ -80,8 +80,8 @@ class States(Places):
         out = np.empty((self.n_state, *singles.shape[1:]), dtype=singles.dtype)
         out[rows] = singles
         if self.rotations is not None:
-            turns, turned = self.rotations
-            out[turned] = evaluation.turned(x[turned], dq[turns])
+            turns, rows = self.rotations
+            out[rows] = turned(x[rows], dq[turns])
         return out
 
     def difference(self, x1: Array, x0: Array) -> Array:
@@ -92,8 +92,8 @@ class States(Places):
             return np.asarray(singles)
         out = np.empty((self.n_freedoms, *singles.shape[1:]), dtype=singles.dtype)
         out[columns] = singles
-        turns, turned = self.rotations
-        out[turns] = evaluation.turn_between(x1[turned], x0[turned])
+        turns, rows = self.rotations
+        out[turns] = turn_between(x1[rows], x0[rows])
         return out
 
     def tangent(self, dq: Array, rates: Array) -> Array:
@@ -101,5 +101,5 @@ class States(Places):
         if self.rotations is None:
             return rates
         out, (turns, _) = rates.copy(), self.rotations
-        out[turns] = evaluation.turn_tangent(dq[turns], rates[turns])
+        out[turns] = turn_tangent(dq[turns], rates[turns])
         return out

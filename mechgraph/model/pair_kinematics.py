@@ -20,9 +20,10 @@ from mechgraph.algebra.se3 import (
     cross,
     identity,
     quaternion_exp,
-    quaternion_inverse,
     quaternion_log,
-    quaternion_product,
+    turn_between,
+    turn_tangent,
+    turned,
 )
 from mechgraph.model.factors import Factor
 from mechgraph.model.row_parts import Component, Freedom
@@ -202,29 +203,6 @@ def coordinates_to_state(row: Row, q: Array) -> Array:
     """State numbers ``(nx, ...)`` from user coordinates ``(f, ...)`` (rotation vectors for rotations)."""
     parts = [quaternion_exp(q[columns]) if step.holds_rotation else q[columns] for step, columns, _ in _placed(row)]
     return np.concatenate(parts) if parts else np.empty((0, *q.shape[1:]))
-
-
-def turned(q: Array, v: Array) -> Array:
-    """Unit quaternions ``(4, ...)`` after rotation vectors ``(3, ...)``: ``exp(v) q``, made unit again."""
-    out = quaternion_product(quaternion_exp(v), q)
-    out /= np.sqrt((out * out).sum(axis=0))
-    return out
-
-
-def turn_between(q1: Array, q0: Array) -> Array:
-    """Rotation vector from ``q0`` to ``q1`` by the short way."""
-    return quaternion_log(quaternion_product(q1, quaternion_inverse(q0)))
-
-
-def turn_tangent(v: Array, w: Array) -> Array:
-    """``dexp^-1(v) w = w - v x w / 2 + (1 - (a / 2) cot(a / 2)) / a^2  v x (v x w)`` with ``a = |v|``, below two turns."""
-    once = cross(v, w)
-    square = (v * v).sum(axis=0)
-    small = square < 1e-2
-    angle = np.sqrt(np.where(small, 1.0, square))
-    series = 1 / 12 + square / 720 + square**2 / 30240 + square**3 / 1209600
-    factor = np.where(small, series, (1.0 - 0.5 * angle / np.tan(0.5 * angle)) / angle**2)
-    return np.asarray(w - 0.5 * once + factor * cross(v, once))
 
 
 def advance(row: Row, x: Array, dq: Array) -> Array:

@@ -382,10 +382,8 @@ def test_rates_of_rotation_vectors_are_their_derivatives(size):
     v = rng.normal(size=(3, 4))
     v *= size / np.linalg.norm(v, axis=0)
     w = rng.normal(size=(3, 4))
-    turned = [
-        evaluation.turn_between(evaluation.turned(se3.quaternion_exp(v), s * h * w), np.eye(4, 1)) for s in (1, -1)
-    ]
-    np.testing.assert_allclose(evaluation.turn_tangent(v, w), (turned[0] - turned[1]) / (2 * h), rtol=0, atol=2e-8)
+    turned = [se3.turn_between(se3.turned(se3.quaternion_exp(v), s * h * w), np.eye(4, 1)) for s in (1, -1)]
+    np.testing.assert_allclose(se3.turn_tangent(v, w), (turned[0] - turned[1]) / (2 * h), rtol=0, atol=2e-8)
 
 
 @pytest.mark.parametrize("row", [row for row in ROWS.values() if row.reactions is None], ids=lambda row: row.symbol)
