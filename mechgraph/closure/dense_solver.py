@@ -66,6 +66,7 @@ class DenseFactored:
         self.rows, self.freedoms, self.T = J.shape
         self._forms, self._fixed = forms, fixed
         self._sensitivity: Array | None = None
+        self._motions: Array | None = None
         used = list(dict.fromkeys(which.tolist()))
         self._parts = []
         for i in used:
@@ -108,8 +109,10 @@ class DenseFactored:
 
     def motions(self) -> Array:
         """See the protocol in ``closure.solver``."""
-        found = [system.null_of_columns() for _, _, system in self._parts]
-        return self._joined(found, (self.freedoms, 0))
+        if self._motions is None:
+            found = [system.null_of_columns() for _, _, system in self._parts]
+            self._motions = self._joined(found, (self.freedoms, 0))
+        return self._motions
 
     def self_stresses(self) -> Array:
         """See the protocol in ``closure.solver``."""

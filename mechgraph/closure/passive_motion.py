@@ -60,8 +60,9 @@ class PassiveMotions:
         self.here, self.passive, self.rates = here, passive, rates
         self.links = sorted({link for motion in passive for link in motion.links})
         self.twists = self._twists(self.rates)
+        self._alone = are_alone(passive)
         if len(passive) > 1:
-            mixes = _named(passive, self.rates, self.twists, self.links)
+            mixes = told_apart(passive, self.rates, self.twists, self.links)
             self.rates = np.einsum("fpt,tpq->fqt", self.rates, mixes)
             self.twists = np.einsum("cnpt,tpq->cnqt", self.twists, mixes)
         mine = [[i for i, motion in enumerate(passive) if link in motion.links] for link in self.links]
@@ -95,17 +96,26 @@ class PassiveMotions:
         return np.concatenate([twists[:3], twists[3:] + cross(twists[:3], self.points[:, :, None])])
 
     @cached_property
+    def _squares(self) -> Array:
+        """Squares ``(p, T)`` of the passive twists ``G``."""
+        return (self._along * self._along).sum(axis=(0, 1))
+
+    @cached_property
     def _inverse(self) -> Array:
         """``(G^T G)^-1 (T, p, p)`` of the passive twists ``G``."""
         return np.linalg.inv(np.einsum("cnpt,cnqt->tpq", self._along, self._along))
 
+    def _shares(self, power: Array) -> Array:
+        """``(G^T G)^-1 power (p, T)``; motions that share no link have nothing in common."""
+        return power / self._squares if self._alone else np.einsum("tpq,qt->pt", self._inverse, power)
+
     def dual(self, power: Array) -> Array:
         """Wrenches ``(6, n, T)`` about the rest points, of least size, that do the power ``(p, T)`` along the motions."""
-        return np.einsum("cnpt,tpq,qt->cnt", self._along, self._inverse, power, optimize=True)
+        return np.einsum("cnpt,pt->cnt", self._along, self._shares(power))
 
     def _against(self, power: Array) -> Array:
         """Rates ``(F, T)`` of the passive motions that take ``power (p, T)`` out."""
-        return -np.einsum("fpt,tpq,qt->ft", self.rates, self._inverse, power, optimize=True)
+        return -np.einsum("fpt,pt->ft", self.rates, self._shares(power))
 
     def at_rest(self, V: Array) -> Array:
         """Rates ``(F, T)`` that, added to those of the twists ``V (6, N, T)``, leave no part along the motions: ``G^T (V + G x) = 0``."""
@@ -151,8 +161,24 @@ class PassiveMotions:
         return 0.5 * (out + cross_twist(V[:, self.links][:, :, None], self.twists))
 
 
-def _named(passive: Sequence[PassiveMotion], Z: Array, V: Array, links: list[int]) -> Array:
+def told_apart(passive: Sequence[PassiveMotion], Z: Array, V: Array, links: list[int]) -> Array:
     """Mixes ``(T, p, p)`` of motions ``Z`` with twists ``V (6, n, p, T)`` of some links: column i moves those of passive motion i as one.
+
+    A link that has one passive motion alone has multiples of one twist: the component that is largest at a position tells its motion from
+    those of all other links.
+    """
+    if not are_alone(passive):
+        return _named(passive, Z, V, links)
+    A = np.empty((V.shape[3], len(passive), len(passive)))
+    for i, motion in enumerate(passive):
+        part = V[: 3 if motion.turns else 6, links.index(motion.links[0])]
+        largest = np.abs(part).max(axis=1).argmax(axis=0)
+        A[:, i] = np.take_along_axis(part, largest[None, None], axis=0)[0].T
+    return np.asarray(np.linalg.inv(A))
+
+
+def _named(passive: Sequence[PassiveMotion], Z: Array, V: Array, links: list[int]) -> Array:
+    """The same for any motions.
 
     First motions that share no link are told apart, by the dual of what each set of links does; then those that do. Where the same links
     have several motions, those that are nearest in their freedoms to the motions at the start.

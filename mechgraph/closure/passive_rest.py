@@ -210,8 +210,12 @@ class _Carried:
             amount, dq = self._missing(x, which, track, place, turns)
             if amount < UNTURNED:
                 break
-            # exact where the rates of the motion are constant (ball joints, hinges); over a plane it comes nearer with every repetition
-            x = self.follower.newton.close(self.path.advance(x, dq, track), x[self.path.rows], track, which).x
+            # exact where the rates of the motion are constant (ball joints, hinges), so that nothing is left to correct; over a plane it
+            # comes nearer with every repetition
+            closed = self.follower.newton.close(self.path.advance(x, dq, track), x[self.path.rows], track, which)
+            x = closed.x
+            if closed.correction.max(initial=0.0) < UNTURNED:
+                break
         return x
 
     def spin(self, nodes: Nodes) -> Array:
