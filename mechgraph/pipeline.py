@@ -109,7 +109,9 @@ class Pipeline:
         self.columns, _ = named_columns(self.m, self.system, dict.fromkeys(drive.names, 0.0))
         self.unit = np.where(self.system.is_length[self.columns], self.system.par.L, 1.0)
         self._refuse_far()
-        self.engine = engine_for(self.system.n_rows, int(np.prod(drive.batch)), options.engine)
+        # reactions of least norm are found position by position, where nothing is gained from many of them
+        positions = 1 if options.redundant == "minimum_norm" else int(np.prod(drive.batch))
+        self.engine = engine_for(self.system.n_rows, positions, options.engine)
         self.solver, proved = solver_at_start(self.engine, self.columns, self.start)
         self.lead = np.arange(len(self.columns))
         self.passive: tuple[PassiveMotion, ...] = ()
@@ -322,6 +324,7 @@ class Outcome:
         which = self.solver.chosen(here, found.which[places])
         f = self.solver.factored(here, which)
         found.work.factorizations += here.T
+        found.work.groups = max(found.work.groups, f.groups)
         open_ = here.closure > CLOSED
         dead = at_dead_points(here, f, self.solver) & ~open_
         if (open_ | dead).any():

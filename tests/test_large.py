@@ -20,8 +20,10 @@ from mechgraph.closure import tree
 from mechgraph.closure.assembly import assembled, scaled_start
 from mechgraph.closure.bordering import LoopSystem
 from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.loop_rows import ClosureRows
 from mechgraph.closure.tree import Tree
 from mechgraph.model.parameters import parameters
+from mechgraph.numerics.sparse import SparseFactors
 from mechgraph.topology.linkgraph import link_graph
 
 AGREE = 1e-9
@@ -218,7 +220,8 @@ def test_a_bordered_system_proves_the_rank(name: str) -> None:
     assert loops.rank == np.linalg.matrix_rank(J, 1e-9)
     assert loops.redundant == J.shape[0] - loops.rank
     assert loops.held == J.shape[1] - loops.rank
-    stress = loops.random_stress(loops.first, loops.rows, np.random.default_rng(1), 3)
+    rows = ClosureRows.of(here, np.arange(1))
+    stress = loops.random_stress(SparseFactors([loops.first]), rows, np.random.default_rng(1), 3)[:, :, 0]
     assert np.abs(J.T @ stress).max(initial=0.0) < 1e-11 * np.abs(stress).max(initial=1.0)
 
 
@@ -248,11 +251,11 @@ def test_factors_of_one_pattern_are_renewed() -> None:
     system, x = assembled(ladder(40))
     here = Configuration(system, x[:, None])
     loops = LoopSystem.at(here, np.array([0]))
-    again = loops.factor(loops.rows)
-    b = np.random.default_rng(2).normal(size=(6 * system.graph.n_loops, 2))
-    assert_allclose(loops.solve(again, b), loops.solve(loops.first, b), atol=1e-11)
-    tau = np.random.default_rng(3).normal(size=(system.n_freedoms, 2))
-    assert_allclose(loops.solve_transposed(again, tau), loops.solve_transposed(loops.first, tau), atol=1e-10)
+    again, first = SparseFactors([loops.factor(loops.rows)]), SparseFactors([loops.first])
+    b = np.random.default_rng(2).normal(size=(6 * system.graph.n_loops, 2, 1))
+    assert_allclose(loops.solve(again, b), loops.solve(first, b), atol=1e-11)
+    tau = np.random.default_rng(3).normal(size=(system.n_freedoms, 2, 1))
+    assert_allclose(loops.solve_transposed(again, tau), loops.solve_transposed(first, tau), atol=1e-10)
 
 
 def test_deep_trees_by_pointer_doubling(monkeypatch: pytest.MonkeyPatch) -> None:

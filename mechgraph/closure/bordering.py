@@ -9,7 +9,8 @@ or column, placed at the loop where it lies. What results,
         [   G     0 ]
 
 is square. Where its pivots are all well away from zero the rank of J is proved: the bordering cannot make up for a rank below that
-of the matching. Then q solves the rates, x gives the loop wrenches, a random ``c`` a random self-stress.
+of the matching. Then q solves the rates, x gives the loop wrenches, a random ``c`` a random self-stress. Many positions are factored
+group by group where that is faster: the blocks of B in block triangular form are the structural groups with these drivers.
 Sources: Duff, Erisman and Reid, Direct Methods for Sparse Matrices, 2017, chapters 5 and 6 (matching, structural rank); Govaerts, Numerical
 Methods for Bifurcations of Dynamical Equilibria, 2000, chapter 3 (bordered systems).
 """
@@ -26,10 +27,13 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
-from mechgraph.numerics.sparse import Factors, Pattern, SparseFactor
+from mechgraph.numerics.block_triangular import BlockFactor, BlockTriangular
+from mechgraph.numerics.sparse import Factors, Pattern, SparseFactor, SparseFactors
 from mechgraph.numerics.tolerances import RANKS
 
 Mask = NDArray[np.bool_]
+Factored = SparseFactors | BlockFactor
+"""The system at many positions, factored one by one or group by group."""
 
 PIVOT = 1e-8
 """Pivot (against unit rows and columns) below which a bordered system counts as singular."""
@@ -40,6 +44,8 @@ RETRY = 1e-3
 INDEPENDENT = 1e-5
 """Smallest over largest singular value that a determinant has to prove, far above ``RANKS.loop`` and above its own rounding."""
 BORDERS_SEED = 17
+FEWEST, MOST = 8, 25
+"""Positions from which, and unknowns a position up to which it is asked whether group by group is faster: the order costs some factors."""
 
 
 class LoopSystem(ReducedRows):
@@ -206,6 +212,38 @@ class LoopSystem(ReducedRows):
         values = (self._turned_blocks(rows)[self._live], self._more(rows).data, self._constant)
         return self.pattern.factor(np.concatenate(values))
 
+    @cached_property
+    def groups(self) -> BlockTriangular:
+        """The system in the order of the structural groups."""
+        return BlockTriangular(*self.pattern.places, self._size)
+
+    def factors(self, here: Configuration, at: Index) -> Factored:
+        """The system factored at positions: of many group by group, all positions together, where that takes less time."""
+        values = self.values_at(here, at)
+        if len(at) >= FEWEST and self._size <= MOST * len(at) and self.groups.pays(len(at)):
+            return self.groups.factor(values)
+        return SparseFactors([self.pattern.factor(one) for one in values])
+
+    def values_at(self, here: Configuration, at: Index) -> Array:
+        """Values ``(T, entries)`` of the pattern at positions."""
+        rows = ClosureRows.of(here, at)
+        inner = self._turned_blocks(rows)[:, self._live]
+        each = at if self.rows.further else at[:1]
+        more = np.array([self._more(ClosureRows.at(here, t)).data for t in each.tolist()])
+        constant = np.broadcast_to(self._constant, (len(at), len(self._constant)))
+        return np.concatenate([inner, np.broadcast_to(more, (len(at), more.shape[1])), constant], axis=1)
+
+    def fits(self, factors: Factored) -> Mask:
+        """Whether no pivot is small against those at the position of choice, ``(T,)``."""
+        if isinstance(factors, BlockFactor):
+            return np.asarray(factors.smallest_pivot > self._group_limit)
+        return np.asarray(factors.smallest_pivot > self.pivot_limit)
+
+    @cached_property
+    def _group_limit(self) -> float:
+        values = (self._turned_blocks(self.rows)[self._live], self._more(self.rows).data, self._constant)
+        return max(PIVOT, WORSE * float(self.groups.factor(np.concatenate(values)[None]).smallest_pivot[0]))
+
     def turned_matrix(self, there: ClosureRows) -> scipy.sparse.csr_array:
         """``J (rows, free columns)`` in turned rows and columns of unit size; rows behind those of the loops as they are."""
         e = self.entries
@@ -232,23 +270,24 @@ class LoopSystem(ReducedRows):
         loops = scipy.sparse.csr_array((blocks.ravel(), (rows.ravel(), cols.ravel())), shape=(6 * n, 6 * n))
         return scipy.sparse.csr_array(scipy.sparse.block_diag([loops, scipy.sparse.eye_array(self.rows.further)]))
 
-    def solve(self, factor: SparseFactor, b: Array) -> Array:
-        """``q (F, k)`` with ``J q = b (rows, k)`` in the kept rows, zero in fixed columns."""
-        rhs = np.zeros((self._size, b.shape[1]))
-        rhs[: self._m] = self.kept_part(b)
-        y = factor.solve(rhs)
-        q = np.zeros((len(self._free), b.shape[1]))
-        q[self._free] = y[: self._n] * self._scale[self._free][:, None]
+    def _columns(self, y: Array) -> Array:
+        """Freedoms ``(F, ...)`` of solutions ``y (size, ...)``, zero in fixed columns."""
+        q = np.zeros((len(self._free), *y.shape[1:]))
+        q[self._free] = y[: self._n] * self._scale[self._free].reshape(-1, *[1] * (y.ndim - 1))
         return q
 
-    def solve_transposed(self, factor: SparseFactor, tau: Array, shared: Array | None = None) -> Array:
-        """Multipliers ``x (rows, k)`` with ``J^T x = tau (F, k)`` in the free columns; multiples ``shared`` of the borders."""
-        rhs = np.zeros((self._size, tau.shape[1]))
-        rhs[: self._n] = tau[self._free] * self._scale[self._free][:, None]
-        if shared is not None:
-            rhs[self._n :] = shared
+    def solve(self, factor: Factored, b: Array) -> Array:
+        """``q (F, k, T)`` with ``J q = b (rows, k, T)`` in the kept rows, zero in fixed columns."""
+        rhs = np.zeros((self._size, *b.shape[1:]))
+        rhs[: self._m] = self.kept_part(_flat(b)).reshape(self._m, *b.shape[1:])
+        return self._columns(factor.solve(rhs))
+
+    def solve_transposed(self, factor: Factored, tau: Array) -> Array:
+        """Multipliers ``x (rows, k, T)`` with ``J^T x = tau (F, k, T)`` in the free columns."""
+        rhs = np.zeros((self._size, *tau.shape[1:]))
+        rhs[: self._n] = tau[self._free] * self._scale[self._free][:, None, None]
         kept = factor.solve(rhs, transposed=True)[: self._m]
-        return self.multipliers(kept)
+        return self.multipliers(_flat(kept)).reshape(self.rows.count, *tau.shape[1:])
 
     def connecting_stress(self, factor: SparseFactor, shares: Array) -> Array:
         """Multipliers ``(kept rows, k)`` of self-stresses that connect loops, for shares ``(shared, k)``."""
@@ -257,37 +296,43 @@ class LoopSystem(ReducedRows):
             rhs[self._n :] = shares
         return factor.solve(rhs, transposed=True)[: self._m]
 
-    def random_stress(self, factor: SparseFactor, rows: ClosureRows, rng: np.random.Generator, count: int) -> Array:
-        """Random self-stresses ``(rows, count)`` for the rows at one position, of size one in the measure of their loops.
+    def random_stress(self, factor: Factored, rows: ClosureRows, rng: np.random.Generator, count: int) -> Array:
+        """Random self-stresses ``(rows, count, T)`` for rows at T positions, of size one in the measure of their loops.
 
         In the rows that fell away they are random; what these bring to the free columns where they are not zero there (in the
         positions behind the first) the other rows take up.
         """
-        e = self.entries
+        e, T = self.entries, len(rows.S)
         free = np.where(self._live, 0.0, self._turned_blocks(rows))
         dropped = ~(np.arange(6) < self.kept[:, None])
         local = np.zeros((len(self.kept), 6, count))
         local[dropped] = rng.normal(size=(int(dropped.sum()), count))
-        rhs = np.zeros((self._size, count))
-        for i in range(count):
-            power = (free * local[e.loop, :, i].T).sum(axis=0)
-            rhs[: self._n, i] = -np.bincount(e.column, power, minlength=len(self._free))[self._free]
+        power = np.einsum("tie,eic->ect", free, local[e.loop], optimize=True)
+        to = scipy.sparse.csr_array(
+            (np.ones(len(e.column)), (e.column, np.arange(len(e.column)))), shape=(len(self._free), len(e.column))
+        )
+        rhs = np.zeros((self._size, count, T))
+        rhs[: self._n] = -np.asarray(to[self._free] @ _flat(power)).reshape(self._n, count, T)
         if self.shared:
-            rhs[self._n :] = rng.normal(size=(self.shared, count))
+            rhs[self._n :] = rng.normal(size=(self.shared, count))[:, :, None]
         kept = factor.solve(rhs, transposed=True)[: self._m]
         size = np.maximum(np.abs(kept).max(axis=0, initial=0.0), 1.0)
-        return self.multipliers(kept / size, local[dropped] / size)
+        own = local[dropped][:, :, None] / size
+        return self.multipliers(_flat(kept / size), _flat(own)).reshape(self.rows.count, count, T)
 
-    def motions(self, factor: SparseFactor) -> Array:
-        """Motions ``(F, held)`` with the fixed columns at rest, one a held motion."""
-        rhs = np.zeros((self._size, self.held))
-        rhs[self._m : self._m + self._motions, : self._motions] = np.eye(self._motions)
+    def motions(self, factor: Factored, T: int) -> Array:
+        """Motions ``(F, held, T)`` with the fixed columns at rest, one a held motion."""
+        rhs = np.zeros((self._size, self.held, T))
+        rhs[self._m : self._m + self._motions, : self._motions] = np.eye(self._motions)[:, :, None]
         others = self.held - self._motions
         if others:
-            rhs[self._size - others :, self._motions :] = np.eye(others)
-        q = np.zeros((len(self._free), self.held))
-        q[self._free] = factor.solve(rhs)[: self._n] * self._scale[self._free][:, None]
-        return q
+            rhs[self._size - others :, self._motions :] = np.eye(others)[:, :, None]
+        return self._columns(factor.solve(rhs))
+
+
+def _flat(values: Array) -> Array:
+    """``(n, k, T)`` as ``(n, k T)``."""
+    return values.reshape(len(values), int(np.prod(values.shape[1:])))
 
 
 def _shares(touch: scipy.sparse.csr_array, back: scipy.sparse.csr_array, left: Index) -> tuple[Index, Index]:

@@ -60,6 +60,7 @@ class DenseFactored:
     """Inverses of the independent rows and columns, all positions of a form together."""
 
     complete = True
+    groups = 0
 
     def __init__(self, forms: list[Form], fixed: Index, J: Array, which: Index) -> None:
         self.J, self.which = J, which

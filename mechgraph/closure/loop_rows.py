@@ -10,7 +10,7 @@ Dense and sparse engine start from these rows, so that they reach the same decis
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -40,7 +40,10 @@ def lengths_of(graph: LinkGraph, pair_points: Array, middles: Array) -> Array:
 
 @dataclass(frozen=True)
 class ClosureRows:
-    """The closure Jacobian of one position: twists ``S (6, F)`` along the loops, and ``more (n, F)`` rows behind those of the loops."""
+    """The closure Jacobian of one position: twists ``S (6, F)`` along the loops, and ``more (n, F)`` rows behind those of the loops.
+
+    Of several positions ``S (T, 6, F)`` and ``points (T, 3, P)``, with ``more`` of the first one.
+    """
 
     graph: LinkGraph
     first_column: Index
@@ -56,10 +59,18 @@ class ClosureRows:
         more = scipy.sparse.csr_array(scipy.sparse.vstack(others)) if others else None
         return cls(s.graph, s.first_column, here.S[:, :, t], here.pair_points[:, :, t], more)
 
+    @classmethod
+    def of(cls, here: Configuration, at: Index) -> ClosureRows:
+        """The rows at several positions."""
+        one, S, points = cls.at(here, int(at[0])), here.S[:, :, at], here.pair_points[:, :, at]
+        return replace(one, S=S.transpose(2, 0, 1), points=points.transpose(2, 0, 1))
+
     @cached_property
     def middles(self) -> Array:
-        """Middle of the pair points of every loop, ``(3, loops)``."""
-        return np.asarray((self.graph.loop_averages @ self.points.T).T)
+        """Middle of the pair points of every loop, ``(3, loops)``, of several positions ``(T, 3, loops)``."""
+        averages = self.graph.loop_averages
+        flat = self.points.reshape(-1, self.points.shape[-1])
+        return np.asarray((averages @ flat.T).T).reshape(*self.points.shape[:-1], averages.shape[0])
 
     @property
     def further(self) -> int:
@@ -120,11 +131,12 @@ class ReducedRows:
         return np.concatenate([mine, self.loops + np.arange(self.rows.further)]).astype(np.intp)
 
     def _blocks(self, S: Array, middles: Array) -> Array:
-        """Entries ``(6, entries)`` about the ``middles (3, loops)``, over the lengths of the loops; zero in the fixed columns."""
+        """Entries ``(..., 6, entries)`` about the ``middles (..., 3, loops)``, over the lengths of the loops; zero in the fixed columns."""
         e = self.entries
-        out = S[:, e.column]
-        out[3:] += cross(out[:3], middles[:, e.loop])
-        out[3:] /= self.length[e.loop]
+        out = S[..., e.column]
+        turns, slides = out[..., :3, :], out[..., 3:, :]
+        slides += np.moveaxis(cross(np.moveaxis(turns, -2, 0), np.moveaxis(middles[..., e.loop], -2, 0)), 0, -2)
+        slides /= self.length[e.loop]
         return np.asarray(out * (e.sign * self._free[e.column]))
 
     @cached_property
@@ -156,11 +168,11 @@ class ReducedRows:
         return (np.arange(6)[:, None] < self.kept[e.loop][None]) & self._free[e.column][None]
 
     def _turned_blocks(self, rows: ClosureRows) -> Array:
-        """Entries ``(6, entries)`` of rows at any position in the turned rows of their loops and columns of unit size."""
+        """Entries ``(..., 6, entries)`` of rows at any positions in the turned rows of their loops and columns of unit size."""
         blocks = self._blocks(rows.S, rows.middles) * self._scale[self.entries.column]
         turned = np.empty_like(blocks)
         for loops, at in self._by_width:
-            turned[:, at] = np.moveaxis(self._turn[loops] @ np.moveaxis(blocks[:, at], 0, 1), 0, 1)
+            turned[..., at] = np.swapaxes(self._turn[loops] @ np.swapaxes(blocks[..., at], -3, -2), -3, -2)
         return turned
 
     @cached_property

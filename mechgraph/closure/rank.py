@@ -24,6 +24,7 @@ from mechgraph.closure.indexing import Index
 from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
 from mechgraph.numerics.least_norm import singular_ratio
 from mechgraph.numerics.linear import rank_of
+from mechgraph.numerics.sparse import SparseFactors
 from mechgraph.numerics.tolerances import RANKS
 from mechgraph.topology.components import labels_of_bipartite, members
 
@@ -87,7 +88,8 @@ class _Bordered:
         return self.loops.connecting_stress(self.loops.first, shares)
 
     def motions(self) -> Array:
-        return np.asarray((self.loops.motions(self.loops.first) / self.loops.scale[:, None])[self.loops.free])
+        q = self.loops.motions(SparseFactors([self.loops.first]), 1)[:, :, 0]
+        return np.asarray((q / self.loops.scale[:, None])[self.loops.free])
 
 
 class _Eliminated:

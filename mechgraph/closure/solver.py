@@ -21,11 +21,11 @@ from mechgraph.closure.sparse_solver import SparseSolver
 
 EngineName = Literal["auto", "dense", "sparse"]
 ENGINES: tuple[EngineName, ...] = ("auto", "dense", "sparse")
-SPARSE_ROWS = {1.0: 120, 200.0: 90, np.inf: 60}
+SPARSE_ROWS = {1.0: 120, 20.0: 84, 50.0: 60, 400.0: 42, np.inf: 30}
 """Closure rows from which on ``auto`` takes the sparse engine, for up to so many positions.
 
-Measured by ``tests/benchmarks/bench_large.py --crossover`` on ladders of four-bars: both engines take the same time at 120 rows (one
-position), 96 (64 positions) and 60 (1000).
+Measured by ``tests/benchmarks/bench_large.py --crossover`` on ladders of four-bars: both engines take the same time at 110 rows (one
+position), 80 (16 positions), 62 (36), 36 (200) and 24 (1000), where the sparse one goes group by group.
 """
 
 
@@ -35,6 +35,8 @@ class FactoredClosure(Protocol):
     which: Index
     complete: bool
     """Whether ``self_stresses`` is a basis of all self-stresses; otherwise it holds random ones that represent them."""
+    groups: int
+    """Number of groups that are solved one after the other; 0 where all equations are factored as a whole."""
 
     @property
     def condition(self) -> Array:

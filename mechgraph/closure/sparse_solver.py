@@ -1,4 +1,4 @@
-"""The closure equations of a batch of positions by sparse factors, one a position, of a bordered system (see ``closure.bordering``)."""
+"""The closure equations of a batch of positions by sparse factors of a bordered system (see ``closure.bordering``)."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ import scipy
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.bordering import LoopSystem
+from mechgraph.closure.bordering import Factored, LoopSystem
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.dense_solver import independent
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.loop_rows import ClosureRows
-from mechgraph.numerics.sparse import Pattern, SparseFactor
+from mechgraph.numerics.block_triangular import BlockFactor
+from mechgraph.numerics.sparse import Pattern, SparseFactors
 from mechgraph.numerics.tolerances import PATH
 
 PROBES = 6
@@ -26,44 +27,43 @@ POWERS = 5
 """Steps of the power iteration that estimates a spectral radius."""
 
 
+Part = tuple[LoopSystem, Index, Factored]
+"""A bordering, the positions in it, and these factored."""
+
+
 class SparseFactored:
-    """Factors of every position, each in its bordering."""
+    """Factors of every position in its bordering, all positions of a bordering together."""
 
     complete = False
 
-    def __init__(self, solver: SparseSolver, here: Configuration, which: Index) -> None:
-        self.solver, self.here, self.which = solver, here, which
-        self._forms = [solver.forms[i] for i in which.tolist()]
-        self._factors = [solver.factor(here, t, number) for t, number in enumerate(which.tolist())]
+    def __init__(self, solver: SparseSolver, here: Configuration, which: Index, parts: list[Part]) -> None:
+        self.solver, self.here, self.which, self._parts = solver, here, which, parts
+        self.groups = max((form.groups.blocks for form, _, f in parts if isinstance(f, BlockFactor)), default=0)
 
-    @classmethod
-    def of(cls, solver: SparseSolver, here: Configuration, which: Index, factors: list[SparseFactor]) -> SparseFactored:
-        """From factors that are known."""
-        out = cls.__new__(cls)
-        out.solver, out.here, out.which, out._factors = solver, here, which, factors
-        out._forms = [solver.forms[i] for i in which.tolist()]
+    def _joined(self, values: list[Array], rows: int, width: int = 0) -> Array:
+        """Values ``(rows, k, T)`` of the borderings at all positions, zero where one has fewer columns."""
+        if len(values) == 1:
+            return values[0]
+        out = np.zeros((rows, max([width, *(value.shape[1] for value in values)]), self.here.T))
+        for (_, at, _), value in zip(self._parts, values, strict=True):
+            out[:, : value.shape[1], at] = value
         return out
 
     @property
     def condition(self) -> Array:
         """An estimate from the smallest pivot against unit rows and columns, ``(T,)``."""
-        return np.array([10.0 / max(factor.smallest_pivot, 1e-300) for factor in self._factors])
-
-    def _each(self, solve: str, b: Array) -> Array:
-        found = [
-            getattr(form, solve)(factor, b[:, :, t])
-            for t, (form, factor) in enumerate(zip(self._forms, self._factors, strict=True))
-        ]
-        rows = self.here.system.n_freedoms if solve == "solve" else self.here.system.n_rows
-        return np.stack(found, axis=2) if found else np.empty((rows, b.shape[1], 0))
+        smallest = self._joined([factors.smallest_pivot[None, None] for _, _, factors in self._parts], 1, 1)
+        return np.asarray(10.0 / np.maximum(smallest[0, 0], 1e-300))
 
     def solve(self, b: Array) -> Array:
         """See ``FactoredClosure``."""
-        return self._each("solve", b)
+        found = [form.solve(factors, b[:, :, at]) for form, at, factors in self._parts]
+        return self._joined(found, self.here.system.n_freedoms, b.shape[1])
 
     def solve_transposed(self, b: Array) -> Array:
         """See ``FactoredClosure``."""
-        return self._each("solve_transposed", b)
+        found = [form.solve_transposed(factors, b[:, :, at]) for form, at, factors in self._parts]
+        return self._joined(found, self.here.system.n_rows, b.shape[1])
 
     def sensitivity(self) -> Array:
         """See ``FactoredClosure``."""
@@ -79,18 +79,21 @@ class SparseFactored:
 
     def motions(self) -> Array:
         """See ``FactoredClosure``."""
-        found = [form.motions(factor) for form, factor in zip(self._forms, self._factors, strict=True)]
-        return np.stack(found, axis=2) if found else np.empty((self.here.system.n_freedoms, 0, 0))
+        found = [form.motions(factors, len(at)) for form, at, factors in self._parts]
+        return self._joined(found, self.here.system.n_freedoms)
 
     def self_stresses(self) -> Array:
         """Random ones, of size one in the measure of every loop; none where there is no redundancy."""
-        count = PROBES if any(form.redundant for form in self._forms) else 0
-        out = np.zeros((self.here.system.n_rows, count, self.here.T))
-        for t, (form, factor) in enumerate(zip(self._forms, self._factors, strict=True)):
-            if count and form.redundant:
-                rng = np.random.default_rng(SEED)
-                out[:, :, t] = form.random_stress(factor, ClosureRows.at(self.here, t), rng, count)
-        return out
+        rows, found = self.here.system.n_rows, []
+        for form, at, factors in self._parts:
+            count = PROBES if form.redundant else 0
+            some = ClosureRows.of(self.here, at)
+            found.append(
+                form.random_stress(factors, some, np.random.default_rng(SEED), count)
+                if count
+                else np.zeros((rows, 0, len(at)))
+            )
+        return self._joined(found, rows)
 
     def least(self, R: Sequence[scipy.sparse.csr_array], r0: Array) -> Array:
         """``[R^T R  J; J^T  0] [x; z] = [-R^T r0; 0]`` in the turned rows of the loops (Golub and Van Loan, section 12.1).
@@ -98,7 +101,8 @@ class SparseFactored:
         Rows that hold the motions left free stand below those of J, with unknowns that come out as zero: without them z is not unique.
         """
         out = np.zeros((self.here.system.n_rows, self.here.T))
-        for t, form in enumerate(self._forms):
+        for t, number in enumerate(self.which.tolist()):
+            form = self.solver.forms[number]
             turned = form.turned_rows
             part = R[t] @ turned
             H = scipy.sparse.coo_array(part.T @ part)
@@ -145,7 +149,13 @@ class SparseFactored:
 
     def part(self, at: Index, here: Configuration) -> SparseFactored:
         """See ``FactoredClosure``."""
-        return SparseFactored.of(self.solver, here, self.which[at], [self._factors[i] for i in at.tolist()])
+        place, parts = np.full(len(self.which), -1), list[Part]()
+        place[at] = np.arange(len(at))
+        for form, mine, factors in self._parts:
+            some = np.flatnonzero(place[mine] >= 0)
+            if some.size:
+                parts.append((form, place[mine[some]], factors.part(some)))
+        return SparseFactored(self.solver, here, self.which[at], parts)
 
     def by_held(self) -> list[tuple[Index, Index]]:
         """The freedoms that hold the passive motions, at all positions."""
@@ -160,20 +170,21 @@ class SparseSolver:
     def __init__(self, fixed: Index, keep: Index | None = None) -> None:
         self.fixed, self.keep = fixed, np.zeros(0, dtype=np.intp) if keep is None else keep
         self.forms: list[LoopSystem] = []
-        self._last: tuple[weakref.ref[Configuration], dict[tuple[int, int], SparseFactor]] | None = None
+        self._last: tuple[weakref.ref[Configuration], dict[int, tuple[Index, Factored]]] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """Without what is kept of the last positions: it refers to them weakly, and is computed again."""
         return vars(self) | {"_last": None}
 
-    def factor(self, here: Configuration, t: int, number: int) -> SparseFactor:
-        """A position factored in a form; what is known of the last positions is kept for who asks next."""
+    def _factors(self, here: Configuration, number: int, at: Index) -> Factored:
+        """Positions factored in a form; what is known of the last positions is kept for who asks next."""
         known = self._known(here)
-        if (t, number) not in known:
-            known[t, number] = self.forms[number].factor(ClosureRows.at(here, t))
-        return known[t, number]
+        before, factors = known.get(number, (at[:0], None))
+        if factors is None or not np.isin(at, before).all():
+            before, factors = known[number] = at, self.forms[number].factors(here, at)
+        return factors if np.array_equal(before, at) else factors.part(np.searchsorted(before, at))
 
-    def _known(self, here: Configuration) -> dict[tuple[int, int], SparseFactor]:
+    def _known(self, here: Configuration) -> dict[int, tuple[Index, Factored]]:
         if self._last is None or self._last[0]() is not here:
             self._last = weakref.ref(here), {}
         return self._last[1]
@@ -201,21 +212,41 @@ class SparseSolver:
 
     def factored(self, here: Configuration, which: Index) -> SparseFactored:
         """See ``ClosureSolver``."""
-        return SparseFactored(self, here, which)
+        parts = []
+        for number in dict.fromkeys(which.tolist()):
+            at = np.flatnonzero(which == number)
+            parts.append((self.forms[number], at, self._factors(here, number, at)))
+        return SparseFactored(self, here, which, parts)
 
     def chosen(self, here: Configuration, which: Index) -> Index:
         """See ``ClosureSolver``."""
         which = which.copy()
-        for t in range(here.T):
-            known = [which[t]] if which[t] >= 0 else range(len(self.forms) - 1, -1, -1)
-            fits = [int(i) for i in known if self.factor(here, t, int(i)).smallest_pivot > self.forms[i].pivot_limit][
-                :1
-            ]
-            if not fits:
-                form = LoopSystem.at(here if here.T == 1 else here.part(np.array([t])), self.fixed)
-                if which[t] < 0 or form.smallest > 5.0 * self.factor(here, t, int(which[t])).smallest_pivot:
-                    self.forms.append(form)
-                    fits = [len(self.forms) - 1]
-                    self._known(here)[t, fits[0]] = form.first
-            which[t] = fits[0] if fits else which[t]
+        poor = np.flatnonzero(which >= 0)
+        for number in dict.fromkeys(which[poor].tolist()):
+            poor = np.setdiff1d(poor, self._fitting(here, number, np.flatnonzero(which == number)))
+        new = np.flatnonzero(which < 0)
+        for number in range(len(self.forms) - 1, -1, -1):
+            fits = self._fitting(here, number, new) if new.size else new
+            which[fits], new = number, np.setdiff1d(new, fits)
+        while new.size:
+            self._make(here, int(new[0]))
+            fits = np.union1d(new[:1], self._fitting(here, len(self.forms) - 1, new)) if new.size > 1 else new
+            which[fits], new = len(self.forms) - 1, np.setdiff1d(new, fits)
+        for t in poor.tolist():
+            before = self.forms[which[t]].factor(ClosureRows.at(here, t)).smallest_pivot
+            self._make(here, t)
+            if self.forms[-1].smallest > 5.0 * before:
+                which[t] = len(self.forms) - 1
+            else:
+                self.forms.pop()
         return which
+
+    def _fitting(self, here: Configuration, number: int, at: Index) -> Index:
+        """Those of the positions that a form fits."""
+        return at[self.forms[number].fits(self._factors(here, number, at))]
+
+    def _make(self, here: Configuration, t: int) -> None:
+        """A form made at a position."""
+        at = np.array([t])
+        self.forms.append(LoopSystem.at(here if here.T == 1 else here.part(at), self.fixed))
+        self._known(here)[len(self.forms) - 1] = at, SparseFactors([self.forms[-1].first])

@@ -195,6 +195,18 @@ SMALL_BATCH = 32
 """Number of matrices up to which ``matmul`` multiplies them faster than ``einsum`` (measured)."""
 
 
+def inverses(stacked: Array) -> Array:
+    """Inverses of matrices ``(N, n, n)``, NaN where one is singular."""
+    try:
+        return np.asarray(np.linalg.inv(stacked), dtype=float)
+    except np.linalg.LinAlgError:
+        singular = np.linalg.slogdet(stacked)[0] == 0
+        identity = np.eye(stacked.shape[1])
+        inverse = np.asarray(np.linalg.inv(np.where(singular[:, None, None], identity, stacked)), dtype=float)
+        inverse[singular] = np.nan
+        return inverse
+
+
 class Factor:
     """Inverses of a batch of square matrices ``(n, n, T)``; solves with one step of refinement.
 
@@ -203,15 +215,7 @@ class Factor:
 
     def __init__(self, A: Array) -> None:
         self._A = A
-        stacked = np.ascontiguousarray(A.transpose(2, 0, 1))
-        try:
-            inverse: Array = np.asarray(np.linalg.inv(stacked), dtype=float)
-        except np.linalg.LinAlgError:
-            singular = np.linalg.slogdet(stacked)[0] == 0
-            inverse = np.asarray(
-                np.linalg.inv(np.where(singular[:, None, None], np.eye(A.shape[0]), stacked)), dtype=float
-            )
-            inverse[singular] = np.nan
+        inverse = inverses(np.ascontiguousarray(A.transpose(2, 0, 1)))
         few = A.shape[2] <= SMALL_BATCH
         self._inverse = inverse.transpose(1, 2, 0)
         if not few:

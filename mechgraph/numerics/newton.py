@@ -114,6 +114,7 @@ class Work:
     nodes : points at which the path was found in between, ``careful`` of them step by step (near a fold or a crossing).
     evaluations : states at which the equations were evaluated, in ``calls`` batches.
     factorizations : matrices factored.
+    groups : structural groups in which they were solved one after the other; 0 where the matrices were factored as a whole.
     """
 
     positions: int = 0
@@ -122,9 +123,11 @@ class Work:
     evaluations: int = 0
     calls: int = 0
     factorizations: int = 0
+    groups: int = 0
 
     def __str__(self) -> str:
-        return ", ".join(f"{getattr(self, name)} {name}" for name in self.__dataclass_fields__)
+        shown = [name for name in self.__dataclass_fields__ if name != "groups" or self.groups]
+        return ", ".join(f"{getattr(self, name)} {name}" for name in shown)
 
     @property
     def counts(self) -> tuple[tuple[int, str], ...]:
@@ -134,6 +137,7 @@ class Work:
             (self.nodes, "node of the path"),
             (self.evaluations, "evaluation"),
             (self.factorizations, "factorization"),
+            *([(self.groups, "group")] if self.groups else []),
         )
 
 

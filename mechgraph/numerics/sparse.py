@@ -128,6 +128,26 @@ class SparseFactor:
         return np.asarray(x + solve(b - A @ x, trans))
 
 
+class SparseFactors:
+    """Factored matrices, one a position, for right sides ``(n, k, T)``."""
+
+    def __init__(self, factors: list[SparseFactor]) -> None:
+        self._factors = factors
+
+    @cached_property
+    def smallest_pivot(self) -> Array:
+        """That of every matrix, ``(T,)``."""
+        return np.array([factor.smallest_pivot for factor in self._factors])
+
+    def solve(self, b: Array, transposed: bool = False) -> Array:
+        """Solutions ``x (n, k, T)`` of ``A x = b``, or ``A^T x = b``; NaN where a matrix is singular."""
+        return np.stack([factor.solve(b[:, :, t], transposed) for t, factor in enumerate(self._factors)], axis=2)
+
+    def part(self, at: Index) -> SparseFactors:
+        """Some of the matrices."""
+        return SparseFactors([self._factors[i] for i in at.tolist()])
+
+
 def _to_places(b: Array, order: Index) -> Array:
     out = np.empty_like(b)
     out[order] = b

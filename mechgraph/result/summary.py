@@ -323,9 +323,9 @@ class _View(Places):
     def work(self) -> Paragraph:
         """Which engine and which force method ran, and how much they did, in one line."""
         method = f", method {self.values.method}" if self.values.method else ""
-        return Paragraph(
-            f"Engine {self.values.engine}{method}: {', '.join(counted(*one) for one in self.values.work.counts)}."
-        )
+        counts = self.values.work.counts
+        grouped = ", group by group" if any(of == "group" for _, of in counts) else ""
+        return Paragraph(f"Engine {self.values.engine}{grouped}{method}: {', '.join(counted(*one) for one in counts)}.")
 
 
 def _shortened(items: list[str], count: int | None = None) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Kinetostatics of large mechanisms: ``python tests/benchmarks/bench_large.py [--all] [--crossover] [kind ...]`` (one BLAS thread).
+"""Kinetostatics of large mechanisms: ``python tests/benchmarks/bench_large.py [--all] [kind ...]``, or ``--crossover`` or ``--groups``.
 
 For ladders, grids, scissors, trees of loops and spatial ladders: seconds to declare; to solve one position from a closed start (one
 driver, gravity, driver rate 1, all reactions) for the first time, when links and pairs are read and the graph is made, and once more with
@@ -25,7 +25,11 @@ import scipy
 from lattices import LATTICES
 
 import mechgraph as mg
+from mechgraph.closure.assembly import assembled
+from mechgraph.closure.bordering import LoopSystem
+from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import indexed
+from mechgraph.numerics.sparse import SparseFactors
 from mechgraph.topology.linkgraph import link_graph
 
 SIZES = [10, 100, 1_000, 10_000, 100_000]
@@ -122,9 +126,9 @@ def table(kinds: list[str], sizes: list[int]) -> None:
 
 def crossover() -> None:
     """Dense against sparse by closure rows: ratio of the shortest times, for some numbers of positions."""
-    counts = (1, 64, 1000)
+    counts = (1, 16, 36, 200, 1000)
     print(f"{'links':>6} {'rows':>6}  dense/sparse for {', '.join(map(str, counts))} positions")
-    for links in (10, 13, 16, 20, 24, 32, 48, 64, 100):
+    for links in (8, 10, 13, 16, 20, 24, 32, 48):
         m = LATTICES["four-bars"](links)
         ratios = []
         for count in counts:
@@ -138,6 +142,38 @@ def crossover() -> None:
         print(f"{len(m.links):6} {indexed(m).n_rows:6}  {'  '.join(f'{r:6.2f}' for r in ratios)}", flush=True)
 
 
+def groups() -> None:
+    """Sparse factors position by position, and group by group: milliseconds of processor time for factors and four solutions."""
+    print(f"{'kind':10} {'links':>6} {'unknowns':>9} {'blocks':>7} {'levels':>7}  positions: whole, by groups (ms)")
+    for kind in LATTICES:
+        for links in (10, 40, 200, 800):
+            m = LATTICES[kind](links)
+            system, x = assembled(m)
+            form = LoopSystem.at(Configuration(system, x[:, None]), np.array([0]))
+            rng, out = np.random.default_rng(0), []
+            for count in (8, 36, 360):
+                here = Configuration(system, x[:, None] + 1e-4 * rng.normal(size=(len(x), count)))
+                values = form.values_at(here, np.arange(count))
+                b = rng.normal(size=(form.groups.size, 1, count))
+                whole, grouped = (min(_linear(form, values, b, way) for _ in range(3)) for way in (False, True))
+                out.append(f"{count}: {whole:.1f}, {grouped:.1f}")
+            g = form.groups
+            print(f"{kind:10} {len(m.links):6} {g.size:9} {g.blocks:7} {g.levels:7}  {'   '.join(out)}", flush=True)
+
+
+def _linear(form: LoopSystem, values: np.ndarray, b: np.ndarray, grouped: bool) -> float:
+    """Milliseconds for factors and four solutions."""
+    begin = process_time()
+    if grouped:
+        factors = form.groups.factor(values)
+    else:
+        factors = SparseFactors([form.pattern.factor(one) for one in values])
+    factors.smallest_pivot.min()
+    for _ in range(4):
+        factors.solve(b)
+    return 1e3 * (process_time() - begin)
+
+
 def main() -> None:
     """Print what the arguments ask for."""
     if "--row" in sys.argv:
@@ -146,6 +182,9 @@ def main() -> None:
         return
     if "--crossover" in sys.argv:
         crossover()
+        return
+    if "--groups" in sys.argv:
+        groups()
         return
     kinds = [a for a in sys.argv[1:] if a in LATTICES] or list(LATTICES)
     table(kinds, SIZES if "--all" in sys.argv else SIZES[:-1])

@@ -1,0 +1,137 @@
+"""Many positions solved group by group: block triangular systems, and mechanisms against all at once, one by one, and group by hand."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from lattices import LATTICES, ladder
+from numpy.testing import assert_allclose
+from test_groups import random_mechanism
+from test_large import AGREE, assert_same
+
+import mechgraph as mg
+from mechgraph.closure.solver import engine_for
+from mechgraph.numerics.block_triangular import BlockTriangular
+
+SIZES = (3, 1, 4, 3, 2)
+T = 7
+
+
+def block_systems(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Rows, columns and values ``(T, entries)`` of systems that are block triangular once permuted, and the matrices."""
+    rng = np.random.default_rng(seed)
+    ends = np.cumsum((0, *SIZES))
+    mask = np.zeros((ends[-1], ends[-1]), dtype=bool)
+    for k, (a, b) in enumerate(pairwise(ends)):
+        mask[a:b, a:b] = True
+        mask[a:b, :a] = rng.random((b - a, a)) < (0.3 if k != 2 else 0.0)
+    p, q = rng.permutation(ends[-1]), rng.permutation(ends[-1])
+    rows, cols = np.nonzero(mask[p][:, q])
+    A = np.where(mask[p][:, q], rng.normal(size=(T, *mask.shape)) + 4.0 * np.eye(ends[-1])[p][:, q], 0.0)
+    return rows, cols, A[:, rows, cols], A
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_block_triangular_systems(seed: int) -> None:
+    rows, cols, values, A = block_systems(seed)
+    form = BlockTriangular(rows, cols, sum(SIZES))
+    assert form.sizes == {1: 1, 2: 1, 3: 2, 4: 1}
+    factor = form.factor(values)
+    b = np.random.default_rng(seed).normal(size=(sum(SIZES), 2, T))
+    for transposed in (False, True):
+        x = factor.solve(b, transposed)
+        for t in range(T):
+            expected = np.linalg.solve(A[t].T if transposed else A[t], b[:, :, t])
+            assert_allclose(x[:, :, t], expected, atol=1e-12 * np.abs(expected).max())
+    some = np.array([5, 2])
+    assert_allclose(factor.part(some).solve(b[:, :, some]), factor.solve(b)[:, :, some], atol=1e-14)
+
+
+def test_a_singular_block_spoils_its_own_system_only() -> None:
+    rows, cols, values, A = block_systems(1)
+    form = BlockTriangular(rows, cols, sum(SIZES))
+    alone = form._diagonal[0][2]
+    values[3, alone] = 0.0
+    factor = form.factor(values)
+    assert np.flatnonzero(factor.smallest_pivot == 0).tolist() == [3]
+    b = np.ones((sum(SIZES), 1, T))
+    assert np.isnan(factor.solve(b)[..., 3]).any()
+    assert_allclose(A[2] @ factor.solve(b)[:, 0, 2], b[:, 0, 2], atol=1e-12)
+
+
+def test_no_matching_no_blocks() -> None:
+    form = BlockTriangular(np.array([0, 1, 2, 2]), np.array([0, 0, 1, 2]), 3)
+    assert form.blocks == 0
+    assert not form.pays(1000)
+
+
+def with_random_driver(seed: int) -> tuple[mg.Mechanism, str]:
+    """A random planar mechanism, and one of the freedoms that can drive it."""
+    m = random_mechanism(seed)
+    drivable = [finding.freedoms[0] for finding in mg.check(m).drivable]
+    return m.replace(drives=[]), str(np.random.default_rng(seed).choice(drivable))
+
+
+@pytest.mark.parametrize("seed", [1, 2, 6, 7, 8, 10, 12, 19, 22, 26])
+def test_group_by_group_is_all_at_once(seed: int) -> None:
+    """Poses, rates, accelerations, reactions of random planar mechanisms with random drivers: by groups, as a whole, one by one."""
+    m, driver = with_random_driver(seed)
+    m = m.replace(
+        loads=[mg.Gravity((0, -9.81, 0))], links=[mg.Link(n, 1.0, (0.1, 0.2, 0), np.eye(3)) for n in m.link_names()]
+    )
+    move = mg.Motion(position=np.linspace(0, 0.003, 16), velocity=1.3, acceleration=-0.4)
+    by_groups, at_once = (mg.solve(m, {driver: move}, engine=engine) for engine in ("sparse", "dense"))
+    assert (by_groups.work.groups > 0, at_once.work.groups) == (True, 0)
+    assert "Engine sparse, group by group" in by_groups.summary()
+    for link in m.link_names():
+        for what in ("pose", "twist", "acceleration"):
+            a, b = (np.asarray(getattr(s.link(link), what)) for s in (by_groups, at_once))
+            assert_allclose(a, b, rtol=0, atol=1e-11 * max(1.0, np.abs(b).max()))
+    for p in m.pairs:
+        for name, b in at_once[p.name].components.items():
+            assert_allclose(
+                by_groups[p.name].components[name], b, rtol=0, atol=1e-11 * max(1.0, np.nanmax(np.abs(b), initial=0))
+            )
+    last = mg.solve(m, {driver: mg.Motion(0.003, 1.3, -0.4)}, engine="sparse")
+    assert last.work.groups == 0
+    for p in m.pairs:
+        assert_allclose(
+            last[p.name].effort,
+            by_groups[p.name].effort[-1],
+            rtol=0,
+            atol=1e-10 * max(1.0, np.abs(last[p.name].effort).max()),
+        )
+
+
+@pytest.mark.parametrize("kind", LATTICES)
+def test_large_ones_group_by_group(kind: str) -> None:
+    """Blocks of a few rows each, as many as there are loops; the reactions are those of the dense engine."""
+    m = LATTICES[kind](30)
+    loops = len(mg.check(m).loops)
+    theta = np.linspace(0, 0.05, 40)
+    s, dense = (mg.solve(m, {"J0": theta}, engine=engine) for engine in ("auto", "dense"))
+    assert s.engine == "sparse"
+    assert s.work.groups == loops
+    assert_same(s, dense)
+
+
+def test_engines_by_size_and_positions() -> None:
+    assert [engine_for(60, positions, "auto") for positions in (1, 8, 36, 1000)] == [
+        "dense",
+        "dense",
+        "sparse",
+        "sparse",
+    ]
+    assert engine_for(24, 10**6, "auto") == "dense"
+    few = mg.solve(ladder(30), {"J0": np.linspace(0, 0.05, 40)}, redundant="minimum_norm")
+    assert few.engine == "dense"  # reactions of least norm gain nothing from many positions
+
+
+def test_groups_of_a_choice_that_no_longer_fits() -> None:
+    """Along a whole turn of many four-bars, through places where the forms change; against the dense engine."""
+    m = ladder(40, equal=True).replace(loads=[])
+    theta = np.linspace(0, 1.2, 60)
+    a, b = (mg.kinematics(m, {"J0": theta}, engine=engine) for engine in ("sparse", "dense"))
+    assert a.work.groups > 0
+    for p in m.pairs:
+        assert_allclose(a[p.name].position, b[p.name].position, atol=AGREE)
