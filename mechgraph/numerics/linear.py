@@ -6,6 +6,7 @@ Source for the strategy: Golub and Van Loan, Matrix Computations, section 5.4 (r
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 import scipy
@@ -148,11 +149,12 @@ class Choice:
 
     def square(self, A: Array) -> Array:
         """``A[rows][:, cols] (r, r, T)`` of matrices ``(m, n, T)``, without a copy where that can be."""
-        rows, cols = self._places
+        rows, cols = self.places
         return A[rows][:, cols]
 
     @kept
-    def _places(self) -> tuple[Place, Place]:
+    def places(self) -> tuple[Place, Place]:
+        """The rows and the columns, as slices where that can be."""
         return compact(self.rows), compact(self.cols)
 
     def same(self, other: Choice) -> bool:
@@ -207,11 +209,60 @@ def inverses(stacked: Array) -> Array:
         return inverse
 
 
-class Factor:
-    """Inverses of a batch of square matrices ``(n, n, T)``; solves with one step of refinement.
+FEW_MATRICES = 4
+"""Number of matrices up to which they are factored one by one by LAPACK, without the calls that a batch takes (measured)."""
 
-    ``condition (T,)`` is the product of the infinity norms of matrix and inverse; singular matrices give infinity and NaN.
-    """
+
+class Factor(Protocol):
+    """A batch of square matrices ``A (n, n, T)``, factored."""
+
+    @property
+    def condition(self) -> Array:
+        """Condition numbers ``(T,)``: the product of the infinity norms of matrix and inverse; infinite for singular matrices."""
+
+    def solve(self, b: Array, transposed: bool = False) -> Array:
+        """Solution of ``A x = b`` (or ``A^T x = b``) for ``b (n, k, T)``; NaN for singular matrices."""
+
+    def applied(self, B: Array) -> Array:
+        """``A^-1 B`` for square ``B (n, n, T)``, without refinement."""
+
+
+def factor_of(A: Array) -> Factor:
+    """The factors of matrices ``(n, n, T)``."""
+    return LuFactors(A) if A.size > 0 and A.shape[2] <= FEW_MATRICES else Inverses(A)
+
+
+class LuFactors:
+    """LU factors of a few matrices, one by one."""
+
+    def __init__(self, A: Array) -> None:
+        self._A = A
+        self._lapack: Any = scipy.linalg.lapack
+        self._factors = [self._lapack.dgetrf(A[:, :, t]) for t in range(A.shape[2])]
+
+    @kept
+    def condition(self) -> Array:
+        """See ``Factor``."""
+        norm, out = self._lapack.dlange, np.full(len(self._factors), np.inf)
+        for t, (lu, pivots, singular) in enumerate(self._factors):
+            if not singular:
+                out[t] = norm("I", self._A[:, :, t]) * norm("I", self._lapack.dgetri(lu, pivots)[0])
+        return np.fmin(out, np.inf)
+
+    def solve(self, b: Array, transposed: bool = False) -> Array:
+        """See ``Factor``."""
+        out = np.empty(b.shape)
+        for t, (lu, pivots, singular) in enumerate(self._factors if b.size else ()):
+            out[:, :, t] = np.nan if singular else self._lapack.dgetrs(lu, pivots, b[:, :, t], trans=transposed)[0]
+        return out
+
+    def applied(self, B: Array) -> Array:
+        """See ``Factor``."""
+        return self.solve(B)
+
+
+class Inverses:
+    """Inverses of many matrices; solves with one step of refinement."""
 
     def __init__(self, A: Array) -> None:
         self._A = A
@@ -223,7 +274,7 @@ class Factor:
 
     @kept
     def condition(self) -> Array:
-        """Condition numbers ``(T,)`` in the infinity norm."""
+        """See ``Factor``."""
         with np.errstate(invalid="ignore", over="ignore"):
             norms = [
                 np.maximum.reduce(np.add.reduce(np.abs(M), axis=1), axis=0, initial=0.0)
@@ -232,11 +283,11 @@ class Factor:
             return np.asarray(np.fmin(norms[0] * norms[1], np.inf))  # of a singular matrix NaN, which fmin leaves out
 
     def applied(self, B: Array) -> Array:
-        """``A^-1 B`` for square ``B (n, n, T)``, without refinement."""
+        """See ``Factor``."""
         return (self._inverse.transpose(2, 0, 1) @ B.transpose(2, 0, 1)).transpose(1, 2, 0)
 
     def solve(self, b: Array, transposed: bool = False) -> Array:
-        """Solution of ``A x = b`` (or ``A^T x = b``) for ``b (n, k, T)``."""
+        """See ``Factor``."""
         A, inverse = self._A, self._inverse
         if transposed:
             A, inverse = np.swapaxes(A, 0, 1), np.swapaxes(inverse, 0, 1)
@@ -272,7 +323,7 @@ class ChosenSystem:
         used = sorted(set(which.tolist()))
         for i in used:
             choice, at = choices[i], EVERY if len(used) == 1 else np.flatnonzero(which == i)
-            self._parts.append((choice, at, Factor(choice.square(A)[:, :, at])))
+            self._parts.append((choice, at, factor_of(choice.square(A)[:, :, at])))
 
     @kept
     def condition(self) -> Array:
@@ -288,14 +339,16 @@ class ChosenSystem:
         """``x (n, k, T)`` with ``A x = b`` in the chosen rows; zero in held and fixed columns."""
         out = np.zeros((self.A.shape[1], *b.shape[1:]))
         for choice, at, factor in self._parts:
-            _put(out, choice.cols, at, factor.solve(b[choice.rows][:, :, at]))
+            rows, cols = choice.places
+            _put(out, cols, at, factor.solve(b[rows][:, :, at]))
         return out
 
     def solve_transposed(self, b: Array) -> Array:
         """``y (m, k, T)`` with ``A^T y = b`` in the chosen columns; zero in the rows that were not chosen."""
         out = np.zeros((self.A.shape[0], *b.shape[1:]))
         for choice, at, factor in self._parts:
-            _put(out, choice.rows, at, factor.solve(b[choice.cols][:, :, at], transposed=True))
+            rows, cols = choice.places
+            _put(out, rows, at, factor.solve(b[cols][:, :, at], transposed=True))
         return out
 
     def null_of_transpose(self) -> Array:
@@ -330,9 +383,9 @@ class ChosenSystem:
         return out
 
 
-def _put(out: Array, rows: Index, at: Place, values: Array) -> None:
+def _put(out: Array, rows: Place, at: Place, values: Array) -> None:
     """``out[rows][:, :, at] = values``."""
-    if isinstance(at, slice):
+    if isinstance(at, slice) or isinstance(rows, slice):
         out[rows, :, at] = values
     else:
         out[rows[:, None, None], np.arange(out.shape[1])[:, None], at] = values

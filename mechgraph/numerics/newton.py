@@ -207,7 +207,7 @@ class _Run:
 
     @property
     def _mine(self) -> Index | slice:
-        return slice(None) if self.active.size == len(self.done) else self.active
+        return EVERY if self.active.size == len(self.done) else self.active
 
     def _evaluated(self) -> bool:
         """Evaluate the active states; where the residual is at its goal, or at rounding and no longer falls, they are done.
@@ -242,7 +242,7 @@ class _Run:
         step = f.solve(-self.point.residual[:, None])[:, 0]
         size = largest(step)
         finite = None
-        if not (size <= LONGEST).all():
+        if np.count_nonzero(size <= LONGEST) < len(size):
             finite = np.isfinite(size)
             step = np.where(finite, step, 0.0) * np.minimum(1.0, LONGEST / np.maximum(size, LONGEST))
         self.x[:, mine] = self.problem.advance(self.point.x, step, self.tracks[mine])
@@ -265,17 +265,17 @@ class _Run:
 
     def _small(self, f: Any, size: Array) -> Mask:
         """Where a step of that size is at its goal."""
-        small = size <= self.step_goal
-        if self.step_goal <= PATH.node and small.any():
+        small: Mask = size <= self.step_goal
+        if self.step_goal <= PATH.node and np.count_nonzero(small):
             # the rates of a node err by the last step times the condition: poor ones are closed further, down to rounding
             condition_here = np.maximum(f.condition, 1.0)
             small &= size <= np.maximum(PATH.rates / condition_here, PATH.rounding * condition_here)
-        return np.asarray(small)
+        return small
 
     def _unmet(self, small: Mask, step: Array, size: Array) -> Mask | None:
         """Where a last step leaves the residual of rows that were left out as dependent as large as it is: they are not. None: nowhere."""
-        doubt = small & (self.left > np.maximum(UNMET * size, 1e3 * min(self.step_goal, PATH.node)))
-        if not doubt.any():
+        doubt = small & (self.left > UNMET * size) & (self.left > 1e3 * min(self.step_goal, PATH.node))
+        if not np.count_nonzero(doubt):
             return None
         rest = largest(self.point.residual + self.point.closure_rates(step))
         return np.asarray(doubt & (rest > 0.5 * self.left))
