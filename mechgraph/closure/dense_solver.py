@@ -103,8 +103,9 @@ class DenseFactored:
         """See the protocol in ``closure.solver``."""
         if self._sensitivity is None:
             fixed = self._fixed
-            Z = self.solve(-self.J[:, fixed])
-            Z[fixed, np.arange(len(fixed))] = 1.0
+            Z = self.solve(-self.J.take(fixed, axis=1))
+            for i, column in enumerate(fixed):
+                Z[column, i] = 1.0
             self._sensitivity = Z
         return self._sensitivity
 
@@ -227,7 +228,7 @@ class DenseSolver:
     def factored(self, here: Configuration, which: Index) -> DenseFactored:
         """See the protocol in ``closure.solver``; those of the last positions are kept for who asks next."""
         known = self._of(here)
-        if known is None or not np.array_equal(known.which, which):
+        if known is None or np.count_nonzero(known.which != which):
             known = DenseFactored(self.forms, self.fixed, here.J, which.copy())
             self._last = weakref.ref(here), known
         return known

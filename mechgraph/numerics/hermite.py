@@ -53,7 +53,11 @@ def cubic(values: Array, rates: Array, rates_there: Array, width: Array, at: Arr
     """Cubics ``(F, n)`` at places ``at (n,)`` that are zero at 0 and ``values`` at ``width (n,)``, with rates given at both."""
     s = at / width
     left = 1.0 - s
-    return np.asarray(values * (s * s * (1.0 + 2.0 * left)) + (at * left) * (left * rates - s * rates_there))
+    part = at * left
+    out = values * (s * s * (1.0 + 2.0 * left))
+    out += rates * (part * left)
+    out -= rates_there * (part * s)
+    return np.asarray(out)
 
 
 def through(problem: Problem, nodes: Nodes, base: Nodes, direction: Array, at: Array) -> Array:

@@ -31,14 +31,15 @@ class March:
 
     def move(self, new: Nodes, before: Nodes, at: Index) -> None:
         """Go on to new nodes of the tracks ``at``."""
-        every = len(at) == len(self.last)
-        self.last = new if every else self.last.replaced(new, at)
-        self.before = before if every else self.before.replaced(before, at)
+        if len(at) == len(self.last):
+            self.last, self.before = new, before
+        else:
+            self.last, self.before = self.last.replaced(new, at), self.before.replaced(before, at)
         self.known[at] = True
 
     def keep(self, going: Mask) -> None:
         """Go on with some of the tracks."""
-        if not going.all():
+        if np.count_nonzero(going) < len(going):
             self.last, self.before = self.last.take(going), self.before.take(going)
             self.known, self.h = self.known[going], self.h[going]
 
@@ -94,7 +95,7 @@ class Marching:
         came, back = last.drive - before.drive, last.place - before.place
         along, sizes = np.add.reduce(came * change), np.add.reduce(came * came) * np.add.reduce(change * change)
         straight = known & (along > (1 - 1e-9) * np.sqrt(sizes)) & (h < 16.0 * back) & (h > 0.25 * back)
-        if straight.all():
+        if np.count_nonzero(straight) == len(straight):
             return self.problem.corrigible(self._through(before, last, change, h), last.which), 4.0
         dq = np.add.reduce(last.Z * change, axis=1)
         order = np.full(len(h), 2.0)
@@ -112,7 +113,7 @@ class Marching:
         """Increments ``(F, n)`` from nodes ``b`` of Hermite's cubics through ``a`` and them, where path values have changed on."""
         direction = change / h
         y = self.problem.difference(a.x, b.x)
-        here, there = (np.add.reduce(node.Z * direction, axis=1) for node in (b, a))
+        here, there = np.add.reduce(b.Z * direction, axis=1), np.add.reduce(a.Z * direction, axis=1)
         return cubic(y, here, self.problem.tangent(y, there), a.place - b.place, h)
 
     def longest(self, last: Nodes, new: Nodes, drive: Array) -> Array | float:
@@ -127,4 +128,5 @@ class Marching:
 def next_step(h: Array, correction: Array, order: Array | float, good: Mask, longest: Array | float) -> Array:
     """The step that aims at the wanted correction, at most the ``longest``; half of one that failed."""
     grown = h * np.minimum(np.maximum((PATH.aim / np.maximum(correction, 1e-9)) ** (1 / order), 0.5), 2.0)
-    return np.where(good, np.minimum(np.maximum(grown, 10 * PATH.shortest), longest), 0.5 * h)
+    grown = np.minimum(np.maximum(grown, 10 * PATH.shortest), longest)
+    return grown if np.count_nonzero(good) == len(good) else np.where(good, grown, 0.5 * h)

@@ -49,18 +49,20 @@ class Paths:
 
     def drive(self, tracks: Index, at: Array) -> Array:
         """Path values ``(d, n)`` at places of tracks; behind the end straight on."""
-        point = np.searchsorted(self._key, at + self._offset[tracks])
-        point = np.minimum(np.maximum(point, self._second[tracks]), self._last[tracks])
-        u = (at - self._from[point]) / self._way[point]
-        values = self._begin.take(point, axis=1) + u * self._added.take(point, axis=1)
-        # the ends themselves are met exactly
-        return np.where(u == 1.0, self._all.take(point, axis=1), values)
+        point = self._key.searchsorted(at + self._offset.take(tracks))
+        point = np.minimum(np.maximum(point, self._second.take(tracks)), self._last.take(tracks))
+        u = (at - self._from.take(point)) / self._way.take(point)
+        values: Array = self._begin.take(point, axis=1) + u * self._added.take(point, axis=1)
+        ends = u == 1.0
+        if np.count_nonzero(ends):  # the ends themselves are met exactly
+            values = np.where(ends, self._all.take(point, axis=1), values)
+        return values
 
     def step(self, tracks: Index, at: Array, h: Array) -> Array:
         """Where a step of at most ``h`` leads: to the furthest point within it up to which the path is nearly straight."""
-        out = np.minimum(at + h, self.end[tracks])
-        inside = np.searchsorted(self._key, out + self._offset[tracks], side="right") - 1
-        for i in (self._places[inside] > at).nonzero()[0]:
+        out = np.minimum(at + h, self.end.take(tracks))
+        inside = self._key.searchsorted(out + self._offset.take(tracks), side="right") - 1
+        for i in (self._places.take(inside) > at).nonzero()[0]:
             out[i] = self._furthest(int(tracks[i]), float(at[i]), float(out[i]))
         return out
 
