@@ -1,12 +1,14 @@
 """Self-aligning variants: complete, without redundancy, and headed by the advice."""
 
-from itertools import combinations, product
+from itertools import combinations, islice, product
 
 import numpy as np
 import pytest
+from lattices import ladder
 
 import mechgraph as mg
-from mechgraph.structure.pair_changes import wider_types
+from mechgraph.structure.pair_changes import changes_of, wider_types
+from mechgraph.structure.self_aligning import rank_key, self_aligning_sets
 
 OVERCONSTRAINED = ["four-bar", "slider-crank", "bennett", "spherical-four-bar", "windows-2"]
 
@@ -53,6 +55,35 @@ def test_none_is_missing() -> None:
     found = {changes for changes in found if {name for name, *_ in changes} <= {*"BC"}}
     assert expected
     assert found == expected
+
+
+def test_the_order_is_that_of_the_rank_and_nothing_comes_twice() -> None:
+    """Sought one by one, by effort, number, width and place: the list is sorted, and its head is the same whatever the limit."""
+    freedoms = mg.check(mg.load("windows-2")).geometry.freedoms
+    found = list(self_aligning_sets(changes_of(freedoms), freedoms.redundancy, 3))
+    assert [rank_key(s) for s in found] == sorted(rank_key(s) for s in found)
+    assert len({tuple(map(id, s)) for s in found}) == len(found) > 100
+    longer = islice(self_aligning_sets(changes_of(freedoms), freedoms.redundancy, None), 20)
+    texts = [[(c.item, c.pair.type.symbol) for c in s] for s in longer]
+    efforts = [max(c.effort for c in s) for s in found]
+    same = [[(c.item, c.pair.type.symbol) for c in s] for s, e in zip(found, efforts, strict=True) if e == efforts[0]]
+    assert texts[: len(same)] == same[:20]
+
+
+def test_the_first_of_very_many_comes_soon() -> None:
+    """A ladder of eight parallelograms, redundancy 24: sets of any number, of which the first ones are not waited for."""
+    report = mg.check(ladder(16, equal=True))
+    assert report.redundancy == 24
+    first = next(report.self_aligning())
+    assert first.effect.redundancy == (24, 0)
+    assert mg.check(first.apply()).redundancy == 0
+
+
+def test_limits_that_are_none() -> None:
+    report = mg.check(mg.load("four-bar"))
+    with pytest.raises(mg.DeclarationError, match=r"most = 0: expected a whole number from 1, or None for any"):
+        report.self_aligning(0)
+    assert {len(a.effect.changes) for a in report.self_aligning()} == {1, 2}
 
 
 def test_nothing_to_align() -> None:

@@ -66,9 +66,9 @@ class Identity:
         if mobility < 0 or self.bare.loops < 1 or self.bare.links > NUMBERED_LINKS:
             return None
         code = self.bare.code
-        places = [
-            chain.code == code for chain in atlas(self.bare.links, mobility, fractionated=self.bare.is_fractionated)
-        ]
+        mine = sorted(self.bare.degrees)
+        chains = atlas(self.bare.links, mobility, fractionated=self.bare.is_fractionated)
+        places = [sorted(chain.degrees) == mine and chain.code == code for chain in chains]
         return (places.index(True) + 1, len(places)) if True in places else None
 
     @cached_property

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, rotation_exp
+from mechgraph.closure.indexing import Index
+from mechgraph.closure.rank import EngineName
 from mechgraph.data import patch
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker, Pair
@@ -16,7 +18,9 @@ from mechgraph.model.pair_table import TABLE
 from mechgraph.model.toml import to_data
 from mechgraph.report.findings import Finding
 from mechgraph.report.words import exchange, joined
-from mechgraph.structure.pair_changes import LEFT_OUT, RIGID, WHOLE, Effect
+from mechgraph.structure.mobility import Freedoms
+from mechgraph.structure.pair_changes import LEFT_OUT, RIGID, WHOLE, Effect, changes_of, effect
+from mechgraph.structure.self_aligning import self_aligning_sets
 from mechgraph.structure.splines import with_spline
 
 
@@ -97,13 +101,13 @@ def alternatives(advice: Iterable[Advice]) -> list[str]:
     """Advice in brief, single changes of one kind with the same effect together: ``... (R -> S) at A or B: redundancy 3 -> 1``."""
     first: dict[tuple[Any, ...], Effect] = {}
     others: dict[tuple[Any, ...], list[str]] = {}
-    for effect in (a.effect for a in advice):
-        if effect is not None:
-            key = (tuple(sorted(change[1:] for change in effect.changes)), consequence(effect))
-            if key in first and len(effect.changes) == 1:
-                others.setdefault(key, []).append(effect.changes[0][0])
-            first.setdefault(key, effect)
-    return [f"{exchanges(effect, others.get(key, ()))}: {consequence(effect)}" for key, effect in first.items()]
+    for e in (a.effect for a in advice):
+        if e is not None:
+            key = (tuple(sorted(change[1:] for change in e.changes)), consequence(e))
+            if key in first and len(e.changes) == 1:
+                others.setdefault(key, []).append(e.changes[0][0])
+            first.setdefault(key, e)
+    return [f"{exchanges(e, others.get(key, ()))}: {consequence(e)}" for key, e in first.items()]
 
 
 def _turned(pair: Pair, angle: float) -> Pair:
@@ -117,3 +121,11 @@ def _turned(pair: Pair, angle: float) -> Pair:
         return pair.replace(second=second(pair))
     a, b = (Marker(side.point, side.axis, second(side)) for side in (pair.on_a, pair.on_b))
     return pair.replace(on_a=a, on_b=b)
+
+
+def variants(m: Mechanism, freedoms: Freedoms, driven: Index, engine: EngineName, most: int | None) -> Iterator[Advice]:
+    """Sets of up to ``most`` wider pairs that leave no redundancy and the mobility as it is, each as an advice."""
+    for chosen in self_aligning_sets(changes_of(freedoms), freedoms.redundancy, most):
+        e = effect(freedoms, driven, chosen, engine)
+        if e.redundancy[1] == 0 and e.mobility[1] == e.mobility[0]:
+            yield Advice(e.text, tuple(item for item, *_ in e.changes), effect=e, mechanism=m)

@@ -14,10 +14,12 @@ from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.rank import EngineName
 from mechgraph.equations.build import BOOKKEEPINGS, BookkeepingName, formulate
 from mechgraph.equations.terms import Ledger, LedgerRow
+from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.tolerances import RANKS
+from mechgraph.quantities import wrong
 from mechgraph.report import driving, findings
-from mechgraph.report.advice import Advice, driving_advice
+from mechgraph.report.advice import Advice, driving_advice, variants
 from mechgraph.report.findings import Finding, LoopFact, PassiveFinding
 from mechgraph.structure.advice import advice
 from mechgraph.structure.decomposition import Decomposition, decomposition
@@ -26,8 +28,7 @@ from mechgraph.structure.finite_motion import FiniteMotion, finite_motion
 from mechgraph.structure.generic import Generic, generic
 from mechgraph.structure.kind import Kind, kind_of, kind_of_mechanism
 from mechgraph.structure.mobility import Freedoms, freedoms_at
-from mechgraph.structure.pair_changes import LARGEST_FOR_SETS, Effect, changes_of, effect
-from mechgraph.structure.self_aligning import self_aligning_sets
+from mechgraph.structure.pair_changes import LARGEST_FOR_SETS, Effect
 from mechgraph.structure.self_stress import SelfStress
 from mechgraph.structure.uniqueness import Uniqueness, uniqueness
 from mechgraph.topology.linkgraph import LinkGraph
@@ -411,19 +412,26 @@ class Facts:
             *(Advice(e.text, tuple(item for item, *_ in e.changes), effect=e, mechanism=m) for e in self.effects),
         )
 
-    def self_aligning(self, most: int = 3) -> Iterator[Advice]:
-        """All sets of up to ``most`` wider pairs that leave no redundancy and the mobility as it is, the easiest to build first.
+    def self_aligning(self, most: int | None = None) -> Iterator[Advice]:
+        """All sets of wider pairs that leave no redundancy and the mobility as it is, the easiest to build first, one by one.
 
         Each can be applied. Sets that add passive freedoms (a rod between two balls) are not among them; see ``advice`` for these.
+
+        Parameters
+        ----------
+        most : changes of a set at most; left out, as many as there are self-stresses. The next one is sought when it is asked for.
+
+        Raises
+        ------
+        DeclarationError
+            where ``most`` is no whole number from 1.
         """
+        if most is not None and not (type(most) is int and most >= 1):
+            raise DeclarationError("self_aligning", [wrong(most, "most", "a whole number from 1, or None for any")])
         g = self.geometry
         if g is None:
-            return
-        m = at_position(self.mechanism, g.system, g.x)
-        for chosen in self_aligning_sets(changes_of(g.freedoms), g.freedoms.redundancy, most):
-            e = effect(g.freedoms, g.driven, chosen, self.asked)
-            if e.redundancy[1] == 0 and e.mobility[1] == e.mobility[0]:
-                yield Advice(e.text, tuple(item for item, *_ in e.changes), effect=e, mechanism=m)
+            return iter(())
+        return variants(at_position(self.mechanism, g.system, g.x), g.freedoms, g.driven, self.asked, most)
 
 
 def counted_ledger(m: Mechanism, bookkeeping: str) -> Ledger:

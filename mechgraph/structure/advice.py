@@ -18,7 +18,7 @@ SPLINE = 1
 FREEING = 3
 """Changes reported that let a structure move."""
 FEW_CHANGES, LARGEST_SET = 80, 3
-"""Changes up to which all sets of so many are searched for the best one, some hundredths of a second; of more, a beam of them."""
+"""Changes up to which the best of all sets of so many heads the advice, some hundredths of a second; of more, the best of a beam."""
 
 
 def advice(freedoms: Freedoms, driven: Index, finite_mobility: int, engine: EngineName = "auto") -> tuple[Effect, ...]:
