@@ -8,9 +8,11 @@ from mechgraph.algebra import inertia
 from mechgraph.atlas.atlas import atlas, load_chains, save_chains
 from mechgraph.atlas.chain import Chain
 from mechgraph.atlas.identify import Identity, identify
+from mechgraph.atlas.multiple import MultipleJoint
 from mechgraph.atlas.system_groups import SystemGroup, system_groups
 from mechgraph.equations.build import formulate
 from mechgraph.equations.formulation import Formulation
+from mechgraph.equivalent import multiple_joints, split_joint
 from mechgraph.errors import (
     AssemblyError,
     ContentError,
@@ -107,6 +109,7 @@ __all__ = [
     "MechgraphWarning",
     "MissingExtraError",
     "Motion",
+    "MultipleJoint",
     "OverTime",
     "Pair",
     "PairType",
@@ -145,12 +148,14 @@ __all__ = [
     "linearize",
     "load",
     "load_chains",
+    "multiple_joints",
     "over_time",
     "pair_types",
     "respond",
     "save",
     "save_chains",
     "solve",
+    "split_joint",
     "structure",
     "study",
     "transmission",

@@ -14,13 +14,15 @@ Source: Marghitu, Fundamentals, section 2.15; Hall, Kinematics and Linkage Desig
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.atlas.multiple import MultipleJoint
 from mechgraph.closure.assembly import assembled, assembled_at, at_position
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.contact_lines import ContactLines
@@ -30,8 +32,10 @@ from mechgraph.model.contact import Contact
 from mechgraph.model.link import Link
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker, Pair
+from mechgraph.quantities import wrong
 from mechgraph.structure.kind import kind_of
 from mechgraph.structure.link_rows import LinkRows
+from mechgraph.structure.multiple_joints import joints_at
 from mechgraph.structure.position import Position
 
 FLAT = 1e-8
@@ -213,3 +217,69 @@ def _in_place_of_gears(parts: _Parts) -> list[str]:
         symbol, point, axis = ("P", feet[0], np.cross(z, n)) if contact.slides else ("R", feet[1], z)
         parts.join(name_b, symbol, link, wheel_b, point, axis)
     return faults
+
+
+# --- multiple joints -----------------------------------------------------------------------------------------------------
+
+
+def multiple_joints(m: Mechanism, at: Mapping[str, float] | None = None) -> tuple[MultipleJoint, ...]:
+    """The turning joints of three or more links on one axis (see ``structure.multiple_joints``), at a closed position."""
+    system, x = assembled_at(m, at) if at else assembled(m)
+    return joints_at(Position.at(Configuration(system, x[:, None])))
+
+
+def split_joint(m: Mechanism, pair: str, on: str, at: Mapping[str, float] | None = None) -> Mechanism:
+    """The same mechanism with a multiple joint declared as pairs of the link ``on`` with each of the others.
+
+    Pairs keep their names; one that changes its links counts from zero at the position ``at`` (left out, the declared start).
+
+    Parameters
+    ----------
+    pair : any pair of the joint.
+
+    Raises
+    ------
+    DeclarationError
+        where the pair is of no multiple joint or the link not in it, and where a pair that would change is driven or loaded.
+    """
+    import networkx as nx
+
+    system, x = assembled_at(m, at) if at else assembled(m)
+    here = Configuration(system, x[:, None])
+    joint = next((j for j in joints_at(Position.at(here)) if pair in j.pairs), None)
+    what = f"split_joint of {m.name!r}"
+    if joint is None:
+        raise DeclarationError(what, [f"pair {pair!r}: is in no joint of three or more links; see mg.multiple_joints"])
+    if on not in joint.links:
+        raise DeclarationError(what, [wrong(on, "on", f"a link of the joint: {', '.join(joint.links)}")])
+    placed = at_position(m, system, x)
+    tree = nx.Graph((p.a, p.b, {"pair": p.name}) for p in m.pairs if p.name in joint.pairs)
+    other = {tree.edges[a, b]["pair"]: b for a, b in nx.bfs_edges(tree, on)}
+    changed = [p.name for p in m.pairs if p.name in other and on not in (p.a, p.b)]
+    used = {text.split(".")[0] for part in (*m.drives, *m.loads, *m.couplings) for text in _texts(vars(part))}
+    faults = [
+        f"pair {name}: is driven, loaded or coupled, and would turn between other links"
+        for name in changed
+        if name in used
+    ]
+    if faults:
+        raise DeclarationError(what, faults)
+    parts = _Parts(m, here, np.zeros(3))
+    for name in changed:
+        k = m.pair_index[name]
+        axis = here.S[:3, system.first_column[k], 0]
+        parts.join(name, m.pairs[k].type.symbol, on, other[name], here.pair_points[:, k, 0], axis)
+    made = {p.name: p for p in parts.pairs}
+    start = {name: value for name, value in placed.start.items() if name.split(".")[0] not in made}
+    return placed.replace(pairs=[made.get(p.name, p) for p in placed.pairs], start=start, links=m.links, frame=m.frame)
+
+
+def _texts(value: Any) -> Iterator[str]:
+    """All texts in a value: keys and values of mappings, members of sequences."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, Mapping):
+        yield from _texts((*value, *value.values()))
+    elif isinstance(value, tuple | list):
+        for item in value:
+            yield from _texts(item)

@@ -67,6 +67,7 @@ def things() -> dict[str, Any]:
         "assemblies": mg.assemblies(m, {"A": 0.3}, cache=False), "at several": mg.assemblies(m, {"A": THETA}, cache=False),
         "branches": mg.branches(m, "A", samples=4, points=12, cache=False),
         "chain": next(mg.atlas(6)), "identity": mg.identify(mg.load("four-bar")), "system group": next(mg.system_groups(1)),
+        "multiple joint": mg.MultipleJoint(("crank", "rod", "arm"), ("B", "E")),
         "structure": mg.structure(mg.load("four-bar")), "groups": mg.groups(mg.load("four-bar")),
         "group": mg.groups(mg.load("four-bar")).groups[1], "families": mg.check(mg.load("four-bar")).families,
         "IndeterminateError": mg.IndeterminateError("free", report),

@@ -81,6 +81,11 @@ class Chain:
         return nx.Graph((("link", link), ("joint", k)) for k, joint in enumerate(self.joints) for link in joint)
 
     @property
+    def is_multiple(self) -> bool:
+        """Whether it has a joint of three or more links."""
+        return any(len(joint) > 2 for joint in self.joints)
+
+    @property
     def is_planar_graph(self) -> bool:
         """Whether its graph can be drawn in a plane without crossings."""
         import networkx as nx

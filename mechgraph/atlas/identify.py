@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 from mechgraph.atlas.atlas import atlas
 from mechgraph.atlas.chain import Chain, family_faults
+from mechgraph.atlas.multiple import MultipleJoint
 from mechgraph.errors import DeclarationError, counted
 from mechgraph.model.mechanism import Mechanism, check_mechanism
 
@@ -46,7 +47,7 @@ class Identity:
     ----------
     chain : the chain with the pair types of the mechanism; links and joints in the order of declaration.
     frame : number of the frame link.
-    links, pairs : names, in that order.
+    links, pairs : names, in that order (those of the pairs of a multiple joint in one).
     """
 
     chain: Chain
@@ -67,7 +68,9 @@ class Identity:
             return None
         code = self.bare.code
         mine = sorted(self.bare.degrees)
-        chains = atlas(self.bare.links, mobility, fractionated=self.bare.is_fractionated)
+        chains = atlas(
+            self.bare.links, mobility, multiple=self.bare.is_multiple, fractionated=self.bare.is_fractionated
+        )
         places = [sorted(chain.degrees) == mine and chain.code == code for chain in chains]
         return (places.index(True) + 1, len(places)) if True in places else None
 
@@ -93,7 +96,9 @@ class Identity:
             return f"ring of {n} links"
         if self.number:
             fractionated = "fractionated " if self.bare.is_fractionated else ""
-            return f"{fractionated}{n}-link chain {self.number[0]} of {self.number[1]}, mobility {self.bare.mobility}"
+            multiple = ", with multiple joints" if self.bare.is_multiple else ""
+            place, count = self.number
+            return f"{fractionated}{n}-link chain {place} of {count}, mobility {self.bare.mobility}{multiple}"
         return f"{n}-link chain ({self.bare.assortment})"
 
     @cached_property
@@ -105,6 +110,20 @@ class Identity:
     def drivers(self) -> tuple[tuple[str, ...], ...]:
         """Pairs that are alike as driver on this frame, with the pair types."""
         return tuple(tuple(self.pairs[k] for k in group) for group in self.chain.drivers(self.frame))
+
+    def split(self, joint: MultipleJoint, on: str) -> Identity:
+        """The same with pairs of the link ``on`` with each of the others in place of a multiple joint."""
+        k = self.pairs.index(", ".join(joint.pairs))
+        mine = [(self.links.index(on), self.links.index(link)) for link in joint.links if link != on]
+        joints, types, names = (
+            (*row[:k], *new, *row[k + 1 :])
+            for row, new in (
+                (self.chain.joints, mine),
+                (self.chain.types, [self.chain.types[k]] * len(mine)),
+                (self.pairs, joint.pairs),
+            )
+        )
+        return replace(self, chain=replace(self.chain, joints=joints, types=types), pairs=names)
 
     @property
     def text(self) -> str:
@@ -118,8 +137,10 @@ class Identity:
         return self.text
 
 
-def identify(m: Mechanism, family: int = 3) -> Identity:
+def identify(m: Mechanism, family: int = 3, joints: Iterable[MultipleJoint] = ()) -> Identity:
     """Which chain a mechanism is: by its links and pairs alone, whatever the dimensions.
+
+    Multiple ``joints`` (``mg.multiple_joints(m)``) count as what they are; left out, each pair is a joint of two links.
 
     Raises
     ------
@@ -134,6 +155,11 @@ def identify(m: Mechanism, family: int = 3) -> Identity:
     if faults:
         raise DeclarationError(f"identify {m.name!r}", faults)
     place = m.link_index
-    joints = tuple((place[p.a], place[p.b]) for p in m.pairs)
-    chain = Chain(len(m.links), joints, tuple(p.type.symbol for p in m.pairs), family)
-    return Identity(chain, place[m.frame], m.link_names(), tuple(p.name for p in m.pairs))
+    shared = {name: joint for joint in joints for name in joint.pairs}
+    found: dict[str, tuple[tuple[int, ...], str]] = {}
+    for p in m.pairs:
+        joint = shared.get(p.name)
+        names, links = (", ".join(joint.pairs), joint.links) if joint else (p.name, (p.a, p.b))
+        found.setdefault(names, (tuple(place[link] for link in links), p.type.symbol))
+    chain = Chain(len(m.links), tuple(at for at, _ in found.values()), tuple(s for _, s in found.values()), family)
+    return Identity(chain, place[m.frame], m.link_names(), tuple(found))

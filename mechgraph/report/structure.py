@@ -7,6 +7,7 @@ from typing import Any
 
 from mechgraph.arguments import items_of
 from mechgraph.atlas.identify import Identity, identify
+from mechgraph.atlas.multiple import MultipleJoint
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, MechgraphError, listed
 from mechgraph.model.mechanism import Mechanism
@@ -14,18 +15,20 @@ from mechgraph.quantities import wrong
 from mechgraph.report.report import DeterminacyReport, check
 from mechgraph.structure.decomposition import Decomposition
 from mechgraph.structure.families import COLUMNS, Families
+from mechgraph.structure.multiple_joints import joints_at
 
 
 class Structure(Shown):
     """The structure of a mechanism at a closed position; prints as a text.
 
     ``report`` the determinacy report that it is taken from, ``groups`` and ``families`` those of the report, ``identity`` its chain (None
-    for a mechanism with couplings).
+    for a mechanism with couplings), ``multiple_joints`` turning joints of three or more links.
     """
 
     def __init__(self, report: DeterminacyReport, groups: Decomposition, families: Families) -> None:
         self.report, self.groups, self.families = report, groups, families
         self.identity: Identity | None = None if report.mechanism.couplings else identify(report.mechanism)
+        self.multiple_joints = joints_at(report.geometry.freedoms.position) if report.geometry else ()
 
     def __repr__(self) -> str:
         return f"Structure({self.report.mechanism.name!r}: {self.groups.symbol}; print it)"
@@ -39,6 +42,31 @@ class Structure(Shown):
     def _chain(self) -> Iterator[Block]:
         if self.identity:
             yield Paragraph(f"{self.identity.text.splitlines()[0]}.")
+            if self.multiple_joints:
+                whole = identify(self.report.mechanism, joints=self.multiple_joints)
+                yield Paragraph(
+                    f"With multiple joints as one joint each: {whole.name}. Split, with the pairs on another of its links:"
+                )
+                rows = [
+                    (
+                        ", ".join(joint.pairs),
+                        str(joint.order),
+                        on,
+                        "yes" if self._declared(joint, on) else "",
+                        self._split(joint, on),
+                    )
+                    for joint in self.multiple_joints
+                    for on in joint.links
+                ]
+                yield Table(("joint", "order", "pairs on", "declared", "chain"), tuple(rows), align="lrlll")
+
+    def _declared(self, joint: MultipleJoint, on: str) -> bool:
+        """Whether the pairs of a joint are declared on a link."""
+        return all(on in self.groups.ends[name] for name in joint.pairs)
+
+    def _split(self, joint: MultipleJoint, on: str) -> str:
+        """The name of the chain with the joint split on a link, other joints as declared."""
+        return identify(self.report.mechanism, joints=(joint,)).split(joint, on).name
 
     def _families(self) -> Iterator[Block]:
         f = self.families
