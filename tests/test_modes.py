@@ -14,7 +14,9 @@ from mechgraph.closure.assembly import close_all, closed_start
 from mechgraph.model.chain import chain_symbols
 from mechgraph.modes import store
 from mechgraph.modes.bounds import bound
+from mechgraph.modes.homotopy import Equations
 from mechgraph.modes.question import Question
+from mechgraph.modes.trace import rational, trace_test
 
 
 @pytest.fixture
@@ -271,3 +273,59 @@ def test_the_table_of_assemblies_shows_their_coordinates() -> None:
     for i, mode in enumerate(modes):
         angles = " +".join(f"{np.rad2deg(mode.start[name]):.6g}" for name in ("B.Rz", "C.Rz", "D.Rz"))
         assert re.search(rf"^{i} +{angles} +regular", str(modes), re.MULTILINE)
+
+
+@pytest.mark.usefixtures("empty")
+@pytest.mark.parametrize("letters", ["RSSR", pytest.param("R-Sc-C-R", marks=pytest.mark.slow)])
+def test_the_trace_test_passes_with_all_assemblies_and_with_none_left_out(
+    letters: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Sums over all are rational functions over a pencil of mechanisms; with any one left out they are not."""
+    m = general(letters)
+    modes = mg.assemblies(m, {"O1": 0.2})
+    assert modes.completeness == "tested"
+    assert re.search(
+        r"Trace test passed: over \d+ random mechanisms .* rational function of degree \d+", modes.evidence[0]
+    )
+    family = Question(m, {"O1": 0.2}).family
+    start = store.kept(family)
+    assert start is not None
+    assert start.trace.passed
+    assert start.trace.beyond < 1e-9 < start.trace.last
+    equations = Equations(family, start.mixing)
+    monkeypatch.setattr("mechgraph.modes.trace.SAMPLES", (48, 96))
+    for i in range(start.x.shape[1]):
+        some = np.delete(start.x, i, axis=1)
+        assert not trace_test(equations, start.member, some, np.random.default_rng(i)).passed
+
+
+def test_rational_functions_are_told_from_others() -> None:
+    rng = np.random.default_rng(0)
+    z = rng.normal(size=(60, 2)) @ [1.0, 1.0j]
+    poles = rng.normal(size=(7, 2)) @ [1.0, 1.0j]
+    exact = rational(z, (1.0 / (z[:, None] - poles)).sum(axis=1), np.ones(60))
+    assert exact.degree == 7
+    for other in (np.sqrt(z - poles[0]), np.exp(z), np.log(z), z.conj()):
+        assert not rational(z, other, np.ones(60)).passed
+
+
+def test_a_platform_on_a_sphere_has_not_the_bound_of_one_in_a_plane() -> None:
+    """Spherical triads have eight assemblies, planar ones six."""
+
+    def triad(point: object) -> mg.Mechanism:
+        rng = np.random.default_rng(1)
+        pairs = []
+        for i in range(3):
+            for name, a, b in ((f"A{i}", "base", f"leg{i}"), (f"B{i}", f"leg{i}", "top")):
+                place = rng.normal(size=3)
+                pairs.append(
+                    mg.Pair(name, "R", a, b, point=place * [1, 1, 0], axis=Z)
+                    if point == "plane"
+                    else mg.Pair(name, "R", a, b, point=(0, 0, 0), axis=place)
+                )
+        return mg.Mechanism("triad", pairs=pairs, frame="base")
+
+    planar_bound = bound(Question(triad("plane"), {}).family)
+    assert planar_bound is not None
+    assert planar_bound.count == 6
+    assert bound(Question(triad("sphere"), {}).family) is None

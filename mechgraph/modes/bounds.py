@@ -2,6 +2,7 @@
 
 With the drivers at rest every loop in turn must have as many unknown freedoms as its group has dimensions; then the assemblies are at
 most the product of those of the loops. A loop counts by the letters of its freedoms that are still unknown, in order round the loop.
+A slide is a turn about a line far away, and regular assemblies stay where dimensions change a little: what bounds turns bounds slides.
 """
 
 from __future__ import annotations
@@ -10,29 +11,41 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechgraph.modes.family import Family
+from mechgraph.modes.family import Family, span
 from mechgraph.topology.components import components_of_edges, members
 
+SIX_TURNS = (
+    "Lee, Woernle and Hiller, A complete solution for the inverse kinematic problem of the general 6R robot manipulator, "
+    "J. Mech. Des. 113, 1991, page 481"
+)
 LOOPS: tuple[tuple[int, str, int, str], ...] = (
     (3, "RRR", 2, "two circles in a plane or on a sphere meet in two points"),
     (3, "RRT", 2, "a circle and a line meet in two points"),
     (3, "RTT", 1, "the sides of a triangle follow from their directions"),
-    (
-        6,
-        "RRRRRR",
-        16,
-        "Primrose, On the input-output equation of the general 7R-mechanism, Mech. Mach. Theory 21, 1986",
-    ),
-    (6, "RRRRRT", 16, "Raghavan and Roth, Inverse kinematics of the general 6R manipulator, J. Mech. Des. 115, 1993"),
+    (6, "RRRRRR", 16, SIX_TURNS),
+    (6, "RRRRRT", 16, f"{SIX_TURNS}; a slide is a turn about a far line"),
 )
 """Dimension of the group, freedoms still unknown (R turns, T slides), the bound, and its source."""
 
 
-LEGS: tuple[tuple[int, int, int, str], ...] = (
-    (6, 6, 40, "Ronga and Vust, Stewart platforms without computer?, Real Analytic and Algebraic Geometry, 1995"),
-    (3, 3, 6, "Gosselin, Sefrioui and Richard, planar manipulators with three legs, Mech. Mach. Theory 27, 1992"),
+LEGS: tuple[tuple[int, int, int, int, str], ...] = (
+    (
+        6,
+        3,
+        6,
+        40,
+        "Ronga and Vust, Stewart platforms without computer?, Real Analytic and Algebraic Geometry, 1995, page 197",
+    ),
+    (
+        3,
+        2,
+        3,
+        6,
+        "a coupler curve, of degree six and threefold in the circular points, meets a circle in 12 - 6 others",
+    ),
 )
-"""Dimension of the group of all loops, number of legs that keep a distance between two bodies, the bound, and its source."""
+"""Dimension of the group of all loops and of its translations, number of legs that keep a distance between two bodies, the bound, and its
+source."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +123,6 @@ def _of_legs(family: Family) -> Bound | None:
     legs = [others for number, others in joints.items() if number not in ends]
     if len(ends) != 2 or any(set(others) != ends for others in legs):
         return None
-    dimensions = {h.shape[1] for h in family.loop_algebras}
-    found = (Bound(count, source) for group, n, count, source in LEGS if {group} == dimensions and n == len(legs))
+    groups = {(h.shape[1], h.shape[1] - span(h[:3]).shape[1]) for h in family.loop_algebras}
+    found = (Bound(count, source) for k, slides, n, count, source in LEGS if {(k, slides)} == groups and n == len(legs))
     return next(found, None)

@@ -150,9 +150,9 @@ class Family:
                 moves[:, side * P + k, 0] = size * (basis @ parts)
         drive = rng.uniform(-np.pi, np.pi, len(self.columns)) + 0.5j * rng.normal(size=len(self.columns))
         drive[self.system.is_length[self.columns]] *= 0.3
-        return Member(compose(pose_exp(self._in_links(moves)), self.target), drive[:, None])
+        return Member(compose(pose_exp(self.in_links(moves)), self.target), drive[:, None])
 
-    def _in_links(self, moves: Array) -> Array:
+    def in_links(self, moves: Array) -> Array:
         """Twists ``(6, 2 P, 1)`` given in the global frame at the closed position, in the frames of the links that bear the markers."""
         X = inverse(self.here.poses[:, :, self._bearers])
         return move_twist(X, moves)

@@ -13,8 +13,10 @@ from itertools import pairwise
 import numpy as np
 
 from mechgraph.closure.configuration import Configuration
+from mechgraph.modes.bounds import bound
 from mechgraph.modes.family import GENERIC, MEMBER_CLOSED, Array, Family, Member
 from mechgraph.modes.homotopy import Care, Equations, Leg, follow
+from mechgraph.modes.trace import NOT_PASSED, Trace, trace_test
 from mechgraph.numerics.linear import rank_of, singular_values
 
 MISSED, MISSED_AGAIN = 1e-4, 1e-6
@@ -41,7 +43,8 @@ class StartSet:
     """All assemblies ``x (nx, N)`` known of a member, and the mixing of its rows.
 
     ``loops`` is the number of loops of members that brought no further assembly, ``chance`` that of one having been missed by them, were
-    every permutation as likely; ``lost`` of the tracks ``followed`` did not come to the end of their leg.
+    every permutation as likely; ``lost`` of the tracks ``followed`` did not come to the end of their leg. ``trace`` is the trace test,
+    which is left out where a bound is met.
     """
 
     member: Member
@@ -52,6 +55,7 @@ class StartSet:
     lost: int
     followed: int
     whole: bool
+    trace: Trace
 
     def fits(self, family: Family) -> bool:
         """Whether it is closed for a class."""
@@ -116,8 +120,12 @@ def _permuted(
     group.grow(MISSED, rng, progress)
     group.move(*_tame(equations, group.base, group.x, rng))
     group.grow(MISSED_AGAIN, rng, progress)
-    whole = group.x.shape[1] < MOST_FOUND
-    return StartSet(group.base, group.x, equations.mixing, group.quiet, group.chance, group.lost, group.followed, whole)
+    whole, known, N = group.x.shape[1] < MOST_FOUND, bound(equations.family), group.x.shape[1]
+    test = whole and (known is None or known.count != N)
+    trace = trace_test(equations, group.base, group.x, rng, progress) if test else NOT_PASSED
+    return StartSet(
+        group.base, group.x, equations.mixing, group.quiet, group.chance, group.lost, group.followed, whole, trace
+    )
 
 
 class _Group:

@@ -18,9 +18,10 @@ import numpy as np
 from mechgraph.errors import MechgraphError
 from mechgraph.modes.family import Family, Member
 from mechgraph.modes.monodromy import StartSet
+from mechgraph.modes.trace import Trace
 from mechgraph.writing import whole_file
 
-START_SET_VERSION = 3
+START_SET_VERSION = 4
 """Of the files and of what start sets mean."""
 
 
@@ -56,8 +57,12 @@ def kept(family: Family) -> StartSet | None:
         with (folder() / f"start-{key(family)}.npz").open("rb") as handle, np.load(handle, allow_pickle=False) as f:
             mixing = f["mixing"] if f["mixing"].size else None
             loops, lost, followed = f["counts"].tolist()
-            chance = float(f["chance"])
-            found = StartSet(Member(f["markers"], f["drive"]), f["x"], mixing, loops, chance, lost, followed, True)
+            chance, last, beyond = f["sizes"].tolist()
+            degree, samples = f["trace"].tolist()
+            trace = Trace(degree, samples, last, beyond)
+            found = StartSet(
+                Member(f["markers"], f["drive"]), f["x"], mixing, loops, chance, lost, followed, True, trace
+            )
     except (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile, TypeError):
         return None
     return found if found.fits(family) else None
@@ -74,7 +79,8 @@ def keep(family: Family, start: StartSet) -> None:
                 drive=start.member.drive,
                 x=start.x,
                 mixing=np.zeros((0, 0)) if start.mixing is None else start.mixing,
-                chance=np.array(start.chance),
+                sizes=np.array([start.chance, start.trace.last, start.trace.beyond]),
+                trace=np.array([start.trace.degree, start.trace.samples]),
                 counts=np.array([start.loops, start.lost, start.followed]),
             )
     except (OSError, RuntimeError, MechgraphError):
