@@ -15,6 +15,7 @@ from mechgraph.model.chain import chain_symbols
 from mechgraph.modes import store
 from mechgraph.modes.bounds import bound
 from mechgraph.modes.homotopy import Equations
+from mechgraph.modes.monodromy import start_set
 from mechgraph.modes.question import Question
 from mechgraph.modes.trace import rational, trace_test
 
@@ -241,16 +242,21 @@ def test_the_inverse_kinematics_of_general_arms_has_sixteen_solutions() -> None:
         assert gaps.min() < 1e-9
 
 
-def test_a_platform_of_six_legs_has_the_bound_of_forty() -> None:
-    rng, pairs = np.random.default_rng(0), []
-    for i in range(6):
-        foot, head = rng.normal(size=3), rng.normal(size=3) + 3 * Z
+def platform(feet: np.ndarray, heads: np.ndarray) -> mg.Mechanism:
+    """Six legs, each with a slide between balls."""
+    pairs = []
+    for i, (foot, head) in enumerate(zip(feet, heads, strict=True)):
         pairs += [
             mg.Pair(f"A{i}", "S", "base", f"lower{i}", point=foot),
             mg.Pair(f"P{i}", "P", f"lower{i}", f"upper{i}", point=foot, axis=head - foot),
             mg.Pair(f"B{i}", "S", f"upper{i}", "platform", point=head),
         ]
-    m = mg.Mechanism("platform", pairs=pairs, frame="base")
+    return mg.Mechanism("platform", pairs=pairs, frame="base")
+
+
+def test_a_platform_of_six_legs_has_the_bound_of_forty() -> None:
+    rng = np.random.default_rng(0)
+    m = platform(rng.normal(size=(6, 3)), rng.normal(size=(6, 3)) + 3 * Z)
     family = Question(m, {f"P{i}": 0.0 for i in range(6)}).family
     found = bound(family)
     assert found is not None
@@ -329,3 +335,42 @@ def test_a_platform_on_a_sphere_has_not_the_bound_of_one_in_a_plane() -> None:
     assert planar_bound is not None
     assert planar_bound.count == 6
     assert bound(Question(triad("sphere"), {}).family) is None
+
+
+DIETMAIER = np.array(
+    [
+        [0, 1.107915, 0.549094, 0.735077, 0.514188, 0.590473],
+        [0, 0, 0.756063, -0.223935, -0.526063, 0.094733],
+        [0, 0, 0, 0.525991, -0.368418, -0.205018],
+        [0, 0.542805, 0.956919, 0.665885, 0.478359, -0.137087],
+        [0, 0, -0.528915, -0.353482, 1.158742, -0.235121],
+        [0, 0, 0, 1.402538, 0.107672, 0.353913],
+        [1, 0.645275, 1.086284, 1.503439, 1.281933, 0.771071],
+    ]
+)
+"""Feet, heads and lengths of the legs of a platform with forty real postures.
+
+Source: P. Dietmaier, The Stewart-Gough platform of general geometry can have 40 real postures, Advances in Robot Kinematics, 1998.
+"""
+
+
+@pytest.mark.slow
+def test_a_platform_has_forty_real_assemblies_on_ten_seeds() -> None:
+    feet, heads, lengths = DIETMAIER[:3].T, DIETMAIER[3:6].T + np.array([0.1, 0.2, 1.2]), DIETMAIER[6]
+    m = platform(feet, heads)
+    at = {f"P{i}": lengths[i] - np.linalg.norm(heads[i] - feet[i]) for i in range(6)}
+    sets = [mg.assemblies(m, at, seed=seed) for seed in range(10)]
+    for modes in sets:
+        assert (len(modes), modes.total, modes.completeness) == (40, 40, "proved")
+        assert np.abs(modes.poses - sets[0].poses).max() < 1e-6
+    # the lengths of all legs in all postures, from the pose of the platform alone
+    top = modes.poses[:, [link.name for link in m.links].index("platform")]
+    ends = np.einsum("mij,lj->mli", top[:, :3, :3], heads) + top[:, None, :3, 3]
+    assert np.abs(np.linalg.norm(ends - feet, axis=2) - lengths).max() < 1e-9
+
+
+@pytest.mark.usefixtures("empty")
+def test_where_a_bound_is_met_no_further_loops_are_run() -> None:
+    family = Question(linked_four_bar(1.0, 2.5, 2.0, 3.0, 0.5), {"O0": 0.3}).family
+    start = start_set(family, np.random.default_rng(0))
+    assert (start.x.shape[1], start.loops, start.whole) == (2, 0, True)

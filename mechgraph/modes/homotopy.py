@@ -49,7 +49,7 @@ POLISHING = 6
 """Newton steps at the end of a track, at most."""
 ARRIVED = 1e-8
 """Last Newton step, against the size of the state, up to which a track has come to its end."""
-CALMING, CALM = 20, 1e-9
+CALMING, CALM = 20, 1e-4
 """Steps in which passive bodies are turned there, at most, and the step at which that ends."""
 MOST_STEPS = 2000
 """Steps after which a track is given up."""
@@ -199,8 +199,12 @@ class Linear:
 
     def idle(self) -> Array:
         """The motions ``(T, p, free)`` conjugate, orthonormal, that the equations leave free: passive ones."""
-        J = self.J.transpose(2, 0, 1)
-        return np.linalg.svd(J)[2][:, J.shape[1] :]
+        J = self.J.transpose(2, 1, 0)
+        rank = J.shape[2]
+        if J.shape[1] == rank:
+            return np.zeros((len(J), 0, rank), dtype=complex)
+        Q = np.linalg.qr(np.where(np.isfinite(J), J, 0.0).conj(), mode="complete")[0]
+        return np.asarray(Q[:, :, rank:].conj().swapaxes(1, 2))
 
 
 def _solved(A: Array, b: Array) -> Array:

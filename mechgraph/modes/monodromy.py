@@ -115,12 +115,15 @@ def _permuted(
     """The assemblies to which loops of members lead from one, until more loops than chance can explain bring none.
 
     They begin at one member and then at another: what is hard to reach at the first, large numbers in its poses, is not at the second.
+    Where a bound is met, no loop could bring a further one.
     """
-    group = _Group(equations, base, x[:, None])
+    known = bound(equations.family)
+    group = _Group(equations, base, x[:, None], MOST_FOUND if known is None else known.count)
     group.grow(MISSED, rng, progress)
     group.move(*_tame(equations, group.base, group.x, rng))
     group.grow(MISSED_AGAIN, rng, progress)
-    whole, known, N = group.x.shape[1] < MOST_FOUND, bound(equations.family), group.x.shape[1]
+    N = group.x.shape[1]
+    whole = N < MOST_FOUND
     test = whole and (known is None or known.count != N)
     trace = trace_test(equations, group.base, group.x, rng, progress) if test else NOT_PASSED
     return StartSet(
@@ -131,8 +134,8 @@ def _permuted(
 class _Group:
     """Assemblies ``x (nx, N)`` known of a member ``base``, and the loops that brought no further one."""
 
-    def __init__(self, equations: Equations, base: Member, x: Array) -> None:
-        self.equations, self.lost, self.followed = equations, 0, 0
+    def __init__(self, equations: Equations, base: Member, x: Array, most: int) -> None:
+        self.equations, self.most, self.lost, self.followed = equations, most, 0, 0
         self.move(base, x)
 
     def move(self, base: Member, x: Array) -> None:
@@ -143,7 +146,7 @@ class _Group:
     def grow(self, missed: float, rng: np.random.Generator, progress: Callable[[str], None] | None) -> None:
         """Loops until the chance of one having been missed is small."""
         family = self.equations.family
-        while (N := self.x.shape[1]) < MOST_FOUND and self.chance > missed:
+        while (N := self.x.shape[1]) < self.most and self.chance > missed:
             if progress is not None:
                 progress(f"{N} assemblies of a random member, {self.quiet} loops without a further one")
             loops = max(1, BATCH // N)
