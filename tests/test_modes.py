@@ -263,15 +263,29 @@ def test_a_platform_of_six_legs_has_the_bound_of_forty() -> None:
     assert (found.count, family.passive.shape[1], family.fault) == (40, 6, "")
 
 
-def test_a_driver_at_its_dead_point_where_the_mechanism_is_declared_is_named() -> None:
-    """A slide cannot tell which way a stretched slider crank goes; no driver is missing."""
+def test_a_driver_at_its_dead_point_where_the_mechanism_is_declared_has_its_assemblies() -> None:
+    """A slide cannot tell which way a stretched slider crank goes; its assemblies are those of the crank at other angles."""
     pins = {"A": ("frame", "crank", 0), "B": ("crank", "rod", 1), "C": ("rod", "slider", 4)}
     pairs = [mg.Pair(name, "R", a, b, point=(x, 0, 0), axis=(0, 0, 1)) for name, (a, b, x) in pins.items()]
     m = mg.Mechanism("stretched", None, [*pairs, mg.Pair("D", "P", "frame", "slider", point=(4, 0, 0), axis=(1, 0, 0))])
-    for ask in (lambda m: mg.assemblies(m, {"D": -1.0}), lambda m: mg.branches(m, "D")):
-        with pytest.raises(mg.DeadPointError, match="dead point where it was assembled: D"):
-            ask(m)
-        assert ask(mg.assemble(m.replace(drives=["A"]), {"A": 0.6}))
+    modes = mg.assemblies(m, {"D": -1.0})
+    crank = np.arccos((1 + 9 - 9) / (2 * 1 * 3))  # sides 1, 3 and 3
+    assert np.allclose(sorted(mode.start["A.Rz"] for mode in modes), [-crank, crank], rtol=0, atol=1e-12)
+    assert mg.assemblies(m, {"D": 0.0}).kinds == ("double",)
+    over = mg.branches(m, "D", samples=8, points=40)
+    assert sorted(round(fold.value, 9) for fold in over.folds) == [-2.0, 0.0]
+
+
+def test_a_driver_that_can_never_drive_is_named() -> None:
+    """Two loops side by side, one of them left alone."""
+    pairs = []
+    for side in ("left", "right"):
+        links = ["ground", f"crank {side}", f"coupler {side}", f"rocker {side}", "ground"]
+        for i, place in enumerate([(0, 0, 0), (0.5, 0.9, 0), (2.4, 1.5, 0), (2.6, 0.1, 0)]):
+            pairs.append(mg.Pair(f"{side}{i}", "R", links[i], links[i + 1], point=place, axis=Z))
+    m = mg.Mechanism("two", pairs=pairs, frame="ground")
+    with pytest.raises(mg.IndeterminateError, match="neither driven nor passive"):
+        mg.assemblies(m, {"left0": 0.5})
 
 
 def test_the_table_of_assemblies_shows_their_coordinates() -> None:

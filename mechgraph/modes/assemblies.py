@@ -127,8 +127,7 @@ class Assemblies(Shown, Sequence[Mechanism]):
                     word,
                 )
             )
-        at = ", ".join(f"{name} = {value:.6g}" for name, value in self.at.items())
-        title = f"{m.name}: {counted(len(self), 'mode')} at {at}"
+        title = f"{m.name}: {counted(len(self), 'mode')} at {values_text(m, self.at)}"
         return Document(
             title,
             (Table(header, tuple(rows)), Paragraph(f"Completeness: {self.completeness}. " + " ".join(self.evidence))),
@@ -178,8 +177,7 @@ class AssembliesOver(Shown, Sequence[Assemblies]):
     def document(self) -> Document:
         """How many assemblies there are at every position."""
         rows = tuple(
-            (", ".join(f"{k} = {v:.6g}" for k, v in p.at.items()), str(len(p)), str(len(p.complex)), p.completeness)
-            for p in self.positions
+            (values_text(p.mechanism, p.at), str(len(p)), str(len(p.complex)), p.completeness) for p in self.positions
         )
         return Document(
             f"{self.positions[0].mechanism.name}: assemblies",
@@ -189,6 +187,21 @@ class AssembliesOver(Shown, Sequence[Assemblies]):
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain data."""
         return {"positions": [p.to_dict() for p in self.positions]}
+
+
+def values_text(m: Mechanism, at: Mapping[str, float]) -> str:
+    """Values given, turns in degrees: ``A.Rz = 30 deg, B.Tz = 0.1``."""
+    return ", ".join(f"{name} = {in_degrees(m, name, value):.6g}{unit_of(m, name)}" for name, value in at.items())
+
+
+def in_degrees(m: Mechanism, name: str, value: float) -> float:
+    """A value of a freedom or coordinate as it is shown: turns in degrees."""
+    return float(np.rad2deg(value)) if m.turns(name) else value
+
+
+def unit_of(m: Mechanism, name: str) -> str:
+    """What is written after it."""
+    return " deg" if m.turns(name) else ""
 
 
 WORDS = ("proved", "tested", "searched")

@@ -14,7 +14,7 @@ from mechgraph.data import plain
 from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, counted
 from mechgraph.model.mechanism import Mechanism, check_mechanism
-from mechgraph.modes.assemblies import Finder, weakest
+from mechgraph.modes.assemblies import Finder, in_degrees, unit_of, values_text, weakest
 from mechgraph.modes.family import Array
 from mechgraph.modes.question import Question
 from mechgraph.modes.record import BifurcationData, BranchData, BranchesData, FoldData
@@ -165,33 +165,40 @@ class Branches(Shown):
         return importlib.import_module("mechgraph.show.modes").draw_branches(self, output, ax=ax, current=current)
 
     def document(self) -> Document:
-        """Branches and folds as tables."""
+        """Branches and folds as tables, turns in degrees."""
+        m, driver = self.mechanism, self.driver
+        unit = " [deg]" if m.turns(driver) else ""
         rows = tuple(
-            (str(i), str(b.circuit), f"{b.interval[0]:.6g} .. {b.interval[1]:.6g}", _turns(b))
+            (str(i), str(b.circuit), " .. ".join(f"{in_degrees(m, driver, v):.6g}" for v in b.interval), _turns(b))
             for i, b in enumerate(self.branches)
         )
         folds = tuple(
-            (f"{f.value:.9g}", "upper" if f.sense > 0 else "lower", f"{f.branches[0]}, {f.branches[1]}", f.fastest)
+            (
+                f"{in_degrees(m, driver, f.value):.9g}",
+                "upper" if f.sense > 0 else "lower",
+                f"{f.branches[0]}, {f.branches[1]}",
+                f.fastest,
+            )
             for f in self.folds
         )
+        step = f"{in_degrees(m, driver, self.resolution):.3g}{unit_of(m, driver)}"
         words = [
-            f"Completeness of the assemblies at the samples: {self.completeness}; samples every {self.resolution:.3g}. A branch that "
-            "begins and ends between two samples is not seen."
+            f"Completeness of the assemblies at the samples: {self.completeness}; samples every {step}. A branch that begins and ends "
+            "between two samples is not seen.",
+            *(["Each fold is a double point: the assemblies of two branches are one there."] if folds else []),
         ]
         if self.open_ends:
             words.append(f"{counted(self.open_ends, 'end')} of branches could not be told: the map is not whole.")
         words += [
-            f"Branches {', '.join(map(str, b.branches))} cross at {self.driver} = {b.value:.9g}."
+            f"Branches {', '.join(map(str, b.branches))} cross at {values_text(m, {driver: b.value})}, a double point."
             for b in self.bifurcations
         ]
-        title = f"{self.mechanism.name}: {counted(len(self), 'branch')} over {self.driver}".replace(
-            "branchs", "branches"
-        )
+        title = f"{m.name}: {counted(len(self), 'branch')} over {driver}".replace("branchs", "branches")
         return Document(
             title,
             (
-                Table(("branch", "circuit", f"interval of {self.driver}", "full turn"), rows),
-                *((Table(("fold", "limit", "branches", "moves most"), folds),) if folds else ()),
+                Table(("branch", "circuit", f"interval of {driver}{unit}", "full turn"), rows),
+                *((Table((f"fold{unit}", "limit", "branches", "moves most"), folds),) if folds else ()),
                 Paragraph(" ".join(words)),
             ),
         )

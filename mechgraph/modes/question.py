@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from mechgraph.closure.assembly import closed_start, named_columns
+from mechgraph.closure.assembly import CLOSED, close_all, closed_start, named_columns
+from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
@@ -16,9 +16,12 @@ from mechgraph.modes.family import Array, Family
 from mechgraph.report.refused import dead_point_error, undriven_error
 from mechgraph.structure.mobility import free_motion
 
+OFF_DEAD_POINT = 0.3
+"""Motion (radians, or lengths over L) of what moves most from a dead point of drivers to where the class is read."""
+
 
 class Question:
-    """Values given at one position or at several, and a closed position of the mechanism.
+    """Values given at one position or at several, and a closed position of the mechanism, beside dead points of the drivers.
 
     ``m`` is the mechanism with free pairs for points and links that are given (see ``closure.prescription``), ``drive (d, n)`` are the
     values in internal units; ``batch`` is ``()`` or ``(n,)``.
@@ -27,6 +30,8 @@ class Question:
     ------
     DeclarationError, AssemblyError, IndeterminateError, DeadPointError
     """
+
+    start: Configuration
 
     def __init__(self, m: Mechanism, values: Mapping[str, Any] | None) -> None:
         given = DriverMotion(m, values)
@@ -40,28 +45,48 @@ class Question:
         if given.free:
             self.m = given.whole(self.start)
             self.start = closed_start(self.m)
-        self.system, self.x = self.start.system, self.start.x[:, 0]
+        self.system = self.start.system
         self.columns, _ = named_columns(self.m, self.system, dict.fromkeys(self.names, 0.0))
         self.unit = np.where(self.system.is_length[self.columns], self.system.par.L, 1.0)
         self.values = given.values("position", self.batch)
         self.drive = self.values / self.unit[:, None]
+        self._read()
+        if self._loose:
+            declared, self.start = self.start, self._beside()
+            self._read()
+            if self._loose:
+                self.start = declared
+                self._read()
+                self._refuse()
+
+    def _read(self) -> None:
+        """What can move at the start, and the class there."""
+        self.x = self.start.x[:, 0]
         self.freedoms = free_motion(self.system, self.x, self.columns)
-        if self.freedoms.undriven and (self.family.unknowns > self.family.rank or self.family.fault):
-            self._refuse()
+        passive = [p.rates for p in self.freedoms.passive]
+        rates = np.stack(passive, axis=1) if passive else np.zeros((self.system.n_freedoms, 0))
+        self.family = Family(self.start, self.columns, rates)
+
+    @property
+    def _loose(self) -> bool:
+        """Whether what is given leaves motions free at the start."""
+        return bool(self.freedoms.undriven) and (self.family.unknowns > self.family.rank or bool(self.family.fault))
+
+    def _beside(self) -> Configuration:
+        """The start moved off a dead point of drivers: along the motion that they leave free, driven by what moves most in it."""
+        still, rates = self.freedoms.still(self.columns), self.freedoms.undriven[0].rates
+        fastest = int(np.argmax(np.abs(rates)))
+        held = np.append(self.columns[~still], fastest)
+        guess = self.system.advance(self.start.x, OFF_DEAD_POINT * rates[:, None] / rates[fastest])
+        x, error = close_all(self.system, guess, held)
+        return Configuration(self.system, x) if error[0] < CLOSED else self.start
 
     def _refuse(self) -> None:
-        """What is given leaves motions free where the mechanism is declared, from where the class is read."""
+        """What is given leaves motions free where the mechanism is declared, and beside it."""
         names = [name for name, rests in zip(self.names, self.freedoms.still(self.columns), strict=True) if rests]
         if names and len(self.names) <= self.freedoms.mobility:
             raise dead_point_error(self.m, names, {name: self.m.start.get(name, 0.0) for name in names}, None)
         raise undriven_error(self.m, self.freedoms.undriven)
-
-    @cached_property
-    def family(self) -> Family:
-        """The class."""
-        passive = [p.rates for p in self.freedoms.passive]
-        rates = np.stack(passive, axis=1) if passive else np.zeros((self.system.n_freedoms, 0))
-        return Family(self.start, self.columns, rates)
 
     def coordinates(self, x: Array) -> Array:
         """User coordinates ``(M, F)`` of real states ``(nx, M)``: whole turns nearest to the start, given ones exactly as given."""

@@ -32,13 +32,13 @@ SAMPLES = (48, 96, 192, 192, 384)
 """Members of pencils, one pencil after the other until one tells."""
 MOST_TRACKS = 6500
 """Tracks over a pencil, at most."""
-SPREAD = 1.2
+PENCIL_SPREAD = 1.2
 """Standard deviation of the imaginary part of ``phi``."""
 RATIONAL = 1e-9
 """Singular value, as part of the largest, below which the Loewner matrix of a rational function ends."""
 ENDS = 1e4
 """Ratio of two singular values, one after the other, at which they end; where they fade it is below 300."""
-SURE = 4
+SPARE_VALUES = 4
 """Singular values beyond the degree, at least."""
 
 
@@ -87,13 +87,15 @@ def trace_test(
 def rational(z: Array, f: Array, weights: Array) -> Trace:
     """Whether a function with values ``f (n,)`` at ``z (n,)`` is rational, and of which degree; ``weights (n,)`` fall with rounding."""
     half = len(z) // 2
-    if half <= SURE:
+    if half <= SPARE_VALUES:
         return NOT_PASSED
     a, b, scale = z[:half, None], z[half : 2 * half], weights / (1.0 + np.abs(f))
     loewner = scale[:half, None] * scale[half : 2 * half] * (f[:half, None] - f[half : 2 * half]) / (a - b)
     sigma = np.linalg.svd(loewner, compute_uv=False)
     sigma = np.concatenate([sigma[:1], sigma]) / sigma[0] if sigma[0] > 0 else np.ones(1)
-    ends = 1 + np.flatnonzero((sigma[1:-SURE] < RATIONAL) & (sigma[1:-SURE] * ENDS < sigma[: -SURE - 1]))
+    ends = 1 + np.flatnonzero(
+        (sigma[1:-SPARE_VALUES] < RATIONAL) & (sigma[1:-SPARE_VALUES] * ENDS < sigma[: -SPARE_VALUES - 1])
+    )
     if not ends.size:
         return NOT_PASSED
     at = int(ends[0])
@@ -122,7 +124,7 @@ class _Pencil:
 
     def sums(self, x: Array, n: int, rng: np.random.Generator) -> tuple[Array, Array, Array]:
         """``z``, the sum of ``1 / (g - c)`` and weights at those of ``n`` random members to which all tracks from ``x (nx, N)`` come."""
-        phi = rng.uniform(-np.pi, np.pi, n) + 1j * SPREAD * rng.normal(size=n)
+        phi = rng.uniform(-np.pi, np.pi, n) + 1j * PENCIL_SPREAD * rng.normal(size=n)
         N, members = x.shape[1], self.members(phi)
         leg = Leg(self.equations, self.base, members, np.repeat(np.arange(n), N))
         tracked = follow(leg, np.tile(x, n), Care())
