@@ -329,9 +329,3 @@ def test_a_motion_alone_and_what_is_not_solved_or_not_unique() -> None:
     assert np.isnan(redundant.contact("B").normal_force).all()
     assert redundant.warnings == ()
     assert "not unique" in redundant.summary()
-
-
-def test_a_sphere_on_a_surface_is_named_as_no_contact_yet() -> None:
-    pair = mg.Pair("B", "Sp", "frame", "b", point=(1, 0, 0), surface=mg.Surface.sphere(radius=1.0), closed="force")
-    with pytest.raises(mg.DeclarationError, match=r"type Sp on a surface is no contact .*; Sc, Sg, Cp, Sp, Ps, Kc are"):
-        mg.Mechanism("bad", pairs=[pair])

@@ -133,7 +133,7 @@ def test_ball_in_a_ring_groove() -> None:
         ({"type": "Ps", "hertz": STEEL, "point": (E, R, 0)}, "radius: the pressure depends on it"),
         (
             {"type": "Sg", "radius": 0.01, "hertz": STEEL, "point": (E, R, 0)},
-            "pressure in a curved groove is not known",
+            "groove_radius = None: expected a number above the radius 0.01",
         ),
     ],
 )

@@ -86,10 +86,10 @@ class AlongCurve(Factor):
         """1 where y of the frame is the normal y of the curve, -1 where it is opposite."""
         return (-1.0 if self.reversed else 1.0) * (-1.0 if self.turned else 1.0)
 
-    def curvature(self, x: Array) -> Array:
-        """Curvature towards y of the frame at coordinates ``(...)``."""
+    def curvatures(self, x: Array) -> Array:
+        """Curvature towards x, y and z of the frame ``(3, ...)`` at coordinates ``(...)``; none towards the tangent."""
         here = self.here(x[None])
-        return self.sideways * (here.dt * here.y).sum(axis=0)
+        return np.asarray((self._axes(here.t, here.y, here.k) * here.dt[:, None]).sum(axis=0))
 
     def _axes(self, t: Array, y: Array, k: Array) -> Array:
         """The frame ``(3, 3, ...)``, columns its axes."""

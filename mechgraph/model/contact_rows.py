@@ -6,64 +6,36 @@ meaning: Fx and Fy of a sphere in a groove act at right angles to it, Fy of two 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from copy import copy
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import count
 from typing import Any
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.errors import ShapeError
-from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.model.along_curve import AlongCurve, Beside, X, Z
 from mechgraph.model.curves import Curve, Line
-from mechgraph.model.on_surface import OnSurface
-from mechgraph.model.pair_table import TABLE
-from mechgraph.model.pair_type import PairType, fill_row
+from mechgraph.model.pair_type import PairType
+from mechgraph.model.placed_rows import OFF_CURVE, PLACE_STEP, Contact, filled, of_function, pair_row
 from mechgraph.model.row_parts import Touching
-from mechgraph.model.surfaces import Surface
 from mechgraph.model.travel import Travel, outside, roller_faults, shape_faults
 from mechgraph.quantities import is_numeric
-from mechgraph.units import LENGTH
 
 ALONG, FOLLOWING = AlongCurve("Ts", Z), AlongCurve("Ts", X)
 """Places for a curve on link a, along z and along x of the frame."""
 BESIDE = AlongCurve("Tsb", X, back=True)
 """A place for a curve on link b."""
-OFF_CURVE = 1e-6
-"""Part of the extent of a curve, or angle, by which the contact may miss it."""
-UNIT_ROUNDING = 1e-12
-"""Miss (in the unit of length) that is rounding at any size of a mechanism, as of a point in a plane through the origin."""
-PLACE_STEP = 1e-12
-"""Part of its length to which a place on a curve is rounded, so that the place of that place is the same."""
-TRIED_PLACES = 16
-"""Places at which it is tried whether components do work."""
 CLOSING_ANGLE = 1e-9
 """Closing angle of a frame that counts."""
-
-
-def _row(
-    symbol: str,
-    name: str,
-    freedoms: Sequence[object],
-    reactions: Sequence[str],
-    efforts: Sequence[str],
-    touching: Touching | None = None,
-) -> PairType:
-    row = object.__new__(PairType)
-    fill_row(row, symbol, name, freedoms, reactions, efforts, touching=touching)
-    object.__setattr__(row, "computed_efforts", True)
-    return row
 
 
 ROWS = {
     row.symbol: row
     for row in (
-        _row("P", "rail and carriage", [ALONG], ["Fx@1", "Fy@1", "Mx@1", "My@1", "Mz@1"], ["Fz@1"]),
-        _row("C", "round rail and carriage", [ALONG, "Rz"], ["Fx@1", "Fy@1", "Mx@1", "My@1"], ["Fz@1", "Mz@1"]),
-        _row(
+        pair_row("P", "rail and carriage", [ALONG], ["Fx@1", "Fy@1", "Mx@1", "My@1", "Mz@1"], ["Fz@1"]),
+        pair_row("C", "round rail and carriage", [ALONG, "Rz"], ["Fx@1", "Fy@1", "Mx@1", "My@1"], ["Fz@1", "Mz@1"]),
+        pair_row(
             "Sg",
             "sphere in curved groove",
             [ALONG, "rotation"],
@@ -71,7 +43,7 @@ ROWS = {
             ["Fz@1", "Mx@1", "My@1", "Mz@1"],
             Touching(("Fx", "Fy"), a=(0.0, -1.0), b=(1.0, 1.0), curved=True),
         ),
-        _row(
+        pair_row(
             "Ps",
             "pin in curved slot",
             [FOLLOWING, "Rz"],
@@ -79,7 +51,7 @@ ROWS = {
             ["Fx@1", "Mz@1"],
             Touching(("Fy",), a=(0.0, 0.0), b=(0.0, 1.0), curved=True),
         ),
-        _row(
+        pair_row(
             "Kc",
             "curves in contact",
             [FOLLOWING, BESIDE],
@@ -92,41 +64,15 @@ ROWS = {
 """The rows by the symbols of their types; of P, C and Sg those with a curve."""
 
 
-SURFACE_ROWS = {
-    "Sp": _row("Sp", "sphere on surface", [OnSurface(), "rotation"], ["Fz@2"], ["Fx@2", "Fy@2", "Mx@2", "My@2", "Mz@2"])
-}
-"""The same of those that take a surface."""
-
-
-@dataclass(frozen=True)
-class Contact:
-    """A row with its curves, the markers at coordinates zero on links a and b ``(3, 4)``, and by how much each misses its curve.
-
-    ``marker_b`` is None where no curve of link b says it; a pair without a place for one has it where it likes.
-    """
-
-    row: PairType
-    marker: Array
-    misses: tuple[float, ...]
-    marker_b: Array | None = None
-
-
-def row_of(type: Any, curve: Any, surface: Any = None) -> Any:
-    """The row of a pair of a type (a symbol or a row) with or without a curve or surface; what is no type is kept."""
-    bent = curve is not None or surface is not None
-    symbol = type.symbol if isinstance(type, PairType) and (bent or travels(type)) else type
-    if not isinstance(symbol, str):
-        return symbol
-    rows = {**TABLE, **SURFACE_ROWS} if surface is not None else {**TABLE, **ROWS} if bent else {**ROWS, **TABLE}
-    return rows.get(symbol, type)
-
-
 def pressing(row: PairType) -> float:
     """1 where link a, which is only pushed against, presses on b along y of the frame that travels on its curve, -1 where against it.
 
-    A roller is pushed away from the curve beside which it runs, what touches a closed curve away from its inside, all else along y.
+    A roller is pushed away from the curve beside which it runs, what touches a closed curve away from its inside, all else along y; what
+    is on a surface along z.
     """
-    place = takes_curves(row)[0]
+    place = next(iter(takes_curves(row)), None)
+    if place is None:
+        return 1.0
     curve = place.curve
     assert curve is not None
     if isinstance(curve, Beside):
@@ -139,52 +85,6 @@ def pressing(row: PairType) -> float:
 def takes_curves(row: PairType) -> tuple[AlongCurve, ...]:
     """The places for curves in a row."""
     return tuple(step for step in row.steps if isinstance(step, AlongCurve))
-
-
-def travels(row: Any) -> bool:
-    """Whether a row has a place for a curve or a surface."""
-    return isinstance(row, PairType) and any(isinstance(step, AlongCurve | OnSurface) for step in row.steps)
-
-
-def on_surface(
-    row: PairType,
-    surface: Surface,
-    point: Sequence[float] | None,
-    axis: Sequence[float] | None,
-    pair: str,
-    on_b: Array | None = None,
-) -> Contact:
-    """A row of a ``pair`` with its surface put in; coordinates zero at ``point`` (in the middle if left out), z towards ``axis``."""
-    middle = tuple(
-        0.5 * (low + high) if np.isfinite(low + high) else 1.0 if np.isfinite(low) else 0.0
-        for low, high in surface.ends
-    )
-    home = middle if point is None else surface.nearest(np.asarray(point))
-    placed = OnSurface(surface, tuple(PLACE_STEP * round(at / PLACE_STEP) for at in home))  # type: ignore[arg-type]
-    if axis is not None and placed.start[:, 2] @ np.asarray(axis) < 0:
-        placed = replace(placed, turned=True)
-    off = 0.0 if point is None or on_b is not None else float(np.linalg.norm(placed.start[:, 3] - point))
-    return Contact(_filled(row, [placed], pair), placed.start, (off,))
-
-
-def surface_faults(row: Any, surface: Surface, point: Any, where: str) -> list[str]:
-    """What is wrong with a surface in a row, before it is put in."""
-    if not isinstance(row, PairType) or not any(isinstance(step, OnSurface) for step in row.steps):
-        return [
-            f"{where}surface: a pair {getattr(row, 'symbol', '?')} takes none; those that do: {', '.join(SURFACE_ROWS)}"
-        ]
-    if not (point is None or is_numeric(point, (3,))):
-        return [f"{where}surface: point is at fault"]
-    found = _of_function(lambda: surface.faults(f"{where}surface."), f"{where}surface.")
-    if found or point is None:
-        return found
-    x = surface.at(*np.array(surface.nearest(np.asarray(point)))[:, None])[:, :, 0]
-    normal, sizes = np.linalg.norm(np.cross(x[1], x[2])), np.linalg.norm(x[1:3], axis=1)
-    if normal <= 1e-9 * sizes.max() ** 2 + 1e-300:
-        return [
-            f"{where}surface: has no normal at ({', '.join(f'{v:.6g}' for v in x[0])}), as at a pole or an apex; take another point"
-        ]
-    return []
 
 
 def in_contact(
@@ -220,7 +120,7 @@ def in_contact(
         factors.append(second)
         back = second.start
         off += [_off(second, beside[:, 3]), float(np.linalg.norm(np.cross(back[:, 0], beside[:, 0])))]
-    return Contact(_filled(row, factors, pair), marker, tuple(off), back if on_b is not None else None)
+    return Contact(filled(row, factors, pair), marker, tuple(off), back if on_b is not None else None)
 
 
 def _across(curve: Curve, place: AlongCurve, z: Sequence[float] | Array | None) -> Curve:
@@ -271,29 +171,6 @@ def _off(factor: AlongCurve, point: Sequence[float] | Array | None) -> float:
     return 0.0 if point is None else float(np.linalg.norm(factor.start[:, 3] - point))
 
 
-def _filled(row: PairType, factors: Sequence[AlongCurve | OnSurface], pair: str) -> PairType:
-    """The row with factors in the places for curves and surfaces; components that would do work are combined with efforts."""
-    out = copy(row)
-    for name in ("factors", "nx", "has_lengths", "takes_pitch"):
-        vars(out).pop(name, None)
-    left = (replace(factor, pair=pair) for factor in factors)
-    steps = tuple(next(left) if isinstance(step, AlongCurve | OnSurface) else step for step in row.steps)
-    object.__setattr__(out, "steps", steps)
-    x = evaluation.random_coordinates(out, np.random.default_rng(12345), 1, TRIED_PLACES)
-    for step, (_, numbers) in zip(steps, evaluation.places(out), strict=True):
-        if isinstance(step, AlongCurve):
-            low, high = (end if np.isfinite(end) else np.copysign(step.travel.length, end) for end in step.ranges[0])
-            x[numbers] = np.linspace(low, high, TRIED_PLACES)
-        elif isinstance(step, OnSurface):
-            x[numbers] = 0.0
-    pitch = np.zeros((1, 1))
-    frames = evaluation.frames_of(out, pitch, x)
-    S, W = evaluation.twists_of(out, pitch, frames, x), evaluation.reactions_of(out, pitch, frames, x)
-    work = np.abs(np.einsum("ifnt,icnt->fcnt", S, W)).max(initial=0.0)
-    object.__setattr__(out, "computed_reactions", bool(work > 1e-12 * max(1.0, np.abs(S).max())))
-    return out
-
-
 # --- faults ----------------------------------------------------------------------------------------------------------
 
 
@@ -336,32 +213,7 @@ def curve_faults(row: Any, curve: Curve, curve_b: Any, roller: Any, point: Any, 
 
 
 def _of_shape(curve: Curve, where: str) -> list[str]:
-    return _of_function(lambda: curve.faults(where) or shape_faults(curve, where), where)
-
-
-def _of_function(faults: Callable[[], list[str]], where: str) -> list[str]:
-    """Faults of a shape, also that its function returns what is none; what the function raises goes on, with its cause."""
-    try:
-        return faults()
-    except ShapeError as error:
-        if error.__cause__ is not None:
-            raise
-        return [where + error.text]
-
-
-def surface_miss(contact: Contact, tol: float, where: str) -> Iterator[str]:
-    """A contact that is not on its surface."""
-    surface = next(
-        step.surface for step in contact.row.steps if isinstance(step, OnSurface) and step.surface is not None
-    )
-    lengths = [np.abs(getattr(surface, name)).max() for name, of in surface.formats.items() if of.slide == LENGTH]
-    size = max(float(np.linalg.norm(contact.marker[:, 3])), *lengths, UNIT_ROUNDING / OFF_CURVE)
-    if contact.misses[0] > max(OFF_CURVE, tol) * size:
-        at = ", ".join(f"{v:.6g}" for v in contact.marker[:, 3])
-        yield (
-            f"{where}point: is {contact.misses[0]:.6g} off its surface, which is nearest at ({at}); give that point, or the marker on "
-            "link b (on_b=mg.Marker(...), and no point) to have the mechanism assembled"
-        )
+    return of_function(lambda: curve.faults(where) or shape_faults(curve, where), where)
 
 
 def miss_faults(contact: Contact, curves: Sequence[Curve | None], tol: float, where: str) -> Iterator[str]:

@@ -15,7 +15,6 @@ import scipy
 
 from mechgraph.algebra.inertia import physical
 from mechgraph.algebra.se3 import Array
-from mechgraph.model.contact_rows import travels
 from mechgraph.model.coupling import BaseCoupling
 from mechgraph.model.drive import Drive
 from mechgraph.model.link import Link
@@ -24,6 +23,7 @@ from mechgraph.model.numeric import tolerance_fault
 from mechgraph.model.pair import PARALLEL_COSINE, Marker, Pair, largest_cosine
 from mechgraph.model.pair_type import PairType
 from mechgraph.model.parts import Parts
+from mechgraph.model.placed_rows import travels
 from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.quantities import column, is_numeric, shown, wrong
 from mechgraph.units import BASE_UNITS

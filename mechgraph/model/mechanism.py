@@ -15,7 +15,6 @@ import numpy as np
 from mechgraph.arguments import items_of
 from mechgraph.document import Document, Shown
 from mechgraph.errors import DeclarationError
-from mechgraph.model.contact_rows import row_of, travels
 from mechgraph.model.coupling import BaseCoupling
 from mechgraph.model.declaration import declaration_faults, flat_start, item_faults, mapping_faults
 from mechgraph.model.describe import mechanism_document
@@ -27,7 +26,9 @@ from mechgraph.model.once import Once
 from mechgraph.model.pair import Pair
 from mechgraph.model.pair_type import PairType
 from mechgraph.model.parts import Parts
+from mechgraph.model.placed_rows import travels
 from mechgraph.model.response_setup import ResponseSetup
+from mechgraph.model.surface_rows import row_of
 from mechgraph.quantities import is_numeric, shown, wrong
 from mechgraph.units import base_factors
 

@@ -69,6 +69,13 @@ class OnSurface(Factor):
         grid = np.tensordot(p, self.start[:, :3], (0, 0)) / self.unit
         return (*grid, *grid.swapaxes(0, 1))
 
+    def curvatures(self, x: Array) -> Array:
+        """Principal curvatures ``(2, ...)`` towards z of the frame at coordinates ``(2, ...)``."""
+        assert self.surface is not None
+        su, sv = self.sizes
+        found = self.surface.curvatures(self.home[0] + self.unit / su * x[0], self.home[1] + self.unit / sv * x[1])
+        return -found[::-1] if self.turned else found
+
     def _here(self, x: Array) -> tuple[Array, Array, Array]:
         """Position, axes ``(3, 3, ...)`` and twists about the point ``(6, 2, ...)``, in the frame of the link."""
         assert self.surface is not None

@@ -11,20 +11,7 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import ShapeError
-from mechgraph.model.contact_rows import (
-    ROWS,
-    Contact,
-    curve_faults,
-    in_contact,
-    kept_side,
-    miss_faults,
-    on_surface,
-    row_of,
-    surface_faults,
-    surface_miss,
-    takes_curves,
-    travels,
-)
+from mechgraph.model.contact_rows import ROWS, curve_faults, in_contact, kept_side, miss_faults, takes_curves
 from mechgraph.model.curves import Curve
 from mechgraph.model.field_format import (
     DIRECTION,
@@ -43,6 +30,8 @@ from mechgraph.model.numeric import plain
 from mechgraph.model.numeric import second_direction as second_direction
 from mechgraph.model.pair_table import TABLE
 from mechgraph.model.pair_type import PairType
+from mechgraph.model.placed_rows import Contact, travels
+from mechgraph.model.surface_rows import on_surface, row_of, surface_faults, surface_miss
 from mechgraph.model.surfaces import Surface
 from mechgraph.quantities import is_numeric, shown, wrong
 from mechgraph.units import LENGTH
@@ -122,7 +111,7 @@ class Pair(Described):
         left out; see ``start``).
     curve_b : the curve on link b that touches it (Kc); a straight face where left out.
     surface : a ``Surface`` in the frame of link a, on which the marker of Sp travels; ``point`` is a place on it.
-    roller : radius of a roller that runs on the curve; ``point`` is its centre.
+    roller : radius of a roller that runs on the curve, or of a ball on the surface; ``point`` is its centre.
     """
 
     name: Annotated[str, TEXT("freedoms are named NAME.Rz and so on")]
@@ -163,7 +152,10 @@ class Pair(Described):
     curve: Annotated[Curve | None, NESTED("curve on link a along which the marker travels", table="curve")] = None
     curve_b: Annotated[Curve | None, NESTED("curve on link b, of Kc", table="curve", default="a straight face")] = None
     roller: Annotated[
-        float | None, POSITIVE("radius of a roller that runs on `curve`; `point` is its centre", LENGTH, default="none")
+        float | None,
+        POSITIVE(
+            "radius of a roller on `curve`, or a ball on `surface`; `point` is its centre", LENGTH, default="none"
+        ),
     ] = None
     surface: Annotated[
         Surface | None, NESTED("surface on link a on which the centre of a sphere travels, of Sp", table="surface")
@@ -239,8 +231,8 @@ class Pair(Described):
         towards = axis if point is not None else None
         if isinstance(curve, Curve) and not curve_faults(row, curve, curve_b, roller, point, ""):
             return in_contact(row, curve, curve_b, roller, point, towards, name, on_b)
-        if curve is None and isinstance(surface, Surface) and not surface_faults(row, surface, point, ""):
-            return on_surface(row, surface, point, towards, name, on_b)
+        if curve is None and isinstance(surface, Surface) and not surface_faults(row, surface, point, "", roller):
+            return on_surface(row, surface, point, towards, name, on_b, roller)
         return None
 
     def reshaped(self, **changes: Any) -> Pair:
@@ -283,8 +275,8 @@ class Pair(Described):
     @property
     def radius_b(self) -> float | None:
         """Radius of the ball, roller or cylinder on link b, where it is known."""
-        rolls = self.roller or self.curve.roller if isinstance(self.curve, Curve) else None
-        return rolls or self.radius
+        rolls = self.curve.roller if isinstance(self.curve, Curve) else None
+        return self.roller or rolls or self.radius
 
     @property
     def pitch_per_radian(self) -> float:
@@ -359,8 +351,7 @@ class Pair(Described):
             said += ["closed"] if self.closed == "force" else []
             if said:
                 have = ", ".join(symbol for symbol, row in {**TABLE, **ROWS}.items() if row.touching)
-                here = " on a surface" if self.surface is not None else ""
-                yield f"{where}{', '.join(said)}: type {self.type.symbol}{here} is no contact of two elements; {have} are"
+                yield f"{where}{', '.join(said)}: type {self.type.symbol} is no contact of two elements; {have} are"
             return
         if self.radius is not None:
             yield self.formats["radius"].fault(self.radius, f"{where}radius")
@@ -377,8 +368,6 @@ class Pair(Described):
         groove, needed = self.hertz.groove_radius, "the pressure depends on it; give it"
         if any(form.b) and self.radius_b is None:
             yield f"{where}radius: {needed}"
-        elif any(form.a) and form.curved:
-            yield f"{where}hertz: the pressure in a curved groove is not known; leave it out"
         elif self.radius is not None and any(form.a) and (groove is None or not groove > self.radius):
             yield wrong(groove, f"{where}hertz.groove_radius", f"a number above the radius {self.radius:g} of the ball")
         if form.along_line and self.hertz.length is None:
@@ -386,6 +375,8 @@ class Pair(Described):
 
     def _curve_faults(self, where: str, tol: float) -> Iterator[str | None]:
         """What is wrong with its curves, or with the contact on them."""
+        if self.roller is not None:
+            yield self.formats["roller"].fault(self.roller, where + "roller")
         for name, given in (("curve", self.curve), ("curve_b", self.curve_b)):
             if not isinstance(given, Curve | None):
                 yield wrong(given, where + name, "a Curve, such as mg.Curve.circle(radius=...)")
@@ -396,7 +387,7 @@ class Pair(Described):
         elif self.surface is not None and self.contact is not None:
             yield from surface_miss(self.contact, tol, where)
         elif self.surface is not None:
-            yield from surface_faults(self.type, self.surface, self.point, where)
+            yield from surface_faults(self.type, self.surface, self.point, where, self.roller)
         elif self.contact is not None:
             yield from miss_faults(self.contact, (self.curve, self.curve_b), tol, where)
         elif isinstance(self.curve, Curve):

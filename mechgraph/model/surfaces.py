@@ -64,6 +64,25 @@ class Surface(Described):
         u, v = np.meshgrid(*axes)
         return u.ravel(), v.ravel()
 
+    def offset(self, distance: float) -> Surface | None:
+        """The surface at a distance towards the normal, on which the centre of a ball travels; None where it is of no known kind."""
+        return None
+
+    def curvatures(self, u: Array, v: Array) -> Array:
+        """Both principal curvatures ``(2, ...)``, positive where the surface bends towards its normal; the lesser one first.
+
+        The roots of ``det(II - k I) = 0`` of both fundamental forms.
+        """
+        _, xu, xv, *second = self.at(u, v)
+        n = cross(xu, xv)
+        n = n / np.sqrt((n * n).sum(axis=0))
+        E, F, G = ((a * b).sum(axis=0) for a, b in ((xu, xu), (xu, xv), (xv, xv)))
+        e, f, g = ((part * n).sum(axis=0) for part in second)
+        area = E * G - F * F
+        mean, gauss = 0.5 * (e * G - 2 * f * F + g * E) / area, (e * g - f * f) / area
+        apart = np.sqrt(np.maximum(mean * mean - gauss, 0.0))
+        return np.stack([mean - apart, mean + apart])
+
     def nearest(self, p: Array) -> tuple[float, float]:
         """Parameters of the point of the surface that is nearest to ``p (3,)``, by Newton's method."""
         u, v = self.grid(p)
@@ -132,6 +151,10 @@ class Plane(AboutAxis):
         out[0], out[1], out[2] = c + u * e1 + v * e2, e1, e2
         return out
 
+    def offset(self, distance: float) -> Surface:
+        """A plane."""
+        return self.replace(center=np.asarray(self.center) + distance * self._basis[2])
+
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Turned(AboutAxis):
@@ -189,6 +212,10 @@ class Sphere(Turned):
         """Half a circle."""
         return self._circle(self.radius, angles=(-0.25 * WHOLE_TURN, 0.25 * WHOLE_TURN))
 
+    def offset(self, distance: float) -> Surface | None:
+        """A sphere about the same centre."""
+        return self.replace(radius=self.radius + distance) if self.radius + distance > 0 else None
+
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Cylinder(Turned):
@@ -201,6 +228,10 @@ class Cylinder(Turned):
     def meridian(self) -> Curve:
         """A line along the axis."""
         return Line(point=np.asarray(self.center) + self.radius * self._basis[0], direction=self.axis)
+
+    def offset(self, distance: float) -> Surface | None:
+        """A cylinder about the same axis."""
+        return self.replace(radius=self.radius + distance) if self.radius + distance > 0 else None
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -215,6 +246,10 @@ class Cone(Turned):
         """A line from the apex."""
         direction = np.sin(self.half_angle) * self._basis[0] + np.cos(self.half_angle) * self._basis[2]
         return Line(point=self.center, direction=direction)
+
+    def offset(self, distance: float) -> Surface:
+        """The cone at a distance, whose apex is beside that of this one."""
+        return self.replace(center=np.asarray(self.center) - distance / np.sin(self.half_angle) * self._basis[2])
 
     @property
     def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -241,6 +276,10 @@ class Torus(Turned):
     def meridian(self) -> Curve:
         """A circle."""
         return self._circle(self.tube, self.radius)
+
+    def offset(self, distance: float) -> Surface | None:
+        """A torus with the same circle of centres."""
+        return self.replace(tube=self.tube + distance) if 0 < self.tube + distance < self.radius else None
 
     def faults(self, where: str) -> list[str]:
         """Radii that make no torus."""

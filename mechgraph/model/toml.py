@@ -16,7 +16,6 @@ import tomli_w
 
 from mechgraph.errors import ContentError, DeclarationError, FileError
 from mechgraph.model.chain import chain
-from mechgraph.model.contact_rows import travels
 from mechgraph.model.curves import Curve
 from mechgraph.model.field_format import BY_FREEDOM, COEFFICIENTS, SIX, STANDS_AS, TABLE, TABLES, Described
 from mechgraph.model.file_format import DEGREES, KINDS, SCHEMA, TABLES_OF_FILE, USUAL
@@ -24,6 +23,7 @@ from mechgraph.model.library import library_names, library_path
 from mechgraph.model.mechanism import Mechanism, check_mechanism
 from mechgraph.model.pair_table import TABLE as PAIR_TABLE
 from mechgraph.model.pair_type import PairType
+from mechgraph.model.placed_rows import travels
 from mechgraph.model.surfaces import Surface
 from mechgraph.model.sweep import swept
 from mechgraph.quantities import is_numeric, real_array, shown, wrong

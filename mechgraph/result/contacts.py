@@ -24,6 +24,7 @@ from mechgraph.model.contact_rows import pressing, takes_curves
 from mechgraph.model.hertz import Pressed, pressed, pressed_along_line
 from mechgraph.model.pair import Pair
 from mechgraph.model.row_parts import Touching
+from mechgraph.model.surface_rows import placed_surface
 from mechgraph.quantities import wrong
 from mechgraph.result.numbers import bracket, number, ranges, with_unit
 from mechgraph.result.places import OK, Places, driver_value
@@ -265,7 +266,7 @@ class ContactResult(Shown):
         groove = data.groove_radius or np.inf
         along, across = (np.asarray(a / groove + b / radius) for a, b in zip(form.a, form.b, strict=True))
         if form.curved:
-            across = self._bends(radius)
+            along, across = self._bends(radius)
         if not form.along_line:
             return pressed(force, (along, across), data.modulus)
         assert data.length is not None
@@ -273,14 +274,33 @@ class ContactResult(Shown):
             off = self._values.components(self._index)[form.tilting] / force if form.tilting else np.zeros(force.shape)
         return pressed_along_line(force, np.nan_to_num(off), data.length, across, data.modulus)
 
-    def _bends(self, radius: float) -> Array:
-        """Relative curvature ``(...)`` of two profiles: of a's, beside which the centre of a roller travels, and of the roller or b's."""
-        row, x = self._pair.type, self._values.coordinates(self._index)[0]
-        places = takes_curves(row)
-        path = -self._sense * places[0].curvature(x[..., 0])
-        profile = path / (1.0 - radius * path) if np.isfinite(radius) else path
-        other = self._sense * places[1].curvature(x[..., 1]) if len(places) > 1 else 1.0 / radius
-        return np.asarray(profile + other)
+    def _bends(self, radius: float) -> tuple[Array, Array]:
+        """Relative curvatures ``(...)`` along and across, where elements are curves or surfaces; NaN where a ball or roller does not fit.
+
+        The centre of a ball or roller of ``radius`` r that bends by k towards the normal n touches what bends by ``k / (1 + r k)``: the
+        relative curvature is ``1 / r - k / (1 + r k) = 1 / (r (1 + r k))``; of the cross section of a groove ``1 / r - 1 / groove_radius``.
+        """
+        row, x = self._pair.type, np.moveaxis(self._values.coordinates(self._index)[0], -1, 0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            if (surface := placed_surface(row)) is not None:
+                towards = np.sign((self.normal * self._directions[..., 0]).sum(axis=-1))
+                one, two = towards * surface.curvatures(x[:2])
+                return _between(radius, one), _between(radius, two)
+            places = takes_curves(row)
+            bends = places[0].curvatures(x[0])
+            if len(self._form.forces) > 1:
+                data = self._pair.hertz
+                assert data is not None
+                assert data.groove_radius is not None
+                n = np.einsum("...ij,...i->j...", self._directions, self.normal)
+                return _between(radius, (bends[:2] * n).sum(axis=0)), np.asarray(
+                    1.0 / radius - 1.0 / data.groove_radius
+                )
+            path = self._sense * bends[1]
+            if np.isfinite(radius):
+                return np.zeros(path.shape), _between(radius, path)
+            other = self._sense * places[1].curvatures(x[1])[1] if len(places) > 1 else 0.0
+            return np.zeros(path.shape), np.asarray(other - path)
 
     # --- motion --------------------------------------------------------------------------------------------------------
 
@@ -317,6 +337,12 @@ class ContactResult(Shown):
             raise DeclarationError(f"contact {self._pair.name!r}", [wrong(link, "link", " or ".join(map(repr, ends)))])
         v = self._velocity(ends.index(link), self.point)
         return angle_between(v, self.normal)
+
+
+def _between(radius: float, k: Array) -> Array:
+    """Relative curvature of a ball or roller, whose centre bends by ``k`` towards the normal, and what it touches."""
+    fits = 1.0 + radius * k
+    return np.where(fits > 0, 1.0 / (radius * np.where(fits > 0, fits, 1.0)), np.nan)
 
 
 def angle_between(v: Array, n: Array) -> Array:

@@ -106,7 +106,12 @@ class Variants:
 
 
 def _placed(pair: Pair, n: Declared, k: int) -> Pair:
-    """A pair with the numbers of one variant; a second direction that must be perpendicular is made so again."""
+    """A pair with the numbers of one variant; a second direction that must be perpendicular is made so again.
+
+    What travels on a curve or surface stands where that says, and has its numbers among the variants' own.
+    """
+    if pair.contact is not None:
+        return pair
     markers = []
     for side in (0, 1):
         axis, second = n.axis[side, :, k], n.second[side, :, k]
