@@ -283,6 +283,58 @@ def test_a_driven_turn_on_a_curve_takes_a_force_with_its_couple(symbol, curve):
     assert found["X.Rz"] == pytest.approx(a["X"].effort[3, 1], rel=1e-9)
 
 
+# --- held in orientation ---------------------------------------------------------------------------------------------
+
+
+def held(**more):
+    return mg.Curve.circle(**{"radius": 0.7, "center": CENTER, "axis": AXIS, "frame": "held", **more})
+
+
+def test_a_circle_held_in_orientation_is_a_parallelogram():
+    """Circular translation: motion, reactions of the rest and the drive are those of a coupler on two equal parallel cranks."""
+    z, r, w = (0, 0, 1), 0.5, 3.0
+    angle = np.linspace(-1.5, 1.2, 25)
+    body = mg.Link("body", mass=2.0, center=(0.6, 0.2, 0.1), inertia=np.diag([0.1, 0.2, 0.3]))
+    loads = [mg.Gravity((0, -9.81, 0)), mg.Wrench("body", force=(1, 2, 3), moment=(0.1, 0.2, 0.3), point=(0.5, 0.1, 0))]
+    rail = mg.Pair("X", "P", "frame", "body", curve=mg.Curve.circle(radius=r, frame="held"), point=(r, 0, 0))
+    one = mg.Mechanism("rail", [mg.Link("frame"), body], [rail], ["X"], loads)
+    cranks = [mg.Pair(f"A{i}", "R", "frame", f"crank{i}", point=(0.2 * i, 0.9 * i, 0), axis=z) for i in range(2)]
+    ends = [mg.Pair(f"B{i}", "R", f"crank{i}", "body", point=(0.2 * i + r, 0.9 * i, 0), axis=z) for i in range(2)]
+    links = [mg.Link("frame"), mg.Link("crank0"), mg.Link("crank1"), body]
+    two = mg.Mechanism("parallelogram", links, [*cranks, *ends], ["A0"], loads)
+    a = mg.solve(one, {"X": mg.Motion(r * angle, r * w, r * 2.0)})
+    b = mg.solve(two, {"A0": mg.Motion(angle, w, 2.0)}, redundant="minimum_norm")
+    for what in ("pose", "twist", "acceleration"):
+        assert_allclose(getattr(a.link("body"), what), getattr(b.link("body"), what), atol=1e-10)
+    total = b["B0"].total + b["B1"].total
+    assert_allclose(a["X"].total, total, atol=1e-10 * np.abs(total).max())
+    assert_allclose(a["X"].effort[:, 0] * r, b["A0"].effort[:, 0], atol=1e-10 * np.abs(b["A0"].effort).max())
+    assert a.checks.power.max() < 1e-12
+    tangent = np.stack([-np.sin(angle), np.cos(angle), 0 * angle], axis=1)
+    assert np.abs((a["X"].force * tangent).sum(axis=1)).max() < 1e-11 * np.abs(a["X"].force).max()
+
+
+@pytest.mark.parametrize("symbol", ["P", "C"])
+@pytest.mark.parametrize("shape", ["circle", "knot"])
+def test_everything_holds_of_a_frame_held_in_orientation(symbol, shape, tmp_path):
+    """Jacobian and bias by complex step, both engines and methods, power, orientation; files."""
+    curve = held() if shape == "circle" else mg.Curve.through(points=TREFOIL, closed=True, frame="held")
+    at = curve.at(np.array(0.3))[0]
+    m = ring(lambda b: mg.Pair("X", symbol, "frame", b, point=at, curve=curve), n=6 - (symbol == "C"), seed=1)
+    holds(*closed(m, 1, 0.02))
+    s = mg.solve(m, {"J0": mg.Motion(0.05 * T, 1.3, 0.7)})
+    for how in ({"method": "newton_euler"}, {"engine": "sparse"}):
+        other = mg.solve(m, {"J0": mg.Motion(0.05 * T, 1.3, 0.7)}, **how)
+        for pair in (p.name for p in m.pairs):
+            assert_allclose(other[pair].reaction, s[pair].reaction, atol=1e-10 * np.abs(s[pair].reaction).max())
+    assert s.checks.power.max() < 1e-12
+    R = s.link(m.pairs[-1].b).pose[:, :3, :3]
+    if symbol == "P":
+        assert_allclose(R, np.broadcast_to(np.eye(3), R.shape), atol=1e-11)
+    mg.save(m, tmp_path / "m.toml")
+    assert mg.load(tmp_path / "m.toml") == m
+
+
 # --- what will not do ------------------------------------------------------------------------------------------------
 
 
@@ -310,6 +362,10 @@ def refused(**given):
         ),
         ({"curve": mg.Curve.helix(radius=1.0, pitch=0.0), "point": (1, 0, 0)}, "pitch = 0: an endless helix advances"),
         ({"curve": "circle"}, "a Curve, such as"),
+        (
+            {"curve": mg.Curve.circle(radius=1.0, frame="held")},
+            "frame='held' is for P and C; a pair Sg turns with its curve",
+        ),
         ({"curve": mg.Curve.circle(radius=1.0), "type": "R"}, "a pair R takes none; those that do: P, C, Sg"),
         ({"curve": cam(roller_radius=1.0, base_radius=0.3, **LOBES)}, "undercut: the roller of radius 1 is larger"),
         ({"curve": cam(follower="flat", base_radius=0.1, **TWICE)}, "curve has a cusp at"),

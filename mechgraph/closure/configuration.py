@@ -172,7 +172,8 @@ class Configuration:
         out = self._wrenches(s.effort_table, s.effort_numbers)
         for g in s.groups:
             if g.row.computed_efforts:
-                out[:, g.columns] = evaluation.dual(out[:, g.columns], self.S[:, g.columns])
+                p = self.pair_points[:, g.pairs]
+                out[:, g.columns] = evaluation.dual(g.row, out[:, g.columns], self.S[:, g.columns], p)
         return out
 
     @kept

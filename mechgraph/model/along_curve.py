@@ -89,7 +89,18 @@ class AlongCurve(Factor):
     def curvatures(self, x: Array) -> Array:
         """Curvature towards x, y and z of the frame ``(3, ...)`` at coordinates ``(...)``; none towards the tangent."""
         here = self.here(x[None])
-        return np.asarray((self._axes(here.t, here.y, here.k) * here.dt[:, None]).sum(axis=0))
+        return np.asarray((self._frame(here) * here.dt[:, None]).sum(axis=0))
+
+    @cached_property
+    def held(self) -> bool:
+        """Whether the frame keeps its orientation."""
+        return self.curve is not None and self.curve.frame == "held"
+
+    def _frame(self, here: Place) -> Array:
+        """The frame ``(3, 3, ...)`` where the curve is ``here``."""
+        if self.held:
+            return np.broadcast_to(self.start[:, :3].reshape(3, 3, *(1,) * (here.t.ndim - 1)), (3, *here.t.shape))
+        return self._axes(here.t, here.y, here.k)
 
     def _axes(self, t: Array, y: Array, k: Array) -> Array:
         """The frame ``(3, 3, ...)``, columns its axes."""
@@ -106,9 +117,10 @@ class AlongCurve(Factor):
     def here(self, x: Array) -> Place:
         """The curve where the coordinate is ``x (1, ...)``, lengths in its own unit."""
         try:
-            return self.travel.at(self.home + (-self.unit if self.reversed else self.unit) * x[0])
+            here = self.travel.at(self.home + (-self.unit if self.reversed else self.unit) * x[0])
         except ShapeError as error:
             raise error.of(self.pair) from error.__cause__
+        return replace(here, w=0.0 * here.w, dw=0.0 * here.dw) if self.held else here
 
     def pose(self, x: Array, pitch: Array) -> Array:
         """Value of the motion."""
@@ -119,11 +131,11 @@ class AlongCurve(Factor):
         R0, p0 = self.start[:, :3], self.start[:, 3].reshape(3, *(1,) * (here.x.ndim - 1))
         out = np.empty((3, 4, *here.x.shape[1:]), dtype=here.x.dtype)
         if self.back:
-            R = self._axes(here.t, here.y, here.k)
+            R = self._frame(here)
             out[:, :3] = np.einsum("ji...,jk->ik...", R, R0)
             out[:, 3] = (R * ((p0 - here.x) / self.unit)[:, None]).sum(axis=0)
         else:
-            out[:, :3] = np.tensordot(R0, self._axes(here.t, here.y, here.k), (0, 0))
+            out[:, :3] = np.tensordot(R0, self._frame(here), (0, 0))
             out[:, 3] = np.tensordot(R0, (here.x - p0) / self.unit, (0, 0))
         return out
 
@@ -149,7 +161,7 @@ class AlongCurve(Factor):
     def _screw(self, here: Place, w: Array, v: Array) -> Array:
         """A screw at the point of the curve, seen from the frame before the factor ``(6, ...)``."""
         if self.back:
-            R = self._axes(here.t, here.y, here.k)
+            R = self._frame(here)
             return np.concatenate([(R * part[:, None]).sum(axis=0) for part in (w, v)])
         p0 = self.start[:, 3].reshape(3, *(1,) * (here.x.ndim - 1))
         v = v - cross(w, (here.x - p0) / self.unit)

@@ -26,6 +26,10 @@ ALONG, FOLLOWING = AlongCurve("Ts", Z), AlongCurve("Ts", X)
 """Places for a curve on link a, along z and along x of the frame."""
 BESIDE = AlongCurve("Tsb", X, back=True)
 """A place for a curve on link b."""
+HELD = ("P", "C")
+"""Types whose marker may keep its orientation on the way."""
+PLACE_DIGITS = 12
+"""Digits to which the direction of a plane is rounded, for the same reason."""
 CLOSING_ANGLE = 1e-9
 """Closing angle of a frame that counts."""
 
@@ -128,9 +132,14 @@ def _across(curve: Curve, place: AlongCurve, z: Sequence[float] | Array | None) 
     travel: Travel = curve.once(Travel)
     if place.tangent != X or z is None or not travel.is_straight or curve.guide is not None:
         return curve
-    t = travel.at(np.zeros(1)).t[:, 0]
-    across = np.asarray(z, dtype=float) - (t @ np.asarray(z)) * t
-    return curve if np.linalg.norm(across) < OFF_CURVE else curve.replace(frame="guided", guide=tuple(across))
+    here = travel.at(np.zeros(1))
+    along = [
+        round(v / float(np.linalg.norm(z)), PLACE_DIGITS)
+        for v in (here.k[:, 0] @ np.asarray(z), here.y[:, 0] @ np.asarray(z))
+    ]
+    if along[1] == 0:
+        return curve
+    return curve.replace(frame="guided", guide=along[0] * here.k[:, 0] + along[1] * here.y[:, 0])
 
 
 def kept_side(row: PairType, curve: Curve, roller: float | None, point: Sequence[float]) -> Sequence[float]:
@@ -193,6 +202,10 @@ def curve_faults(row: Any, curve: Curve, curve_b: Any, roller: Any, point: Any, 
     if curve_b is not None and len(places) < 2:
         found.append(
             f"{where}curve_b: a pair {row.symbol} takes one curve, on link a; exchange a and b for one on link b"
+        )
+    if any(given.frame == "held" for given in curves.values()) and row.symbol not in HELD:
+        found.append(
+            f"{where}curve: frame='held' is for {' and '.join(HELD)}; a pair {row.symbol} turns with its curve"
         )
     plane = roller or any(place.tangent == X for place in places)
     found += [

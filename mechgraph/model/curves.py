@@ -35,7 +35,7 @@ ORDERS = 4
 CLOSED_GAP = 1e-9
 """Gap over its extent up to which a curve is closed."""
 WHOLE_TURN = 2.0 * np.pi
-FRAMES = ("minimizing", "guided")
+FRAMES = ("minimizing", "guided", "held")
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -43,7 +43,8 @@ class Curve(Described, Once):
     """A curve in the frame of a link; ``Curve.circle(...)`` and so on make one.
 
     Its frame has the tangent as one direction. ``minimizing`` turns as little as possible about it (a plane curve keeps its normal);
-    ``guided`` holds the direction ``guide`` in the plane of tangent and third direction, the axis of the curve where left out.
+    ``guided`` holds the direction ``guide`` in the plane of tangent and third direction, the axis of the curve where left out. ``held``
+    does not turn at all (P and C): what travels along a circle is then translated as the coupler of a parallelogram is.
     """
 
     kind: ClassVar[str]

@@ -57,6 +57,10 @@ class Row(Protocol):
         """Whether the efforts are combined to be dual to the freedoms."""
 
     @property
+    def pushed(self) -> tuple[int, ...]:
+        """Freedoms whose effort is a force along the velocity of the origin of marker B, whatever its component says."""
+
+    @property
     def computed_reactions(self) -> bool:
         """Whether the components are combined with the efforts to do no work."""
 
@@ -142,11 +146,15 @@ def _moved(
 def efforts_of(row: Row, pitch: Array, frames: Sequence[Array], x: Array | None = None) -> Array:
     """Effort wrenches ``E``, one a freedom, ``(6, f, n, T)``; combined to ``E (S^T E)^-1`` where the row asks for it."""
     E = components_of(row.efforts, pitch, frames)
-    return dual(E, twists_of(row, pitch, frames, x)) if row.computed_efforts else E
+    return dual(row, E, twists_of(row, pitch, frames, x), frames[-1][:, 3]) if row.computed_efforts else E
 
 
-def dual(E: Array, S: Array) -> Array:
-    """The combinations ``E (S^T E)^-1`` of efforts ``(6, f, n, T)`` that are dual to the twists ``S``."""
+def dual(row: Row, E: Array, S: Array, p: Array) -> Array:
+    """The combinations ``E (S^T E)^-1`` of efforts ``(6, f, n, T)`` of a row that are dual to the twists ``S``, B at ``p (3, n, T)``."""
+    if row.pushed:
+        E, at = E.copy(), list(row.pushed)
+        along = S[3:, at] + cross(S[:3, at], np.broadcast_to(p[:, None], S[3:, at].shape))
+        E[3:, at], E[:3, at] = along, cross(np.broadcast_to(p[:, None], along.shape), along)
     unit = np.einsum("ifnt,ignt->ntfg", S, E)
     return np.asarray(np.einsum("ignt,gfnt->ifnt", E, batch_last(np.linalg.inv(unit))))
 

@@ -85,6 +85,7 @@ class PairType:
     computed_efforts: bool
     touching: Touching | None
     computed_reactions: bool
+    pushed: tuple[int, ...]
 
     def __init__(
         self,
@@ -250,6 +251,7 @@ def fill_row(
         "computed_efforts": False,
         "touching": touching,
         "computed_reactions": False,
+        "pushed": (),
     }
     for key, value in fields.items():
         object.__setattr__(row, key, value)

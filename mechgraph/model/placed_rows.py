@@ -68,6 +68,15 @@ def filled(row: PairType, factors: Sequence[AlongCurve | OnSurface], pair: str) 
     left = (replace(factor, pair=pair) for factor in factors)
     steps = tuple(next(left) if isinstance(step, AlongCurve | OnSurface) else step for step in row.steps)
     object.__setattr__(out, "steps", steps)
+    held = tuple(
+        columns.start
+        for step, (columns, _) in zip(steps, evaluation.places(out), strict=True)
+        if isinstance(step, AlongCurve) and step.held
+    )
+    if held:  # no component is constant in a frame that does not turn with the curve
+        object.__setattr__(out, "pushed", held)
+        object.__setattr__(out, "reactions", None)
+        return out
     x = evaluation.random_coordinates(out, np.random.default_rng(12345), 1, TRIED_PLACES)
     for step, (_, numbers) in zip(steps, evaluation.places(out), strict=True):
         if isinstance(step, AlongCurve):
