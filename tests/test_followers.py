@@ -211,3 +211,72 @@ def test_a_straight_slot_has_the_plane_that_its_axis_asks_for(direction, turn):
     assert not pair.faults()
     assert pair.replace() == pair
     assert pair.replace(point=None, axis=None, on_a=pair.markers[0], on_b=pair.markers[1]).type == pair.type
+
+
+# --- many turns ------------------------------------------------------------------------------------------------------
+
+
+def lifted():
+    """A cam of a law with its roller."""
+    lobe = mg.Curve.cam.of(law(), 0.9, second=(0, 1, 0), roller_radius=0.2, offset=0.15)
+    top = lobe.at(np.array(0.0))[0]
+    return driven_cam(
+        mg.Pair("F", "P", "frame", "follower", point=top, axis=(0, 1, 0)),
+        mg.Pair("K", "Ps", "cam", "follower", curve=lobe, point=top),
+        point=top,
+    )
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+def test_a_closed_curve_comes_back_after_every_round(engine):
+    """Positions of fifty turns are those of the first, the place on the curve its length further each turn; one turn is followed."""
+    m, one = (
+        lifted(),
+        0.05 + np.linspace(0, 2 * np.pi, 13)[:-1],
+    )  # off the samples, at which the roller's acceleration jumps
+    every = (one + 2 * np.pi * np.arange(50)[:, None]).ravel()
+    first = mg.solve(m, {"A": mg.Motion(one, 3.0, 2.0)}, engine=engine)
+    s = mg.solve(m, {"A": mg.Motion(every, 3.0, 2.0)}, engine=engine)
+    assert s.work.nodes < 4 * first.work.nodes
+    for name in ("F", "K"):
+        for what in ("velocity", "acceleration", "reaction"):
+            x, y = (
+                getattr(of[name], what)[:, 2:5] if what == "reaction" else getattr(of[name], what) for of in (s, first)
+            )
+            x = x.reshape(50, *y.shape)
+            assert_allclose(x, np.broadcast_to(y, x.shape), atol=1e-9 * np.abs(y).max())
+    length = m.pair("K").type.steps[0].travel.length
+    rounds = s["K"].position[:, 0].reshape(50, 12) - first["K"].position[:, 0]
+    assert_allclose(
+        rounds, np.sign(rounds[1, 0]) * length * np.arange(50)[:, None] * np.ones(12), atol=1e-9 * 50 * length
+    )
+
+
+def test_a_driven_place_on_a_closed_curve_comes_back():
+    """A block carried round and round a track by its arc length."""
+    track = mg.Curve.ellipse(a=2.0, b=1.0)
+    block = mg.Link("block", 2.0, (2.1, 0, 0), np.diag([0.1, 0.2, 0.3]))
+    m = mg.Mechanism(
+        "track", [mg.Link("frame"), block], [mg.Pair("K", "P", "frame", "block", curve=track, point=(2, 0, 0))], ["K"]
+    )
+    length = m.pair("K").type.steps[0].travel.length
+    part = length * np.linspace(0, 1, 7)[:-1]
+    s = mg.solve(m, {"K": mg.Motion((part + length * np.arange(30)[:, None]).ravel(), 1.0)})
+    x = s.link("block").center.reshape(30, 6, 3)
+    assert_allclose(x, np.broadcast_to(x[0], x.shape), atol=1e-10)
+
+
+def test_a_response_round_a_closed_curve_is_tabulated_once():
+    """A cam turned by a constant torque against a damper goes round and round; energy is balanced and the lift is the law's."""
+    m = lifted().replace(
+        drives=[], loads=[mg.Effort("A", 20.0), mg.Damper("A", coefficient=4.0), mg.Gravity((0, -9.81, 0))]
+    )
+    r = mg.respond(m, np.linspace(0, 12.0, 25), rates={"A": 5.0}, rtol=1e-9)
+    angle = r["A"].position[:, 0]
+    assert angle[-1] > 8 * np.pi
+    lift = mg.kinematics(lifted(), {"A": angle % (2 * np.pi)})["F"].position
+    assert_allclose(r["F"].position, lift, atol=1e-8)
+    e = r.energy
+    assert_allclose(
+        e.kinetic + e.potential - e.work, (e.kinetic + e.potential - e.work)[0], atol=1e-5 * np.abs(e.work).max()
+    )

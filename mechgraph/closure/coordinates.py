@@ -18,7 +18,7 @@ def continued(path: DriverPath, found: Positions) -> Array:
     start = s.start_coordinates(s.m.start)
     if all(len(factor) == 1 for g in s.groups for factor in g.row.factors):
         q = s.coordinates_of(found.x)
-        return q if found.gained is None else q + found.gained
+        return q if found.gained is None else q + s.in_user_units(found.gained)
     out = np.full((s.n_freedoms, found.x.shape[1]), np.nan)
     good = np.flatnonzero(found.moved)
     turns = np.zeros(found.x.shape[1], dtype=np.intp) if found.turns is None else found.turns
@@ -45,7 +45,7 @@ def continued(path: DriverPath, found: Positions) -> Array:
             back = np.empty_like(order)
             back[order] = np.arange(len(order))
             out[:, at], near = q[:, back[len(number) :]], q[:, -1]
-    return out if found.gained is None else out + found.gained
+    return out if found.gained is None else out + s.in_user_units(found.gained)
 
 
 def _by_track(track: Index) -> list[tuple[int, Index]]:

@@ -20,7 +20,6 @@ from mechgraph.closure.legs import Legs
 from mechgraph.numerics.continuation import Follower
 from mechgraph.numerics.tracks import Nodes, Paths
 
-TURN = 2.0 * np.pi
 TURNS = (1, 4, 16)
 """Turns of the driver over which a motion is followed to see whether it repeats itself, one number after the other."""
 WORTH = 2
@@ -63,9 +62,10 @@ def _along_curves(path: DriverPath, requests: list[Request], total: int) -> Posi
         for sense, there in ((1.0, along >= 0), (-1.0, along < 0)):
             if there.any():
                 ways.append(_Way(request, sense, np.flatnonzero(there), sense * along[there]))
-    if not path.system.is_length[path.columns[0]]:
+    turn = path.system.periods[path.columns[0]]
+    if np.isfinite(turn):
         for most in TURNS:
-            far = [way for way in ways if way.period == np.inf and not way.ends and way.way.max() > WORTH * most * TURN]
+            far = [way for way in ways if way.period == np.inf and not way.ends and way.way.max() > WORTH * most * turn]
             if far:
                 _find_periods(path, far, most)
     legs = Legs(path, total)
@@ -95,7 +95,7 @@ def _find_periods(path: DriverPath, ways: list[_Way], most: int) -> None:
     """Follow the motion over some turns of the driver and note where it repeats itself."""
     path.variant_of = np.array([way.request.variant for way in ways], dtype=np.intp)
     x = np.stack([way.request.x for way in ways], axis=1)
-    ends = TURN * np.arange(most + 1.0)
+    ends = path.system.periods[path.columns[0]] * np.arange(most + 1.0)
     points = [x[path.rows, v][:, None] + way.sense * ends for v, way in enumerate(ways)]
     follower = Follower(path)
     tracks = follower.follow(x, Paths(points, [np.ones(most + 1, dtype=bool)] * len(ways)))
@@ -118,8 +118,8 @@ def _shift(path: DriverPath, follower: Follower, node: Nodes, start: Nodes, cros
     system = path.system
     x = follower.newton.close(node.x, node.drive, node.track, node.which).x
     gained = path.difference(x, start.x)[:, 0]
-    turning = (system.single_rows >= 0) & ~system.is_length
-    shift = np.where(turning, TURN * np.round(gained / TURN), 0.0)
+    turning = (system.single_rows >= 0) & np.isfinite(system.periods)
+    shift = np.where(turning, system.rounds(np.arange(system.n_freedoms), gained), 0.0)
     here = path.at(start.x, start.drive, start.track)
     free = path.factored(here, start.which).motions()[:, :, 0]
     left = gained - shift

@@ -206,6 +206,20 @@ class Places:
         columns = np.flatnonzero(np.isfinite(ranges).any(axis=1))
         return columns, ranges[columns, 0], ranges[columns, 1]
 
+    @sized
+    def periods(self) -> Array:
+        """By how much every freedom ``(F,)`` grows until it is back: a turn, the length of a closed curve; infinite where it goes on."""
+        out = np.full(self.n_freedoms, np.inf)
+        for g in self.groups:
+            out[g.columns] = np.array([p for step in g.row.steps for p in step.periods])[:, None] if g.row.f else np.inf
+        return out
+
+    def rounds(self, columns: Index | NDArray[np.bool_], gained: Array) -> Array:
+        """What whole rounds amount to in gains ``(n, ...)`` of some freedoms: zero in those that do not come back."""
+        period = self.periods[columns].reshape(-1, *(1,) * (gained.ndim - 1))
+        back = np.isfinite(period)
+        return np.where(back, np.where(back, period, 0.0) * np.round(gained / period), 0.0)
+
     def place_of(self, pair: int) -> tuple[int, int]:
         """Number of the group of a pair, and its place there."""
         number = int(self._types[1][pair])

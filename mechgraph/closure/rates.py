@@ -137,7 +137,7 @@ def disagreement(moved: Rates, columns: Index, positions: Array, velocity: Array
     """How far motions given to freedoms ``columns (d, T)`` are from those found, relative ``(T,)``; angles up to whole turns."""
     system = moved.here.system
     off = positions - moved.here.x[system.single_rows[columns]]
-    off -= np.where(system.is_length[columns], 0.0, 2 * np.pi)[:, None] * np.round(off / (2 * np.pi))
+    off -= system.rounds(columns, off)
     out = np.maximum(np.abs(off).max(axis=0, initial=0.0), moved.contradiction)
     for asked, found in ((velocity, moved.dq), (acceleration, moved.ddq)):
         size = np.abs(found).max(axis=0, initial=0.0) + np.abs(asked).max(axis=0, initial=0.0)

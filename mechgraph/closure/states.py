@@ -63,6 +63,10 @@ class States(Places):
         q[self.is_length] *= self.par.L
         return q
 
+    def in_user_units(self, gained: Array) -> Array:
+        """Amounts ``(F, ...)`` in the units of the user."""
+        return gained * np.where(self.is_length, self.par.L, 1.0).reshape(-1, *(1,) * (gained.ndim - 1))
+
     def start_coordinates(self, start: Mapping[str, float]) -> Array:
         """User coordinates ``(F,)`` from a mapping freedom -> value, zero elsewhere."""
         q = np.zeros(self.n_freedoms)

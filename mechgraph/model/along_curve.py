@@ -70,6 +70,11 @@ class AlongCurve(Factor):
         return ((-high, -low) if self.reversed else (low, high),)
 
     @property
+    def periods(self) -> tuple[float, ...]:
+        """The length of a closed curve."""
+        return (self.travel.length / self.unit if self.travel.is_closed else np.inf,)
+
+    @property
     def outline(self) -> tuple[Array, ...]:
         """The curve, seen from the frame at coordinate zero: the one before the factor, or on the side of link b the one behind it.
 

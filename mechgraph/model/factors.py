@@ -23,6 +23,8 @@ from mechgraph.algebra.se3 import Array, homogeneous, inverse, quaternion_matrix
 from mechgraph.model.row_parts import Freedom
 
 Flags = NDArray[np.bool_]
+TURN = 2.0 * np.pi
+"""A turn."""
 
 
 class Factor(ABC):
@@ -42,6 +44,11 @@ class Factor(ABC):
     def ranges(self) -> tuple[tuple[float, float], ...]:
         """Least and greatest value of every coordinate; infinite where it does not end."""
         return ((-np.inf, np.inf),) * len(self.freedoms)
+
+    @property
+    def periods(self) -> tuple[float, ...]:
+        """By how much every coordinate grows until the motion is back; infinite where it goes on. Turns do so round by round."""
+        return tuple(TURN if freedom.turns else np.inf for freedom in self.freedoms)
 
     @property
     def outline(self) -> tuple[Array, ...]:

@@ -58,6 +58,12 @@ class OnSurface(Factor):
         return tuple(((low - at) * size, (high - at) * size) for (low, high), at, size in parts)
 
     @property
+    def periods(self) -> tuple[float, ...]:
+        """Lengths after which the surface returns into itself."""
+        assert self.surface is not None
+        return tuple((np.array(self.surface.periods) * self.sizes / self.unit).tolist())
+
+    @property
     def outline(self) -> tuple[Array, ...]:
         """Lines of the surface about the frame at coordinates zero, on both sides of it as far as it goes, at most its size at home."""
         if self.surface is None:

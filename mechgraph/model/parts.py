@@ -159,6 +159,11 @@ class Parts(Formatted):
         found = self._find_freedom(freedom)
         return not isinstance(found, str) and self.pairs[found[0]].type.freedoms[found[1]].turns
 
+    def period(self, freedom: str) -> float:
+        """By how much the coordinate of a freedom grows until it is back: a turn, the length of a closed curve, or infinite."""
+        pair, number = self.freedom(freedom)
+        return [period for step in self.pairs[pair].type.steps for period in step.periods][number]
+
     def in_own_units(self, freedom: str, value: Any) -> Any:
         """A coordinate given as a quantity of pint as a plain number in the declared units; unchanged where it does not fit."""
         return without_units(value, PURE if self.turns(freedom) else LENGTH, self.units)

@@ -57,6 +57,11 @@ class Surface(Described):
         """Least and greatest values of both parameters; infinite where the surface goes on or closes."""
         return NO_ENDS, NO_ENDS
 
+    @property
+    def periods(self) -> tuple[float, float]:
+        """Ranges of both parameters after which the surface returns into itself; infinite where it does not."""
+        return np.inf, np.inf
+
     def grid(self, p: Array) -> tuple[Array, Array]:
         """Parameters among which one is near to a point ``(3,)``."""
         size = 1.0 + 2.0 * float(np.linalg.norm(p))
@@ -187,6 +192,12 @@ class Turned(AboutAxis):
     def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Those of the meridian."""
         return NO_ENDS, NO_ENDS if self._curve.is_closed else self._curve.ends
+
+    @property
+    def periods(self) -> tuple[float, float]:
+        """A turn, and the range of a closed meridian."""
+        begin, end = self._curve.ends
+        return WHOLE_TURN, end - begin if self._curve.is_closed else np.inf
 
     def grid(self, p: Array) -> tuple[Array, Array]:
         """A whole turn, and the meridian; of an endless one no farther from where it begins than the point."""

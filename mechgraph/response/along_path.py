@@ -37,7 +37,6 @@ from mechgraph.response.way import POINTS, Piece, Way
 
 FAST = 2.0
 """Rate of another freedom against that of the coordinate above which it becomes the coordinate."""
-TURN = 2.0 * np.pi
 UNEVEN = 0.37
 """Where in its part of a turn loads are compared with those a turn later: not at the quarters, where change points often are."""
 PERIODIC = 1e-9
@@ -56,6 +55,8 @@ class Arc:
         motion = closure_rank(Configuration(s, x[:, None]), engine=task.engine).motions[:, 0]
         singles = np.flatnonzero(s.single_rows >= 0)
         self.column = int(singles[np.argmax(np.abs(motion[singles]))])
+        self.turn = float(s.periods[self.column]) if np.isfinite(s.periods[self.column]) else 0.0
+        """By how much the coordinate grows in a whole turn, or round a closed curve; zero where it goes on."""
         columns = np.array([self.column], dtype=np.intp)
         self.path = DriverPath(s, closure_solver(task.engine, columns), partial(_same, s))
         self.begin, self.rate = float(x[s.single_rows[self.column]]), float(dq[self.column])
@@ -67,7 +68,7 @@ class Arc:
     def piece(self, u: float) -> tuple[Piece, float] | None:
         """The piece in which a place lies, and the whole turns by which the place is further on; None where the table ends before."""
         turns = float(self._turns(np.array([u]))[0])
-        u -= TURN * turns
+        u -= self.turn * turns
         way = self._ways[float(np.sign(u - self.begin)) or self._first_way]
         at = way.sense * (u - self.begin)
         while (at > way.length or not way.length) and not way.closed:
@@ -80,13 +81,13 @@ class Arc:
         """Whole turns by which places ``u (T,)`` are further on than where they are tabulated."""
         if self._advance is None:
             return np.zeros(len(u))
-        return np.asarray(self._sense * np.floor(self._sense * (u - self.begin) / TURN))
+        return np.asarray(self._sense * np.floor(self._sense * (u - self.begin) / self.turn))
 
     def close(self, u: Array) -> Closed:
         """Closed states at places ``u (T,)`` within the table."""
         s = self.task.system
         turns = self._turns(u)
-        home = u - TURN * turns
+        home = u - self.turn * turns
         x, which = np.empty((s.n_state, len(u))), np.empty(len(u), dtype=np.intp)
         for way in self._ways.values():
             mine = np.where(home == self.begin, self._first_way, np.sign(home - self.begin)) == way.sense
@@ -101,24 +102,23 @@ class Arc:
 
     def _extend(self, way: Way) -> None:
         """Tabulate the path further, up to where another freedom moves much faster, or until it comes back."""
-        turning = not self.task.system.is_length[self.column]
-        way.extend(TURN if turning and way.length < TURN else np.inf)
-        if turning and way.length >= TURN and self._advance is None:
+        way.extend(self.turn if way.length < self.turn else np.inf)
+        if 0.0 < self.turn <= way.length and self._advance is None:
             self._advance, self._sense = self._after_a_turn(way.sense), way.sense
 
     def _after_a_turn(self, sense: float) -> Array | None:
         """How the state has advanced after a turn of the coordinate, where all links and loads are back; None where they are not."""
         s = self.task.system
-        ends = self.close(self.begin + sense * TURN * np.array([0.0, 1.0])).here
+        ends = self.close(self.begin + sense * self.turn * np.array([0.0, 1.0])).here
         if np.abs(ends.poses[..., 1] - ends.poses[..., 0]).max() > PERIODIC:
             return None
         out = np.zeros(s.n_state)
         singles = np.flatnonzero(s.single_rows >= 0)
         rows = s.single_rows[singles]
         turned = sense * (ends.x[rows, 1] - ends.x[rows, 0])
-        out[rows] = np.where(s.is_length[singles], 0.0, TURN * np.round(turned / TURN))
+        out[rows] = s.rounds(singles, turned)
         # a load may count turns, as a spring in a freedom does that winds up: then nothing comes back
-        around = self.close(self.begin + sense * TURN * (np.arange(POINTS) + UNEVEN) / POINTS)
+        around = self.close(self.begin + sense * self.turn * (np.arange(POINTS) + UNEVEN) / POINTS)
         further = Configuration(s, around.here.x + sense * out[:, None])
         loads, factored = self.task.loads, self.path.solver.factored(further, around.f.which)
         now, then = along_one(around.here, around.f, loads), along_one(further, factored, loads)
@@ -142,13 +142,13 @@ class PathStage:
     def _terms(self, u: float) -> Array:
         """Values of the series at a place."""
         piece, turns = self._piece, self._turns
-        w = u - TURN * turns
+        w = u - self.arc.turn * turns
         if piece is None or not min(piece.begin, piece.end) <= w <= max(piece.begin, piece.end):
             found = self.arc.piece(u)
             if found is None:
                 return np.full(4, np.nan)
             self._piece, self._turns = piece, turns = found
-            w = u - TURN * turns
+            w = u - self.arc.turn * turns
         z = (2.0 * w - piece.begin - piece.end) / (piece.end - piece.begin)
         # Chebyshev polynomials by their angles: one cosine each
         angle = np.arccos(min(1.0, max(-1.0, z)))

@@ -126,10 +126,11 @@ def _runs(q: Array, v: Array) -> bool:
 
 
 def _returned(values: Array, name: str, s: Solution, ended: bool) -> bool:
-    """Whether the last value of a coordinate or rate leads back to the first; a turn is where it was after whole turns."""
+    """Whether the last value of a coordinate or rate leads back to the first, up to whole turns and rounds of closed curves."""
     gap = float(values[-1] - values[0])
-    if s.whole.turns(name):
-        gap -= 2 * np.pi * round(gap / (2 * np.pi))
+    period = s.whole.period(name)
+    if np.isfinite(period):
+        gap -= period * round(gap / period)
     size = float(np.ptp(values)) + float(np.abs(values).max())
     return abs(gap) <= (
         RETURNED * max(size, 1e-300)
