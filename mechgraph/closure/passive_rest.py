@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, cross, rotate, rotate_back
-from mechgraph.closure.driver_path import DriverPath, Positions, Status, in_blocks
+from mechgraph.closure.driver_path import DriverPath, Mask, Positions, Status, in_blocks
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.passive_motion import PassiveMotion, PassiveMotions, are_alone
-from mechgraph.closure.passive_steps import PassiveSteps
+from mechgraph.closure.passive_steps import PassiveSteps, rest_is_sure
 from mechgraph.closure.rates import Velocities
 from mechgraph.closure.solver import FactoredClosure
 from mechgraph.numerics.continuation import Follower
@@ -25,6 +25,8 @@ MOST_TURNS = 8
 """Most repetitions of the turn that takes the spin out."""
 UNTURNED = 1e-13
 """Angle that is rounding."""
+MISSING = 1e-9
+"""Angle, or length / L, that may be missing to rest where repetition ends: what poor condition leaves of the rounding."""
 
 
 def unspun(path: DriverPath, found: Positions, passive: tuple[PassiveMotion, ...]) -> Positions:
@@ -42,19 +44,20 @@ def unspun(path: DriverPath, found: Positions, passive: tuple[PassiveMotion, ...
         return found
     how = _Carried if are_alone(passive) else PassiveSteps
     carried = how(path, interpolation, found.follower, passive)
-    x = found.x.copy()
+    x, status = found.x.copy(), found.status.copy()
     turns = np.zeros(found.x.shape[1], dtype=np.intp) if found.turns is None else found.turns
     for at in in_blocks(good):
-        x[:, at] = carried.turned(found.x[:, at], found.which[at], found.track[at], found.place[at], turns[at])
+        x[:, at], sure = carried.turned(found.x[:, at], found.which[at], found.track[at], found.place[at], turns[at])
+        status[at[~sure]] = Status.NOT_CLOSED
 
     def turned(some: Nodes) -> Nodes:
         still = np.zeros(len(some), dtype=np.intp)
-        return replace(some, x=carried.turned(some.x, some.which, some.track, some.place, still))
+        return replace(some, x=carried.turned(some.x, some.which, some.track, some.place, still)[0])
 
     tracks = replace(found.tracks, nodes=turned(nodes))
     crossings = [replace(c, sides=turned(c.sides)) for c in found.crossings]
     spin = carried.spin(tracks.nodes) if found.turns is not None and isinstance(carried, _Carried) else None
-    return replace(found, x=x, here=None, tracks=tracks, crossings=crossings, spin=spin)
+    return replace(found, x=x, status=status, here=None, tracks=tracks, crossings=crossings, spin=spin)
 
 
 @dataclass(frozen=True)
@@ -167,6 +170,7 @@ class _Carried:
         track, which = nodes.track[left][step], nodes.which[left][step]
         drive = self.follower.paths.drive(track, place)
         closed = self.follower.newton.close(self.interpolation(step, place, drive), drive, track, which)
+        self._sure = rest_is_sure(closed, step, nodes.track[left])
         there, f = self._motions(closed.x, closed.which, track)
         dq = (f.sensitivity() * self.interpolation.slope[:, step]).sum(axis=1)
         moving = Velocities(there.here, dq + there.at_rest(there.here.link_twists(dq)))
@@ -204,38 +208,42 @@ class _Carried:
         period *= np.where((u[:, last, -1] * u[:, first, 0]).sum(axis=0) < 0, -1.0, 1.0)
         return _Course(u, e, c, begin, series, period[of_track])
 
-    def turned(self, x: Array, which: Index, track: Index, place: Array, turns: Index) -> Array:
-        """States with all passive links moved to where they stand when they are at rest, ``turns`` periods of the track later."""
+    def turned(self, x: Array, which: Index, track: Index, place: Array, turns: Index) -> tuple[Array, Mask]:
+        """States with all passive links moved to where they stand when they are at rest, ``turns`` periods of the track later.
+
+        Also where that is beyond doubt.
+        """
         for _ in range(MOST_TURNS):
-            amount, dq = self._missing(x, which, track, place, turns)
-            if amount < UNTURNED:
+            amount, dq, sure = self._missing(x, which, track, place, turns)
+            if amount.max(initial=0.0) < UNTURNED:
                 break
             # exact where the rates of the motion are constant (ball joints, hinges), so that nothing is left to correct; over a plane it
             # comes nearer with every repetition
             closed = self.follower.newton.close(self.path.advance(x, dq, track), x[self.path.rows], track, which)
             x = closed.x
             if closed.correction.max(initial=0.0) < UNTURNED:
+                amount = np.zeros(len(track))
                 break
-        return x
+        return x, sure & (amount < MISSING)
 
     def spin(self, nodes: Nodes) -> Array:
         """Increments ``(F, nodes)`` from nodes to one period later."""
         return self._missing(nodes.x, nodes.which, nodes.track, nodes.place, np.ones(len(nodes), dtype=np.intp))[1]
 
-    def _missing(self, x: Array, which: Index, track: Index, place: Array, turns: Index) -> tuple[float, Array]:
-        """The largest amount of a motion that is missing to rest at states, and the increments ``(F, n)`` that lead there."""
+    def _missing(self, x: Array, which: Index, track: Index, place: Array, turns: Index) -> tuple[Array, Array, Mask]:
+        """Amounts ``(n,)`` by which states miss rest, increments ``(F, n)`` that lead there, and where the way to it is beyond doubt."""
         nodes = self.interpolation.nodes
         tracks = nodes.track[self.interpolation.left]
         moved = np.isin(track, tracks)
         step = self.interpolation.find(np.where(moved, track, tracks[0]), place)
         t = 2.0 * (place - nodes.place[self.interpolation.left[step]]) / self._h[step] - 1.0
         here, _ = self._motions(x, which, track)
-        dq, most = np.zeros((here.rates.shape[0], x.shape[1])), 0.0
+        dq, most = np.zeros((here.rates.shape[0], x.shape[1])), np.zeros(x.shape[1])
         for i, course in self._courses.items():
             amount, part = course.missing(_At.of(here, i), step, t, turns)
-            most = max(most, float(np.abs(np.where(moved, amount, 0.0)).max(initial=0.0)))
+            most = np.maximum(most, np.abs(np.where(moved, amount, 0.0)))
             dq += np.where(moved, part, 0.0)
-        return most, dq
+        return most, dq, self._sure[step] | ~moved
 
 
 def _turning(e: Array, u: Array, du: Array) -> Array:

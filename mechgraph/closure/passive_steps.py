@@ -9,17 +9,29 @@ from __future__ import annotations
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.driver_path import DriverPath
+from mechgraph.closure.driver_path import DriverPath, Mask
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.passive_motion import PassiveMotion, PassiveMotions
 from mechgraph.numerics.continuation import Follower
 from mechgraph.numerics.hermite import Interpolation
 from mechgraph.numerics.legendre import GAUSS, POINTS, TO_SERIES, integrals
+from mechgraph.numerics.newton import Closed
+from mechgraph.numerics.tolerances import PATH
 
 MOST_TIMES = 30
 """Most repetitions of a step: each leaves a small part of what was wrong along the passive motions."""
 REPEATED = 1e-14
 """Change of the increments of a step that is rounding."""
+SETTLED = 1e-10
+"""Change of the increments of a step up to which its repetitions have come to an end."""
+
+
+def rest_is_sure(closed: Closed, step: Index, track: Index) -> Mask:
+    """Steps with which, and up to which, the way of a ``track`` is beyond doubt: states ``closed`` in a ``step`` are as foretold."""
+    bad = np.zeros(len(track), dtype=bool)
+    bad[step[~closed.done | (closed.correction > PATH.correction)]] = True
+    before = np.cumsum(bad)
+    return before == (before - bad)[np.searchsorted(track, track)]
 
 
 class PassiveSteps:
@@ -37,21 +49,22 @@ class PassiveSteps:
         self._h = nodes.place[right] - nodes.place[left]
         self._series = np.zeros((path.size[0], len(left), GAUSS))
         self._begin = nodes.x[:, left]
+        self._sure = np.ones(len(left), dtype=bool)
         number = np.arange(len(left)) - np.searchsorted(nodes.track[left], nodes.track[left])
         for k in range(int(number.max(initial=-1)) + 1):
             steps = np.flatnonzero(number == k)
             if k:
                 before = steps - 1
                 drive = nodes.drive[:, right[before]]
-                self._begin[:, steps] = self._at(before, np.ones(len(steps)), drive, nodes.which[left[steps]])[0]
+                closed = self._at(before, np.ones(len(steps)), drive, nodes.which[left[steps]])
+                self._begin[:, steps], self._sure[steps] = closed.x, self._sure[before] & closed.done
             self._follow(steps)
 
-    def _at(self, step: Index, t: Array, drive: Array, which: Index) -> tuple[Array, Index]:
-        """Closed states in steps at ``t`` from -1 to 1, and their forms."""
+    def _at(self, step: Index, t: Array, drive: Array, which: Index) -> Closed:
+        """States in steps at ``t`` from -1 to 1, closed."""
         dq = np.einsum("fng,ng->fn", self._series[:, step], integrals(t))
         track = self.interpolation.nodes.track[self.interpolation.left[step]]
-        closed = self.follower.newton.close(self.path.advance(self._begin[:, step], dq, track), drive, track, which)
-        return closed.x, closed.which
+        return self.follower.newton.close(self.path.advance(self._begin[:, step], dq, track), drive, track, which)
 
     def _follow(self, steps: Index) -> None:
         """Find the increments of some steps, of different tracks."""
@@ -61,24 +74,29 @@ class PassiveSteps:
         track, which = nodes.track[np.repeat(left, GAUSS)], nodes.which[np.repeat(left, GAUSS)]
         drive = self.follower.paths.drive(track, place)
         for _ in range(MOST_TIMES):
-            x, forms = self._at(many, t, drive, which)
-            here = self.path.at(x, drive, track)
-            f = self.path.factored(here, forms)
+            closed = self._at(many, t, drive, which)
+            x, here = closed.x, self.path.at(closed.x, drive, track)
+            f = self.path.factored(here, closed.which)
             dq = (f.sensitivity() * self.interpolation.slope[:, many]).sum(axis=1)
             dq += PassiveMotions(here, self.passive, f.motions()).at_rest(here.link_twists(dq))
             rates = self.path.tangent(self.path.difference(x, self._begin[:, many]), dq)
             series = self._h[steps, None] * (rates.reshape(-1, len(steps), GAUSS) @ TO_SERIES)
-            change = np.abs(series - self._series[:, steps]).max(initial=0.0)
+            change = np.abs(series - self._series[:, steps]).max(axis=(0, 2), initial=0.0)
             self._series[:, steps] = series
-            if change < REPEATED * max(1.0, float(np.abs(series).max(initial=0.0))):
+            if change.max() < REPEATED * max(1.0, float(np.abs(series).max(initial=0.0))):
                 break
+        self._sure[steps] &= (change < SETTLED) & closed.done.reshape(-1, GAUSS).all(axis=1)
 
-    def turned(self, x: Array, which: Index, track: Index, place: Array, turns: Index) -> Array:
-        """States at rest at places of the tracks, as far as these have steps; their motion is followed all the way, without ``turns``."""
+    def turned(self, x: Array, which: Index, track: Index, place: Array, turns: Index) -> tuple[Array, Mask]:
+        """States at rest at places of the tracks, as far as these have steps; their motion is followed all the way, without ``turns``.
+
+        Also where that is beyond doubt.
+        """
         nodes, left = self.interpolation.nodes, self.interpolation.left
         moved = np.flatnonzero(np.isin(track, nodes.track[left]))
         step = self.interpolation.find(track[moved], place[moved])
         t = 2.0 * (place[moved] - nodes.place[left[step]]) / self._h[step] - 1.0
-        out = x.copy()
-        out[:, moved] = self._at(step, t, x[self.path.rows][:, moved], which[moved])[0]
-        return out
+        out, sure = x.copy(), np.ones(x.shape[1], dtype=bool)
+        closed = self._at(step, t, x[self.path.rows][:, moved], which[moved])
+        out[:, moved], sure[moved] = closed.x, self._sure[step] & closed.done
+        return out, sure

@@ -17,6 +17,9 @@ Index = NDArray[np.intp]
 
 STRAIGHT_ON = 1 - 1e-9
 """Cosine between two steps above which a track goes straight on: rounding, no corner."""
+CLOSEST = 1 / 16
+"""Distance of two nodes, in parts of a step beside them, below which only the step's own nodes give its polynomial: divided differences
+over nodes at a distance d err by the rounding of the nodes times (h / d)^3."""
 
 
 def divided_differences(places: Array, values: Array, rates: Array) -> tuple[Array, Array]:
@@ -120,11 +123,17 @@ class Interpolation:
         begin = self.left[np.searchsorted(run, run, side="left")]
         end = self.right[np.searchsorted(run, run, side="right") - 1]
         width = np.minimum(PATH.window, end - begin + 1)
+        place, first = self.nodes.place, np.clip(self.left - (width - 2) // 2, begin, end - width + 1)
+        for k in range(PATH.window - 1):
+            a = np.minimum(first + k, end - 1)
+            inside = (k < width - 1) & (a + 1 - self.left != 1)
+            near = place[a + 1] - place[a] < CLOSEST * (place[self.right] - place[self.left])
+            width = np.where(inside & near, 2, width)
+        first = np.where(width == 2, self.left, first)
         out = []
         for w in np.unique(width):
             i = np.flatnonzero(width == w)
-            first = np.clip(self.left[i] - (w - 2) // 2, begin[i], end[i] - w + 1)
-            names = first + np.arange(w)[:, None]
+            names = first[i] + np.arange(w)[:, None]
             order = np.argsort(np.abs(names - self.left[i] - 0.25), axis=0, kind="stable")
             out.append((i, np.take_along_axis(names, order, axis=0)))
         return out
