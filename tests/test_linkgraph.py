@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mechgraph as mg
+from mechgraph.closure.indexing import indexed
 from mechgraph.topology.linkgraph import graph_of_ends, link_graph, network
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -178,3 +179,28 @@ def test_network_is_a_multigraph_with_links_and_pairs_as_data():
     assert graph.number_of_edges("frame", "door") == 2
     assert graph.edges["frame", "door", "B"]["pair"] is m.pair("B")
     assert graph.nodes["door"]["link"] is m.link("door")
+
+
+def test_what_follows_from_the_graph_alone_is_made_once_for_all_numbers():
+    """Start, masses and places of pairs may change; another end or type makes another graph."""
+    m = mg.load("four-bar")
+    before = indexed(m)
+    heavier = [link.replace(mass=2.0 * link.mass) if link.mass else link for link in m.links]
+    moved = [pair.replace(point=tuple(2.0 * x for x in pair.point)) if pair.point else pair for pair in m.pairs]
+    for other in (
+        m.replace(start=dict(m.start)),
+        m.replace(links=heavier),
+        m.replace(pairs=moved),
+        m.replace(tol=1e-6),
+    ):
+        after = indexed(other)
+        assert after.graph is before.graph
+        assert all(
+            getattr(after, name) is getattr(before, name) for name in ("walk", "batches", "entries", "rotations")
+        )
+    assert not np.array_equal(indexed(m.replace(pairs=moved)).par.marker_a, before.par.marker_a)
+    turned = [m.pairs[0].replace(a=m.pairs[0].b, b=m.pairs[0].a), *m.pairs[1:]]
+    assert indexed(m.replace(pairs=turned)).graph is not before.graph
+    assert indexed(m.replace(pairs=m.pairs[::-1])).graph is not before.graph
+    name = m.pairs[1].name
+    assert indexed(m.with_pair_type(name, "S")).graph is not before.graph

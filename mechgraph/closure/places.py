@@ -20,6 +20,7 @@ from mechgraph.closure.batches import FactorBatch, Group, Index, ScrewTable, fac
 from mechgraph.closure.coefficients import MARKER_A, MARKER_B
 from mechgraph.closure.tree import Ranks, Tree, Walk, ranked
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.once import of_graph
 from mechgraph.model.pair_type import PairType
 from mechgraph.model.parameters import Parameters
 from mechgraph.model.row_parts import Component
@@ -57,6 +58,7 @@ class sized(shared[Value]):
     store = "_sized"
 
 
+@of_graph
 def _nothing_yet(m: Mechanism) -> dict[str, Any]:
     """What the systems of a mechanism share."""
     return {}

@@ -175,7 +175,10 @@ class Mechanism(Parts, Once, Shown):
                 f"mechanism {self.name!r}", [f"replace: unknown field {k!r}" for k in sorted(unknown)]
             )
         if not set(changes) <= {"drives", "loads", "start"}:
-            return Mechanism(**{**self._arguments(), **changes})
+            changed = Mechanism(**{**self._arguments(), **changes})
+            if changed.has_graph_of(self):
+                changed.take_graph_of(self)
+            return changed
         # links, pairs and couplings stay, and with them what is kept of the graph: only what refers to them is checked again
         out = object.__new__(Mechanism)
         fields = {k: getattr(self, k) for k in self.formats}
@@ -189,6 +192,18 @@ class Mechanism(Parts, Once, Shown):
             faults = item_faults(out)
         out._finish(start, wrong_kinds + faults + mapping_faults(start=start))
         return out
+
+    def has_graph_of(self, other: Mechanism) -> bool:
+        """Whether links and pairs have the names, ends and types of those of another mechanism, in the same order."""
+        return (
+            self.frame == other.frame
+            and [link.name for link in self.links] == [link.name for link in other.links]
+            and len(self.pairs) == len(other.pairs)
+            and all(
+                (p.name, p.a, p.b) == (q.name, q.a, q.b) and (p.type is q.type or p.type == q.type)
+                for p, q in zip(self.pairs, other.pairs, strict=True)
+            )
+        )
 
     def with_pair_type(self, pair: str, type: str | PairType, *, pitch: float | None = None) -> Mechanism:
         """A copy in which one pair has another type, at the same markers; drives that it cannot take are dropped."""

@@ -9,6 +9,12 @@ from typing import Any, TypeVar
 Made = TypeVar("Made")
 
 
+def of_graph(make: Callable[[Any], Made]) -> Callable[[Any], Made]:
+    """Mark what follows from names, ends and types of links and pairs alone, whatever the numbers."""
+    vars(make)["of_graph"] = True
+    return make
+
+
 class Once:
     """A thing that does not change, with what is made of it."""
 
@@ -18,6 +24,10 @@ class Once:
             self._kept[make] = make(self)
         made: Made = self._kept[make]
         return made
+
+    def take_graph_of(self, other: Once) -> None:
+        """Take over what was made of the graph of another thing, of which the graph is the same."""
+        self._kept.update({make: made for make, made in other._kept.items() if "of_graph" in vars(make)})
 
     @cached_property
     def _kept(self) -> dict[Callable[..., Any], Any]:

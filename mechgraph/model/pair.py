@@ -195,7 +195,7 @@ class Pair(Described):
             raise error.of(name) from error.__cause__
         object.__setattr__(self, "contact", contact)
         if contact is not None:
-            row, (second, _, axis, point) = contact.row, contact.marker.T.tolist()
+            row, (second, _, axis, point) = contact.row, map(tuple, contact.marker.T.tolist())
             if on_b is not None:
                 on_a, point, axis, second = Marker(point, axis, second), None, None, None
             if contact.marker_b is not None:
@@ -205,7 +205,7 @@ class Pair(Described):
             axis = (0.0, 0.0, 1.0)
         if second is None and is_numeric(axis, (3,)):
             second = second_direction(axis)
-        placed = (plain(point), plain(axis), plain(second), plain(pitch), plain(lead), on_a, on_b)
+        placed = (point, axis, second, plain(pitch), plain(lead), on_a, on_b)
         values: tuple[Any, ...] = (
             name,
             row,

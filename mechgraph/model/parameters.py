@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array, cross
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.once import of_graph
 
 Index = NDArray[np.intp]
 Items = NDArray[np.object_]
@@ -150,6 +151,7 @@ class Declared:
         return np.stack([np.broadcast_to(v, (*v.shape[:2], B)) for v in (x, cross(z, x), z, at)], axis=1)
 
 
+@of_graph
 def pair_ends(m: Mechanism) -> tuple[Index, Index]:
     """Indices of the links a and b of every pair, ``(P,)`` each."""
     place, n = m.link_index, len(m.pairs)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from mechgraph.errors import counted
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.once import of_graph
 from mechgraph.model.parameters import pair_ends
 
 if TYPE_CHECKING:
@@ -116,6 +117,7 @@ def network(m: Mechanism) -> nx.MultiGraph[str]:
     return graph
 
 
+@of_graph
 def link_graph(m: Mechanism) -> LinkGraph:
     """Tree, chords and loops of a mechanism."""
     return _graph(len(m.links), *m.once(pair_ends), m.link_index[m.frame])
