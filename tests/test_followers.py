@@ -280,3 +280,42 @@ def test_a_response_round_a_closed_curve_is_tabulated_once():
     assert_allclose(
         e.kinetic + e.potential - e.work, (e.kinetic + e.potential - e.work)[0], atol=1e-5 * np.abs(e.work).max()
     )
+
+
+def test_two_cams_in_contact_by_their_closed_form():
+    """Two eccentric discs that touch: their centres keep their distance, so that they move as a four-bar; forces along the centres."""
+    pivot, ra, rb = np.array([1.6, 0.8, 0]), 0.9, 0.7
+    ca = np.array([0.2, 0.1, 0])
+    along = 0.1
+    cb = ca + (ra + rb) * np.array([np.cos(along), np.sin(along), 0])
+    at = ca + ra * (cb - ca) / (ra + rb)
+    bearing = mg.Pair("F", "R", "frame", "follower", point=pivot, axis=Z)
+    discs = mg.Pair(
+        "K", "Kc", "cam", "follower", point=at,
+        curve=mg.Curve.circle(radius=ra, center=ca), curve_b=mg.Curve.circle(radius=rb, center=cb),
+    )  # fmt: skip
+    rod = [
+        mg.Pair("D", "R", "cam", "rod", point=ca, axis=Z),
+        mg.Pair("E", "R", "rod", "follower", point=cb, axis=Z),
+    ]
+    turn = {"A": mg.Motion(np.linspace(0, 1.0, 9), 3.0, 2.0)}
+    s = assert_same_plane_forces(
+        driven_cam(bearing, discs, point=cb),
+        driven_cam(bearing, *rod, point=cb, more=["rod"]),
+        turn,
+        {"A": "A", "F": "F"},
+    )
+    way = s.link("follower").point(cb)[0] - s.link("cam").point(ca)[0]
+    assert_allclose(np.linalg.norm(way, axis=1), ra + rb, rtol=1e-12)
+    force = s["K"].force
+    assert np.abs(force[:, 0] * way[:, 1] - force[:, 1] * way[:, 0]).max() < 1e-11 * np.abs(force[:, :2]).max()
+
+
+def test_cams_that_touch_on_the_line_of_their_pivots_are_at_a_dead_point():
+    """The force passes both axes; said so, where the search for near relations failed on two slides along one tangent."""
+    discs = [mg.Curve.ellipse(a=1.0, b=0.8, center=(x, 0, 0)) for x in (0.6, 2.6)]
+    pair = mg.Pair("K", "Kc", "cam", "follower", curve=discs[0], curve_b=discs[1], point=(1.6, 0, 0))
+    m = driven_cam(mg.Pair("F", "R", "frame", "follower", point=(2.0, 0, 0), axis=Z), pair, point=(2.6, 0, 0))
+    with pytest.raises(mg.DeadPointError):
+        mg.solve(m, {"A": TURN})
+    assert not mg.check(m).determinate

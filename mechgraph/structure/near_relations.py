@@ -56,10 +56,12 @@ def features(here: Configuration) -> tuple[Feature, ...]:
 def _shown(k: int, name: str, type: PairType, S: Array) -> Iterator[Feature]:
     """Of one pair with twists ``S (6, f)``."""
     turning = [j for j, f in enumerate(type.freedoms) if f.turns]
-    slides = [S[3:, j] for j, f in enumerate(type.freedoms) if not f.turns]
+    # what travels along a bend turns as it slides: it has no direction that relations could be about
+    straight = np.abs(S[:3]).max(axis=0, initial=0.0) < 1e-9
+    slides = [S[3:, j] for j, f in enumerate(type.freedoms) if not f.turns and straight[j]]
     free = set(turning)
     if any(step.holds_rotation for step in type.steps):
-        if not slides:
+        if all(f.turns for f in type.freedoms):
             center = np.linalg.lstsq(_arms(S[:3, turning]), S[3:, turning].T.ravel(), rcond=None)[0]
             yield Feature(k, f"centre of {name}", True, None, np.asarray(center))
         free = set()
@@ -71,8 +73,8 @@ def _shown(k: int, name: str, type: PairType, S: Array) -> Iterator[Feature]:
         fixed = all(np.linalg.norm(np.cross(s, w)) < 1e-9 for s in slides)
         shown.append(w)
         yield Feature(k, f"axis of {name}", True, w, np.cross(w, v) if fixed else None)
-    plane = len(slides) == 2
-    way = np.cross(slides[0], slides[1]) if plane else slides[0] if len(slides) == 1 else None
+    plane = len(slides) == 2 and bool(np.linalg.norm(np.cross(slides[0], slides[1])) > 1e-9)
+    way = np.cross(slides[0], slides[1]) if plane else slides[0] if slides else None
     if way is not None and not any(abs(way @ d) > (1 - 1e-9) * np.linalg.norm(way) for d in shown):
         yield Feature(k, f"{'normal' if plane else 'direction'} of {name}", False, way / np.linalg.norm(way), None)
 
