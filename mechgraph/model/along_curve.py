@@ -11,7 +11,7 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array, cross
 from mechgraph.errors import ShapeError
-from mechgraph.model.curves import ORDERS, Curve
+from mechgraph.model.curves import ORDERS, Curve, turned
 from mechgraph.model.factors import Factor, PoseStack, Stack, entries
 from mechgraph.model.row_parts import UNIT_TWISTS, Freedom
 from mechgraph.model.travel import COMPLEX_STEP, Place, Travel
@@ -140,8 +140,8 @@ class AlongCurve(Factor):
             out[:, :3] = np.einsum("ji...,jk->ik...", R, R0)
             out[:, 3] = (R * ((p0 - here.x) / self.unit)[:, None]).sum(axis=0)
         else:
-            out[:, :3] = np.tensordot(R0, self._frame(here), (0, 0))
-            out[:, 3] = np.tensordot(R0, (here.x - p0) / self.unit, (0, 0))
+            out[:, :3] = turned(R0.T, self._frame(here))
+            out[:, 3] = turned(R0.T, (here.x - p0) / self.unit)
         return out
 
     def twists(self, x: Array, pitch: Array) -> Array:
@@ -170,7 +170,7 @@ class AlongCurve(Factor):
             return np.concatenate([(R * part[:, None]).sum(axis=0) for part in (w, v)])
         p0 = self.start[:, 3].reshape(3, *(1,) * (here.x.ndim - 1))
         v = v - cross(w, (here.x - p0) / self.unit)
-        return np.concatenate([np.tensordot(self.start[:, :3], part, (0, 0)) for part in (w, v)])
+        return np.concatenate([turned(self.start[:, :3].T, part) for part in (w, v)])
 
     def stack(self, factors: Sequence[Factor], counts: Sequence[int]) -> Stack:
         """Copies evaluated together."""
@@ -215,8 +215,17 @@ class Beside(Curve):
     base: Curve
     distance: float
 
+    @cached_property
+    def _named(self) -> Curve | None:
+        """The same as a curve with a name, by its own parameter: beside a line is a line, beside a circle a circle."""
+        travel: Travel = self.base.once(Travel)
+        begin = np.array([travel.begin if np.isfinite(travel.begin) else 0.0])
+        return self.base.beside(self.distance, travel.at(begin).y[:, 0])
+
     def at(self, u: Array) -> Array:
         """``x + d y``, with ``t' = k y`` and ``y' = -k t``; three derivatives."""
+        if self._named is not None:
+            return self._named.at(u)
         travel: Travel = self.base.once(Travel)
         x, t, dt, ddt, y, *_ = travel.guided(u)
         k, dk = (dt * y).sum(axis=0), (ddt * y).sum(axis=0)
@@ -233,8 +242,15 @@ class Beside(Curve):
     @property
     def ends(self) -> tuple[float, float]:
         """Those of the curve."""
+        if self._named is not None:
+            return self._named.ends
         travel: Travel = self.base.once(Travel)
         return travel.begin, travel.end
+
+    @property
+    def speed(self) -> float | None:
+        """That of a curve with a name."""
+        return None if self._named is None else self._named.speed
 
     @property
     def orders(self) -> int:
@@ -254,4 +270,4 @@ class Beside(Curve):
     @cached_property
     def breaks(self) -> Array:
         """As the curve."""
-        return self.base.once(Travel).s
+        return self.base.once(Travel).s if self._named is None else self._named.breaks

@@ -104,6 +104,10 @@ class Curve(Described, Once):
         """How many of position and derivatives are known, that of complex arguments counted."""
         return ORDERS + 1
 
+    def beside(self, distance: float, y: Array) -> Curve | None:
+        """The curve at a distance towards the normal, which is ``y (3,)`` where it begins, where that is a curve with a name too."""
+        return None
+
     @property
     def roller(self) -> float:
         """Radius of the roller whose centre the curve is the path of, on the outside of the shape."""
@@ -121,6 +125,11 @@ def remade_from(shape: Any) -> tuple[Any, tuple[Any, ...]]:
 
 def _remade(kind: Callable[..., Any], values: dict[str, Any]) -> Any:
     return kind(**values)
+
+
+def turned(R: Array, v: Array) -> Array:
+    """Products ``R v`` of a matrix ``(3, 3)`` and vectors ``(3, ...)``."""
+    return (R @ v.reshape(3, -1)).reshape(v.shape)
 
 
 def _unit(v: Any) -> Array:
@@ -148,6 +157,10 @@ class Line(Curve):
     def ends(self) -> tuple[float, float]:
         """As declared."""
         return self.ends_at or (-np.inf, np.inf)
+
+    def beside(self, distance: float, y: Array) -> Curve:
+        """A parallel line."""
+        return self.replace(point=np.asarray(self.point) + distance * y)
 
     @property
     def speed(self) -> float:
@@ -183,7 +196,7 @@ class Centred(Curve):
 
     def _placed(self, parts: Array) -> Array:
         """Position and derivatives ``(4, 3, ...)`` from those in the own axes."""
-        out = np.asarray(np.einsum("ij,kj...->ki...", self._basis, parts))
+        out = np.matmul(self._basis, parts.reshape(len(parts), 3, -1)).reshape(parts.shape)
         out[0] += np.asarray(self.center).reshape(3, *(1,) * (parts.ndim - 2))
         return out
 
@@ -216,6 +229,13 @@ class Circle(Centred):
     def is_closed(self) -> bool:
         """Unless it is an arc."""
         return self.angles is None
+
+    def beside(self, distance: float, y: Array) -> Curve | None:
+        """A circle about the same centre."""
+        radius = self.radius + distance * float(
+            np.sign(y @ (self.at(np.array(self.ends[0]))[0] - np.asarray(self.center)))
+        )
+        return self.replace(radius=radius) if radius > 0 else None
 
     @property
     def speed(self) -> float:

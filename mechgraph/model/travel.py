@@ -18,7 +18,7 @@ import numpy as np
 import scipy
 
 from mechgraph.algebra.se3 import Array, cross
-from mechgraph.model.curves import CLOSED_GAP, ORDERS, Curve
+from mechgraph.model.curves import CLOSED_GAP, ORDERS, Curve, turned
 from mechgraph.model.numeric import second_direction
 from mechgraph.model.pieces import Pieces, hermite
 from mechgraph.quantities import shown
@@ -60,8 +60,9 @@ class Travel:
     def __init__(self, curve: Curve) -> None:
         self.curve = curve
         self.speed = curve.speed
+        self._origin = curve.ends[0] if np.isfinite(curve.ends[0]) else 0.0
         if self.speed is not None:
-            s = self.speed * (curve.breaks - (curve.ends[0] if np.isfinite(curve.ends[0]) else 0.0))
+            s = self.speed * (curve.breaks - self._origin)
         else:
             s, self._parameter = _by_arc_length(curve)
         self.s = s
@@ -69,6 +70,7 @@ class Travel:
         self.length = float(s[-1] - s[0])
         self.is_closed = curve.is_closed
         self.guide, self.is_plane = self._guide()
+        self._quarter = np.cross(self.guide, np.eye(3)).T
         self.minimizing = curve.frame == "minimizing"
         self.closing = 0.0
         self._turn: Pieces | None = None
@@ -100,9 +102,8 @@ class Travel:
 
     def _parameter_at(self, s: Array) -> Array:
         """The parameter at arc lengths; beyond the ends of an open curve at the speed that it has there."""
-        begin = self.curve.ends[0] if np.isfinite(self.curve.ends[0]) else 0.0
         if self.speed is not None:
-            return np.asarray(begin + s / self.speed)
+            return np.asarray(self._origin + s / self.speed)
         inside = (
             s.real - self._rounds(s.real) * self.length if self.is_closed else np.clip(s.real, self.begin, self.end)
         )
@@ -138,10 +139,11 @@ class Travel:
 
     def at(self, s: Array) -> Place:
         """Position and frame at arc lengths ``(...)``, real or complex."""
-        if self.is_plane:
+        if self.is_plane:  # y = k x t, t x t' = (t' . y) k
             x, t, dt, ddt = self._rates(self._parameter_at(s))
-            k = np.broadcast_to(self.guide.reshape(3, *(1,) * s.ndim), t.shape)
-            return Place(x, t, dt, cross(k, t), k, cross(t, dt), cross(t, ddt))
+            k = self.guide.reshape(3, *(1,) * s.ndim)
+            y = turned(self._quarter, t)
+            return Place(x, t, dt, y, np.broadcast_to(k, t.shape), _dot(dt, y) * k, _dot(ddt, y) * k)
         x, t, dt, ddt, y, k, r, dr = self.guided(s)
         w, dw = cross(t, dt), cross(t, ddt)
         if not self.minimizing:
