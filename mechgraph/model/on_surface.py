@@ -86,14 +86,15 @@ class OnSurface(Factor):
         """Position, axes ``(3, 3, ...)`` and twists about the point ``(6, 2, ...)``, in the frame of the link."""
         assert self.surface is not None
         su, sv = self.sizes
+        u, v = self.home[0] + self.unit / su * x[0], self.home[1] + self.unit / sv * x[1]
         try:
-            J = self.surface.at(self.home[0] + self.unit / su * x[0], self.home[1] + self.unit / sv * x[1])
+            J, sense = self.surface.at(u, v), self.surface.sense(u, v)
         except ShapeError as error:
             raise error.of(self.pair) from error.__cause__
         x_, xu, xv = J[0], J[1] / su, J[2] / sv
         second = self.unit * np.stack([J[3] / su**2, J[4] / (su * sv), J[5] / sv**2])
-        lu, N = np.sqrt((xu * xu).sum(axis=0)), cross(xu, xv)
-        ln, up = np.sqrt((N * N).sum(axis=0)), -1.0 if self.turned else 1.0
+        lu, N = sense * np.sqrt((xu * xu).sum(axis=0)), cross(xu, xv)
+        ln, up = sense * np.sqrt((N * N).sum(axis=0)), -1.0 if self.turned else 1.0
         e1, n = xu / lu, up * N / ln
         axes = (e1, cross(n, e1), n)
         twists = []

@@ -70,6 +70,8 @@ def on_surface(
     The centre of a ball (``roller``) travels beside the surface, on the side of the point.
     """
     surface = _beside(surface, roller, point) or surface
+    if point is not None:
+        surface = surface.away_from_pole(np.asarray(point))
     middle = tuple(
         0.5 * (low + high) if np.isfinite(low + high) else 1.0 if np.isfinite(low) else 0.0
         for low, high in surface.ends
@@ -88,6 +90,7 @@ def _beside(surface: Surface, roller: float | None, point: Sequence[float] | Non
         return surface
     side = 1.0
     if point is not None:
+        surface = surface.away_from_pole(np.asarray(point))
         x, xu, xv = surface.at(*np.array(surface.nearest(np.asarray(point)))[:, None])[:3, :, 0]
         side = 1.0 if (np.asarray(point) - x) @ cross(xu, xv) > 0 else -1.0
     return surface.offset(side * roller)
@@ -117,6 +120,7 @@ def surface_faults(row: Any, surface: Surface, point: Any, where: str, roller: A
     found = found or _ball_faults(surface, roller, point, where)
     if found or point is None:
         return found
+    surface = surface.away_from_pole(np.asarray(point))
     x = surface.at(*np.array(surface.nearest(np.asarray(point)))[:, None])[:, :, 0]
     normal, sizes = np.linalg.norm(np.cross(x[1], x[2])), np.linalg.norm(x[1:3], axis=1)
     if normal <= 1e-9 * sizes.max() ** 2 + 1e-300:

@@ -25,6 +25,8 @@ from mechgraph.units import LENGTH, PURE
 NEAREST_GRID = 33
 """Values of each parameter from which the nearest point of a surface is sought."""
 NO_ENDS = (-np.inf, np.inf)
+BESIDE_POLE = 0.25
+"""Angle from a pole of a sphere up to which a place of it has its coordinates about another axis."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -56,6 +58,14 @@ class Surface(Described):
     def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Least and greatest values of both parameters; infinite where the surface goes on or closes."""
         return NO_ENDS, NO_ENDS
+
+    def away_from_pole(self, p: Array) -> Surface:
+        """The same surface by parameters that say something at a point ``p (3,)`` of it; itself where there is nothing better."""
+        return self
+
+    def sense(self, u: Array, v: Array) -> Array | float:
+        """-1 where ``x_u`` is opposite to what it is on the near side of a pole, so that axes go on over it; 1 everywhere else."""
+        return 1.0
 
     @property
     def periods(self) -> tuple[float, float]:
@@ -213,7 +223,7 @@ class Turned(AboutAxis):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Sphere(Turned):
-    """A sphere, by longitude and latitude; it ends at the poles, where the longitude says nothing."""
+    """A sphere, by longitude and latitude, which goes on over the poles; at a pole itself the longitude says nothing."""
 
     kind = "sphere"
     radius: Annotated[float, POSITIVE("radius", LENGTH)]
@@ -222,6 +232,26 @@ class Sphere(Turned):
     def meridian(self) -> Curve:
         """Half a circle."""
         return self._circle(self.radius, angles=(-0.25 * WHOLE_TURN, 0.25 * WHOLE_TURN))
+
+    @property
+    def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """It has none."""
+        return NO_ENDS, NO_ENDS
+
+    @property
+    def periods(self) -> tuple[float, float]:
+        """A turn each."""
+        return WHOLE_TURN, WHOLE_TURN
+
+    def away_from_pole(self, p: Array) -> Surface:
+        """Within ``BESIDE_POLE`` of a pole by longitude and latitude about ``second``."""
+        off = p - np.asarray(self.center)
+        near = np.linalg.norm(np.cross(self._basis[2], off)) < np.sin(BESIDE_POLE) * np.linalg.norm(off)
+        return self.replace(axis=self._basis[0], second=self._basis[1]) if near else self
+
+    def sense(self, u: Array, v: Array) -> Array:
+        """The sign of the cosine of the latitude."""
+        return np.where(np.cos(v.real) < 0, -1.0, 1.0)
 
     def offset(self, distance: float) -> Surface | None:
         """A sphere about the same centre."""
