@@ -42,6 +42,10 @@ FLAT = 1e-8
 """Curvature (times L) below which a side of a contact is straight."""
 ONE_POINT = 1e-8
 """Distance (over L) below which two points are one, and misfit of the circle up to which there is one."""
+SPATIAL = (
+    "is no planar mechanism: not all its pairs move in one plane. Two surfaces that touch in space have two centres of curvature each, "
+    "between which no single link moves as they do; keep the higher pairs, which check and solve take as they are"
+)
 NAMES = ("{}_link", "{}_a", "{}_b")
 """Names of the link that takes the place of a higher pair, and of its pairs."""
 
@@ -105,9 +109,7 @@ def equivalent(m: Mechanism, at: Mapping[str, float] | None = None, *, rollers: 
     position = Position.at(here)
     kind = kind_of(position.rows.S)
     if kind.name != "planar":
-        raise DeclarationError(
-            f"equivalent of {m.name!r}", ["is no planar mechanism: not all its pairs move in one plane"]
-        )
+        raise DeclarationError(f"equivalent of {m.name!r}", [SPATIAL])
     rows = LinkRows(position, np.zeros(0, dtype=np.intp), kind.twists)
     normal = np.array(kind.place)
     parts = _Parts(m, here, normal, list(m.links))

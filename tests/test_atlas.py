@@ -1,7 +1,8 @@
 """Kinematic chains: their numbers in the literature, brute force, names, inversions; system groups."""
 
-from itertools import combinations, permutations
+from itertools import combinations, pairwise, permutations
 from pathlib import Path
+from typing import Any
 
 import networkx as nx
 import numpy as np
@@ -252,9 +253,44 @@ def test_a_page_of_the_atlas() -> None:
     for chain, ax in zip(chains, page.axes, strict=True):
         assert len(ax.patches) == sum(degree > 2 for degree in chain.degrees)
         assert len(ax.lines) == chain.degrees.count(2)
-        assert len(ax.collections[0].get_offsets()) == len(chain.joints) == 10
+        assert sum(len(joints.get_offsets()) for joints in ax.collections) == len(chain.joints) == 10
     with pytest.raises(mg.DeclarationError, match="0 chains in 6 columns"):
         draw_chains([])
+
+
+def segments(ax: Any) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Sides of the links drawn."""
+    out = [tuple(line.get_xydata()) for line in ax.lines]
+    for polygon in ax.patches:
+        out += list(pairwise(polygon.get_xy()))
+    return out
+
+
+def crossings(ax: Any) -> int:
+    def side(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:
+        return float(np.sign((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])))
+
+    count = 0
+    for (a, b), (c, d) in combinations(segments(ax), 2):
+        if min(np.linalg.norm(x - y) for x in (a, b) for y in (c, d)) > 1e-9:
+            count += side(a, b, c) != side(a, b, d) and side(c, d, a) != side(c, d, b)
+    return count
+
+
+def test_links_do_not_cross_on_the_page() -> None:
+    """Those of up to eight links can all be drawn without crossings; two of the sixteen may keep one."""
+    assert [crossings(ax) for ax in draw_chains(mg.atlas(6, multiple=True)).axes] == [0, 0, 0, 0]
+    left = [crossings(ax) for ax in draw_chains(mg.atlas(8)).axes]
+    assert sum(left) <= 2
+
+
+def test_pair_types_are_seen() -> None:
+    """A square for a slide, the symbol in a diamond for other types than turns and slides."""
+    (ax,) = draw_chains([next(c for c in mg.atlas(4, types=("R", "P")) if c.types.count("P") == 1)]).axes
+    assert sorted(len(joints.get_offsets()) for joints in ax.collections) == [0, 1, 3]
+    chain = next(mg.atlas(4, family=0, types=("R", "C", "S"), joints=4))
+    (ax,) = draw_chains([chain]).axes
+    assert sorted(text.get_text() for text in ax.texts) == sorted(t for t in chain.types if t != "R")
 
 
 def test_the_structural_diagram_has_a_colour_for_each_group() -> None:

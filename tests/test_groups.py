@@ -165,6 +165,15 @@ def test_other_drivers() -> None:
     assert by["B0.Rz"].startswith("RR(R)R - D10") or by["B0.Rz"].startswith("R(R)RR - D10")
 
 
+def test_symbols_are_explained_where_they_are_printed() -> None:
+    windows = mg.load("windows-2")
+    plain, within = (str(mg.groups(windows, [name])) for name in ("A0", "B0"))
+    for text in (plain, within):
+        assert "the numbers of the links on which it hangs, 0 the frame" in " ".join(text.split())
+    assert "parentheses" not in plain
+    assert "A letter in parentheses is a driven pair" in " ".join(within.split())
+
+
 def test_spatial_groups() -> None:
     assert mg.groups(mg.load("rcsr-csr")).symbol == "R - CSR - CSR - 2 + 0"
     bennett = mg.groups(mg.load("bennett"))

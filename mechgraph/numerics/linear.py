@@ -237,8 +237,12 @@ class LuFactors:
 
     def __init__(self, A: Array) -> None:
         self._A = A
-        self._lapack: Any = scipy.linalg.lapack
         self._factors = [self._lapack.dgetrf(A[:, :, t]) for t in range(A.shape[2])]
+
+    @property
+    def _lapack(self) -> Any:
+        """LAPACK; not kept, as modules cannot be pickled."""
+        return scipy.linalg.lapack
 
     @kept
     def condition(self) -> Array:

@@ -41,7 +41,9 @@ class Structure(Shown):
 
     def _chain(self) -> Iterator[Block]:
         if self.identity:
-            yield Paragraph(f"{self.identity.text.splitlines()[0]}.")
+            first, *others = self.identity.text.splitlines()
+            yield Paragraph(f"{first}.")
+            yield Bullets(tuple(line.strip() for line in others))
             if self.multiple_joints:
                 whole = identify(self.report.mechanism, joints=self.multiple_joints)
                 yield Paragraph(

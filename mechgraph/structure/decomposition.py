@@ -103,6 +103,21 @@ class Decomposition(Shown):
         """The same by what the pairs do, e.g. ``R-RRT-RTR``."""
         return "-".join(g.letters if g.driver or g.contours == 1 else g.name for g in self.groups)
 
+    @property
+    def legend(self) -> str:
+        """How the symbol is read."""
+        parts = [
+            "The symbol names the driver links (R turns, T slides), then the groups in the order in which they are solved, then for each "
+            "group the numbers of the links on which it hangs, 0 the frame (1 + 0 of the first group is not written)."
+        ]
+        if any("(" in g.name for g in self.groups):
+            parts.append(
+                "A letter in parentheses is a driven pair between two moving links: it drives its group from within."
+            )
+        if any(g.name == f"{_roman(g.class_)}.{g.order}" for g in self.groups):
+            parts.append("Groups of several contours are named by class and order: III.3 is of class III and order 3.")
+        return " ".join(parts)
+
     def __repr__(self) -> str:
         return f"Decomposition({self.symbol!r}; print it)"
 
@@ -127,6 +142,7 @@ class Decomposition(Shown):
             for g in self.groups
         ]
         yield Table(("group", "pairs do", "kind", "links", "pairs", "on", "family"), tuple(rows))
+        yield Paragraph(self.legend)
         if self.free:
             yield Paragraph(f"Not determined by these drivers: {', '.join(self.free)}.")
         table = tuple((str(number), link, ", ".join(at)) for number, link, at in self.connectivity)
