@@ -288,8 +288,10 @@ class Configuration:
         """Twists of the freedoms about the middles of the loops, with their signs in the rows of every loop, ``(6 loops, F, T)``."""
         s, e = self.system, self.system.entries
         twists, origins = self._twists
-        parts = twists[:, :, e.columns] * e.signs
-        parts[1] += cross(origins[:, e.columns] - self.middles[:, e.loops], parts[0])
+        parts, arms = twists.take(e.column, axis=2), origins.take(e.column, axis=1)
+        parts *= e.signs
+        arms -= self.middles[:, e.loops]
+        parts[1] += cross(arms, parts[0])
         rows = parts.reshape(6, *parts.shape[2:])
         if s.entry_places is None:
             return rows

@@ -74,11 +74,6 @@ class Entries:
     first: Index
 
     @cached_property
-    def columns(self) -> Place:
-        """The columns, as a slice where that can be."""
-        return compact(self.column)
-
-    @cached_property
     def loops(self) -> Place:
         """The loops; of one loop alone, one place for all."""
         return self.loop if len(self.first) > 2 else slice(0, 1)
