@@ -14,7 +14,7 @@ from mechgraph.model.parameters import Parameters
 
 MARKER_A, MARKER_B = range(2)
 """Order of the constant poses in ``Numbers.constants``, after the identity."""
-FACTORS_AT_ONCE = 4096
+FACTORS_AT_ONCE = 2048
 """Factors whose coefficients are multiplied with their markers at once: what lies between stays in the cache."""
 
 

@@ -138,7 +138,7 @@ class Configuration:
         out = np.empty((2, 3, len(nodes), self.T), dtype=dtype)
         X = self._nodes.take(nodes, axis=2)
         multiplied(X[:, :3], local, out=out.swapaxes(0, 1))
-        return out, X[:, 3]
+        return out, X[:, 3].copy()
 
     @kept
     def _twists(self) -> tuple[Array, Array]:

@@ -47,8 +47,8 @@ def row_of(type: Any, curve: Any, surface: Any = None) -> Any:
     symbol = type.symbol if isinstance(type, PairType) and (bent or travels(type)) else type
     if not isinstance(symbol, str):
         return symbol
-    rows = {**TABLE, **SURFACE_ROWS} if surface is not None else {**TABLE, **ROWS} if bent else {**ROWS, **TABLE}
-    return rows.get(symbol, type)
+    tables = (SURFACE_ROWS, TABLE) if surface is not None else (ROWS, TABLE) if bent else (TABLE, ROWS)
+    return next((table[symbol] for table in tables if symbol in table), type)
 
 
 def placed_surface(row: PairType) -> OnSurface | None:
