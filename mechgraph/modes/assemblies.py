@@ -394,8 +394,8 @@ class Finder:
         rank = int((sigma > SINGULAR * sigma[0]).sum()) if sigma.size else 0
         passive = family.passive.shape[1]
         if rank + passive >= len(family.free):
-            proof, condition = certificate(here, family.free, passive, not self.fault)
-            return "regular", condition, proof
+            condition = float(sigma[0] / sigma[rank - 1]) if rank else 1.0
+            return "regular", condition, certificate(here, family.free, passive, not self.fault)
         return ("continuum" if self._moves(here, Vt[rank:]) else "double"), np.inf, None
 
     def _moves(self, here: Configuration, left: Array) -> bool:

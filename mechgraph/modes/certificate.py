@@ -1,15 +1,17 @@
-"""A certificate of a real assembly: the theorem of Newton and Kantorovich on the independent closure rows.
+"""A certificate of a real assembly: the theorem of Newton and Kantorovich on the independent closure rows, with rounding in it.
 
 Of every loop, product ``M(u)`` of the motions along it, ``f = (vee (R - R^T) / 2, p)`` about its middle vanishes where it is closed and,
-within half a turn, nowhere else. With ``A`` its independent rows and the passive motions held, ``beta = |A^-1|``,
-``eta = |A^-1 f|`` with all rounding in it, and ``K`` a bound of the second derivatives within ``BALL``:
+within half a turn, nowhere else. Both ``f`` and its derivative come with bounds of all rounding (see ``balls``). With ``A`` the independent
+combinations of rows on the complement of the passive motions, ``beta >= |A^-1|``, ``eta >= |A^-1 f|``, and ``K`` a bound of the second
+derivatives within ``BALL``:
 
     beta K eta <= 1/2  =>  one root, within (1 - sqrt(1 - 2 beta K eta)) / (beta K), and no other within min(BALL, 1 / (beta K)).
 
-``K``: the second derivative along a unit ``u`` is a sum of products of two twists ``(w_i, v_i) u_i``, so that
-``|f''| <= (sum |w_i| |u_i|) (sum h_j |u_j|)``, ``h^2 = |w|^2 + g^2``; ``g`` bounds ``|v|`` and the gap of the loop, and grows by no more
-than ``exp(2 BALL sqrt(m))`` over the reach (``m`` freedoms). Source: Ortega and Rheinboldt, Iterative Solution of Nonlinear Equations
-in Several Variables, 1970, section 12.6. The bound is evaluated in floating point, with a margin for rounding, not in intervals.
+``beta``: with ``Y`` a computed inverse, ``|A^-1| <= |Y| / (1 - |1 - Y A|)`` for every ``A`` within its bounds. ``K``: the second
+derivative along a unit ``u`` is a sum of products of two twists ``(w_i, v_i) u_i``, so that ``|f''| <= (sum |w_i| |u_i|) (sum h_j |u_j|)``,
+``h^2 = |w|^2 + g^2``; ``g`` bounds ``|v|`` and the gap of the loop, and grows by no more than ``exp(2 BALL sqrt(m))`` over the reach
+(``m`` freedoms). It is a sum of positive numbers, of which rounding takes less than a part in 1e12: 1 % is added. Sources: Ortega and
+Rheinboldt, Iterative Solution of Nonlinear Equations in Several Variables, 1970, section 12.6; Rump, Acta Numerica 19, 2010, section 10.
 """
 
 from __future__ import annotations
@@ -21,14 +23,14 @@ import numpy as np
 from mechgraph.algebra.se3 import cross
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
-from mechgraph.numerics.linear import choose
+from mechgraph.modes.balls import STORED, TINY, Ball, Open, exact, loop_rows
 
 BALL = 0.05
 """Size of the increments (radians, lengths / L) within which second derivatives are bounded."""
-ROW_ROUNDING = 1e-14
-"""Rounding of a closure row, against the largest number in it."""
-BOUND_ROUNDING = 1.01
-"""Factor that stands for the rounding of the bounds themselves."""
+MARGIN = 1.01
+"""Factor that stands for the rounding of bounds of second derivatives, and of bases that are orthonormal to rounding."""
+TOLD_APART = 1e-8
+"""Distance of the root up to which assemblies that are told apart have roots of their own."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,7 @@ class Certificate:
 
     Attributes
     ----------
-    proved : whether ``product <= 1/2``.
+    proved : whether ``product <= 1/2``, and the root is where the assembly is told apart from others.
     product : ``beta K eta`` of Newton and Kantorovich.
     error : bound of the distance of the root from the state given (radians, lengths / L).
     radius : distance within which there is no other root.
@@ -56,29 +58,45 @@ class Certificate:
     residual: float
 
 
-def certificate(here: Configuration, free: Index, passive: int, by_structure: bool) -> tuple[Certificate, float]:
-    """The certificate of a state, and the condition number of its independent rows."""
-    J, s = here.J[:, :, 0], here.system
-    fixed = np.setdiff1d(np.arange(s.n_freedoms), free)
-    rows = choose(J, fixed).rows
-    A = J[rows[:, None], free]
-    U, sigma, Vt = np.linalg.svd(A)
-    rank = len(rows)
-    if rank + passive != len(free):
-        return Certificate(False, np.inf, np.inf, 0.0, rank, s.n_rows - rank, "checked", float(here.closure[0])), np.inf
-    beta = BOUND_ROUNDING / sigma[rank - 1] if rank else 0.0
-    r = here.residual[rows, 0]
-    size = max(1.0, float(np.abs(here.poses).max()))
-    eta = BOUND_ROUNDING * beta * (float(np.linalg.norm(r)) + ROW_ROUNDING * size * np.sqrt(len(r) + 1.0))
-    K = BOUND_ROUNDING * curvature(here)
+def certificate(here: Configuration, free: Index, passive: int, by_structure: bool) -> Certificate | None:
+    """The certificate of a state; None where a pair is no product of screws and rotations."""
+    s = here.system
+    try:
+        f, A = rows(here)
+    except Open:
+        return None
+    A, rank = A[:, free], len(free) - passive
+    U, sigma, Vt = np.linalg.svd(A.mid)
+    how, residual = "structure" if by_structure else "checked", float(here.closure[0])
+    dependent, Y = s.n_rows - rank, exact(np.diag(1.0 / np.maximum(sigma[:rank], TINY)))
+    independent = exact(U[:, :rank].T)
+    off = float(np.linalg.norm((Y @ (independent @ A @ exact(Vt[:rank].T)) - exact(np.eye(rank))).bound)) * MARGIN
+    if off >= 1.0:
+        return Certificate(False, np.inf, np.inf, 0.0, rank, dependent, "checked", residual)
+    beta = MARGIN / (sigma[rank - 1] * (1.0 - off)) if rank else 0.0
+    eta = MARGIN * float(np.linalg.norm((Y @ (independent @ f)).bound)) / (1.0 - off)
+    K = MARGIN * curvature(here)
     h = beta * K * eta
     proved = bool(h <= 0.5)
     error = float((1 - np.sqrt(1 - 2 * h)) / (beta * K)) if proved and h > 0 else float(eta)
     radius = float(min(BALL, 1 / (beta * K))) if proved and h > 0 else 0.0
-    proved = proved and error < BALL
-    how = "structure" if by_structure else "checked"
-    condition = float(sigma[0] / sigma[rank - 1]) if rank else 1.0
-    return Certificate(proved, float(h), error, radius, rank, s.n_rows - rank, how, float(here.closure[0])), condition
+    return Certificate(proved and error < TOLD_APART, float(h), error, radius, rank, dependent, how, residual)
+
+
+def rows(here: Configuration) -> tuple[Ball, Ball]:
+    """What the rows leave open ``(n,)`` and their derivatives ``(n, F)``, with bounds of their rounding; those of couplings are linear."""
+    s, J, r = here.system, here.J[:, :, 0], here.residual[:, 0]
+    f, A = Ball(r.copy(), np.zeros_like(r)), Ball(J.copy(), np.zeros_like(J))
+    for loop, (columns, _) in enumerate(s.loop_columns):
+        at = slice(6 * loop, 6 * loop + 6)
+        opened, twists = loop_rows(here, loop)
+        f.mid[at], f.rad[at] = opened.mid, opened.rad
+        A.mid[at], A.rad[at] = 0.0, 0.0
+        A.mid[at, columns], A.rad[at, columns] = twists.mid, twists.rad
+    linear = slice(6 * s.graph.n_loops, None)
+    A.rad[linear] = STORED * np.abs(J[linear])
+    f.rad[linear] = STORED * s.n_freedoms * (1.0 + np.abs(J[linear]).sum(axis=1) * np.abs(here.x).max(initial=1.0))
+    return f, A
 
 
 def curvature(here: Configuration) -> float:
