@@ -17,6 +17,7 @@ from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, counted
 from mechgraph.force.applied_loads import user_poses
 from mechgraph.model.mechanism import Mechanism, check_mechanism
+from mechgraph.modes.balls import TINY
 from mechgraph.modes.bounds import Bound, bound
 from mechgraph.modes.certificate import Certificate, certificate
 from mechgraph.modes.family import Array
@@ -330,7 +331,7 @@ class Finder:
         real = imaginary < np.where(found.singular, REAL_SINGULAR, REAL)
         x, error = close_all(q.system, found.x[:, real].real, q.columns)
         x = self._distinct(x[:, error < REAL_CLOSED])
-        if (self._irregular(found.x[:, ~real])).any():
+        if (self._irregular(found.x[:, ~real & found.singular])).any():
             x = np.concatenate([x, self._of_continuum(i)], axis=1)
         word, evidence = _completeness(found, start, N, bound(self.family))
         return _Solutions(x, found.x[:, ~real], word, evidence, N, found.infinite)
@@ -391,11 +392,12 @@ class Finder:
         family, here = self.family, Configuration(self.question.system, x)
         J = here.J[:, family.free, 0]
         _, sigma, Vt = np.linalg.svd(J)
-        rank = int((sigma > SINGULAR * sigma[0]).sum()) if sigma.size else 0
-        passive = family.passive.shape[1]
-        if rank + passive >= len(family.free):
-            condition = float(sigma[0] / sigma[rank - 1]) if rank else 1.0
-            return "regular", condition, certificate(here, family.free, passive, not self.fault)
+        rank, wanted = int((sigma > SINGULAR * sigma[0]).sum()) if sigma.size else 0, family.unknowns
+        condition = float(sigma[0] / max(sigma[wanted - 1], TINY)) if wanted else 1.0
+        sure = certificate(here, family.free, family.passive.shape[1], not self.fault)
+        # what is proved is regular, be it ever so close to a double point
+        if rank >= wanted or (sure is not None and sure.proved):
+            return "regular", condition, sure
         return ("continuum" if self._moves(here, Vt[rank:]) else "double"), np.inf, None
 
     def _moves(self, here: Configuration, left: Array) -> bool:

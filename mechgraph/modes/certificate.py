@@ -23,13 +23,15 @@ import numpy as np
 from mechgraph.algebra.se3 import cross
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
-from mechgraph.modes.balls import STORED, TINY, Ball, Open, exact, loop_rows
+from mechgraph.modes.balls import STORED, Ball, Open, exact, loop_rows
 
 BALL = 0.05
 """Size of the increments (radians, lengths / L) within which second derivatives are bounded."""
 MARGIN = 1.01
 """Factor that stands for the rounding of bounds of second derivatives, and of bases that are orthonormal to rounding."""
-TOLD_APART = 1e-8
+SINGULAR_ROWS = 1e-13
+"""Smallest singular value, as part of the largest, below which nothing is tried."""
+TOLD_APART = 1e-7
 """Distance of the root up to which assemblies that are told apart have roots of their own."""
 
 
@@ -68,9 +70,10 @@ def certificate(here: Configuration, free: Index, passive: int, by_structure: bo
     A, rank = A[:, free], len(free) - passive
     U, sigma, Vt = np.linalg.svd(A.mid)
     how, residual = "structure" if by_structure else "checked", float(here.closure[0])
-    dependent, Y = s.n_rows - rank, exact(np.diag(1.0 / np.maximum(sigma[:rank], TINY)))
-    independent = exact(U[:, :rank].T)
-    off = float(np.linalg.norm((Y @ (independent @ A @ exact(Vt[:rank].T)) - exact(np.eye(rank))).bound)) * MARGIN
+    dependent, off = s.n_rows - rank, np.inf
+    if not rank or sigma[rank - 1] > SINGULAR_ROWS * sigma[0]:
+        Y, independent = exact(np.diag(1.0 / sigma[:rank])), exact(U[:, :rank].T)
+        off = MARGIN * float(np.linalg.norm((Y @ (independent @ A @ exact(Vt[:rank].T)) - exact(np.eye(rank))).bound))
     if off >= 1.0:
         return Certificate(False, np.inf, np.inf, 0.0, rank, dependent, "checked", residual)
     beta = MARGIN / (sigma[rank - 1] * (1.0 - off)) if rank else 0.0

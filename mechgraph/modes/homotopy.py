@@ -49,8 +49,8 @@ POLISHING = 6
 """Newton steps at the end of a track, at most."""
 ARRIVED = 1e-8
 """Last Newton step, against the size of the state, up to which a track has come to its end."""
-CALMING, CALM = 20, 1e-4
-"""Steps in which passive bodies are turned there, at most, and the step at which that ends."""
+CALMING, CALMEST, CALM = 8, 1.0, 1e-4
+"""Steps in which passive bodies are turned there, at most, the largest of them, and that at which it ends."""
 MOST_STEPS = 2000
 """Steps after which a track is given up."""
 
@@ -374,7 +374,7 @@ def polished(leg: Leg, x: Array, t: complex, tracks: Index) -> tuple[Array, Mask
 
 
 def _calming(eq: Equations, here: Linear) -> Array:
-    """Increments ``(F, T)`` along passive motions that take as much of the imaginary part of the states away as can be, at most a half."""
+    """Increments ``(F, T)`` along passive motions that take as much of the imaginary part of the states away as can be."""
     s, idle = eq.family.system, here.idle()
     moves = np.zeros((s.n_freedoms, eq.idle, here.here.T), dtype=complex)
     moves[eq.family.free] = idle.conj().transpose(2, 1, 0)
@@ -383,4 +383,4 @@ def _calming(eq: Equations, here: Linear) -> Array:
     c = -(np.linalg.pinv(both, rcond=1e-6) @ here.here.x.imag.T[..., None])[..., 0]
     c = c[:, : eq.idle] + 1j * c[:, eq.idle :]
     step = np.einsum("fpt,tp->ft", moves, c)
-    return np.asarray(step * np.minimum(1.0, 0.5 / np.maximum(np.abs(step).max(axis=0, initial=0.0), 1e-300)))
+    return np.asarray(step * np.minimum(1.0, CALMEST / np.maximum(np.abs(step).max(axis=0, initial=0.0), 1e-300)))

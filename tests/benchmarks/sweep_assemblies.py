@@ -35,11 +35,11 @@ def arm(seed: int) -> tuple[mg.Mechanism, dict[str, object]]:
     return m, {"L6": hand}
 
 
-def topology(seed: int) -> tuple[mg.Mechanism, dict[str, object]]:
-    """One to three loops of random pairs, one freedom of the first pair driven, each further loop with six freedoms."""
+def topology(seed: int, most: int) -> tuple[mg.Mechanism, dict[str, object]]:
+    """One loop to ``most`` loops of random pairs, one freedom of the first pair driven, each further loop with six freedoms."""
     rng = np.random.default_rng(seed)
     pairs: list[mg.Pair] = []
-    links, loops = ["frame"], int(rng.integers(1, 4))
+    links, loops = ["frame"], int(rng.integers(1, most + 1))
     for loop in range(loops):
         letters = ["R"] if loop == 0 else []
         while (left := (7 if loop == 0 else 6) - sum(FREEDOMS[s] for s in letters)) > 0:
@@ -56,16 +56,12 @@ def topology(seed: int) -> tuple[mg.Mechanism, dict[str, object]]:
     return m, {"O0": 0.1}
 
 
-def prints(modes: mg.Assemblies) -> np.ndarray:
+def prints(q: Question, modes: mg.Assemblies) -> np.ndarray:
     """What tells the assemblies of a set apart ``(n, M)``."""
-    q = Question(modes.mechanism, dict(modes.at))
-    return q.family.prints(Configuration(q.system, states(q, modes)))
-
-
-def states(q: Question, modes: mg.Assemblies) -> np.ndarray:
-    """States ``(nx, M)`` of a set."""
-    starts = [Question(mode, dict(modes.at)).x for mode in modes]
-    return np.stack(starts, axis=1) if starts else np.zeros((q.system.n_state, 0))
+    s = q.system
+    starts = [s.state_of(s.start_coordinates(mode.start)[:, None]) for mode in modes]
+    x = np.concatenate(starts, axis=1) if starts else np.zeros((s.n_state, 0))
+    return q.family.prints(Configuration(s, x))
 
 
 def outside(found: np.ndarray, known: np.ndarray) -> int:
@@ -95,11 +91,11 @@ def arms(count: int) -> list[str]:
     return faults
 
 
-def seeds(count: int, runs: int = 10) -> list[str]:
+def seeds(count: int, most: int = 3, runs: int = 10) -> list[str]:
     """Faults of topologies whose set depends on the seed."""
     faults = []
     for number in range(count):
-        m, at = topology(number)
+        m, at = topology(number, most)
         try:
             begin = time.process_time()
             sets = [mg.assemblies(m, at, seed=seed, cache=False) for seed in range(runs)]
@@ -111,16 +107,16 @@ def seeds(count: int, runs: int = 10) -> list[str]:
         good = [s for s in sets if s.completeness != "searched"]
         if len({(s.total, len(s)) for s in good}) > 1:
             faults.append(f"{number} {m.name}: {sorted(totals, key=str)}")
-        elif good and any(outside(prints(good[0]), prints(s)) for s in good[1:]):
+        elif good and any(outside(prints(Question(m, at), good[0]), prints(Question(m, at), s)) for s in good[1:]):
             faults.append(f"{number} {m.name}: other poses")
     return faults
 
 
-def newton(count: int, guesses: int = 10_000) -> list[str]:
+def newton(count: int, most: int = 3, guesses: int = 10_000) -> list[str]:
     """Faults of topologies in which Newton finds what is not in the set."""
     faults = []
     for number in range(count):
-        m, at = topology(number)
+        m, at = topology(number, most)
         try:
             modes = mg.assemblies(m, at)
             q = Question(m, at)
@@ -128,7 +124,7 @@ def newton(count: int, guesses: int = 10_000) -> list[str]:
             print(f"{number} {m.name}: {type(error).__name__}", flush=True)
             continue
         x = searched(q.system, q.x, q.columns, q.drive[:, 0], guesses, 0.5, np.random.default_rng(number))
-        missed = outside(q.family.prints(Configuration(q.system, x)), prints(modes))
+        missed = outside(q.family.prints(Configuration(q.system, x)), prints(q, modes))
         print(
             f"{number} {m.name}: {len(modes)} real of {modes.total}, {modes.completeness}; {x.shape[1]} guesses closed, "
             f"{missed} of them outside",
