@@ -50,8 +50,9 @@ from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.model.row_parts import Bookkeeping, Component, Freedom
 from mechgraph.model.stop import Stop
 from mechgraph.model.surfaces import Surface
-from mechgraph.modes.assemblies import Assemblies, AssembliesOver, assemblies
+from mechgraph.modes.assemblies import assemblies
 from mechgraph.modes.branches import Branches, branches
+from mechgraph.modes.result import Assemblies, AssembliesOver
 from mechgraph.report.report import DeterminacyReport, check
 from mechgraph.report.structure import Structure, groups, structure
 from mechgraph.response.course import Response

@@ -171,7 +171,7 @@ UPWARD = {
     ("model/mechanism.py", "equivalent", "mechgraph.equivalent"),
     ("model/mechanism.py", "view", "mechgraph.show.page.widget"),
     ("result/solution.py", "view", "mechgraph.show.page.widget"),
-    ("modes/assemblies.py", "plot", "mechgraph.show.modes"),
+    ("modes/result.py", "plot", "mechgraph.show.modes"),
     ("modes/branches.py", "plot", "mechgraph.show.modes"),
 }
 """Methods that a user looks for on a class of a lower room: all they do is call, when they are called, a function of a room above."""

@@ -11,6 +11,7 @@ from mechanisms import Z, bennett, linked_four_bar, ring
 
 import mechgraph as mg
 from mechgraph.closure.assembly import close_all, closed_start
+from mechgraph.force.applied_loads import user_poses
 from mechgraph.model.chain import chain_symbols
 from mechgraph.modes import store
 from mechgraph.modes.bounds import bound
@@ -130,7 +131,7 @@ def test_newton_from_many_guesses_finds_nothing_outside_the_set(name: str) -> No
     for i in range(x.shape[1]):
         q = s.coordinates_of(x[:, [i]])[:, 0]
         start = dict(zip(m.freedom_names(), q.tolist(), strict=True))
-        poses = mg.assemblies.__globals__["user_poses"](closed_start(m.replace(start=start)))[:, 0][driven_links]
+        poses = user_poses(closed_start(m.replace(start=start)))[:, 0][driven_links]
         # the coupler of an S-S pair may spin: its origin on the axis and all other links tell
         gaps = np.abs(known[:, :, :3, :] - poses[:, :3, :]).reshape(len(known), len(driven_links), -1).max(axis=2)
         assert np.sort(gaps.min(axis=0))[: len(driven_links) - (name == "rssr")].max() < 1e-6

@@ -14,10 +14,11 @@ from mechgraph.data import plain
 from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, counted
 from mechgraph.model.mechanism import Mechanism, check_mechanism
-from mechgraph.modes.assemblies import Finder, in_degrees, unit_of, values_text, weakest
 from mechgraph.modes.family import Array
+from mechgraph.modes.finding import Finder
 from mechgraph.modes.question import Question
-from mechgraph.modes.record import BifurcationData, BranchData, BranchesData, FoldData
+from mechgraph.modes.record import Bifurcation, BranchData, BranchesData, Fold
+from mechgraph.modes.result import in_degrees, unit_of, values_text, weakest
 from mechgraph.modes.tracing import Map, Tracer
 from mechgraph.quantities import is_numeric, wrong
 
@@ -43,27 +44,6 @@ class Branch:
     turns: int
     circuit: int
     prints: Array = field(repr=False)
-
-
-@dataclass(frozen=True)
-class Fold:
-    """Where two branches meet and the driver has to turn back: a limit from above (``sense`` 1) or from below (-1).
-
-    ``fastest`` is the freedom that moves most there, while the driver stands still.
-    """
-
-    value: float
-    sense: int
-    branches: tuple[int, int]
-    fastest: str
-
-
-@dataclass(frozen=True)
-class Bifurcation:
-    """Where branches cross: all that meet there."""
-
-    value: float
-    branches: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -216,8 +196,8 @@ class Branches(Shown):
                 BranchData(b.interval, b.full_turn, b.turns, b.circuit, ranges)
                 for b, ranges in zip(self.branches, self.ranges, strict=True)
             ),
-            tuple(FoldData(f.value, f.sense, f.branches, f.fastest) for f in self.folds),
-            tuple(BifurcationData(b.value, b.branches) for b in self.bifurcations),
+            self.folds,
+            self.bifurcations,
             self.circuits,
         )
 

@@ -45,18 +45,18 @@ class BranchData:
 
 
 @dataclass(frozen=True)
-class FoldData:
-    """Where two branches meet and the driver turns back."""
+class Fold:
+    """Where two branches meet and the driver has to turn back."""
 
     value: float
     sense: Annotated[int, "1 at an upper limit, -1 at a lower one"]
     branches: tuple[int, int]
-    fastest: Annotated[str, "the freedom that moves most there"]
+    fastest: Annotated[str, "the freedom that moves most there, while the driver stands still"]
 
 
 @dataclass(frozen=True)
-class BifurcationData:
-    """Where branches cross."""
+class Bifurcation:
+    """Where branches cross: all that meet there."""
 
     value: float
     branches: tuple[int, ...]
@@ -72,6 +72,6 @@ class BranchesData:
     resolution: Annotated[float, "distance of the samples"]
     open_ends: Annotated[int, "ends of branches that could not be told"]
     branches: tuple[BranchData, ...]
-    folds: tuple[FoldData, ...]
-    bifurcations: tuple[BifurcationData, ...]
+    folds: tuple[Fold, ...]
+    bifurcations: tuple[Bifurcation, ...]
     circuits: Annotated[tuple[tuple[int, ...], ...], "branches of each"]

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from mechgraph.errors import DeclarationError
-from mechgraph.modes.assemblies import Assemblies
 from mechgraph.modes.branches import Branch, Branches
+from mechgraph.modes.result import Assemblies
 from mechgraph.show.canvas import INK, MUTED, PALETTE, new_axes, plain, said
 from mechgraph.show.skeleton import draw_skeleton
 

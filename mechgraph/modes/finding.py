@@ -1,0 +1,239 @@
+"""How the assemblies of a question are found: tracks from a start set, or a search; what each is, and how sure it is that these are all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, cmp_to_key
+
+import numpy as np
+
+from mechgraph.closure.assembly import close_all
+from mechgraph.closure.configuration import Configuration
+from mechgraph.errors import counted
+from mechgraph.force.applied_loads import user_poses
+from mechgraph.modes.balls import TINY
+from mechgraph.modes.bounds import Bound, bound
+from mechgraph.modes.certificate import Certificate, certificate
+from mechgraph.modes.family import Array
+from mechgraph.modes.monodromy import Irregular, StartSet, distinct, start_set
+from mechgraph.modes.question import Question
+from mechgraph.modes.result import Assemblies, ComplexModes
+from mechgraph.modes.search import searched
+from mechgraph.modes.store import keep, kept
+from mechgraph.modes.targets import Ends, ends
+
+REAL = 1e-6
+"""Imaginary part of link poses up to which an assembly counts as real."""
+REAL_SINGULAR, REAL_CLOSED = 1e-3, 1e-9
+"""The same at singular ends, which are known to the root of rounding only; closure error of what is real."""
+SINGULAR = 1e-5
+"""Smallest singular value of the closure rows, as part of the largest, below which an assembly is no regular point."""
+LARGE_STATE = 10.0
+"""Size of a state that is not real from which on small singular values are a matter of scale."""
+AWAY = 1e-2
+"""Step along a motion that the rows leave free, after which a continuum is still closed."""
+GUESSES = 400
+"""Random guesses where no class is known."""
+GUESSED_TURNS = 1.0
+"""Turns on either side of the start within which angles are guessed."""
+ORDER = 1e-7
+"""Difference of link poses (and coordinates) below which the next number decides the order of assemblies."""
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class _Solutions:
+    """Real states ``(nx, M)`` at a position and ``others`` that are not real, with what is said of them (see ``Assemblies``)."""
+
+    x: Array
+    others: Array
+    word: str
+    evidence: tuple[str, ...]
+    total: int | None
+    infinite: int
+
+
+class Finder:
+    """Finds the assemblies of a question."""
+
+    def __init__(self, question: Question, seed: int, cache: bool, progress: Progress | None) -> None:
+        self.question, self.family, self.progress = question, question.family, progress
+        self.rng, self.cache = np.random.default_rng(seed), cache
+        self.fault = self.family.fault
+
+    @cached_property
+    def start(self) -> StartSet | None:
+        """The start set of the class; None where there is none."""
+        if self.fault:
+            return None
+        known = kept(self.family) if self.cache else None
+        if known is not None:
+            return known
+        try:
+            made = start_set(self.family, self.rng, self.progress)
+        except Irregular:
+            self.fault = "random mechanisms of its class are not closed by regular equations"
+            return None
+        if self.cache and made.whole:
+            keep(self.family, made)
+        return made
+
+    def solutions(self, guesses: int = GUESSES, turns: float = GUESSED_TURNS) -> list[_Solutions]:
+        """What is found at all positions."""
+        q = self.question
+        if self.start is None:
+            return [self._searched(q.drive[:, i], guesses, turns) for i in range(q.drive.shape[1])]
+        found = ends(self.family, self.start, q.drive, self.rng, self.progress)
+        return [self._tracked(one, self.start, i) for i, one in enumerate(found)]
+
+    def positions(self, guesses: int, turns: float) -> list[Assemblies]:
+        """The assemblies at all positions."""
+        return [self._result(found, i) for i, found in enumerate(self.solutions(guesses, turns))]
+
+    def _distinct(self, x: Array) -> Array:
+        return x[:, distinct(self.family.prints(Configuration(self.question.system, x)))]
+
+    def _searched(self, drive: Array, guesses: int, turns: float) -> _Solutions:
+        q = self.question
+        x = searched(q.system, q.x, q.columns, drive, guesses, turns, self.rng, self.progress)
+        x = np.concatenate([x, *([q.start.x] if np.allclose(q.start.x[self.family.rows, 0], drive) else [])], axis=1)
+        why = (
+            f"No class is known: {self.fault}. Searched from {guesses} random guesses within {turns:g} turns of the start; "
+            "others may exist."
+        )
+        return _Solutions(
+            self._distinct(x), np.zeros((q.system.n_state, 0), dtype=complex), "searched", (why,), None, 0
+        )
+
+    def _tracked(self, found: Ends, start: StartSet, i: int) -> _Solutions:
+        q, N = self.question, start.x.shape[1]
+        size = np.maximum(1.0, np.abs(found.poses).max(axis=0, initial=0.0))
+        imaginary = np.abs(found.poses.imag).max(axis=0, initial=0.0) / size
+        real = imaginary < np.where(found.singular, REAL_SINGULAR, REAL)
+        x, error = close_all(q.system, found.x[:, real].real, q.columns)
+        x = self._distinct(x[:, error < REAL_CLOSED])
+        if (self._irregular(found.x[:, ~real & found.singular])).any():
+            x = np.concatenate([x, self._of_continuum(i)], axis=1)
+        word, evidence = _completeness(found, start, N, bound(self.family))
+        return _Solutions(x, found.x[:, ~real], word, evidence, N, found.infinite)
+
+    def _irregular(self, x: Array) -> Array:
+        """Which assemblies that are not real are no regular points."""
+        J = Configuration(self.question.system, x).J[:, self.family.free].transpose(2, 0, 1)
+        sigma = np.linalg.svd(J, compute_uv=False)
+        least = len(self.family.free) - self.family.passive.shape[1] - 1
+        large = np.abs(x).max(axis=0, initial=0.0) > LARGE_STATE
+        return np.asarray((sigma[:, least] < SINGULAR * sigma[:, 0]) & ~large)
+
+    def _of_continuum(self, i: int) -> Array:
+        """A real assembly ``(nx, 1)`` of a continuum that tracks met at complex points, the nearest to the start; or none."""
+        q = self.question
+        x = searched(q.system, q.x, q.columns, q.drive[:, i], GUESSES // 4, 0.5, self.rng, self.progress)
+        near = np.argsort(np.abs(q.system.difference(x, q.start.x)).max(axis=0))
+        found = [j for j in near.tolist() if self._point(x[:, [j]])[0] == "continuum"]
+        return x[:, found[:1]]
+
+    def _result(self, found: _Solutions, i: int) -> Assemblies:
+        q, m, x = self.question, self.question.asked, found.x
+        here = Configuration(q.system, x)
+        poses = np.moveaxis(user_poses(here), 1, 0)
+        order = _ordered(self.family.prints(here).T)
+        x, poses = x[:, order], poses[order]
+        coordinates = q.coordinates(x)
+        coordinates[:, q.columns] = q.values[:, i]
+        own = [q.m.freedom_names().index(name) for name in m.freedom_names()]
+        kinds, conditions, sure = [], [], []
+        for j in range(x.shape[1]):
+            kind, condition, proof = self._point(x[:, [j]])
+            kinds.append(kind)
+            conditions.append(condition)
+            sure.append(proof)
+        modes = tuple(
+            m.replace(start=dict(zip(m.freedom_names(), row[own].tolist(), strict=True))) for row in coordinates
+        )
+        away = Configuration(q.system, found.others)
+        return Assemblies(
+            m,
+            dict(zip(q.names, q.values[:, i].tolist(), strict=True)),
+            modes,
+            poses,
+            coordinates[:, own],
+            tuple(kinds),
+            np.array(conditions),
+            tuple(sure),
+            ComplexModes(q.complex_coordinates(found.others)[:, own], np.moveaxis(user_poses(away), 1, 0)),
+            found.word,
+            found.evidence,
+            found.total,
+            found.infinite,
+        )
+
+    def _point(self, x: Array) -> tuple[str, float, Certificate | None]:
+        """Kind, condition and certificate of a real assembly ``x (nx, 1)``."""
+        family, here = self.family, Configuration(self.question.system, x)
+        J = here.J[:, family.free, 0]
+        _, sigma, Vt = np.linalg.svd(J)
+        rank, wanted = int((sigma > SINGULAR * sigma[0]).sum()) if sigma.size else 0, family.unknowns
+        condition = float(sigma[0] / max(sigma[wanted - 1], TINY)) if wanted else 1.0
+        sure = certificate(here, family.free, family.passive.shape[1], not self.fault)
+        # what is proved is regular, be it ever so close to a double point
+        if rank >= wanted or (sure is not None and sure.proved):
+            return "regular", condition, sure
+        return ("continuum" if self._moves(here, Vt[rank:]) else "double"), np.inf, None
+
+    def _moves(self, here: Configuration, left: Array) -> bool:
+        """Whether the loops stay closed along a motion that the rows leave free, with the drivers at rest."""
+        family, s = self.family, self.question.system
+        if family.passive.shape[1]:
+            held = np.linalg.qr(family.passive[family.free])[0]
+            left = left - (left @ held) @ held.T
+        for direction in left:
+            size = np.abs(direction).max()
+            if size < 1e-3:
+                continue
+            for sign in (1.0, -1.0):
+                dq = np.zeros((s.n_freedoms, 1))
+                dq[family.free, 0] = sign * AWAY * direction / size
+                moved, error = close_all(s, s.advance(here.x, dq), family.columns)
+                gone = np.abs(self.family.prints(Configuration(s, moved)) - self.family.prints(here)).max()
+                if error[0] < 1e-11 and gone > 0.2 * AWAY:
+                    return True
+        return False
+
+
+def _completeness(found: Ends, start: StartSet, N: int, known: Bound | None) -> tuple[str, tuple[str, ...]]:
+    """The word for how sure it is that no assembly is missing, and what it rests on."""
+    many = counted(N, "mode")
+    loops = (
+        f"A random complex mechanism of the class has {many}: {counted(start.loops, 'loop')} of such mechanisms brought no further one "
+        f"(chance of one missed {start.chance:.1g} where all permutations are as likely), {start.lost} of {start.followed} tracks lost."
+    )
+    tracks = (
+        f"{counted(N, 'track')} to this position in {counted(found.runs, 'run')}: {found.x.shape[1]} different ends, "
+        f"{found.infinite} at infinity, {found.lost} lost in the best run."
+    )
+    if not start.whole or not found.clean:
+        return "searched", (loops, tracks, "Tracks that are lost, or meet, leave open whether these are all.")
+    if known is not None and known.count == N:
+        return "proved", (f"The class has at most {N}: {known.source}.", tracks)
+    trace = start.trace
+    if not trace.passed:
+        return "searched", (loops, "No trace test was passed, so that others may exist.", tracks)
+    words = (
+        f"Trace test passed: over {trace.samples} random mechanisms of the class a sum over all assemblies is a rational function of "
+        f"degree {trace.degree} (the singular values of its Loewner matrix end there: {trace.last:.1g}, {trace.beyond:.1g})."
+    )
+    return "tested", (words, loops, tracks)
+
+
+def _ordered(numbers: Array) -> list[int]:
+    """The order of rows by their numbers, of which smaller differences than rounding do not count."""
+
+    def compare(i: int, j: int) -> int:
+        apart = numbers[i] - numbers[j]
+        first = int(np.argmax(np.abs(apart) > ORDER * max(1.0, float(np.abs(numbers).max()))))
+        return int(np.sign(apart[first]))
+
+    return sorted(range(len(numbers)), key=cmp_to_key(compare))

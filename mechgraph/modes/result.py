@@ -1,0 +1,184 @@
+"""All assemblies at a position or at several, as they are returned."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mechgraph.data import plain
+from mechgraph.document import Document, Paragraph, Shown, Table
+from mechgraph.errors import counted
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.modes.certificate import Certificate
+from mechgraph.modes.family import Array
+from mechgraph.modes.record import AssembliesData, ModeData
+
+COORDINATES = 5
+"""Most coordinates of an assembly in its table; all are in ``start`` of the mode."""
+
+
+@dataclass(frozen=True)
+class ComplexModes:
+    """Assemblies that are not real: ``coordinates (n, F)`` and ``poses (n, N, 4, 4)``, complex arrays, no mechanisms."""
+
+    coordinates: Array
+    poses: Array
+
+    def __len__(self) -> int:
+        return len(self.poses)
+
+
+@dataclass(frozen=True, repr=False)
+class Assemblies(Shown, Sequence[Mechanism]):
+    """All real assemblies at one position, each a Mechanism whose ``start`` is that assembly.
+
+    Attributes
+    ----------
+    mechanism, at : the mechanism, and the values given.
+    poses : ``(M, N, 4, 4)`` of all links.
+    coordinates : ``(M, F)`` of all freedoms, in the order of ``freedom_names``.
+    kinds : of every assembly ``"regular"``, ``"double"`` (assemblies meet) or ``"continuum"`` (it can move with the drivers at rest).
+    condition : condition numbers ``(M,)`` of the closure equations; infinite where singular.
+    certificates : of regular ones, else None.
+    complex : those that are not real.
+    completeness : ``"proved"`` (the count equals a bound), ``"tested"`` (a trace test was passed, loops of random mechanisms of the class
+        bring no further one, and no track was lost) or ``"searched"``.
+    evidence : what that rests on, in words with numbers.
+    total : assemblies of a random complex mechanism of the class; None where no class is known. ``infinite`` of them lie at infinity here.
+    """
+
+    mechanism: Mechanism
+    at: Mapping[str, float]
+    modes: tuple[Mechanism, ...]
+    poses: Array
+    coordinates: Array
+    kinds: tuple[str, ...]
+    condition: Array
+    certificates: tuple[Certificate | None, ...]
+    complex: ComplexModes
+    completeness: str
+    evidence: tuple[str, ...]
+    total: int | None
+    infinite: int
+
+    def __len__(self) -> int:
+        return len(self.modes)
+
+    def __getitem__(self, i: Any) -> Any:
+        return self.modes[i]
+
+    def __iter__(self) -> Iterator[Mechanism]:
+        return iter(self.modes)
+
+    def document(self) -> Document:
+        """A table of the assemblies, and how sure it is that these are all."""
+        m = self.mechanism
+        single = [
+            name for pair in m.pairs for name, one in zip(pair.freedom_names, pair.type.drivable, strict=True) if one
+        ]
+        shown = [name for name in single if name not in self.at][:COORDINATES]
+        places = [m.freedom_names().index(name) for name in shown]
+        units = [180.0 / np.pi if m.turns(name) else 1.0 for name in shown]
+        names = [f"{name} [deg]" if m.turns(name) else name for name in shown]
+        header = ("mode", *names, "kind", "condition", "certificate")
+        rows = []
+        for i, kind in enumerate(self.kinds):
+            sure = self.certificates[i]
+            word = "none" if sure is None else f"unique within {sure.radius:.2g}" if sure.proved else "not proved"
+            rows.append(
+                (
+                    str(i),
+                    *(f"{u * self.coordinates[i, k]:.6g}" for k, u in zip(places, units, strict=True)),
+                    kind,
+                    f"{self.condition[i]:.3g}",
+                    word,
+                )
+            )
+        title = f"{m.name}: {counted(len(self), 'mode')} at {values_text(m, self.at)}"
+        return Document(
+            title,
+            (Table(header, tuple(rows)), Paragraph(f"Completeness: {self.completeness}. " + " ".join(self.evidence))),
+        )
+
+    def plot(self) -> Any:
+        """A picture of all assemblies side by side; the figure."""
+        return importlib.import_module("mechgraph.show.modes").draw_assemblies(self)
+
+    @property
+    def data(self) -> AssembliesData:
+        """Everything but arrays as a record."""
+        modes = zip(self.modes, self.kinds, self.condition.tolist(), self.certificates, strict=True)
+        return AssembliesData(
+            self.mechanism.name,
+            self.at,
+            self.completeness,
+            self.evidence,
+            self.total,
+            self.infinite,
+            len(self.complex),
+            tuple(ModeData(mode.start, kind, condition, sure) for mode, kind, condition, sure in modes),
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The same as plain data."""
+        return plain(self.data)
+
+
+@dataclass(frozen=True, repr=False)
+class AssembliesOver(Shown, Sequence[Assemblies]):
+    """The assemblies at several positions, one after the other: ``modes[position][mode]``."""
+
+    positions: tuple[Assemblies, ...]
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def __getitem__(self, i: Any) -> Any:
+        return self.positions[i]
+
+    @property
+    def completeness(self) -> str:
+        """The weakest of all positions."""
+        return weakest(p.completeness for p in self.positions)
+
+    def document(self) -> Document:
+        """How many assemblies there are at every position."""
+        rows = tuple(
+            (values_text(p.mechanism, p.at), str(len(p)), str(len(p.complex)), p.completeness) for p in self.positions
+        )
+        return Document(
+            f"{self.positions[0].mechanism.name}: assemblies",
+            (Table(("at", "real", "not real", "completeness"), rows),),
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything as plain data."""
+        return {"positions": [p.to_dict() for p in self.positions]}
+
+
+def values_text(m: Mechanism, at: Mapping[str, float]) -> str:
+    """Values given, turns in degrees: ``A.Rz = 30 deg, B.Tz = 0.1``."""
+    return ", ".join(f"{name} = {in_degrees(m, name, value):.6g}{unit_of(m, name)}" for name, value in at.items())
+
+
+def in_degrees(m: Mechanism, name: str, value: float) -> float:
+    """A value of a freedom or coordinate as it is shown: turns in degrees."""
+    return float(np.rad2deg(value)) if m.turns(name) else value
+
+
+def unit_of(m: Mechanism, name: str) -> str:
+    """What is written after it."""
+    return " deg" if m.turns(name) else ""
+
+
+WORDS = ("proved", "tested", "searched")
+"""What completeness may be, the strongest first."""
+
+
+def weakest(words: Iterable[str]) -> str:
+    """The weakest of words for completeness."""
+    return max(words, key=WORDS.index)
