@@ -27,7 +27,7 @@ from mechgraph.modes.balls import STORED, Ball, Open, exact, loop_rows
 
 BALL = 0.05
 """Size of the increments (radians, lengths / L) within which second derivatives are bounded."""
-MARGIN = 1.01
+BOUND_ROUNDING = 1.01
 """Factor that stands for the rounding of bounds of second derivatives, and of bases that are orthonormal to rounding."""
 SINGULAR_ROWS = 1e-13
 """Smallest singular value, as part of the largest, below which nothing is tried."""
@@ -73,12 +73,14 @@ def certificate(here: Configuration, free: Index, passive: int, by_structure: bo
     dependent, off = s.n_rows - rank, np.inf
     if not rank or sigma[rank - 1] > SINGULAR_ROWS * sigma[0]:
         Y, independent = exact(np.diag(1.0 / sigma[:rank])), exact(U[:, :rank].T)
-        off = MARGIN * float(np.linalg.norm((Y @ (independent @ A @ exact(Vt[:rank].T)) - exact(np.eye(rank))).bound))
+        off = BOUND_ROUNDING * float(
+            np.linalg.norm((Y @ (independent @ A @ exact(Vt[:rank].T)) - exact(np.eye(rank))).bound)
+        )
     if off >= 1.0:
         return Certificate(False, np.inf, np.inf, 0.0, rank, dependent, "checked", residual)
-    beta = MARGIN / (sigma[rank - 1] * (1.0 - off)) if rank else 0.0
-    eta = MARGIN * float(np.linalg.norm((Y @ (independent @ f)).bound)) / (1.0 - off)
-    K = MARGIN * curvature(here)
+    beta = BOUND_ROUNDING / (sigma[rank - 1] * (1.0 - off)) if rank else 0.0
+    eta = BOUND_ROUNDING * float(np.linalg.norm((Y @ (independent @ f)).bound)) / (1.0 - off)
+    K = BOUND_ROUNDING * curvature(here)
     h = beta * K * eta
     proved = bool(h <= 0.5)
     error = float((1 - np.sqrt(1 - 2 * h)) / (beta * K)) if proved and h > 0 else float(eta)
