@@ -231,3 +231,44 @@ def test_numbers_of_assemblies_multiply() -> None:
     assert len(found) == 4
     assert different(first.links) == 2
     assert different((*first.links, *second.links)) == 4
+
+
+def alone(m: mg.Mechanism, group: mg.Group, before: set[str], drives: tuple[str, ...]) -> mg.Mechanism:
+    """A group with the links before it as one frame, as declared."""
+    pairs = []
+    for p in m.pairs:
+        if p.name in group.pairs:
+            a, b = (m.frame if link in before else link for link in (p.a, p.b))
+            pairs.append(mg.Pair(p.name, p.type.symbol, a, b, point=p.point, axis=p.axis, second=p.second))
+    mine = [d for d in drives if d.split(".")[0] in group.pairs]
+    return mg.Mechanism("alone", pairs=pairs, frame=m.frame, drives=mine)
+
+
+def number(m: mg.Mechanism, drives: tuple[str, ...]) -> int:
+    """Real and complex assemblies at the declared place of the drivers."""
+    found = mg.assemblies(m, dict.fromkeys(drives, 0.0), seed=0)
+    assert found.completeness in ("proved", "tested")
+    return len(found) + len(found.complex)
+
+
+@pytest.mark.parametrize(
+    ("symbol", "seed"),
+    [
+        ("R - D10 - D20 - 3 + 0", 1),
+        *(pytest.param(f"R - {rest}", seed, marks=pytest.mark.slow) for seed in (2, 3, 4) for rest in (
+            "D10 - D10 - 1 + 2", "D10 - D20 - 3 + 0", "D20 - D10 - 2 + 3", "D10 - D10 - 2 + 3")),
+    ],
+)  # fmt: skip
+def test_numbers_of_assemblies_multiply_whatever_the_driver(symbol: str, seed: int) -> None:
+    """Random dyads with a random driver: the assemblies, real and complex, are as many as the product of those of the groups alone."""
+    m = named(symbol, seed)
+    drivable = [finding.freedoms[0] for finding in mg.check(m).drivable]
+    m = m.replace(drives=[str(np.random.default_rng(seed).choice(drivable))])
+    g = mg.groups(m)
+    before, product = {m.frame}, 1
+    for group in g.groups:
+        if not group.driver:
+            part = alone(m, group, before, g.drivers)
+            product *= number(part, tuple(d.freedom for d in part.drives))
+        before |= set(group.links)
+    assert number(m, g.drivers) == product > 1
