@@ -11,7 +11,7 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import ShapeError
-from mechgraph.model.contact_rows import ROWS, curve_faults, in_contact, kept_side, miss_faults, takes_curves
+from mechgraph.model.contact_rows import ROWS, curve_faults, in_contact, kept_side
 from mechgraph.model.curves import Curve
 from mechgraph.model.field_format import (
     DIRECTION,
@@ -28,10 +28,11 @@ from mechgraph.model.field_format import (
 from mechgraph.model.hertz import Hertz
 from mechgraph.model.numeric import plain
 from mechgraph.model.numeric import second_direction as second_direction
+from mechgraph.model.pair_faults import contact_faults, shape_faults_of
 from mechgraph.model.pair_table import TABLE
 from mechgraph.model.pair_type import PairType
 from mechgraph.model.placed_rows import Contact, travels
-from mechgraph.model.surface_rows import on_surface, row_of, surface_faults, surface_miss
+from mechgraph.model.surface_rows import on_surface, row_of, surface_faults
 from mechgraph.model.surfaces import Surface
 from mechgraph.quantities import is_numeric, shown, wrong
 from mechgraph.units import LENGTH
@@ -320,8 +321,8 @@ class Pair(Described):
         ]
         if isinstance(self.a, str) and isinstance(self.b, str) and self.a == self.b:
             found.append(f"{where}joins link {self.a!r} to itself; a pair joins two links")
-        curved = [*self._curve_faults(where, tol or 0.0)]
-        found += [*self._pitch_faults(where), *self._contact_faults(where), *curved]
+        curved = [*shape_faults_of(self, where, tol or 0.0)]
+        found += [*self._pitch_faults(where), *contact_faults(self, where), *curved]
         most = largest_cosine(tol) if self.type.square_second else PARALLEL_COSINE
         if (self.on_a is None) != (self.on_b is None):
             missing = "on_b" if self.on_b is None else "on_a"
@@ -342,60 +343,6 @@ class Pair(Described):
             if self.point is not None and self.axis is not None:
                 found += Marker(self.point, self.axis, self.second).faults(where, most)
         return [fault for fault in found if fault]
-
-    def _contact_faults(self, where: str) -> Iterator[str | None]:
-        yield self.formats["closed"].fault(self.closed, f"{where}closed")
-        form, given = self.type.touching, {"radius": self.radius, "hertz": self.hertz}
-        if form is None:
-            said = [name for name, value in given.items() if value is not None]
-            said += ["closed"] if self.closed == "force" else []
-            if said:
-                have = ", ".join(symbol for symbol, row in {**TABLE, **ROWS}.items() if row.touching)
-                yield f"{where}{', '.join(said)}: type {self.type.symbol} is no contact of two elements; {have} are"
-            return
-        if self.radius is not None:
-            yield self.formats["radius"].fault(self.radius, f"{where}radius")
-            if not any(form.b) or self.radius_b != self.radius:
-                yield f"{where}radius: the curves and their roller say it; leave it out"
-        if self.hertz is None:
-            return
-        if not isinstance(self.hertz, Hertz):
-            yield wrong(self.hertz, f"{where}hertz", "mg.Hertz(moduli=(E_a, E_b))")
-            return
-        yield from (faults := self.hertz.value_faults(f"{where}hertz."))
-        if faults:
-            return
-        groove, needed = self.hertz.groove_radius, "the pressure depends on it; give it"
-        if any(form.b) and self.radius_b is None:
-            yield f"{where}radius: {needed}"
-        elif self.radius is not None and any(form.a) and (groove is None or not groove > self.radius):
-            yield wrong(groove, f"{where}hertz.groove_radius", f"a number above the radius {self.radius:g} of the ball")
-        if form.along_line and self.hertz.length is None:
-            yield f"{where}hertz.length: {needed}"
-
-    def _curve_faults(self, where: str, tol: float) -> Iterator[str | None]:
-        """What is wrong with its curves, or with the contact on them."""
-        if self.roller is not None:
-            yield self.formats["roller"].fault(self.roller, where + "roller")
-        for name, given in (("curve", self.curve), ("curve_b", self.curve_b)):
-            if not isinstance(given, Curve | None):
-                yield wrong(given, where + name, "a Curve, such as mg.Curve.circle(radius=...)")
-        if not isinstance(self.surface, Surface | None):
-            yield wrong(self.surface, where + "surface", "a Surface, such as mg.Surface.sphere(radius=...)")
-        elif self.surface is not None and self.curve is not None:
-            yield f"{where}has a curve and a surface; give one of them"
-        elif self.surface is not None and self.contact is not None:
-            yield from surface_miss(self.contact, tol, where)
-        elif self.surface is not None:
-            yield from surface_faults(self.type, self.surface, self.point, where, self.roller)
-        elif self.contact is not None:
-            yield from miss_faults(self.contact, (self.curve, self.curve_b), tol, where)
-        elif isinstance(self.curve, Curve):
-            yield from curve_faults(self.type, self.curve, self.curve_b, self.roller, self.point, where)
-        elif self.curve_b is not None or self.roller:
-            yield f"{where}has a curve_b or a roller, but no curve; give curve=, or exchange links a and b"
-        elif takes_curves(self.type) and self.has_geometry:
-            yield f"{where}type {self.type.symbol} needs a curve, such as curve=mg.Curve.circle(radius=...)"
 
     def _pitch_faults(self, where: str) -> Iterator[str | None]:
         given = [(n, v) for n, v in (("pitch", self.pitch), ("lead", self.lead)) if v is not None]
