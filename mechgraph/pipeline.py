@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property, partial
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,8 @@ from mechgraph.closure.passive_motion import PassiveMotion, are_alone
 from mechgraph.closure.passive_rest import unspun
 from mechgraph.closure.ranges import end_at_ranges
 from mechgraph.closure.rates import Rates, Velocities, at_dead_points, disagreement, distance_to_dead_point, rates
+from mechgraph.closure.reduced_path import follow_reduced
+from mechgraph.closure.reduction import Reduction, reduction_of
 from mechgraph.closure.solver import ClosureSolver, FactoredClosure, closure_solver, engine_for, solver_at_start
 from mechgraph.errors import DeclarationError, IndeterminateError
 from mechgraph.force.block import BlockForces, ForceTask, forces_of_block
@@ -57,12 +60,14 @@ CONTRADICTION = 1e-6
 CLOSING = 1e-13
 """Part of the condition number within which a start is not told from a dead point: some hundred roundings of its closing."""
 Mask = NDArray[np.bool_]
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True)
 class Options:
     """How to solve: force ``method`` (None: motion alone), what becomes of ``redundant`` reactions, and the ``engine``.
 
+    ``form`` says by which form of the equations paths are followed, ``"full"`` or ``"reduced"``, or ``"auto"``: the faster one.
     ``progress`` is called with the numbers of positions done and of all that were reached, block by block.
     """
 
@@ -70,6 +75,7 @@ class Options:
     redundant: str = "nan"
     engine: str = "auto"
     progress: Callable[[int, int], None] | None = field(default=None, compare=False)
+    form: str = "auto"
 
 
 @dataclass(frozen=True)
@@ -127,7 +133,8 @@ class Pipeline:
     @cached_property
     def freedoms(self) -> Freedoms:
         """What can move at the start, what the drivers leave free, passive freedoms."""
-        return free_motion(self.system, self.x, self.columns, self.engine)
+        key = "free", self.engine, self.columns.tobytes(), bool(self.m.loads)
+        return self._with_start(key, lambda: free_motion(self.system, self.x, self.columns, self.engine))
 
     # --- drivers ---------------------------------------------------------------------------------------------------------
 
@@ -237,14 +244,35 @@ class Pipeline:
         followed = (1, batch[-1]) if shared else batch
         path = DriverPath(self.system, self.solver, starts.system_of, start)
         path.carries = are_alone(self.passive)
-        found = follow(
-            path, requests(starts.x, self.values("position", followed)[self.lead], followed), int(np.prod(followed))
-        )
-        if self.passive:
-            found = unspun(path, found, self.passive)
-            found.interpolate()
+        found = self._followed(path, starts, followed)
         end_at_ranges(path, found)
         return Outcome(self, starts, batch, variant, found, path)
+
+    def _followed(self, path: DriverPath, starts: Starts, batch: tuple[int, ...]) -> Positions:
+        """The positions along the path, by the reduced form of the mechanism where it has one."""
+        values, total = self.values("position", batch)[self.lead], int(np.prod(batch))
+        form = self.reduction
+        found = None if form is None else follow_reduced(path, form, starts.x, values, batch, total)
+        if found is None:
+            found = follow(path, requests(starts.x, values, batch), total)
+            if self.passive:
+                found = unspun(path, found, self.passive)
+                found.interpolate()
+        return found
+
+    @cached_property
+    def reduction(self) -> Reduction | None:
+        """The reduced form of the mechanism, where paths are followed by it."""
+        key = "reduced", self.options.form, self.leading.tobytes()
+        return self._with_start(key, lambda: reduction_of(self.start, self.leading, self.passive, self.options.form))
+
+    def _with_start(self, key: tuple[object, ...], make: Callable[[], Made]) -> Made:
+        """What follows from the start and the drivers alone is kept with the start."""
+        kept = self.start.solvers
+        if key not in kept:
+            kept[key] = make()
+        made: Made = kept[key]
+        return made
 
 
 class Outcome:

@@ -38,9 +38,7 @@ class Configuration:
 
     def part(self, at: Index) -> Configuration:
         """Some of the positions, evaluated separately."""
-        par = self.system.par
-        system = self.system if par.batch == 1 else self.system.with_parameters(par.taken(at))
-        return Configuration(system, self.x[:, at])
+        return Configuration(self.system.cases(at), self.x[:, at])
 
     def repeated(self, system: System, count: int) -> Configuration:
         """The states ``count`` times, one after the other, for a system of which masses alone differ; what is evaluated is taken over."""
@@ -265,13 +263,13 @@ class Configuration:
     @kept
     def closure(self) -> Array:
         """Closure error ``(T,)``: largest of angle and length / L over all loops, and of the other rows."""
-        errors = [part.error(self) for part in self.system.rows]
+        errors = [part.error(self) for part in self.system.position_rows]
         return errors[0] if len(errors) == 1 else np.max(errors, axis=0)
 
     @kept
     def residual(self) -> Array:
         """What the closure rows leave open ``(n_rows, T)``: loops first, then the others."""
-        return _stacked([part.residual(self) for part in self.system.rows])
+        return _stacked([part.residual(self) for part in self.system.position_rows])
 
     @property
     def rounding(self) -> Array:
@@ -281,7 +279,7 @@ class Configuration:
     @kept
     def J(self) -> Array:
         """Closure Jacobian ``(n_rows, F, T)``; of the loops ``J = (C x I6) diag(S_k)``."""
-        return _stacked([part.jacobian(self) for part in self.system.rows])
+        return _stacked([part.jacobian(self) for part in self.system.position_rows])
 
     @property
     def loop_jacobian(self) -> Array:
@@ -302,7 +300,7 @@ class Configuration:
 
     def closure_rates(self, dq: Array) -> Array:
         """``J q' (n_rows, T)`` for rates ``dq (F, T)``, without forming ``J``."""
-        return _stacked([part.rates(self, dq) for part in self.system.rows])
+        return _stacked([part.rates(self, dq) for part in self.system.position_rows])
 
     def closure_bias(self, pairs: Array) -> Array:
         """Velocity part ``(n_rows, T)`` of the closure accelerations ``J q'' + bias`` from that of the pairs (``bias``, ``(6, P, T)``)."""

@@ -90,7 +90,11 @@ class DriverPath:
         start = self._start
         if start is not None and x.shape == start.x.shape and not np.count_nonzero(x != start.x):
             return start
-        return Configuration(self._system_of(self.variant_of[tracks]), x)
+        return Configuration(self.system_on(tracks), x)
+
+    def system_on(self, tracks: Index) -> System:
+        """The system with the numbers of the variants that tracks follow."""
+        return self._system_of(self.variant_of[tracks])
 
     def chosen(self, point: Configuration, which: Index) -> Index:
         """See ``numerics.newton.Problem``."""

@@ -6,6 +6,7 @@ What follows from links, pairs and frame is in ``closure.places`` and is made on
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from itertools import pairwise, starmap
 from typing import Any
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.batches import Index as Index
 from mechgraph.closure.coefficients import Numbers
-from mechgraph.closure.rows import CouplingRows, LoopRows, Rows
+from mechgraph.closure.rows import CouplingRows, LoopRows, PositionRows, Rows
 from mechgraph.closure.states import States
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import Parameters, coupling_places, parameters
@@ -37,6 +38,11 @@ class System(States):
         """The contributors of closure rows: the loops, then the couplings."""
         loops: list[Rows] = [LoopRows(self.graph.n_loops)]
         return loops + ([self._coupling_rows()] if self.m.couplings else [])
+
+    @property
+    def position_rows(self) -> Sequence[PositionRows]:
+        """The same where positions alone are asked for."""
+        return self.rows
 
     def _coupling_rows(self) -> CouplingRows:
         """The rows of the couplings; one without a constant keeps the value that it has at the start."""
@@ -64,7 +70,7 @@ class System(States):
     def row_scale(self) -> Array:
         """Factors ``(n_rows, B)`` of every row over the user's relation: its multiplier in the user's units is ``scale * x``."""
         B = self.par.couplings.shape[1]
-        return np.concatenate([np.broadcast_to(part.scale, (len(part.scale), B)) for part in self.rows])
+        return np.concatenate([np.broadcast_to(part.scale, (len(part.scale), B)) for part in self.position_rows])
 
     @property
     def coupling_matrix(self) -> Array:

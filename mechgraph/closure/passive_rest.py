@@ -17,12 +17,17 @@ from mechgraph.closure.passive_steps import PassiveSteps, rest_is_sure
 from mechgraph.closure.rates import Velocities
 from mechgraph.closure.solver import FactoredClosure
 from mechgraph.numerics.continuation import Follower
+from mechgraph.numerics.crossings import WINDOW
 from mechgraph.numerics.hermite import Interpolation
-from mechgraph.numerics.legendre import GAUSS, PLACES, POINTS, TO_SERIES, integrals
+from mechgraph.numerics.legendre import Rule, rule
+from mechgraph.numerics.newton import Closed
+from mechgraph.numerics.tolerances import PATH
 from mechgraph.numerics.tracks import Nodes
 
 MOST_TURNS = 8
 """Most repetitions of the turn that takes the spin out."""
+MOST_BENDS = 20_000
+"""Bends up to which steps end there; of more (many positions of several drivers) a step goes along its chord."""
 UNTURNED = 1e-13
 """Angle that is rounding."""
 MISSING = 1e-9
@@ -39,11 +44,13 @@ def unspun(path: DriverPath, found: Positions, passive: tuple[PassiveMotion, ...
     Source: Bishop, There is more than one way to frame a curve, Amer. Math. Monthly 82, 1975 (vectors carried along an axis).
     """
     nodes, good = found.tracks.nodes, np.flatnonzero((found.status == Status.OK) & (found.near < 0))
-    interpolation = Interpolation(path, nodes)
-    if not len(interpolation.left) or not good.size:
+    if not len(nodes.steps[0]) or not good.size:
         return found
-    how = _Carried if are_alone(passive) else PassiveSteps
-    carried = how(path, interpolation, found.follower, passive)
+    carried = (
+        _Carried(path, *parts_of_steps(path, found), found.follower, passive)
+        if are_alone(passive)
+        else PassiveSteps(path, Interpolation(path, nodes), found.follower, passive)
+    )
     x, status = found.x.copy(), found.status.copy()
     turns = np.zeros(found.x.shape[1], dtype=np.intp) if found.turns is None else found.turns
     for at in in_blocks(good):
@@ -58,6 +65,52 @@ def unspun(path: DriverPath, found: Positions, passive: tuple[PassiveMotion, ...
     crossings = [replace(c, sides=turned(c.sides)) for c in found.crossings]
     spin = carried.spin(tracks.nodes) if found.turns is not None and isinstance(carried, _Carried) else None
     return replace(found, x=x, status=status, here=None, tracks=tracks, crossings=crossings, spin=spin)
+
+
+def parts_of_steps(path: DriverPath, found: Positions) -> tuple[Interpolation, Rule]:
+    """Steps between nodes, parted where a path bends so that what is integrated along them is smooth, and the rule for these parts."""
+    nodes = _with_bends(path, found)
+    out, (left, right) = Interpolation(path, nodes), found.tracks.nodes.steps
+    if nodes is found.tracks.nodes or not len(left):
+        return out, rule()
+    whole, span = found.tracks.nodes, float(nodes.place.max()) + 1.0
+    key = span * whole.track[left] + whole.place[left]
+    step = np.searchsorted(key, span * nodes.track[out.left] + nodes.place[out.left], side="right") - 1
+    part = (nodes.place[out.right] - nodes.place[out.left]) / (whole.place[right] - whole.place[left])[step]
+    return out, rule(float(part.max(initial=0.0)))
+
+
+def _with_bends(path: DriverPath, found: Positions) -> Nodes:
+    """The nodes of all tracks, with one wherever a path bends."""
+    nodes, paths = found.tracks.nodes, found.follower.paths
+    track, place = paths.bends
+    end = np.zeros(len(paths.end))
+    np.maximum.at(end, nodes.track, nodes.place)
+    # beside a crossing states are interpolated
+    inside = place < end[track]
+    for crossed, at in found.tracks.crossings:
+        inside &= (track != crossed) | (np.abs(place - at) > WINDOW)
+    track, place = track[inside], place[inside]
+    if not 0 < len(track) <= MOST_BENDS:
+        return nodes
+    interpolation = Interpolation(path, nodes)
+    step = interpolation.find(track, place)
+    which, drive = nodes.which[interpolation.left[step]], paths.drive(track, place)
+    closed = found.follower.newton.nodes(interpolation(step, place, drive), drive, track, which, PATH.node)
+    return Nodes.join([nodes, Nodes.closed(closed, drive, track, place, sure=True)])
+
+
+def at_points(
+    interpolation: Interpolation, follower: Follower, rule: Rule, steps: Index
+) -> tuple[Closed, Index, Array]:
+    """States at the points of a rule in steps between nodes, their tracks ``(n,)``, and the rates of the path values ``(d, n)``."""
+    nodes, step = interpolation.nodes, np.repeat(steps, rule.count)
+    left, right = interpolation.left[step], interpolation.right[step]
+    t = 0.5 * (np.tile(rule.points, len(steps)) + 1.0)
+    place, track = nodes.place[left] + t * (nodes.place[right] - nodes.place[left]), nodes.track[left]
+    drive = follower.paths.drive(track, place)
+    closed = follower.newton.close(interpolation(step, place, drive), drive, track, nodes.which[left])
+    return closed, track, interpolation.slope[:, step]
 
 
 @dataclass(frozen=True)
@@ -116,11 +169,12 @@ class _At:
 class _Course:
     """One passive motion at rest along all steps.
 
-    Its axes ``u (3, steps, GAUSS + 2)`` at the places of every step, references ``e``, ``c (3, steps)`` of the amount, the amount where a
-    step ``begin``s, the Legendre ``series`` of its further change, and by how much it differs after the whole track, where that is a
-    ``period``.
+    Its axes ``u (3, steps, points + 2)`` at the places of every step by the ``rule``, references ``e``, ``c (3, steps)`` of the
+    amount, the amount where a step ``begin``s, the Legendre ``series`` of its further change, and by how much it differs after the whole
+    track, where that is a ``period``.
     """
 
+    rule: Rule
     u: Array
     e: Array
     c: Array
@@ -130,9 +184,9 @@ class _Course:
 
     def missing(self, at: _At, step: Index, t: Array, turns: Index) -> tuple[Array, Array]:
         """Amounts ``(n,)`` that are missing to rest in steps at ``t`` from -1 to 1, so many periods later; their increments ``(F, n)``."""
-        nearest = np.argmin(np.abs(t[:, None] - PLACES), axis=1)
+        nearest = np.argmin(np.abs(t[:, None] - self.rule.places), axis=1)
         at = at.in_sense(self.u[:, step, nearest])
-        amount = self.begin[step] + (self.series[step] * integrals(t)).sum(axis=1) + turns * self.period[step]
+        amount = self.begin[step] + (self.series[step] * self.rule.integrals(t)).sum(axis=1) + turns * self.period[step]
         amount = amount - at.amount(self.e[:, step], self.c[:, step])
         amount = _wrapped(amount) if at.turns else amount
         return amount, at.unit * amount
@@ -142,11 +196,17 @@ class _Carried:
     """Passive motions at rest along tracks."""
 
     def __init__(
-        self, path: DriverPath, interpolation: Interpolation, follower: Follower, passive: tuple[PassiveMotion, ...]
+        self,
+        path: DriverPath,
+        interpolation: Interpolation,
+        rule: Rule,
+        follower: Follower,
+        passive: tuple[PassiveMotion, ...],
     ) -> None:
         self.path, self.interpolation, self.follower, self.passive = path, interpolation, follower, passive
         nodes, left = interpolation.nodes, interpolation.left
         self._h = nodes.place[interpolation.right] - nodes.place[left]
+        self._rule = rule
         track = nodes.track[left]
         self._first = np.concatenate([[True], track[1:] != track[:-1]])
         here, _ = self._motions(nodes.x, nodes.which, nodes.track)
@@ -164,24 +224,21 @@ class _Carried:
 
     def _between(self) -> tuple[PassiveMotions, Array, Array]:
         """The motions at the Gauss points of all steps, twists ``(6, n, T)`` at rest in them, rates ``(6, n, p, T)`` of their own."""
-        nodes, left = self.interpolation.nodes, self.interpolation.left
-        step = np.repeat(np.arange(len(left)), GAUSS)
-        place = nodes.place[left][step] + 0.5 * (np.tile(POINTS, len(left)) + 1.0) * self._h[step]
-        track, which = nodes.track[left][step], nodes.which[left][step]
-        drive = self.follower.paths.drive(track, place)
-        closed = self.follower.newton.close(self.interpolation(step, place, drive), drive, track, which)
-        self._sure = rest_is_sure(closed, step, nodes.track[left])
+        closed, track, slope = at_points(self.interpolation, self.follower, self._rule, np.arange(len(self._h)))
+        step = np.repeat(np.arange(len(self._h)), self._rule.count)
+        self._sure = rest_is_sure(closed, step, self.interpolation.nodes.track[self.interpolation.left])
         there, f = self._motions(closed.x, closed.which, track)
-        dq = (f.sensitivity() * self.interpolation.slope[:, step]).sum(axis=1)
+        dq = (f.sensitivity() * slope).sum(axis=1)
         moving = Velocities(there.here, dq + there.at_rest(there.here.link_twists(dq)))
         return there, moving.V[:, there.links], there.twist_rates(f, moving.dq, moving.V, moving.bias)
 
     def _course(self, here: _At, between: _At, V: Array, change: Array) -> _Course:
         """One motion, given at the nodes and at the Gauss points; there with the twist ``V`` of its link and the rate of its own."""
+        points = self._rule.count
         left, right, n = self.interpolation.left, self.interpolation.right, len(self.interpolation.left)
         first, last = np.flatnonzero(self._first), np.flatnonzero(np.append(self._first[1:], True))
         of_track = np.cumsum(self._first) - 1
-        u = np.concatenate([here.u[:, left, None], between.u.reshape(3, n, GAUSS), here.u[:, right, None]], axis=2)
+        u = np.concatenate([here.u[:, left, None], between.u.reshape(3, n, points), here.u[:, right, None]], axis=2)
         # one sense along every track; two nodes at one place, of other forms, may have other senses as well
         every = u.reshape(3, -1)
         turned = np.concatenate([[1.0], np.where((every[:, 1:] * every[:, :-1]).sum(axis=0) < 0, -1.0, 1.0)])
@@ -189,9 +246,9 @@ class _Carried:
         u *= sense * sense[first, :1][of_track]
         e = _perpendicular(u[:, :, 0])
         c = rotate_back(here.R[:, :, left], e)
-        repeated = [np.repeat(references, GAUSS, axis=1) for references in (e, c)]
+        repeated = [np.repeat(references, points, axis=1) for references in (e, c)]
         rate = between.in_sense(u[:, :, 1:-1].reshape(3, -1)).amount_rate(repeated[0], repeated[1], V, change)
-        series = self._h[:, None] * (rate.reshape(n, GAUSS) @ TO_SERIES)
+        series = self._h[:, None] * (rate.reshape(n, points) @ self._rule.to_series)
 
         def amount(nodes: Index, steps: Index, side: int) -> Array:
             return here.take(nodes).in_sense(u[:, steps, side]).amount(e[:, steps], c[:, steps])
@@ -206,7 +263,7 @@ class _Carried:
         # a track that comes back to where it starts comes back with its passive links moved
         period = begin[last] + series[last, 0] - amount(left[first], last, -1)
         period *= np.where((u[:, last, -1] * u[:, first, 0]).sum(axis=0) < 0, -1.0, 1.0)
-        return _Course(u, e, c, begin, series, period[of_track])
+        return _Course(self._rule, u, e, c, begin, series, period[of_track])
 
     def turned(self, x: Array, which: Index, track: Index, place: Array, turns: Index) -> tuple[Array, Mask]:
         """States with all passive links moved to where they stand when they are at rest, ``turns`` periods of the track later.

@@ -109,6 +109,16 @@ class Places:
         self._shared = m.once(_nothing_yet)
         self._sized = {} if self.has_lengths else self._shared
 
+    @property
+    def types(self) -> list[PairType]:
+        """The pair types."""
+        return self._types[0]
+
+    @property
+    def type_of(self) -> Index:
+        """For every pair the number of its type among ``types``."""
+        return self._types[1]
+
     @shared
     def _types(self) -> tuple[list[PairType], Index]:
         """The pair types, and for every pair the number of its own."""

@@ -29,6 +29,10 @@ class Evaluated(Protocol):
         """Twists of all freedoms ``(6, F, T)``."""
 
     @property
+    def poses(self) -> Array:
+        """Poses of all links ``(3, 4, N, T)``."""
+
+    @property
     def chord_gaps(self) -> Array:
         """Closure errors of the chords at their pair points, ``(6, chords, T)``."""
 
@@ -47,7 +51,7 @@ class Evaluated(Protocol):
         """``(6, P, T)`` -> ``(6 loops, T)``."""
 
 
-class Rows(Protocol):
+class PositionRows(Protocol):
     """``n`` closure rows ``phi(q) = 0`` of one contributor, evaluated at a configuration of ``T`` positions."""
 
     @property
@@ -63,11 +67,15 @@ class Rows(Protocol):
     def jacobian(self, here: Evaluated) -> Array:
         """``J (n, F, T)`` with ``d phi/dt = J q'``."""
 
-    def sparse_jacobian(self, t: int) -> scipy.sparse.csr_array | None:
-        """``J (n, F)`` at one position, entries at the same places at all of them; None for loops (see ``closure.loop_rows``)."""
-
     def rates(self, here: Evaluated, dq: Array) -> Array:
         """``J q' (n, T)`` for rates ``dq (F, T)``."""
+
+
+class Rows(PositionRows, Protocol):
+    """Rows that serve accelerations, forces and the sparse engine as well."""
+
+    def sparse_jacobian(self, t: int) -> scipy.sparse.csr_array | None:
+        """``J (n, F)`` at one position, entries at the same places at all of them; None for loops (see ``closure.loop_rows``)."""
 
     def bias(self, here: Evaluated, pairs: Array) -> Array:
         """Velocity part ``(n, T)`` of ``d^2 phi/dt^2 = J q'' + bias``, from that of the relative accelerations of ``pairs (6, P, T)``."""

@@ -2,25 +2,51 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-GAUSS = 8
-"""Points of Gauss and Legendre a step between nodes: what is integrated over it is exact to rounding."""
-POINTS, WEIGHTS = np.polynomial.legendre.leggauss(GAUSS)
-PLACES = np.concatenate([[-1.0], POINTS, [1.0]])
-"""The points of a step and its ends."""
-TO_SERIES = WEIGHTS[:, None] * np.polynomial.legendre.legvander(POINTS, GAUSS - 1) * (np.arange(GAUSS) + 0.5)
-"""Coefficients of Legendre's series from values at the points."""
+POINTS_FOR = {0.01: 3, 0.1: 4, 0.5: 6, 1.0: 8}
+"""Points of a part of a step between nodes: what is integrated over it is exact to rounding, as with eight over the whole of it."""
 
 
-def integrals(t: Array) -> Array:
-    """Half the integrals of Legendre's polynomials from -1 to ``t (n,)``, ``(n, GAUSS)``."""
-    P = np.polynomial.legendre.legvander(t, GAUSS)
-    out = np.empty((len(t), GAUSS))
-    out[:, 0] = 0.5 * (t + 1.0)
-    k = np.arange(1, GAUSS)
-    out[:, 1:] = 0.5 * (P[:, 2:] - P[:, : GAUSS - 1]) / (2 * k + 1)
-    return out
+class Rule:
+    """The rule with ``count`` points in a step from -1 to 1."""
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+        self.points, weights = np.polynomial.legendre.leggauss(count)
+        self.places = np.concatenate([[-1.0], self.points, [1.0]])
+        """The points of a step and its ends."""
+        self.to_series = (
+            weights[:, None] * np.polynomial.legendre.legvander(self.points, count - 1) * (np.arange(count) + 0.5)
+        )
+        """Coefficients of Legendre's series from values at the points."""
+
+    def integrals(self, t: Array) -> Array:
+        """Half the integrals of Legendre's polynomials from -1 to ``t (n,)``, ``(n, count)``."""
+        P = np.polynomial.legendre.legvander(t, self.count)
+        out = np.empty((len(t), self.count))
+        out[:, 0] = 0.5 * (t + 1.0)
+        k = np.arange(1, self.count)
+        out[:, 1:] = 0.5 * (P[:, 2:] - P[:, : self.count - 1]) / (2 * k + 1)
+        return out
+
+
+@cache
+def _rule(count: int) -> Rule:
+    return Rule(count)
+
+
+def rule(part: float = 1.0) -> Rule:
+    """The rule for parts of steps between nodes."""
+    return _rule(next((count for most, count in POINTS_FOR.items() if part <= most), max(POINTS_FOR.values())))
+
+
+WHOLE = rule()
+GAUSS, POINTS, TO_SERIES = WHOLE.count, WHOLE.points, WHOLE.to_series
+"""The rule for whole steps."""
+integrals = WHOLE.integrals

@@ -218,7 +218,10 @@ class Factor(Protocol):
 
     @property
     def condition(self) -> Array:
-        """Condition numbers ``(T,)``: the product of the infinity norms of matrix and inverse; infinite for singular matrices."""
+        """Condition numbers ``(T,)``: the product of the infinity norms of matrix and inverse; infinite for singular matrices.
+
+        That of the matrix counts as one at least: rows and columns are of unit size, and a single entry tells how near it is to zero.
+        """
 
     def solve(self, b: Array, transposed: bool = False) -> Array:
         """Solution of ``A x = b`` (or ``A^T x = b``) for ``b (n, k, T)``; NaN for singular matrices."""
@@ -250,7 +253,7 @@ class LuFactors:
         norm, out = self._lapack.dlange, np.full(len(self._factors), np.inf)
         for t, (lu, pivots, singular) in enumerate(self._factors):
             if not singular:
-                out[t] = norm("I", self._A[:, :, t]) * norm("I", self._lapack.dgetri(lu, pivots)[0])
+                out[t] = max(norm("I", self._A[:, :, t]), 1.0) * norm("I", self._lapack.dgetri(lu, pivots)[0])
         return np.fmin(out, np.inf)
 
     def solve(self, b: Array, transposed: bool = False) -> Array:
@@ -284,7 +287,8 @@ class Inverses:
                 np.maximum.reduce(np.add.reduce(np.abs(M), axis=1), axis=0, initial=0.0)
                 for M in (self._A, self._inverse)
             ]
-            return np.asarray(np.fmin(norms[0] * norms[1], np.inf))  # of a singular matrix NaN, which fmin leaves out
+            # of a singular matrix NaN, which fmin leaves out
+            return np.asarray(np.fmin(np.maximum(norms[0], 1.0) * norms[1], np.inf))
 
     def applied(self, B: Array) -> Array:
         """See ``Factor``."""

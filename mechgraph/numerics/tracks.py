@@ -14,6 +14,9 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
+BENT = 1e-12
+"""Distance from which on a point is off the line of the points beside it: more than rounding."""
+
 
 def places_of(points: Array) -> Array:
     """Lengths ``(M,)`` along a polyline ``(d, M)`` up to each of its points."""
@@ -46,6 +49,15 @@ class Paths:
         self._begin, self._from = self._all[:, begin], self._places[begin]
         self._way, self._added = self._places - self._from, self._all - self._begin
         self._way[self._way == 0] = 1.0
+
+    @property
+    def bends(self) -> tuple[Index, Array]:
+        """Tracks and places of the points at which a path turns."""
+        unit, track = self._added / self._way, np.repeat(np.arange(len(self.count)), self.count)
+        inner = np.flatnonzero((track[1:-1] == track[:-2]) & (track[1:-1] == track[2:])) + 1
+        change = np.abs(unit[:, inner + 1] - unit[:, inner]).max(axis=0, initial=0.0)
+        turns = change * np.minimum(self._way[inner], self._way[inner + 1]) > BENT
+        return track[inner[turns]], self._places[inner[turns]]
 
     def drive(self, tracks: Index, at: Array) -> Array:
         """Path values ``(d, n)`` at places of tracks; behind the end straight on."""
