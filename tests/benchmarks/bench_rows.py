@@ -28,6 +28,7 @@ FORMS = ("full", "reduced")
 CASES = {
     "five-rod suspension": (machines.five_rods, 0.05),
     "6-PSS": (sliders, 0.1),
+    "6-SPS": (lambda: known.hexapod("SPS"), 0.1),
     "rods, spheres, planes": (lambda: random_platforms(0), 0.02),
     "RSSR": (lambda: mg.load("rssr"), 0.5),
     "6-UPS": (known.hexapod, 0.1),

@@ -107,8 +107,14 @@ def geared() -> mg.Mechanism:
 
 @pytest.mark.parametrize(
     ("make", "size"),
-    [(machines.five_rods, 0.05), (sliders, 0.1), (geared, 0.5), (known.hexapod, 0.1)],
-    ids=["five rods", "6-PSS", "geared", "6-UPS"],
+    [
+        (machines.five_rods, 0.05),
+        (sliders, 0.1),
+        (geared, 0.5),
+        (known.hexapod, 0.1),
+        (lambda: known.hexapod("SPS"), 0.1),
+    ],
+    ids=["five rods", "6-PSS", "geared", "6-UPS", "6-SPS"],
 )
 @pytest.mark.parametrize("engine", ["dense", pytest.param("sparse", marks=pytest.mark.slow)])
 def test_several_loops(make, size, engine) -> None:
@@ -185,6 +191,40 @@ def test_gaps_of_several_drivers() -> None:
     way = np.concatenate([np.linspace(0, 2.2, 12), np.linspace(2.2, 0, 12)])
     motions = {f"P{k}": mg.Motion(way if k == 0 else 0 * way, 1.0, 0.0) for k in range(6)}
     assert_same(m, motions, condition=1e4)
+
+
+def strut(turned: bool, aside: float = 0.0) -> mg.Mechanism:
+    """A rocker moved by a cylinder between two balls; ``turned``: its slide is declared the other way round."""
+    a, b = np.array((1.0, 0.2, 0.1)), np.array((0.3, 1.1, 0.4))
+    along = (b - a) * (-1.0 if turned else 1.0) + (aside, 0, 0)
+    pairs = [
+        mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=Z),
+        mg.Pair("B", "S", "tube", "crank", point=a),
+        mg.Pair("P", "P", *(("piston", "tube") if turned else ("tube", "piston")), point=0.5 * (a + b), axis=along),
+        mg.Pair("C", "S", "piston", "rocker", point=b),
+        mg.Pair("D", "R", "frame", "rocker", point=(0, 1, 0), axis=(0.3, 0.1, 1)),
+    ]
+    bodies = [
+        mg.Link("tube", mass=1.0, center=0.7 * a + 0.3 * b),
+        mg.Link("piston", mass=0.5, center=0.2 * a + 0.8 * b),
+    ]
+    links = [mg.Link("frame"), mg.Link("crank"), *bodies, mg.Link("rocker", mass=2.0, center=(0.1, 1.2, 0.2))]
+    return mg.Mechanism("strut", links, pairs, ["A", "P"], [mg.Gravity((0, -9.81, 0))])
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_cylinder_is_a_rod_that_its_slide_makes_longer(turned: bool) -> None:
+    m = strut(turned)
+    found = assert_same(m, {"A": sine(m, "A", 0.3), "P": sine(m, "P", -0.2)})
+    d = found.link("rocker").pose[:, :3] @ (0.3, 1.1, 0.4, 1) - found.link("crank").pose[:, :3] @ (1.0, 0.2, 0.1, 1)
+    length = np.sqrt(0.49 + 0.81 + 0.09) + found["P"].position[:, 0]
+    np.testing.assert_allclose(np.linalg.norm(d, axis=1), length, atol=1e-13)
+
+
+def test_a_slide_beside_the_line_is_none() -> None:
+    m = strut(False, aside=1e-6)
+    line = Pipeline(DriverMotion(m, {"A": sine(m, "A", 0.3), "P": sine(m, "P", -0.2)}), Options(form="reduced"))
+    assert line.reduction is None
 
 
 def curved(n: int, more: int = 1) -> dict[str, mg.Motion]:
