@@ -14,7 +14,7 @@ from mechgraph.closure.indexing import Index
 from mechgraph.closure.passive_motion import PassiveMotion, PassiveMotions
 from mechgraph.numerics.continuation import Follower
 from mechgraph.numerics.hermite import Interpolation
-from mechgraph.numerics.legendre import GAUSS, POINTS, TO_SERIES, integrals
+from mechgraph.numerics.legendre import rule
 from mechgraph.numerics.newton import Closed
 from mechgraph.numerics.tolerances import PATH
 
@@ -47,7 +47,7 @@ class PassiveSteps:
         self.path, self.interpolation, self.follower, self.passive = path, interpolation, follower, passive
         nodes, left, right = interpolation.nodes, interpolation.left, interpolation.right
         self._h = nodes.place[right] - nodes.place[left]
-        self._series = np.zeros((path.size[0], len(left), GAUSS))
+        self._series = np.zeros((path.size[0], len(left), rule().count))
         self._begin = nodes.x[:, left]
         self._sure = np.ones(len(left), dtype=bool)
         number = np.arange(len(left)) - np.searchsorted(nodes.track[left], nodes.track[left])
@@ -62,16 +62,16 @@ class PassiveSteps:
 
     def _at(self, step: Index, t: Array, drive: Array, which: Index) -> Closed:
         """States in steps at ``t`` from -1 to 1, closed."""
-        dq = np.einsum("fng,ng->fn", self._series[:, step], integrals(t))
+        dq = np.einsum("fng,ng->fn", self._series[:, step], rule().integrals(t))
         track = self.interpolation.nodes.track[self.interpolation.left[step]]
         return self.follower.newton.close(self.path.advance(self._begin[:, step], dq, track), drive, track, which)
 
     def _follow(self, steps: Index) -> None:
         """Find the increments of some steps, of different tracks."""
         nodes, left = self.interpolation.nodes, self.interpolation.left[steps]
-        many, t = np.repeat(steps, GAUSS), np.tile(POINTS, len(steps))
-        place = nodes.place[np.repeat(left, GAUSS)] + 0.5 * (t + 1.0) * self._h[many]
-        track, which = nodes.track[np.repeat(left, GAUSS)], nodes.which[np.repeat(left, GAUSS)]
+        many, t = np.repeat(steps, rule().count), np.tile(rule().points, len(steps))
+        place = nodes.place[np.repeat(left, rule().count)] + 0.5 * (t + 1.0) * self._h[many]
+        track, which = nodes.track[np.repeat(left, rule().count)], nodes.which[np.repeat(left, rule().count)]
         drive = self.follower.paths.drive(track, place)
         for _ in range(MOST_TIMES):
             closed = self._at(many, t, drive, which)
@@ -80,12 +80,12 @@ class PassiveSteps:
             dq = (f.sensitivity() * self.interpolation.slope[:, many]).sum(axis=1)
             dq += PassiveMotions(here, self.passive, f.motions()).at_rest(here.link_twists(dq))
             rates = self.path.tangent(self.path.difference(x, self._begin[:, many]), dq)
-            series = self._h[steps, None] * (rates.reshape(-1, len(steps), GAUSS) @ TO_SERIES)
+            series = self._h[steps, None] * (rates.reshape(-1, len(steps), rule().count) @ rule().to_series)
             change = np.abs(series - self._series[:, steps]).max(axis=(0, 2), initial=0.0)
             self._series[:, steps] = series
             if change.max() < REPEATED * max(1.0, float(np.abs(series).max(initial=0.0))):
                 break
-        self._sure[steps] &= (change < SETTLED) & closed.done.reshape(-1, GAUSS).all(axis=1)
+        self._sure[steps] &= (change < SETTLED) & closed.done.reshape(-1, rule().count).all(axis=1)
 
     def turned(self, x: Array, which: Index, track: Index, place: Array, turns: Index) -> tuple[Array, Mask]:
         """States at rest at places of the tracks, as far as these have steps; their motion is followed all the way, without ``turns``.

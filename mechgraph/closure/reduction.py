@@ -39,7 +39,7 @@ from mechgraph.topology.components import components_of_edges
 
 ON_LINE = 1e-12
 """Sine of the angle between a slide and the line of its rod up to which they are one: rounding."""
-LARGEST = 2000
+FORM_PAIRS = 2000
 """Pairs above which no reduced form is looked for: more of it would stay than a dense engine does well."""
 
 
@@ -394,7 +394,7 @@ def reduction_of(start: Configuration, fixed: Index, passive: Sequence[PassiveMo
     1.1 to 1.8 times as long, though the path itself takes 0.7 to 1: the full form is evaluated at every position anyway.
     """
     system = start.system
-    if form == "full" or len(system.m.pairs) > LARGEST or not (form == "reduced" or may_have_rods(system)):
+    if form == "full" or len(system.m.pairs) > FORM_PAIRS or not (form == "reduced" or may_have_rods(system)):
         return None
     kept = {int(k) for k in system.pair_of_freedom[np.concatenate([fixed, system.coupled_freedoms])]}
     plan = plan_of(start, kept)

@@ -44,9 +44,3 @@ def _rule(count: int) -> Rule:
 def rule(part: float = 1.0) -> Rule:
     """The rule for parts of steps between nodes."""
     return _rule(next((count for most, count in POINTS_FOR.items() if part <= most), max(POINTS_FOR.values())))
-
-
-WHOLE = rule()
-GAUSS, POINTS, TO_SERIES = WHOLE.count, WHOLE.points, WHOLE.to_series
-"""The rule for whole steps."""
-integrals = WHOLE.integrals
