@@ -7,9 +7,11 @@ mechgraph returns all reactions with it, the others are not asked for any. Varia
 """
 
 import importlib
+import multiprocessing
 import os
 import platform
 import re
+import signal
 import sys
 import textwrap
 import time
@@ -25,9 +27,7 @@ from motion_cases import row as row_of
 ACCURACIES = (1e-3, 1e-6)
 """Wanted accuracies, in parts of the size of a mechanism."""
 LIMIT = 5.0
-"""Seconds above which no longer row is tried."""
-FINER = 2.5
-"""Seconds above which no finer setting is tried."""
+"""Processor seconds after which a run of another program is ended, or twice those of mechgraph where these are more."""
 STALE = 4
 """Settings, one finer than the other, after which a variant is left that is no nearer to the reference."""
 ROUNDS = 5
@@ -59,38 +59,60 @@ def once(program: ModuleType, case: Case, variant: str, place: int) -> tuple[flo
     return time.process_time() - begin, case.error(found), ""
 
 
+def limited(program: ModuleType, case: Case, variant: str, place: int, most: float) -> tuple[float, float, str]:
+    """The same in a process of its own, which the system ends after so many processor seconds."""
+    if most == np.inf:
+        return once(program, case, variant, place)
+    here, there = multiprocessing.Pipe(duplex=False)
+
+    def run() -> None:
+        signal.setitimer(signal.ITIMER_PROF, most)
+        there.send(once(program, case, variant, place))
+
+    process = multiprocessing.get_context("fork").Process(target=run)
+    process.start()
+    there.close()
+    try:
+        return here.recv()
+    except EOFError:
+        return most, np.inf, f"over {short(most)} s"
+    finally:
+        process.join()
+
+
 def climbed(program: ModuleType, case: Case, variant: str, first: int, most: float) -> list[Run]:
-    """The coarsest settings that reach the accuracies, one after the other; ``most`` seconds are worth a run."""
+    """The coarsest settings that reach the accuracies, one after the other, in at most so many seconds each."""
     out: list[Run] = []
     place = first
-    while place and once(program, case, variant, place)[1] <= ACCURACIES[0]:
+    while place and limited(program, case, variant, place, most)[1] <= ACCURACIES[0]:
         place -= 1  # a smaller row may have asked for more
-    why, took, errors = "", 0.0, [np.inf]
+    why, errors = "not reached", [np.inf]
     steps = len(program.ladder(case, variant))
-    while len(out) < len(ACCURACIES) and place < steps and took < most:
-        took, error, why = once(program, case, variant, place)
+    while len(out) < len(ACCURACIES) and place < steps:
+        took, error, failure = limited(program, case, variant, place, most)
         errors.append(error)
+        if took >= most:
+            why = failure
+            break
         if len(errors) > STALE and min(errors[-STALE:]) >= 0.5 * min(errors[:-STALE]) < np.inf:
-            why = why or f"error stays {error:.0e}"
+            why = failure or f"error stays {error:.0e}"
             break
         while len(out) < len(ACCURACIES) and error <= ACCURACIES[len(out)]:
             out.append(Run(took, error, variant, place))
         place += 1
-    why = why or (f"over {short(2 * took)} s" if place < steps else "not reached")
     return out + [Run(failure=why)] * (len(ACCURACIES) - len(out))
 
 
-def fastest(program: ModuleType, case: Case, before: list[Run]) -> list[Run]:
+def fastest(program: ModuleType, case: Case, before: list[Run], most: float) -> list[Run]:
     """For every accuracy the fastest variant, timed again; ``before``: those of the smaller row, from which the search begins."""
     best = [Run(failure="not reached")] * len(ACCURACIES)
-    if before and before[0].seconds > LIMIT:
-        return [Run(failure="not run")] * len(ACCURACIES)
+    best_before = {run.variant for run in before if run.seconds < np.inf}
     for variant in program.variants(case):
-        known = [run.place for run in before if run.variant == variant]
-        if before and not known:
+        if best_before and variant not in best_before:
             continue
-        for i, run in enumerate(climbed(program, case, variant, min(known, default=0), FINER)):
-            if run.seconds < best[i].seconds or (best[i].seconds == np.inf and run.failure):
+        known = [run.place for run in before if run.variant == variant and run.seconds < np.inf]
+        for i, run in enumerate(climbed(program, case, variant, min(known, default=0), most)):
+            if run.seconds < best[i].seconds or (best[i].seconds == np.inf and not best[i].failure.startswith("over")):
                 best[i] = run
     return [again(program, case, run) if run.seconds < np.inf else run for run in best]
 
@@ -129,17 +151,61 @@ def table(names: list[str], lines: list[tuple[str, dict[str, list[Run]]]], grown
     return "\n".join([*out, row("growth with N", *grown)])
 
 
+def ahead(base: Run, run: Run) -> bool:
+    """Whether mechgraph took less time, as far as it was measured."""
+    return base.seconds < (np.inf if run.failure.startswith("over") else run.seconds) and run.failure[:4] in (
+        "",
+        "over",
+    )
+
+
+def told(lines: list[tuple[str, dict[str, list[Run]]]], rows: int) -> str:
+    """What the table says at the finer accuracy: of the first ``rows`` lines, and of the others."""
+    out = []
+    for peer in [name for name in lines[0][1] if name != "mechgraph"]:
+        faster, slower = [], []
+        for label, found in lines:
+            base, run = found["mechgraph"][-1], found[peer][-1]
+            if ahead(base, run):
+                faster.append(label)
+            elif run.seconds < np.inf:
+                slower.append(f"{label} ({short(base.seconds / run.seconds)} times)")
+        row = [label for label, _ in lines[:rows]]
+        behind = max((i for i, label in enumerate(row) if label not in faster), default=-1)
+        words = [
+            f"{row[behind + 1]} and all longer rows" if 0 <= behind < rows - 1 else "every row" if behind < 0 else ""
+        ]
+        words += [label for label in faster if label not in row[behind + 1 :]]
+        won = ", ".join(word for word in words if word) or "nothing"
+        out.append(
+            f"Against {peer} at {ACCURACIES[-1]:.0e} mechgraph is faster on {won}; slower on {', '.join(slower) or 'nothing'}."
+        )
+    return " ".join(out)
+
+
 MEANING = (
     "Each program at the coarsest tolerance or step at which a point of the mechanism is nowhere further off than 1e-3 or 1e-6 of a rod's "
-    "length; median processor times, in brackets against mechgraph (above 1: mechgraph is faster). References: A2 its one-freedom "
+    "length; median processor times, in brackets against mechgraph (above 1: mechgraph is faster). A run of another program that "
+    f"took more than {LIMIT:g} s, or twice the time of mechgraph where that is more, was ended ('over'). References: A2 its one-freedom "
     "equation, the others mechgraph at 1e-10. mechgraph returns all reactions with the motion, the others were asked for one point. "
     "Pinocchio: classical Runge-Kutta steps of our own or scipy's DOP853 around `constraintDynamics` with Baumgarte's stabilization, for "
     "Bricard also around `lcaba`; that leaves the stabilization out, so that it loses the row of four-bars at its flat position, and it "
     "was given up on Andrews' mechanism. The governor, which has no loops, by `aba` and LSODA. Exudyn: planar bodies where the "
     "mechanism is planar, its two implicit solvers with default settings (its "
-    "explicit ones refuse joints), the solver that ignores redundant constraints where there are any. A time limit says that the next "
-    "finer setting was not tried. Written by people who know mechgraph better."
+    "explicit ones refuse joints), the solver that ignores redundant constraints where there are any. "
+    "Written by people who know mechgraph better."
 )
+
+
+def measured(programs: dict[str, ModuleType], case: Case, before: dict[str, list[Run]]) -> dict[str, list[Run]]:
+    """The runs of all programs, mechgraph first, by whose time the others are limited."""
+    found: dict[str, list[Run]] = {}
+    for name, program in programs.items():
+        longest = max((run.seconds for run in found.get("mechgraph", []) if run.seconds < np.inf), default=0.0)
+        most = max(LIMIT, 2.0 * longest) if found else np.inf
+        found[name] = fastest(program, case, before.get(name, []), most)
+        print(case.name, name, *(f"{cell(r, r)} {r.variant} {r.error:.0e}" for r in found[name]), sep="  ", flush=True)
+    return found
 
 
 def main() -> None:
@@ -149,12 +215,12 @@ def main() -> None:
     lines: list[tuple[str, dict[str, list[Run]]]] = []
     by_length: dict[str, dict[int, list[Run]]] = {name: {} for name in programs}
     before: dict[str, list[Run]] = {}
+    for program in programs.values():  # what is loaded and compiled at first use counts for none
+        once(program, row_of(1), program.variants(row_of(1))[0], 0)
     for case, n in [*((row_of(n), n) for n in rows), *((case, 0) for case in others())]:
-        found = {name: fastest(program, case, before.get(name, []) if n else []) for name, program in programs.items()}
-        label = f"{case.name}, N = {n}" if n else case.name
-        lines.append((label, found))
+        found = measured(programs, case, before if n else {})
+        lines.append((f"{case.name}, N = {n}" if n else case.name, found))
         for name, runs in found.items():
-            print(label, name, *(f"{cell(r, r)} {r.variant} {r.error:.0e}" for r in runs), sep="  ", flush=True)
             if n:
                 by_length[name][n] = runs
                 before[name] = runs
@@ -163,7 +229,8 @@ def main() -> None:
     versions = ", ".join(f"{name} {p.VERSION}" for name, p in programs.items() if p.VERSION)
     versions = f"{versions}, numpy {np.__version__}, Python {platform.python_version()}, {date.today().isoformat()}"
     run = f"One core of {os.cpu_count()} ({processor()}), {versions}."
-    text = table(names, lines, grown) + "\n\n" + textwrap.fill(f"{run} {MEANING}", WIDTH)
+    parts = [told(lines, len(rows)), f"{run} {MEANING}"]
+    text = "\n\n".join([table(names, lines, grown), *(textwrap.fill(part, WIDTH) for part in parts)])
     print(text)
     if "--write" in sys.argv:
         page, times = MARKED.subn(lambda m: m[1] + "\n" + text + "\n" + m[2], README.read_text(encoding="utf-8"))
