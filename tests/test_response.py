@@ -275,6 +275,8 @@ def test_at_other_times():
         ({"t": 3.0}, "begin, end"),
         ({"t": (1.0, 0.0)}, "rising"),
         ({"rates": {"A0": 1.0, "A1": 2.0}}, "contradict the closure"),
+        ({"rates": {"A0": 1.0}, "motions": {"A0": lambda t: (0.0, 2.0, 0.0)}}, "A0"),
+        ({"start": {"A0": 0.3}, "motions": {"A0": lambda t: (0.0, 2.0, 0.0)}}, "its motion is prescribed, 0 at t = 0"),
         ({"rates": {"Q": 1.0}}, "unknown freedom"),
         ({"start": {"Q": 1.0}}, "unknown freedom"),
         ({"motions": {"A0": np.zeros(3)}}, "expected a Motion with t"),
@@ -333,6 +335,32 @@ def rotor(loads=(), inertia=1.0):
     links = [mg.Link("frame"), mg.Link("rotor", mass=inertia, center=(0, 0, 0), inertia=inertia * np.eye(3))]
     pairs = [mg.Pair("A", "R", "frame", "rotor", point=(0, 0, 0), axis=Z)]
     return mg.Mechanism("rotor", links, pairs, loads=list(loads))
+
+
+def test_stiff_loads_on_an_explicit_stepper_are_told_and_lose_nothing():
+    """A damper with a time of a microsecond, which Radau passes: a warning where that takes minutes, an end where it takes days."""
+    m = rotor([mg.Damper("A", coefficient=1e6), mg.Effort("A", 1.0)])
+    taken = []
+
+    def progress(t):
+        taken.append(t)
+        if len(taken) > 600:
+            raise KeyboardInterrupt
+
+    with pytest.warns(mg.MechgraphWarning, match="method='Radau' takes far fewer.*An interrupt keeps"):
+        r = mg.respond(m, (0, 10), rates={"A": 1.0}, progress=progress, on_stop="return")
+    assert r.t[-1] == taken[-1]
+    with pytest.raises(mg.ResponseError, match=r"followed to t = .*Radau") as failed:
+        mg.respond(m, (0, 1e5), rates={"A": 1.0})
+    assert failed.value.solution.t[-1] > 0.0
+    done = mg.respond(m, (0, 1e5), rates={"A": 1.0}, method="Radau", rtol=1e-6)
+    assert done["A"].velocity[-1, 0] == pytest.approx(1e-6, rel=1e-4)
+
+
+def test_start_values_that_contradict_each_other_are_named():
+    """All cranks of a parallelogram turn alike."""
+    with pytest.raises(mg.AssemblyError, match=r"cannot be assembled at A0\.Rz = 0\.1, A1\.Rz = 0\.5"):
+        mg.respond(windows(1), (0, 1), start={"A0": 0.1, "A1": 0.5})
 
 
 def test_a_spring_that_is_wound_up_over_several_turns():

@@ -37,6 +37,8 @@ from mechgraph.response.way import POINTS, Piece, Way
 
 FAST = 2.0
 """Rate of another freedom against that of the coordinate above which it becomes the coordinate."""
+FURTHEST = 4.0 * np.pi
+"""Distance beyond what is tabulated to which a trial step may lead; what is further off asks for a shorter one."""
 UNEVEN = 0.37
 """Where in its part of a turn loads are compared with those a turn later: not at the quarters, where change points often are."""
 PERIODIC = 1e-9
@@ -60,8 +62,8 @@ class Arc:
         columns = np.array([self.column], dtype=np.intp)
         self.path = DriverPath(s, closure_solver(task.engine, columns), partial(_same, s))
         self.begin, self.rate = float(x[s.single_rows[self.column]]), float(dq[self.column])
-        self._first_way = math.copysign(1.0, self.rate)
-        self._ways = {sense: Way(self.path, task.loads, x, sense) for sense in (1.0, -1.0)}
+        self._first_way = 1 if self.rate >= 0.0 else -1
+        self._ways = {sense: Way(self.path, task.loads, x, float(sense)) for sense in (1, -1)}
         self._advance: Array | None = None
         self._sense = 1.0
 
@@ -69,8 +71,10 @@ class Arc:
         """The piece in which a place lies, and the whole turns by which the place is further on; None where the table ends before."""
         turns = float(self._turns(np.array([u]))[0])
         u -= self.turn * turns
-        way = self._ways[float(np.sign(u - self.begin)) or self._first_way]
+        way = self._ways[(u > self.begin) - (u < self.begin) or self._first_way]
         at = way.sense * (u - self.begin)
+        if not at < way.length + FURTHEST:
+            return None
         while (at > way.length or not way.length) and not way.closed:
             self._extend(way)
             if self._advance is not None and not turns:

@@ -7,6 +7,7 @@ stage's coordinates ``y = (u, v, work)``: independent coordinates, rates of inde
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
@@ -16,9 +17,17 @@ import scipy
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.indexing import Index
-from mechgraph.errors import counted
+from mechgraph.errors import MechgraphWarning, counted
 from mechgraph.response.chart import Closed, Stopped
 from mechgraph.response.charts import Task
+
+EXPLICIT = ("RK23", "RK45", "DOP853")
+LOOK = 500
+"""Steps after which the length of steps is looked at."""
+MANY = 100_000
+"""Steps to come from which on the user is told: minutes."""
+ENDLESS = 1e8
+"""Steps to come from which on the motion is given up: hours and days."""
 
 
 class Stage(Protocol):
@@ -88,6 +97,7 @@ class Integration:
     done: float = 0.0
     """Work done since the start."""
     work: Count = field(default_factory=Count)
+    _told: bool = False
 
     def run(self, stage: Stage, begin: float, end: float, first: float | None = None) -> Iterator[Segment]:
         """Follow the motion from a stage, behind what was followed before; yields every accepted step. ``first``: longest first step.
@@ -122,12 +132,29 @@ class Integration:
                     # the step goes on with its length, which a multistep method finds anew
                     h = None if self.method in ("BDF", "LSODA") else stepper.t - t
                     t, self.done = stepper.t, work + float(stepper.y[-1])
+                    self._look(end)
                     serves = stage.accepted(t, stepper.y)
                     yield self.segments[-1]
             finally:
                 self.work.evaluations += stepper.nfev
             if t < end:
                 stage = stage.following(t, stepper.y)
+
+    def _look(self, end: float) -> None:
+        """Say where steps have become so short that loads are likely stiff, and a long wait certain; give up where there is no end."""
+        if self.method not in EXPLICIT or self.work.steps % LOOK:
+            return
+        t = self.segments[-1].end
+        left = (end - t) * LOOK / (t - self.segments[-LOOK].begin)
+        message = (
+            f"at the length of the last {LOOK} steps of {self.method}, some {left:.0e} more lead to t = {end:g}; where loads are stiff, "
+            "method='Radau' takes far fewer. Loads that jump, as dry friction does, want to be smoothed"
+        )
+        if left > ENDLESS:
+            raise Stopped(message)
+        if left > MANY and not self._told:
+            self._told = True
+            warnings.warn(f"{message}. An interrupt keeps what there is", MechgraphWarning, stacklevel=2)
 
     def cut(self, t: float) -> None:
         """End the last step at a time within it."""

@@ -105,9 +105,10 @@ class Way:
 
     def _follow(self, goal: float) -> None:
         """Follow the path to a place, or to where it cannot be followed on."""
-        while not self._ended and self._reached < goal:
+        there = goal - PATH.shortest  # by rounding the last node may lie before the goal
+        while not self._ended and self._reached < there:
             self._take(self._march(goal, careful=False), [])
-            if self._reached >= goal or self._known() < self._reached:
+            if self._reached >= there or self._known() < self._reached:
                 return
             self.follower.paths = Paths([self._drives(np.array([0.0, goal]))])
             found = leapt(self.follower, self._nodes)

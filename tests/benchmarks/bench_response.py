@@ -55,7 +55,7 @@ def once(program: ModuleType, case: Case, variant: str, place: int) -> tuple[flo
     try:
         found = program.solve(case, variant, program.ladder(case, variant)[place])
     except Exception as error:
-        return time.process_time() - begin, np.inf, (str(error) or repr(error)).splitlines()[0][:50]
+        return time.process_time() - begin, np.inf, (str(error) or type(error).__name__).splitlines()[0][:50]
     return time.process_time() - begin, case.error(found), ""
 
 
@@ -90,6 +90,7 @@ def climbed(program: ModuleType, case: Case, variant: str, first: int, most: flo
     steps = len(program.ladder(case, variant))
     while len(out) < len(ACCURACIES) and place < steps:
         took, error, failure = limited(program, case, variant, place, most)
+        why = failure or why
         errors.append(error)
         if took >= most:
             why = failure
@@ -151,35 +152,24 @@ def table(names: list[str], lines: list[tuple[str, dict[str, list[Run]]]], grown
     return "\n".join([*out, row("growth with N", *grown)])
 
 
-def ahead(base: Run, run: Run) -> bool:
-    """Whether mechgraph took less time, as far as it was measured."""
-    return base.seconds < (np.inf if run.failure.startswith("over") else run.seconds) and run.failure[:4] in (
-        "",
-        "over",
-    )
-
-
-def told(lines: list[tuple[str, dict[str, list[Run]]]], rows: int) -> str:
-    """What the table says at the finer accuracy: of the first ``rows`` lines, and of the others."""
+def told(lines: list[tuple[str, dict[str, list[Run]]]]) -> str:
+    """What the table says at the finer accuracy."""
     out = []
     for peer in [name for name in lines[0][1] if name != "mechgraph"]:
-        faster, slower = [], []
+        faster, slower, failed = [], [], []
         for label, found in lines:
             base, run = found["mechgraph"][-1], found[peer][-1]
-            if ahead(base, run):
+            if base.seconds == np.inf or (run.failure and not run.failure.startswith("over")):
+                failed.append(f"{label} ({base.failure or run.failure})")
+            elif base.seconds < run.seconds:
                 faster.append(label)
-            elif run.seconds < np.inf:
-                slower.append(f"{label} ({short(base.seconds / run.seconds)} times)")
-        row = [label for label, _ in lines[:rows]]
-        behind = max((i for i, label in enumerate(row) if label not in faster), default=-1)
-        words = [
-            f"{row[behind + 1]} and all longer rows" if 0 <= behind < rows - 1 else "every row" if behind < 0 else ""
-        ]
-        words += [label for label in faster if label not in row[behind + 1 :]]
-        won = ", ".join(word for word in words if word) or "nothing"
-        out.append(
-            f"Against {peer} at {ACCURACIES[-1]:.0e} mechgraph is faster on {won}; slower on {', '.join(slower) or 'nothing'}."
+            else:
+                slower.append(f"{label} (x {short(run.seconds / base.seconds)})")
+        parts = [f"Against {peer} at {ACCURACIES[-1]:.0e} mechgraph is faster on {'; '.join(faster) or 'nothing'}"]
+        parts += [f"slower on {'; '.join(slower)}"] * bool(slower) + [f"not compared on {'; '.join(failed)}"] * bool(
+            failed
         )
+        out.append(", ".join(parts) + ".")
     return " ".join(out)
 
 
@@ -229,7 +219,7 @@ def main() -> None:
     versions = ", ".join(f"{name} {p.VERSION}" for name, p in programs.items() if p.VERSION)
     versions = f"{versions}, numpy {np.__version__}, Python {platform.python_version()}, {date.today().isoformat()}"
     run = f"One core of {os.cpu_count()} ({processor()}), {versions}."
-    parts = [told(lines, len(rows)), f"{run} {MEANING}"]
+    parts = [told(lines), f"{run} {MEANING}"]
     text = "\n\n".join([table(names, lines, grown), *(textwrap.fill(part, WIDTH) for part in parts)])
     print(text)
     if "--write" in sys.argv:

@@ -1,0 +1,133 @@
+"""Motion in time of mechanisms that nobody chose, and of published ones: energy, momentum, the way back, the drives it needs."""
+
+import numpy as np
+import pytest
+import strategies
+
+import mechgraph as mg
+
+T = np.linspace(0.0, 0.2, 9)
+
+
+def random_mechanism(seed):
+    """One or two loops and perhaps a branch, mobility 1 to 3 and passive freedoms, under gravity and a spring without damper."""
+    rng = np.random.default_rng((seed, 7))
+    m = strategies.closed_mechanism(seed, loops=1 + seed % 2, mobility=1 + seed % 3, branches=seed % 2)
+    moving = [link.name for link in m.links if link.name != m.frame]
+    ends = rng.uniform(-1, 1, 3), rng.uniform(1, 2, 3)
+    return m.replace(
+        loads=[mg.Gravity((0, -9.81, 0)), mg.Spring("frame", moving[-1], *ends, stiffness=30.0, free_length=0.5)]
+    )
+
+
+def places(r):
+    """Poses of all links at the outputs."""
+    return np.stack([r.link(link.name).pose for link in r.mechanism.links], axis=1)
+
+
+def motion_of(r, freedom):
+    """Position, velocity and acceleration of a freedom at the outputs."""
+    name = next(pair.name for pair in r.mechanism.pairs if freedom in pair.freedom_names)
+    column = r.mechanism.pair(name).freedom_names.index(freedom)
+    return tuple(getattr(r[name], what)[:, column] for what in ("position", "velocity", "acceleration"))
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.seeds(5, without=(1, 4))
+def test_energy_is_kept_and_accuracy_is_that_of_the_tolerance(seed, engine):
+    """Closed to rounding, with tolerances that are ten thousand times apart."""
+    m = random_mechanism(seed)
+    fine, coarse = (mg.respond(m, T, rtol=rtol, atol=1e-2 * rtol, engine=engine) for rtol in (1e-10, 1e-6))
+    largest = fine.energy.kinetic.max()
+    assert np.abs(fine.energy.balance).max() < 1e-8 * largest
+    assert np.abs(coarse.energy.balance).max() < 1e-4 * largest
+    assert np.abs(places(coarse) - places(fine)).max() < 1e-4
+    assert max(fine.checks.closure.max(), coarse.checks.closure.max()) < 1e-12
+
+
+@pytest.mark.parametrize("seed", [0, 3, 12])
+def test_with_the_rates_turned_round_it_goes_back(seed):
+    """From where it came to, to rest where it began."""
+    m = random_mechanism(seed)
+    there = mg.respond(m, T, rtol=1e-11, atol=1e-13)
+    drivable = [n for p in m.pairs for n, d in zip(p.freedom_names, p.type.drivable, strict=True) if d]
+    fastest = max(drivable, key=lambda name: abs(motion_of(there, name)[1][-1]))
+    position, velocity, _ = motion_of(there, fastest)
+    back = mg.respond(m, T, start={fastest: position[-1]}, rates={fastest: -velocity[-1]}, rtol=1e-11, atol=1e-13)
+    np.testing.assert_allclose(places(back)[::-1], places(there), atol=1e-8)
+    assert back.energy.kinetic[-1] < 1e-12 * there.energy.kinetic.max()
+
+
+def test_a_path_that_ends_by_rounding_before_its_goal_is_followed_on():
+    """It was followed to the same place for ever; beyond a fold of the slide, which is passed with speed."""
+    m = random_mechanism(6)
+    r = mg.respond(m, T, start={"J2.Tz": 0.29614693}, rates={"J2.Tz": -17.22776129}, rtol=1e-11, atol=1e-13)
+    assert np.abs(r.energy.balance).max() < 1e-8 * r.energy.kinetic.max()
+
+
+@pytest.mark.parametrize("seed", [2, 3, 5, 8, 12, 13])
+def test_what_moves_by_itself_needs_no_drives(seed):
+    """Kinetostatics along the result: drives that hold it to its motion exert nothing, and the reactions are the same."""
+    m = random_mechanism(seed)
+    driven = strategies.with_drives(m, seed)
+    r = mg.respond(m, T[:5], rtol=1e-10, atol=1e-12)
+    motions = {drive.freedom: mg.Motion(*motion_of(r, drive.freedom)) for drive in driven.drives}
+    s = mg.solve(driven, motions)
+    largest = max(np.abs(s[pair.name].reaction).max(initial=0.0) for pair in m.pairs)
+    for pair in m.pairs:
+        assert np.nanmax(np.abs(s[pair.name].effort), initial=0.0) < 1e-9 * largest
+    for pair in m.pairs:
+        np.testing.assert_allclose(r[pair.name].force, s[pair.name].force, atol=1e-8 * largest)
+
+
+@pytest.mark.parametrize("symbol", ["H", "U", "E", "Sc", "Cp"])
+def test_momentum_is_kept_where_nothing_acts(symbol):
+    """Momentum, and moment of momentum about the origin, of three bodies in free flight with eight to eleven freedoms."""
+    rng = np.random.default_rng(8)
+    links = [mg.Link("frame"), *(strategies.body(rng, name, rng.uniform(-1, 1, 3)) for name in ("one", "two", "three"))]
+    pairs = [mg.Pair("F", "Fr", "frame", "one", point=(0, 0, 0), axis=(0, 0, 1))]
+    pairs += [strategies.placed(rng, "A", symbol, "one", "two", rng.uniform(-1, 1, 3))]
+    pairs += [strategies.placed(rng, "B", "R", "two", "three", rng.uniform(-1, 1, 3))]
+    m = mg.Mechanism(f"{symbol} in free flight", links, pairs)
+    rates = {"F.Tx": 0.4, "F.Rx": 0.5, "F.Ry": -0.8, m.pair("A").freedom_names[0]: 0.6, "B": -0.9}
+    r = mg.respond(m, np.linspace(0, 0.5, 4), rates=rates, rtol=1e-10, atol=1e-12)
+    momentum, spin = np.zeros((4, 3)), np.zeros((4, 3))
+    for link in m.links[1:]:
+        s = r.link(link.name)
+        R = s.pose[:, :3, :3]
+        momentum += link.mass * s.center_velocity
+        own = np.einsum("tij,jk,tlk,tl->ti", R, np.asarray(link.inertia), R, s.angular_velocity)
+        spin += link.mass * np.cross(s.center, s.center_velocity) + own
+    for kept in (momentum, spin):
+        np.testing.assert_allclose(kept, np.broadcast_to(kept[0], kept.shape), atol=1e-8 * np.abs(kept).max())
+
+
+@pytest.mark.parametrize(
+    ("name", "more", "end"),
+    [("windows-2", {"rates": {"A0": -1.0}}, 10.0), ("bricard-cube", {}, 10.0), ("andrews", {}, 0.03)],
+)
+def test_published_mechanisms_keep_their_energy(name, more, end):
+    """At small tolerances and at the defaults, of the greatest kinetic energy."""
+    m = mg.load(name).replace(drives=[])
+    for tolerances, most in (({"rtol": 1e-11, "atol": 1e-13}, 1e-8), ({}, 1e-6)):
+        r = mg.respond(m, (0.0, end), **more, **tolerances)
+        assert np.abs(r.energy.balance).max() < most * r.energy.kinetic.max()
+
+
+def test_andrews_mechanism_against_the_published_reference():
+    """Angles at 0.03 s; delta as the Test Set for IVP Solvers has it, .5244099658805."""
+    begin = [-0.06171389001427645, 0.0, 0.45527981916307037, 0.22266839016588588, 0.48736497954384256,
+             -0.22266839016588588, 1.2305474445498212]  # fmt: skip
+    end = [15.8107711952, -15.7563710584, 0.0408222401, -0.5347301163, 0.5244099659, 0.5347301163, 1.0480807410]
+    pairs = {
+        "J1": 1,
+        "J2": 1,
+        "J4": 1,
+        "J6": -1,
+        "J7": 1,
+        "J9": -1,
+        "J10": 1,
+    }  # beta, Theta, gamma, Phi, delta, Omega, epsilon
+    r = mg.respond(mg.load("andrews"), (0.0, 0.03), rtol=1e-11, atol=1e-13)
+    turned = [sense * r[pair].position[-1, 0] for pair, sense in pairs.items()]
+    np.testing.assert_allclose(np.add(begin, turned), end, atol=1e-9)
