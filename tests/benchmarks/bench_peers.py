@@ -212,8 +212,8 @@ LIMITS = (
     "which choose one of many reactions without saying so. Exudyn integrates the motion: its error falls with its step, one "
     "position has no meaning, and it was given the initial velocities, and a spectral radius and Newton tolerance that on these "
     "four gave less error than its defaults (a dozen settings tried); where constraints are redundant its default solver stops "
-    "(`matrix is not factorized!`), so another was set. Written by people who know mechgraph better. Large mechanisms and "
-    "simulation in time, for which the two are made, are not in the table."
+    "(`matrix is not factorized!`), so another was set. Written by people who know mechgraph better. Simulation in time, "
+    "for which the two are made, has a table of its own (see Motion in time)."
 )
 
 
