@@ -24,9 +24,9 @@ from mechgraph.response.charts import Task
 EXPLICIT = ("RK23", "RK45", "DOP853")
 LOOK = 500
 """Steps after which the length of steps is looked at."""
-MANY = 100_000
+TOLD_FROM = 100_000
 """Steps to come from which on the user is told: minutes."""
-ENDLESS = 1e8
+GIVEN_UP_FROM = 1e8
 """Steps to come from which on the motion is given up: hours and days."""
 
 
@@ -150,9 +150,9 @@ class Integration:
             f"at the length of the last {LOOK} steps of {self.method}, some {left:.0e} more lead to t = {end:g}; where loads are stiff, "
             "method='Radau' takes far fewer. Loads that jump, as dry friction does, want to be smoothed"
         )
-        if left > ENDLESS:
+        if left > GIVEN_UP_FROM:
             raise Stopped(message)
-        if left > MANY and not self._told:
+        if left > TOLD_FROM and not self._told:
             self._told = True
             warnings.warn(f"{message}. An interrupt keeps what there is", MechgraphWarning, stacklevel=2)
 
