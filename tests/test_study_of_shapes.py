@@ -249,7 +249,8 @@ def test_curves_in_contact_by_markers_are_those_by_a_point(what):
     other = mg.Curve.circle(radius=0.5, center=(0.3, 1.5, 0)) if what == "curve" else None
     circle = mg.Curve.circle(radius=1.0, center=CENTER)
     pair = mg.Pair("K", "Kc", "cam", "follower", curve=circle, curve_b=other, point=at)
-    apart = mg.Pair("K", "Kc", "cam", "follower", curve=circle, curve_b=other, on_b=pair.markers[1])
+    on_b = pair.markers[1] if other is None else mg.Marker(at, Z, (-1, 0.3, 0))
+    apart = mg.Pair("K", "Kc", "cam", "follower", curve=circle, curve_b=other, on_b=on_b)
     one, two = (driven_cam(bearing, p, point=at) for p in (pair, apart))
     start = pair.type.steps[0].home
     a, b = mg.solve(one, GIVEN), mg.solve(two.replace(start={"K.Ts": start}), GIVEN)

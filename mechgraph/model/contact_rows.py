@@ -123,7 +123,9 @@ def in_contact(
         )
         factors.append(second)
         back = second.start
-        off += [_off(second, beside[:, 3]), float(np.linalg.norm(np.cross(back[:, 0], beside[:, 0])))]
+        # a marker of its own says near which direction the curve of link b runs, a contact at one point that both touch
+        crossing = float(np.linalg.norm(np.cross(back[:, 0], beside[:, 0]))) if on_b is None else 0.0
+        off += [_off(second, beside[:, 3]), crossing]
     return Contact(filled(row, factors, pair), marker, tuple(off), back if on_b is not None else None)
 
 
