@@ -1,9 +1,9 @@
 """The reduced form of a mechanism for following a path: rods and spheres in grooves or on planes as rows of points.
 
-A rod (a link with two S pairs and nothing else) holds two points at a distance; a pair that ends in a rotation (S, Sg, Sp) holds the
-centre of a sphere in as many planes as there are directions in which it does not slide. These links and pairs fall away, and with them
-loops of six rows each: a smaller mechanism is left with ``closure.point_rows`` behind its own rows. A link that nothing joins to the
-frame any more floats: it has a pair of six freedoms.
+A rod (a link with two S pairs and nothing else, or two that slide along the line of theirs) holds two points at a distance; a pair that
+ends in a rotation (S, Sg, Sp) holds the centre of a sphere in as many planes as there are directions in which it does not slide. These
+links and pairs fall away, and with them loops of six rows each: a smaller mechanism is left with ``closure.point_rows`` behind its own
+rows. A link that nothing joins to the frame any more floats: it has a pair of six freedoms.
 
 The twists of what falls away span ``6 - k`` dimensions at every position, reciprocal to the wrenches of its ``k`` rows of points (a rod
 has six freedoms, one of them its spin). So in rows turned by these the closure matrix is ``[[B, *], [0, K]]``, ``B`` regular and ``K`` that
@@ -13,10 +13,9 @@ of the reduced form: one form is singular where the other is. No coordinate that
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, cached_property
 from itertools import count
-from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -27,18 +26,15 @@ from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.passive_motion import PassiveMotion
 from mechgraph.closure.point_rows import PointNumbers, PointRows
+from mechgraph.closure.reduction_plan import ON_LINE, Plan, may_have_rods, plan_of, slides_of_sphere
 from mechgraph.closure.rows import PositionRows
 from mechgraph.closure.solver import engine_for
-from mechgraph.model.factors import ConstantScrew
 from mechgraph.model.link import Link
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.model.pair_type import PairType
 from mechgraph.model.parameters import Parameters
-from mechgraph.topology.components import components_of_edges
 
-ON_LINE = 1e-12
-"""Sine of the angle between a slide and the line of its rod up to which they are one: rounding."""
 FORM_PAIRS = 2000
 """Pairs above which no reduced form is looked for: more of it would stay than a dense engine does well."""
 
@@ -50,99 +46,6 @@ Mask = NDArray[np.bool_]
 def floating_type() -> PairType:
     """A pair that holds nothing, with a rotation that has no chart."""
     return PairType("floating", freedoms=["Tx", "Ty", "Tz", "rotation"], reactions=[])
-
-
-def slides_of_sphere(row: PairType) -> Array | None:
-    """Directions ``(3, k)`` in marker A along which a sphere slides, where slides and a rotation are all that a pair has; else None."""
-    if not row.steps or not row.steps[-1].holds_rotation:
-        return None
-    slides = row.steps[:-1]
-    if any(not isinstance(step, ConstantScrew) or step.freedom.turns for step in slides):
-        return None
-    along = np.array([step.freedoms[0].twist[3:] for step in slides]).reshape(-1, 3).T
-    return along if np.abs(along.T @ along - np.eye(len(slides))).max(initial=0.0) < 1e-12 else None
-
-
-class Rod(NamedTuple):
-    """A link, or two that slide along their line by the pair ``slide``, between the balls ``first`` (on the first link) and ``second``."""
-
-    links: tuple[int, ...]
-    first: int
-    second: int
-    slide: int = -1
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What falls away: ``rods``, further ``pairs``; links ``afloat`` get a floating pair."""
-
-    rods: tuple[Rod, ...]
-    pairs: tuple[int, ...]
-    afloat: tuple[int, ...]
-
-
-def plan_of(start: Configuration, kept: set[int]) -> Plan:
-    """What falls away of a mechanism where the pairs ``kept`` stay: drivers, couplings.
-
-    Pairs that no loop holds stay; of spheres that do not slide those that join what else would float.
-    """
-    system = start.system
-    ends, frame = system.graph.ends, system.graph.frame
-    slides = {
-        k: along
-        for k in sorted({*system.graph.loop_steps[1].tolist()} - kept)
-        if (along := slides_of_sphere(system.m.pairs[k].type)) is not None
-    }
-    balls = {k for k, along in slides.items() if not along.size}
-    rods = _rods(start, balls)
-    away = [k for k, along in slides.items() if along.size]
-    part = components_of_edges(len(system.m.links), [pair for k, pair in enumerate(ends) if k not in slides])
-    for k in sorted(balls.difference(k for rod in rods for k in (rod.first, rod.second))):
-        a, b = part[list(ends[k])]
-        if a == b:
-            away.append(k)
-        part[part == b] = a
-    part[[link for rod in rods for link in rod.links]] = part[frame]
-    afloat = np.unique(part, return_index=True)[1]
-    return Plan(tuple(rods), tuple(sorted(away)), tuple(i for i in sorted(afloat.tolist()) if part[i] != part[frame]))
-
-
-def _rods(start: Configuration, balls: set[int]) -> list[Rod]:
-    """Links, or two on a slide, with two of the pairs ``balls`` and no other; a rod ends on links that stay, and not twice on one."""
-    system = start.system
-    ends, frame = system.graph.ends, system.graph.frame
-    at: list[list[int]] = [[] for _ in system.m.links]
-    for k, pair in enumerate(ends):
-        for link in pair:
-            at[link].append(k)
-    parts: list[tuple[tuple[int, ...], int]] = [((link,), -1) for link, mine in enumerate(at) if balls.issuperset(mine)]
-    parts += [
-        (pair, k)
-        for k, pair in enumerate(ends)
-        if _is_slide(system.m.pairs[k].type) and min(map(len, (at[i] for i in pair))) > 1
-    ]
-    rods: list[Rod] = []
-    free = set(balls)
-    for links, slide in parts:
-        mine = [k for link in links for k in at[link] if k != slide]
-        if frame not in links and len(mine) == 2 and free.issuperset(mine):
-            rod = Rod(links, mine[0], mine[1], slide)
-            outer = [sum(ends[k]) - link for k, link in zip(mine, (links[0], links[-1]), strict=True)]
-            if outer[0] != outer[1] and not {*outer} & {*links} and (slide < 0 or _on_line(start, rod)):
-                rods.append(rod)
-                free.difference_update(mine)
-    return rods
-
-
-def _is_slide(row: PairType) -> bool:
-    return len(row.steps) == 1 and isinstance(row.steps[0], ConstantScrew) and not row.steps[0].freedom.turns
-
-
-def _on_line(start: Configuration, rod: Rod) -> bool:
-    """Whether both links slide along the line of the balls."""
-    d = start.pair_points[:, rod.second, 0] - start.pair_points[:, rod.first, 0]
-    along = start.S[3:, start.system.first_column[rod.slide], 0]
-    return bool(np.abs(cross(d, along)).max() < ON_LINE * np.sqrt(d @ d))
 
 
 class ReducedSystem(System):
@@ -372,17 +275,6 @@ def _ranges(first: Index, which: Index) -> Index:
     return np.concatenate([np.arange(first[k], first[k + 1]) for k in which] or [np.zeros(0, dtype=np.intp)]).astype(
         np.intp
     )
-
-
-def may_have_rods(system: System) -> bool:
-    """Whether a link has two pairs that are spheres, and no other pair, or one and a slide."""
-    ball, slide = (
-        np.array([is_one(row) for row in system.types], dtype=bool)[system.type_of]
-        for is_one in (lambda row: row.f == 3 and row.steps[0].holds_rotation, _is_slide)
-    )
-    ends = np.concatenate([system.a, system.b])
-    every, balls, slides = (np.bincount(ends, np.tile(some, 2)) for some in (ball | True, ball, slide))
-    return bool(((every == 2) & (balls >= 1) & (balls + slides == 2)).any())
 
 
 def reduction_of(start: Configuration, fixed: Index, passive: Sequence[PassiveMotion], form: str) -> Reduction | None:
