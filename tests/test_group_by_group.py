@@ -122,7 +122,7 @@ def test_engines_by_size_and_positions() -> None:
         "sparse",
         "sparse",
     ]
-    assert engine_for(24, 10**6, "auto") == "dense"
+    assert engine_for(30, 10**6, "auto") == "dense"
     few = mg.solve(ladder(30), {"J0": np.linspace(0, 0.05, 40)}, redundant="minimum_norm")
     assert few.engine == "dense"  # reactions of least norm gain nothing from many positions
 
