@@ -25,8 +25,8 @@ SPARSE_ROWS = {1.0: 120, 20.0: 84, 50.0: 60, 400.0: 42, np.inf: 36}
 """Closure rows from which on ``auto`` takes the sparse engine, for up to so many positions.
 
 Measured by ``tests/benchmarks/bench_large.py --crossover`` on ladders of four-bars: both engines take the same time at 110 rows (one
-position), 80 (16 positions), 62 (36), 36 (200) and 24 (1000), where the sparse one goes group by group. A platform on six legs (30 rows, one
-group) takes a quarter more with the sparse one at 1000 positions, so that this many rows stay with the dense one.
+position), 80 (16 positions), 62 (36), 36 (200) and 24 (1000), where the sparse one goes group by group. A platform on six legs (30 rows,
+one group) takes a quarter more with the sparse one at 1000 positions, so that this many rows stay with the dense one.
 """
 
 
