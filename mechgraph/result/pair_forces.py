@@ -144,7 +144,9 @@ class PairForces(Kept):
         return unit * own, unit * given
 
     def _driven(self, columns: slice) -> Mask:
-        return np.isin(np.arange(self._system.n_freedoms)[columns], self.driven)[:, None]
+        return np.array([[column in self.driven] for column in range(columns.start, columns.stop)], dtype=bool).reshape(
+            -1, 1
+        )
 
     def _stress_of_drives(self, columns: slice, places: Place = EVERY) -> Array:
         """What self-stresses have in the efforts of drives, ``(f, s, n)``."""
