@@ -144,9 +144,8 @@ class PairForces(Kept):
         return unit * own, unit * given
 
     def _driven(self, columns: slice) -> Mask:
-        return np.array([[column in self.driven] for column in range(columns.start, columns.stop)], dtype=bool).reshape(
-            -1, 1
-        )
+        places = np.arange(*columns.indices(self._system.n_freedoms))
+        return np.asarray((places[:, None] == self.driven).any(axis=1)[:, None])
 
     def _stress_of_drives(self, columns: slice, places: Place = EVERY) -> Array:
         """What self-stresses have in the efforts of drives, ``(f, s, n)``."""
