@@ -23,8 +23,9 @@ from mechgraph.modes.trace import rational, trace_test
 
 @pytest.fixture
 def empty(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """No start set is kept."""
+    """No start set is kept, and none came with the package."""
     monkeypatch.setenv("MECHGRAPH_CACHE", str(tmp_path))
+    monkeypatch.setattr(store, "PACKED", tmp_path / "none")
 
 
 def general(letters: str, seed: int = 3, **more: object) -> mg.Mechanism:

@@ -65,8 +65,9 @@ class StartSet:
             return False
         if (self.mixing is None) != family.whole or not np.isfinite(self.x).all():
             return False
-        closure = Configuration(family.system_with(self.member.markers), self.x).closure
-        return bool(closure.max(initial=0.0) < MEMBER_CLOSED)
+        here = Configuration(family.system_with(self.member.markers), self.x)
+        size = np.maximum(1.0, np.abs(here.poses).max(axis=(0, 1, 2)))
+        return bool((here.closure < MEMBER_CLOSED * size).all())
 
 
 def fingerprints(family: Family, member: Member, x: Array) -> Array:

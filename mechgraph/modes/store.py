@@ -1,7 +1,8 @@
 """Start sets kept in a folder of the user, one file for each class of mechanisms; a file is written whole or not at all.
 
 The folder is ``MECHGRAPH_CACHE`` where that is set, else ``mechgraph`` in that of the user for such files (``XDG_CACHE_HOME``,
-``LOCALAPPDATA`` or ``~/.cache``). Where it cannot be read or written, start sets are worked out anew.
+``LOCALAPPDATA`` or ``~/.cache``). Where it cannot be read or written, start sets are worked out anew. Those of the library's mechanisms and
+of common topologies come with the package (``PACKED``, made by ``tests/benchmarks/make_start_sets.py``).
 """
 
 from __future__ import annotations
@@ -21,7 +22,9 @@ from mechgraph.modes.monodromy import StartSet
 from mechgraph.modes.trace import Trace
 from mechgraph.writing import whole_file
 
-START_SET_VERSION = 4
+PACKED = Path(__file__).with_name("start-sets.npz")
+"""Start sets that come with the package, one after the other: names are ``key/array``."""
+START_SET_VERSION = 5
 """Of the files and of what start sets mean."""
 
 
@@ -46,26 +49,45 @@ def key(family: Family) -> str:
         "driven": family.columns.tolist(),
         "ranks": [h.shape[1] for h in family.loop_algebras],
         "passive": family.passive.shape[1],
-        "geometry": None if family.whole else np.round(family.target.real, 9).tolist(),
+        "geometry": None if family.whole else (np.round(family.target.real, 9) + 0.0).tolist(),
     }
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
 
 def kept(family: Family) -> StartSet | None:
-    """The start set of a class, where it is kept and closed."""
+    """The start set of a class, where one is kept and closed: the user's, or else that of the package."""
+    name = key(family)
+    for file, prefix in ((folder() / f"start-{name}.npz", ""), (PACKED, f"{name}/")):
+        found = _read(file, prefix)
+        if found is not None and found.fits(family):
+            return found
+    return None
+
+
+def _read(file: Path, prefix: str) -> StartSet | None:
     try:
-        with (folder() / f"start-{key(family)}.npz").open("rb") as handle, np.load(handle, allow_pickle=False) as f:
-            mixing = f["mixing"] if f["mixing"].size else None
-            loops, lost, followed = f["counts"].tolist()
-            chance, last, beyond = f["sizes"].tolist()
-            degree, samples = f["trace"].tolist()
+        with file.open("rb") as handle, np.load(handle, allow_pickle=False) as f:
+            mixing = f[prefix + "mixing"]
+            loops, lost, followed, degree, samples = f[prefix + "counts"].tolist()
+            chance, last, beyond = f[prefix + "sizes"].tolist()
+            member = Member(f[prefix + "markers"], f[prefix + "drive"])
             trace = Trace(degree, samples, last, beyond)
-            found = StartSet(
-                Member(f["markers"], f["drive"]), f["x"], mixing, loops, chance, lost, followed, True, trace
-            )
+            own = mixing if mixing.size else None
+            return StartSet(member, f[prefix + "x"], own, loops, chance, lost, followed, True, trace)
     except (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile, TypeError):
         return None
-    return found if found.fits(family) else None
+
+
+def arrays(start: StartSet) -> dict[str, Any]:
+    """A start set as arrays by name."""
+    return {
+        "markers": start.member.markers,
+        "drive": start.member.drive,
+        "x": start.x,
+        "mixing": np.zeros((0, 0)) if start.mixing is None else start.mixing,
+        "sizes": np.array([start.chance, start.trace.last, start.trace.beyond]),
+        "counts": np.array([start.loops, start.lost, start.followed, start.trace.degree, start.trace.samples]),
+    }
 
 
 def keep(family: Family, start: StartSet) -> None:
@@ -73,15 +95,6 @@ def keep(family: Family, start: StartSet) -> None:
     try:
         folder().mkdir(parents=True, exist_ok=True)
         with whole_file(folder() / f"start-{key(family)}.npz") as temporary, temporary.open("xb") as handle:
-            np.savez_compressed(
-                handle,
-                markers=start.member.markers,
-                drive=start.member.drive,
-                x=start.x,
-                mixing=np.zeros((0, 0)) if start.mixing is None else start.mixing,
-                sizes=np.array([start.chance, start.trace.last, start.trace.beyond]),
-                trace=np.array([start.trace.degree, start.trace.samples]),
-                counts=np.array([start.loops, start.lost, start.followed]),
-            )
+            np.savez_compressed(handle, **arrays(start))
     except (OSError, RuntimeError, MechgraphError):
         return

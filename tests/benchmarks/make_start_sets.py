@@ -1,0 +1,89 @@
+"""Make the start sets that come with the package: of the library's mechanisms and of common topologies, where a class is known.
+
+    python tests/benchmarks/make_start_sets.py          takes some minutes, and replaces mechgraph/modes/start-sets.npz
+
+Only sets of which a bound or a trace test says that they are all are taken in.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+import mechgraph as mg
+from mechgraph.model.chain import chain_symbols
+from mechgraph.model.library import library_path
+from mechgraph.modes import store
+from mechgraph.modes.bounds import bound
+from mechgraph.modes.monodromy import Irregular, start_set
+from mechgraph.modes.question import Question
+
+LOOPS = ("RSSR", "RCSR", "RRSC", "RSCR", "RCCC", "RCRCR", "RCRRC", "RRRRRRR", "RRRRRRP")
+"""Loops of pairs that stand anywhere, driven at the first."""
+MOST = 64
+"""Assemblies of a set, at most: larger ones take long and fill the file."""
+
+
+def wanted() -> Iterator[tuple[mg.Mechanism, dict[str, Any]]]:
+    """Mechanisms, and what is given."""
+    for name in sorted(file.stem for file in library_path("7r").parent.glob("*.toml")):
+        m = mg.load(name)
+        if m.drives:
+            yield m, {m.full_name(d.freedom): m.start.get(m.full_name(d.freedom), 0.0) for d in m.drives}
+    rng = np.random.default_rng(3)
+    for letters in LOOPS:
+        types = chain_symbols(letters)[0]
+        links = ["frame", *(f"link{i}" for i in range(1, len(types))), "frame"]
+        pairs = [
+            mg.Pair(f"O{i + 1}", symbol, links[i], links[i + 1], point=rng.normal(size=3), axis=rng.normal(size=3))
+            for i, symbol in enumerate(types)
+        ]
+        yield mg.Mechanism(letters, pairs=pairs, drives=["O1"]), {"O1": 0.2}
+    for feet, heads in ((6, 6), (6, 3)):
+        A, B = rng.normal(size=(feet, 3)), rng.normal((0.0, 0.0, 3.0), 1.0, (heads, 3))
+        pairs = []
+        for i in range(6):
+            foot, head = A[i], B[i * heads // 6]
+            pairs += [
+                mg.Pair(f"A{i}", "S", "base", f"lower{i}", point=foot),
+                mg.Pair(f"P{i}", "P", f"lower{i}", f"upper{i}", point=foot, axis=head - foot),
+                mg.Pair(f"B{i}", "S", f"upper{i}", "platform", point=head),
+            ]
+        m = mg.Mechanism(f"platform {feet}-{heads}", pairs=pairs, frame="base")
+        yield m, {f"P{i}": 0.0 for i in range(6)}
+    pairs = [
+        mg.Pair(f"A{i}", "R", f"L{i}", f"L{i + 1}", point=rng.normal(size=3), axis=rng.normal(size=3)) for i in range(6)
+    ]
+    arm = mg.Mechanism("arm", pairs=pairs)
+    yield arm, {"L6": mg.kinematics(arm, {f"A{i}": 0.3 * i for i in range(6)}).link("L6").pose}
+
+
+def main() -> None:
+    """Work them out and write them."""
+    found: dict[str, Any] = {}
+    for m, at in wanted():
+        begin = time.process_time()
+        try:
+            family = Question(m, at).family
+            name = store.key(family)
+            if family.fault or f"{name}/x" in found:
+                print(f"{m.name}: {family.fault or 'known'}", flush=True)
+                continue
+            start = start_set(family, np.random.default_rng(0))
+        except (mg.MechgraphError, Irregular) as error:
+            print(f"{m.name}: {type(error).__name__}", flush=True)
+            continue
+        known, N = bound(family), start.x.shape[1]
+        sure = start.trace.passed or (known is not None and known.count == N)
+        print(f"{m.name}: {N}, {'sure' if sure else 'not sure'}, {time.process_time() - begin:.1f} s", flush=True)
+        if sure and N <= MOST:
+            found |= {f"{name}/{part}": value for part, value in store.arrays(start).items()}
+            np.savez_compressed(sys.argv[1] if len(sys.argv) > 1 else store.PACKED, **found)
+
+
+if __name__ == "__main__":
+    main()

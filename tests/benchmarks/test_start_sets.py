@@ -1,0 +1,51 @@
+"""The start sets that come with the package serve the mechanisms that they were made of, and others of the same topology."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from make_start_sets import wanted
+
+import mechgraph as mg
+from mechgraph.modes import store
+from mechgraph.modes.bounds import bound
+from mechgraph.modes.question import Question
+
+
+@pytest.fixture(autouse=True)
+def _no_folder_of_the_user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MECHGRAPH_CACHE", str(tmp_path))
+
+
+def test_start_sets_of_the_library_and_of_common_topologies_come_with_the_package() -> None:
+    with np.load(store.PACKED) as packed:
+        names = {name.split("/")[0] for name in packed.files}
+    served = set()
+    for m, at in wanted():
+        family = Question(m, at).family
+        if family.fault or store.key(family) not in names:
+            continue
+        found, known = store.kept(family), bound(family)
+        assert found is not None, m.name
+        assert found.trace.passed or (known is not None and known.count == found.x.shape[1])
+        served.add(store.key(family))
+    assert served == names
+    assert len(names) >= 20
+    assert store.PACKED.stat().st_size < 400_000
+
+
+def test_other_mechanisms_of_the_same_topology_take_theirs_from_the_package() -> None:
+    said: list[str] = []
+    rng = np.random.default_rng(77)
+    for letters, count in (("RSSR", 2), ("RRRRRRR", 16)):
+        links = ["frame", *(f"link{i}" for i in range(1, len(letters))), "frame"]
+        pairs = [
+            mg.Pair(f"O{i}", symbol, links[i], links[i + 1], point=rng.normal(size=3), axis=rng.normal(size=3))
+            for i, symbol in enumerate(letters)
+        ]
+        modes = mg.assemblies(mg.Mechanism(letters, pairs=pairs), {"O0": 0.2}, progress=said.append)
+        assert len(modes) + len(modes.complex) == modes.total == count
+    assert said
+    assert not any("random member" in line for line in said)
