@@ -47,7 +47,7 @@ def _values(texts: Sequence[str], turns: bool, where: str) -> list[float]:
             what = (
                 "is an angle: deg or rad (the default)"
                 if turns
-                else "is a length, in the unit that the mechanism declares: no unit"
+                else "is a length: write the number alone, in the unit of length of the mechanism"
             )
             refuse(where, f"unit {unit or last!r} in {text!r}: the freedom {what}")
         out.append(value * scales[unit or last])

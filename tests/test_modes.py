@@ -293,7 +293,7 @@ def test_a_driver_that_can_never_drive_is_named() -> None:
 def test_the_table_of_assemblies_shows_their_coordinates() -> None:
     modes = mg.assemblies(mg.load("four-bar"), {"A": 0.3})
     for i, mode in enumerate(modes):
-        angles = " +".join(f"{np.rad2deg(mode.start[name]):.6g}" for name in ("B.Rz", "C.Rz", "D.Rz"))
+        angles = " +".join(f"{np.rad2deg(mode.start[name]):.5g}" for name in ("B.Rz", "C.Rz", "D.Rz"))
         assert re.search(rf"^{i} +{angles} +regular", str(modes), re.MULTILINE)
 
 
@@ -390,3 +390,13 @@ def test_where_a_bound_is_met_no_further_loops_are_run() -> None:
     family = Question(linked_four_bar(1.0, 2.5, 2.0, 3.0, 0.5), {"O0": 0.3}).family
     start = start_set(family, np.random.default_rng(0))
     assert (start.x.shape[1], start.loops, start.whole) == (2, 0, True)
+
+
+def test_a_mode_is_one_line_of_the_table() -> None:
+    """No number is broken over two lines in a text of the usual width."""
+    modes = mg.assemblies(mg.load("7r"), {"O1": 0.3})
+    lines = str(modes).splitlines()
+    rule = next(i for i, line in enumerate(lines) if line.startswith("----"))
+    rows = lines[rule + 1 :]
+    assert [line.split()[0] for line in rows[: len(modes)]] == [str(i) for i in range(len(modes))]
+    assert not rows[len(modes)]

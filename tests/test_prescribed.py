@@ -417,3 +417,17 @@ def test_random_mechanisms_moved_by_points_are_the_same(seed: int) -> None:
     sums = np.array([sum(np.nansum(p, axis=-1) for p in of) for of in power])[:, same & (elsewhere.status == "ok")]
     largest = max(np.nanmax(np.abs(p), initial=1.0) for of in power for p in of)
     np.testing.assert_allclose(sums, sums[[0, 0, 0]], rtol=0, atol=1e-9 * largest)
+
+
+def test_a_pose_has_the_coordinates_and_efforts_of_its_angles() -> None:
+    """Pose and single coordinates are two spellings of one place: the same angles, and the weight's couples about x, new y and new z."""
+    angles = [0.2, 0.1, 0.05]
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = Rotation.from_euler("XYZ", angles).as_matrix(), (0.03, -0.02, 0.04)
+    single = {f"platform.T{k}": v for k, v in zip("xyz", T[:3, 3], strict=True)}
+    single |= {f"platform.R{k}": v for k, v in zip("xyz", angles, strict=True)}
+    whole, parts = (mg.solve(hexapod("U"), given)["platform"] for given in ({"platform": T}, single))
+    np.testing.assert_allclose(whole.position, [*T[:3, 3], *angles], atol=1e-12)
+    np.testing.assert_allclose(whole.effort, parts.effort, atol=1e-9)
+    c = T[:3, :3] @ (0, 0, 1.1)
+    np.testing.assert_allclose(whole.effort[3], np.cross(c, (0, 0, 500.0))[0], rtol=1e-9)

@@ -29,6 +29,8 @@ SLIDES, TURNS = ("Tx", "Ty", "Tz"), ("Rx", "Ry", "Rz")
 PART = re.compile(r"(?P<point>.+)\.(?P<part>Tx|Ty|Tz|T\([^()]*\))")
 ALMOST_PARALLEL = 0.98
 """Cosine between the first and the last axis of three successive turns from which on they do not describe a rotation well."""
+LITTLE_TURNED = 1.3
+"""Angle from the global directions to which poses are described by turns about x, the new y and the new z, as ``"arm.Rx"`` is."""
 PROPER = 1e-6
 """Largest entry of ``R R^T - 1`` of a pose."""
 
@@ -247,16 +249,19 @@ class Prescription:
     def _pose(self, name: str, target: Target, poses: Array, twist: Any, change: Any, t: Any) -> None:
         """Motions of a link's coordinates for its poses, its twist about the global origin and that one's rate."""
         R = poses[..., :3, :3]
+        first: Array | None = None
         gap = np.abs(R @ np.swapaxes(R, -1, -2) - np.eye(3)).max(initial=0.0)
-        chart = None
+        chart: Array | None = None
         if gap > PROPER or (np.linalg.det(R) < 0).any() or (poses[..., 3, :] != (0, 0, 0, 1)).any():
             fault = "expected poses with a proper rotation and the last row 0 0 0 1"
         elif change is not None and twist is None:
             fault = "has an acceleration and no velocity; give both"
         elif name in self.free:
             fault = f"{name} is given twice"
+        elif (np.trace(R, axis1=-2, axis2=-1) > 1.0 + 2.0 * np.cos(LITTLE_TURNED)).all():
+            chart = np.eye(3)
         else:
-            chart = _chart(R.reshape(-1, 3, 3))
+            chart, first = _chart(R.reshape(-1, 3, 3)), R.reshape(-1, 3, 3)[0].T
             fault = "no three successive turns describe all its poses well; prescribe them in several calls"
         if chart is None:
             self.faults.append(f"motion of {name!r}: {fault}")
@@ -266,7 +271,7 @@ class Prescription:
         def row() -> PairType:
             return PairType(f"free_pose{len(self.free)}", freedoms=[*SLIDES, *turns], reactions=())
 
-        pair = self._made(name, target, row, on_b=R.reshape(-1, 3, 3)[0].T)
+        pair = self._made(name, target, row, on_b=first)
         q = coordinates(pair, poses)
         rates = (None, None) if twist is None else _rates(pair, q, twist, change, at_rest=t is None)
         self._components(name, pair, (*SLIDES, *TURNS), (np.moveaxis(q, 0, -1), *rates, t))

@@ -17,7 +17,7 @@ from mechgraph.modes.certificate import Certificate
 from mechgraph.modes.family import Array
 from mechgraph.modes.record import AssembliesData, ModeData
 
-COORDINATES = 5
+COORDINATES = 4
 """Most coordinates of an assembly in its table; all are in ``start`` of the mode."""
 
 
@@ -84,15 +84,15 @@ class Assemblies(Shown, Sequence[Mechanism]):
         places = [m.freedom_names().index(name) for name in shown]
         units = [180.0 / np.pi if m.turns(name) else 1.0 for name in shown]
         names = [f"{name} [deg]" if m.turns(name) else name for name in shown]
-        header = ("mode", *names, "kind", "condition", "certificate")
+        header = ("mode", *names, "kind", "condition", "unique within")
         rows = []
         for i, kind in enumerate(self.kinds):
             sure = self.certificates[i]
-            word = "none" if sure is None else f"unique within {sure.radius:.2g}" if sure.proved else "not proved"
+            word = "none" if sure is None else f"{sure.radius:.2g}" if sure.proved else "not proved"
             rows.append(
                 (
                     str(i),
-                    *(f"{u * self.coordinates[i, k]:.6g}" for k, u in zip(places, units, strict=True)),
+                    *(f"{u * self.coordinates[i, k]:.5g}" for k, u in zip(places, units, strict=True)),
                     kind,
                     f"{self.condition[i]:.3g}",
                     word,

@@ -74,7 +74,9 @@ class _Place:
         self.task = Task(system, Loads.of(m.loads), still, columns, engine_for(system.n_rows, 1, engine))
         self.go(x)
         if not self.n:
-            raise DeclarationError(f"{call} {m.name!r}", ["nothing can move: it has no freedom that is not driven"])
+            raise DeclarationError(
+                f"{call} {m.name!r}", ["nothing can move while its drives are held; m.replace(drives=[]) frees them"]
+            )
 
     def go(self, x: Array) -> None:
         """Lay out a chart at a closed state."""
