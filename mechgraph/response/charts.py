@@ -76,7 +76,10 @@ class ChartStage:
         self._last = _Known(t, x, dq, np.zeros_like(dq))
         self._path = [self._last]
         found = self._found(t, self._first)
-        assert found is not None
+        if found is None:
+            raise Stopped(
+                "the loops do not close any more to where a step led, as at positions where the mechanism locks"
+            )
         self._path = [self._last]
         # kinetic energy, and the work of the forces over a unit of the coordinates
         kinetic = float(kinetic_energy(found.rates.here, found.rates.V)[0])
