@@ -13,6 +13,7 @@ from mechgraph.errors import MechgraphError, shortened
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.model.sweep import swept
+from mechgraph.units import KNOWN
 
 
 class UsageError(MechgraphError):
@@ -62,12 +63,15 @@ def named_value(text: str, what: str) -> tuple[str, str]:
     return name.strip(), rest.strip()
 
 
-def duration(text: str) -> float:
-    """A time span: ``10`` or ``10s`` (``ms`` too), in the unit of time that the mechanism declares where none is written."""
+def duration(text: str, m: Mechanism) -> float:
+    """A time span: ``10`` or ``10s`` (``ms`` too), in the unit of time that the mechanism declares (seconds where it declares none)."""
     value, unit = _number(text, f"--for {text!r}")
-    scales = {"": 1.0, "s": 1.0, "ms": 1e-3}
+    declared, known = m.units.get("time", "s"), KNOWN["time"]
+    scales = {"": 1.0, declared: 1.0}
+    if declared in known:
+        scales |= {name: known[name] / known[declared] for name in ("s", "ms")}
     if unit not in scales or value <= 0:
-        refuse(f"--for {text!r}", "expected a time above 0, e.g. 10s")
+        refuse(f"--for {text!r}", f"expected a time above 0 in {', '.join(filter(None, scales))}, e.g. 10{declared}")
     return value * scales[unit]
 
 

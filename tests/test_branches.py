@@ -84,3 +84,12 @@ def test_bad_arguments_of_a_map_are_all_named() -> None:
     with pytest.raises(mg.DeclarationError) as caught:
         mg.branches(mg.load("four-bar"), "Q", samples=1, points=0, over=(1.0, 0.0))
     assert len(caught.value.faults) == 4
+
+
+def test_turns_are_those_next_to_the_start() -> None:
+    """The output of RSSR stands at 0 where the crank does, on the branch of the start."""
+    m = mg.load("rssr")
+    s = mg.solve(m, {"A": np.linspace(0, 2 * np.pi, 25)[:-1]})["D"].position
+    ranges = [found["D.Rz"] for found in mg.branches(m, "A", samples=12, points=24).ranges]
+    assert any(np.allclose(one, (s.min(), s.max()), atol=0.02) for one in ranges)
+    assert all(-np.pi < middle <= np.pi for middle in map(np.mean, ranges))

@@ -665,6 +665,7 @@ def test_respond_prints_a_summary_and_writes_the_motion(tmp_path):
     ("options", "words"),
     [
         (("--for", "-1s"), "above 0"),
+        (("--for", "1min"), "above 0 in s, ms"),
         (("--for", "3min"), "expected a time"),
         (("--for", "1s", "--rate", "A0=1", "--rate", "A1=2"), "contradict the closure"),
         (("--for", "1s", "--start", "A0=3kg"), "--start"),

@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 import mechgraph as mg
 from mechgraph.cli import app
 from mechgraph.model.schema import json_schema
+from mechgraph.typed import duration
 
 Z = (0, 0, 1)
 FILE = """
@@ -249,3 +250,9 @@ def test_the_command_line_asks_how_long() -> None:
     result = CliRunner().invoke(app, ["respond", "rssr"])
     assert result.exit_code == 2
     assert "Give --for TIME" in result.stderr
+
+
+def test_a_time_span_is_converted_to_the_declared_unit() -> None:
+    m = mg.load("windows-2").replace(units={"length": "mm", "mass": "kg", "time": "ms"})
+    assert [duration(text, m) for text in ("2s", "2ms", "2")] == [2000.0, 2.0, 2.0]
+    assert duration("5ms", mg.load("windows-2")) == 0.005

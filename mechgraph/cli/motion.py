@@ -161,7 +161,7 @@ def respond(
     begin = dict(parse_at(m, text, "--start") for text in start or ())
     rates = dict(parse_at(m, text, "--rate") for text in rate or ())
     if span is not None:
-        times = np.array([0.0, duration(span)])
+        times = np.array([0.0, duration(span, m)])
     elif m.response is not None:
         times = m.response.times
     else:
