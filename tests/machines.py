@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
+from strategies import body, placed
 
 import mechgraph as mg
 
 Y = (0, 1, 0)
+Z = (0.0, 0.0, 1.0)
+CONTACTS = {"rod": 1, "Sp": 1, "Sg": 2, "S": 3}
 
 
 def cylinder(name: str, a: str, b: str, p: ArrayLike, q: ArrayLike, types: str) -> list[mg.Pair]:
@@ -59,3 +62,48 @@ def double_cardan() -> mg.Mechanism:
         mg.Pair("out", "R", "output", "frame", point=q + a, axis=a),
     ]
     return mg.Mechanism("double Cardan", None, pairs, ["in"])
+
+
+def sliders() -> mg.Mechanism:
+    """A platform on six rods from sliders."""
+    pairs = []
+    for k in range(6):
+        a, side = np.pi / 3 * k, (-1) ** k
+        foot = np.array([2 * np.cos(a + 0.25 * side), 2 * np.sin(a + 0.25 * side), 0.0])
+        head = np.array([np.cos(a + 0.35 - 0.3 * side), np.sin(a + 0.35 - 0.3 * side), 1.7 + 0.1 * np.sin(2 * k)])
+        pairs.append(mg.Pair(f"P{k}", "P", "frame", f"slide{k}", point=foot, axis=Z))
+        pairs.append(mg.Pair(f"A{k}", "S", f"slide{k}", f"rod{k}", point=foot))
+        pairs.append(mg.Pair(f"B{k}", "S", f"rod{k}", "platform", point=head))
+    return mg.Mechanism("6-PSS", None, pairs, [f"P{k}" for k in range(6)])
+
+
+def random_platforms(seed: int) -> mg.Mechanism:
+    """Bodies one above the other, each held by rods and spheres that leave it no freedom, on the frame, a crank and bodies below."""
+    rng = np.random.default_rng(seed)
+    pairs = [mg.Pair("A", "R", "frame", "crank", point=rng.normal(size=3), axis=rng.normal(size=3))]
+    below, links = ["frame", "crank"], []
+    for i in range(1 + seed % 2):
+        kinds = ["rod", *rng.permutation(["Sp", "rod", ("Sg", "Sp")[seed % 2], ("rod", "S")[seed % 3 == 0]]).tolist()]
+        while (left := 6 - sum(CONTACTS[kind] for kind in kinds)) < 0:
+            kinds.pop()
+        for n, kind in enumerate([*kinds, *["rod"] * left]):
+            on, name, k = below[-1] if not n else str(rng.choice(below)), f"platform{i}", len(pairs)
+            at, foot = rng.uniform(-1, 1, (2, 3))
+            if kind == "rod":
+                pairs.append(
+                    mg.Pair(f"J{k}", "S", *rng.permutation([on, f"rod{k}"]).tolist(), point=foot - 2 * np.array(Z))
+                )
+                pairs.append(mg.Pair(f"K{k}", "S", *rng.permutation([name, f"rod{k}"]).tolist(), point=at))
+                links.append(body(rng, f"rod{k}", 0.5 * (at + foot)))
+            else:
+                pairs.append(placed(rng, f"J{k}", kind, *rng.permutation([on, name]).tolist(), at))
+        below.append(f"platform{i}")
+    links = [mg.Link("frame"), *links, *(body(rng, name, rng.uniform(-1, 1, 3)) for name in below[1:])]
+    return mg.Mechanism(f"platforms {seed}", links, pairs, ["A"], [mg.Gravity(rng.normal(size=3))])
+
+
+def sine(m, freedom, size, n=19):
+    """A motion about the start."""
+    t = np.linspace(0, 2 * np.pi, n)
+    begin = m.start.get(m.full_name(freedom), 0.0)
+    return mg.Motion(begin + size * np.sin(t), size * np.cos(t), -size * np.sin(t))

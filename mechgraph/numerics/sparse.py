@@ -108,7 +108,7 @@ class SparseFactor:
             rmatmat=lambda b: self.solve(b, transposed=True),
             dtype=np.dtype(float),
         )
-        size = float(scipy.sparse.linalg.onenormest(inverse))
+        size = float(scipy.sparse.linalg.onenormest(inverse, t=1))
         return 1.0 / size if 0 < size < np.inf else 0.0
 
     def solve(self, b: Array, transposed: bool = False) -> Array:

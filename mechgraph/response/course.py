@@ -32,6 +32,25 @@ from mechgraph.result.summary import summary
 from mechgraph.result.trajectory import Trajectory
 from mechgraph.structure.snapping import SnappedMechanism, declared_closure
 
+LOST_ENERGY = 1e-3
+"""Error of the balance of energies, of their greatest change, from which on a motion in time is doubtful."""
+ROUNDING = 1e-9
+"""Change of energies, of the potential energy, that is rounding: nothing moves."""
+
+
+@dataclass(frozen=True)
+class EnergyLost:
+    """The balance of energies is not kept: the motion is doubtful from about the time ``t`` on, by the part ``error``."""
+
+    error: float
+    t: float
+
+    def __str__(self) -> str:
+        return (
+            f"energy balance: off by {self.error:.2g} of the greatest change of energy, from t = {self.t:.4g} on, so that the motion "
+            "from there is doubtful (a change point or a jump of the loads that steps do not resolve); give a smaller rtol"
+        )
+
 
 @dataclass(frozen=True, repr=False)
 class Energy(Shown):
@@ -50,6 +69,14 @@ class Energy(Shown):
     def balance(self) -> Array:
         """``kinetic + potential - work`` less its value at the start: zero for an exact solution."""
         return np.asarray(self.kinetic + self.potential - self.work - self.start)
+
+    @property
+    def error(self) -> float:
+        """Greatest error of the balance, of the greatest change of an energy or work; 0 where that is rounding of the potential energy."""
+        parts = self.kinetic, self.potential - self.potential[:1], self.work
+        change = max(float(np.abs(part).max(initial=0.0)) for part in parts)
+        floor = ROUNDING * float(np.abs(self.potential).max(initial=0.0))
+        return float(np.abs(self.balance).max(initial=0.0)) / change if change > floor else 0.0
 
     def document(self) -> Document:
         """Ranges over the output times."""
@@ -73,6 +100,16 @@ class Response(Solution):
     def __init__(self, trajectory: Trajectory, energy: Energy, course: Course) -> None:
         super().__init__(trajectory)
         self.energy, self._course = energy, course
+
+    @property
+    def warnings(self) -> tuple[Any, ...]:
+        """What makes reactions doubtful, and the motion itself: see ``Solution.warnings``; energies that do not balance."""
+        error = self.energy.error
+        if not error > LOST_ENERGY:
+            return super().warnings
+        off = np.abs(self.energy.balance)
+        first = int(np.argmax(off > 0.5 * off.max()))
+        return (*super().warnings, EnergyLost(error, float(self.t[first])))
 
     def document(self, asked: bool = False) -> Document:
         """The summary of a Solution, with the balance of energies, and what happened."""

@@ -11,25 +11,22 @@ from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "identities"))
 
+import machines
+import mechanisms as known
 import numpy as np
-from test_reduced_form import random_platforms, sine, sliders
 
 import mechgraph as mg
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.pipeline import Options, Pipeline
-from tests import machines
-from tests import mechanisms as known
 
 ROUNDS = 5
 FORMS = ("full", "reduced")
 CASES = {
     "five-rod suspension": (machines.five_rods, 0.05),
-    "6-PSS": (sliders, 0.1),
+    "6-PSS": (machines.sliders, 0.1),
     "6-SPS": (lambda: known.hexapod("SPS"), 0.1),
-    "rods, spheres, planes": (lambda: random_platforms(0), 0.02),
+    "rods, spheres, planes": (lambda: machines.random_platforms(0), 0.02),
     "RSSR": (lambda: mg.load("rssr"), 0.5),
     "6-UPS": (known.hexapod, 0.1),
     "RCSR": (lambda: mg.load("rcsr"), 0.5),
@@ -44,7 +41,9 @@ def main() -> None:
         m = make()
         for count in (36, 360, 3600):
             drives = enumerate(m.drives)
-            motion = DriverMotion(m, {d.freedom: sine(m, d.freedom, size * np.cos(k), count) for k, d in drives})
+            motion = DriverMotion(
+                m, {d.freedom: machines.sine(m, d.freedom, size * np.cos(k), count) for k, d in drives}
+            )
             took: dict[str, list[float]] = {form: [] for form in FORMS}
             for _ in range(ROUNDS):
                 for form in FORMS:

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
+import machines
+import mechanisms as known
 import numpy as np
 import pytest
 from attack import differences
-from strategies import body, placed
 
 import mechgraph as mg
 import mechgraph.pipeline as pipeline
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.pipeline import Options, Pipeline
 from mechgraph.result.solution import Solution
-from tests import machines
-from tests import mechanisms as known
 
 SAME = 1e-11
 Z = (0.0, 0.0, 1.0)
@@ -32,13 +31,6 @@ def assert_same(m, motions, condition=1.0, **options):
     size = max(float(np.nanmax(np.abs(full[p.name].velocity))) for p in m.pairs if p.type.f)
     assert worst <= SAME * condition * max(1.0, size) ** 2, f"{where}: {worst:.1e} at rates {size:.1e}"
     return reduced
-
-
-def sine(m, freedom, size, n=19):
-    """A motion about the start."""
-    t = np.linspace(0, 2 * np.pi, n)
-    begin = m.start.get(m.full_name(freedom), 0.0)
-    return mg.Motion(begin + size * np.sin(t), size * np.cos(t), -size * np.sin(t))
 
 
 WITH_FORM = [
@@ -66,19 +58,6 @@ def test_library(name: str, engine: str) -> None:
     size = 1.0 if m.pairs[pair].type.freedoms[j].turns else 0.02
     begin = m.start.get(m.full_name(freedom), 0.0)
     assert_same(m, {freedom: mg.Motion(begin + size * np.linspace(-np.pi, np.pi, 19), 1.3, 0.7)}, engine=engine)
-
-
-def sliders() -> mg.Mechanism:
-    """A platform on six rods from sliders."""
-    pairs = []
-    for k in range(6):
-        a, side = np.pi / 3 * k, (-1) ** k
-        foot = np.array([2 * np.cos(a + 0.25 * side), 2 * np.sin(a + 0.25 * side), 0.0])
-        head = np.array([np.cos(a + 0.35 - 0.3 * side), np.sin(a + 0.35 - 0.3 * side), 1.7 + 0.1 * np.sin(2 * k)])
-        pairs.append(mg.Pair(f"P{k}", "P", "frame", f"slide{k}", point=foot, axis=Z))
-        pairs.append(mg.Pair(f"A{k}", "S", f"slide{k}", f"rod{k}", point=foot))
-        pairs.append(mg.Pair(f"B{k}", "S", f"rod{k}", "platform", point=head))
-    return mg.Mechanism("6-PSS", None, pairs, [f"P{k}" for k in range(6)])
 
 
 def geared() -> mg.Mechanism:
@@ -109,7 +88,7 @@ def geared() -> mg.Mechanism:
     ("make", "size"),
     [
         (machines.five_rods, 0.05),
-        (sliders, 0.1),
+        (machines.sliders, 0.1),
         (geared, 0.5),
         (known.hexapod, 0.1),
         (lambda: known.hexapod("SPS"), 0.1),
@@ -119,35 +98,9 @@ def geared() -> mg.Mechanism:
 @pytest.mark.parametrize("engine", ["dense", pytest.param("sparse", marks=pytest.mark.slow)])
 def test_several_loops(make, size, engine) -> None:
     m = make()
-    assert_same(m, {d.freedom: sine(m, d.freedom, size * np.cos(k)) for k, d in enumerate(m.drives)}, engine=engine)
-
-
-CONTACTS = {"rod": 1, "Sp": 1, "Sg": 2, "S": 3}
-
-
-def random_platforms(seed: int) -> mg.Mechanism:
-    """Bodies one above the other, each held by rods and spheres that leave it no freedom, on the frame, a crank and bodies below."""
-    rng = np.random.default_rng(seed)
-    pairs = [mg.Pair("A", "R", "frame", "crank", point=rng.normal(size=3), axis=rng.normal(size=3))]
-    below, links = ["frame", "crank"], []
-    for i in range(1 + seed % 2):
-        kinds = ["rod", *rng.permutation(["Sp", "rod", ("Sg", "Sp")[seed % 2], ("rod", "S")[seed % 3 == 0]]).tolist()]
-        while (left := 6 - sum(CONTACTS[kind] for kind in kinds)) < 0:
-            kinds.pop()
-        for n, kind in enumerate([*kinds, *["rod"] * left]):
-            on, name, k = below[-1] if not n else str(rng.choice(below)), f"platform{i}", len(pairs)
-            at, foot = rng.uniform(-1, 1, (2, 3))
-            if kind == "rod":
-                pairs.append(
-                    mg.Pair(f"J{k}", "S", *rng.permutation([on, f"rod{k}"]).tolist(), point=foot - 2 * np.array(Z))
-                )
-                pairs.append(mg.Pair(f"K{k}", "S", *rng.permutation([name, f"rod{k}"]).tolist(), point=at))
-                links.append(body(rng, f"rod{k}", 0.5 * (at + foot)))
-            else:
-                pairs.append(placed(rng, f"J{k}", kind, *rng.permutation([on, name]).tolist(), at))
-        below.append(f"platform{i}")
-    links = [mg.Link("frame"), *links, *(body(rng, name, rng.uniform(-1, 1, 3)) for name in below[1:])]
-    return mg.Mechanism(f"platforms {seed}", links, pairs, ["A"], [mg.Gravity(rng.normal(size=3))])
+    assert_same(
+        m, {d.freedom: machines.sine(m, d.freedom, size * np.cos(k)) for k, d in enumerate(m.drives)}, engine=engine
+    )
 
 
 QUICK = (0, 2, 7, 8, 10)
@@ -157,8 +110,8 @@ QUICK = (0, 2, 7, 8, 10)
     "seed", [seed if seed in QUICK else pytest.param(seed, marks=pytest.mark.slow) for seed in range(12)]
 )
 def test_random_platforms(seed: int) -> None:
-    m = random_platforms(seed)
-    assert_same(m, {"A": sine(m, "A", 0.02)}, engine=("dense", "sparse")[seed % 2])
+    m = machines.random_platforms(seed)
+    assert_same(m, {"A": machines.sine(m, "A", 0.02)}, engine=("dense", "sparse")[seed % 2])
 
 
 def crank_and_rocker(crank: float = 0.3) -> mg.Mechanism:
@@ -187,7 +140,7 @@ def test_out_of_reach_is_flagged_alike() -> None:
 
 def test_gaps_of_several_drivers() -> None:
     """The polygon leads out of the reach of a slider's rod and back."""
-    m = sliders()
+    m = machines.sliders()
     way = np.concatenate([np.linspace(0, 2.2, 12), np.linspace(2.2, 0, 12)])
     motions = {f"P{k}": mg.Motion(way if k == 0 else 0 * way, 1.0, 0.0) for k in range(6)}
     assert_same(m, motions, condition=1e4)
@@ -215,7 +168,7 @@ def strut(turned: bool, aside: float = 0.0) -> mg.Mechanism:
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_cylinder_is_a_rod_that_its_slide_makes_longer(turned: bool) -> None:
     m = strut(turned)
-    found = assert_same(m, {"A": sine(m, "A", 0.3), "P": sine(m, "P", -0.2)})
+    found = assert_same(m, {"A": machines.sine(m, "A", 0.3), "P": machines.sine(m, "P", -0.2)})
     d = found.link("rocker").pose[:, :3] @ (0.3, 1.1, 0.4, 1) - found.link("crank").pose[:, :3] @ (1.0, 0.2, 0.1, 1)
     length = np.sqrt(0.49 + 0.81 + 0.09) + found["P"].position[:, 0]
     np.testing.assert_allclose(np.linalg.norm(d, axis=1), length, atol=1e-13)
@@ -223,7 +176,9 @@ def test_a_cylinder_is_a_rod_that_its_slide_makes_longer(turned: bool) -> None:
 
 def test_a_slide_beside_the_line_is_none() -> None:
     m = strut(False, aside=1e-6)
-    line = Pipeline(DriverMotion(m, {"A": sine(m, "A", 0.3), "P": sine(m, "P", -0.2)}), Options(form="reduced"))
+    line = Pipeline(
+        DriverMotion(m, {"A": machines.sine(m, "A", 0.3), "P": machines.sine(m, "P", -0.2)}), Options(form="reduced")
+    )
     assert line.reduction is None
 
 
@@ -237,7 +192,7 @@ def curved(n: int, more: int = 1) -> dict[str, mg.Motion]:
 @pytest.mark.parametrize("n", [37, pytest.param(361, marks=pytest.mark.slow)])
 def test_paths_of_several_drivers_that_bend(n: int) -> None:
     """Rods rest all along the polygon, not along chords across its bends: positions between leave them where they stood."""
-    m = sliders()
+    m = machines.sliders()
     found = assert_same(m, curved(n))
     finer = mg.kinematics(m, curved(n, more=4))
     for k in range(6):
