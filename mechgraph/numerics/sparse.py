@@ -108,6 +108,7 @@ class SparseFactor:
             rmatmat=lambda b: self.solve(b, transposed=True),
             dtype=np.dtype(float),
         )
+        # one column: more of them begin with random numbers of the whole process, so that the same call could end in two ways
         size = float(scipy.sparse.linalg.onenormest(inverse, t=1))
         return 1.0 / size if 0 < size < np.inf else 0.0
 
