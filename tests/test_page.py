@@ -569,6 +569,7 @@ def test_nothing_moves_by_itself_for_those_who_want_that(reader: Reader, pages: 
     reader.open(pages["rssr"], prefers_reduced_motion="reduce")
     for button in reader.all(".choices button"):
         reader.js("arguments[0].click()", button)
+        reader.settled()
         before = labels(reader)
         time.sleep(0.15)
         assert labels(reader) == before

@@ -33,9 +33,11 @@ from mechgraph.result.trajectory import Trajectory
 from mechgraph.structure.snapping import SnappedMechanism, declared_closure
 
 LOST_ENERGY = 1e-3
-"""Error of the balance of energies, of their greatest change, from which on a motion in time is doubtful."""
+"""Error of the balance of energies, of the greatest one, from which on a motion in time is doubtful."""
 ROUNDING = 1e-9
-"""Change of energies, of the potential energy, that is rounding: nothing moves."""
+"""Energies, of the potential energy, that are rounding: nothing moves."""
+STEPS_LOOKED_AT = 100
+"""Steps at which the greatest energy of a motion is looked for."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class EnergyLost:
 
     def __str__(self) -> str:
         return (
-            f"energy balance: off by {self.error:.2g} of the greatest change of energy, from t = {self.t:.4g} on, so that the motion "
+            f"energy balance: off by {self.error:.2g} of the greatest energy, from t = {self.t:.4g} on, so that the motion "
             "from there is doubtful (a change point or a jump of the loads that steps do not resolve); give a smaller rtol"
         )
 
@@ -71,12 +73,11 @@ class Energy(Shown):
         return np.asarray(self.kinetic + self.potential - self.work - self.start)
 
     @property
-    def error(self) -> float:
-        """Greatest error of the balance, of the greatest change of an energy or work; 0 where that is rounding of the potential energy."""
-        parts = self.kinetic, self.potential - self.potential[:1], self.work
-        change = max(float(np.abs(part).max(initial=0.0)) for part in parts)
-        floor = ROUNDING * float(np.abs(self.potential).max(initial=0.0))
-        return float(np.abs(self.balance).max(initial=0.0)) / change if change > floor else 0.0
+    def greatest(self) -> float:
+        """The greatest energy, counted from the start, or work; 0 where that is rounding of the potential energy."""
+        parts = self.kinetic, self.potential - self.start, self.work
+        size = max(float(np.abs(part).max(initial=0.0)) for part in parts)
+        return size if size > ROUNDING * float(np.abs(self.potential).max(initial=0.0)) else 0.0
 
     def document(self) -> Document:
         """Ranges over the output times."""
@@ -104,12 +105,15 @@ class Response(Solution):
     @property
     def warnings(self) -> tuple[Any, ...]:
         """What makes reactions doubtful, and the motion itself: see ``Solution.warnings``; energies that do not balance."""
-        error = self.energy.error
-        if not error > LOST_ENERGY:
-            return super().warnings
         off = np.abs(self.energy.balance)
-        first = int(np.argmax(off > 0.5 * off.max()))
-        return (*super().warnings, EnergyLost(error, float(self.t[first])))
+        # in question at few times, which may be those of little energy: beside the whole motion
+        if (
+            not off.max() > LOST_ENERGY * self.energy.greatest
+            or not off.max() > LOST_ENERGY * self._course.greatest > 0
+        ):
+            return super().warnings
+        lost = np.asarray(self.t)[off > 0.5 * off.max()]
+        return (*super().warnings, EnergyLost(float(off.max()) / self._course.greatest, float(lost.min())))
 
     def document(self, asked: bool = False) -> Document:
         """The summary of a Solution, with the balance of energies, and what happened."""
@@ -181,6 +185,12 @@ class Course:
     def _energy_at_start(self) -> float:
         _, kinetic, potential, work = self._read(np.array(self.begin))
         return float((kinetic + potential - work)[0])
+
+    @cached_property
+    def greatest(self) -> float:
+        """The greatest energy of the motion at its steps, of many at some of them."""
+        ends = np.array([self.begin, *(segment.end for segment in self.integration.segments)])
+        return self.response(ends[:: max(1, len(ends) // STEPS_LOOKED_AT)]).energy.greatest
 
     def _read(self, times: Array) -> tuple[Trajectory, Array, Array, Array]:
         """The trajectory at times, with kinetic and potential energy and work, flat."""
