@@ -133,8 +133,8 @@ def test_andrews_mechanism_against_the_published_reference():
     np.testing.assert_allclose(np.add(begin, turned), end, atol=1e-9)
 
 
-def test_a_motion_that_ends_beside_a_change_point_is_told_how_far_it_came():
-    """A rod as coupler of a parallelogram whose folded position is missed by 1e-7: what cannot be followed is an error of its own."""
+def test_with_a_passive_freedom_it_passes_beside_a_change_point():
+    """A rod as coupler of a parallelogram whose folded position is missed by 1e-7: it was given up there."""
     inertia = np.diag([0.1, 0.1, 0.1])
     links = [
         mg.Link("frame"),
@@ -149,25 +149,48 @@ def test_a_motion_that_ends_beside_a_change_point_is_told_how_far_it_came():
         mg.Pair("D", "R", "frame", "rocker", point=(2, 0, 0), axis=(0, 0, 1)),
     ]
     m = mg.Mechanism("parallelogram", links, pairs, [], [mg.Gravity((0, -9.81, 0))])
-    r = mg.respond(m, np.linspace(0, 0.12, 3), rates={"A": -9.0}, on_stop="return")
-    assert "followed to t = 0.10" in r.stopped or not r.stopped
-    assert np.abs(r.energy.balance[:2]).max() < 1e-5 * r.energy.kinetic.max()
+    r = mg.respond(m, np.linspace(0, 0.15, 4), rates={"A": -9.0})
+    assert np.abs(r.energy.balance).max() < 1e-5 * r.energy.kinetic.max()
 
 
-def test_energy_that_is_lost_beside_a_change_point_is_said():
-    """A parallelogram whose coupler is longer by 1e-5 all but crosses itself where it is flat: steps leap from one branch to the other."""
-    z, corners = (0, 0, 1), [(0, 0, 0), (0, 1, 0), (2 + 1e-5, 1, 0), (2, 0, 0)]
+def nearly_a_parallelogram(off, *loads):
+    """A parallelogram of which the coupler is too long by ``off``: branches all but cross where it is flat, the root of that apart."""
+    z, corners = (0, 0, 1), [(0, 0, 0), (0, 1, 0), (2 + off, 1, 0), (2, 0, 0)]
     names = ["frame", "crank", "coupler", "rocker", "frame"]
     pairs = [mg.Pair("ABCD"[i], "R", names[i], names[i + 1], point=corners[i], axis=z) for i in range(4)]
     middles = {"crank": (0, 0.5, 0), "coupler": (1, 1, 0), "rocker": (2, 0.5, 0)}
     links = [mg.Link("frame"), *(mg.Link(name, 1.0, at, 0.1 * np.eye(3)) for name, at in middles.items())]
-    m = mg.Mechanism("nearly a parallelogram", links, pairs, ["A"], [mg.Gravity((0, -9.81, 0))])
-    t = np.linspace(0.0, 3.0, 41)
+    return mg.Mechanism("nearly a parallelogram", links, pairs, ["A"], [mg.Gravity((0, -9.81, 0)), *loads])
+
+
+@pytest.mark.parametrize("off", [1e-5, -1e-9, 1e-10])
+def test_no_energy_is_lost_where_branches_all_but_cross(off):
+    """Past the flat position twice, the second time folded over; up to 4 % were lost, or steps collapsed."""
+    r = mg.respond(nearly_a_parallelogram(off), np.linspace(0.0, 0.8, 31), rates={"A": -9.0})
+    assert "along the path" in str(r.work)
+    assert np.abs(r.energy.balance).max() < 2e-6 * r.energy.greatest
+    assert not r.warnings
+
+
+@pytest.mark.parametrize("off", [1e-8, -1e-9])
+def test_a_load_in_time_passes_there_as_well(off):
+    """In independent freedoms: closing took rounding for an open loop where the condition is poor."""
+    m = nearly_a_parallelogram(off, mg.Effort("A", lambda pose, twist, t: 0.0))
+    r = mg.respond(m, np.linspace(0.0, 0.2, 11), rates={"A": -9.0})
+    assert "in independent freedoms" in str(r.work)
+    assert np.abs(r.energy.balance).max() < 1e-4 * r.energy.greatest
+
+
+def test_energy_that_is_lost_is_said():
+    """At a tolerance that does not resolve the swing of a pendulum."""
+    links = [mg.Link("frame"), mg.Link("arm", 1.0, (0.5, 0, 0), 0.1 * np.eye(3))]
+    pair = mg.Pair("A", "R", "frame", "arm", point=(0, 0, 0), axis=(0, 0, 1))
+    m = mg.Mechanism("pendulum", links, [pair], ["A"], [mg.Gravity((0, -9.81, 0))])
+    t = np.linspace(0.0, 10.0, 41)
     with pytest.warns(mg.MechgraphWarning, match="energy balance: off by .* of the greatest energy, from t = "):
-        lost = mg.respond(m, t, rates={"A": -9.0})
+        lost = mg.respond(m, t, method="RK23", rtol=0.03, atol=0.03)
     assert np.abs(lost.energy.balance).max() > 1e-3 * lost.energy.kinetic.max()
-    away = mg.respond(m, t[:11], rates={"A": 0.1})
-    assert not away.warnings
+    assert not mg.respond(m, t).warnings
 
 
 def test_where_it_turns_back_no_energy_is_missed():

@@ -177,7 +177,10 @@ class PathStage:
         closed, v = self.states(np.array([t]), y[:, None])
         dq = closed.f.sensitivity()[:, 0, 0] * v[0, 0]
         arc = Arc(self.arc.task, closed.here.x[:, 0], dq)
-        return PathStage(arc, arc.begin, arc.rate)
+        stage = PathStage(arc, arc.begin, arc.rate)
+        # with the energy that there is, which the rate has less well where the mass changes fast
+        stage._first[1] = math.copysign(math.sqrt(self._mass / stage._mass) * y[1], arc.rate)
+        return stage
 
     def states(self, t: Array, y: Array) -> tuple[Closed, Array]:
         """See ``Stage``."""

@@ -22,13 +22,16 @@ from mechgraph.closure.solver import ClosureSolver, FactoredClosure, closure_sol
 from mechgraph.numerics.tolerances import PATH
 
 STEEPEST = 3.0
-"""Largest rate of a freedom for unit rates of the independent ones, against that where the chart was laid out, before a new one is."""
+"""Largest rate of a freedom for unit rates of the independent ones, against that where the chart was laid out, before a new one is; and
+the same of a condition that is poor."""
 MOST_TURNED = 1.0
 """Angle of an independent rotation from where the chart was laid out above which a new one is."""
 CLOSING_STEPS = 12
 """Most Newton steps to a closed state."""
 LAST_STEP = 1e-13
 """Newton step from which on a state counts as closed; the step before it was a millionth, so that only rounding is left."""
+NOISE_OF_STEP = 1e-15
+"""The same of a step that is rounding, as a part of the condition."""
 LOST = 1.0
 """Correction above which closing is given up: the step was too long."""
 UNMOVED_BY_SPIN = 1e-9
@@ -82,7 +85,7 @@ class Chart:
         self.which = self.solver.chosen(here, np.full(1, -1))
         self.start = here
         f = self.solver.factored(here, self.which)
-        self.steepness = self._steepness(f)
+        self.steepness, self.condition = self._steepness(f), float(f.condition[0])
         self._singles = system.single_rows[self.free]
         self.turns = bool((self._singles < 0).any())
         self._rows = system.single_rows[prescribed]
@@ -94,7 +97,8 @@ class Chart:
     def worn(self, f: FactoredClosure, u: Array) -> bool:
         """Whether another chart should take over at a state with coordinates ``u (n,)``."""
         far = self.turns and np.abs(u[self._singles < 0]).max(initial=0.0) > MOST_TURNED
-        return bool(far or self._steepness(f) > STEEPEST * self.steepness or not f.condition[0] < PATH.doubtful)
+        poor = not f.condition[0] < max(PATH.doubtful, STEEPEST * self.condition)
+        return bool(far or poor or self._steepness(f) > STEEPEST * self.steepness)
 
     def coordinates(self, x: Array) -> Array:
         """Independent coordinates ``u (n, T)`` of states: how far they are from where the chart was laid out."""
@@ -133,7 +137,8 @@ class Chart:
             total = total + size
             with np.errstate(invalid="ignore"):
                 # below what is asked for, or twice below what rounding allows where the condition is poor
-                closed = (size <= LAST_STEP) | ((size <= 10 * LAST_STEP) & (before <= 10 * LAST_STEP))
+                most = np.maximum(10 * LAST_STEP, NOISE_OF_STEP * f.condition)
+                closed = (size <= LAST_STEP) | ((size <= most) & (before <= most))
             before = size
             if closed.all() or not np.isfinite(size).all() or (total > LOST).any():
                 break

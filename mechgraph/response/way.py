@@ -41,8 +41,10 @@ SERIES_TAIL = 1e-12
 """Part of the largest coefficient that the last two of a series may have; what a smooth series leaves out behind them is far smaller."""
 COEFFICIENT_NOISE = 1e-14
 """Rounding of what a series is made of, times the square of the condition."""
-SHORTEST_PIECE = 0.01
-"""Shortest piece."""
+SHORTEST_PIECE = 1e-8
+"""Shortest piece: where branches all but cross, a path turns from one towards the other within the root of what opens the crossing."""
+AT_CROSSING = 0.01
+"""Distance from a change point up to which a place counts as it."""
 NOT_FALLING = 0.3
 """Part of the coefficients before them that the last ones of a series have where they are noise: those of a smooth series of that size
 (``NOISE``, against the largest term) fall by a hundred from four to four."""
@@ -88,7 +90,7 @@ class Way:
         self._next *= 2.0
         self._follow(place + AROUND / 2)
         # a part does not end beside a change point
-        while near := [c.place for c in self.crossings if abs(place - c.place) < AROUND / 2 - SHORTEST_PIECE]:
+        while near := [c.place for c in self.crossings if abs(place - c.place) < AROUND / 2 - AT_CROSSING]:
             place = max(near) + AROUND / 2
             self._follow(place + AROUND / 2)
         known = self._known()
@@ -150,7 +152,7 @@ class Way:
     def _known(self) -> float:
         """How far the coordinate serves: to before the first node at which another freedom moves much faster."""
         nodes, singles = self._nodes, self.path.system.single_rows >= 0
-        near = np.array([np.abs(nodes.place - c.place) < SHORTEST_PIECE for c in self.crossings]).any(axis=0)
+        near = np.array([np.abs(nodes.place - c.place) < AT_CROSSING for c in self.crossings]).any(axis=0)
         steep = np.flatnonzero((np.abs(nodes.Z[singles]).max(axis=(0, 1)) > FASTEST) & ~near)
         return float(nodes.place[max(int(steep[0]) - 1, 0)]) if steep.size else self._reached
 
@@ -176,7 +178,7 @@ class Way:
             again = []
             for (a, b), c, steepness, noise in zip(spans, *self._series(spans), strict=True):
                 if (
-                    _coarse(c, noise)
+                    (_coarse(c, noise) or b - a > POINTS * self._step(a, b))
                     and b - a > SHORTEST_PIECE
                     and not (np.abs(middles - 0.5 * (a + b)) < 0.25 * (b - a)).any()
                 ):
@@ -186,6 +188,12 @@ class Way:
                     out.append(Piece(begin, end, c, float(steepness)))
             spans = again
         return sorted(out, key=lambda piece: self.sense * piece.begin)
+
+    def _step(self, begin: float, end: float) -> float:
+        """The shortest step of the path between two places: where it turns between two points of a series, its nodes are close."""
+        places = self._nodes.place
+        steps = np.diff(places[max(0, np.searchsorted(places, begin) - 1) : np.searchsorted(places, end) + 1])
+        return float(steps[steps > 0.0].min())
 
     def _spans(self, begin: float, end: float) -> list[tuple[float, float]]:
         """Places between which pieces are tried first: change points in the middle of theirs."""
@@ -224,6 +232,6 @@ def _coarse(c: Array, noise: float) -> bool:
     tail, size = np.abs(c[-2:]).max(axis=0), np.abs(c).max(axis=0)
     # the mass beside itself, forces beside what gives the mass an acceleration of one as well
     largest = np.append(size[0], np.full(3, size[:2].max()))
-    rounding = (last > NOT_FALLING * late) & (last < NOISE * largest)
-    small = tail <= max(SERIES_TAIL, noise) * np.maximum(size, 1e-3 * largest)
+    rounding = (last > NOT_FALLING * late) & (last < max(NOISE, noise) * largest)
+    small = tail <= SERIES_TAIL * np.maximum(size, 1e-3 * largest)
     return bool(not (small | rounding).all())
