@@ -14,10 +14,9 @@ Source: Marghitu, Fundamentals, section 2.15; Hall, Kinematics and Linkage Desig
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -122,7 +121,7 @@ def equivalent(m: Mechanism, at: Mapping[str, float] | None = None, *, rollers: 
     if faults:
         raise DeclarationError(f"equivalent of {m.name!r}", faults)
     names = {p.name for p in parts.pairs}
-    start = {name: value for name, value in placed.start.items() if name.split(".")[0] in names}
+    start = {name: value for name, value in placed.start.items() if m.pairs[m.freedom(name)[0]].name in names}
     return placed.replace(
         name=f"{m.name}, lower pairs", links=parts.links, pairs=parts.pairs, couplings=(), start=start, frame=m.frame
     )
@@ -258,11 +257,11 @@ def split_joint(m: Mechanism, pair: str, on: str, at: Mapping[str, float] | None
     tree = nx.Graph((p.a, p.b, {"pair": p.name}) for p in m.pairs if p.name in joint.pairs)
     other = {tree.edges[a, b]["pair"]: b for a, b in nx.bfs_edges(tree, on)}
     changed = [p.name for p in m.pairs if p.name in other and on not in (p.a, p.b)]
-    used = {text.split(".")[0] for part in (*m.drives, *m.loads, *m.couplings) for text in _texts(vars(part))}
+    bound = m.bound_freedoms
     faults = [
-        f"pair {name}: is driven, loaded or coupled, and would turn between other links"
+        f"pair {name}: is driven, loaded, coupled or named by the response, and would turn between other links"
         for name in changed
-        if name in used
+        if not bound.isdisjoint(m.pair(name).freedom_names)
     ]
     if faults:
         raise DeclarationError(what, faults)
@@ -272,16 +271,5 @@ def split_joint(m: Mechanism, pair: str, on: str, at: Mapping[str, float] | None
         axis = here.S[:3, system.first_column[k], 0]
         parts.join(name, m.pairs[k].type.symbol, on, other[name], here.pair_points[:, k, 0], axis)
     made = {p.name: p for p in parts.pairs}
-    start = {name: value for name, value in placed.start.items() if name.split(".")[0] not in made}
+    start = {name: value for name, value in placed.start.items() if m.pairs[m.freedom(name)[0]].name not in made}
     return placed.replace(pairs=[made.get(p.name, p) for p in placed.pairs], start=start, links=m.links, frame=m.frame)
-
-
-def _texts(value: Any) -> Iterator[str]:
-    """All texts in a value: keys and values of mappings, members of sequences."""
-    if isinstance(value, str):
-        yield value
-    elif isinstance(value, Mapping):
-        yield from _texts((*value, *value.values()))
-    elif isinstance(value, tuple | list):
-        for item in value:
-            yield from _texts(item)

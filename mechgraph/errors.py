@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import re
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,8 @@ MOST_FAULTS = 30
 """Faults that a message lists."""
 MOST_NAMES = 30
 """Names that a fault lists."""
+LONGEST_NAME = 100
+"""Characters of a wrong name that are compared with known ones."""
 LONGEST_FAULT = 2000
 """Characters of one fault: what was given may be of any size."""
 
@@ -31,6 +34,16 @@ def listed(names: Iterable[object], most: int = MOST_NAMES) -> str:
     shown = list(map(str, names))
     more = len(shown) - most
     return ", ".join(shown[:most]) + (f" and {more} more" if more > 0 else "")
+
+
+def near_names(name: str, known: Iterable[str], least: float = 0.5) -> list[str]:
+    """The known names, at most four, that may be meant by a wrong one: as like it as ``least`` (1: the same) or more."""
+    return difflib.get_close_matches(name[:LONGEST_NAME], list(known), n=4, cutoff=least)
+
+
+def did_you_mean(near: Sequence[str]) -> str:
+    """``did you mean crank.mass?``; nothing where no name is near."""
+    return f"did you mean {' or '.join(near)}?" if near else ""
 
 
 def counted(number: int, name: str) -> str:

@@ -492,3 +492,28 @@ def test_an_endless_helix_is_drawn_a_turn_to_either_side():
     x = line.shape.vertices @ marker[:, :3].T + marker[:, 3] - at
     assert_allclose(x[[0, len(x) // 2, -1]], [[0, 0, -0.2 * np.pi], [0, 0, 0], [0, 0, 0.2 * np.pi]], atol=0.02)
     assert_allclose(np.hypot(x[:, 0] + 0.5, x[:, 1]), 0.5, atol=1e-12)
+
+
+def test_a_curve_at_fault_is_the_only_fault():
+    """It says no markers, so that none are missing or too many; given by a marker on b, or by both as in a study."""
+
+    def cusp(u):
+        z = 0 * u
+        return [
+            np.stack([u**2, u**3, z]),
+            np.stack([2 * u, 3 * u**2, z]),
+            np.stack([2 + z, 6 * u, z]),
+            np.stack([z, 6 + z, z]),
+        ]
+
+    curve, marker = mg.Curve.function(position=cusp, ends_at=(-1, 1)), mg.Marker((1, 1, 0), (0, 0, 1), (1, 0, 0))
+    for given in ({"on_b": marker}, {"on_b": marker, "on_a": marker}, {"on_b": marker, "point": (1, 1, 0)}):
+        pair = mg.Pair("K", "Ps", "frame", "pin", curve=curve, **given)
+        with pytest.raises(mg.DeclarationError) as error:
+            mg.Mechanism("m", None, [pair])
+        (fault,) = error.value.faults
+        assert "has a cusp" in fault
+    with pytest.raises(mg.DeclarationError, match=r"(?s)2 faults.*on_a is missing.*on_b is missing"):
+        mg.Mechanism(
+            "m", None, [mg.Pair("K", "R", "frame", "pin", on_b=marker), mg.Pair("L", "R", "frame", "pin", on_a=marker)]
+        )

@@ -272,3 +272,16 @@ def test_numbers_of_assemblies_multiply_whatever_the_driver(symbol: str, seed: i
             product *= number(part, tuple(d.freedom for d in part.drives))
         before |= set(group.links)
     assert number(m, g.drivers) == product > 1
+
+
+def test_more_drivers_than_can_move() -> None:
+    """Two cranks of a four-bar were both named drivers of a dyad with two pairs; of declared ones those that lead count."""
+    m = mg.load("four-bar")
+    for drives in (["A", "D"], ["A", "A.Rz"], ["A", "B", "C", "D"]):
+        with pytest.raises(
+            mg.DeclarationError, match=r"drives = .*: expected independent freedoms, here 1, e\.g\. A\.Rz"
+        ):
+            mg.groups(m, drives)
+    assert mg.groups(m.replace(drives=["D", "A"])).symbol == mg.groups(m, ["D"]).symbol
+    rod = mg.load("rssr")  # its rod may spin: two freedoms, one that can be driven
+    assert mg.groups(rod.replace(drives=["A", "D"])).symbol == mg.groups(rod, ["A"]).symbol

@@ -3,6 +3,8 @@
 import copy
 import math
 import pickle
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -365,6 +367,11 @@ def test_unknown_law_lists_the_known():
     said = faults("cycloid", 1.0, 1.0, 0.0)
     assert "'cycloid'" in said
     assert all(name in said for name in LAWS)
+
+
+def test_the_readme_lists_every_law():
+    page = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+    assert re.findall(r'^\| `"(\w+)"` \| `(?:rise|speed|samples)', page, re.MULTILINE) == [*LAWS]
 
 
 @pytest.mark.parametrize(

@@ -74,9 +74,24 @@ def test_what_cannot_be_split() -> None:
     with pytest.raises(mg.DeclarationError, match="on = 'lever': expected a link of the joint: crank, rod, arm"):
         mg.split_joint(m, "B", "lever")
     loaded = m.replace(loads=[mg.Effort("E", 2.0)])
-    with pytest.raises(mg.DeclarationError, match="pair E: is driven, loaded or coupled"):
+    with pytest.raises(mg.DeclarationError, match="pair E: is driven, loaded, coupled"):
         mg.split_joint(loaded, "B", "rod")
+    stopped = m.replace(response=mg.ResponseSetup((0.0, 1.0), stops=[mg.Stop("E", upper=1.0)]))
+    with pytest.raises(mg.DeclarationError, match=r"pair E: is .* named by the response"):
+        mg.split_joint(stopped, "B", "rod")
     assert mg.split_joint(loaded, "B", "arm").pairs[1].name == "B"
+
+
+def test_a_link_may_have_the_name_of_a_pair() -> None:
+    """A load on a link E is none in the pair E, nor is one in a pair E.F one in the pair E."""
+    m = watt_with_a_double_joint()
+    pairs = [p.replace(**{s: "E" for s in "ab" if getattr(p, s) == "lever"}) for p in m.pairs]
+    pairs = [p.replace(name="E.F") if p.name == "F" else p for p in pairs]
+    loads = [mg.Wrench("E", force=(1.0, -2.0, 0.0), point=(-1, 1, 0)), mg.Effort("E.F", 1.0)]
+    named = mg.Mechanism("named", pairs=pairs, drives=["A"], loads=loads, start={"E.F": 0.0})
+    other = mg.split_joint(named, "B", "rod")
+    assert {"rod", "arm"} == {other.pair("E").a, other.pair("E").b}
+    assert dict(other.start) == {"E.F.Rz": 0.0}
 
 
 def test_the_structure_tells_them() -> None:

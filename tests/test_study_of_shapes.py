@@ -231,6 +231,43 @@ def test_numbers_that_are_none_are_refused(make, name, words):
         mg.study(make(), {name: [1.0, 2.0]}, "A.effort", n=2, motions=GIVEN)
 
 
+@pytest.mark.parametrize(
+    ("given", "outputs", "words"),
+    [
+        ({"K.curve.radus": [1.0, 2.0]}, "A.effort", r"'K\.curve\.radus'.*; did you mean K\.curve\.radius\?"),
+        ({"cm.mas": [1.0, 2.0]}, "A.effort", r"did you mean cam\.mass\?"),
+        ({"K.curve.pitch": [1.0, 2.0]}, "A.effort", "no declared number of that name; expected e.g"),
+        ({"K.roller": [0.25, 0.2]}, "A.efort", r"'A\.efort': is no quantity; did you mean A\.effort\?"),
+        ({"K.roller": [0.25, 0.2]}, "Q.effort", r"'Q\.effort': there is no pair or link 'Q' \(pairs: A, F, K; links: "),
+        ({"K.roller": [0.25, 0.2]}, {"x": "Q.effort"}, r"'x': 'Q\.effort': there is no pair or link 'Q'"),
+    ],
+)
+def test_what_may_be_meant_is_named(given, outputs, words):
+    with pytest.raises(mg.DeclarationError, match=words):
+        mg.study(eccentric()[0], given, outputs, n=2, motions=GIVEN)
+
+
+def test_numbers_with_units_are_told_from_what_is_no_sequence():
+    pint = pytest.importorskip("pint")
+    mm = pint.UnitRegistry().mm
+    m = eccentric()[0].replace(units={"length": "m"})
+    for given in ([250 * mm, 200 * mm], np.array([250, 200]) * mm, 250 * mm):
+        with pytest.raises(mg.DeclarationError, match=r"'K\.roller' = .*: has units; a study takes plain numbers"):
+            mg.study(m, {"K.roller": given}, "A.effort", n=2, motions=GIVEN)
+
+
+def test_variants_in_other_units_are_refused():
+    """Their numbers are others: they would stand side by side with those of the first."""
+
+    def build(size):
+        m = eccentric()[0].replace(units={"length": "m", "mass": "kg", "time": "s"})
+        return m.to_units(length="mm") if size > 1 else m
+
+    study = mg.study(build, {"size": [0.5, 0.6, 2.0]}, "F.position", motions=GIVEN, sampling="grid")
+    assert study.failed.tolist() == [False, False, True]
+    assert "differs in links, pairs, drives, loads or units" in study.messages[2]
+
+
 def test_a_radius_of_a_ball_varies():
     """It was taken for a number that kernels read, and failed."""
     plane = mg.Pair("K", "Sp", "frame", "ball", point=(0, 0, 0), axis=Z, radius=0.1)

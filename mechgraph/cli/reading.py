@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 import sys
 import warnings
@@ -11,14 +10,11 @@ from pathlib import Path
 
 import mechgraph as mg
 from mechgraph.cli.output import show, write
-from mechgraph.errors import visible
+from mechgraph.errors import did_you_mean, near_names, visible
 from mechgraph.exchange.comparison import compare
 from mechgraph.exchange.files import READERS
 from mechgraph.typed import refuse
 from mechgraph.writing import Format, format_of, writable
-
-LONGEST_NAME = 100
-"""Characters of a wrong name that are compared with those of the library."""
 
 
 def loaded(name: str) -> mg.Mechanism:
@@ -34,8 +30,7 @@ def loaded(name: str) -> mg.Mechanism:
         if sys.stderr is not None:
             sys.stderr.write("".join(f"mechgraph: {visible(str(note.message))}\n" for note in notes))
         return made
-    near = difflib.get_close_matches(name.lower()[:LONGEST_NAME], known, n=4, cutoff=0.5)
-    hint = f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(known)}"
+    hint = did_you_mean(near_names(name.lower(), known)) or f"there are: {', '.join(known)}"
     raise mg.FileError(name, f"no mechanism of that name in the library, and no such file; {hint}")
 
 

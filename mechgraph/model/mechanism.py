@@ -165,6 +165,13 @@ class Mechanism(Parts, Once, Shown):
         """Full names of all freedoms, ``"B.Tz"``, in the order of the pairs."""
         return self.once(Parts.freedom_names)
 
+    @property
+    def bound_freedoms(self) -> set[str]:
+        """Full names of the freedoms that drives, loads, couplings and the response name."""
+        named = {d.freedom for d in self.drives} | {name for c in self.couplings for name in c.freedoms}
+        named |= {load.in_freedom for load in self.loads if load.in_freedom is not None}
+        return {self.full_name(name) for name in named | (self.response.freedoms if self.response else set())}
+
     # --- changed copies ----------------------------------------------------------------------------------------------
 
     def replace(self, **changes: Any) -> Mechanism:

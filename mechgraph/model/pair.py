@@ -324,25 +324,30 @@ class Pair(Described):
         curved = [*shape_faults_of(self, where, tol or 0.0)]
         found += [*self._pitch_faults(where), *contact_faults(self, where), *curved]
         most = largest_cosine(tol) if self.type.square_second else PARALLEL_COSINE
-        if (self.on_a is None) != (self.on_b is None):
-            missing = "on_b" if self.on_b is None else "on_a"
-            found.append(f"{where}{missing} is missing; a pair by markers needs one on each link")
-        elif self.on_a is not None and self.on_b is not None:
-            if self.point is not None or self.axis is not None:
-                found.append(f"{where}has both point/axis and markers on_a/on_b; give one form")
+        if self.contact is not None or not curved:  # a curve or surface that is at fault says no markers
+            found += self._form_faults(where)
+        if self.on_a is not None and self.on_b is not None:
             for side, marker in (("on_a", self.on_a), ("on_b", self.on_b)):
                 if isinstance(marker, Marker):
                     found += marker.faults(f"{where}{side}.", most)
                 else:
                     found.append(wrong(marker, where + side, "a Marker, mg.Marker(point, axis)"))
-        elif self.has_geometry:
-            if self.point is None:
-                found.append(f"{where}has an axis but no point; give point=(x, y, z)")
-            if self.axis is None and not curved:  # a curve or a surface in order says the axis
-                found.append(f"{where}has a point but no axis; type {self.type.symbol} needs axis=(x, y, z)")
-            if self.point is not None and self.axis is not None:
-                found += Marker(self.point, self.axis, self.second).faults(where, most)
+        elif self.point is not None and self.axis is not None:
+            found += Marker(self.point, self.axis, self.second).faults(where, most)
         return [fault for fault in found if fault]
+
+    def _form_faults(self, where: str) -> Iterator[str]:
+        """What is missing or too much of a point with an axis, or markers."""
+        if (self.on_a is None) != (self.on_b is None):
+            missing = "on_b" if self.on_b is None else "on_a"
+            yield f"{where}{missing} is missing; a pair by markers needs one on each link"
+        elif self.on_a is not None and (self.point is not None or self.axis is not None):
+            yield f"{where}has both point/axis and markers on_a/on_b; give one form"
+        elif self.on_a is None and self.has_geometry:
+            if self.point is None:
+                yield f"{where}has an axis but no point; give point=(x, y, z)"
+            if self.axis is None:
+                yield f"{where}has a point but no axis; type {self.type.symbol} needs axis=(x, y, z)"
 
     def _pitch_faults(self, where: str) -> Iterator[str | None]:
         given = [(n, v) for n, v in (("pitch", self.pitch), ("lead", self.lead)) if v is not None]

@@ -136,6 +136,12 @@ class ResponseSetup(Described):
             stops=tuple(replace(one, freedom=full_name(one.freedom)) for one in self.stops),
         )
 
+    @property
+    def freedoms(self) -> set[str]:
+        """Names of the freedoms of which it says anything."""
+        named = [one.freedom for one in (*self.motions, *self.stops)] + [one.of for one in self.events]
+        return {*self.start, *self.rates, *(name for name in named if isinstance(name, str))}
+
     def without(self, gone: set[str]) -> ResponseSetup:
         """The same without what is said of some freedoms, named in full."""
         return replace(

@@ -211,15 +211,20 @@ class Facts:
         return self.groups_with(names if names and not self.suggested_drives else (*names, *self.suggested_drives))
 
     def groups_with(self, drives: Sequence[str]) -> Decomposition | None:
-        """The same for other drivers, by the names of their freedoms."""
+        """The same for other drivers, by the names of their freedoms; of more than can move the independent ones, in their order."""
         if not (g := self.geometry):
             return None
         place = {name: i for i, name in enumerate(self.mechanism.freedom_names())}
         columns = np.array([place[self.mechanism.full_name(name)] for name in drives], dtype=np.intp)
-        freedoms = (
-            g.freedoms if np.array_equal(columns, g.driven) else freedoms_at(g.freedoms.position, columns, self.asked)
-        )
+        freedoms = self._freedoms_with(g, columns)
+        if len(columns) > freedoms.mobility - len(freedoms.passive):
+            columns = columns[freedoms.leading(columns)]
+            freedoms = self._freedoms_with(g, columns)
         return decomposition(freedoms, columns, self._kind)
+
+    def _freedoms_with(self, g: Geometry, columns: Index) -> Freedoms:
+        at_hand = np.array_equal(columns, g.driven)
+        return g.freedoms if at_hand else freedoms_at(g.freedoms.position, columns, self.asked)
 
     @cached_property
     def groups_by_driver(self) -> dict[str, str]:

@@ -132,6 +132,9 @@ def _groups(report: DeterminacyReport, drives: Iterable[str] | None) -> Decompos
     found = report.groups if names is None else report.groups_with(names)
     if found is None:
         raise _no_position(report)
+    if len(found.drivers) < len(names or ()):
+        able = f"independent freedoms, here {len(found.drivers)}, e.g. {', '.join(found.drivers)}"
+        raise DeclarationError(f"groups of {m.name!r}", [wrong(tuple(names or ()), "drives", able)])
     return found
 
 

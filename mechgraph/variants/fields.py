@@ -281,8 +281,9 @@ def _side_by_side(mechanisms: Sequence[Mechanism]) -> Declared:
 
 
 def topology_of(m: Mechanism) -> tuple[Any, ...]:
-    """What variants must share: names, types and ends of pairs, the way they are placed, couplings, drives, kinds of loads."""
+    """What variants must share: names, types and ends of pairs, the way they are placed, couplings, drives, kinds of loads, units."""
     return (
+        tuple(sorted(m.units.items())),
         m.link_names(),
         m.frame,
         tuple((p.name, p.type if p.contact is None else p.type.symbol, p.a, p.b, p.on_a is None) for p in m.pairs),

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from mechgraph.errors import did_you_mean, near_names
 from mechgraph.model.chain import NUMBERS_OF_CHAIN, chain_numbers
 from mechgraph.model.coupling import BaseCoupling
 from mechgraph.model.field_format import Described, FieldFormat
@@ -32,6 +33,8 @@ MARKER = tuple(Marker.formats)
 """Numbers of a marker."""
 SIDES = [name for name, about in Pair.formats.items() if about.table == "marker"]
 """Fields of a pair that hold its markers, on link a and on link b."""
+NEAR = 0.8
+"""How like a wrong name is to one that may be meant: they share the names of link, pair and curve."""
 _INDEXED = re.compile(r"(?P<what>\w+)\[(?P<index>\d+)\](?:\.(?P<rest>.+))?")
 
 Place = tuple[Any, ...]
@@ -124,11 +127,20 @@ def find_field(m: Mechanism, name: str) -> AnyField | str:
         for i, item in enumerate(items):
             if name.startswith(item.name + ".") and (found := find(m, i, name.removeprefix(item.name + "."))):
                 return found
-    return (
-        f"{name!r}: no declared number of that name; expected e.g. {m.links[-1].name}.mass, {m.links[-1].name}.center.x, "
+    example = (
+        f"expected e.g. {m.links[-1].name}.mass, {m.links[-1].name}.center.x, "
         f"{m.links[-1].name}.inertia.xx, {m.pairs[0].name}.{'point' if m.pairs[0].point is not None else 'on_a.point'}.x, "
         "loads[0].stiffness, or length[2] of a chain"
     )
+    return f"{name!r}: no declared number of that name; {did_you_mean(_near(m, name)) or example}"
+
+
+def _near(m: Mechanism, name: str) -> list[str]:
+    """Names of numbers that may be meant by a wrong one, of the items with which it begins or whose names are near its first part."""
+    named: list[Link | Pair | BaseCoupling] = [*m.links, *m.pairs, *m.couplings]
+    items = {item.name: item for item in named}
+    owners = [own for own in items if name.startswith(own + ".")] or near_names(name.partition(".")[0], items)
+    return near_names(name, (f"{own}.{rest}" for own in owners for rest in _numbers_of(items[own])), NEAR)
 
 
 def _component(item: Described, rest: str) -> tuple[tuple[str, ...], FieldFormat, tuple[Place, ...]] | None:
@@ -220,13 +232,14 @@ def _coupling_field(m: Mechanism, index: int, rest: str) -> Field | ItemField | 
 
 
 def _numbers_of(item: Described) -> list[str]:
-    """Names of the numbers that are declared."""
-    return [
-        f"{name}.{part}".rstrip(".")
-        for name, about in item.formats.items()
-        for part in about.kind.components()
-        if _component(item, f"{name}.{part}".rstrip(".")) is not None
-    ]
+    """Names of the numbers that are declared, those of what it holds too."""
+    out = []
+    for name, about in item.formats.items():
+        if isinstance(held := getattr(item, name), Described):
+            out += [f"{name}.{rest}" for rest in _numbers_of(held)]
+        parts = (f"{name}.{part}".rstrip(".") for part in about.kind.components())
+        out += [text for text in parts if _component(item, text) is not None]
+    return out
 
 
 INDEXED: dict[str, Callable[[Mechanism, int, str], AnyField | str]] = {

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.errors import DeclarationError
+from mechgraph.errors import DeclarationError, did_you_mean, listed, near_names
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import shown, wrong
 from mechgraph.result.solution import Solution
 from mechgraph.result.views import LinkResult, PairResult, link_units, pair_units
 from mechgraph.units import unit_of
+from mechgraph.variants.number_names import NEAR
 
 Output = str | Callable[[Solution], Any]
 
@@ -66,11 +67,32 @@ def _fault(m: Mechanism, name: str, what: Any) -> str | None:
     if isinstance(what, str) and _found(m, what):
         return None
     pair = m.pairs[0]
-    return (
-        f"{shown(name)}: {shown(what)} is no quantity; expected e.g. '{pair.name}.effort', '{pair.name}.position', "
+    hint = did_you_mean(near_names(what, _known(m, what), NEAR)) if isinstance(what, str) else ""
+    example = (
+        f"expected e.g. '{pair.name}.effort', '{pair.name}.position', "
         f"'{pair.freedom_names[0] if pair.freedom_names else pair.name}', '{pair.name}:{(*pair.type.component_names, 'Fx')[0]}', "
         f"'{m.links[-1].name}.center', 'shaking', or a function of a Solution"
     )
+    said = shown(name) if name == what else f"{shown(name)}: {shown(what)}"
+    return f"{said}: {_missing(m, what)}; {hint or example}"
+
+
+def _missing(m: Mechanism, what: Any) -> str:
+    """What there is not: a pair or link of that name, or a quantity of it."""
+    owner = what.rpartition(".")[0] or what.rpartition(":")[0] if isinstance(what, str) else ""
+    if not owner or owner in (*m.pair_index, *m.link_index):
+        return "is no quantity"
+    return f"there is no pair or link {shown(owner)} (pairs: {listed(m.pair_index)}; links: {listed(m.link_index)})"
+
+
+def _known(m: Mechanism, what: str) -> list[str]:
+    """Names of the quantities of the pair or link that is named, or of all."""
+    owner = what.rpartition(".")[0]
+    of = [(pair.name, OF_PAIR) for pair in m.pairs] + [(link.name, OF_LINK) for link in m.links]
+    return [f"{name}.{part}" for name, parts in of if owner in (name, "") for part in parts] + [
+        *OF_SOLUTION,
+        *OF_CHECKS,
+    ]
 
 
 def _found(m: Mechanism, text: str) -> Callable[[Solution], Any] | None:

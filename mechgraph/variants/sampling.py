@@ -11,7 +11,7 @@ import scipy
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
-from mechgraph.quantities import is_numeric, real_array, shown, wrong
+from mechgraph.quantities import has_quantity, is_numeric, real_array, shown, wrong
 
 IGNORED_TAIL = 0.00135
 """Part of a distribution without end that is ignored at either end: three standard deviations of a normal one."""
@@ -88,6 +88,8 @@ def _with_quantiles(given: Any) -> Any:
     found = InverseDistribution(given) if hasattr(given, "icdf") else given
     if hasattr(found, "ppf") and not hasattr(found, "freeze"):
         return found if _has_median(found) else "has no median; check the arguments of the distribution"
+    if has_quantity(given):
+        return "has units; a study takes plain numbers, in the units in which the number is declared"
     levels = real_array(given)
     if levels is None or levels.ndim != 1 or not levels.size or not np.isfinite(levels).all():
         return "expected a distribution of scipy.stats with its numbers, e.g. scipy.stats.norm(10, 0.1), or a sequence of numbers"

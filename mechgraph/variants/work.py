@@ -69,7 +69,7 @@ class Source:
         if topology_of(made) != topology_of(self._as_declared):
             raise DeclarationError(
                 f"study of {self.mechanism.name!r}",
-                ["a variant differs in links, pairs, drives or loads from the first; only numbers may differ"],
+                ["a variant differs in links, pairs, drives, loads or units from the first; only numbers may differ"],
             )
         return made
 
