@@ -87,6 +87,32 @@ def test_the_side_of_a_roller_decides_which_way_it_is_pushed(inward: bool) -> No
     assert np.allclose(c.point, (0, R, 0), atol=1e-10)
 
 
+def test_pressure_angle_where_the_follower_stands_still() -> None:
+    """It turns back at both ends of its stroke, and the whole mechanism may stand: the angle is that of its way."""
+    theta = np.append(THETA, [-np.pi / 2, np.pi / 2])
+    expected = np.arcsin(E * np.abs(np.cos(theta)) / (R + ROLL))
+    for speed in (SPEED, 0.0):
+        c = mg.solve(with_roller(), {"A": mg.Motion(theta, speed)}).contact("B")
+        assert np.allclose(c.pressure_angle("follower"), expected, rtol=0, atol=1e-10)
+        across = np.cross(Z, c.point)
+        cosine = np.abs((across * c.normal).sum(axis=1)) / np.linalg.norm(across, axis=1)
+        assert np.allclose(np.cos(c.pressure_angle("cam")), cosine, atol=1e-10)
+
+
+def test_pressure_angle_of_a_link_that_is_guided_by_another_one() -> None:
+    """A slide on a slide: the way of its velocity, of its acceleration where it begins to move; none where it rests."""
+    pairs = [
+        mg.Pair("A", "P", "frame", "cross", point=(0, 0, 0), axis=(1, 0, 0)),
+        mg.Pair("C", "P", "cross", "foot", point=(0, 0, 0), axis=(0, 0, 1)),
+        mg.Pair("K", "Sp", "frame", "foot", point=(0, 0, 0), axis=(np.sin(0.3), 0, np.cos(0.3))),
+    ]
+    m = mg.Mechanism("foot", None, pairs, ["A"])
+    s = mg.kinematics(m, {"A": mg.Motion([0.0, 0.1, 0.2], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0])})
+    found = s.contact("K").pressure_angle("foot")
+    assert np.allclose(found[:2], np.pi / 2, atol=1e-12)
+    assert np.isnan(found[2])
+
+
 def test_flat_follower_on_a_disc() -> None:
     """The face bears the weight alone; the contact wanders by the eccentricity to both sides."""
     face = mg.Pair(
@@ -99,7 +125,7 @@ def test_flat_follower_on_a_disc() -> None:
     assert np.allclose(c.normal_force, force, rtol=1e-9)
     assert np.allclose(c.point, np.stack([E * np.cos(THETA), E * np.sin(THETA) + R, 0 * THETA], axis=-1), atol=1e-10)
     assert np.ptp(c.path_b, axis=0).max() == pytest.approx(2 * E, rel=1e-9)
-    assert np.allclose(c.pressure_angle("follower")[np.abs(np.cos(THETA)) > 1e-6], 0.0, atol=1e-9)
+    assert np.allclose(c.pressure_angle("follower"), 0.0, atol=1e-9)
     assert np.allclose(c.hertz.pressure, np.sqrt(force / LENGTH * MODULUS / (np.pi * R)), rtol=1e-8)
     assert np.allclose(c.sliding, SPEED * (R + E * np.sin(THETA))[:, None] * np.array([1.0, 0, 0]), atol=1e-10)
 

@@ -36,6 +36,10 @@ PULL = 1e-10
 """Part of the greatest normal force of a contact below which a pull is rounding."""
 
 
+AT_REST = 1e-10
+"""Part of the greatest velocity of a link at a contact below which it is rounding."""
+
+
 @dataclass(frozen=True)
 class LiftOff:
     """A range of positions in which a contact that only pushes would have to pull.
@@ -84,7 +88,7 @@ class ContactResult(Shown):
         rows = [(name + bracket(unit_of(units, of)), value) for name, value, of in self.columns()]
         held = "held on both sides" if pair.closed == "form" else "only pushed"
         blocks: list[Block] = [
-            Paragraph(f"{pair.type.name}, {pair.a} on {pair.b}, {held}."),
+            Paragraph(f"{pair.type.name}, {pair.a} on {pair.b}, {held}. Paths are seen in the frames of its markers."),
             ranges(rows, Places(self._values).name),
             *(Paragraph(found.text) for found in (self.lift_off if self._values.has_forces else ())),
         ]
@@ -328,15 +332,29 @@ class ContactResult(Shown):
         return np.asarray((turning * self.normal).sum(axis=-1))
 
     def pressure_angle(self, link: str) -> Array:
-        """Angle ``(...)`` from 0 to pi/2 between the normal and the velocity of a link where they touch; NaN where that stands still.
+        """Angle ``(...)`` from 0 to pi/2 between the normal and the path of a link where they touch; NaN where that has no direction.
 
-        Of the driven link it is its deviation angle: the force moves it best at 0 and not at all at pi/2.
+        The path of a link with one freedom on the frame is that of its pair, at rest too. Of any other link it has the direction of the
+        velocity, and where that is zero of the acceleration. Of the driven link the angle is its deviation angle: the force moves it best
+        at 0 and not at all at pi/2.
         """
         ends = (self._pair.a, self._pair.b)
         if link not in ends:
             raise DeclarationError(f"contact {self._pair.name!r}", [wrong(link, "link", " or ".join(map(repr, ends)))])
-        v = self._velocity(ends.index(link), self.point)
-        return angle_between(v, self.normal)
+        return angle_between(self._along_path(link, ends.index(link)), self.normal)
+
+    def _along_path(self, link: str, side: int) -> Array:
+        """A vector ``(..., 3)`` along the path of a link where they touch; zero where it has none."""
+        m = self._values.whole
+        for k, pair in enumerate(m.pairs):
+            if k != self._index and {pair.a, pair.b} == {link, m.frame} and pair.type.f == 1:
+                guided = self._values.screws(k)[..., 0]
+                return np.asarray(guided[..., 3:] + np.cross(guided[..., :3], self.point))
+        v, w = self._velocity(side, self.point), self._bodies[2 * side + 1][..., :3]
+        dV = self._values.link(m.place_of_link(link))[2]
+        a = dV[..., 3:] + np.cross(dV[..., :3], self.point) + np.cross(w, v)
+        size = np.linalg.norm(v, axis=-1, keepdims=True)
+        return np.where(size <= AT_REST * np.nanmax(size, initial=0.0), a, v)
 
 
 def _between(radius: float, k: Array) -> Array:
@@ -364,7 +382,10 @@ def lift_offs(values: Values) -> tuple[LiftOff, ...]:
 
 
 def contact_columns(values: Values) -> Iterator[tuple[str, Array, tuple[int, int, int]]]:
-    """Columns of the table: ``B path on plane:x``, ``B normal force``, ``B sliding speed``, ...; of gears force and sliding speed."""
+    """Columns of the table: ``B path on plane:x``, ``B normal force``, ``B sliding speed``, ...; of gears force and sliding speed.
+
+    Paths are seen in the frames of the markers of the pair on these links.
+    """
     for name, contact in contacts_of(values).items():
         yield from ((f"{name} {fact}", value, dimension) for fact, value, dimension in contact.columns())
     for k, coupling in enumerate(values.whole.couplings):
