@@ -33,7 +33,7 @@ MARKER = tuple(Marker.formats)
 """Numbers of a marker."""
 SIDES = [name for name, about in Pair.formats.items() if about.table == "marker"]
 """Fields of a pair that hold its markers, on link a and on link b."""
-NEAR = 0.8
+ALIKE = 0.8
 """How like a wrong name is to one that may be meant: they share the names of link, pair and curve."""
 _INDEXED = re.compile(r"(?P<what>\w+)\[(?P<index>\d+)\](?:\.(?P<rest>.+))?")
 
@@ -140,7 +140,7 @@ def _near(m: Mechanism, name: str) -> list[str]:
     named: list[Link | Pair | BaseCoupling] = [*m.links, *m.pairs, *m.couplings]
     items = {item.name: item for item in named}
     owners = [own for own in items if name.startswith(own + ".")] or near_names(name.partition(".")[0], items)
-    return near_names(name, (f"{own}.{rest}" for own in owners for rest in _numbers_of(items[own])), NEAR)
+    return near_names(name, (f"{own}.{rest}" for own in owners for rest in _numbers_of(items[own])), ALIKE)
 
 
 def _component(item: Described, rest: str) -> tuple[tuple[str, ...], FieldFormat, tuple[Place, ...]] | None:

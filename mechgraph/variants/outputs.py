@@ -14,7 +14,7 @@ from mechgraph.quantities import shown, wrong
 from mechgraph.result.solution import Solution
 from mechgraph.result.views import LinkResult, PairResult, link_units, pair_units
 from mechgraph.units import unit_of
-from mechgraph.variants.number_names import NEAR
+from mechgraph.variants.number_names import ALIKE
 
 Output = str | Callable[[Solution], Any]
 
@@ -67,7 +67,7 @@ def _fault(m: Mechanism, name: str, what: Any) -> str | None:
     if isinstance(what, str) and _found(m, what):
         return None
     pair = m.pairs[0]
-    hint = did_you_mean(near_names(what, _known(m, what), NEAR)) if isinstance(what, str) else ""
+    hint = did_you_mean(near_names(what, _known(m, what), ALIKE)) if isinstance(what, str) else ""
     example = (
         f"expected e.g. '{pair.name}.effort', '{pair.name}.position', "
         f"'{pair.freedom_names[0] if pair.freedom_names else pair.name}', '{pair.name}:{(*pair.type.component_names, 'Fx')[0]}', "
