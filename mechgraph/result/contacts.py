@@ -36,7 +36,7 @@ PULL = 1e-10
 """Part of the greatest normal force of a contact below which a pull is rounding."""
 
 
-AT_REST = 1e-10
+STANDS = 1e-10
 """Part of the greatest velocity of a link at a contact below which it is rounding."""
 
 
@@ -354,7 +354,7 @@ class ContactResult(Shown):
         dV = self._values.link(m.place_of_link(link))[2]
         a = dV[..., 3:] + np.cross(dV[..., :3], self.point) + np.cross(w, v)
         size = np.linalg.norm(v, axis=-1, keepdims=True)
-        return np.where(size <= AT_REST * np.nanmax(size, initial=0.0), a, v)
+        return np.where(size <= STANDS * np.nanmax(size, initial=0.0), a, v)
 
 
 def _between(radius: float, k: Array) -> Array:
