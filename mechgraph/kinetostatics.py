@@ -14,6 +14,7 @@ from mechgraph.closure.assembly import assembled_at, last_closed
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.closure.driver_path import Status
+from mechgraph.closure.poles import away_from_poles
 from mechgraph.closure.solver import ENGINES, EngineName
 from mechgraph.errors import (
     AssemblyError,
@@ -41,6 +42,8 @@ ON_REACH: tuple[ReachName, ...] = ("raise", "flag")
 REDUNDANT: tuple[RedundantName, ...] = ("nan", "minimum_norm")
 
 
+AXES_TRIED = 4
+"""Axes of spheres that are tried for a path: each keeps far from what is known of it, which may be a part."""
 SOLVED = (Status.OK.value, Status.CHANGE_POINT.value, Status.ACTUATORS_REST.value)
 """Outcomes that are no reason to raise."""
 DEAD = "At a dead point the drivers do not determine the motion; drive another freedom, leave the position out, or use on_reach='flag'"
@@ -147,8 +150,7 @@ def _solved(
     actuate: Iterable[str] | None,
     quiet: bool,
 ) -> Solution:
-    line = Pipeline(DriverMotion(m, motions, actuate), options)
-    outcome = line.run()
+    line, outcome = _run(m, motions, options, actuate)
     _check_drivers(line, outcome)
     _check_actuators(line, outcome)
     if isinstance(m, SnappedMechanism):
@@ -160,6 +162,20 @@ def _solved(
     if error is not None:
         raise error
     return solution
+
+
+def _run(
+    m: Mechanism, motions: Mapping[str, Any] | None, options: Options, actuate: Iterable[str] | None
+) -> tuple[Pipeline, Outcome]:
+    """All positions; again with other axes of spheres where some of them, or what ends the path, lie beside poles."""
+    for _ in range(AXES_TRIED):
+        line = Pipeline(DriverMotion(m, motions, actuate), options)
+        outcome = line.run()
+        other = None if isinstance(m, SnappedMechanism) else away_from_poles(m, line.system, outcome.found)
+        if other is None:
+            break
+        m = other
+    return line, outcome
 
 
 def solve_quietly(

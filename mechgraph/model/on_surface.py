@@ -78,15 +78,32 @@ class OnSurface(Factor):
     def curvatures(self, x: Array) -> Array:
         """Principal curvatures ``(2, ...)`` towards z of the frame at coordinates ``(2, ...)``."""
         assert self.surface is not None
-        su, sv = self.sizes
-        found = self.surface.curvatures(self.home[0] + self.unit / su * x[0], self.home[1] + self.unit / sv * x[1])
+        found = self.surface.curvatures(*self._parameters(x))
         return -found[::-1] if self.turned else found
+
+    def _parameters(self, x: Array) -> Array:
+        """Parameters ``(2, ...)`` at coordinates ``(2, ...)``."""
+        return np.stack([at + self.unit / size * q for at, size, q in zip(self.home, self.sizes, x, strict=True)])
+
+    def points(self, x: Array) -> Array:
+        """Points ``(3, ...)`` at coordinates ``(2, ...)``, in the frame of the link."""
+        return self._here(x)[0]
+
+    def to_pole(self, x: Array) -> Array:
+        """Angle ``(...)`` at coordinates ``(2, ...)`` from a pole of the parameters."""
+        assert self.surface is not None
+        return self.surface.to_pole(*self._parameters(x))
+
+    def coordinates_at(self, p: Array) -> Array:
+        """Coordinates ``(2,)`` of the point of the surface that is nearest to ``p (3,)``."""
+        assert self.surface is not None
+        return (np.array(self.surface.nearest(p)) - self.home) * self.sizes / self.unit
 
     def _here(self, x: Array) -> tuple[Array, Array, Array]:
         """Position, axes ``(3, 3, ...)`` and twists about the point ``(6, 2, ...)``, in the frame of the link."""
         assert self.surface is not None
         su, sv = self.sizes
-        u, v = self.home[0] + self.unit / su * x[0], self.home[1] + self.unit / sv * x[1]
+        u, v = self._parameters(x)
         try:
             J, sense = self.surface.at(u, v), self.surface.sense(u, v)
         except ShapeError as error:

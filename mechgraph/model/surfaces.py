@@ -19,6 +19,7 @@ from mechgraph.model.curves import WHOLE_TURN, Circle, Curve, Line, remade_from
 from mechgraph.model.field_format import DIRECTION, POINT, POSITIVE, Described
 from mechgraph.model.field_format import TABLE as NESTED
 from mechgraph.model.numeric import second_direction
+from mechgraph.model.travel import far_from
 from mechgraph.quantities import wrong
 from mechgraph.units import LENGTH, PURE
 
@@ -61,6 +62,14 @@ class Surface(Described):
 
     def away_from_pole(self, p: Array) -> Surface:
         """The same surface by parameters that say something at a point ``p (3,)`` of it; itself where there is nothing better."""
+        return self
+
+    def to_pole(self, u: Array, v: Array) -> Array:
+        """Angle ``(...)`` of places from a pole that is none of the surface but of its parameters; infinite where there is none."""
+        return np.full(np.shape(u), np.inf)
+
+    def with_poles_far_from(self, p: Array) -> Surface:
+        """The same surface by parameters that have their poles far from points ``(3, n)`` of it; itself where there is no better."""
         return self
 
     def sense(self, u: Array, v: Array) -> Array | float:
@@ -223,7 +232,7 @@ class Turned(AboutAxis):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Sphere(Turned):
-    """A sphere, by longitude and latitude, which goes on over the poles; at a pole itself the longitude says nothing."""
+    """A sphere, by longitude and latitude, which goes on over the poles; for paths beside a pole see ``closure.poles``."""
 
     kind = "sphere"
     radius: Annotated[float, POSITIVE("radius", LENGTH)]
@@ -248,6 +257,15 @@ class Sphere(Turned):
         off = p - np.asarray(self.center)
         near = np.linalg.norm(np.cross(self._basis[2], off)) < np.sin(BESIDE_POLE) * np.linalg.norm(off)
         return self.replace(axis=self._basis[0], second=self._basis[1]) if near else self
+
+    def to_pole(self, u: Array, v: Array) -> Array:
+        """From the nearer pole."""
+        return np.asarray(np.abs(np.arcsin(np.cos(v))))
+
+    def with_poles_far_from(self, p: Array) -> Sphere:
+        """About the axis that keeps far from the points, and from those opposite to them."""
+        off = p - np.asarray(self.center)[:, None]
+        return self.replace(axis=far_from(off / np.linalg.norm(off, axis=0)), second=None)
 
     def sense(self, u: Array, v: Array) -> Array:
         """The sign of the cosine of the latitude."""

@@ -28,7 +28,7 @@ STRAIGHT, IN_PLANE = 1e-9, 1e-9
 STANDSTILL = 1e-7
 """Part of its greatest speed below which a curve stands still."""
 GUIDES_TRIED = 200
-"""Directions that are tried as guide of a minimizing frame."""
+"""Directions that are tried as guide of a minimizing frame, or as axis of a sphere."""
 COMPLEX_STEP = 1e-30
 """Imaginary step of a derivative."""
 INTEGRAL_ERROR, INTEGRAL_HALVINGS = 1e-15, 8
@@ -96,7 +96,7 @@ class Travel:
             return _right_handed(normal, self.curve.at(self.curve.breaks)[0]), True
         if self.curve.frame == "guided":
             return _right_handed(normal, self.curve.at(self.curve.breaks)[0]), False
-        return _far_from(t), False
+        return far_from(t), False
 
     # --- by arc length -----------------------------------------------------------------------------------------------
 
@@ -281,8 +281,8 @@ def _right_handed(normal: Array, x: Array) -> Array:
     return normal if about > 0 else -normal
 
 
-def _far_from(t: Array) -> Array:
-    """The direction that keeps farthest from all tangents ``(3, n)`` and their opposites, of many on a spiral over the sphere."""
+def far_from(t: Array) -> Array:
+    """The direction that keeps farthest from all directions ``(3, n)`` and their opposites, of many on a spiral over the sphere."""
     i = np.arange(GUIDES_TRIED) + 0.5
     z, angle = 1 - i / GUIDES_TRIED, np.pi * (1 + np.sqrt(5.0)) * i
     tried = np.stack([np.sqrt(1 - z * z) * np.cos(angle), np.sqrt(1 - z * z) * np.sin(angle), z])

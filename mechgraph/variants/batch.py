@@ -17,6 +17,7 @@ from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.closure.driver_path import DriverPath
 from mechgraph.closure.indexing import Index, System
+from mechgraph.closure.poles import away_from_poles
 from mechgraph.closure.solver import FactoredClosure, closure_solver
 from mechgraph.errors import DeclarationError
 from mechgraph.model.motion import Motion
@@ -120,17 +121,20 @@ def solve_together(
     if not begun.any():
         return Together(None, np.ones(V, dtype=bool), nothing)
     starts = Starts(x, systems.cases, variants.loads, sharing)
-    q = systems.coordinates_of(starts.x[..., None], line.system.start_coordinates(line.m.start))[..., 0][: len(nothing)]
+    q = systems.coordinates_of(starts.x[..., None], line.system.start_coordinates(line.m.start))[: len(nothing), :, 0]
+    q = np.broadcast_to(q, nothing.shape)
     try:
         outcome = line.run(starts, np.broadcast_shapes((V, 1), line.drive.batch))
     except DeclarationError:
+        return Together(None, np.ones(V, dtype=bool), q)
+    if away_from_poles(line.m, line.system, outcome.found) is not None:
         return Together(None, np.ones(V, dtype=bool), q)
     numbers, tol = variants.declared, line.m.tol
     if numbers is not None and tol is not None:
         variant = np.arange(int(np.prod(outcome.batch))) // outcome.batch[-1]
         outcome.trajectory.as_declared(lambda x, at: declared_closure(line.system, numbers, x, variant[at]), tol)
     alone = ~begun | outcome.contradicting.reshape(V, -1).any(axis=1)
-    return Together(Solution(outcome.trajectory), alone, np.broadcast_to(q, nothing.shape))
+    return Together(Solution(outcome.trajectory), alone, q)
 
 
 def _move_alike(itself: Parameters, varied: Parameters) -> bool:
