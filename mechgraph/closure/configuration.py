@@ -7,6 +7,7 @@ type of the numbers that come in, real or complex.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -37,16 +38,22 @@ class Configuration:
         return {}
 
     def part(self, at: Index) -> Configuration:
-        """Some of the positions, evaluated separately."""
-        return Configuration(self.system.cases(at), self.x[:, at])
+        """Some of the positions; what is evaluated is taken over."""
+        return self._with(self.system.cases(at), lambda values: values[..., at])
 
     def repeated(self, system: System, count: int) -> Configuration:
         """The states ``count`` times, one after the other, for a system of which masses alone differ; what is evaluated is taken over."""
-        out = Configuration(system, np.tile(self.x, count))
-        for name, value in vars(type(self)).items():
-            known = self.__dict__.get(name)
-            if isinstance(value, kept) and isinstance(known, np.ndarray):
-                out.__dict__[name] = np.tile(known, count)
+        return self._with(system, lambda values: np.tile(values, count))
+
+    def _with(self, system: System, over: Callable[[Array], Array]) -> Configuration:
+        """The states, and what is evaluated at them, taken ``over`` to a system; the last axis is that of positions."""
+        out = Configuration(system, over(self.x))
+        for name, known in vars(self).items():
+            if isinstance(vars(type(self)).get(name), kept):
+                if isinstance(known, np.ndarray):
+                    out.__dict__[name] = over(known)
+                elif isinstance(known, tuple) and isinstance(known[0], np.ndarray):
+                    out.__dict__[name] = tuple(over(values) for values in known)
         return out
 
     def rescaled(self, system: System) -> Configuration:

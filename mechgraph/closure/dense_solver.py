@@ -121,11 +121,11 @@ class DenseFactored:
         found = [form.back(system.null_of_transpose()) for form, _, system in self._parts]
         return self._joined(found, (self.rows, 0))
 
-    def regular_between(self, a: Configuration, b: Configuration) -> NDArray[np.bool_]:
+    def regular_between(self, ends: Configuration, a: Index, b: Index) -> NDArray[np.bool_]:
         """See the protocol in ``closure.solver``."""
         out = np.ones(self.T, dtype=bool)
         for form, at, system in self._parts:
-            matrices = [form.rows(_at(J, at)) for J in (self.J, a.J, b.J)]
+            matrices = [form.rows(_at(J, at)) for J in (self.J, ends.J.take(a, -1), ends.J.take(b, -1))]
             if form.turn is not None:
                 # turned rows may be singular where the loop is not: the rows independent at these very positions are asked
                 matrices = _independent_rows(matrices, form.choice)

@@ -178,8 +178,9 @@ class Legs:
         doubt = np.flatnonzero(~bad & (found.correction > SURE))
         if doubt.size:
             here = path.at(found.x[:, doubt], drive[:, doubt], tracks[doubt])
-            a, b = (path.at(n.x, n.drive, n.track) for n in (nodes.take(left[doubt]), nodes.take(right[doubt])))
-            bad[doubt] = ~path.factored(here, found.which[doubt]).regular_between(a, b)
+            ends, sides = nodes.ends(left[doubt], right[doubt])
+            beside = path.at(ends.x, ends.drive, ends.track)
+            bad[doubt] = ~path.factored(here, found.which[doubt]).regular_between(beside, *sides)
         if whole and len(at) == self.total:
             out.here = found.point if not bad.any() else None
         return bad

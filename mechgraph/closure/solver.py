@@ -58,8 +58,8 @@ class FactoredClosure(Protocol):
     def self_stresses(self) -> Array:
         """Multipliers ``(m, s, T)`` with ``J^T x = 0`` in the columns not fixed: all of them (dense), or random ones (sparse)."""
 
-    def regular_between(self, a: Configuration, b: Configuration) -> NDArray[np.bool_]:
-        """Whether no matrix on the parabola through those at ``a``, here and at ``b`` is singular or nearly so, ``(T,)``."""
+    def regular_between(self, ends: Configuration, a: Index, b: Index) -> NDArray[np.bool_]:
+        """Whether no matrix on the parabola through those at ``ends`` ``a (T,)``, here and at ``b`` is singular or nearly so, ``(T,)``."""
 
     def part(self, at: Index, here: Configuration) -> FactoredClosure:
         """Some of the positions, evaluated in ``here``."""

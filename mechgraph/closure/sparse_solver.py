@@ -121,17 +121,18 @@ class SparseFactored:
             out[:, t] = turned @ found
         return out
 
-    def regular_between(self, a: Configuration, b: Configuration) -> NDArray[np.bool_]:
+    def regular_between(self, ends: Configuration, a: Index, b: Index) -> NDArray[np.bool_]:
         """Whether the changes ``1 - A^-1 A_a`` and ``1 - A^-1 A_b`` have spectral radii below ``departure``, by power iteration.
 
         Borders may be singular where the loops are not: those that fail are asked again with borders of the very position.
         """
-        out = self._departures(a, b) <= PATH.departure
+        sides = ends.part(a), ends.part(b)
+        out = self._departures(*sides) <= PATH.departure
         for t in np.flatnonzero(~out):
             one = np.array([t])
-            here, ends = self.here.part(one), (a.part(one), b.part(one))
+            here, beside = self.here.part(one), [side.part(one) for side in sides]
             alone = SparseSolver(self.solver.fixed, self.solver.keep)
-            out[t] = alone.factored(here, alone.chosen(here, np.full(1, -1)))._departures(*ends)[0] <= PATH.departure
+            out[t] = alone.factored(here, alone.chosen(here, np.full(1, -1)))._departures(*beside)[0] <= PATH.departure
         return np.asarray(out)
 
     def _departures(self, a: Configuration, b: Configuration) -> Array:

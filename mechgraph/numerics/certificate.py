@@ -32,6 +32,9 @@ def smooth(problem: Problem, a: Nodes, m: Nodes, b: Nodes, correction: Array, fr
     On a smooth track ``r_m = 3/2 (x_b - x_a) / h - (r_a + r_b) / 4`` and the correction of ``x_m`` vanishes, both to higher order than
     the change of rates; where a step leads from one branch onto another by a jump of the rates, the one holds for a jump at a sixth
     of the step, the other at a quarter, so never both. Motions left ``free (F, p, n)`` do not count: corrections move nodes along them.
+
+    Nor need they be so smooth (accelerations of cams jump) where no other branch is as near. An end on another branch, ``d`` away from
+    where the step should lead, makes ``2 h |r_m - ...| + 4 |correction| >= d``; and two solutions are at least ``2 / (|J^-1| |J'|)`` apart.
     """
     h = b.place - a.place
     direction = (b.drive - a.drive) / h
@@ -49,4 +52,6 @@ def smooth(problem: Problem, a: Nodes, m: Nodes, b: Nodes, correction: Array, fr
     off = np.abs(m.drive - 0.5 * (a.drive + b.drive)).max(axis=0, initial=0.0) / h
     noise = (4.0 * off + 1e-6) * np.abs(r_m).max(axis=0, initial=0.0) + 1e-14 * m.condition / h
     noise += PATH.tiny / h  # branches that are no further apart are one
-    return np.asarray((gap <= PATH.smooth * change + noise) & (correction <= h * (PATH.smooth * change / 8 + noise)))
+    on_cubic = (gap <= PATH.smooth * change + noise) & (correction <= h * (PATH.smooth * change / 8 + noise))
+    condition = np.maximum(np.maximum(a.condition, m.condition), b.condition)
+    return np.asarray(on_cubic | (2.0 * h * gap + 4.0 * correction <= PATH.alone / condition))

@@ -184,15 +184,17 @@ class Follower(Marching):
         here = self.problem.at(found.x, drive, a.track)
         f = self.problem.factored(here, a.which)
         ok &= smooth(self.problem, a, middle, b, found.correction, f.motions())
-        self.work.evaluations += 3 * len(ok)
+        self.work.evaluations += len(ok)
         self.work.factorizations += len(ok)
         test = np.flatnonzero(ok)
         if test.size:
-            ends = [self.problem.at(end.x, end.drive, end.track) for end in (a.take(test), b.take(test))]
+            ends, sides = nodes.ends(left[test], right[test])
+            beside = self.problem.at(ends.x, ends.drive, ends.track)
+            self.work.evaluations += len(ends)
             if test.size < len(ok):
                 here = here.part(test)
                 f = self.problem.factored(here, a.which[test])
-            ok[test] = f.regular_between(*ends)
+            ok[test] = f.regular_between(beside, *sides)
         return ok, middle
 
     def _certified_all(self, nodes: Nodes) -> Nodes:

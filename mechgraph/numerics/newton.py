@@ -44,8 +44,8 @@ class Factored(Protocol):
     def motions(self) -> Array:
         """Increments ``(F, p, n)`` that the equations leave free with the path values at rest."""
 
-    def regular_between(self, a: Any, b: Any) -> Mask:
-        """Whether no matrix on the parabola through those at ``a``, here and at ``b`` is singular or nearly so, ``(n,)``."""
+    def regular_between(self, ends: Any, a: Index, b: Index) -> Mask:
+        """Whether no matrix on the parabola through those at ``ends`` ``a (n,)``, here and at ``b`` is singular or nearly so, ``(n,)``."""
 
 
 class Point(Protocol):

@@ -119,6 +119,11 @@ class Nodes:
         """Some of the nodes."""
         return Nodes(*[getattr(self, name)[..., at] for name in self.__dataclass_fields__])
 
+    def ends(self, left: Index, right: Index) -> tuple[Nodes, Index]:
+        """The nodes at the ends of steps, each of them once, and the places of both ends ``(2, n)`` among them."""
+        used, places = np.unique(np.concatenate([left, right]), return_inverse=True)
+        return self.take(used), places.reshape(2, -1)
+
     def replaced(self, new: Nodes, at: Index) -> Nodes:
         """The nodes with those ``at`` replaced."""
         values = {f.name: getattr(self, f.name).copy() for f in fields(Nodes)}
