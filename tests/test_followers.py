@@ -175,6 +175,17 @@ def test_a_cam_of_a_law_lifts_by_it(follower):
     assert_allclose(between[:100], half.position, atol=1e-9)
 
 
+def test_jumps_of_a_jerk_take_no_more_nodes_than_a_circle():
+    """Where the pieces of a law meet no step is halved time after time: no other branch of the motion is near."""
+    lobe = mg.Curve.cam.of(law(), 0.9, second=(0, 1, 0), roller_radius=0.2, offset=0.15)
+    nodes = []
+    for curve, top in ((lobe, lobe.at(np.array(0.0))[0]), (CIRCLE, np.array([0.1, np.sqrt(1 - 0.2**2), 0]))):
+        slide = mg.Pair("F", "P", "frame", "follower", point=top, axis=(0, 1, 0))
+        m = driven_cam(slide, mg.Pair("K", "Ps", "cam", "follower", curve=curve, point=top), point=top)
+        nodes.append(mg.kinematics(m, {"A": np.linspace(0, 6.2, 40)}).work.nodes)
+    assert nodes[0] < 1.5 * nodes[1]
+
+
 def test_a_roller_larger_than_the_radius_of_curvature_is_refused():
     hollow = mg.Curve.ellipse(a=1.0, b=0.3)
     pair = mg.Pair("K", "Ps", "a", "b", curve=hollow, roller=0.2, point=(0.75, 0, 0))

@@ -1,5 +1,7 @@
 """Identities of reach: no position behind a gap is reached, however the positions lie, and no branch is left where loops nearly fold."""
 
+from dataclasses import replace
+
 import mechanisms
 import numpy as np
 import pytest
@@ -7,6 +9,9 @@ from attack import Bars, anywhere, four_bars, just_out_of_reach, nearly_folded, 
 from mechanisms import Z
 
 import mechgraph as mg
+from mechgraph.closure.driver_motion import DriverMotion
+from mechgraph.numerics.tolerances import PATH
+from mechgraph.pipeline import Options, Pipeline
 
 COUNTS = (4, 5, 7, 10, 20, 36, 41, 100, 181)
 LIMIT = 1e-6
@@ -45,6 +50,28 @@ def assert_reached(s, bar, crank, start, low, high):
     error = np.abs(wrapped(s["D0"].position[..., 0] - bar.rocker(crank) + bar.rocker(start)))
     # rates, and rounding with them, grow as the inverse square root of the distance to the limit
     assert (error[good] * np.sqrt(np.minimum(1.0, margin[good]))).max(initial=0.0) < 1e-11
+
+
+@pytest.mark.seeds(6)
+@pytest.mark.parametrize("folded", [False, True])
+def test_the_other_branch_is_farther_than_a_certificate_takes_for_granted(seed, folded):
+    """Near a limit of the crank both branches are close to each other: still many times as far apart as where one alone is looked for."""
+    rng = np.random.default_rng((seed, 26))
+    bar = just_out_of_reach(rng, folded=folded)
+    start, low, high = inside_reach(rng, bar)
+    limit = high if np.isfinite(high) else low
+    for before in 10.0 ** -np.arange(1, 8):
+        crank = limit + before * np.sign(start - limit)
+        if not low < crank < high:
+            continue
+        line = Pipeline(DriverMotion(four_bars([bar], crank), {"A": [0.0]}), Options())
+        condition = line.solver.factored(line.start, line.solver.chosen(line.start, np.full(1, -1))).condition[0]
+        both = []
+        for one in (bar, replace(bar, side=-bar.side)):
+            rod = one.head(crank) - one.tip(crank)
+            both.append([np.arctan2(rod[1], rod[0]), one.rocker(crank)])
+        rod, rocker = wrapped(np.subtract(*both))
+        assert max(abs(rod), abs(rocker), abs(wrapped(rod - rocker))) > 10 * PATH.alone / condition
 
 
 @pytest.mark.seeds(16)
