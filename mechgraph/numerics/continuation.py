@@ -50,14 +50,6 @@ class Tracks:
     work: Work
 
 
-OPEN_STEPS = 4
-"""Times as many steps as after the first halvings that may be open, for halvings to go on."""
-
-
-BESIDE = 10.0
-"""Condition of a node, of the median of all, from which on a singular point may be near."""
-
-
 class Follower(Marching):
     """Follows the tracks of a problem; see the head of this file."""
 
@@ -199,20 +191,12 @@ class Follower(Marching):
 
     def _certified_all(self, nodes: Nodes) -> Nodes:
         """Nodes with those in the middle of all steps; steps that could not be certified are halved a few times."""
-        most = np.inf
-        for halvings in range(PATH.finest):
+        for _ in range(PATH.halvings):
             left, right = nodes.steps
             open_ = ~nodes.sure[right]
             left, right = left[open_], right[open_]
-            if halvings >= PATH.halvings:
-                # beside a singular point, which the careful march takes, the condition grows; at a jump it does not
-                usual = BESIDE * np.median(nodes.condition[np.isfinite(nodes.condition)])
-                far = np.maximum(nodes.condition[left], nodes.condition[right]) <= usual
-                left, right = left[far], right[far]
-            # at jumps some more steps are open for a while; beside a singular point twice as many each time, which the careful march takes
-            if not left.size or left.size > OPEN_STEPS * most:
+            if not left.size:
                 break
-            most = left.size if halvings == PATH.halvings else most
             ok, middle = self._certified(nodes, left, right)
             sure = nodes.sure.copy()
             sure[right[ok]] = True

@@ -166,10 +166,8 @@ class PathTolerances:
     """Most nodes through which one interpolation goes, each with value and rate."""
     worth: int = 20
     """Positions for every new node above which new nodes save time (fewer corrections of positions)."""
-    finest: int = 12
-    """Most halvings of a step for its certificate: so small, a jump of an acceleration, as cams have, is slight."""
     halvings: int = 4
-    """Most halvings of a gap between nodes at a time."""
+    """Most halvings of a step at a time: for its certificate, and for interpolation."""
     refinements: int = 5
     """Times that nodes are put between nodes at most."""
 
