@@ -191,7 +191,7 @@ class Follower(Marching):
 
     def _certified_all(self, nodes: Nodes) -> Nodes:
         """Nodes with those in the middle of all steps; steps that could not be certified are halved a few times."""
-        for _ in range(PATH.halvings):
+        for _ in range(PATH.finest):
             left, right = nodes.steps
             open_ = ~nodes.sure[right]
             left, right = left[open_], right[open_]

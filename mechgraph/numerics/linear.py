@@ -12,6 +12,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from mechgraph.algebra.se3 import SMALL_BATCH
 from mechgraph.numerics.kept import kept
 
 Array = NDArray[np.float64]
@@ -191,10 +192,6 @@ def choose(A: Array, fixed: Index, tolerance: float = RANK_TOLERANCE, keep: Inde
         complement(np.concatenate([fixed, cols]), A.shape[1]),
         np.asarray(fixed, dtype=np.intp),
     )
-
-
-SMALL_BATCH = 32
-"""Number of matrices up to which ``matmul`` multiplies them faster than ``einsum`` (measured)."""
 
 
 def inverses(stacked: Array) -> Array:

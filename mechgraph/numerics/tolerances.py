@@ -166,8 +166,10 @@ class PathTolerances:
     """Most nodes through which one interpolation goes, each with value and rate."""
     worth: int = 20
     """Positions for every new node above which new nodes save time (fewer corrections of positions)."""
+    finest: int = 6
+    """Most halvings of a step for its certificate: what is left open then is beside a singular point, which the careful march takes."""
     halvings: int = 4
-    """Most halvings of a step at a time: for its certificate, and for interpolation."""
+    """Most halvings of a gap between nodes at a time."""
     refinements: int = 5
     """Times that nodes are put between nodes at most."""
 
