@@ -6,13 +6,14 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from mechanisms import linked_four_bar
+from mechanisms import hexapod, linked_four_bar, ring
 
 import mechgraph as mg
-from mechgraph.closure.assembly import close_all
+from mechgraph.closure.assembly import close_all, scaled_start
 from mechgraph.closure.configuration import Configuration
+from mechgraph.modes import certificate as certificates
 from mechgraph.modes.balls import Ball, loop_rows
-from mechgraph.modes.certificate import certificate
+from mechgraph.modes.certificate import certificate, curvature, rows, told_apart
 from mechgraph.modes.question import Question
 
 
@@ -46,6 +47,64 @@ def test_loops_of_balls_are_those_of_the_closure_rows(name: str) -> None:
         assert (np.abs(opened.mid - q.start.residual[at, 0]) <= opened.rad + 1e-13).all()
         assert np.abs(twists.mid - q.start.loop_jacobian[at, columns, 0]).max() < 1e-12
         assert max(opened.rad.max(), twists.rad.max()) < 1e-11
+
+
+@pytest.mark.parametrize("make", [hexapod, lambda: mg.load("rssr")])
+def test_rods_of_balls_are_those_of_the_rows_of_rods(make: object) -> None:
+    m = make()
+    here = Question(m, {m.full_name(d.freedom): 0.0 for d in m.drives}).form.family.here
+    opened, turned = rows(here)
+    assert len(here.system.points.a) > 0
+    assert (np.abs(opened.mid - here.residual[:, 0]) <= opened.rad + 1e-13).all()
+    assert np.abs(turned.mid - here.J[:, :, 0]).max() < 1e-12
+    assert max(opened.rad.max(), turned.rad.max()) < 1e-11
+
+
+def largest_curvature(here: Configuration, rng: np.random.Generator) -> float:
+    """The largest second derivative along a unit direction that is found, by differences of first ones."""
+    s, h = here.system, 1e-5
+    sides = [
+        [rows(Configuration(s, s.advance(here.x, sign * h * e[:, None])))[1].mid for e in np.eye(s.n_freedoms)]
+        for sign in (1, -1)
+    ]
+    T = np.stack([(a - b) / (2 * h) for a, b in zip(*sides, strict=True)], axis=2)
+    T, best = 0.5 * (T + T.transpose(0, 2, 1)), 0.0
+    for _ in range(10):
+        u = rng.normal(size=s.n_freedoms)
+        for _ in range(30):
+            v = np.einsum("rij,i,j->r", T, u, u)
+            w, V = np.linalg.eigh(np.einsum("rij,r->ij", T, v / np.linalg.norm(v)))
+            u = V[:, np.argmax(np.abs(w))]
+        best = max(best, float(np.linalg.norm(np.einsum("rij,i,j->r", T, u, u))))
+    return best
+
+
+def test_second_derivatives_do_not_pass_their_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A turn before slides has the most: its part in them counts twice."""
+    monkeypatch.setattr(certificates, "BALL", 1e-9)
+    rng = np.random.default_rng(0)
+    found = [Question(hexapod(), dict.fromkeys((f"P{k}" for k in range(1, 7)), 0.0)).form.family.here]
+    for letters, arm in (("RRCRC", 1.0), ("RPPPPP", 1.0), ("RPPPPP", 0.1), ("RPPPPP", 3.0), ("RPPPPP", 10.0)):
+        points, axes = rng.normal(size=(2, len(letters), 3))
+        found.append(scaled_start(ring(letters, arm * points, axes)))
+    for here in found:
+        assert largest_curvature(here, rng) <= curvature(here) * (1 + 1e-6)
+
+
+def test_roots_are_apart_where_their_balls_are() -> None:
+    """Two assemblies of a four-bar; the same state twice, by a whole turn of a pair, is one root."""
+    q = Question(linked_four_bar(1.0, 2.5, 2.0, 3.0, 0.5), {"O0": 0.5})
+    family, s = q.family, q.system
+    modes = mg.assemblies(q.m, {"O0": 0.5})
+    states = np.concatenate([s.state_of(s.start_coordinates(mode.start)[:, None]) for mode in modes], axis=1)
+    sure = [certificate(Configuration(s, states[:, [i]]), family.free, 0, True) for i in (0, 1)]
+    apart = [one.apart for one in told_apart(family, states, sure)]
+    angles = np.abs(np.angle(np.exp(1j * np.diff(states, axis=1)))).max()
+    assert apart == [one.apart for one in modes.certificates]
+    assert apart[0] == apart[1] == pytest.approx(angles, abs=1e-9)
+    same = np.repeat(states[:, :1], 2, axis=1)
+    same[s.single_rows[family.free[0]], 1] += 2 * np.pi
+    assert all(one.apart < 0 for one in told_apart(family, same, [sure[0], sure[0]]))
 
 
 def test_a_root_lies_within_its_bound_and_what_is_no_root_has_no_certificate() -> None:

@@ -184,10 +184,17 @@ class ScrewStack:
 
     def __init__(self, factors: Sequence[ConstantScrew], counts: Sequence[int]) -> None:
         self.factors, self.counts = factors, counts
+        self._turns = np.repeat([f.freedom.turns for f in factors], counts)[:, None]
 
     def values(self, x: Array) -> Array:
         """``1, sin q, 1 - cos q, q``."""
-        return screw_values(x[0])
+        q = x[0]
+        if not np.iscomplexobj(q):
+            return screw_values(q)
+        # a slide needs no sine, which of a long imaginary one has no value
+        out = screw_values(np.where(self._turns, q, 0.0))
+        out[3] = q
+        return out
 
     def coefficients(self, pitch: Array, back: Flags) -> Array:
         """``screw_terms``; ``exp(-q s)`` changes the sign of the odd values, ``sin q`` and ``q``."""

@@ -4,7 +4,7 @@ A ball is a number with a radius within which the exact one lies. Sums and produ
 done: half a unit in the last place of every operation, ``n + 2`` of them in a product of matrices with ``n`` terms (Rump, Verification
 methods, Acta Numerica 19, 2010, section 10). Radii are rounded up by more than the few operations that make them can lose. Sines and
 cosines are taken to be right to four units in the last place, the bound that NumPy states for them. Markers count as the exact rigid
-poses next to the stored ones, coordinates are taken as they are stored.
+poses next to the stored ones; coordinates, points and lengths of rods are taken as they are stored.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 from mechgraph.closure.configuration import Configuration
 from mechgraph.model.factors import ConstantScrew, Rotation, screw_terms
 from mechgraph.modes.family import Array
+from mechgraph.modes.rods import RodSystem
 
 HALF_ULP = 2.0**-53
 """Largest relative rounding of one operation."""
@@ -81,6 +82,22 @@ def _skew_size(v: Array) -> Array:
 
 class Open(ValueError):
     """A loop has pairs for which there is no ball arithmetic."""
+
+
+def rod_row(here: Configuration, rod: int) -> tuple[Ball, Ball]:
+    """Of a rod at one position ``((p_b - p_a)^2 - l^2) / 2 (1,)`` and its derivatives by the freedoms between its bodies ``(1, n)``.
+
+    Raises
+    ------
+    Open
+        where a pair is no product of screws and rotations.
+    """
+    assert isinstance(here.system, RodSystem)
+    k = here.system.points
+    walk = _Walk(here, np.zeros(3))
+    for pair, sign in here.system.way(rod):
+        walk.along(pair, sign)
+    return walk.distance(k.at_a[:, rod, 0], k.at_b[:, rod, 0], k.length[rod, 0])
 
 
 def loop_rows(here: Configuration, loop: int) -> tuple[Ball, Ball]:
@@ -154,7 +171,7 @@ class _Walk:
         assert self.pose is not None
         motion = (self.pose @ _inverse(self.first))[:3]
         motion = motion - exact(np.eye(3, 4))
-        S = Ball(*(np.concatenate([getattr(t, part) for t in self.twists], axis=1) for part in ("mid", "rad")))
+        S = self._columns()
         R, p = motion[:, :3], motion[:, 3]
         # the skew part of w x (R - 1), by its size
         loose = 2.0 * np.abs(R.bound).max() * S.bound[:3].sum(axis=0)
@@ -163,6 +180,17 @@ class _Walk:
         odd = R - Ball(R.mid.T, R.rad.T)
         turned = Ball(0.5 * odd.mid[[2, 0, 1], [1, 2, 0]], 0.5 * odd.rad[[2, 0, 1], [1, 2, 0]])
         return _stacked(turned, p), columns
+
+    def distance(self, at_a: Array, at_b: Array, square: float) -> tuple[Ball, Ball]:
+        """See ``rod_row``: points in the frames of the links where the walk began and ended."""
+        assert self.pose is not None
+        a, b = (X[:3] @ exact(np.append(at, 1.0)) for X, at in ((self.first, at_a), (self.pose, at_b)))
+        d, S = (b - a)[None], self._columns()
+        f = d @ d[0] - exact(np.array([square]))
+        return Ball(0.5 * f.mid, 0.5 * f.rad), d @ (S[3:] - crossed(b, S[:3]))
+
+    def _columns(self) -> Ball:
+        return Ball(*(np.concatenate([getattr(t, part) for t in self.twists], axis=1) for part in ("mid", "rad")))
 
 
 def _stacked(*balls: Ball) -> Ball:

@@ -7,17 +7,21 @@ A slide is a turn about a line far away, and regular assemblies stay where dimen
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
 
 from mechgraph.modes.family import Family, span
-from mechgraph.topology.components import components_of_edges, members
+from mechgraph.modes.rods import RodFamily
+from mechgraph.topology.components import components_of_edges
 
 SIX_TURNS = (
     "Lee, Woernle and Hiller, A complete solution for the inverse kinematic problem of the general 6R robot manipulator, "
     "J. Mech. Des. 113, 1991, page 481"
 )
+RONGA = "Ronga and Vust, Stewart platforms without computer?, Real Analytic and Algebraic Geometry, 1995, page 197"
+NANUA = "Nanua, Waldron and Murthy, Direct kinematic solution of a Stewart platform, IEEE Trans. Robotics and Automation 6, 1990, page 438"
 LOOPS: tuple[tuple[int, str, int, str], ...] = (
     (3, "RRR", 2, "two circles in a plane or on a sphere meet in two points"),
     (3, "RRT", 2, "a circle and a line meet in two points"),
@@ -28,24 +32,15 @@ LOOPS: tuple[tuple[int, str, int, str], ...] = (
 """Dimension of the group, freedoms still unknown (R turns, T slides), the bound, and its source."""
 
 
-LEGS: tuple[tuple[int, int, int, int, str], ...] = (
-    (
-        6,
-        3,
-        6,
-        40,
-        "Ronga and Vust, Stewart platforms without computer?, Real Analytic and Algebraic Geometry, 1995, page 197",
-    ),
-    (
-        3,
-        2,
-        3,
-        6,
-        "a coupler curve, of degree six and threefold in the circular points, meets a circle in 12 - 6 others",
-    ),
+PLATFORMS: tuple[tuple[tuple[int, ...], int, str], ...] = (
+    ((2, 2, 2), 16, NANUA),
+    ((1, 1, 1, 1, 1, 1), 40, RONGA),
 )
-"""Dimension of the group of all loops and of its translations, number of legs that keep a distance between two bodies, the bound, and its
-source."""
+"""Rods at each joint of the one body of a platform on six rods, whatever their joints on the other; the bound, and its source."""
+TRIADS = (6, "a coupler curve, of degree six and threefold in the circular points, meets a circle in 12 - 6 others")
+"""The bound of two bodies in a plane joined by three links, and its source."""
+PLANE = (3, 2)
+"""Dimensions of the group of plane motions and of its translations."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +53,21 @@ class Bound:
 
 def bound(family: Family) -> Bound | None:
     """The bound for a class, where the tables have one."""
-    return _of_legs(family) or _of_loops(family)
+    return _of_platform(family) if isinstance(family, RodFamily) else _of_triad(family) or _of_loops(family)
+
+
+def _of_platform(family: RodFamily) -> Bound | None:
+    """The bound of two bodies joined by six rods and nothing else, those one between which all is driven."""
+    s = family.system
+    driven = set(family.columns.tolist())
+    columns = [range(s.first_column[k], s.first_column[k + 1]) for k in range(len(s.m.pairs))]
+    moving = [k for k, own in enumerate(columns) if not driven.issuperset(own)]
+    body = components_of_edges(len(s.m.links), [ends for k, ends in enumerate(s.graph.ends) if k not in moving])
+    joined = {tuple(sorted(body[[a, b]].tolist())) for a, b in zip(s.points.a, s.points.b, strict=True)}
+    if family.rods != 6 or len(moving) != 1 or len(columns[moving[0]]) != 6 or joined != {(0, 1)}:
+        return None
+    shared = [tuple(sorted(Counter(side.tolist()).values())) for side in np.split(family.joints, 2)]
+    return next((Bound(count, source) for joints, count, source in PLATFORMS if joints in shared), None)
 
 
 def _of_loops(family: Family) -> Bound | None:
@@ -97,32 +106,25 @@ def _entry(dimension: int, letters: str) -> Bound | None:
     return None
 
 
-def _of_legs(family: Family) -> Bound | None:
-    """The bound of two bodies joined by legs, links that turn about a point of either; links between which all is driven are one."""
+def _of_triad(family: Family) -> Bound | None:
+    """The bound of two bodies in a plane joined by three links; links between which all is driven are one."""
     s, P = family.system, range(len(family.system.m.pairs))
     driven = set(family.columns.tolist())
     columns = [range(s.first_column[k], s.first_column[k + 1]) for k in P]
     locked = [k for k in P if driven.issuperset(columns[k])]
-    body = np.empty(len(s.m.links), dtype=np.intp)
-    for number, links in enumerate(members(components_of_edges(len(body), [s.graph.ends[k] for k in locked]))):
-        body[links] = number
+    body = components_of_edges(len(s.m.links), [s.graph.ends[k] for k in locked])
     joints: dict[int, list[int]] = {}
     for k in P:
         one, other = (int(body[link]) for link in s.graph.ends[k])
         if k in locked:
             continue
-        if (
-            s.is_length[columns[k]].any()
-            or any(np.any(f.twist[3:]) for f in s.m.pairs[k].type.freedoms)
-            or one == other
-        ):
+        if s.is_length[columns[k]].any() or one == other:
             return None
         joints.setdefault(one, []).append(other)
         joints.setdefault(other, []).append(one)
     ends = {number for number, others in joints.items() if len(others) > 2}
     legs = [others for number, others in joints.items() if number not in ends]
-    if len(ends) != 2 or any(set(others) != ends for others in legs):
+    if len(ends) != 2 or len(legs) != 3 or any(set(others) != ends for others in legs):
         return None
     groups = {(h.shape[1], h.shape[1] - span(h[:3]).shape[1]) for h in family.loop_algebras}
-    found = (Bound(count, source) for k, slides, n, count, source in LEGS if {(k, slides)} == groups and n == len(legs))
-    return next(found, None)
+    return Bound(*TRIADS) if groups == {PLANE} else None

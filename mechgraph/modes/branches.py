@@ -277,8 +277,8 @@ class _Mapper:
             progress(f"following {sum(x.shape[1] for x in states)} assemblies")
         place = q.names.index(self.driver)
         self.q, self.unit = q, float(q.unit[place])
-        tracer = Tracer(q, finder.family, q.drive[place], states, self.between, self.closed, place)
-        self.found, self.states, self.family = Map(tracer.pieces(), states), states, finder.family
+        tracer = Tracer(q, q.family, q.drive[place], states, self.between, self.closed, place)
+        self.found, self.states, self.family = Map(tracer.pieces(), states), states, q.family
         circuits = sorted(sorted(c) for c in self.found.circuits())
         number = {branch: i for i, c in enumerate(circuits) for branch in c}
         return Branches(

@@ -8,22 +8,31 @@ derivatives within ``BALL``:
     beta K eta <= 1/2  =>  one root, within (1 - sqrt(1 - 2 beta K eta)) / (beta K), and no other within min(BALL, 1 / (beta K)).
 
 ``beta``: with ``Y`` a computed inverse, ``|A^-1| <= |Y| / (1 - |1 - Y A|)`` for every ``A`` within its bounds. ``K``: the second
-derivative along a unit ``u`` is a sum of products of two twists ``(w_i, v_i) u_i``, so that ``|f''| <= (sum |w_i| |u_i|) (sum h_j |u_j|)``,
-``h^2 = |w|^2 + g^2``; ``g`` bounds ``|v|`` and the gap of the loop, and grows by no more than ``exp(2 BALL sqrt(m))`` over the reach
-(``m`` freedoms). It is a sum of positive numbers, of which rounding takes less than a part in 1e12: 1 % is added. Sources: Ortega and
-Rheinboldt, Iterative Solution of Nonlinear Equations in Several Variables, 1970, section 12.6; Rump, Acta Numerica 19, 2010, section 10.
+derivative along a unit ``u`` is that of a product of motions, ``sum_i u_i^2 s_i s_i + 2 sum_(i < j) u_i u_j s_i s_j``, so that with
+``h^2 = |w|^2 + g^2`` and ``g`` a bound of ``|v|`` and the gap of the loop
+
+    |f''|^2 <= sum_i |w_i|^2 h_i^2 + 2 sum_(i < j) |w_i|^2 h_j^2 <= 2 (sum |w_i|^2) (sum h_j^2).
+
+Of a rod, ``f = ((p_b - p_a)^2 - l^2) / 2``: ``|f''| <= g^2 + sqrt(2) |w| g |p_b - p_a|`` with ``g`` the speeds of ``p_b`` and ``|w|`` the
+turns, both summed as squares. All grow by no more than ``exp(2 BALL sqrt(m))`` over the reach (``m`` freedoms). These are sums of positive
+numbers, of which rounding takes less than a part in 1e12: 1 % is added. Sources: Ortega and Rheinboldt, Iterative Solution of Nonlinear
+Equations in Several Variables, 1970, section 12.6; Rump, Acta Numerica 19, 2010, section 10.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 
-from mechgraph.algebra.se3 import cross
+from mechgraph.algebra.se3 import cross, rotate
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
-from mechgraph.modes.balls import STORED, Ball, Open, exact, loop_rows
+from mechgraph.modes.balls import UP, Ball, Open, exact, loop_rows, rod_row
+from mechgraph.modes.family import Array, Family
+from mechgraph.modes.rods import RodSystem
 
 BALL = 0.05
 """Size of the increments (radians, lengths / L) within which second derivatives are bounded."""
@@ -31,6 +40,8 @@ BOUND_ROUNDING = 1.01
 """Factor that stands for the rounding of bounds of second derivatives, and of bases that are orthonormal to rounding."""
 SINGULAR_ROWS = 1e-13
 """Smallest singular value, as part of the largest, below which nothing is tried."""
+APART_ROUNDING = 1e-13
+"""Taken from the distance of two states for its rounding."""
 TOLD_APART = 1e-7
 """Distance of the root up to which assemblies that are told apart have roots of their own."""
 
@@ -48,6 +59,8 @@ class Certificate:
     rows, dependent : numbers of independent rows, on which it rests, and of those that depend on them.
     dependence : ``"structure"`` where all motions of the loops lie in one group, which makes them follow; otherwise ``"checked"``.
     residual : largest closure error in all rows.
+    apart : bound from below of how far any other root that is proved at this position is (radians, lengths / L), in the coordinate in
+        which they differ most; at most zero where they may be one, None where there is no other.
     """
 
     proved: bool
@@ -58,6 +71,7 @@ class Certificate:
     dependent: int
     dependence: str
     residual: float
+    apart: float | None = None
 
 
 def certificate(here: Configuration, free: Index, passive: int, by_structure: bool) -> Certificate | None:
@@ -88,34 +102,76 @@ def certificate(here: Configuration, free: Index, passive: int, by_structure: bo
     return Certificate(proved and error < TOLD_APART, float(h), error, radius, rank, dependent, how, residual)
 
 
+def told_apart(family: Family, x: Array, sure: Sequence[Certificate | None]) -> list[Certificate | None]:
+    """Certificates of states ``x (nx, M)`` with how far ``apart`` their roots are.
+
+    A root lies within ``error`` of its state, measured by increments, so that no coordinate and no angle of a rotation differs by more:
+    roots whose states differ by more than both errors are two. Coordinates that passive motions change do not count.
+    """
+    angles, lengths = family.settled_rows
+    turns, proved = family.settled_rotations, [i for i, one in enumerate(sure) if one is not None and one.proved]
+    error = np.array([one.error for one in sure if one is not None and one.proved])
+    x, out = x[:, proved], list(sure)
+    for n, i in enumerate(proved):
+        off = (x - x[:, [n]])[angles]
+        Q, R = x[turns], x[turns][:, :, [n]]
+        gaps = [
+            np.abs(off - 2 * np.pi * np.round(off / (2 * np.pi))),
+            np.abs(x - x[:, [n]])[lengths],
+            # twice the chord is no more than the angle
+            2.0 * np.minimum(*(np.sqrt(((Q + sign * R) ** 2).sum(axis=0)) for sign in (1.0, -1.0))),
+        ]
+        least = np.delete(np.concatenate(gaps).max(axis=0, initial=0.0) / UP - error - error[n] - APART_ROUNDING, n)
+        out[i] = replace(cast(Certificate, sure[i]), apart=float(least.min()) if least.size else None)
+    return out
+
+
 def rows(here: Configuration) -> tuple[Ball, Ball]:
-    """What the rows leave open ``(n,)`` and their derivatives ``(n, F)``, with bounds of their rounding; those of couplings are linear."""
-    s, J, r = here.system, here.J[:, :, 0], here.residual[:, 0]
-    f, A = Ball(r.copy(), np.zeros_like(r)), Ball(J.copy(), np.zeros_like(J))
+    """What loops and rods leave open ``(n,)`` and their derivatives ``(n, F)``, with bounds of their rounding."""
+    s = here.system
+    f, A = (Ball(np.zeros(shape), np.zeros(shape)) for shape in ((s.n_rows,), (s.n_rows, s.n_freedoms)))
     for loop, (columns, _) in enumerate(s.loop_columns):
-        at = slice(6 * loop, 6 * loop + 6)
-        opened, twists = loop_rows(here, loop)
-        f.mid[at], f.rad[at] = opened.mid, opened.rad
-        A.mid[at], A.rad[at] = 0.0, 0.0
-        A.mid[at, columns], A.rad[at, columns] = twists.mid, twists.rad
-    linear = slice(6 * s.graph.n_loops, None)
-    A.rad[linear] = STORED * np.abs(J[linear])
-    f.rad[linear] = STORED * s.n_freedoms * (1.0 + np.abs(J[linear]).sum(axis=1) * np.abs(here.x).max(initial=1.0))
+        _put(f, A, slice(6 * loop, 6 * loop + 6), columns, loop_rows(here, loop))
+    if isinstance(s, RodSystem):
+        for rod, columns in enumerate(_columns_of_rods(s)):
+            row = 6 * s.graph.n_loops + rod
+            _put(f, A, slice(row, row + 1), columns, rod_row(here, rod))
     return f, A
 
 
+def _put(f: Ball, A: Ball, at: slice, columns: Index, found: tuple[Ball, Ball]) -> None:
+    for part in ("mid", "rad"):
+        getattr(f, part)[at], getattr(A, part)[at, columns] = (getattr(ball, part) for ball in found)
+
+
+def _columns_of_rods(s: RodSystem) -> list[Index]:
+    """Freedoms between the bodies of every rod, in the order of the way."""
+    first = s.first_column
+    ways = (s.way(rod) for rod in range(len(s.points.a)))
+    return [np.concatenate([np.arange(first[k], first[k + 1])[::sign] for k, sign in way]) for way in ways]
+
+
 def curvature(here: Configuration) -> float:
-    """A bound of the second derivatives of the rows of all loops within ``BALL``."""
-    s, total = here.system, 0.0
-    S = here.S[:, :, 0]
+    """A bound of the second derivatives of the rows of all loops and rods within ``BALL``."""
+    s, S, total = here.system, here.S[:, :, 0], 0.0
     for loop, (columns, _) in enumerate(s.loop_columns):
-        w, v = (
-            S[:3, columns],
-            S[3:, columns] + cross(S[:3, columns], np.repeat(here.middles[:, loop], len(columns), axis=1)),
-        )
-        turn, arm = np.sqrt((w * w).sum(axis=0)), np.sqrt((v * v).sum(axis=0))
-        grown = np.exp(2 * BALL * np.sqrt(len(columns)))
+        turn, arm, grown = _sizes(S[:, columns], here.middles[:, loop, 0])
         gap = BALL * grown * np.sqrt((turn**2 + arm**2).sum())
         h2 = turn**2 + (grown * arm + turn * gap) ** 2
-        total += float((turn**2).sum() * h2.sum())
+        total += 2.0 * float((turn**2).sum() * h2.sum())
+    if isinstance(s, RodSystem):
+        W, k = s.rod_rows.lines(here)[1][..., 0], s.points
+        for rod, columns in enumerate(_columns_of_rods(s)):
+            end = rotate(here.poses[:, :3, k.b[rod]], k.at_b[:, rod]) + here.poses[:, 3, k.b[rod]]
+            turn, arm, grown = _sizes(S[:, columns], end[:, 0])
+            gone = BALL * grown * np.sqrt((arm**2).sum())
+            speed, length = np.sqrt(((arm + turn * gone) ** 2).sum()), np.sqrt((W[3:, rod] ** 2).sum()) + gone
+            total += float(speed**2 + np.sqrt(2.0 * (turn**2).sum()) * speed * length) ** 2
     return float(np.sqrt(total))
+
+
+def _sizes(S: Array, point: Array) -> tuple[Array, Array, float]:
+    """Sizes ``|w|, |v|`` of twists ``S (6, n)`` about a ``point (3,)``, and how far these grow within ``BALL``."""
+    w = S[:3]
+    v = S[3:] + cross(w, np.repeat(point[:, None], w.shape[1], axis=1))
+    return np.sqrt((w * w).sum(axis=0)), np.sqrt((v * v).sum(axis=0)), float(np.exp(2 * BALL * np.sqrt(w.shape[1])))

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.screw import cross_twist, move_twist
-from mechgraph.algebra.se3 import compose, inverse, pose_exp, pose_log
+from mechgraph.algebra.se3 import compose, finite_twist, inverse, multiplied, pose_exp
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.rank import closure_rank
@@ -51,14 +51,20 @@ class Member:
 
 
 class Family:
-    """The class of a mechanism with drivers ``columns``, told at a closed position ``here``; ``passive (F, p)`` are passive motions."""
+    """The class of a mechanism with drivers ``columns``, told at a closed position ``here``.
 
-    def __init__(self, here: Configuration, columns: Index, passive: Array) -> None:
+    ``passive (F, p)`` are passive motions, ``rods`` numbers of links by which assemblies are not told apart (see ``modes.form``).
+    """
+
+    def __init__(self, here: Configuration, columns: Index, passive: Array, rods: Index | None = None) -> None:
         self.here, self.system, self.columns, self.passive = here, here.system, columns, passive
+        self._rods = np.zeros(0, dtype=np.intp) if rods is None else rods
         self.free = complement(columns, self.system.n_freedoms)
         self.rows = self.system.single_rows[columns]
         par = self.system.par
         self.target: Array = np.concatenate([par.marker_a, par.marker_b], axis=2).astype(complex)
+        self.bearers: Index = np.concatenate([self.system.a, self.system.b])
+        """Links that bear the markers."""
 
     @cached_property
     def loop_algebras(self) -> list[Array]:
@@ -86,6 +92,11 @@ class Family:
         return out
 
     @property
+    def points(self) -> list[list[int]]:
+        """Links, and points that are one, at the ends of rods; here there are none."""
+        return []
+
+    @property
     def rank(self) -> int:
         """Rank of the closure equations of the members."""
         return sum(algebra.shape[1] for algebra in self.loop_algebras)
@@ -110,22 +121,40 @@ class Family:
         S = self.here.S[:, :, 0]
         if np.abs((S[:3] * S[3:]).sum(axis=0)).max(initial=0.0) > SPAN:
             return "helical pairs make the closure transcendental"
-        if closure_rank(self.here, self.columns).rank != self.rank or self.unknowns != self.rank:
+        if self.unknowns != self.rank or not self.independent:
             return "its closure rows depend on each other by relations that no known class keeps"
         return ""
 
+    @property
+    def independent(self) -> bool:
+        """Whether the closure rows have at the start the rank that they have for all members."""
+        return closure_rank(self.here, self.columns).rank == self.rank
+
     @cached_property
     def settled_links(self) -> Index:
-        """Links that no passive motion moves."""
+        """Links that no passive motion moves, and that are not parts of rods."""
         V = [self.here.link_twists(rates[:, None]) for rates in self.passive.T]
-        return np.flatnonzero(np.abs(V).max(axis=(0, 1, 3)) < SPAN) if V else np.arange(len(self.system.m.links))
+        links = np.arange(len(self.system.m.links))
+        still = np.abs(V).max(axis=(0, 1, 3)) < SPAN if V else np.ones(len(links), dtype=bool)
+        return links[still & ~np.isin(links, self._rods)]
 
     @cached_property
     def settled_rows(self) -> tuple[Index, Index]:
-        """State rows of angles and of slides that no passive motion changes."""
+        """State rows of angles and of slides that no passive motion changes, and that are not in rods."""
         s = self.system
+        inside = np.isin(s.a, self._rods) | np.isin(s.b, self._rods)
         still = (s.single_rows >= 0) & (np.abs(self.passive).max(axis=1, initial=0.0) < SPAN)
+        still &= ~inside[s.pair_of_freedom]
         return s.single_rows[still & ~s.is_length], s.single_rows[still & s.is_length]
+
+    @property
+    def settled_rotations(self) -> Index:
+        """State rows ``(4, n)`` of rotations that no passive motion changes."""
+        if self.system.rotations is None:
+            return np.zeros((4, 0), dtype=np.intp)
+        columns, rows = self.system.rotations
+        still = np.abs(self.passive).max(axis=1, initial=0.0) < SPAN
+        return rows[:, still[columns].all(axis=0)]
 
     def prints(self, here: Configuration) -> Array:
         """What tells assemblies apart ``(n, T)``: poses of links that no passive motion moves, coordinates that none changes."""
@@ -133,34 +162,61 @@ class Family:
         angles, lengths = (here.x[rows] for rows in self.settled_rows)
         return np.concatenate([poses.reshape(12 * poses.shape[2], here.T), np.cos(angles), np.sin(angles), lengths])
 
-    def system_with(self, markers: Array) -> System:
-        """The system with other markers ``(3, 4, 2 P, B)``."""
+    def system_of(self, member: Member) -> System:
+        """The system of members."""
+        return self.system_with(member.markers, member.drive)
+
+    def system_with(self, markers: Array, drive: Array) -> System:
+        """The system with other markers ``(3, 4, 2 P, B)``, of which ``drive (d, B)`` are the driver values."""
         P = len(self.system.m.pairs)
         return self.system.with_parameters(
             replace(self.system.par, marker_a=markers[:, :, :P], marker_b=markers[:, :, P:])
         )
 
+    def drive_of(self, markers: Array, x: Array) -> Array:
+        """The driver values ``(d, 1)`` of a member with such markers that stands at ``x (nx, 1)``."""
+        return x[self.rows]
+
+    @property
+    def bases(self) -> list[Array]:
+        """For every marker a basis of the motions by which members differ."""
+        return [*self.moving, *self.moving]
+
+    @property
+    def moved_as(self) -> Index:
+        """For every marker the first one that moves with it."""
+        return np.arange(2 * len(self.system.m.pairs))
+
     def random_member(self, rng: np.random.Generator, size: float = 0.35) -> Member:
         """A random complex member."""
-        P = len(self.system.m.pairs)
-        moves = np.zeros((6, 2 * P, 1), dtype=complex)
-        for side in range(2):
-            for k, basis in enumerate(self.moving):
-                parts = rng.normal(size=(basis.shape[1], 2)) @ [1.0, 0.7j]
-                moves[:, side * P + k, 0] = size * (basis @ parts)
+        moves = np.zeros((6, len(self.bearers), 1), dtype=complex)
+        for k, basis in enumerate(self.bases):
+            parts = rng.normal(size=(basis.shape[1], 2)) @ [1.0, 0.7j]
+            moves[:, k, 0] = size * (basis @ parts)
+        moves = self.in_links(moves[:, self.moved_as])
+        return Member(compose(pose_exp(moves), self.target), self.random_drive(rng)[:, None])
+
+    def random_drive(self, rng: np.random.Generator) -> Array:
+        """Random complex driver values ``(d,)``."""
         drive = rng.uniform(-np.pi, np.pi, len(self.columns)) + 0.5j * rng.normal(size=len(self.columns))
         drive[self.system.is_length[self.columns]] *= 0.3
-        return Member(compose(pose_exp(self.in_links(moves)), self.target), drive[:, None])
+        return np.asarray(drive)
+
+    def lengths_of(self, drive: Array) -> Array:
+        """Of numbers ``(d,)``, one a driver, those that are lengths of rods; zero elsewhere."""
+        return np.zeros_like(drive)
 
     def in_links(self, moves: Array) -> Array:
         """Twists ``(6, 2 P, 1)`` given in the global frame at the closed position, in the frames of the links that bear the markers."""
-        X = inverse(self.here.poses[:, :, self._bearers])
+        X = inverse(self.here.poses[:, :, self.bearers])
         return move_twist(X, moves)
 
-    @cached_property
-    def _bearers(self) -> Index:
-        """Links that bear the markers."""
-        return np.concatenate([self.system.a, self.system.b])
+    def open_by(self, here: Configuration, V: Array, change: Array) -> Array:
+        """Rates ``(rows, T)`` at which markers that move with twists ``V (6, 2 P, T)``, and drivers, open the rows."""
+        s, P = self.system, len(self.system.m.pairs)
+        out = (here.J[:, self.columns] * change[: len(self.columns)]).sum(axis=1)
+        out[: 6 * s.graph.n_loops] += here.loop_sums(V[:, :P] - V[:, P:])
+        return np.asarray(out)
 
     def random_closed(self, rng: np.random.Generator) -> tuple[Member, Array] | None:
         """A random member with an assembly ``x (nx,)`` of it; None where random coordinates cannot be closed within the class."""
@@ -171,20 +227,22 @@ class Family:
         markers, P = member.markers.copy(), len(s.m.pairs)
         chords, b = s.chords, s.b[s.chords]
         for _ in range(3):
-            open_ = Configuration(self.system_with(markers), x)
+            open_ = Configuration(self.system_with(markers, member.drive), x)
             T = open_.poses[:, :, b]
             moved = compose(pose_exp(open_.chord_errors), compose(T, markers[:, :, P + chords]))
             markers[:, :, P + chords] = compose(inverse(T), moved)
-        closed = Configuration(self.system_with(markers), x)
+        found = Member(markers, self.drive_of(markers, x))
+        closed = Configuration(self.system_of(found), x)
         if not closed.closure[0] < MEMBER_CLOSED or not self._within(markers):
             return None
-        return Member(markers, x[self.rows]), x[:, 0]
+        return found, x[:, 0]
 
     def _within(self, markers: Array) -> bool:
         """Whether markers of chords lie in the class."""
         P = len(self.system.m.pairs)
         at = P + self.system.chords
-        e = pose_log(compose(markers[:, :, at], inverse(self.target[:, :, at])))
+        marker, target = markers[:, :, at], self.target[:, :, at]
+        e = finite_twist(multiplied(marker[:, :3], target[:, :3].swapaxes(0, 1)), marker[:, 3], target[:, 3])
         e = move_twist(self.here.poses[:, :, self.system.b[self.system.chords]], e)[:, :, 0]
         for i, chord in enumerate(self.system.chords.tolist()):
             basis = self.algebras[chord]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, cmp_to_key
 
@@ -14,8 +14,9 @@ from mechgraph.errors import counted
 from mechgraph.force.applied_loads import user_poses
 from mechgraph.modes.balls import TINY
 from mechgraph.modes.bounds import Bound, bound
-from mechgraph.modes.certificate import Certificate, certificate
+from mechgraph.modes.certificate import Certificate, certificate, told_apart
 from mechgraph.modes.family import Array
+from mechgraph.modes.form import Form, Whole
 from mechgraph.modes.monodromy import Irregular, StartSet, distinct, start_set
 from mechgraph.modes.question import Question
 from mechgraph.modes.result import Assemblies, ComplexModes
@@ -45,9 +46,13 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class _Solutions:
-    """Real states ``(nx, M)`` at a position and ``others`` that are not real, with what is said of them (see ``Assemblies``)."""
+    """Real states ``(nx, M)`` at a position and ``others`` that are not real, with what is said of them (see ``Assemblies``).
+
+    ``solved`` are the real ones as they stand in the equations that were solved.
+    """
 
     x: Array
+    solved: Array
     others: Array
     word: str
     evidence: tuple[str, ...]
@@ -59,7 +64,9 @@ class Finder:
     """Finds the assemblies of a question."""
 
     def __init__(self, question: Question, seed: int, cache: bool, progress: Progress | None) -> None:
-        self.question, self.family, self.progress = question, question.family, progress
+        self.question, self.progress = question, progress
+        self.form: Form = question.form
+        self.family = self.form.family
         self.rng, self.cache = np.random.default_rng(seed), cache
         self.fault = self.family.fault
 
@@ -75,6 +82,8 @@ class Finder:
             made = start_set(self.family, self.rng, self.progress)
         except Irregular:
             self.fault = "random mechanisms of its class are not closed by regular equations"
+            self.form = Whole(self.question.family, self.question.drive)
+            self.family = self.form.family
             return None
         if self.cache and made.whole:
             keep(self.family, made)
@@ -85,15 +94,15 @@ class Finder:
         q = self.question
         if self.start is None:
             return [self._searched(q.drive[:, i], guesses, turns) for i in range(q.drive.shape[1])]
-        found = ends(self.family, self.start, q.drive, self.rng, self.progress)
+        found = ends(self.family, self.start, self.form.drive, self.rng, self.progress)
         return [self._tracked(one, self.start, i) for i, one in enumerate(found)]
 
     def positions(self, guesses: int, turns: float) -> list[Assemblies]:
         """The assemblies at all positions."""
         return [self._result(found, i) for i, found in enumerate(self.solutions(guesses, turns))]
 
-    def _distinct(self, x: Array) -> Array:
-        return x[:, distinct(self.family.prints(Configuration(self.question.system, x)))]
+    def _distinct(self, x: Array, i: int) -> Array:
+        return x[:, distinct(self.family.prints(Configuration(self.form.at(i), x)))]
 
     def _searched(self, drive: Array, guesses: int, turns: float) -> _Solutions:
         q = self.question
@@ -103,25 +112,33 @@ class Finder:
             f"No class is known: {self.fault}. Searched from {guesses} random guesses within {turns:g} turns of the start; "
             "others may exist."
         )
-        return _Solutions(
-            self._distinct(x), np.zeros((q.system.n_state, 0), dtype=complex), "searched", (why,), None, 0
-        )
+        x = x[:, distinct(q.family.prints(Configuration(q.system, x)))]
+        return _Solutions(x, x, np.zeros((q.system.n_state, 0), dtype=complex), "searched", (why,), None, 0)
 
     def _tracked(self, found: Ends, start: StartSet, i: int) -> _Solutions:
-        q, N = self.question, start.x.shape[1]
+        system, N = self.form.at(i), start.x.shape[1]
         size = np.maximum(1.0, np.abs(found.poses).max(axis=0, initial=0.0))
         imaginary = np.abs(found.poses.imag).max(axis=0, initial=0.0) / size
         real = imaginary < np.where(found.singular, REAL_SINGULAR, REAL)
-        x, error = close_all(q.system, found.x[:, real].real, q.columns)
-        x = self._distinct(x[:, error < REAL_CLOSED])
+        solved, error = close_all(system, found.x[:, real].real, self.family.columns)
+        solved = self._distinct(solved[:, error < REAL_CLOSED], i)
         if (self._irregular(found.x[:, ~real & found.singular])).any():
-            x = np.concatenate([x, self._of_continuum(i)], axis=1)
+            solved = np.concatenate([solved, self._of_continuum(i)], axis=1)
         word, evidence = _completeness(found, start, N, bound(self.family))
-        return _Solutions(x, found.x[:, ~real], word, evidence, N, found.infinite)
+        # rods that would need complex turns to be put back are not real
+        x, others = self.form.lifted(solved, i), self.form.lifted(found.x[:, ~real], i)
+        complex_ = np.abs(x.imag).max(axis=0, initial=0.0) > REAL
+        made = ~complex_ & (Configuration(self.question.system, x.real).closure < REAL_CLOSED)
+        if (lost := int((~made & ~complex_).sum())) > 0:
+            word, evidence = "searched", (*evidence, f"Of {counted(lost, 'mode')} the rods could not be put back.")
+        others = np.concatenate([others, x[:, complex_]], axis=1)
+        return _Solutions(
+            x[:, made].real, solved[:, made], others, word, (*evidence, *self.form.told), N, found.infinite
+        )
 
     def _irregular(self, x: Array) -> Array:
         """Which assemblies that are not real are no regular points."""
-        J = Configuration(self.question.system, x).J[:, self.family.free].transpose(2, 0, 1)
+        J = Configuration(self.family.system, x).J[:, self.family.free].transpose(2, 0, 1)
         sigma = np.linalg.svd(J, compute_uv=False)
         least = len(self.family.free) - self.family.passive.shape[1] - 1
         large = np.abs(x).max(axis=0, initial=0.0) > LARGE_STATE
@@ -129,27 +146,29 @@ class Finder:
 
     def _of_continuum(self, i: int) -> Array:
         """A real assembly ``(nx, 1)`` of a continuum that tracks met at complex points, the nearest to the start; or none."""
-        q = self.question
-        x = searched(q.system, q.x, q.columns, q.drive[:, i], GUESSES // 4, 0.5, self.rng, self.progress)
-        near = np.argsort(np.abs(q.system.difference(x, q.start.x)).max(axis=0))
-        found = [j for j in near.tolist() if self._point(x[:, [j]])[0] == "continuum"]
+        family, system = self.family, self.form.at(i)
+        drive = self.form.drive[: len(family.columns), i]
+        x = searched(system, family.here.x[:, 0], family.columns, drive, GUESSES // 4, 0.5, self.rng, self.progress)
+        near = np.argsort(np.abs(system.difference(x, family.here.x)).max(axis=0))
+        found = [j for j in near.tolist() if self._point(Configuration(system, x[:, [j]]))[0] == "continuum"]
         return x[:, found[:1]]
 
     def _result(self, found: _Solutions, i: int) -> Assemblies:
         q, m, x = self.question, self.question.asked, found.x
         here = Configuration(q.system, x)
         poses = np.moveaxis(user_poses(here), 1, 0)
-        order = _ordered(self.family.prints(here).T)
-        x, poses = x[:, order], poses[order]
+        order = _ordered(q.family.prints(here).T)
+        x, poses, solved = x[:, order], poses[order], found.solved[:, order]
         coordinates = q.coordinates(x)
         coordinates[:, q.columns] = q.values[:, i]
         own = [q.m.freedom_names().index(name) for name in m.freedom_names()]
-        kinds, conditions, sure = [], [], []
+        kinds, conditions, sure, system = [], [], [], self.form.at(i)
         for j in range(x.shape[1]):
-            kind, condition, proof = self._point(x[:, [j]])
+            kind, condition, proof = self._point(Configuration(system, solved[:, [j]]))
             kinds.append(kind)
             conditions.append(condition)
             sure.append(proof)
+        sure = told_apart(self.family, solved, sure)
         modes = tuple(
             m.replace(start=dict(zip(m.freedom_names(), row[own].tolist(), strict=True))) for row in coordinates
         )
@@ -165,14 +184,14 @@ class Finder:
             tuple(sure),
             ComplexModes(q.complex_coordinates(found.others)[:, own], np.moveaxis(user_poses(away), 1, 0)),
             found.word,
-            found.evidence,
+            (*found.evidence, *_said_apart(sure)),
             found.total,
             found.infinite,
         )
 
-    def _point(self, x: Array) -> tuple[str, float, Certificate | None]:
-        """Kind, condition and certificate of a real assembly ``x (nx, 1)``."""
-        family, here = self.family, Configuration(self.question.system, x)
+    def _point(self, here: Configuration) -> tuple[str, float, Certificate | None]:
+        """Kind, condition and certificate of a real assembly."""
+        family = self.family
         J = here.J[:, family.free, 0]
         _, sigma, Vt = np.linalg.svd(J)
         rank, wanted = int((sigma > SINGULAR * sigma[0]).sum()) if sigma.size else 0, family.unknowns
@@ -185,7 +204,7 @@ class Finder:
 
     def _moves(self, here: Configuration, left: Array) -> bool:
         """Whether the loops stay closed along a motion that the rows leave free, with the drivers at rest."""
-        family, s = self.family, self.question.system
+        family, s = self.family, here.system
         if family.passive.shape[1]:
             held = np.linalg.qr(family.passive[family.free])[0]
             left = left - (left @ held) @ held.T
@@ -226,6 +245,18 @@ def _completeness(found: Ends, start: StartSet, N: int, known: Bound | None) -> 
         f"degree {trace.degree} (the singular values of its Loewner matrix end there: {trace.last:.1g}, {trace.beyond:.1g})."
     )
     return "tested", (words, loops, tracks)
+
+
+def _said_apart(sure: Sequence[Certificate | None]) -> tuple[str, ...]:
+    """What certificates say of how far apart roots are."""
+    apart = [one.apart for one in sure if one is not None and one.apart is not None]
+    if not apart:
+        return ()
+    if min(apart) > 0:
+        return (
+            f"Roots of {counted(len(apart), 'certificate')} are proved to be {min(apart):.1g} apart or more (radians, lengths over L).",
+        )
+    return ("Of some certificates it is not proved that their roots are two.",)
 
 
 def _ordered(numbers: Array) -> list[int]:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.screw import move_twist
-from mechgraph.algebra.se3 import compose, homogeneous, inverse, pose_log, quaternion_product
+from mechgraph.algebra.se3 import finite_twist, homogeneous, multiplied, quaternion_product
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
 from mechgraph.model.factors import screw_terms, screw_values
@@ -31,8 +31,9 @@ FIRST_STEP = 0.02
 """First step."""
 LARGEST_STEP = 0.25
 """Largest step."""
-SMALLEST_STEP = 1e-7
-"""Smallest step."""
+SMALLEST_STEP, NEAREST = 1e-7, 1e-4
+"""Smallest step, as part of what is left of the way, and the least that this counts as: steps are short before an end that is nearly
+singular."""
 ENDLESS_STATE = (25.0, 1e5, 1e3)
 """Imaginary part of an angle, length over L, and quaternion from which on an assembly is on its way to infinity."""
 SLIDE = 1e-9
@@ -112,7 +113,8 @@ class Leg:
 
     def __init__(self, equations: Equations, begin: Member, end: Member, which: Index | None = None) -> None:
         self.equations, self.family = equations, equations.family
-        eta = pose_log(compose(end.markers, inverse(begin.markers)))
+        R = multiplied(end.markers[:, :3], begin.markers[:, :3].swapaxes(0, 1))
+        eta = finite_twist(R, end.markers[:, 3], begin.markers[:, 3])
         turn = np.sqrt((eta[:3] * eta[:3]).sum(axis=0))
         slides = np.abs(turn) < SLIDE
         self._turn = np.where(slides, 1.0, turn)
@@ -135,13 +137,14 @@ class Leg:
         """The equations at states ``x (nx, T)`` of tracks at ``t (T,)``."""
         x = x.copy()
         change = self._of(self._change, tracks)
-        x[self.family.rows] = self._of(self._begin, tracks) + t * change
+        drive = self._of(self._begin, tracks) + t * change
+        x[self.family.rows] = drive[: len(self.family.rows)]
         paths, values = self._of(self._paths, tracks), screw_values(self._of(self._turn, tracks) * t)
         one = paths.shape[-1] == 1
         markers = (
             np.einsum("ijkn,knt->ijnt", paths[..., 0], values) if one else np.einsum("ijknt,knt->ijnt", paths, values)
         )
-        here = Configuration(self.family.system_with(markers), x)
+        here = Configuration(self.family.system_with(markers, drive), x)
         return Linear(self, here, change, self._of(self._eta, tracks))
 
 
@@ -180,18 +183,17 @@ class Linear:
 
     def rates(self, idle: Array) -> tuple[Array, Array]:
         """Rates ``(F, T)`` of the freedoms with ``t``, and the idle motions ``(T, p, free)`` conjugate, of unit size."""
-        s, here = self.family.system, self.here
-        P, p = len(s.m.pairs), idle.shape[1]
-        bearers = np.concatenate([s.a, s.b])
-        V = move_twist(here.poses[:, :, bearers], np.broadcast_to(self._eta, (*self._eta.shape[:2], here.T)))
-        moved = here.loop_sums(V[:, :P] - V[:, P:])
-        moved = moved + (here.J[:, self.family.columns] * self.change).sum(axis=1)
+        here, p = self.here, idle.shape[1]
+        V = move_twist(
+            here.poses[:, :, self.family.bearers], np.broadcast_to(self._eta, (*self._eta.shape[:2], here.T))
+        )
+        moved = self.family.open_by(here, V, self.change)
         right = np.zeros((self.J.shape[1], 1 + p, here.T), dtype=complex)
         right[: self.J.shape[0], 0] = -self._mixed(moved)
         right[self.J.shape[0] :, 1:] = np.eye(p)[:, :, None]
         out = self.solve(idle, right)
         rates = out[:, 0]
-        rates[self.family.columns] = self.change
+        rates[self.family.columns] = self.change[: len(self.family.columns)]
         if not p:
             return rates, idle
         motions = out[self.family.free, 1:].transpose(2, 0, 1)
@@ -265,7 +267,7 @@ def follow(
         for mask, flag in ((ended, out.arrived), (infinite, out.infinite)):
             flag[march.who[mask]] = True
         out.x[:, march.who], out.s[march.who] = march.x, march.s[0]
-        march.keep(~(ended | infinite | (march.h < SMALLEST_STEP)))
+        march.keep(~(ended | infinite | (march.h < SMALLEST_STEP * np.clip(1.0 - march.s[0], NEAREST, 1.0))))
     done = np.flatnonzero(out.arrived)
     if done.size and polish:
         out.x[:, done], good = polished(leg, out.x[:, done], way(np.ones(1))[0][0], every[done])

@@ -60,19 +60,18 @@ class StartSet:
     def fits(self, family: Family) -> bool:
         """Whether it is closed for a class."""
         s = family.system
-        P = len(s.m.pairs)
-        if self.member.markers.shape != (3, 4, 2 * P, 1) or self.x.ndim != 2 or len(self.x) != s.n_state:
+        if self.member.markers.shape != family.target.shape or self.x.ndim != 2 or len(self.x) != s.n_state:
             return False
         if (self.mixing is None) != family.whole or not np.isfinite(self.x).all():
             return False
-        here = Configuration(family.system_with(self.member.markers), self.x)
+        here = Configuration(family.system_of(self.member), self.x)
         size = np.maximum(1.0, np.abs(here.poses).max(axis=(0, 1, 2)))
         return bool((here.closure < MEMBER_CLOSED * size).all())
 
 
 def fingerprints(family: Family, member: Member, x: Array) -> Array:
     """What tells assemblies of a member apart ``(n, V)``, see ``Family.prints``."""
-    return family.prints(Configuration(family.system_with(member.markers), x))
+    return family.prints(Configuration(family.system_of(member), x))
 
 
 def distinct(poses: Array, known: Array | None = None) -> Array:

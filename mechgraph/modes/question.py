@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.family import Array, Family
+from mechgraph.modes.form import Form, Whole, WithoutRods, rods_of
 from mechgraph.report.refused import dead_point_error, undriven_error
 from mechgraph.structure.mobility import free_motion
 
@@ -65,7 +67,18 @@ class Question:
         self.freedoms = free_motion(self.system, self.x, self.columns)
         passive = [p.rates for p in self.freedoms.passive]
         rates = np.stack(passive, axis=1) if passive else np.zeros((self.system.n_freedoms, 0))
-        self.family = Family(self.start, self.columns, rates)
+        self.rods = [] if self.m.couplings else rods_of(self.system, self.columns)
+        links = np.array([link for rod in self.rods for link in rod.links], dtype=np.intp)
+        self.family = Family(self.start, self.columns, rates, links)
+
+    @cached_property
+    def form(self) -> Form:
+        """The equations in which assemblies are looked for: without rods, where these can be left out."""
+        if self.rods:
+            found = WithoutRods(self.start, self.columns, self.family.passive, self.drive, self.rods)
+            if not found.family.fault:
+                return found
+        return Whole(self.family, self.drive)
 
     @property
     def _loose(self) -> bool:

@@ -51,20 +51,22 @@ def key(family: Family) -> str:
         "passive": family.passive.shape[1],
         "geometry": None if family.whole else (np.round(family.target.real, 9) + 0.0).tolist(),
     }
+    if family.points:
+        parts["points"] = family.points
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
 
 def kept(family: Family) -> StartSet | None:
     """The start set of a class, where one is kept and closed: the user's, or else that of the package."""
-    name = key(family)
-    for file, prefix in ((folder() / f"start-{name}.npz", ""), (PACKED, f"{name}/")):
-        found = _read(file, prefix)
-        if found is not None and found.fits(family):
-            return found
-    return None
+    return _read(folder() / f"start-{key(family)}.npz", "", family) or packed(family)
 
 
-def _read(file: Path, prefix: str) -> StartSet | None:
+def packed(family: Family) -> StartSet | None:
+    """The start set of a class that came with the package."""
+    return _read(PACKED, f"{key(family)}/", family)
+
+
+def _read(file: Path, prefix: str, family: Family) -> StartSet | None:
     try:
         with file.open("rb") as handle, np.load(handle, allow_pickle=False) as f:
             mixing = f[prefix + "mixing"]
@@ -73,7 +75,8 @@ def _read(file: Path, prefix: str) -> StartSet | None:
             member = Member(f[prefix + "markers"], f[prefix + "drive"])
             trace = Trace(degree, samples, last, beyond)
             own = mixing if mixing.size else None
-            return StartSet(member, f[prefix + "x"], own, loops, chance, lost, followed, True, trace)
+            found = StartSet(member, f[prefix + "x"], own, loops, chance, lost, followed, True, trace)
+            return found if found.fits(family) else None
     except (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile, TypeError):
         return None
 

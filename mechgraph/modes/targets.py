@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mechgraph.modes.family import Array, Family, Member
+from mechgraph.modes.family import GENERIC, Array, Family, Member
 from mechgraph.modes.homotopy import Care, Equations, Leg, follow
 from mechgraph.modes.monodromy import StartSet, distinct, fingerprints
 from mechgraph.numerics.linear import Index
@@ -163,19 +163,21 @@ def _arc(k: int) -> Callable[[Array], tuple[Array, Array]]:
 
 def _account(family: Family, at: Member, known: Ends, run: _Run, lost_before: int) -> None:
     """Put the ends of a run to those that are known."""
-    x, singular, infinite = run.x.copy(), run.singular.copy(), int(run.infinite.sum())
+    x, regular, singular, infinite = run.x.copy(), run.regular.copy(), run.singular.copy(), int(run.infinite.sum())
     if singular.any():
         some = np.flatnonzero(singular)
-        x[:, some], closed = _settled(family, at, x[:, some])
+        x[:, some], closed, rank = _settled(family, at, x[:, some])
         singular[some[~closed]] = False
         # a track that is bounded near its end has an assembly there: this one is not
         infinite += int((~closed).sum())
-    good = np.flatnonzero(run.regular | singular)
+        # what was led round has come to a regular point, to which no other track comes
+        singular[some[rank]], regular[some[rank]] = False, True
+    good = np.flatnonzero(regular | singular)
     poses = fingerprints(family, at, x[:, good])
     new = distinct(poses, known.poses if known.runs else None)
-    own = distinct(poses[:, run.regular[good]])
-    lost = len(run.regular) - len(good) - infinite + lost_before
-    met = int(run.regular.sum()) - len(own)
+    own = distinct(poses[:, regular[good]])
+    lost = len(regular) - len(good) - infinite + lost_before
+    met = int(regular.sum()) - len(own)
     best = not known.runs or lost + met <= known.lost + known.met
     known.x = np.concatenate([known.x, x[:, good[new]]], axis=1)
     known.poses = np.concatenate([known.poses, poses[:, new]], axis=1) if known.runs else poses[:, new]
@@ -184,11 +186,11 @@ def _account(family: Family, at: Member, known: Ends, run: _Run, lost_before: in
     if best:
         known.lost, known.met, known.infinite = lost, met, infinite
     # all are accounted for on one run without a loss, or by different ends of several
-    known.clean = (lost == 0 and met == 0) or known.x.shape[1] >= len(run.regular) + lost_before
+    known.clean = (lost == 0 and met == 0) or known.x.shape[1] >= len(regular) + lost_before
 
 
-def _settled(family: Family, at: Member, x: Array) -> tuple[Array, Array]:
-    """Singular ends closed by steps of least norm; which closed."""
+def _settled(family: Family, at: Member, x: Array) -> tuple[Array, Array, Array]:
+    """Singular ends closed by steps of least norm; which closed, and which of these are regular points nevertheless."""
     leg = Leg(Equations(family, None), at, at)
     T = x.shape[1]
     tracks, one = np.zeros(T, dtype=np.intp), np.ones(T)
@@ -202,4 +204,7 @@ def _settled(family: Family, at: Member, x: Array) -> tuple[Array, Array]:
         dq[family.free] = -np.einsum("tij,jt->it", inverse, r)
         dq *= np.minimum(1.0, 0.1 / np.maximum(np.abs(dq).max(axis=0, initial=0.0), 1e-300))
         x = family.system.advance(here.here.x, dq)
-    return x, np.abs(leg.at(x, one, tracks).here.residual).max(axis=0, initial=0.0) < 1e-10
+    here = leg.at(x, one, tracks)
+    closed = np.abs(here.here.residual).max(axis=0, initial=0.0) < 1e-10
+    sigma = np.linalg.svd(here.J.transpose(2, 0, 1), compute_uv=False)
+    return x, closed, closed & (sigma[:, family.unknowns - 1] > GENERIC * sigma[:, 0])

@@ -1,6 +1,7 @@
 """The trace test: a sum over all assemblies of a class is a rational function of its parameters, a sum over some of them is not.
 
-In every loop one marker turns by ``phi`` about a line that the algebra of the loop allows. Over this pencil of members all equations are
+In every loop one marker turns by ``phi`` about a line that the algebra of the loop allows, and the squares of the lengths of all rods
+are linear in ``z``. Over this pencil of members all equations are
 rational in ``z = exp(i phi)``, and the assemblies are an irreducible curve over the plane of ``z`` (see ``family``), whose points are
 permuted as ``z`` goes round the places where they meet. With ``g`` a number that tells assemblies apart and ``c`` a random one, the sum
 of ``1 / (g - c)`` over all assemblies is the same whichever way ``z`` came: a rational function, its degree the number of ``z`` with
@@ -103,24 +104,25 @@ def rational(z: Array, f: Array, weights: Array) -> Trace:
 
 
 class _Pencil:
-    """Members of a class in which one marker of every loop has turned by ``phi`` about a line."""
+    """Members of a class in which one marker of every loop has turned by ``phi`` about a line, and all rods have other lengths."""
 
     def __init__(self, equations: Equations, base: Member, rng: np.random.Generator) -> None:
         self.equations, self.family, self.base = equations, equations.family, base
         s = self.family.system
         P = len(s.m.pairs)
-        self.lines = np.zeros((6, 2 * P, 1), dtype=complex)
+        self.lines = np.zeros((6, len(self.family.bearers), 1), dtype=complex)
         for chord, algebra in zip(s.chords.tolist(), self.family.loop_algebras, strict=True):
             self.lines[:, P + chord, 0] = _line(algebra, rng)
+        self.drive = self.family.lengths_of(_random(rng, len(base.drive)))[:, None]
         self.c = _random(rng, 1)[0]
         self.weights = _random(rng, len(_told(self.family, self.family.here)))
 
     def members(self, phi: Array) -> Member:
-        """Members at ``phi (n,)``; a line without a turn is a direction, along which the marker goes by ``z - 1``."""
+        """Members at ``phi (n,)``; a line without a turn is a direction, along which it goes by ``z - 1``, as squares of rods do."""
         slides = np.abs(self.lines[:3]).max(axis=0) < SPAN
         turned = self.lines * np.where(slides, np.exp(1j * phi) - 1.0, phi)
         markers = compose(pose_exp(self.family.in_links(turned)), self.base.markers)
-        return Member(markers, np.repeat(self.base.drive, len(phi), axis=1))
+        return Member(markers, self.base.drive + self.drive * (np.exp(1j * phi) - 1.0))
 
     def sums(self, x: Array, n: int, rng: np.random.Generator) -> tuple[Array, Array, Array]:
         """``z``, the sum of ``1 / (g - c)`` and weights at those of ``n`` random members to which all tracks from ``x (nx, N)`` come."""

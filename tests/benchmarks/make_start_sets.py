@@ -1,13 +1,12 @@
 """Make the start sets that come with the package: of the library's mechanisms and of common topologies, where a class is known.
 
-    python tests/benchmarks/make_start_sets.py          takes some minutes, and replaces mechgraph/modes/start-sets.npz
+    python tests/benchmarks/make_start_sets.py          writes mechgraph/modes/start-sets.npz anew; those that it has are taken over
 
 Only sets of which a bound or a trace test says that they are all are taken in.
 """
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -68,12 +67,12 @@ def main() -> None:
     for m, at in wanted():
         begin = time.process_time()
         try:
-            family = Question(m, at).family
+            family = Question(m, at).form.family
             name = store.key(family)
             if family.fault or f"{name}/x" in found:
                 print(f"{m.name}: {family.fault or 'known'}", flush=True)
                 continue
-            start = start_set(family, np.random.default_rng(0))
+            start = store.packed(family) or start_set(family, np.random.default_rng(0))
         except (mg.MechgraphError, Irregular) as error:
             print(f"{m.name}: {type(error).__name__}", flush=True)
             continue
@@ -82,7 +81,7 @@ def main() -> None:
         print(f"{m.name}: {N}, {'sure' if sure else 'not sure'}, {time.process_time() - begin:.1f} s", flush=True)
         if sure and N <= MOST:
             found |= {f"{name}/{part}": value for part, value in store.arrays(start).items()}
-            np.savez_compressed(sys.argv[1] if len(sys.argv) > 1 else store.PACKED, **found)
+    np.savez_compressed(store.PACKED, **found)
 
 
 if __name__ == "__main__":

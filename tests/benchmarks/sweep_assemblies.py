@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
 
 import numpy as np
 
@@ -19,8 +20,25 @@ from mechgraph.modes.search import searched
 
 FREEDOMS = {"R": 1, "P": 1, "C": 2, "U": 2, "S": 3, "Sp": 5, "Sg": 4, "Sc": 3, "E": 3}
 """Pair types of random loops, and how many freedoms each has."""
+PATIENCE = 240.0
+"""Processor seconds after which a call is given up."""
 SAME = 1e-6
 """Difference of link poses up to which two assemblies are one."""
+
+
+class GivenUp(Exception):
+    """A call took too long."""
+
+
+def patience() -> Callable[[str], None]:
+    """A function of progress that gives a call up after a while."""
+    end = time.process_time() + PATIENCE
+
+    def told(_: str) -> None:
+        if time.process_time() > end:
+            raise GivenUp
+
+    return told
 
 
 def arm(seed: int) -> tuple[mg.Mechanism, dict[str, object]]:
@@ -98,8 +116,8 @@ def seeds(count: int, most: int = 3, runs: int = 10) -> list[str]:
         m, at = topology(number, most)
         try:
             begin = time.process_time()
-            sets = [mg.assemblies(m, at, seed=seed, cache=False) for seed in range(runs)]
-        except mg.MechgraphError as error:
+            sets = [mg.assemblies(m, at, seed=seed, cache=False, progress=patience()) for seed in range(runs)]
+        except (mg.MechgraphError, GivenUp) as error:
             print(f"{number} {m.name}: {type(error).__name__}", flush=True)
             continue
         totals = {(s.total, len(s), s.completeness) for s in sets}
@@ -118,9 +136,9 @@ def newton(count: int, most: int = 3, guesses: int = 10_000) -> list[str]:
     for number in range(count):
         m, at = topology(number, most)
         try:
-            modes = mg.assemblies(m, at)
+            modes = mg.assemblies(m, at, progress=patience())
             q = Question(m, at)
-        except mg.MechgraphError as error:
+        except (mg.MechgraphError, GivenUp) as error:
             print(f"{number} {m.name}: {type(error).__name__}", flush=True)
             continue
         x = searched(q.system, q.x, q.columns, q.drive[:, 0], guesses, 0.5, np.random.default_rng(number))

@@ -24,7 +24,7 @@ def test_start_sets_of_the_library_and_of_common_topologies_come_with_the_packag
         names = {name.split("/")[0] for name in packed.files}
     served = set()
     for m, at in wanted():
-        family = Question(m, at).family
+        family = Question(m, at).form.family
         if family.fault or store.key(family) not in names:
             continue
         found, known = store.kept(family), bound(family)

@@ -1,0 +1,376 @@
+"""The equations in which assemblies are looked for: those of the mechanism, or of what is left of it without its rods.
+
+A rod is a chain of links with a ball at its one end and a ball or two turns at the other, in which all between is driven or welded (S-S,
+S-P-S, U-P-S). Over the complex numbers all that it does is to keep two points at a distance, as both ends turn so that they point at
+each other wherever the bodies are that it joins. So it falls away, and with it its loops of six rows, for one row (see ``modes.rods``);
+a body that nothing else joins to the frame floats on a pair of six freedoms. Put back, a ball turns as little as it can, and two turns
+go that of their two ways that is nearest to the start: ways of rods are no assemblies of their own.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import count
+from operator import itemgetter
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from mechgraph.algebra.se3 import (
+    compose,
+    cross,
+    identity,
+    inverse,
+    matrix_quaternion,
+    quaternion_matrix,
+    quaternion_product,
+    rotate,
+)
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import Index, System
+from mechgraph.closure.point_rows import PointNumbers
+from mechgraph.closure.reduction import floating_type
+from mechgraph.errors import counted
+from mechgraph.model import pair_kinematics
+from mechgraph.model.link import Link
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.pair import Pair
+from mechgraph.model.pair_type import PairType
+from mechgraph.modes.family import SPAN, Array, Family
+from mechgraph.modes.rods import RodFamily, RodSystem
+from mechgraph.topology.components import components_of_edges
+
+WAYS = "A leg that two turns carry can stand in two ways in the same assembly: nearest to the start, the other does not count"
+"""What is said of rods with two turns at an end."""
+
+
+class Form(Protocol):
+    """Equations of a class, at given positions."""
+
+    family: Family
+    drive: Array
+    """Values ``(d, n)`` of the drivers of the class at all positions."""
+    told: tuple[str, ...]
+    """What is to be said of them, in words."""
+
+    def at(self, position: int) -> System:
+        """The system at a position."""
+
+    def lifted(self, x: Array, position: int) -> Array:
+        """States of the mechanism from those ``(nx, M)`` found; complex where rods cannot be put back with real numbers."""
+
+
+class Whole:
+    """All of the mechanism."""
+
+    def __init__(self, family: Family, drive: Array) -> None:
+        self.family, self.drive = family, drive
+        self.told: tuple[str, ...] = ()
+
+    def at(self, position: int) -> System:
+        """The mechanism, of which drivers are freedoms."""
+        return self.family.system
+
+    def lifted(self, x: Array, position: int) -> Array:
+        """The same."""
+        return x
+
+
+class Step(NamedTuple):
+    """A pair on the way along a rod, from its link a to b (``sign`` 1) or back."""
+
+    pair: int
+    sign: int
+
+
+class Rod(NamedTuple):
+    """A chain of links between two bodies: its pairs, of which the last is a ball, the links on the way, and the bodies."""
+
+    steps: tuple[Step, ...]
+    links: tuple[int, ...]
+    bodies: tuple[int, int]
+
+
+def rods_of(system: System, columns: Index) -> list[Rod]:
+    """The rods of a mechanism with drivers ``columns``; no pair and no link belongs to two."""
+    driven, rows = set(columns.tolist()), [pair.type for pair in system.m.pairs]
+    at: list[list[Step]] = [[] for _ in system.m.links]
+    for k, (a, b) in enumerate(system.graph.ends):
+        at[a].append(Step(k, 1))
+        at[b].append(Step(k, -1))
+    ends = {k for k, row in enumerate(rows) if _points(row) and driven.isdisjoint(_columns(system, k))}
+    out: list[Rod] = []
+    for k in sorted(ends, key=lambda k: _is_ball(rows[k])):
+        for body, sign in zip(system.graph.ends[k], (1, -1), strict=True):
+            if k not in ends:
+                continue
+            steps, links = [Step(k, sign)], [sum(system.graph.ends[k]) - body]
+            while len(at[links[-1]]) == 2 and links[-1] != system.graph.frame:
+                steps.append(next(step for step in at[links[-1]] if step.pair != steps[-1].pair))
+                links.append(sum(system.graph.ends[steps[-1].pair]) - links[-1])
+                if not driven.issuperset(_columns(system, steps[-1].pair)):
+                    break
+            last = steps[-1].pair
+            # the first end may have two turns, as ends are taken in that order; the second is a ball
+            if len(steps) > 1 and last in ends and _is_ball(rows[last]) and links[-1] not in (body, *links[:-1]):
+                out.append(Rod(tuple(steps), tuple(links[:-1]), (body, links[-1])))
+                ends -= {k, last}
+    return out
+
+
+def _columns(system: System, pair: int) -> range:
+    return range(system.first_column[pair], system.first_column[pair + 1])
+
+
+def _is_ball(row: PairType) -> bool:
+    return len(row.steps) == 1 and row.steps[0].holds_rotation
+
+
+def _points(row: PairType) -> bool:
+    """Whether a pair can point anywhere about one point and does nothing else: a ball, or two turns about different axes."""
+    if _is_ball(row):
+        return True
+    twists = np.array([f.twist for f in row.freedoms])
+    return (
+        len(row.steps) == len(row.freedoms) == 2
+        and not twists[:, 3:].any()
+        and bool(np.linalg.norm(np.cross(*twists[:, :3])) > SPAN)
+    )
+
+
+class WithoutRods:
+    """What is left of a mechanism that stands at ``start``, with drivers ``columns`` at ``drive (d, n)``, when ``rods`` fall away."""
+
+    def __init__(self, start: Configuration, columns: Index, passive: Array, drive: Array, rods: list[Rod]) -> None:
+        self.start, self.full, self._rows = start, start.system, start.system.single_rows[columns]
+        self._drive = drive
+        s = self.full
+        # the frame comes first, so that a start set serves whatever the order of declaration
+        inner = [s.graph.frame, *(link for rod in rods for link in rod.links)]
+        self.links = np.array([s.graph.frame, *np.setdiff1d(np.arange(len(s.m.links)), inner)], dtype=np.intp)
+        self.place = np.full(len(s.m.links), -1, dtype=np.intp)
+        self.place[self.links] = np.arange(len(self.links))
+        self.pairs = np.setdiff1d(np.arange(len(s.m.pairs)), [step.pair for rod in rods for step in rod.steps])
+        part = components_of_edges(len(s.m.links), [s.graph.ends[k] for k in self.pairs])[self.links]
+        first = np.unique(part, return_index=True)[1]
+        self.afloat = self.links[np.sort(first[first > 0])]
+        self.rods = _sorted(rods, self._points)
+        self.state_rows, self.kept = (
+            np.array([i for k in self.pairs for i in range(to[k], to[k + 1])], dtype=np.intp)
+            for to in (s.first_row, s.first_column)
+        )
+        own = np.isin(columns, self.kept)
+        self.drive = np.concatenate([drive[own], self._squares()])
+        both = sum(not _is_ball(s.m.pairs[rod.steps[0].pair].type) for rod in rods)
+        self.told: tuple[str, ...] = (f"{WAYS} ({counted(both, 'leg')} here).",) if both else ()
+        self._small = self._mechanism()
+        here = Configuration(self.at(0), self._state())
+        self.family: Family = RodFamily(here, np.searchsorted(self.kept, columns[own]), self._passive(here, passive))
+
+    # --- numbers -----------------------------------------------------------------------------------------------------
+
+    def _points(self, rod: Rod) -> list[tuple[int, Array]]:
+        """The points ``(3,)`` of a rod in the frames of its bodies, with the places of these."""
+        out = []
+        for body, step, outside in zip(rod.bodies, (rod.steps[0], rod.steps[-1]), (1, -1), strict=True):
+            marker = self.full.par.marker_a if step.sign == outside else self.full.par.marker_b
+            out.append((int(self.place[body]), marker[:, 3, step.pair, 0]))
+        return out
+
+    def _pose(self, pair: int, x: Array) -> Array:
+        """Pose ``(3, 4, T)`` of marker B in marker A at states ``x (nx, T)``."""
+        s = self.full
+        row, states = s.m.pairs[pair].type.scaled(s.par.L), x[s.first_row[pair] : s.first_row[pair + 1], None]
+        if not row.steps:
+            return identity(x.shape[1])
+        return np.asarray(pair_kinematics.frames_of(row, s.par.pitch[[pair]], states)[-1][:, :, 0])
+
+    def _behind(self, step: Step, x: Array) -> Array:
+        """Pose ``(3, 4, T)`` of the link behind a pair, seen from the link before it."""
+        par = self.full.par
+        D = compose(
+            compose(par.marker_a[:, :, step.pair], self._pose(step.pair, x)), inverse(par.marker_b[:, :, step.pair])
+        )
+        return D if step.sign > 0 else inverse(D)
+
+    def _inside(self, rod: Rod, x: Array) -> tuple[Array, Array]:
+        """From the first link of a rod to its last ``(3, 4, T)``, and the way between its ends ``(3, T)`` seen from the first."""
+        C = identity(x.shape[1])
+        for step in rod.steps[1:-1]:
+            C = compose(C, self._behind(step, x))
+        par, (near, far) = self.full.par, (rod.steps[0], rod.steps[-1])
+        begin = (par.marker_b if near.sign > 0 else par.marker_a)[:, 3, near.pair]
+        end = (par.marker_a if far.sign > 0 else par.marker_b)[:, 3, far.pair]
+        return C, rotate(C[:, :3], end) + C[:, 3] - begin
+
+    def _driven(self, drive: Array) -> Array:
+        """The start ``(nx, n)`` with drivers at ``drive (d, n)``."""
+        x = np.repeat(self.start.x[:, :1], drive.shape[1], axis=1)
+        x[self._rows] = drive
+        return x
+
+    def _squares(self) -> Array:
+        """Squares ``(rods, n)`` of the lengths of the rods at all positions."""
+        x = self._driven(self._drive)
+        return np.array([(d * d).sum(axis=0) for _, d in (self._inside(rod, x) for rod in self.rods)])
+
+    def _mechanism(self) -> RodSystem:
+        """What is left, and points of rods, whose lengths are those of the first position."""
+        full, par = self.full.m, self.full.par
+        taken = {pair.name for pair in full.pairs}
+        fresh = (name for i in count() if (name := f"floating{i}") not in taken)
+        floating = [
+            Pair(next(fresh), floating_type(), full.frame, full.links[i].name, point=(0, 0, 0), axis=(0, 0, 1))
+            for i in self.afloat.tolist()
+        ]
+        left = Mechanism(
+            full.name,
+            [Link(full.links[i].name) for i in self.links],
+            [*(full.pairs[k] for k in self.pairs), *floating],
+            frame=full.frame,
+        )
+        still = identity(len(floating), 1)
+        numbers = replace(
+            par,
+            marker_a=np.concatenate([par.marker_a[:, :, self.pairs], still], axis=2),
+            marker_b=np.concatenate([par.marker_b[:, :, self.pairs], still], axis=2),
+            pitch=np.concatenate([par.pitch[self.pairs], np.zeros((len(floating), 1))]),
+            mass=par.mass[self.links],
+            center=par.center[:, self.links],
+            inertia=par.inertia[:, :, self.links],
+            offset=par.offset[:, self.links],
+        )
+        ends = list(zip(*(sorted(self._points(rod), key=itemgetter(0)) for rod in self.rods), strict=True))
+        (a, at_a), (b, at_b) = (
+            (np.array([place for place, _ in side]), np.stack([at for _, at in side], axis=1)[..., None])
+            for side in ends
+        )
+        none, n = np.zeros((3, 0, 1)), len(self.rods)
+        squares = self.drive[-n:, :1]
+        points = PointNumbers(a, b, at_a, at_b, squares, none, np.full(n, -1), np.zeros((n, 1)))
+        return RodSystem(left, None, numbers, points)
+
+    def at(self, position: int) -> System:
+        """What is left at a position."""
+        s = self._small
+        return s.with_points(replace(s.points, length=self.drive[-len(self.rods) :, [position]]))
+
+    # --- states ------------------------------------------------------------------------------------------------------
+
+    def _state(self) -> Array:
+        """The state ``(nx, 1)`` of what is left at the start."""
+        D = compose(inverse(self.start.poses[:, :, [self.full.graph.frame]]), self.start.poses[:, :, self.afloat])
+        floating = np.concatenate([D[:, 3], matrix_quaternion(D[:, :3])]).swapaxes(0, 1).reshape(-1, 1)
+        return np.concatenate([self.start.x[self.state_rows], floating])
+
+    def _passive(self, here: Configuration, rates: Array) -> Array:
+        """Passive motions ``(F, p)`` of what is left, of those ``rates`` of the mechanism."""
+        out, s = np.zeros((here.system.n_freedoms, rates.shape[1])), here.system
+        out[: len(self.kept)] = rates[self.kept]
+        for i, rate in enumerate(rates.T):
+            V = self.start.link_twists(rate[:, None])[:, :, 0]
+            for k, link in enumerate(self.afloat.tolist(), len(self.pairs)):
+                at = slice(s.first_column[k], s.first_column[k + 1])
+                out[at, i] = np.linalg.solve(here.S[:, at, 0], V[:, link])
+        return out[:, np.abs(out).max(axis=0, initial=0.0) > SPAN]
+
+    def lifted(self, x: Array, position: int) -> Array:
+        """States of the mechanism: balls and turns of the rods put back one after the other."""
+        here = Configuration(self.at(position), x)
+        out = np.repeat(self._driven(self._drive[:, [position]]), x.shape[1], axis=1).astype(complex)
+        out[self.state_rows] = x[: len(self.state_rows)]
+        begin = out.copy()
+        with np.errstate(all="ignore"):
+            for n, rod in enumerate(self.rods):
+                self._put_back(rod, here, n, out, begin)
+        return out
+
+    def _put_back(self, rod: Rod, here: Configuration, n: int, out: Array, begin: Array) -> None:
+        """The numbers of a rod in states ``out``, near those where it ``begin``s."""
+        s, par = self.full, self.full.par
+        near, far = rod.steps[0], rod.steps[-1]
+        bodies = [here.poses[:, :, self.place[body]] for body in rod.bodies]
+        (_, at_a), (_, at_b) = self._points(rod)
+        d = (
+            rotate(bodies[1][:, :3], at_b[:, None])
+            + bodies[1][:, 3]
+            - rotate(bodies[0][:, :3], at_a[:, None])
+            - bodies[0][:, 3]
+        )
+        C, inside = self._inside(rod, out)
+        # directions in the markers on the body and on the rod
+        outer, inner = (par.marker_a, par.marker_b) if near.sign > 0 else (par.marker_b, par.marker_a)
+        to = rotate(inverse(compose(bodies[0], outer[:, :, near.pair]))[:, :3], d)
+        of = rotate(inverse(inner[:, :, near.pair])[:, :3], inside)
+        if near.sign < 0:
+            to, of = of, to
+        rows = slice(s.first_row[near.pair], s.first_row[near.pair + 1])
+        row = s.m.pairs[near.pair].type
+        out[rows] = _ball(of, to, begin[rows]) if _is_ball(row) else _two_turns(row, of, to, begin[rows])
+        # the ball at the other end, from both its markers
+        last = compose(compose(bodies[0], self._behind(near, out)), C)
+        A, B = (last, bodies[1]) if far.sign > 0 else (bodies[1], last)
+        D = compose(inverse(compose(A, par.marker_a[:, :, far.pair])), compose(B, par.marker_b[:, :, far.pair]))
+        out[s.first_row[far.pair] : s.first_row[far.pair + 1]] = matrix_quaternion(D[:, :3])
+
+
+def _unit(v: Array) -> Array:
+    return np.asarray(v / np.sqrt((v * v).sum(axis=0)))
+
+
+def _ball(of: Array, to: Array, begin: Array) -> Array:
+    """Quaternions ``(4, T)`` that take directions ``of`` to those ``to (3, T)`` by the least turn from where they ``begin``."""
+    a, u = np.broadcast_arrays(_unit(rotate(quaternion_matrix(begin), of)), _unit(to))
+    cosine = (a * u).sum(axis=0)
+    # half a turn about any line across
+    across = _unit(cross(a, np.eye(3)[np.argmin(np.abs(a), axis=0)].T.astype(complex)))
+    least = np.concatenate([(1.0 + cosine)[None], cross(a, u)]) / np.sqrt(2.0 * (1.0 + cosine))
+    half = np.concatenate([np.zeros_like(cosine)[None], across])
+    return quaternion_product(np.where(np.abs(1.0 + cosine) < SPAN, half, least), begin)
+
+
+def _two_turns(row: PairType, of: Array, to: Array, begin: Array) -> Array:
+    """Angles ``(2, T)`` that take directions ``of`` to those ``to (3, T)``: of both ways the one nearest to where they ``begin``.
+
+    With ``e`` and ``g`` the directions and ``v`` the one between the turns: ``v . w_2 = e . w_2``, ``v . w_1 = g . w_1``, ``v^2 = e^2``.
+    Source: Paden, Kinematics and Control of Robot Manipulators, 1986, subproblem 2.
+    """
+    first, second = (np.array(f.twist[:3])[:, None] for f in row.freedoms)
+    e, g = np.broadcast_arrays(_unit(of), _unit(to))
+    c, p, q = (first * second).sum(), (first * g).sum(axis=0), (second * e).sum(axis=0)
+    alpha, beta = (p - c * q) / (1 - c * c), (q - c * p) / (1 - c * c)
+    across = np.sqrt((1.0 - alpha**2 - beta**2 - 2 * alpha * beta * c + 0j) / (1 - c * c))
+    normal = np.cross(first, second, axis=0)
+    ways = []
+    for sign in (1.0, -1.0):
+        v = alpha * first + beta * second + sign * across * normal
+        ways.append(np.stack([_angle(v, g, first), _angle(e, v, second)]))
+    apart = [np.abs(np.exp(1j * way) - np.exp(1j * begin)).max(axis=0) for way in ways]
+    return np.where(apart[0] <= apart[1], *ways)
+
+
+def _angle(a: Array, b: Array, axis: Array) -> Array:
+    """Angles ``(T,)`` by which ``a`` turns about a unit ``axis`` into ``b``."""
+    a, b = (v - axis * (axis * v).sum(axis=0) for v in (a, b))
+    cosine, sine = (v / (a * a).sum(axis=0) for v in ((a * b).sum(axis=0), (axis * np.cross(a, b, axis=0)).sum(axis=0)))
+    # exp(i angle) and exp(-i angle): the smaller one has lost its digits
+    ahead, back = cosine + 1j * sine, cosine - 1j * sine
+    return np.where(np.abs(ahead) >= np.abs(back), -1j * np.log(ahead), 1j * np.log(back))
+
+
+def _sorted(rods: list[Rod], points: Callable[[Rod], list[tuple[int, Array]]]) -> list[Rod]:
+    """Rods in an order that follows from the bodies and the points that they share, not from their names."""
+    number: dict[tuple[float, ...], int] = {}
+
+    def joint(body: int, at: Array) -> tuple[int, int]:
+        return body, number.setdefault((body, *np.round(at, 6).tolist()), len(number))
+
+    joined = [[joint(*end) for end in sorted(points(rod), key=itemgetter(0))] for rod in rods]
+    shared = Counter(end for ends in joined for end in ends)
+    order = sorted(
+        range(len(rods)),
+        key=lambda i: ([body for body, _ in joined[i]], [-shared[end] for end in joined[i]], joined[i]),
+    )
+    return [rods[i] for i in order]

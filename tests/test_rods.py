@@ -1,0 +1,155 @@
+"""Assemblies of mechanisms with rods: found without the rods, which are put back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import machines
+import numpy as np
+import pytest
+from mechanisms import Z, hexapod
+
+import mechgraph as mg
+from mechgraph.algebra.se3 import quaternion_matrix, rotation_exp
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import indexed
+from mechgraph.model.factors import ConstantScrew
+from mechgraph.modes.form import _ball, _two_turns, rods_of
+from mechgraph.modes.homotopy import Equations, Leg
+from mechgraph.modes.question import Question
+
+
+def states(q: Question, modes: mg.Assemblies) -> np.ndarray:
+    """States of real assemblies ``(nx, M)``."""
+    s = q.system
+    return np.concatenate([s.state_of(s.start_coordinates(mode.start)[:, None]) for mode in modes], axis=1)
+
+
+def test_a_hexapod_has_forty_assemblies_whatever_carries_its_legs() -> None:
+    """Balls at both ends, or universal joints at the feet: eight real postures, the same ones."""
+    found = []
+    for legs in ("SPS", "UPS"):
+        m = hexapod(legs)
+        at = {f"P{k}": 0.02 * k for k in range(1, 7)}
+        modes, q = mg.assemblies(m, at), Question(m, at)
+        assert (modes.total, len(modes) + len(modes.complex), modes.completeness) == (40, 40, "proved")
+        assert all(sure is not None and sure.proved and sure.apart > 0 for sure in modes.certificates)
+        assert Configuration(q.system, states(q, modes)).closure.max() < 1e-12
+        assert any("two ways" in line for line in modes.evidence) == (legs == "UPS")
+        found.append(modes)
+    platform = [link.name for link in m.links].index("platform")
+    both = [np.sort_complex(modes.poses[:, platform, 0, 3] + 1j * modes.poses[:, platform, 1, 3]) for modes in found]
+    assert len(both[0]) == len(both[1]) > 2
+    assert np.abs(both[0] - both[1]).max() < 1e-9
+    # the assembly in which it is declared, legs as they stand there
+    home = mg.assemblies(m, {f"P{k}": 0.0 for k in range(1, 7)})
+    assert np.abs(home.coordinates).max(axis=1).min() < 1e-9
+
+
+def test_assemblies_that_are_not_real_close_the_loops_too() -> None:
+    """Legs are put back over the complex numbers."""
+    for legs in ("SPS", "UPS"):
+        m = hexapod(legs)
+        modes = mg.assemblies(m, {f"P{k}": 0.0 for k in range(1, 7)})
+        index = {link.name: i for i, link in enumerate(m.links)}
+        for k in range(1, 7):
+            rod, tube = (modes.complex.poses[:, index[f"{part}{k}"]] for part in ("rod", "tube"))
+            # the slide is at rest: both links have one pose; all rotations are orthogonal
+            assert np.abs(rod - tube).max() < 1e-7 * np.abs(rod).max()
+            R = rod[:, :3, :3]
+            assert np.abs(R @ R.swapaxes(1, 2) - np.eye(3)).max() < 1e-7 * np.abs(R).max() ** 2
+            head = next(pair.point for pair in m.pairs if pair.name == f"B{k}")
+            at = np.append(head, 1.0)
+            top = modes.complex.poses[:, index["platform"]]
+            assert (np.abs((tube - top) @ at).max(axis=1) < 1e-8 * np.abs(top).max(axis=(1, 2)) ** 2).all()
+
+
+@pytest.mark.parametrize(
+    ("feet", "heads"), [((0, 1, 2, 3, 4, 5), (0, 0, 1, 1, 2, 2)), ((0, 1, 1, 2, 2, 0), (0, 0, 1, 1, 2, 2))]
+)
+def test_a_platform_on_three_joints_has_sixteen(feet: tuple[int, ...], heads: tuple[int, ...]) -> None:
+    """Joints that coincide stay one in all mechanisms of the class, which has fewer assemblies than the general platform."""
+    rng = np.random.default_rng(4)
+    A, B = rng.normal(size=(6, 3)), rng.normal((0.0, 0.0, 3.0), 1.0, (3, 3))
+    pairs = []
+    for i, (foot, head) in enumerate(zip(A[list(feet)], B[list(heads)], strict=True)):
+        pairs += [
+            mg.Pair(f"A{i}", "S", "base", f"leg{i}", point=foot),
+            mg.Pair(f"B{i}", "S", f"leg{i}", "platform", point=head),
+        ]
+    m = mg.Mechanism("platform", pairs=pairs, frame="base")
+    modes = mg.assemblies(m, {})
+    assert (modes.total, len(modes) + len(modes.complex), modes.completeness) == (16, 16, "proved")
+    assert "Nanua" in modes.evidence[0]
+    place = [link.name for link in m.links].index("platform")
+    gaps = np.abs(modes.poses[:, place] - np.eye(4)).max(axis=(1, 2))
+    assert gaps.min() < 1e-9
+
+
+def test_rods_are_chains_between_balls_or_two_turns_with_nothing_free_between() -> None:
+    def chain(*letters: str, driven: tuple[str, ...] = ()) -> int:
+        """How many rods a loop has of an R at the frame and these pairs."""
+        rng = np.random.default_rng(1)
+        links = ["frame", *(f"l{i}" for i in range(len(letters))), "frame"]
+        pairs = [
+            mg.Pair(f"{s}{i}", s, links[i], links[i + 1], point=rng.normal(size=3), axis=rng.normal(size=3))
+            for i, s in enumerate(("R", *letters))
+        ]
+        s = indexed(mg.Mechanism("loop", pairs=pairs))
+        return len(rods_of(s, np.array([s.first_column[int(name[1:])] for name in ("R0", *driven)])))
+
+    assert chain("S", "S", "R") == chain("U", "S", "R") == chain("S", "U", "R") == 1
+    assert chain("S", "P", "S", driven=("P2",)) == 1
+    assert chain("S", "R", "S", driven=("R2",)) == 1
+    assert chain("S", "P", "S", driven=()) == chain("U", "U", "R", "R") == chain("Sg", "S") == 0
+
+
+def test_balls_and_two_turns_point_where_they_shall() -> None:
+    rng = np.random.default_rng(0)
+    row = mg.Pair("U", "U", "a", "b", point=(0, 0, 0), axis=Z).type
+    axes = [np.array(step.freedom.twist[:3]) for step in row.steps if isinstance(step, ConstantScrew)]
+    angles, of = rng.uniform(-3, 3, (2, 50)), rng.normal(size=(3, 1))
+
+    def turned(at: np.ndarray) -> np.ndarray:
+        first, second = (rotation_exp(axis[:, None] * angle) for axis, angle in zip(axes, at, strict=True))
+        return np.einsum("ijt,jkt,k->it", first, second, of[:, 0])
+
+    to = turned(angles)
+    found = _two_turns(row, of, to, angles.astype(complex))
+    assert np.abs(found - angles).max() < 1e-9
+    other = _two_turns(row, of, to, angles + np.pi + 0j)
+    assert np.abs(turned(other.real) - to).max() < 1e-9
+    assert np.abs(other.imag).max() < 1e-9
+    begin = rng.normal(size=(4, 50))
+    begin /= np.linalg.norm(begin, axis=0)
+    to[:, 0] = -np.einsum("ij,j->i", quaternion_matrix(begin)[:, :, 0], of[:, 0])  # half a turn from where it is
+    reached = np.einsum("ijt,j->it", quaternion_matrix(_ball(of, to, begin.astype(complex))), of[:, 0])
+    assert np.abs(reached - to).max() < 1e-12
+
+
+def test_a_slide_may_have_any_imaginary_length() -> None:
+    """Its pose has no sine, which overflows at 710: tracks to assemblies far away were lost there."""
+    s = indexed(mg.Mechanism("slide", pairs=[mg.Pair("P", "P", "frame", "body", point=(0, 0, 0), axis=Z)]))
+    poses = Configuration(s, np.array([[2000j]])).poses
+    assert np.abs(poses[2, 3, 1, 0] - 2000j) < 1e-9
+    assert np.abs(poses[:, :3, 1, 0] - np.eye(3)).max() < 1e-12
+
+
+@pytest.mark.parametrize("make", [lambda: mg.load("rssr"), hexapod, machines.sliders])
+def test_rates_of_tracks_keep_rods_closed(make: Callable[[], mg.Mechanism]) -> None:
+    """From member to member markers, points and lengths move: with the rates of the freedoms the rows open with the square of the step."""
+    m = make()
+    family = Question(m, {m.full_name(d.freedom): 0.0 for d in m.drives}).form.family
+    rng = np.random.default_rng(0)
+    closed = family.random_closed(rng)
+    assert closed is not None
+    member, x = closed
+    leg = Leg(Equations(family, family.mixing(rng)), member, family.random_member(rng))
+    one = np.zeros(1, dtype=np.intp)
+    here = leg.at(x[:, None], np.zeros(1), one)
+    rates = here.rates(here.idle())[0]
+    open_by = []
+    for h in (1e-4, 1e-5):
+        there = leg.at(family.system.advance(here.here.x, h * rates), np.array([h]), one)
+        open_by.append(np.abs(there.here.residual).max() / max(1.0, np.abs(rates).max()) ** 2)
+    assert open_by[1] < 0.03 * open_by[0]
