@@ -39,7 +39,7 @@ PLATFORMS: tuple[tuple[tuple[int, ...], int, str], ...] = (
 """Rods at each joint of the one body of a platform on six rods, whatever their joints on the other; the bound, and its source."""
 TRIADS = (6, "a coupler curve, of degree six and threefold in the circular points, meets a circle in 12 - 6 others")
 """The bound of two bodies in a plane joined by three links, and its source."""
-PLANE = (3, 2)
+PLANE_MOTIONS = (3, 2)
 """Dimensions of the group of plane motions and of its translations."""
 
 
@@ -127,4 +127,4 @@ def _of_triad(family: Family) -> Bound | None:
     if len(ends) != 2 or len(legs) != 3 or any(set(others) != ends for others in legs):
         return None
     groups = {(h.shape[1], h.shape[1] - span(h[:3]).shape[1]) for h in family.loop_algebras}
-    return Bound(*TRIADS) if groups == {PLANE} else None
+    return Bound(*TRIADS) if groups == {PLANE_MOTIONS} else None

@@ -31,7 +31,7 @@ FIRST_STEP = 0.02
 """First step."""
 LARGEST_STEP = 0.25
 """Largest step."""
-SMALLEST_STEP, NEAREST = 1e-7, 1e-4
+SMALLEST_STEP, LEFT_OF_WAY = 1e-7, 1e-4
 """Smallest step, as part of what is left of the way, and the least that this counts as: steps are short before an end that is nearly
 singular."""
 ENDLESS_STATE = (25.0, 1e5, 1e3)
@@ -267,7 +267,7 @@ def follow(
         for mask, flag in ((ended, out.arrived), (infinite, out.infinite)):
             flag[march.who[mask]] = True
         out.x[:, march.who], out.s[march.who] = march.x, march.s[0]
-        march.keep(~(ended | infinite | (march.h < SMALLEST_STEP * np.clip(1.0 - march.s[0], NEAREST, 1.0))))
+        march.keep(~(ended | infinite | (march.h < SMALLEST_STEP * np.clip(1.0 - march.s[0], LEFT_OF_WAY, 1.0))))
     done = np.flatnonzero(out.arrived)
     if done.size and polish:
         out.x[:, done], good = polished(leg, out.x[:, done], way(np.ones(1))[0][0], every[done])
