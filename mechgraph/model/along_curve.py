@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar
@@ -11,10 +11,11 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array, cross
 from mechgraph.errors import ShapeError
-from mechgraph.model.curves import ORDERS, Curve, turned
+from mechgraph.model.curves import ORDERS, Curve
 from mechgraph.model.factors import Factor, PoseStack, Stack, entries
 from mechgraph.model.row_parts import UNIT_TWISTS, Freedom
 from mechgraph.model.travel import COMPLEX_STEP, Place, Travel
+from mechgraph.model.travelling import Travelling
 
 X, Z = 0, 2
 """Axes of the frame that may be the tangent."""
@@ -25,7 +26,7 @@ CURVE_POINTS = 181
 
 
 @dataclass(frozen=True)
-class AlongCurve(Factor):
+class AlongCurve(Travelling):
     """A frame that travels along a curve by the arc length ``q``, from where it is the frame before the factor.
 
         D(q) = F(home)^-1 F(home + q);   on the side of link b, D(q) = F(home + q)^-1 F(home)
@@ -49,11 +50,6 @@ class AlongCurve(Factor):
     def freedoms(self) -> tuple[Freedom, ...]:
         """A slide along the tangent."""
         return (Freedom(self.name, UNIT_TWISTS["Tx" if self.tangent == X else "Tz"]),)
-
-    @property
-    def kind(self) -> Hashable:
-        """Each by itself."""
-        return self
 
     @property
     def travel(self) -> Travel:
@@ -133,16 +129,11 @@ class AlongCurve(Factor):
 
     def pose_at(self, here: Place) -> Array:
         """The pose where the curve is ``here``."""
-        R0, p0 = self.start[:, :3], self.start[:, 3].reshape(3, *(1,) * (here.x.ndim - 1))
-        out = np.empty((3, 4, *here.x.shape[1:]), dtype=here.x.dtype)
-        if self.back:
-            R = self._frame(here)
-            out[:, :3] = np.einsum("ji...,jk->ik...", R, R0)
-            out[:, 3] = (R * ((p0 - here.x) / self.unit)[:, None]).sum(axis=0)
-        else:
-            out[:, :3] = turned(R0.T, self._frame(here))
-            out[:, 3] = turned(R0.T, (here.x - p0) / self.unit)
-        return out
+        R = self._frame(here)
+        if not self.back:
+            return self._pose_seen(R, here.x)
+        R0, behind = self.start[:, :3], -self._off(here.x)
+        return np.concatenate([np.einsum("ji...,jk->ik...", R, R0), (R * behind[:, None]).sum(axis=0)[:, None]], axis=1)
 
     def twists(self, x: Array, pitch: Array) -> Array:
         """``(w, t + w x (p - x))``, p the origin of the frame before it; on the side of link b minus ``(R^T w, R^T t)``."""
@@ -168,9 +159,7 @@ class AlongCurve(Factor):
         if self.back:
             R = self._frame(here)
             return np.concatenate([(R * part[:, None]).sum(axis=0) for part in (w, v)])
-        p0 = self.start[:, 3].reshape(3, *(1,) * (here.x.ndim - 1))
-        v = v - cross(w, (here.x - p0) / self.unit)
-        return np.concatenate([turned(self.start[:, :3].T, part) for part in (w, v)])
+        return self._screw_seen(here.x, w, v)
 
     def stack(self, factors: Sequence[Factor], counts: Sequence[int]) -> Stack:
         """Copies evaluated together."""

@@ -99,7 +99,7 @@ class Function(Curve):
     @cached_property
     def orders(self) -> int:
         """As many as it returns."""
-        return len(self.position(np.array([self.ends[0]])))
+        return len(list(self.position(np.array([self.ends[0]]))))
 
     @property
     def ends(self) -> tuple[float, float]:

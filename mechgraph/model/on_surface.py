@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -14,13 +13,14 @@ from mechgraph.model.factors import Factor
 from mechgraph.model.row_parts import UNIT_TWISTS, Freedom
 from mechgraph.model.surfaces import Surface
 from mechgraph.model.travel import COMPLEX_STEP
+from mechgraph.model.travelling import Travelling
 
 SURFACE_LINES = 9
 """Lines each way by which a surface is drawn."""
 
 
 @dataclass(frozen=True)
-class OnSurface(Factor):
+class OnSurface(Travelling):
     """A frame that lies on a surface: z its normal, x along u; coordinates are lengths along u and v where they are zero.
 
     D(q) = F(home)^-1 F(home + q / sizes), ``sizes`` being ``|x_u|`` and ``|x_v|`` at home; ``turned`` has the normal the other way round;
@@ -38,11 +38,6 @@ class OnSurface(Factor):
     def freedoms(self) -> tuple[Freedom, ...]:
         """Slides along both parameters."""
         return Freedom("Tu", UNIT_TWISTS["Tx"]), Freedom("Tv", UNIT_TWISTS["Ty"])
-
-    @property
-    def kind(self) -> Hashable:
-        """Each by itself."""
-        return self
 
     @cached_property
     def sizes(self) -> Array:
@@ -133,17 +128,12 @@ class OnSurface(Factor):
     def pose(self, x: Array, pitch: Array) -> Array:
         """Value of the motion."""
         p, R, _ = self._here(x)
-        R0, p0 = self.start[:, :3], self.start[:, 3].reshape(3, *(1,) * (p.ndim - 1))
-        return np.concatenate(
-            [np.tensordot(R0, R, (0, 0)), np.tensordot(R0, (p - p0) / self.unit, (0, 0))[:, None]], axis=1
-        )
+        return self._pose_seen(R, p)
 
     def twists(self, x: Array, pitch: Array) -> Array:
         """``(w, x_a + w x (p - x))`` for both parameters, p the origin of the frame before it."""
         p, _, S = self._here(x)
-        off = ((p - self.start[:, 3].reshape(3, *(1,) * (p.ndim - 1))) / self.unit)[:, None]
-        v = S[3:] - cross(S[:3], np.broadcast_to(off, S[:3].shape))
-        return np.concatenate([np.tensordot(self.start[:, :3], part, (0, 0)) for part in (S[:3], v)])
+        return np.stack([self._screw_seen(p, S[:3, a], S[3:, a]) for a in range(2)], axis=1)
 
     def twist_rates(self, x: Array, dq: Array, pitch: Array) -> Array:
         """The derivative of ``sum_j S_j q'_j`` along ``q'``, by a complex step: exact."""
