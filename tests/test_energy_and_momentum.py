@@ -1,10 +1,15 @@
 """Motion in time of mechanisms that nobody chose, and of published ones: energy, momentum, the way back, the drives it needs."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
+import scipy
 import strategies
 
 import mechgraph as mg
+from mechgraph.response.charts import ChartStage
 
 T = np.linspace(0.0, 0.2, 9)
 
@@ -133,6 +138,44 @@ def test_andrews_mechanism_against_the_published_reference():
     np.testing.assert_allclose(np.add(begin, turned), end, atol=1e-9)
 
 
+def test_the_slider_of_the_governor_rises_and_sinks_as_published():
+    """A5 of the IFToMM library: between .50 and about .743 m, about 9.7 periods in 10 s; arms that were rods would rise as high.
+
+    With rods in place of the stiff springs, angular momentum ``I(s) w`` and energy ``(I w)^2 / 2 I + V(s)`` tell where it turns back.
+    """
+    m = mg.load(Path(__file__).parent / "reference" / "data" / "flyball-governor.toml").replace(drives=[])
+    t = np.linspace(0.0, 1.1, 221)
+    r = mg.respond(m, t, rates={"A": 2 * np.pi}, method="LSODA", rtol=1e-6, atol=1e-8)
+    height, low = r.link("slider").center[:, 2], 120
+    assert height.max() == pytest.approx(0.743, abs=7e-4)
+    assert height[low:].min() == pytest.approx(0.50, abs=1e-4)
+    assert 10.0 / t[low + np.argmin(height[low:])] == pytest.approx(9.7, abs=0.1)
+
+    def inertia_and_potential(s):
+        down = (
+            1.0 - s
+        ) / 1.0  # sine of the angle of the arms: their middles are as far from the slider as from the hinge
+        balls, own = (0.05 + np.sqrt(1 - down**2)) ** 2, 0.3 * (0.05 + 0.5 * np.sqrt(1 - down**2)) ** 2
+        spin = 0.3 / 12 * (1 - down**2) + 0.3 * 0.01**2 / 12 * (1 + down**2)
+        inertia = 2 * (5.0 * balls + own + spin) + 3.0 * 0.1**2 / 6 + 0.3 * 0.01**2 / 6
+        return inertia, 9.81 * (3.0 * s - 2 * (5.0 + 0.15) * down)
+
+    (I0, V0), w = inertia_and_potential(0.5), 2 * np.pi
+    off = lambda s: (I0 * w) ** 2 / 2 / inertia_and_potential(s)[0] + inertia_and_potential(s)[1] - I0 * w**2 / 2 - V0
+    assert height.max() == pytest.approx(scipy.optimize.brentq(off, 0.6, 0.9), abs=5e-4)
+
+
+@pytest.mark.parametrize("rates", [{"A": 3.0}, {}])
+def test_a_start_at_a_change_point_is_named(rates):
+    """A flat parallelogram, in which two branches meet: steps collapsed, of which stiff loads were called the cause."""
+    corners, names = [(0, 0, 0), (1, 0, 0), (3, 0, 0), (2, 0, 0)], ["frame", "crank", "coupler", "rocker", "frame"]
+    links = [mg.Link("frame"), *(mg.Link(name, 1.0, (0.5, 0, 0), 0.1 * np.eye(3)) for name in names[1:4])]
+    pairs = [mg.Pair("ABCD"[i], "R", names[i], names[i + 1], point=corners[i], axis=(0, 0, 1)) for i in range(4)]
+    m = mg.Mechanism("flat", links, pairs, [], [mg.Gravity((0, -9.81, 0))])
+    with pytest.raises(mg.ResponseError, match=r"2 branches meet there.*: its mobility is 2 there and 1 beside it"):
+        mg.respond(m, (0.0, 1.0), rates=rates)
+
+
 def test_with_a_passive_freedom_it_passes_beside_a_change_point():
     """A rod as coupler of a parallelogram whose folded position is missed by 1e-7: it was given up there."""
     inertia = np.diag([0.1, 0.1, 0.1])
@@ -205,3 +248,20 @@ def test_where_it_turns_back_no_energy_is_missed():
     assert np.abs(at.energy.balance) > 1e-3 * at.energy.greatest
     assert not at.warnings
     assert not r.warnings
+
+
+@pytest.mark.parametrize("seed", [2, 7])
+def test_derivatives_for_implicit_steppers_come_in_one_batch(seed):
+    """Those of a stage of independent freedoms against central differences, with loops, turns in space and a damper."""
+    m = random_mechanism(seed)
+    spring = next(load for load in m.loads if isinstance(load, mg.Spring))
+    m = m.replace(loads=[m.loads[0], replace(spring, damping=5.0)])
+    r = mg.respond(m, (0.0, 0.05), method="Radau", rtol=1e-4)
+    segment = r._course.integration.segments[-1]
+    stage = segment.stage
+    assert isinstance(stage, ChartStage)
+    t, y = segment.end, segment.dense(segment.end)
+    J, h = stage.jacobian(t, y), 1e-5
+    for i, nudge in enumerate(h * np.eye(len(y))):
+        column = (stage.rates(t, y + nudge) - stage.rates(t, y - nudge)) / (2 * h)
+        np.testing.assert_allclose(J[:, i], column, atol=1e-4 * np.abs(J).max())

@@ -132,6 +132,8 @@ class Arc:
 class PathStage:
     """Implements ``integration.Stage`` along an arc, from a place ``u`` with rate ``v``."""
 
+    jacobian = None
+
     def __init__(self, arc: Arc, u: float, v: float) -> None:
         self.arc, self.task, self._first = arc, arc.task, np.array([u, v, 0.0])
         self._piece: Piece | None = None

@@ -16,6 +16,9 @@ from mechgraph.response.motion_equations import Loads, Moved, moved
 from mechgraph.response.prescribed import Prescribed
 from mechgraph.structure.mobility import free_motion
 
+NUDGE = 1e-7
+"""Part of a coordinate (or of one) by which it is changed for a derivative."""
+
 
 @dataclass(frozen=True)
 class Task:
@@ -75,7 +78,7 @@ class ChartStage:
         self._first = np.concatenate([np.zeros(self.n), dq[self.chart.moving], [0.0]])
         self._last = _Known(t, x, dq, np.zeros_like(dq))
         self._path = [self._last]
-        found = self._found(t, self._first)
+        found = self._found(t, self._first[:, None])
         if found is None:
             raise Stopped(
                 "the loops do not close any more to where a step led, as at positions where the mechanism locks"
@@ -91,16 +94,28 @@ class ChartStage:
 
     def rates(self, t: float, y: Array) -> Array:
         """See ``Stage``."""
+        return self._rates(t, y[:, None])[:, 0]
+
+    def _rates(self, t: float, y: Array) -> Array:
+        """``y' (k, T)`` at one time and several ``y (k, T)``; NaN where no closed states are found near the last ones."""
         found = self._found(t, y)
         if found is None:
-            return np.full(len(y), np.nan)
+            return np.full(y.shape, np.nan)
         du = self.chart.rates_of_coordinates(found.rates.here.x, found.rates.dq)
-        return np.concatenate([du[:, 0], found.rates.ddq[self.chart.moving, 0], found.power])
+        return np.concatenate([du, found.rates.ddq[self.chart.moving], found.power[None]])
+
+    def jacobian(self, t: float, y: Array) -> Array:
+        """See ``Stage``: forward differences, all evaluated in one batch."""
+        size = NUDGE * np.maximum(1.0, np.abs(y[:-1]))
+        f = self._rates(t, y[:, None] + np.pad(np.diag(size), ((0, 1), (1, 0))))
+        J = (f[:, 1:] - f[:, :1]) / size
+        # where it does not close the rates are NaN as well, and the step is taken back
+        return np.nan_to_num(np.pad(J, ((0, 0), (0, 1))), copy=False)
 
     def accepted(self, t: float, y: Array) -> bool:
         """See ``Stage``."""
         if self._last.t != t or not np.array_equal(self._y, y):
-            self._found(t, y)
+            self._found(t, y[:, None])
         self._path.append(self._last)
         return not self.chart.worn(self._f, y[: self.n])
 
@@ -118,15 +133,15 @@ class ChartStage:
         return self.chart.close(guess, y[: self.n], self.task.prescribed_at(t)[0]), y[self.n : -1]
 
     def _found(self, t: float, y: Array) -> Moved | None:
-        """Rates and accelerations at a time; None where no closed state is found near the last ones."""
-        at, n = np.array([t]), self.n
+        """Rates and accelerations at a time for ``y (k, T)``; None where no closed states are found near the last ones."""
+        at, n = np.full(y.shape[1], t), self.n
         near = self._last if abs(self._last.t - t) < abs(self._path[-1].t - t) else self._path[-1]
-        p = self.task.prescribed_at(at)
-        closed = self.chart.close(near.ahead(self.task.system, at), y[:n, None], p[0])
-        if not closed.done[0]:
+        p = self.task.prescribed_at(at[:1]).repeat(len(at), axis=2)
+        closed = self.chart.close(near.ahead(self.task.system, at), y[:n], p[0])
+        if not closed.done.all():
             return None
-        found = moved(closed, y[n:-1, None], p[1:], self.task.loads, at)
+        found = moved(closed, y[n:-1], p[1:], self.task.loads, at)
         rates = found.rates
         self._last = _Known(t, closed.here.x[:, 0], rates.dq[:, 0], rates.ddq[:, 0])
-        self._f, self._y = closed.f, y
+        self._f, self._y = closed.f, y[:, 0]
         return found

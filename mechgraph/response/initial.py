@@ -18,9 +18,12 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.linear import rank_of, singular_values
 from mechgraph.numerics.tolerances import MOTIONS
 from mechgraph.quantities import is_numeric, without_units, wrong
+from mechgraph.response.chart import Stopped
 from mechgraph.response.charts import Task
 from mechgraph.response.motion_equations import Columns
 from mechgraph.response.prescribed import Prescribed
+from mechgraph.structure.branching import branches, branches_text
+from mechgraph.structure.finite_motion import finite_motion
 
 AGREEING = 1e-9
 """Part of the given rates by which they may miss the closure before they contradict it."""
@@ -79,6 +82,8 @@ def start_rates(m: Mechanism, task: Task, x: Array, rates: Mapping[str, float], 
     ------
     DeclarationError
         where they contradict the closure.
+    Stopped
+        where they do not tell how the motion begins, as at a change point.
     """
     s = task.system
     names = [*task.prescribed.names, *rates]
@@ -86,7 +91,12 @@ def start_rates(m: Mechanism, task: Task, x: Array, rates: Mapping[str, float], 
     places = [m.freedom(name) for name in names]
     columns = np.array([int(s.first_column[k]) + j for k, j in places], dtype=np.intp)
     wanted = np.array(values) / np.where(s.is_length[columns], s.par.L, 1.0)
-    N = closure_rank(Configuration(s, x[:, None]), engine=task.engine).motions
+    closure = closure_rank(Configuration(s, x[:, None]), engine=task.engine)
+    N = closure.motions
+    if N.shape[1] > 1 and closure.rank < closure.count:
+        beside = finite_motion(s, x, closure, task.engine).mobility
+        if beside < N.shape[1]:
+            raise Stopped(_where_branches_meet(s, x, N, beside))
     if task.held:
         N = _at_rest(task, x)
     if not len(names):
@@ -105,6 +115,17 @@ def start_rates(m: Mechanism, task: Task, x: Array, rates: Mapping[str, float], 
             ],
         )
     return np.asarray(N @ a)
+
+
+def _where_branches_meet(s: System, x: Array, motions: Array, beside: int) -> str:
+    """What is said of a start in a singular position: its motions are not those that the mechanism has ``beside`` it."""
+    fastest = int(np.argmax(np.where(s.single_rows >= 0, np.abs(motions).max(axis=1), 0.0)))
+    ways = branches(s, x, np.array([fastest], dtype=np.intp)) if beside == 1 else ()
+    meet = f" ({branches_text(ways, s.m.freedom_names()[fastest])})" if ways else ""
+    return (
+        f"it begins in a singular position{meet}: its mobility is {motions.shape[1]} there and {beside} beside it, so that rates do not "
+        "tell how the motion goes on; start beside it, on the branch that is meant"
+    )
 
 
 def _at_rest(task: Task, x: Array) -> Array:

@@ -44,6 +44,10 @@ class Stage(Protocol):
     def rates(self, t: float, y: Array) -> Array:
         """``y'``; NaN where the coordinates do not reach (the stepper takes a shorter step)."""
 
+    @property
+    def jacobian(self) -> Callable[[float, Array], Array] | None:
+        """Derivatives ``(k, k)`` of ``y'`` by ``y`` for implicit steppers; None to have them found by single evaluations."""
+
     def accepted(self, t: float, y: Array) -> bool:
         """Keep what is known at the end of an accepted step; whether the stage serves on."""
 
@@ -114,7 +118,9 @@ class Integration:
             work, y = self.done, stage.begin()
             atol = np.full(len(y), self.atol)
             atol[-1] *= stage.energy
-            more: dict[str, float] = {} if h is None else {"first_step": min(h, end - t)}
+            more: dict[str, Any] = {} if h is None else {"first_step": min(h, end - t)}
+            if self.method not in EXPLICIT:
+                more["jac"] = stage.jacobian
             stepper = make(stage.rates, t, y, end, rtol=self.rtol, atol=atol, **more)
             serves = True
             try:

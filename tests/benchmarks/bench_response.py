@@ -176,8 +176,9 @@ def told(lines: list[tuple[str, dict[str, list[Run]]]]) -> str:
 MEANING = (
     "Each program at the coarsest tolerance or step at which a point of the mechanism is nowhere further off than 1e-3 or 1e-6 of a rod's "
     "length; median processor times, in brackets against mechgraph (above 1: mechgraph is faster). A run of another program that "
-    f"took more than {LIMIT:g} s, or twice the time of mechgraph where that is more, was ended ('over'). References: A2 its one-freedom "
-    "equation, the others mechgraph at 1e-10. mechgraph returns all reactions with the motion, the others were asked for one point. "
+    f"took more than {LIMIT:g} s, or twice the time of mechgraph where that is more, was ended ('over'); other words in place of a "
+    "time are how that program's own run ended. References: A2 its one-freedom equation, "
+    "the others mechgraph at 1e-10. mechgraph returns all reactions with the motion, the others were asked for one point. "
     "Pinocchio: classical Runge-Kutta steps of our own or scipy's DOP853 around `constraintDynamics` with Baumgarte's stabilization, for "
     "Bricard also around `lcaba`; that leaves the stabilization out, so that it loses the row of four-bars at its flat position, and it "
     "was given up on Andrews' mechanism. The governor, which has no loops, by `aba` and LSODA. Exudyn: planar bodies where the "
