@@ -92,9 +92,13 @@ class Marching:
         extrapolated; behind a corner the change of the sensitivity over the last step; else the sensitivity alone.
         """
         h, change = at - last.place, drive - last.drive
-        came, back = last.drive - before.drive, last.place - before.place
-        along, sizes = np.add.reduce(came * change), np.add.reduce(came * came) * np.add.reduce(change * change)
-        straight = known & (along > (1 - 1e-9) * np.sqrt(sizes)) & (h < 16.0 * back) & (h > 0.25 * back)
+        back = last.place - before.place
+        straight = known & (h < 16.0 * back) & (h > 0.25 * back)
+        if self.paths.bent:
+            came = last.drive - before.drive
+            along, sizes = np.add.reduce(came * change), np.add.reduce(came * came) * np.add.reduce(change * change)
+            straight &= along > (1 - 1e-9) * np.sqrt(sizes)
+            known = known & (along > 0)
         if np.count_nonzero(straight) == len(straight):
             return self.problem.corrigible(self._through(before, last, change, h), last.which), 4.0
         dq = np.add.reduce(last.Z * change, axis=1)
@@ -103,7 +107,7 @@ class Marching:
         if two.size:
             dq[:, two] = self._through(before.take(two), last.take(two), change[:, two], h[two])
             order[two] = 4.0
-        bent = (known & ~straight & (along > 0) & (h < 4.0 * back)).nonzero()[0]
+        bent = (known & ~straight & (h < 4.0 * back)).nonzero()[0]
         turn = ((last.Z - before.Z)[:, :, bent] * change[:, bent]).sum(axis=1)
         dq[:, bent] += 0.5 * h[bent] / back[bent] * turn
         order[bent] = 3.0

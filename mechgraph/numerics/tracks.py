@@ -49,6 +49,8 @@ class Paths:
         self._begin, self._from = self._all[:, begin], self._places[begin]
         self._way, self._added = self._places - self._from, self._all - self._begin
         self._way[self._way == 0] = 1.0
+        self.bent = bool((count > 2).any())
+        """Whether there are points between the ends, at which paths may turn."""
 
     @property
     def bends(self) -> tuple[Index, Array]:
@@ -61,8 +63,10 @@ class Paths:
 
     def drive(self, tracks: Index, at: Array) -> Array:
         """Path values ``(d, n)`` at places of tracks; behind the end straight on."""
-        point = self._key.searchsorted(at + self._offset.take(tracks))
-        point = np.minimum(np.maximum(point, self._second.take(tracks)), self._last.take(tracks))
+        point = self._last.take(tracks)
+        if self.bent:
+            found = self._key.searchsorted(at + self._offset.take(tracks))
+            point = np.minimum(np.maximum(found, self._second.take(tracks)), point)
         u = (at - self._from.take(point)) / self._way.take(point)
         values: Array = self._begin.take(point, axis=1) + u * self._added.take(point, axis=1)
         ends = u == 1.0
@@ -73,6 +77,8 @@ class Paths:
     def step(self, tracks: Index, at: Array, h: Array) -> Array:
         """Where a step of at most ``h`` leads: to the furthest point within it up to which the path is nearly straight."""
         out = np.minimum(at + h, self.end.take(tracks))
+        if not self.bent:
+            return out
         inside = self._key.searchsorted(out + self._offset.take(tracks), side="right") - 1
         for i in (self._places.take(inside) > at).nonzero()[0]:
             out[i] = self._furthest(int(tracks[i]), float(at[i]), float(out[i]))
