@@ -29,7 +29,8 @@ from mechgraph.model.declaration import mapping_faults
 from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism, check_mechanism
 from mechgraph.model.parameters import declared
-from mechgraph.pipeline import Options, Outcome, Pipeline
+from mechgraph.outcome import Outcome
+from mechgraph.pipeline import Options, Pipeline
 from mechgraph.quantities import wrong
 from mechgraph.report.report import check, hinted
 from mechgraph.result.solution import Solution

@@ -19,7 +19,7 @@ import numpy as np
 from bench_core import best, seven_r
 
 import mechgraph as mg
-from mechgraph import kinetostatics, pipeline
+from mechgraph import kinetostatics, outcome
 from mechgraph.closure import legs
 from mechgraph.force import block
 from mechgraph.force.dalembert import METHODS
@@ -35,7 +35,7 @@ STAGES = (
     ("careful march", Follower, "_careful"),
     ("nodes between", legs, "refined"),
     ("interpolation, Newton", legs.Legs, "_closed"),
-    ("rates", pipeline, "rates"),
+    ("rates", outcome, "rates"),
     ("loads", block.Site, "collect"),
     ("inertia", block, "inertia_wrenches"),
     ("wrenches", METHODS, "loop_wrench"),

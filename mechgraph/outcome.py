@@ -1,0 +1,207 @@
+"""What becomes of positions that were found: rates, forces, and a trajectory of them, block by block."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mechgraph.closure.assembly import CLOSED
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.coordinates import continued
+from mechgraph.closure.driver_path import BLOCK, DriverPath, Positions, Status, in_blocks
+from mechgraph.closure.indexing import Index, System
+from mechgraph.closure.rates import Rates, Velocities, at_dead_points, disagreement, rates
+from mechgraph.closure.solver import ClosureSolver, FactoredClosure, closure_solver
+from mechgraph.errors import DeclarationError
+from mechgraph.force.block import BlockForces, ForceTask, forces_of_block
+from mechgraph.result.kept import BlockMotion
+from mechgraph.result.trajectory import Trajectory
+from mechgraph.structure.actuation import stand_still
+
+if TYPE_CHECKING:
+    from mechgraph.pipeline import Pipeline, Starts
+
+CONTRADICTION = 1e-6
+"""Relative part of the closure rates that drivers may leave open before they count as contradicting each other."""
+
+
+class Outcome:
+    """Positions found, turned into a trajectory block by block."""
+
+    def __init__(
+        self, line: Pipeline, starts: Starts, batch: tuple[int, ...], variant: Index, found: Positions, path: DriverPath
+    ) -> None:
+        self.line, self.starts, self.batch, self.found, self.path = line, starts, batch, found, path
+        self.solver: ClosureSolver = path.solver
+        self.variant = variant
+        self.contradicting = np.zeros(len(variant), dtype=bool)
+        self._system_at = partial(_system_at, starts, variant)
+        self._velocity, self._acceleration = (line.values(kind, batch) for kind in ("velocity", "acceleration"))
+        coordinates = np.tile(continued(path, found), starts.sharing) if starts.sharing > 1 else continued(path, found)
+        self.trajectory = Trajectory(
+            line.system,
+            self._system_at,
+            batch,
+            line.drive.t,
+            line.acting,
+            coordinates,
+            line.options.redundant == "nan",
+            line.passive if line.options.method else (),
+            line.drive.shown,
+            line.drive.names,
+        )
+        work = found.work
+        work.positions, work.nodes = len(variant), len(found.tracks.nodes)
+        self.trajectory.engine, self.trajectory.work = line.engine, work
+        self.trajectory.loads = starts.loads
+        self.trajectory.method = line.options.method
+        self._fill()
+
+    def _fill(self) -> None:
+        found = self.found
+        good = np.flatnonzero((found.status == Status.OK) & (found.near < 0))
+        bad = np.flatnonzero(found.status != Status.OK)
+        whole = not all(load.by_position for load in self.starts.loads)
+        if self.starts.sharing > 1:
+            self._fill_shared(good, whole)
+            return
+        self.trajectory.mark(bad, [status.value for status in found.status[bad]])
+        done, progress = 0, self.line.options.progress
+        for places in [good] if whole else in_blocks(good):
+            moved = self._moved(places)
+            if moved is not None:
+                self._put(*moved)
+            done += len(places)
+            if progress is not None:
+                progress(done, len(good))
+        for motion, f in self._beside_change_points():
+            self._put(motion, f)
+
+    def _fill_shared(self, good: Index, whole: bool) -> None:
+        """The motion of the first variant serves all; forces in blocks of whole variants."""
+        every, N = np.arange(self.starts.sharing)[:, None], self.batch[-1]
+        moved = self._moved(good)
+        status = np.where(
+            self.found.status == Status.OK, self.trajectory.first(N), [s.value for s in self.found.status]
+        )
+        self.trajectory.mark(np.arange(len(self.variant)), np.tile(status, len(every)))
+        self.contradicting[:] = np.tile(self.contradicting[:N], len(every))
+        blocks = 1 if whole else len(every) // max(1, BLOCK // N)
+        for motion, f in [*([] if moved is None else [moved]), *self._beside_change_points()]:
+            for variants in np.array_split(every, max(1, blocks)):
+                places, count = (variants * N + motion.places).ravel(), len(variants)
+                here = motion.here.repeated(self._system_at(places), count)
+                factors = None if f is None else self.solver.factored(here, np.tile(f.which, count))
+                self._put(BlockMotion(places, motion.rates.repeated(here, count)), factors)
+
+    def _moved(self, places: Index) -> tuple[BlockMotion, FactoredClosure] | None:
+        """Rates of a block, and the factors with which they were found; None where it has no position that is closed and regular."""
+        found = self.found
+        here = found.here if found.here is not None and len(places) == found.x.shape[1] else None
+        here = here or Configuration(self._system_at(places), found.x[:, places])
+        which = self.solver.chosen(here, found.which[places])
+        f = self.solver.factored(here, which)
+        found.work.factorizations += here.T
+        found.work.groups = max(found.work.groups, f.groups)
+        open_ = here.closure > CLOSED
+        dead = at_dead_points(here, f, self.solver) & ~open_
+        if (open_ | dead).any():
+            self.trajectory.mark(places[open_], Status.NOT_CLOSED.value)
+            self.trajectory.mark(places[dead], Status.DEAD_POINT.value)
+            keep = np.flatnonzero(~(open_ | dead))
+            places, here = places[keep], here.part(keep)
+            f = f.part(keep, here)
+        if not places.size:
+            return None
+        return self._agreed(self._rates(here, f, places), places), f
+
+    def _agreed(self, moved: Rates, places: Index) -> BlockMotion:
+        """Rates at places; where dependent drivers contradict the leading ones is noted."""
+        line = self.line
+        if len(line.lead) < len(line.columns):
+            given = line.values("position", self.batch), self._velocity, self._acceleration
+            moved.contradiction = disagreement(moved, line.columns, *(values[:, places] for values in given))
+        self.contradicting[places] = moved.contradiction > CONTRADICTION
+        return BlockMotion(places, moved)
+
+    def _rates(self, here: Configuration, f: FactoredClosure, places: Index) -> Rates:
+        """Rates at states for the motions of the drivers at places."""
+        line = self.line
+        velocity, acceleration = self._velocity[line.lead][:, places], self._acceleration[line.lead][:, places]
+        with np.errstate(over="ignore", invalid="ignore"):
+            moved = rates(here, f, line.leading, velocity, acceleration, line.passive)
+            largest = np.square(np.max([np.abs(values).max(initial=0.0) for values in (moved.V, moved.dq, moved.ddq)]))
+        if not np.isfinite(largest):  # accelerations hold squares of rates
+            too_large = "rates are beyond the largest number (1.8e308): give smaller velocities and accelerations"
+            raise DeclarationError(f"solve {line.m.name!r}", [too_large])
+        return moved
+
+    def _beside_change_points(self) -> Iterator[tuple[BlockMotion, FactoredClosure | None]]:
+        """Motion at and beside the change points passed, interpolated between both sides; without factors where these are singular."""
+        found, path = self.found, self.path
+        for number, crossing in enumerate(found.crossings):
+            places, sides = np.flatnonzero(found.near == number), crossing.sides
+            n, k = len(places), len(sides)
+            many = np.tile(np.arange(k), n)
+            beside = path.at(sides.x[:, many], sides.drive[:, many], sides.track[many])
+            f = path.factored(beside, sides.which[many])
+            moved = self._rates(beside, f, np.repeat(places, k))
+            weights = crossing.weights(found.place[places])
+            dq, ddq = (np.einsum("fnk,kn->fn", values.reshape(-1, n, k), weights) for values in (moved.dq, moved.ddq))
+            open_ = Configuration(self._system_at(places), found.x[:, places]).closure > CLOSED
+            self.trajectory.mark(places[open_], Status.NOT_CLOSED.value)
+            for regular in (True, False):
+                mine = np.flatnonzero(((found.status[places] == Status.OK) == regular) & ~open_)
+                if not mine.size:
+                    continue
+                at = places[mine]
+                here = Configuration(self._system_at(at), found.x[:, at])
+                motion = Rates(Velocities(here, dq[:, mine]), ddq[:, mine], np.zeros(len(mine)))
+                factors = self.solver.factored(here, self.solver.chosen(here, found.which[at])) if regular else None
+                yield self._agreed(motion, at), factors
+
+    def _put(self, motion: BlockMotion, f: FactoredClosure | None) -> None:
+        self.trajectory.has_forces |= self.line.options.method is not None
+        if not self.line.options.method or f is None:
+            self.trajectory.put(motion, None)
+            return
+        if self.line.drive.actuated:
+            rest = stand_still(f.sensitivity(), self.line.acting)
+            if rest.any():
+                self.trajectory.mark(motion.places[rest], Status.ACTUATORS_REST.value)
+                self.trajectory.put(motion.part(np.flatnonzero(rest)), None)
+                motion = motion.part(np.flatnonzero(~rest))
+        if len(motion.places):
+            self.trajectory.put(motion, self._forces(motion, f))
+
+    def _forces(self, motion: BlockMotion, f: FactoredClosure) -> BlockForces:
+        line = self.line
+        if line.acting is not line.columns or len(line.lead) < len(line.columns):  # all their efforts are unknowns
+            solver = closure_solver(line.engine, line.acting, line.hold)
+            f = solver.factored(motion.here, solver.chosen(motion.here, np.full(motion.here.T, -1)))
+        assert line.options.method is not None
+        task = ForceTask(
+            line.options.method,
+            self.starts.loads,
+            line.acting,
+            line.passive,
+            self.batch,
+            line.drive.t,
+            line.options.redundant,
+        )
+        coordinates = self.trajectory.coordinates_at(motion.places)
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = forces_of_block(task, motion.rates, f, coordinates, motion.places)
+            finite = np.isfinite(found.balance + found.power) | self.contradicting[motion.places]
+        if not finite.all():
+            too_large = "forces are beyond the largest number (1.8e308): masses, loads or rates are too large"
+            raise DeclarationError(f"solve {line.m.name!r}", [too_large])
+        return found
+
+
+def _system_at(starts: Starts, variant: Index, places: Index) -> System:
+    """The system with the numbers of the positions at flat places."""
+    return starts.system_of(variant[places])
