@@ -517,3 +517,18 @@ def test_a_curve_at_fault_is_the_only_fault():
         mg.Mechanism(
             "m", None, [mg.Pair("K", "R", "frame", "pin", on_b=marker), mg.Pair("L", "R", "frame", "pin", on_a=marker)]
         )
+
+
+def test_a_function_may_yield_its_derivatives():
+    """One by one, as a generator does: its number of derivatives was asked by the length of what it returns."""
+
+    def helix(u):
+        for k in range(5):
+            yield np.stack(
+                [np.cos(u + k * np.pi / 2), np.sin(u + k * np.pi / 2), (u, 1 + 0 * u, 0 * u, 0 * u, 0 * u)[k]]
+            )
+
+    curve = mg.Curve.function(position=helix, ends_at=(0.0, 6.0))
+    listed = mg.Curve.function(position=lambda u: list(helix(u)), ends_at=(0.0, 6.0))
+    s = np.linspace(0, 8, 7)
+    assert_allclose(curve.once(Travel).at(s).y, listed.once(Travel).at(s).y, atol=1e-15)
