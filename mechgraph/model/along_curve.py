@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar
@@ -10,9 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, cross
-from mechgraph.errors import ShapeError
 from mechgraph.model.curves import ORDERS, Curve
-from mechgraph.model.factors import Factor, PoseStack, Stack, entries
+from mechgraph.model.factors import Factor
 from mechgraph.model.row_parts import UNIT_TWISTS, Freedom
 from mechgraph.model.travel import COMPLEX_STEP, Place, Travel
 from mechgraph.model.travelling import Travelling
@@ -115,17 +113,10 @@ class AlongCurve(Travelling):
         here = self.travel.at(np.array(self.home))
         return np.column_stack([self._axes(here.t, here.y, here.k), here.x])
 
-    def here(self, x: Array) -> Place:
+    def place_of(self, x: Array) -> Place:
         """The curve where the coordinate is ``x (1, ...)``, lengths in its own unit."""
-        try:
-            here = self.travel.at(self.home + (-self.unit if self.reversed else self.unit) * x[0])
-        except ShapeError as error:
-            raise error.of(self.pair) from error.__cause__
+        here = self.travel.at(self.home + (-self.unit if self.reversed else self.unit) * x[0])
         return replace(here, w=0.0 * here.w, dw=0.0 * here.dw) if self.held else here
-
-    def pose(self, x: Array, pitch: Array) -> Array:
-        """Value of the motion."""
-        return self.pose_at(self.here(x))
 
     def pose_at(self, here: Place) -> Array:
         """The pose where the curve is ``here``."""
@@ -135,21 +126,13 @@ class AlongCurve(Travelling):
         R0, behind = self.start[:, :3], -self._off(here.x)
         return np.concatenate([np.einsum("ji...,jk->ik...", R, R0), (R * behind[:, None]).sum(axis=0)[:, None]], axis=1)
 
-    def twists(self, x: Array, pitch: Array) -> Array:
-        """``(w, t + w x (p - x))``, p the origin of the frame before it; on the side of link b minus ``(R^T w, R^T t)``."""
-        return self.twists_at(self.here(x))
-
     def twists_at(self, here: Place) -> Array:
-        """The twists where the curve is ``here``."""
+        """``(w, t + w x (p - x))``; on the side of link b minus ``(R^T w, R^T t)``."""
         w, sense = self.unit * here.w, -1.0 if self.reversed != self.back else 1.0
         return sense * self._screw(here, w, here.t)[:, None]
 
-    def twist_rates(self, x: Array, dq: Array, pitch: Array) -> Array:
+    def twist_rates_at(self, here: Place, x: Array, dq: Array) -> Array:
         """Their derivatives by the coordinate, times the rate squared."""
-        return self.twist_rates_at(self.here(x), dq)
-
-    def twist_rates_at(self, here: Place, dq: Array) -> Array:
-        """The rates where the curve is ``here``."""
         w, dw = self.unit * here.w, self.unit**2 * here.dw
         sense = -1.0 if self.back else 1.0
         return sense * dq[0] ** 2 * self._screw(here, dw, self.unit * here.dt - cross(w, here.t))
@@ -161,39 +144,9 @@ class AlongCurve(Travelling):
             return np.concatenate([(R * part[:, None]).sum(axis=0) for part in (w, v)])
         return self._screw_seen(here.x, w, v)
 
-    def stack(self, factors: Sequence[Factor], counts: Sequence[int]) -> Stack:
-        """Copies evaluated together."""
-        return CurveStack(self)
-
     def scaled(self, L: float) -> Factor:
         """With lengths over ``L``."""
         return self if self.curve is None else replace(self, unit=self.unit * L)
-
-
-class CurveStack(PoseStack):
-    """Copies of one of them; the place on the curve serves poses, twists and rates at the same coordinates."""
-
-    def __init__(self, factor: AlongCurve) -> None:
-        super().__init__(factor)
-        self.along = factor
-        self._last: tuple[Array, Place] | None = None
-
-    def _here(self, x: Array) -> Place:
-        if self._last is None or not np.array_equal(self._last[0], x):
-            self._last = x, self.along.here(x)
-        return self._last[1]
-
-    def values(self, x: Array) -> Array:
-        """Entries of the pose and of its inverse."""
-        return entries(self.along.pose_at(self._here(x)))
-
-    def twists(self, x: Array, pitch: Array) -> Array:
-        """Those of the factor."""
-        return self.along.twists_at(self._here(x))
-
-    def twist_rates(self, x: Array, dq: Array, pitch: Array) -> Array:
-        """Those of the factor."""
-        return self.along.twist_rates_at(self._here(x), dq)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

@@ -8,7 +8,6 @@ from functools import cached_property
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, cross
-from mechgraph.errors import ShapeError
 from mechgraph.model.factors import Factor
 from mechgraph.model.row_parts import UNIT_TWISTS, Freedom
 from mechgraph.model.surfaces import Surface
@@ -66,7 +65,7 @@ class OnSurface(Travelling):
         ranges = [(max(low, -size), min(high, size)) for (low, high), size in zip(self.ranges, self.sizes, strict=True)]
         u, v = (np.linspace(*ends, SURFACE_LINES) for ends in ranges)
         x = np.stack(np.meshgrid(u, v))
-        p = self._here(x)[0] - self.start[:, 3].reshape(3, 1, 1)
+        p = self.here(x)[0] - self.start[:, 3].reshape(3, 1, 1)
         grid = np.tensordot(p, self.start[:, :3], (0, 0)) / self.unit
         return (*grid, *grid.swapaxes(0, 1))
 
@@ -82,7 +81,7 @@ class OnSurface(Travelling):
 
     def points(self, x: Array) -> Array:
         """Points ``(3, ...)`` at coordinates ``(2, ...)``, in the frame of the link."""
-        return self._here(x)[0]
+        return self.here(x)[0]
 
     def to_pole(self, x: Array) -> Array:
         """Angle ``(...)`` at coordinates ``(2, ...)`` from a pole of the parameters."""
@@ -94,15 +93,12 @@ class OnSurface(Travelling):
         assert self.surface is not None
         return (np.array(self.surface.nearest(p)) - self.home) * self.sizes / self.unit
 
-    def _here(self, x: Array) -> tuple[Array, Array, Array]:
+    def place_of(self, x: Array) -> tuple[Array, Array, Array]:
         """Position, axes ``(3, 3, ...)`` and twists about the point ``(6, 2, ...)``, in the frame of the link."""
         assert self.surface is not None
         su, sv = self.sizes
         u, v = self._parameters(x)
-        try:
-            J, sense = self.surface.at(u, v), self.surface.sense(u, v)
-        except ShapeError as error:
-            raise error.of(self.pair) from error.__cause__
+        J, sense = self.surface.at(u, v), self.surface.sense(u, v)
         x_, xu, xv = J[0], J[1] / su, J[2] / sv
         second = self.unit * np.stack([J[3] / su**2, J[4] / (su * sv), J[5] / sv**2])
         lu, N = sense * np.sqrt((xu * xu).sum(axis=0)), cross(xu, xv)
@@ -122,23 +118,23 @@ class OnSurface(Travelling):
     @cached_property
     def start(self) -> Array:
         """The frame at coordinates zero on its link ``(3, 4)``."""
-        x, R, _ = self._here(np.zeros((2, 1)))
+        x, R, _ = self.here(np.zeros((2, 1)))
         return np.concatenate([R, x[:, None]], axis=1)[..., 0]
 
-    def pose(self, x: Array, pitch: Array) -> Array:
+    def pose_at(self, here: tuple[Array, Array, Array]) -> Array:
         """Value of the motion."""
-        p, R, _ = self._here(x)
+        p, R, _ = here
         return self._pose_seen(R, p)
 
-    def twists(self, x: Array, pitch: Array) -> Array:
-        """``(w, x_a + w x (p - x))`` for both parameters, p the origin of the frame before it."""
-        p, _, S = self._here(x)
+    def twists_at(self, here: tuple[Array, Array, Array]) -> Array:
+        """``(w, x_a + w x (p - x))`` for both parameters."""
+        p, _, S = here
         return np.stack([self._screw_seen(p, S[:3, a], S[3:, a]) for a in range(2)], axis=1)
 
-    def twist_rates(self, x: Array, dq: Array, pitch: Array) -> Array:
+    def twist_rates_at(self, here: tuple[Array, Array, Array], x: Array, dq: Array) -> Array:
         """The derivative of ``sum_j S_j q'_j`` along ``q'``, by a complex step: exact."""
         ahead: Array = x.real + 1j * COMPLEX_STEP * dq.real
-        return np.asarray((self.twists(ahead, pitch) * dq).sum(axis=1).imag / COMPLEX_STEP)
+        return np.asarray((self.twists_at(self.here(ahead)) * dq).sum(axis=1).imag / COMPLEX_STEP)
 
     def scaled(self, L: float) -> Factor:
         """With lengths over ``L``."""
