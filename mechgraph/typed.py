@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Sequence
 from typing import NoReturn
 
 import numpy as np
 
 from mechgraph.closure.prescription import coordinate
-from mechgraph.errors import MechgraphError, shortened
+from mechgraph.errors import MechgraphError, MechgraphWarning, shortened
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.model.sweep import swept
@@ -53,6 +54,22 @@ def _values(texts: Sequence[str], turns: bool, where: str) -> list[float]:
             refuse(where, f"unit {unit or last!r} in {text!r}: the freedom {what}")
         out.append(value * scales[unit or last])
     return out
+
+
+MANY_TURNS = 2.0
+"""Turns from which on an angle typed without a unit is more likely meant in degrees."""
+
+
+def _doubt(texts: Sequence[str], values: Sequence[float], where: str) -> None:
+    """Warn of angles typed without a unit that are many turns."""
+    most = max(values, key=abs) / (2 * np.pi)
+    if abs(most) > MANY_TURNS and not any(_number(text, where)[1] for text in texts):
+        as_degrees = f"{texts[-1].strip()}deg"
+        warnings.warn(
+            f"{where}: read as radians, {most:.4g} turns; where degrees are meant write {as_degrees}, where radians {texts[-1].strip()}rad",
+            MechgraphWarning,
+            stacklevel=3,
+        )
 
 
 def named_value(text: str, what: str) -> tuple[str, str]:
@@ -100,6 +117,8 @@ def parse_drive(m: Mechanism, text: str) -> tuple[str, Motion]:
     if len(parts) not in (1, 3) or len(rates) > 2:
         refuse(where, "expected FREEDOM=START:STOP:STEP or FREEDOM=VALUE, then @RATE and @ACCELERATION where wanted")
     values = _values(parts, turns, where)
+    if turns:
+        _doubt(parts[:2], values[:2], where)
     velocity, acceleration = (
         *(_values([r.removesuffix("/s^2").removesuffix("/s2").removesuffix("/s")], turns, where)[0] for r in rates),
         0.0,
@@ -127,8 +146,24 @@ def drives_of(m: Mechanism, texts: Sequence[str]) -> dict[str, Motion]:
     return out
 
 
+def motions_of(m: Mechanism, texts: Sequence[str]) -> dict[str, Motion]:
+    """The motions of all drives where one is needed of each that is declared."""
+    out = drives_of(m, texts)
+    given = {name if m.freedom_fault(name, single=True) else m.full_name(name) for name in out}
+    declared = {m.full_name(drive.freedom): drive.motion for drive in m.drives}
+    still = [name for name, motion in declared.items() if motion is None and name not in given]
+    if still and (not given or given & set(declared)):
+        example = "0:360:5deg" if m.turns(still[0]) else "0:0.1:0.01"
+        refuse(f"drive {still[0]!r}", f"has no motion; give one, e.g. --drive {still[0]}={example}")
+    return out
+
+
 def parse_at(m: Mechanism, text: str, option: str = "--at") -> tuple[str, float]:
     """Freedom and value of ``A=30deg``."""
     where = f"{option} {text!r}"
     name, value = named_value(text, option)
-    return name, _values([value], _turns(m, name, where), where)[0]
+    turns = _turns(m, name, where)
+    out = _values([value], turns, where)
+    if turns and option != "--rate":
+        _doubt([value], out, where)
+    return name, out[0]

@@ -688,3 +688,24 @@ def test_a_drive_declared_at_its_dead_point_is_told_without_a_hint_that_does_not
     assert result.exit_code == 1
     assert "A.Rz stands still" in result.output
     assert "--on-reach" not in result.output
+
+
+def test_an_angle_of_many_turns_without_a_unit_is_doubted() -> None:
+    """It is read as radians all the same; with a unit nothing is said, and lengths and rates have no turns."""
+    told = run("solve", "four-bar", "--drive", "A=0:360:30")
+    assert told.exit_code == 0
+    assert "--drive 'A=0:360:30': read as radians, 57.3 turns; where degrees are meant write 360deg" in told.stderr
+    assert json.loads(run("solve", "four-bar", "--drive", "A=0:360:30", "--json").stdout)["positions"] == 12
+    assert "write 30deg" in run("check", "four-bar", "--at", "A=30").stderr
+    for quiet in ("A=0:360:30deg", "A=0:12:1", "A=0:360rad:30", "A=0:6:1@600"):
+        assert "read as" not in run("solve", "four-bar", "--drive", quiet).stderr
+
+
+def test_a_drive_without_a_motion_is_answered_in_options(tmp_path: Path) -> None:
+    m = mg.load("four-bar")
+    mg.save(m.replace(drives=["A"]), tmp_path / "still.toml")
+    for arguments in (("plot", "efforts"), ("plot", "path"), ("solve",), ("loads", "coupler")):
+        message = bad(arguments[0], tmp_path / "still.toml", *arguments[1:])
+        assert "drive 'A.Rz': has no motion; give one, e.g. --drive A.Rz=0:360:5deg" in message
+    out = tmp_path / "still.svg"
+    assert run("plot", tmp_path / "still.toml", "--out", out).exit_code == 0

@@ -11,6 +11,7 @@ from mechanisms import Z, bennett, linked_four_bar, ring
 
 import mechgraph as mg
 from mechgraph.closure.assembly import close_all, closed_start
+from mechgraph.closure.configuration import Configuration
 from mechgraph.force.applied_loads import user_poses
 from mechgraph.model.chain import chain_symbols
 from mechgraph.modes import store
@@ -172,6 +173,41 @@ def test_where_no_class_is_known_the_word_is_searched() -> None:
         assert modes.completeness == "searched"
         assert why in modes.evidence[0]
         assert modes.total is None
+
+
+def test_assemblies_with_helical_pairs_are_closed_at_their_start() -> None:
+    """A helical pair that has turned once more stands elsewhere: no turns are taken off it."""
+    m = mg.load("rchch")
+    modes = mg.assemblies(m, {m.drives[0].freedom: 0.0}, guesses=40, turns=2.0)
+    assert len(modes) > 2
+    assert any(abs(mode.start["O3.Rz"]) > np.pi for mode in modes)
+    for mode in modes:
+        s = closed_start(mode).system
+        given = Configuration(s, s.state_of(s.start_coordinates(mode.start)[:, None]))
+        assert given.closure[0] < 1e-10
+
+
+def test_a_round_of_a_closed_curve_makes_no_further_assembly() -> None:
+    """An eccentric disc under a point that slides: two heights, wherever on the rim the point is counted from."""
+    E, R = 0.1, 0.5
+    rim = mg.Curve.circle(radius=R, center=(E, 0, 0), axis=Z)
+    pairs = [
+        mg.Pair("A", "R", "frame", "disc", point=(0, 0, 0), axis=Z),
+        mg.Pair("B", "Ps", "disc", "follower", curve=rim, point=(0, np.sqrt(R * R - E * E), 0)),
+        mg.Pair("C", "P", "frame", "follower", point=(0, 0, 0), axis=(0, 1, 0)),
+    ]
+    m = mg.Mechanism("eccentric", pairs=pairs, drives=["A"], frame="frame")
+    modes = mg.assemblies(m, {"A": 0.7}, guesses=40)
+    assert len(modes) == 2
+    q = Question(m, {"A": 0.7})
+    s, column = q.system, m.freedom_names().index("B.Ts")
+    x = np.concatenate([s.state_of(s.start_coordinates(mode.start)[:, None]) for mode in modes], axis=1)
+    rounds = x.copy()
+    rounds[s.single_rows[column]] += np.array([1, -2]) * 2 * np.pi * R / s.par.L
+    here, there = (Configuration(s, states) for states in (x, rounds))
+    assert np.abs(here.poses - there.poses).max() < 1e-12
+    assert np.abs(q.family.prints(here) - q.family.prints(there)).max() < 1e-12
+    assert np.abs(q.coordinates(x) - q.coordinates(rounds)).max() < 1e-12
 
 
 def test_bad_arguments_are_all_named() -> None:

@@ -32,7 +32,7 @@ from mechgraph.cli.reading import check_out, loaded, show_compared
 from mechgraph.cli.records import Written, write_json
 from mechgraph.document import Document
 from mechgraph.result.export import FORMATS
-from mechgraph.typed import drives_of, duration, parse_at, refuse
+from mechgraph.typed import duration, motions_of, parse_at, refuse
 
 Told = list[Document] | dict[str, Any]
 """Documents to be shown, or a record."""
@@ -66,7 +66,7 @@ def solve(
         refuse("solve", "--json and --compare exclude each other")
     check_out(out, mechanism, FORMATS)
     m = loaded(mechanism)
-    motions = drives_of(m, drive or ())
+    motions = motions_of(m, drive or ())
     with progress(f"solving {m.name}") as moved, warnings.catch_warnings():
         warnings.simplefilter("ignore", mg.MechgraphWarning)  # the summary has them
         how: dict[str, Any] = {"method": method, "redundant": redundant, "on_reach": on_reach, "engine": engine}

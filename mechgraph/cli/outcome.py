@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import sys
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, NoReturn
@@ -43,6 +44,20 @@ def fail(message: str, status: int) -> NoReturn:
     except OSError:  # where messages cannot be written either, the status says it
         forget(sys.stderr)
     sys.exit(status)
+
+
+@contextmanager
+def warned() -> Iterator[None]:
+    """Every warning of the package as a message."""
+
+    def say(message: Warning | str, *_: Any, **__: Any) -> None:
+        if sys.stderr is not None:
+            sys.stderr.write(f"mechgraph: {visible(str(message))}\n")
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", mg.MechgraphWarning)
+        warnings.showwarning = say
+        yield
 
 
 def _reached(error: mg.MechgraphError) -> str:

@@ -19,7 +19,7 @@ from mechgraph.cli.reading import loaded, refuse_own_file
 from mechgraph.cli.records import PlotData, write_json
 from mechgraph.show.animation import FORMATS as FILMS
 from mechgraph.show.animation import PICTURES
-from mechgraph.typed import drives_of, refuse
+from mechgraph.typed import drives_of, motions_of, refuse
 from mechgraph.writing import format_of, formats_text
 
 
@@ -130,12 +130,13 @@ def plot(
     refuse_own_file(target, mechanism)
     format_of(target, FILMS if film else PICTURES)
     asked = _Asked(tuple(of or ()), over, position, forces, moment)
-    motions = drives_of(m, drive or ())
-    still = what == "skeleton" and not (film or motions or any(d.motion is not None for d in m.drives))
+    still = what == "skeleton" and not (film or drive or any(d.motion is not None for d in m.drives))
+    moves = kind.moves and not still
+    motions = (motions_of if moves else drives_of)(m, drive or ())
     with working(f"drawing {m.name}"), warnings.catch_warnings():
         warnings.simplefilter("ignore", mg.MechgraphWarning)
         drawn: Any = m
-        if kind.moves and not still:
+        if moves:
             how: dict[str, Any] = {"on_reach": on_reach, "tol": tol}
             needs = kind.forces or forces
             drawn = (

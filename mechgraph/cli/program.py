@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from mechgraph.cli.outcome import DONE, EXIT_STATUS, outcome
+from mechgraph.cli.outcome import DONE, EXIT_STATUS, outcome, warned
 from mechgraph.cli.output import write
 
 
@@ -26,7 +26,7 @@ class Program(TyperGroup):
 
     def invoke(self, context: Any) -> Any:
         """Run a command, before the errors that are left are taken for those of the command line itself."""
-        with outcome():
+        with outcome(), warned():
             return super().invoke(context)
 
 

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import os
-import sys
-import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
 import mechgraph as mg
 from mechgraph.cli.output import show, write
-from mechgraph.errors import did_you_mean, near_names, visible
+from mechgraph.errors import did_you_mean, near_names
 from mechgraph.exchange.comparison import compare
 from mechgraph.exchange.files import READERS
 from mechgraph.typed import refuse
@@ -24,12 +22,7 @@ def loaded(name: str) -> mg.Mechanism:
         return mg.load(name)
     path = Path(name)
     if os.path.lexists(path) or path.suffix.lower() in (".toml", *READERS) or len(path.parts) > 1:
-        with warnings.catch_warnings(record=True) as notes:
-            warnings.simplefilter("always", mg.MechgraphWarning)
-            made = mg.load(path)
-        if sys.stderr is not None:
-            sys.stderr.write("".join(f"mechgraph: {visible(str(note.message))}\n" for note in notes))
-        return made
+        return mg.load(path)
     hint = did_you_mean(near_names(name.lower(), known)) or f"there are: {', '.join(known)}"
     raise mg.FileError(name, f"no mechanism of that name in the library, and no such file; {hint}")
 

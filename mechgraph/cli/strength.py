@@ -15,7 +15,7 @@ from mechgraph.cli.output import show, working, write
 from mechgraph.cli.reading import check_out, loaded
 from mechgraph.cli.records import loads_data, write_json
 from mechgraph.result.load_files import FORMATS
-from mechgraph.typed import drives_of, refuse
+from mechgraph.typed import motions_of, refuse
 from mechgraph.writing import formats_text
 
 
@@ -59,9 +59,9 @@ def loads(
     places: Any = at if at in ("worst", "all") else int(at)
     options = {"model": model, "held": held, "couples": couples, "inertia": inertia}
     m.place_of_link(link)
+    motions = motions_of(m, drive or ()) or None
     with working(f"solving {m.name}"), warnings.catch_warnings():
         warnings.simplefilter("ignore", mg.MechgraphWarning)
-        motions = drives_of(m, drive or ()) or None
         s = mg.solve(m, motions, actuate=actuate, redundant=redundant, on_reach=on_reach, engine=engine, tol=tol)
         body = mg.free_body(s, link)
         document = body.document(places)

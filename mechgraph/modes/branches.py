@@ -316,12 +316,13 @@ class _Mapper:
         x, along = np.concatenate(states, axis=1), np.concatenate(values)
         s = self.q.system
         q = s.coordinates_of(x, s.start_coordinates(self.m.start)).T
-        turning = (s.single_rows >= 0) & ~s.is_length
-        q[:, turning] = np.unwrap(q[:, turning], axis=0)
-        # whole turns such that the place nearest to the declared value of the driver is nearest to the start
-        turning[self.q.columns[self.q.names.index(self.driver)]] = False
-        near = q[np.argmin(np.abs(along - self.samples[0]))]
-        q -= turning * 2 * np.pi * np.round((near - s.start_coordinates(self.m.start)) / (2 * np.pi))
+        period = self.q.periods
+        back = np.isfinite(period)
+        q[:, back] = np.unwrap(q[:, back] * (2 * np.pi / period[back]), axis=0) * (period[back] / (2 * np.pi))
+        # whole rounds such that the place nearest to the declared value of the driver is nearest to the start
+        back[self.q.columns[self.q.names.index(self.driver)]] = False
+        near = (q[np.argmin(np.abs(along - self.samples[0]))] - s.start_coordinates(self.m.start))[back]
+        q[:, back] -= period[back] * np.round(near / period[back])
         prints = self.family.prints(Configuration(s, x))
         turns = round(len(chain) / len(self.samples)) if cyclic else 0
         if self.closed and not cyclic:

@@ -139,13 +139,21 @@ class Family:
         return links[still & ~np.isin(links, self._rods)]
 
     @cached_property
+    def periods(self) -> Array:
+        """By how much freedoms ``(F,)`` grow until all is as it was: turns, closed curves; infinite for slides and helical motions."""
+        S = self.here.S[:, :, 0]
+        helical = ~self.system.is_length & (np.abs((S[:3] * S[3:]).sum(axis=0)) > SPAN)
+        return np.where(helical, np.inf, self.system.periods)
+
+    @cached_property
     def settled_rows(self) -> tuple[Index, Index]:
-        """State rows of angles and of slides that no passive motion changes, and that are not in rods."""
+        """State rows of freedoms that come back and of those that do not, which no passive motion changes, and that are not in rods."""
         s = self.system
         inside = np.isin(s.a, self._rods) | np.isin(s.b, self._rods)
         still = (s.single_rows >= 0) & (np.abs(self.passive).max(axis=1, initial=0.0) < SPAN)
         still &= ~inside[s.pair_of_freedom]
-        return s.single_rows[still & ~s.is_length], s.single_rows[still & s.is_length]
+        back = np.isfinite(self.periods)
+        return s.single_rows[still & back], s.single_rows[still & ~back]
 
     @property
     def settled_rotations(self) -> Index:
@@ -159,8 +167,18 @@ class Family:
     def prints(self, here: Configuration) -> Array:
         """What tells assemblies apart ``(n, T)``: poses of links that no passive motion moves, coordinates that none changes."""
         poses = here.poses[:, :, self.settled_links]
-        angles, lengths = (here.x[rows] for rows in self.settled_rows)
-        return np.concatenate([poses.reshape(12 * poses.shape[2], here.T), np.cos(angles), np.sin(angles), lengths])
+        back, others = self.settled_rows
+        angles = here.x[back] * (2 * np.pi / self._period_of_row[back])[:, None]
+        return np.concatenate(
+            [poses.reshape(12 * poses.shape[2], here.T), np.cos(angles), np.sin(angles), here.x[others]]
+        )
+
+    @cached_property
+    def _period_of_row(self) -> Array:
+        out, s = np.full(self.system.n_state, np.inf), self.system
+        single = s.single_rows >= 0
+        out[s.single_rows[single]] = self.periods[single]
+        return out
 
     def system_of(self, member: Member) -> System:
         """The system of members."""

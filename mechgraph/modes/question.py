@@ -102,15 +102,22 @@ class Question:
         raise undriven_error(self.m, self.freedoms.undriven)
 
     def coordinates(self, x: Array) -> Array:
-        """User coordinates ``(M, F)`` of real states ``(nx, M)``: whole turns nearest to the start, given ones exactly as given."""
+        """User coordinates ``(M, F)`` of real states ``(nx, M)``: whole rounds nearest to the start, given ones exactly as given."""
         s = self.system
         start = s.start_coordinates(self.m.start)
         q = np.stack([s.coordinates_of(x[:, [i]], start)[:, 0] for i in range(x.shape[1])] or [np.zeros(0)])
         q = q.reshape(x.shape[1], s.n_freedoms)
-        turning = (s.single_rows >= 0) & ~s.is_length
-        turning[self.columns] = False
-        q[:, turning] -= 2 * np.pi * np.round((q - start)[:, turning] / (2 * np.pi))
+        period = self.periods.copy()
+        period[self.columns] = np.inf
+        back = np.isfinite(period)
+        q[:, back] -= period[back] * np.round((q - start)[:, back] / period[back])
         return q
+
+    @property
+    def periods(self) -> Array:
+        """By how much single freedoms grow until all is as it was, user units; infinite where they go on, and for rotations."""
+        s = self.system
+        return np.where(s.single_rows >= 0, s.in_user_units(self.family.periods), np.inf)
 
     def complex_coordinates(self, x: Array) -> Array:
         """User coordinates ``(n, F)`` of complex states ``(nx, n)``."""
