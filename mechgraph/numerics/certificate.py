@@ -53,5 +53,7 @@ def smooth(problem: Problem, a: Nodes, m: Nodes, b: Nodes, correction: Array, fr
     noise = (4.0 * off + 1e-6) * np.abs(r_m).max(axis=0, initial=0.0) + 1e-14 * m.condition / h
     noise += PATH.tiny / h  # branches that are no further apart are one
     on_cubic = (gap <= PATH.smooth * change + noise) & (correction <= h * (PATH.smooth * change / 8 + noise))
-    condition = np.max([np.ones_like(h), a.condition, m.condition, b.condition], axis=0)
-    return np.asarray(on_cubic | (2.0 * h * gap + 4.0 * correction <= PATH.alone / condition))
+    # pivots do not tell how the inverse grows along a chain of loops, rates do
+    size = np.max([np.abs(r).max(axis=0, initial=1.0) for r in rates], axis=0)
+    size *= np.max([np.ones_like(h), a.condition, m.condition, b.condition], axis=0)
+    return np.asarray(on_cubic | (2.0 * h * gap + 4.0 * correction <= PATH.alone / size))

@@ -129,8 +129,9 @@ class PathTolerances:
     smooth: float = 0.05
     """Part of the change of rates over a step by which the rates in its middle may miss those of the Hermite cubic of its ends (and of
     the sagitta that it makes, by which the state may)."""
-    alone: float = 0.02
-    """Part of the inverse condition number up to which another branch is not as near: matrices change by at most a hundred a radian."""
+    alone: float = 0.05
+    """Part of the inverse condition number, over rates above one, up to which another branch is not as near: matrices change by at most
+    forty a radian (near the limits of four-bars the other branch is 170 times as far)."""
     tiny: float = 1e-9
     """Distance between states below which ``smooth`` is not tested: differences of rounding and of numerical derivatives."""
     fair: float = 1e3
