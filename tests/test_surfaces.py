@@ -278,6 +278,15 @@ def test_a_start_is_kept_where_the_axis_changes():
     agree(mg.solve(swung((0, 1, 0)), turn), mg.solve(m.replace(start=q), turn))
 
 
+def test_a_ball_by_its_marker_goes_over_poles_too():
+    """Its mechanism is assembled, from a place far from where it is declared by a point."""
+    turn = {"A": mg.Motion(np.linspace(0, -2 * np.pi, 9), 2.0, 1.0)}
+    m, marker = swung((0, 1e-8, 1)), swung((0, 0, 1)).pair("K").markers[1]
+    ball = mg.Pair("K", "Sp", "frame", "slide", surface=m.pair("K").surface, on_b=marker)
+    apart = m.replace(pairs=[*m.pairs[:2], ball])
+    agree(mg.solve(swung((0, 1, 0)), turn), mg.solve(apart, turn))
+
+
 def test_variants_beside_a_pole_are_those_by_themselves():
     m, turn = swung((0, 1e-8, 1)), {"A": mg.Motion(TOP * np.linspace(0, 2, 5), 2.0, 1.0)}
     study = mg.study(m, {"slide.mass": [1.0, 2.0]}, "A.effort", n=2, motions=turn, sampling="grid")

@@ -23,8 +23,7 @@ NEAR_POLE = 0.01
 def away_from_poles(m: Mechanism, system: System, found: Positions) -> Mechanism | None:
     """The mechanism with spheres about other axes where positions lie beside poles, or a node of a path that ends; None where none does.
 
-    The axes keep far from all places that are known. Spheres whose parameters are driven, coupled or loaded, and those placed by
-    markers, keep theirs.
+    The axes keep far from all places that are known; spheres whose parameters are driven, coupled or loaded keep theirs.
     """
     if not any(pair.surface is not None for pair in m.pairs):
         return None
@@ -35,26 +34,25 @@ def away_from_poles(m: Mechanism, system: System, found: Positions) -> Mechanism
     pairs, start, bound = list(m.pairs), dict(m.start), m.bound_freedoms
     for k, pair in enumerate(m.pairs):
         place, own = placed_surface(pair.type), slice(system.first_column[k], system.first_column[k + 1])
-        kept = pair.surface is None or pair.on_b is not None or not bound.isdisjoint(pair.freedom_names)
-        if place is None or kept or not (place.to_pole(q_near[own][:2]) < NEAR_POLE).any():
+        free = pair.surface is not None and bound.isdisjoint(pair.freedom_names)
+        if place is None or not free or not (place.to_pole(q_near[own][:2]) < NEAR_POLE).any():
             continue
         assert pair.surface is not None
-        pairs[k] = pair.replace(surface=pair.surface.with_poles_far_from(place.points(q[own][:2])))
-        if not start.keys().isdisjoint(pair.freedom_names):
-            start |= dict(zip(pair.freedom_names, _renamed(pair, pairs[k], begin[own]).tolist(), strict=True))
+        pairs[k] = pair.reshaped(surface=pair.surface.with_poles_far_from(place.points(q[own][:2])))
+        start |= dict(zip(pair.freedom_names, _renamed(pair, pairs[k], begin[own]).tolist(), strict=True))
     return m.replace(pairs=pairs, start=start) if pairs != list(m.pairs) else None
 
 
 def _renamed(old: Pair, new: Pair, q: Array) -> Array:
     """Coordinates ``(5,)`` of a pair about its new axis where the one about the old axis has ``q (5,)``.
 
-    The marker of both links is turned by ``C``: ``D' = C^-1 D C``.
+    With the markers ``A`` on link a: ``A' D' = A D``.
     """
     moved, pitch = placed_surface(new.type), np.zeros((1, 1))
     assert moved is not None
-    C = compose(inverse(old.markers[0].pose()[..., None, None]), new.markers[0].pose()[..., None, None])
+    A, A_new = (pair.markers[0].pose()[..., None, None] for pair in (old, new))
     x = evaluation.coordinates_to_state(old.type, q[:, None, None])
-    D = compose(inverse(C), compose(evaluation.frames_of(old.type, pitch, x)[-1], C))
-    at = moved.coordinates_at(moved.start[:, :3] @ D[:, 3, 0, 0] + moved.start[:, 3])
-    turn = compose(inverse(moved.pose(at[:, None, None], pitch)), D)[:, :3, 0, 0]
+    there = compose(A, evaluation.frames_of(old.type, pitch, x)[-1])
+    at = moved.coordinates_at(there[:, 3, 0, 0])
+    turn = compose(inverse(compose(A_new, moved.pose(at[:, None, None], pitch))), there)[:, :3, 0, 0]
     return np.concatenate([at, quaternion_log(matrix_quaternion(turn))])
