@@ -18,6 +18,8 @@ DEEPEST = 32
 """Sequences nested more deeply are no arrays (numpy knows 64 axes)."""
 
 _FLOATS, _PLAIN = {float}, {float, int}
+_is_finite = LARGEST.__gt__
+"""Whether the size of a number is below the largest; not so of what is no number (NaN)."""
 
 
 def real_array(value: Any) -> NDArray[np.float64] | None:
@@ -66,7 +68,7 @@ def is_numeric(value: Any, shape: tuple[int, ...]) -> bool:
     if type(value) is float:
         return shape == () and abs(value) < LARGEST
     if type(value) is tuple and all_floats(value):
-        return shape == (len(value),) and all(abs(v) < LARGEST for v in value)
+        return shape == (len(value),) and all(map(_is_finite, map(abs, value)))
     array = real_array(value)
     return array is not None and array.shape == shape and bool((np.abs(array) < LARGEST).all())
 

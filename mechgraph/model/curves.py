@@ -26,7 +26,7 @@ from mechgraph.model.field_format import (
     TEXT,
     Described,
 )
-from mechgraph.model.numeric import second_direction
+from mechgraph.model.numeric import filled_second
 from mechgraph.model.once import Once
 from mechgraph.units import LENGTH
 
@@ -180,8 +180,8 @@ class Centred(Curve):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.second is None and np.shape(self.axis) == (3,):
-            object.__setattr__(self, "second", second_direction(self.axis))
+        if self.second is None:
+            object.__setattr__(self, "second", filled_second(self.axis))
 
     @property
     def normal(self) -> Array:

@@ -6,6 +6,7 @@ through one by one, to say in words what is wrong with which.
 
 from __future__ import annotations
 
+import operator
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -17,7 +18,7 @@ from mechgraph.algebra.inertia import physical
 from mechgraph.algebra.se3 import Array
 from mechgraph.model.coupling import BaseCoupling
 from mechgraph.model.drive import Drive
-from mechgraph.model.link import Link
+from mechgraph.model.link import NO_POINTS, Link
 from mechgraph.model.load import LOADS
 from mechgraph.model.numeric import tolerance_fault
 from mechgraph.model.pair import PARALLEL_COSINE, Marker, Pair, largest_cosine
@@ -70,10 +71,10 @@ def declaration_faults(m: Parts) -> list[str]:
         faults.append("no pairs; a mechanism needs at least one pair")
     if faults:
         return faults
-    names = [name for name in m.link_names() if isinstance(name, str)]
     if not _links_are_sound(m.links):
         faults += [fault for link in m.links for fault in link.faults()]
-    faults += _repeated(names, "link") + _repeated([p.name for p in m.pairs if isinstance(p.name, str)], "pair")
+    names, pair_names = _texts(m.link_names()), _texts([pair.name for pair in m.pairs])
+    faults += _repeated(names, "link") + _repeated(pair_names, "pair")
     if not _pairs_are_sound(m.pairs, m.tol):
         faults += [fault for pair in m.pairs for fault in pair.faults(m.tol)]
     faults += _end_faults(m, names)
@@ -101,36 +102,41 @@ def mapping_faults(**given: Any) -> list[str]:
 
 def _end_faults(m: Parts, names: Sequence[str]) -> list[str]:
     """Ends of pairs and the frame that are no links; links that no pairs connect to the frame."""
-    known = set(names)
+    known = m.link_index
     faults = []
-    ends = [end for pair in m.pairs for end in (pair.a, pair.b)]
-    all_known = set(map(type, ends)) == {str} and set(ends) <= known
-    declared = ", ".join(names)
+    all_known = bool((np.concatenate(m.pair_ends) >= 0).all())
     for pair in () if all_known else m.pairs:
         for end in (pair.a, pair.b):
             if end is None:
                 faults.append(f"pair {pair.name!r}: is on one link only; name both links")
             elif isinstance(end, str) and end not in known:
-                faults.append(f"pair {pair.name!r}: link {end!r} is not declared (links: {declared})")
+                faults.append(f"pair {pair.name!r}: link {end!r} is not declared (links: {', '.join(names)})")
     if not isinstance(m.frame, str) or m.frame not in known:
-        faults.append(f"frame {shown(m.frame)}: is no link (links: {declared})")
+        faults.append(f"frame {shown(m.frame)}: is no link (links: {', '.join(names)})")
     elif all_known and len(names) == len(m.links):
         faults += _connection_faults(m)
     return faults
 
 
+def _types(pairs: Sequence[Pair]) -> list[Any]:
+    """The types of pairs, each object once."""
+    return list({id(pair.type): pair.type for pair in pairs}.values())
+
+
 def _symbol_faults(m: Parts) -> list[str]:
     """Pair types that share a symbol and differ."""
-    faults = []
     by_symbol: dict[str, PairType] = {}
-    for pair in m.pairs:
-        if isinstance(pair.type, PairType) and not travels(pair.type):
-            first = by_symbol.setdefault(pair.type.symbol, pair.type)
-            if first is not pair.type and first != pair.type:
-                faults.append(
-                    f"pair {pair.name!r}: its type shares the symbol {pair.type.symbol!r} with another type; rename one"
-                )
-    return faults
+    rows = [row for row in _types(m.pairs) if isinstance(row, PairType) and not travels(row)]
+    others = {id(row) for row in rows if by_symbol.setdefault(row.symbol, row) != row}
+    return [
+        f"pair {pair.name!r}: its type shares the symbol {pair.type.symbol!r} with another type; rename one"
+        for pair in (m.pairs if others else ())
+        if id(pair.type) in others
+    ]
+
+
+def _texts(names: Sequence[Any]) -> Sequence[str]:
+    return names if set(map(type, names)) <= {str} else [name for name in names if isinstance(name, str)]
 
 
 def _are_names(names: Sequence[Any]) -> bool:
@@ -139,17 +145,13 @@ def _are_names(names: Sequence[Any]) -> bool:
 
 def _links_are_sound(links: Sequence[Link]) -> bool:
     """Whether every link passes, checked in columns; False where it takes a closer look."""
-    masses = [link.mass for link in links]
     if not _are_names([link.name for link in links]) or {type(link.unphysical) for link in links} != {bool}:
         return False
-    mass = column(masses, ())
-    if (
-        mass is None
-        or (mass < 0).any()
-        or column([link.center for link in links if link.center is not None], (3,)) is None
-    ):
+    mass = column([link.mass for link in links], ())
+    placed = [link.center for link in links if link.center is not None]
+    if mass is None or (mass < 0).any() or column(placed, (3,)) is None:
         return False
-    if any(link.faults() for link in links if link.points != {}):
+    if any(link.faults() for link in links if link.points is not NO_POINTS and link.points != {}):
         return False
     if any(link.center is None and (link.mass > 0 or link.inertia is not None) for link in links):
         return False
@@ -164,21 +166,20 @@ def _links_are_sound(links: Sequence[Link]) -> bool:
 
 def _pairs_are_sound(pairs: Sequence[Pair], tol: float | None) -> bool:
     """Whether every pair passes, checked in columns; False where it takes a closer look."""
-    types = {id(p.type): p.type for p in pairs}.values()
+    types = _types(pairs)
     if not _are_names([p.name for p in pairs]) or not all(isinstance(t, PairType) for t in types):
         return False
-    if not set(map(type, (end for p in pairs for end in (p.a, p.b)))) <= {str}:
+    a, b = [p.a for p in pairs], [p.b for p in pairs]
+    if not set(map(type, a)) | set(map(type, b)) <= {str} or any(map(operator.eq, a, b)):
         return False
-    if any(p.a == p.b or (p.on_a is None) != (p.on_b is None) for p in pairs):
+    closer = {id(t) for t in types if t.takes_pitch or travels(t)}
+    if any(p.faults(tol) for p in pairs if p.says_more or id(p.type) in closer):
         return False
-    takers = {id(t) for t in types if t.takes_pitch}
-    if any(p.faults(tol) for p in pairs if p.says_more or id(p.type) in takers):
+    by_markers = [p for p in pairs if p.on_a is not None or p.on_b is not None]
+    if not all(isinstance(side, Marker) for p in by_markers for side in (p.on_a, p.on_b)):
         return False
     by_point = [p for p in pairs if p.point is not None or p.axis is not None]
-    by_markers = [p for p in pairs if p.on_a is not None]
-    if any(p.on_a is not None for p in by_point):
-        return False
-    if not all(isinstance(side, Marker) for p in by_markers for side in (p.on_a, p.on_b)):
+    if by_markers and any(p.on_a is not None for p in by_point):
         return False
     markers = [*by_point, *(p.on_a for p in by_markers), *(p.on_b for p in by_markers)]
     square = np.array([p.type.square_second for p in (*by_point, *by_markers, *by_markers)], dtype=bool)
@@ -208,8 +209,7 @@ def item_faults(m: Parts) -> list[str]:
 
 def _connection_faults(m: Parts) -> list[str]:
     place, n = m.link_index, len(m.links)
-    a, b = np.array([place[p.a] for p in m.pairs]), np.array([place[p.b] for p in m.pairs])
-    graph = scipy.sparse.coo_array((np.ones(len(a), dtype=bool), (a, b)), shape=(n, n))
+    graph = scipy.sparse.coo_array((np.ones(len(m.pairs), dtype=bool), m.pair_ends), shape=(n, n))
     _, part = scipy.sparse.csgraph.connected_components(graph, directed=False)
     names = m.link_names()
     return [

@@ -26,6 +26,8 @@ XYZ = "xyz"
 Schema = Mapping[str, Any]
 STANDS_AS = {str: "a text", bool: "true or false", dict: "a table"}
 """How the types of values are called in messages."""
+NEEDED = object()
+"""What stands for the default of a field that must not be left out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +120,7 @@ class Formatted:
     formats: ClassVar[Mapping[str, FieldFormat]] = {}
     """What the fields hold, by their names."""
     _numeric: ClassVar[tuple[str, ...]] = ()
-    _optional: ClassVar[frozenset[str]] = frozenset()
+    _defaults: ClassVar[tuple[Any, ...]] = ()
 
     def __init_subclass__(cls) -> None:
         if cls.__repr__ is Formatted.__repr__:
@@ -127,7 +129,7 @@ class Formatted:
         found = {name: getattr(hint, "__metadata__", (None,))[0] for name, hint in hints.items()}
         cls.formats = {name: about for name, about in found.items() if isinstance(about, FieldFormat)}
         cls._numeric = tuple(name for name, about in cls.formats.items() if about.kind.numeric)
-        cls._optional = frozenset(name for name in cls.formats if getattr(cls, name, ...) is None)
+        cls._defaults = tuple(getattr(cls, name, NEEDED) for name in cls.formats)
 
     def __repr__(self) -> str:
         """The fields that differ from what they are where they are left out."""
@@ -142,7 +144,7 @@ class Formatted:
 
 def _is_default(cls: type, name: str, value: Any) -> bool:
     """Whether a value says nothing: that of a field that was left out, or an empty table."""
-    default = getattr(cls, name, ...)
+    default = getattr(cls, name, NEEDED)
     return (
         value is default
         or (isinstance(value, bool | float | tuple) and value == default)
@@ -163,9 +165,9 @@ class Described(Formatted):
     def value_faults(self, where: str) -> list[str]:
         """What is wrong with the values alone; None is no fault where the field may be left out."""
         faults = []
-        for name, about in self.formats.items():
+        for (name, about), default in zip(self.formats.items(), self._defaults, strict=True):
             value = getattr(self, name)
-            if value is not None or name not in self._optional:
+            if value is not None or default is not None:
                 faults.append(about.fault(value, where + name))
         return [fault for fault in faults if fault]
 

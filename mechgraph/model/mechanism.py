@@ -7,6 +7,7 @@ import importlib
 import itertools
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -104,7 +105,7 @@ class Mechanism(Parts, Once, Shown):
 
     def _take_quantities(self) -> bool:
         """Turn quantities of pint into plain numbers, where units are declared; whether there may have been any."""
-        if not self.units or not all(isinstance(pair, Pair) for pair in self.pairs):
+        if not self.units or not _are_pairs(self.pairs):
             return False
         new: dict[str, list[Any]] = {
             "links": [item.without_quantities(self.units) for item in self.links if isinstance(item, Link)],
@@ -131,7 +132,7 @@ class Mechanism(Parts, Once, Shown):
     def _finish(self, start: Any, faults: list[str]) -> None:
         """Raise all faults at once, those of ``start`` too; keep start values and couplings by full freedom names."""
         flat: dict[str, float] = {}
-        if all(isinstance(p, Pair) for p in self.pairs):
+        if _are_pairs(self.pairs):
             flat, start_faults = flat_start(self, start if isinstance(start, Mapping) else {})
             faults += start_faults
         if faults:
@@ -193,6 +194,9 @@ class Mechanism(Parts, Once, Shown):
         fields["drives"] = _as_drives(items_of(changes.get("drives", self.drives), "drives", wrong_kinds))
         fields["loads"] = items_of(changes.get("loads", self.loads), "loads", wrong_kinds)
         out._set(**fields, _kept=self._kept)
+        vars(out).update(
+            (k, v) for k, v in vars(self).items() if isinstance(getattr(Mechanism, k, None), cached_property)
+        )
         start = changes.get("start", self.start)
         faults = item_faults(out)
         if faults and out._take_quantities():
@@ -331,6 +335,10 @@ def _ends(pairs: Iterable[Any]) -> list[str]:
     """Names of the links of pairs, each once, in order."""
     ends = (end for p in pairs if isinstance(p, Pair) for end in (p.a, p.b))
     return list(dict.fromkeys(end for end in ends if isinstance(end, str)))
+
+
+def _are_pairs(items: Iterable[Any]) -> bool:
+    return all(issubclass(kind, Pair) for kind in set(map(type, items)))
 
 
 def _as_drives(drives: Iterable[Any]) -> tuple[Any, ...]:

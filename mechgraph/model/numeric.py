@@ -38,7 +38,19 @@ def _as_tuples(value: Any, depth: int) -> Any:
     return tuple([_as_tuples(v, depth - 1) for v in value])
 
 
+def filled_second(axis: Any) -> tuple[float, ...] | None:
+    """What fills ``second`` where it is left out, of an axis as ``plain`` gives it; None where that is no direction."""
+    try:
+        return _filled(axis)
+    except TypeError:  # what has no hash is no tuple of numbers
+        return None
+
+
 @lru_cache
+def _filled(axis: Any) -> tuple[float, ...] | None:
+    return second_direction(axis) if is_numeric(axis, (3,)) else None
+
+
 def second_direction(axis: Any) -> tuple[float, ...]:
     """The global axis least aligned with ``axis``, made perpendicular to it: what fills ``second`` where it is left out."""
     length = math.hypot(*axis)

@@ -26,12 +26,12 @@ from mechgraph.model.field_format import (
     TABLE as NESTED,
 )
 from mechgraph.model.hertz import Hertz
-from mechgraph.model.numeric import plain
+from mechgraph.model.numeric import filled_second, plain
 from mechgraph.model.numeric import second_direction as second_direction
 from mechgraph.model.pair_faults import contact_faults, shape_faults_of
 from mechgraph.model.pair_table import TABLE
 from mechgraph.model.pair_type import PairType
-from mechgraph.model.placed_rows import Contact, travels
+from mechgraph.model.placed_rows import Contact
 from mechgraph.model.surface_rows import on_surface, row_of, surface_faults
 from mechgraph.model.surfaces import Surface
 from mechgraph.quantities import is_numeric, shown, wrong
@@ -62,8 +62,8 @@ class Marker(Described):
 
     def __post_init__(self) -> None:
         self.read_numbers()
-        if self.second is None and is_numeric(self.axis, (3,)):
-            object.__setattr__(self, "second", second_direction(self.axis))
+        if self.second is None:
+            object.__setattr__(self, "second", filled_second(self.axis))
 
     def faults(self, where: str, most: float) -> list[str]:
         """What is wrong with this marker; ``most`` is the largest cosine that its axis and second direction may have."""
@@ -190,12 +190,14 @@ class Pair(Described):
         if (curve is not None or surface is not None) and point is None and isinstance(on_a, Marker):
             point, axis = on_a.point, on_a.axis
         apart = on_b.pose() if isinstance(on_b, Marker) and not on_b.faults("", 1.0) else None
-        try:
-            contact = self._placed(name, row, curve, curve_b, roller, surface, point, axis, apart)
-        except ShapeError as error:
-            raise error.of(name) from error.__cause__
-        object.__setattr__(self, "contact", contact)
+        contact = None
+        if curve is not None or surface is not None:
+            try:
+                contact = self._placed(name, row, curve, curve_b, roller, surface, point, axis, apart)
+            except ShapeError as error:
+                raise error.of(name) from error.__cause__
         if contact is not None:
+            object.__setattr__(self, "contact", contact)
             row, (second, _, axis, point) = contact.row, map(tuple, contact.marker.T.tolist())
             if on_b is not None:
                 on_a, point, axis, second = Marker(point, axis, second), None, None, None
@@ -204,8 +206,8 @@ class Pair(Described):
                 on_b = Marker(at, z, x)
         if axis is None and point is not None and isinstance(row, PairType) and not row.directed:
             axis = (0.0, 0.0, 1.0)
-        if second is None and is_numeric(axis, (3,)):
-            second = second_direction(axis)
+        if second is None:
+            second = filled_second(axis)
         placed = (point, axis, second, plain(pitch), plain(lead), on_a, on_b)
         values: tuple[Any, ...] = (
             name,
@@ -221,8 +223,9 @@ class Pair(Described):
             roller,
             surface,
         )
-        for key, value in zip(self.formats, values, strict=True):
-            object.__setattr__(self, key, value)
+        for key, value, default in zip(self.formats, values, self._defaults, strict=True):
+            if value is not default:  # what a pair does not say stands in the class
+                object.__setattr__(self, key, value)
 
     @staticmethod
     def _placed(
@@ -255,18 +258,17 @@ class Pair(Described):
     @property
     def says_more(self) -> bool:
         """Whether it says more than its type and where it sits."""
-        said = (
-            self.pitch,
-            self.lead,
-            self.radius,
-            self.hertz,
-            self.curve,
-            self.curve_b,
-            self.roller,
-            self.surface,
-            self.closed,
+        return not (
+            self.pitch is None
+            and self.lead is None
+            and self.radius is None
+            and self.hertz is None
+            and self.curve is None
+            and self.curve_b is None
+            and self.roller is None
+            and self.surface is None
+            and self.closed is Pair.closed
         )
-        return said != (*(None,) * 8, "form") or travels(self.type)
 
     @property
     def curves(self) -> dict[str, Any]:

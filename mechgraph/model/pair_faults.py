@@ -20,7 +20,7 @@ def contact_faults(pair: Any, where: str) -> Iterator[str | None]:
     form, given = pair.type.touching, {"radius": pair.radius, "hertz": pair.hertz}
     if form is None:
         said = [name for name, value in given.items() if value is not None]
-        said += ["closed"] if pair.closed == "force" else []
+        said += ["closed"] if isinstance(pair.closed, str) and pair.closed == "force" else []
         if said:
             have = ", ".join(symbol for symbol, row in {**TABLE, **ROWS}.items() if row.touching)
             yield f"{where}{', '.join(said)}: type {pair.type.symbol} is no contact of two elements; {have} are"

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array, cross
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.once import of_graph
 
 Index = NDArray[np.intp]
 Items = NDArray[np.object_]
@@ -101,7 +100,7 @@ class Declared:
 
     def offset(self, m: Mechanism) -> Array:
         """Middle of the markers of every link in its frame, ``(3, N)``: of the first variant."""
-        ends = np.concatenate(m.once(pair_ends))
+        ends = np.concatenate(m.pair_ends)
         points = np.concatenate([self.point[0, :, :, 0], self.point[1, :, :, 0]], axis=1)
         count = np.bincount(ends, minlength=len(m.links))
         return np.stack([np.bincount(ends, row, minlength=len(m.links)) for row in points]) / count
@@ -125,7 +124,7 @@ class Declared:
         frame[:, 3, 0] = (offset[:, frame_link] - origin) / L
         placed = np.array([link.center is not None for link in m.links])
         center = np.where(placed[:, None], self.center - offset[:, :, None], 0.0)
-        a, b = m.once(pair_ends)
+        a, b = m.pair_ends
         return Parameters(
             marker_a=self._markers(0, offset[:, a], L),
             marker_b=self._markers(1, offset[:, b], L),
@@ -149,15 +148,6 @@ class Declared:
         at = (self.point[side] - offset[:, :, None]) / L
         B = max(z.shape[2], x.shape[2], at.shape[2])
         return np.stack([np.broadcast_to(v, (*v.shape[:2], B)) for v in (x, cross(z, x), z, at)], axis=1)
-
-
-@of_graph
-def pair_ends(m: Mechanism) -> tuple[Index, Index]:
-    """Indices of the links a and b of every pair, ``(P,)`` each."""
-    place, n = m.link_index, len(m.pairs)
-    return np.fromiter((place[p.a] for p in m.pairs), np.intp, n), np.fromiter(
-        (place[p.b] for p in m.pairs), np.intp, n
-    )
 
 
 def coupling_places(m: Mechanism) -> list[slice]:

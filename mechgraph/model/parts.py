@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import repeat
 from types import MappingProxyType
 from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from mechgraph.errors import DeclarationError
 from mechgraph.model.coupling import BaseCoupling
@@ -73,7 +77,7 @@ class Parts(Formatted):
 
     def link_names(self) -> tuple[str, ...]:
         """Names of the links, in order."""
-        return tuple(link.name for link in self.links)
+        return tuple([link.name for link in self.links])
 
     def massive_links(self) -> tuple[str, ...]:
         """Names of the links that have mass."""
@@ -93,6 +97,16 @@ class Parts(Formatted):
     def pair_index(self) -> Mapping[str, int]:
         """Place of every pair, by name."""
         return MappingProxyType(_places(pair.name for pair in self.pairs))
+
+    @cached_property
+    def pair_ends(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Indices of the links a and b of every pair, ``(P,)`` each; -1 for what is no link."""
+        place = self.link_index.get
+        a, b = (
+            np.fromiter(map(place, _hashed(ends), repeat(-1)), np.intp, len(ends))
+            for ends in ([pair.a for pair in self.pairs], [pair.b for pair in self.pairs])
+        )
+        return a, b
 
     def _place_of_named(self, name: str) -> int | None:
         """Place of the first pair that answers to a name, its own or that of one of its freedoms."""
@@ -203,6 +217,11 @@ class Parts(Formatted):
     def has_geometry(self) -> bool:
         """Whether every pair says where it sits (otherwise: a topology, which can be counted, not solved)."""
         return all(pair.has_geometry for pair in self.pairs)
+
+
+def _hashed(names: list[Any]) -> list[Any]:
+    """Names, with None for what is no text."""
+    return names if set(map(type, names)) <= {str} else [name if isinstance(name, str) else None for name in names]
 
 
 def _places(names: Iterable[Any]) -> dict[Any, int]:

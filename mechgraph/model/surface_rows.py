@@ -39,6 +39,9 @@ SURFACE_ROWS = {
     )
 }
 """The same of those that take a surface."""
+_BY_SYMBOL = {**ROWS, **TABLE}
+_WITH_CURVE = {**TABLE, **ROWS}
+_WITH_SURFACE = {**TABLE, **SURFACE_ROWS}
 
 
 def row_of(type: Any, curve: Any, surface: Any = None) -> Any:
@@ -47,8 +50,8 @@ def row_of(type: Any, curve: Any, surface: Any = None) -> Any:
     symbol = type.symbol if isinstance(type, PairType) and (bent or travels(type)) else type
     if not isinstance(symbol, str):
         return symbol
-    tables = (SURFACE_ROWS, TABLE) if surface is not None else (ROWS, TABLE) if bent else (TABLE, ROWS)
-    return next((table[symbol] for table in tables if symbol in table), type)
+    rows = _WITH_SURFACE if surface is not None else _WITH_CURVE if bent else _BY_SYMBOL
+    return rows.get(symbol, type)
 
 
 def placed_surface(row: PairType) -> OnSurface | None:

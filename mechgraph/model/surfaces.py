@@ -18,7 +18,7 @@ from mechgraph.algebra.se3 import Array, cross
 from mechgraph.model.curves import WHOLE_TURN, Circle, Curve, Line, remade_from
 from mechgraph.model.field_format import DIRECTION, POINT, POSITIVE, Described
 from mechgraph.model.field_format import TABLE as NESTED
-from mechgraph.model.numeric import second_direction
+from mechgraph.model.numeric import filled_second
 from mechgraph.model.travel import far_from
 from mechgraph.quantities import wrong
 from mechgraph.units import LENGTH, PURE
@@ -151,8 +151,8 @@ class AboutAxis(Surface):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.second is None and np.shape(self.axis) == (3,):
-            object.__setattr__(self, "second", second_direction(self.axis))
+        if self.second is None:
+            object.__setattr__(self, "second", filled_second(self.axis))
 
     @cached_property
     def _basis(self) -> Array:

@@ -10,7 +10,6 @@ from mechgraph.algebra.se3 import Array, compose, inverse, rotation_exp, rotatio
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import System
 from mechgraph.model.pair import Marker, Pair
-from mechgraph.model.parameters import pair_ends
 
 EXACT = 1e-13
 """Residual with which a relation, or a loop, counts as exact."""
@@ -28,7 +27,7 @@ class Placed:
         first, last = pair_frames(here)
         self.steps = compose(inverse(first), last)[..., 0]
         self.poses, self.frames, self.misfit = self._shared(last[..., 0])
-        a, b = pair_ends(self.system.m)
+        a, b = self.system.m.pair_ends
         self._to_a, self._to_b = inverse(self.poses[:, :, a]), inverse(self.poses[:, :, b])
         m = self.system.m
         q = self.system.coordinates_of(here.x, self.system.start_coordinates(m.start))[:, 0]
@@ -37,7 +36,7 @@ class Placed:
     def _shared(self, as_a: Array) -> tuple[Array, Array, Array]:
         """Poses of the links, frames of the pairs in the middle of their sides, and half the misfit, with least sum of squares."""
         s = self.system
-        a, b = pair_ends(s.m)
+        a, b = s.m.pair_ends
         poses = self.here.poses[..., 0].copy()
         as_b = compose(poses[:, :, b], s.par.marker_b[..., 0])
         gap = _between(as_b, as_a)
@@ -79,7 +78,7 @@ class Placed:
         first, last = pair_frames(here)
         as_a = compose(first, np.broadcast_to(self.steps[..., None], first.shape))
         as_b = compose(
-            here.poses[:, :, pair_ends(self.system.m)[1]], np.broadcast_to(here.system.par.marker_b, last.shape)
+            here.poses[:, :, self.system.m.pair_ends[1]], np.broadcast_to(here.system.par.marker_b, last.shape)
         )
         back = _moved(self.frames, change)[:, :3]
         out = np.zeros((6, len(self.system.m.pairs), 6, here.T))
@@ -95,7 +94,7 @@ class Placed:
         """The declared pairs, those that move with other markers: in the form in which they are declared where that can express it."""
         par, m = self.system.par, self.system.m
         sides = self._markers(change)
-        ends = pair_ends(m)
+        ends = m.pair_ends
         still = np.max(self.moved(change), axis=0, initial=0.0) <= EXACT
         out = []
         for k, pair in enumerate(m.pairs):

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from mechgraph.errors import counted
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.once import of_graph
-from mechgraph.model.parameters import pair_ends
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -120,7 +119,7 @@ def network(m: Mechanism) -> nx.MultiGraph[str]:
 @of_graph
 def link_graph(m: Mechanism) -> LinkGraph:
     """Tree, chords and loops of a mechanism."""
-    return _graph(len(m.links), *m.once(pair_ends), m.link_index[m.frame])
+    return _graph(len(m.links), *m.pair_ends, m.link_index[m.frame])
 
 
 def graph_of_ends(n_links: int, ends: Sequence[tuple[int, int]], frame: int) -> LinkGraph:
