@@ -107,14 +107,13 @@ class LoopSystem(ReducedRows):
         return out
 
     def _motions_of_single_loops(self) -> list[tuple[Array, Index]]:
-        blocks = self._blocks(self.rows.S, self.rows.middles) * self._scale[self.entries.column]
         shared = np.bincount(self.entries.column, minlength=len(self._free)) > 1
         if self.rows.more is not None:
             shared[self.rows.more.indices] = True
         own = self._free & ~shared
         rows: list[tuple[Array, Index]] = []
         for _, at in self._by_width:
-            block = np.moveaxis(blocks[:, at], 0, 1)
+            block = np.moveaxis(self._first[:, at], 0, 1)
             rows += self._own_motions(block, own[self.entries.column[at]], self.entries.column[at])
         return rows
 
@@ -303,11 +302,13 @@ class LoopSystem(ReducedRows):
         positions behind the first) the other rows take up.
         """
         e, T = self.entries, len(rows.S)
-        free = np.where(self._live, 0.0, self._turned_blocks(rows))
+        free = self._turned_blocks(rows)
         dropped = ~(np.arange(6) < self.kept[:, None])
-        local = np.zeros((len(self.kept), 6, count))
+        local = np.zeros((len(self.kept), 6, count))  # zero in the kept rows; fixed columns are zero in the blocks
         local[dropped] = rng.normal(size=(int(dropped.sum()), count))
-        power = np.einsum("tie,eic->ect", free, local[e.loop], optimize=True)
+        power = np.empty((len(e.column), count, T))
+        for loops, at in self._by_width:
+            power[at] = np.moveaxis(free[..., at].transpose(0, 2, 3, 1) @ local[loops], 0, -1)
         to = scipy.sparse.csr_array(
             (np.ones(len(e.column)), (e.column, np.arange(len(e.column)))), shape=(len(self._free), len(e.column))
         )

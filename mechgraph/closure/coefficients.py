@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -19,12 +19,21 @@ FACTORS_AT_ONCE = 2048
 
 
 class Numbers:
-    """Coefficients of poses and screws of a system, from its parameters; a trailing batch axis of length 1, or one a variant."""
+    """Coefficients of poses and screws of a system, from its parameters; a trailing batch axis of length 1, or one a variant.
+
+    ``for_one``: whether one state alone is evaluated, for which the coefficients of the poses are not kept.
+    """
 
     def __init__(
-        self, par: Parameters, walk: Walk, batches: Sequence[FactorBatch], n_factors: Index, n_freedoms: int
+        self,
+        par: Parameters,
+        walk: Walk,
+        batches: Sequence[FactorBatch],
+        n_factors: Index,
+        n_freedoms: int,
+        for_one: bool = False,
     ) -> None:
-        self.par, self.walk, self.batches = par, walk, batches
+        self.par, self.walk, self.batches, self.for_one = par, walk, batches, for_one
         self.n_factors, self.n_freedoms = n_factors, n_freedoms
         self.n_pairs = len(n_factors)
 
@@ -60,6 +69,17 @@ class Numbers:
             C = C.reshape(16, *C.shape[2:])
             out.append((np.ascontiguousarray(C[..., 0].transpose(2, 0, 1)) if C.shape[3] == 1 else C, (left, right)))
         return out
+
+    def parts(self) -> Iterator[tuple[FactorBatch, Array, tuple[Array, Array] | None]]:
+        """The factors with their coefficients and the poses beside them, see ``poses``: whole batches, or few factors at once."""
+        if not self.for_one:
+            yield from ((b, *pose) for b, pose in zip(self.batches, self.poses, strict=True))
+            return
+        for b in self.batches:
+            for i in range(0, len(b.pairs), FACTORS_AT_ONCE):
+                part = b.part(slice(i, i + FACTORS_AT_ONCE))
+                C = self._coefficients(part)
+                yield part, C.reshape(16, *C.shape[2:]), self._beside(part)
 
     def _coefficients(self, b: FactorBatch) -> Array:
         """Coefficients ``(4, 4, m, n, B)`` of the poses of a batch in the sense of the walk."""

@@ -86,7 +86,7 @@ class Configuration:
         s = self.system
         dtype = self.x.dtype if s.numbers.is_real else complex
         out = np.empty((16, len(s.walk.parents), self.T), dtype=dtype)
-        for b, (C, beside) in zip(s.batches, s.numbers.poses, strict=True):
+        for b, C, beside in s.numbers.parts():
             values = b.stack.values(self.x.take(b.state_rows, axis=0))
             if beside is None and isinstance(b.at_steps, slice):
                 np.matmul(C, values.transpose(1, 0, 2), out=out[:, b.at_steps].transpose(1, 0, 2))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.batches import Index as Index
-from mechgraph.closure.coefficients import Numbers
+from mechgraph.closure.coefficients import FACTORS_AT_ONCE, Numbers
 from mechgraph.closure.rows import CouplingRows, LoopRows, PositionRows, Rows
 from mechgraph.closure.states import States
 from mechgraph.model.mechanism import Mechanism
@@ -149,7 +149,13 @@ def _numbers(m: Mechanism) -> Numbers:
 
 
 def indexed(m: Mechanism) -> System:
-    """The system of a mechanism with its declared numbers, which are made once."""
+    """The system of a mechanism with its declared numbers, which are made once.
+
+    Of many pairs they take more memory than all else, and serve for one state, the declared one: then they are not kept.
+    """
     out = System(m)
-    vars(out)["numbers"] = m.once(_numbers)
+    if len(m.pairs) <= FACTORS_AT_ONCE:
+        vars(out)["numbers"] = m.once(_numbers)
+    else:
+        vars(out)["numbers"] = Numbers(out.par, out.walk, out.batches, out.n_factors, out.n_freedoms, for_one=True)
     return out

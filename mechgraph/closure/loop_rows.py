@@ -102,7 +102,9 @@ class ReducedRows:
         if rows.more is not None:
             largest = np.maximum(largest, abs(rows.more).max(axis=0).toarray())
         self._scale = np.where(largest > 0, 1.0 / np.where(largest > 0, largest, 1.0), 1.0)
-        self._reduce(blocks * self._scale[self.entries.column])
+        blocks *= self._scale[self.entries.column]
+        self._first = blocks
+        self._reduce(blocks)
 
     @property
     def loops(self) -> int:
@@ -137,7 +139,8 @@ class ReducedRows:
         turns, slides = out[..., :3, :], out[..., 3:, :]
         slides += np.moveaxis(cross(np.moveaxis(turns, -2, 0), np.moveaxis(middles[..., e.loop], -2, 0)), 0, -2)
         slides /= self.length[e.loop]
-        return np.asarray(out * (e.sign * self._free[e.column]))
+        out *= e.sign * self._free[e.column]
+        return out
 
     @cached_property
     def _by_width(self) -> list[tuple[Index, Index]]:
@@ -169,11 +172,17 @@ class ReducedRows:
 
     def _turned_blocks(self, rows: ClosureRows) -> Array:
         """Entries ``(..., 6, entries)`` of rows at any positions in the turned rows of their loops and columns of unit size."""
-        blocks = self._blocks(rows.S, rows.middles) * self._scale[self.entries.column]
+        blocks = self._first if rows is self.rows else self._unit_blocks(rows)
         turned = np.empty_like(blocks)
         for loops, at in self._by_width:
             turned[..., at] = np.swapaxes(self._turn[loops] @ np.swapaxes(blocks[..., at], -3, -2), -3, -2)
         return turned
+
+    def _unit_blocks(self, rows: ClosureRows) -> Array:
+        """Entries ``(..., 6, entries)`` of rows at any positions in columns of unit size."""
+        out = self._blocks(rows.S, rows.middles)
+        out *= self._scale[self.entries.column]
+        return out
 
     @cached_property
     def matrix(self) -> scipy.sparse.csr_array:

@@ -237,6 +237,12 @@ class Places:
         """For every freedom its pair, as numbers."""
         return np.repeat(np.arange(len(self.m.pairs)), np.diff(self.first_column))
 
+    def freedom_names_of(self, columns: Index) -> tuple[str, ...]:
+        """Full names of some freedoms."""
+        pairs = self.pair_of_freedom[columns]
+        places = columns - self.first_column[pairs]
+        return tuple(self.m.pairs[k].freedom_names[i] for k, i in zip(pairs.tolist(), places.tolist(), strict=True))
+
     @shared
     def owners(self) -> Place:
         """For every freedom its pair."""

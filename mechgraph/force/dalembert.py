@@ -74,6 +74,8 @@ def loop_wrench(problem: ForceProblem) -> Wrenches:
 
 def row_efforts(here: Configuration, multipliers: Array) -> Array:
     """Efforts ``(F, k, T)`` that multipliers ``(n, k, T)`` of the rows behind those of the loops exert in the freedoms."""
+    if not len(multipliers):
+        return np.zeros((here.system.n_freedoms, *multipliers.shape[1:]))
     loops = np.zeros((6 * here.system.graph.n_loops, *multipliers.shape[1:]))
     return here.row_efforts(np.concatenate([loops, multipliers]))
 

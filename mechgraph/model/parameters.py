@@ -146,8 +146,9 @@ class Declared:
         x = self.second[side] - (z * self.second[side]).sum(axis=0) * z
         x = x / np.sqrt((x * x).sum(axis=0))
         at = (self.point[side] - offset[:, :, None]) / L
-        B = max(z.shape[2], x.shape[2], at.shape[2])
-        return np.stack([np.broadcast_to(v, (*v.shape[:2], B)) for v in (x, cross(z, x), z, at)], axis=1)
+        out = np.empty((3, 4, at.shape[1], max(z.shape[2], x.shape[2], at.shape[2])), dtype=np.result_type(x, at))
+        out[:, 0], out[:, 1], out[:, 2], out[:, 3] = x, cross(z, x), z, at
+        return out
 
 
 def coupling_places(m: Mechanism) -> list[slice]:

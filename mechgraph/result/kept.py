@@ -77,8 +77,7 @@ class Kept:
     ) -> None:
         self.whole: Mechanism = system.m
         self.mechanism: Mechanism = mechanism or self.whole
-        names = self.whole.freedom_names()
-        self.actuated = tuple(names[column] for column in driven)
+        self.actuated = system.freedom_names_of(driven)
         self.prescribed = self.actuated if prescribed is None else prescribed
         self.batch, self.t, self.driven, self._passive = batch, t, driven, passive
         self._system, self._system_at, self.least_norm = system, system_at, not mask_redundant
@@ -177,9 +176,9 @@ class Kept:
 
     def shown_as(self, mechanism: Mechanism, driven: Index) -> Self:
         """The same of a mechanism with fewer drives, which stands at a dead point of them."""
-        out, names = copy(self), self.whole.freedom_names()
+        out = copy(self)
         out.mechanism, out.driven = mechanism, driven
-        out.actuated = out.prescribed = tuple(names[column] for column in driven)
+        out.actuated = out.prescribed = self._system.freedom_names_of(driven)
         out._status = np.full(self._count, Status.DEAD_POINT.value, dtype="U24")
         return out
 

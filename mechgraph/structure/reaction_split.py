@@ -48,15 +48,17 @@ def pair_power(here: Configuration, totals: Array) -> Array:
 
 
 def split_stress(here: Configuration, states: Array, multipliers: Array, acting: Index) -> Stress:
-    """Reaction parts and efforts of pair wrench states ``(6, P, s, T)``; only the freedoms ``acting`` (driven, coupled) have efforts."""
+    """Reaction parts and efforts of pair wrench states ``(6, P, s, T)``; only the freedoms ``acting`` (driven, coupled) have efforts.
+
+    The reaction parts take the place of ``states``, as these are large.
+    """
     s = states.shape[2]
     efforts = np.zeros((here.system.n_freedoms, s, here.T))
-    reactions = np.empty_like(states)
     for i in range(s):
         tau = pair_power(here, states[:, :, i])
         efforts[acting, i] = tau[acting]
-        reactions[:, :, i] = reaction_part(here, states[:, :, i], efforts[:, i])
-    return Stress(reactions, efforts, multipliers)
+        states[:, :, i] = reaction_part(here, states[:, :, i], efforts[:, i])
+    return Stress(states, efforts, multipliers)
 
 
 def orthonormal_stress(here: Configuration, states: Array, multipliers: Array, acting: Index) -> Stress:

@@ -155,12 +155,12 @@ class _Edges:
     def __init__(self, n_nodes: int, a: Index, b: Index) -> None:
         ends = np.stack([a, b], axis=1).ravel()
         self.both: list[int] = (a + b).tolist()
-        self._numbers: list[int] = (np.argsort(ends, kind="stable") // 2).tolist()
-        self._begin: list[int] = np.concatenate([[0], np.cumsum(np.bincount(ends, minlength=n_nodes))]).tolist()
+        self.numbers: list[int] = (np.argsort(ends, kind="stable") // 2).tolist()
+        self.begin: list[int] = np.concatenate([[0], np.cumsum(np.bincount(ends, minlength=n_nodes))]).tolist()
 
     def at(self, node: int) -> list[int]:
         """Edges at a node."""
-        return self._numbers[self._begin[node] : self._begin[node + 1]]
+        return self.numbers[self.begin[node] : self.begin[node + 1]]
 
 
 def _short_loops(
@@ -173,61 +173,63 @@ def _short_loops(
     """
     order = np.concatenate([tree, closing])
     edges = _Edges(n_links, a[order], b[order])
-    pairs, tails, heads = order.tolist(), a[order].tolist(), b[order].tolist()
+    tails, heads, forward = a[order].tolist(), b[order].tolist(), (2 * order + 1).tolist()
     loops = []
     for chord in range(len(tree), len(order)):
         path = _shortest_path(edges, heads[chord], tails[chord], chord)
-        loops.append(_oriented([2 * pairs[k] + (tails[k] == node) for k, node in [(chord, tails[chord]), *path]]))
+        steps = [forward[k] if tails[k] == node else forward[k] - 1 for k, node in path]
+        loops.append(_oriented([forward[chord], *steps]))
     loops.sort(key=lambda loop: (loop[0], len(loop), loop))
-    steps = np.fromiter(chain.from_iterable(loops), np.intp)
-    loop = np.repeat(np.arange(len(loops)), np.array([len(steps) for steps in loops], dtype=np.intp))
-    return loop.astype(np.intp), (steps >> 1).astype(np.intp), np.where(steps & 1, 1.0, -1.0)
+    run = np.fromiter(chain.from_iterable(loops), np.intp)
+    loop = np.repeat(np.arange(len(loops)), np.fromiter(map(len, loops), np.intp, len(loops)))
+    return loop.astype(np.intp), (run >> 1).astype(np.intp), np.where(run & 1, 1.0, -1.0)
 
 
 def _shortest_path(edges: _Edges, start: int, goal: int, limit: int) -> list[tuple[int, int]]:
     """Edges, each with the node from which it is run through, of a shortest path along edges before ``limit``.
 
-    Searched from both ends; ties go to the earlier edge.
+    Searched from both ends, from the one with the fewer new nodes next; ties go to the earlier edge.
     """
-    back: tuple[dict[int, int], dict[int, int]] = ({start: -1}, {goal: -1})
-    fronts = [[start], [goal]]
-    meet = -1
-    while meet < 0:
-        side = 0 if len(fronts[0]) <= len(fronts[1]) else 1
-        fronts[side], meet = _next_front(edges, fronts[side], back[side], back[1 - side], limit)
+    both, numbers, begin = edges.both, edges.numbers, edges.begin
+    mine, theirs, front, others = {start: -1}, {goal: -1}, [start], [goal]  # node -> edge that led there
+    from_start = True
+    while True:
+        if len(front) > len(others) or (len(front) == len(others) and not from_start):
+            mine, theirs, front, others, from_start = theirs, mine, others, front, not from_start
+        following: list[int] = []
+        for node in front:
+            for k in numbers[begin[node] : begin[node + 1]]:
+                if k >= limit:
+                    break
+                other = both[k] - node
+                if other in mine:
+                    continue
+                mine[other] = k
+                if other in theirs:
+                    return _joined(both, other, *((mine, theirs) if from_start else (theirs, mine)))
+                following.append(other)
+        front = following
+
+
+def _joined(both: list[int], meet: int, back: dict[int, int], ahead: dict[int, int]) -> list[tuple[int, int]]:
+    """The path through the node where the searches from the start and from the goal met."""
     path: list[tuple[int, int]] = []
     node = meet
-    while (k := back[0][node]) >= 0:
-        node = edges.both[k] - node
+    while (k := back[node]) >= 0:
+        node = both[k] - node
         path.append((k, node))
     path.reverse()
     node = meet
-    while (k := back[1][node]) >= 0:
+    while (k := ahead[node]) >= 0:
         path.append((k, node))
-        node = edges.both[k] - node
+        node = both[k] - node
     return path
 
 
-def _next_front(
-    edges: _Edges, front: list[int], mine: dict[int, int], theirs: dict[int, int], limit: int
-) -> tuple[list[int], int]:
-    """Nodes next to a front that are new to ``mine`` (node -> edge that led there), up to the first in ``theirs``; that one or -1."""
-    following: list[int] = []
-    for node in front:
-        for k in edges.at(node):
-            if k >= limit:
-                break
-            other = edges.both[k] - node
-            if other not in mine:
-                mine[other] = k
-                if other in theirs:
-                    return following, other
-                following.append(other)
-    return following, -1
-
-
-def _oriented(loop: list[int]) -> list[int]:
+def _oriented(loop: list[int]) -> tuple[int, ...]:
     """The loop begun at its first declared pair, run through from that pair's a to its b."""
-    at = loop.index(min(loop))
-    turned = loop[at:] + loop[:at]
-    return turned if turned[0] & 1 else [step ^ 1 for step in (turned[0], *reversed(turned[1:]))]
+    first = min(loop)
+    at = loop.index(first)
+    if first & 1:
+        return (*loop[at:], *loop[:at])
+    return tuple([step ^ 1 for step in (loop[at::-1] + loop[:at:-1])])
