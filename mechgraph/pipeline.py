@@ -11,6 +11,7 @@ from typing import TypeVar
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.arguments import option_faults
 from mechgraph.closure.assembly import closed_start, named_columns
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
@@ -22,7 +23,7 @@ from mechgraph.closure.passive_rest import unspun
 from mechgraph.closure.ranges import end_at_ranges
 from mechgraph.closure.rates import distance_to_dead_point
 from mechgraph.closure.reduced_path import follow_reduced
-from mechgraph.closure.reduction import Reduction, reduction_of
+from mechgraph.closure.reduction import FORMS, Reduction, reduction_of
 from mechgraph.closure.solver import closure_solver, engine_for, solver_at_start
 from mechgraph.errors import DeclarationError, IndeterminateError
 from mechgraph.model.load_base import Load
@@ -60,6 +61,10 @@ class Options:
     engine: str = "auto"
     progress: Callable[[int, int], None] | None = field(default=None, compare=False)
     form: str = "auto"
+
+    def __post_init__(self) -> None:
+        if faults := option_faults({"form": (self.form, FORMS)}):
+            raise DeclarationError("options of a solution", faults)
 
 
 @dataclass(frozen=True)

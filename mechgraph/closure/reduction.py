@@ -35,6 +35,8 @@ from mechgraph.model.pair import Pair
 from mechgraph.model.pair_type import PairType
 from mechgraph.model.parameters import Parameters
 
+FORMS = ("auto", "full", "reduced")
+"""The forms of the equations by which a path may be followed; ``"auto"``: the faster one."""
 FORM_PAIRS = 2000
 """Pairs above which no reduced form is looked for: more of it would stay than a dense engine does well."""
 

@@ -118,5 +118,5 @@ def may_have_rods(system: System) -> bool:
         for is_one in (lambda row: row.f == 3 and row.steps[0].holds_rotation, _is_slide)
     )
     ends = np.concatenate([system.a, system.b])
-    every, balls, slides = (np.bincount(ends, np.tile(some, 2)) for some in (ball | True, ball, slide))
-    return bool(((every == 2) & (balls >= 1) & (balls + slides == 2)).any())
+    balls, slides = (np.bincount(ends, np.tile(some, 2)) for some in (ball, slide))
+    return bool(((np.bincount(ends) == 2) & (balls >= 1) & (balls + slides == 2)).any())

@@ -182,6 +182,11 @@ def test_a_slide_beside_the_line_is_none() -> None:
     assert line.reduction is None
 
 
+def test_an_unknown_form_is_one_clear_error() -> None:
+    with pytest.raises(mg.DeclarationError, match="form = 'redcued': expected one of 'auto', 'full', 'reduced'"):
+        Options(form="redcued")
+
+
 def curved(n: int, more: int = 1) -> dict[str, mg.Motion]:
     """Motions of the sliders round a curve, ``n`` positions; ``more - 1`` between any two of these, on the chord."""
     t = np.linspace(0, 2 * np.pi, n)
