@@ -19,7 +19,9 @@ import mechgraph as mg
 from mechgraph.closure import tree
 from mechgraph.closure.assembly import assembled, scaled_start
 from mechgraph.closure.bordering import LoopSystem
+from mechgraph.closure.coefficients import Numbers
 from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import System
 from mechgraph.closure.loop_rows import ClosureRows
 from mechgraph.closure.tree import Tree
 from mechgraph.model.parameters import parameters
@@ -244,6 +246,17 @@ def test_the_poses_of_a_start_are_taken_over_when_it_is_scaled(m: mg.Mechanism) 
         assert_allclose(here.S, fresh.S, atol=1e-11)
         assert_allclose(here.pair_points.mean(axis=1), 0, atol=1e-12)
         assert 0.5 < np.sqrt((points**2).sum(axis=0).mean()) < 2
+
+
+@pytest.mark.parametrize("name", ["rcsr", "7r", "pphchp", "r-sg-c", "geneva"])
+def test_poses_are_the_same_whether_coefficients_are_kept_or_not(name: str) -> None:
+    """The declared state of many pairs is evaluated a few factors at a time, with nothing kept."""
+    system, again = (System(mg.load(name)) for _ in range(2))
+    x = system.state_of(np.random.default_rng(0).uniform(-0.3, 0.3, (system.n_freedoms, 1)))
+    parts = (system.par, system.walk, system.batches, system.n_factors, system.n_freedoms)
+    vars(again)["numbers"] = Numbers(*parts, for_one=True)
+    assert_allclose(Configuration(again, x).poses, Configuration(system, x).poses, rtol=1e-13, atol=1e-13)
+    assert "poses" not in vars(again.numbers)
 
 
 def test_factors_of_one_pattern_are_renewed() -> None:
