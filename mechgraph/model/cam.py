@@ -11,7 +11,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
 from mechgraph.model.curves import ORDERS, WHOLE_TURN, Centred
-from mechgraph.model.field_format import NUMBER, POSITIVE, SAMPLES, TEXT
+from mechgraph.model.field_kinds import NUMBER, POSITIVE, SAMPLES, TEXT
 from mechgraph.model.pieces import Pieces, parted
 from mechgraph.quantities import wrong
 from mechgraph.units import LENGTH

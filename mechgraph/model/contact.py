@@ -20,7 +20,7 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array, cross
 from mechgraph.model.coupling import BaseCoupling
-from mechgraph.model.field_format import FREEDOM_NAME, TEXT
+from mechgraph.model.field_kinds import FREEDOM_NAME, TEXT
 from mechgraph.model.pair import Marker, Pair
 
 FITTING = 1e-6

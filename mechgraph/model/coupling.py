@@ -7,7 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Self
 
-from mechgraph.model.field_format import COEFFICIENTS, NUMBER, TEXT, Described
+from mechgraph.model.field_format import Described
+from mechgraph.model.field_kinds import COEFFICIENTS, NUMBER, TEXT
 from mechgraph.model.nameable import Nameable
 from mechgraph.model.numeric import number_fault, plain
 from mechgraph.quantities import is_numeric, shown, without_units, wrong

@@ -16,16 +16,8 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.model.field_format import (
-    DIRECTION,
-    FLAG,
-    INTERVAL,
-    NUMBER,
-    POINT,
-    POSITIVE,
-    TEXT,
-    Described,
-)
+from mechgraph.model.field_format import Described
+from mechgraph.model.field_kinds import DIRECTION, FLAG, INTERVAL, NUMBER, POINT, POSITIVE, TEXT
 from mechgraph.model.numeric import filled_second
 from mechgraph.model.once import Once
 from mechgraph.units import LENGTH

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Literal, Self, get_args
 
 from mechgraph.errors import DeclarationError
-from mechgraph.model.field_format import FLAG, FREEDOM_NAME, NUMBER, OTHER, POSITION, TEXT, Described
+from mechgraph.model.field_format import Described
+from mechgraph.model.field_kinds import FLAG, FREEDOM_NAME, NUMBER, OTHER, POSITION, TEXT
 from mechgraph.model.nameable import Nameable
 from mechgraph.quantities import is_numeric, wrong
 from mechgraph.units import factor_of

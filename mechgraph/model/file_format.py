@@ -12,19 +12,8 @@ from typing import Any
 
 from mechgraph.model.drive import Drive
 from mechgraph.model.event import Event
-from mechgraph.model.field_format import (
-    FLAG,
-    INTEGER,
-    NUMBERS,
-    OTHER,
-    SIX,
-    TABLE,
-    TABLES,
-    TEXT,
-    FieldFormat,
-    Formatted,
-    Schema,
-)
+from mechgraph.model.field_format import FieldFormat, Formatted, Schema
+from mechgraph.model.field_kinds import FLAG, INTEGER, NUMBERS, OTHER, SIX, TABLE, TABLES, TEXT
 from mechgraph.model.force_table import ForceTable
 from mechgraph.model.gears import COUPLINGS
 from mechgraph.model.given_curves import CURVES, Function

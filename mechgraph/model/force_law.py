@@ -14,7 +14,7 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
-from mechgraph.model.field_format import FREEDOM_NAME, LINK_NAME, NAMED_POINT, NUMBER, POSITION, TABLE
+from mechgraph.model.field_kinds import FREEDOM_NAME, LINK_NAME, NAMED_POINT, NUMBER, POSITION, TABLE
 from mechgraph.model.force_table import ForceTable
 from mechgraph.model.load_base import Load, LoadSite
 from mechgraph.model.nameable import Nameable

@@ -10,7 +10,8 @@ import numpy as np
 import scipy
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.model.field_format import POSITION, RATE, SAMPLES, TEXT, Described
+from mechgraph.model.field_format import Described
+from mechgraph.model.field_kinds import POSITION, RATE, SAMPLES, TEXT
 from mechgraph.quantities import shown, wrong
 from mechgraph.units import FORCE, MOMENT
 

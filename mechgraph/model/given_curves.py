@@ -14,7 +14,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.model.asked import asked, inner, slope_faults
 from mechgraph.model.cam import Cam
 from mechgraph.model.curves import CLOSED_GAP, ORDERS, Circle, Curve, Ellipse, Helix, Involute, Line
-from mechgraph.model.field_format import FLAG, FUNCTION, INTERVAL, POINT_LIST
+from mechgraph.model.field_kinds import FLAG, FUNCTION, INTERVAL, POINT_LIST
 from mechgraph.model.pieces import Pieces, parted
 from mechgraph.units import LENGTH
 

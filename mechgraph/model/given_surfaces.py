@@ -12,7 +12,7 @@ import scipy
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.model.asked import asked, inner, slope_faults
-from mechgraph.model.field_format import FUNCTION, INTEGER, INTERVAL, POINT_LIST
+from mechgraph.model.field_kinds import FUNCTION, INTEGER, INTERVAL, POINT_LIST
 from mechgraph.model.surfaces import Cone, Cylinder, Plane, Revolution, Sphere, Surface, Torus
 from mechgraph.units import LENGTH
 

@@ -12,7 +12,8 @@ import numpy as np
 import scipy
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.model.field_format import POSITIVE, TWO, TWO_POSITIVE, Described
+from mechgraph.model.field_format import Described
+from mechgraph.model.field_kinds import POSITIVE, TWO, TWO_POSITIVE
 from mechgraph.quantities import wrong
 from mechgraph.units import LENGTH, PRESSURE, PURE
 

@@ -12,7 +12,8 @@ import numpy as np
 
 from mechgraph.algebra.inertia import physical_faults
 from mechgraph.errors import DeclarationError
-from mechgraph.model.field_format import FLAG, NUMBER, POINT, POINTS, TENSOR, TEXT, Described
+from mechgraph.model.field_format import Described
+from mechgraph.model.field_kinds import FLAG, NUMBER, POINT, POINTS, TENSOR, TEXT
 from mechgraph.quantities import is_numeric, shown
 from mechgraph.units import INERTIA, LENGTH, MASS
 

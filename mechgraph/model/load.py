@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from mechgraph.algebra.se3 import rotate
-from mechgraph.model.field_format import FREEDOM_NAME, LINK_NAME, NAMED_POINT, SERIES, TEXT, VECTOR, VECTOR_SERIES
+from mechgraph.model.field_kinds import FREEDOM_NAME, LINK_NAME, NAMED_POINT, SERIES, TEXT, VECTOR, VECTOR_SERIES
 from mechgraph.model.force_law import Damper, ForceLaw, Spring, TorsionSpring
 from mechgraph.model.load_base import Load, LoadSite, Value
 from mechgraph.model.nameable import Nameable

@@ -10,7 +10,8 @@ from typing import Any, ClassVar, Protocol, Self
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.model.field_format import FREEDOM_NAME, LINK_NAME, Described
+from mechgraph.model.field_format import Described
+from mechgraph.model.field_kinds import FREEDOM_NAME, LINK_NAME
 from mechgraph.model.nameable import Nameable
 from mechgraph.model.numeric import same_fields
 from mechgraph.quantities import shown

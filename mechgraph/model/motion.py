@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
-from mechgraph.model.field_format import SERIES, Described
+from mechgraph.model.field_format import Described
+from mechgraph.model.field_kinds import SERIES
 from mechgraph.model.motion_law import LAWS, Law, LawFault, Smooth, rates_of_samples, read_series
 from mechgraph.quantities import has_quantity, shown, wrong
 from mechgraph.units import LENGTH, PURE, TIME

@@ -13,18 +13,9 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.errors import ShapeError
 from mechgraph.model.contact_rows import ROWS, curve_faults, in_contact, kept_side
 from mechgraph.model.curves import Curve
-from mechgraph.model.field_format import (
-    DIRECTION,
-    LINK_NAME,
-    NUMBER,
-    POINT,
-    POSITIVE,
-    TEXT,
-    Described,
-)
-from mechgraph.model.field_format import (
-    TABLE as NESTED,
-)
+from mechgraph.model.field_format import Described
+from mechgraph.model.field_kinds import DIRECTION, LINK_NAME, NUMBER, POINT, POSITIVE, TEXT
+from mechgraph.model.field_kinds import TABLE as NESTED
 from mechgraph.model.hertz import Hertz
 from mechgraph.model.numeric import filled_second, plain
 from mechgraph.model.numeric import second_direction as second_direction

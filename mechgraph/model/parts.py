@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from mechgraph.errors import DeclarationError
 from mechgraph.model.coupling import BaseCoupling
 from mechgraph.model.drive import Drive
-from mechgraph.model.field_format import BY_FREEDOM, FACTS, NUMBER, TABLE, TABLES, TEXT, Formatted
+from mechgraph.model.field_format import Formatted
+from mechgraph.model.field_kinds import BY_FREEDOM, FACTS, NUMBER, TABLE, TABLES, TEXT
 from mechgraph.model.link import Link
 from mechgraph.model.load_base import Load
 from mechgraph.model.pair import Pair

@@ -13,7 +13,8 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.arguments import items_of
 from mechgraph.model.drive import Drive
 from mechgraph.model.event import Event
-from mechgraph.model.field_format import BY_FREEDOM, NUMBER, OTHER, SERIES, TABLES, TEXT, Described
+from mechgraph.model.field_format import Described
+from mechgraph.model.field_kinds import BY_FREEDOM, NUMBER, OTHER, SERIES, TABLES, TEXT
 from mechgraph.model.motion import Motion
 from mechgraph.model.nameable import Nameable
 from mechgraph.model.numeric import plain, same_fields

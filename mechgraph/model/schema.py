@@ -8,7 +8,8 @@ from collections.abc import Iterator
 from typing import Any
 from urllib.parse import quote
 
-from mechgraph.model.field_format import TABLE, TABLES, FieldFormat
+from mechgraph.model.field_format import FieldFormat
+from mechgraph.model.field_kinds import TABLE, TABLES
 from mechgraph.model.file_format import KINDS, TABLES_OF_FILE, USUAL, Table
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from mechgraph.model.field_format import FREEDOM_NAME, NUMBER, POSITION, Described
+from mechgraph.model.field_format import Described
+from mechgraph.model.field_kinds import FREEDOM_NAME, NUMBER, POSITION
 from mechgraph.model.nameable import Nameable
 from mechgraph.quantities import is_numeric, wrong
 

@@ -16,8 +16,9 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array, cross
 from mechgraph.model.curves import WHOLE_TURN, Circle, Curve, Line, remade_from
-from mechgraph.model.field_format import DIRECTION, POINT, POSITIVE, Described
-from mechgraph.model.field_format import TABLE as NESTED
+from mechgraph.model.field_format import Described
+from mechgraph.model.field_kinds import DIRECTION, POINT, POSITIVE
+from mechgraph.model.field_kinds import TABLE as NESTED
 from mechgraph.model.numeric import filled_second
 from mechgraph.model.travel import far_from
 from mechgraph.quantities import wrong

@@ -17,7 +17,8 @@ import tomli_w
 from mechgraph.errors import ContentError, DeclarationError, FileError
 from mechgraph.model.chain import chain
 from mechgraph.model.curves import Curve
-from mechgraph.model.field_format import BY_FREEDOM, COEFFICIENTS, SIX, STANDS_AS, TABLE, TABLES, Described
+from mechgraph.model.field_format import STANDS_AS, Described
+from mechgraph.model.field_kinds import BY_FREEDOM, COEFFICIENTS, SIX, TABLE, TABLES
 from mechgraph.model.file_format import DEGREES, KINDS, SCHEMA, TABLES_OF_FILE, USUAL
 from mechgraph.model.library import library_names, library_path
 from mechgraph.model.mechanism import Mechanism, check_mechanism

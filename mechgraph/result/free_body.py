@@ -12,7 +12,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.document import Bullets, Document, Heading, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError
 from mechgraph.model.coupling import BaseCoupling
-from mechgraph.model.field_format import NAMED_POINT
+from mechgraph.model.field_kinds import NAMED_POINT
 from mechgraph.model.link import Link
 from mechgraph.model.load import Gravity
 from mechgraph.model.load_base import Load
