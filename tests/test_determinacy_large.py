@@ -25,7 +25,7 @@ from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
 from mechgraph.closure.rank import ClosureRank, closure_rank, rank_of_rows
 from mechgraph.numerics.tolerances import RANKS
 from mechgraph.report import rounding
-from mechgraph.report.facts import counted_ledger
+from mechgraph.report.graph_facts import counted_ledger
 from mechgraph.structure import snapping
 from mechgraph.structure.generic import random_rows
 from mechgraph.structure.kind import kind_of

@@ -12,15 +12,13 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import at_position
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.rank import EngineName
-from mechgraph.equations.build import BOOKKEEPINGS, BookkeepingName, formulate
-from mechgraph.equations.terms import Ledger, LedgerRow
 from mechgraph.errors import DeclarationError
-from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.tolerances import RANKS
 from mechgraph.quantities import wrong
 from mechgraph.report import driving, findings
 from mechgraph.report.advice import Advice, driving_advice, variants
 from mechgraph.report.findings import Finding, LoopFact, PassiveFinding
+from mechgraph.report.graph_facts import GraphFacts
 from mechgraph.structure.advice import advice
 from mechgraph.structure.decomposition import Decomposition, decomposition
 from mechgraph.structure.families import Families, families
@@ -31,8 +29,6 @@ from mechgraph.structure.mobility import Freedoms, freedoms_at
 from mechgraph.structure.pair_changes import LARGEST_FOR_SETS, Effect
 from mechgraph.structure.self_stress import SelfStress
 from mechgraph.structure.uniqueness import Uniqueness, uniqueness
-from mechgraph.topology.linkgraph import LinkGraph
-from mechgraph.topology.matching import Parts, parts_of
 
 MOST_DRIVERS = 60
 """Freedoms that are tried as driver where the groups of all choices are asked for."""
@@ -57,67 +53,23 @@ class Geometry:
 
 
 @dataclass(frozen=True, repr=False)
-class Facts:
-    """What the graph alone and the graph with its geometry say about a mechanism.
+class Facts(GraphFacts):
+    """What the graph alone (see ``GraphFacts``) and the graph with its geometry say about a mechanism.
 
     Facts that need geometry are None (or empty) for a topology, and where the loops cannot be closed (see ``note``).
     What is expensive is computed when first asked for, whatever the size; ``engine`` says which one decided the rank.
     """
 
-    mechanism: Mechanism
-    graph: LinkGraph
     note: str = ""
     geometry: Geometry | None = None
     asked: EngineName = "auto"
 
-    # --- the graph alone -----------------------------------------------------------------------------------------------
-
-    @property
-    def links(self) -> tuple[str, ...]:
-        """Names of the links."""
-        return self.mechanism.link_names()
-
-    @cached_property
-    def pairs(self) -> tuple[str, ...]:
-        """Names of the pairs."""
-        return tuple(p.name for p in self.mechanism.pairs)
-
-    @cached_property
-    def loops(self) -> tuple[tuple[tuple[str, int], ...], ...]:
-        """Independent loops, each a chain of (pair name, sign)."""
-        return tuple(tuple((self.pairs[k], sign) for k, sign in loop) for loop in self.graph.loops)
-
-    @property
-    def freedom_count(self) -> int:
-        """Sum of the freedoms of the pairs."""
-        return sum(p.type.f for p in self.mechanism.pairs)
-
-    @property
-    def equation_count(self) -> int:
-        """Number of closure equations: six a loop, one a coupling."""
-        return 6 * self.graph.n_loops + len(self.mechanism.couplings)
-
-    @property
-    def mobility_by_count(self) -> int:
-        """Kutzbach mobility: sum of freedoms - closure equations."""
-        return self.freedom_count - self.equation_count
-
-    def ledger(self, bookkeeping: BookkeepingName = "lee") -> Ledger:
-        """Unknowns against equations in a bookkeeping, ``"lee"`` or ``"minimal"``."""
-        countable = isinstance(bookkeeping, str) and bookkeeping in BOOKKEEPINGS and not self.mechanism.couplings
-        if countable:
-            return counted_ledger(self.mechanism, bookkeeping)
-        return formulate(self.mechanism, bookkeeping).ledger()
+    # --- what the topology decides ---------------------------------------------------------------------------------------
 
     @cached_property
     def generic(self) -> Generic:
         """Rank and excess for random geometry: what the topology alone decides."""
         return generic(self.mechanism, self.graph, self.asked)
-
-    @cached_property
-    def parts(self) -> Parts:
-        """Dulmage-Mendelsohn parts: which links and pairs are over-, which underdetermined by count."""
-        return parts_of(self.mechanism, self.graph)
 
     @cached_property
     def loop_facts(self) -> tuple[LoopFact, ...]:
@@ -437,15 +389,3 @@ class Facts:
         if g is None:
             return iter(())
         return variants(at_position(self.mechanism, g.system, g.x), g.freedoms, g.driven, self.asked, most)
-
-
-def counted_ledger(m: Mechanism, bookkeeping: str) -> Ledger:
-    """The ledger counted from the pair table: must agree with that of the formulation."""
-    rows: dict[str, LedgerRow] = {}
-    for pair in m.pairs:
-        unknowns, equations = pair.type.unknowns_and_equations if bookkeeping == "lee" else (6 - pair.type.f, 0)
-        old = rows.get(pair.type.symbol, LedgerRow(0, 0, 0))
-        rows[pair.type.symbol] = LedgerRow(old.count + 1, old.unknowns + unknowns, old.equations + equations)
-    rows["driver"] = LedgerRow(len(m.drives), len(m.drives), 0)
-    rows["link"] = LedgerRow(len(m.links) - 1, 0, 6 * (len(m.links) - 1))
-    return Ledger(bookkeeping, rows)
