@@ -2,7 +2,9 @@
 
 python tests/benchmarks/sweep_assemblies.py arms 100          sixteen postures of random arms of six turns
 python tests/benchmarks/sweep_assemblies.py seeds 20          random topologies: the same set for ten seeds
-python tests/benchmarks/sweep_assemblies.py newton 20 10000   Newton from so many random guesses finds nothing outside the set
+python tests/benchmarks/sweep_assemblies.py newton 20 3 10000 Newton from so many random guesses finds nothing outside the set
+
+The number after the count is that of loops, at most. Small samples are in ``test_sweep_assemblies.py``.
 """
 
 from __future__ import annotations

@@ -1,0 +1,33 @@
+"""Small samples of the sweeps: random topologies have the same assemblies for any seed, and Newton finds no others."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sweep_assemblies import outside, prints, topology
+
+import mechgraph as mg
+from mechgraph.closure.configuration import Configuration
+from mechgraph.modes import store
+from mechgraph.modes.question import Question
+from mechgraph.modes.search import searched
+
+
+@pytest.mark.parametrize("number", [14, pytest.param(16, marks=pytest.mark.slow)])
+def test_random_topologies_have_the_same_assemblies_for_any_seed(
+    number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(store, "PACKED", tmp_path / "none")
+    m, at = topology(number, 3)
+    q = Question(m, at)
+    sets = [mg.assemblies(m, at, seed=seed, cache=False) for seed in (0, 1)]
+    assert len({(one.total, len(one), one.completeness) for one in sets}) == 1
+    assert sets[0].completeness == "tested"
+    first, second = (prints(q, one) for one in sets)
+    assert first.shape[1] > 0
+    assert outside(first, second) == outside(second, first) == 0
+    x = searched(q.system, q.x, q.columns, q.drive[:, 0], 200, 0.5, np.random.default_rng(number))
+    assert x.shape[1] > 20
+    assert outside(q.family.prints(Configuration(q.system, x)), first) == 0
