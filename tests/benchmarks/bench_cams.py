@@ -1,7 +1,7 @@
 """Cams beside linkages of the same size and motion: ``python tests/benchmarks/bench_cams.py``.
 
 An eccentric with a roller moves as a slider-crank does (``test_followers``), so both do the same work but for the curve; a cam of a
-law, whose jerk jumps, takes nodes at the jumps beside that. Timed in turn in one run: ``mg.solve`` with rates, reactions and checks.
+law, whose jerk jumps, takes more steps. Timed in turn in one run: ``mg.solve`` with rates, reactions and checks.
 """
 
 import os
