@@ -221,7 +221,8 @@ def test_change_points_are_passed_alike() -> None:
     m = mg.Mechanism("parallelogram", None, pairs, ["A"])
     begin = np.arctan2(0.8, 0.5)
     turn = np.linspace(0.1, 6.2, 62) - begin
-    found = assert_same(m, {"A": mg.Motion(turn, 1.0, 0.3)}, condition=10.0)
+    # 0.04 beside the crossing accelerations lose rounding over the cube of that
+    found = assert_same(m, {"A": mg.Motion(turn, 1.0, 0.3)}, condition=100.0)
     np.testing.assert_allclose(found["D"].position, found["A"].position, atol=1e-11)
 
 
