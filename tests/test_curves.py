@@ -338,6 +338,21 @@ def test_everything_holds_of_a_frame_held_in_orientation(symbol, shape, tmp_path
 # --- what will not do ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"type": "Ps", "curve": mg.Curve.circle(radius=0.5), "roller": 0.2}, "0.3 off its curve at the radius of the"),
+        ({"type": "Sp", "surface": mg.Surface.sphere(radius=0.5)}, "0.5 off its surface"),
+    ],
+)
+def test_a_point_off_its_curve_is_refused_also_of_a_copy_and_where_units_are_named(given, words):
+    """A copy with other fields (units make one) must not take the nearest place for the point that was given."""
+    off = mg.Pair("X", a="frame", b="body", point=(1, 0, 0), **given)
+    for pair, units in ((off, {"length": "m", "mass": "kg", "time": "s"}), (off.replace(closed="force"), None)):
+        with pytest.raises(mg.DeclarationError, match=words):
+            mg.Mechanism("m", None, [pair], units=units)
+
+
 def refused(**given):
     with pytest.raises(mg.DeclarationError) as error:
         mg.Mechanism("m", None, [mg.Pair("X", **{"type": "Sg", "a": "frame", "b": "body", **given})])

@@ -85,6 +85,7 @@ def test_pendulum_swings_as_the_elliptic_functions_say(loads):
     tension = G * np.cos(below) + r["A"].velocity[:, 0] ** 2
     np.testing.assert_allclose(np.linalg.norm(r["A"].force, axis=1), np.abs(tension), atol=1e-8)
     assert np.abs(r.energy.balance).max() < 1e-8
+    assert f"t = {t[r.energy.kinetic.argmax()]:.5g}" in str(r.energy)
 
 
 def exact_windows(n, t):

@@ -241,8 +241,9 @@ def miss_faults(contact: Contact, curves: Sequence[Curve | None], tol: float, wh
         if name:
             marker = contact.marker_b if contact.marker_b is not None and i else contact.marker
             at = ", ".join(f"{v:.6g}" for v in marker[:, 3])
+            roller = i == 0 and isinstance(takes_curves(contact.row)[0].curve, Beside)
             yield (
-                f"{where}point: is {miss:.6g} off its {name}, which is nearest at ({at}); give that point, or the marker on link b "
+                f"{where}point: is {miss:.6g} off its {name}{' at the radius of the roller' * roller}, which is nearest at ({at}); give that point, or the marker on link b "
                 "(on_b=mg.Marker(...), and no point) to have the mechanism assembled"
             )
         else:

@@ -153,6 +153,8 @@ class Pair(Described):
         Surface | None, NESTED("surface on link a on which the centre of a sphere travels, of Sp", table="surface")
     ] = None
     contact: ClassVar[Contact | None] = None
+    asked_point: ClassVar[Any] = None
+    """The point as it was given, where the pair travels on a curve or surface and ``point`` is the nearest place on it."""
 
     def __init__(
         self,
@@ -189,6 +191,7 @@ class Pair(Described):
                 raise error.of(name) from error.__cause__
         if contact is not None:
             object.__setattr__(self, "contact", contact)
+            object.__setattr__(self, "asked_point", point if on_b is None else None)
             row, (second, _, axis, point) = contact.row, map(tuple, contact.marker.T.tolist())
             if on_b is not None:
                 on_a, point, axis, second = Marker(point, axis, second), None, None, None
@@ -229,6 +232,11 @@ class Pair(Described):
         if curve is None and isinstance(surface, Surface) and not surface_faults(row, surface, point, "", roller):
             return on_surface(row, surface, point, towards, name, on_b, roller)
         return None
+
+    def replace(self, **changes: Any) -> Pair:
+        """A copy with fields changed; a point that is off its curve or surface stays so, to be refused by the mechanism."""
+        asked = {} if self.asked_point is None else {"point": self.asked_point}
+        return super().replace(**{**asked, **changes})
 
     def reshaped(self, **changes: Any) -> Pair:
         """The same pair with fields changed; with another curve or surface its marker on b stays, that on a goes to the nearest place."""

@@ -56,7 +56,7 @@ class EnergyLost:
 
 @dataclass(frozen=True, repr=False)
 class Energy(Shown):
-    """Energies over time ``(T,)`` in the user's units.
+    """Energies over the times ``t (T,)`` in the user's units.
 
     ``kinetic``; ``potential`` of gravity and springs; ``work`` done since the start by prescribed drivers and by loads without a potential
     energy. ``kinetic + potential - work`` is constant; ``start`` is its value at the start.
@@ -66,6 +66,7 @@ class Energy(Shown):
     potential: Array
     work: Array
     start: float
+    t: Array
 
     @property
     def balance(self) -> Array:
@@ -82,7 +83,7 @@ class Energy(Shown):
     def document(self) -> Document:
         """Ranges over the output times."""
         rows = [(name, getattr(self, name)) for name in ("kinetic", "potential", "work", "balance")]
-        return Document("Energies", (ranges(rows, "time {}".format),))
+        return Document("Energies", (ranges(rows, lambda i: f"t = {self.t.reshape(-1)[i]:.5g}"),))
 
 
 class Response(Solution):
@@ -179,7 +180,7 @@ class Course:
             raise DeclarationError("response", [wrong(t, "t", what)])
         trajectory, *parts = self._read(times)
         kinetic, potential, work = (part.reshape(times.shape) for part in parts)
-        return Response(trajectory, Energy(kinetic, potential, work, self._energy_at_start), self)
+        return Response(trajectory, Energy(kinetic, potential, work, self._energy_at_start, times), self)
 
     @cached_property
     def _energy_at_start(self) -> float:
