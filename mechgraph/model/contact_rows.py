@@ -241,10 +241,10 @@ def miss_faults(contact: Contact, curves: Sequence[Curve | None], tol: float, wh
         if name:
             marker = contact.marker_b if contact.marker_b is not None and i else contact.marker
             at = ", ".join(f"{v:.6g}" for v in marker[:, 3])
-            roller = i == 0 and isinstance(takes_curves(contact.row)[0].curve, Beside)
+            rolls = i == 0 and isinstance(takes_curves(contact.row)[0].curve, Beside)
             yield (
-                f"{where}point: is {miss:.6g} off its {name}{' at the radius of the roller' * roller}, which is nearest at ({at}); give that point, or the marker on link b "
-                "(on_b=mg.Marker(...), and no point) to have the mechanism assembled"
+                f"{where}point: is {miss:.6g} off its {name}{' at the radius of the roller' * rolls}, which is nearest at ({at}); "
+                "give that point, or the marker on link b (on_b=mg.Marker(...), and no point) to have the mechanism assembled"
             )
         else:
             yield f"{where}curve_b: crosses the curve at {np.rad2deg(miss):.6g} degrees at the point; curves in contact touch"
