@@ -164,12 +164,14 @@ def _arc(k: int) -> Callable[[Array], tuple[Array, Array]]:
 def _account(family: Family, at: Member, known: Ends, run: _Run, lost_before: int) -> None:
     """Put the ends of a run to those that are known."""
     x, regular, singular, infinite = run.x.copy(), run.regular.copy(), run.singular.copy(), int(run.infinite.sum())
+    doubtful = 0
     if singular.any():
         some = np.flatnonzero(singular)
         x[:, some], closed, rank = _settled(family, at, x[:, some])
         singular[some[~closed]] = False
-        # a track that is bounded near its end has an assembly there: this one is not
-        infinite += int((~closed).sum())
+        # a track that is bounded near its end has an assembly there: this one is not, or it was led round to another one
+        doubtful = int((~closed).sum())
+        infinite += doubtful
         # what was led round has come to a regular point, to which no other track comes
         singular[some[rank]], regular[some[rank]] = False, True
     good = np.flatnonzero(regular | singular)
@@ -178,6 +180,7 @@ def _account(family: Family, at: Member, known: Ends, run: _Run, lost_before: in
     own = distinct(poses[:, regular[good]])
     lost = len(regular) - len(good) - infinite + lost_before
     met = int(regular.sum()) - len(own)
+    confirmed = known.runs > 0 and not new.size and infinite == known.infinite
     best = not known.runs or lost + met <= known.lost + known.met
     known.x = np.concatenate([known.x, x[:, good[new]]], axis=1)
     known.poses = np.concatenate([known.poses, poses[:, new]], axis=1) if known.runs else poses[:, new]
@@ -185,8 +188,10 @@ def _account(family: Family, at: Member, known: Ends, run: _Run, lost_before: in
     known.runs += 1
     if best:
         known.lost, known.met, known.infinite = lost, met, infinite
-    # all are accounted for on one run without a loss, or by different ends of several
-    known.clean = (lost == 0 and met == 0) or known.x.shape[1] >= len(regular) + lost_before
+    # all are accounted for on one run without a loss, on two where it is doubtful what is at infinity, or by different ends of several
+    left = max(0, len(regular) + lost_before - known.x.shape[1])
+    known.infinite = min(known.infinite, left)
+    known.clean = (lost == 0 and met == 0 and (not doubtful or confirmed)) or not left
 
 
 def _settled(family: Family, at: Member, x: Array) -> tuple[Array, Array, Array]:
