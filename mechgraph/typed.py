@@ -29,12 +29,12 @@ def refuse(what: str, fault: str) -> NoReturn:
 NUMBER = re.compile(r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[A-Za-z/^0-9]*)")
 
 
-def _number(text: str, where: str) -> tuple[float, str]:
+def _number(text: str, where: str, examples: str = "30deg, 0.5rad or 0.02") -> tuple[float, str]:
     """A number and the unit written after it."""
     found = NUMBER.fullmatch(text.strip())
     value = float(found["number"]) if found else np.nan
     if found is None or not np.isfinite(value):
-        refuse(where, f"{text!r} is no number; write e.g. 30deg, 0.5rad or 0.02")
+        refuse(where, f"{text!r} is no number; write e.g. {examples}")
     return value, found["unit"]
 
 
@@ -51,7 +51,7 @@ def _values(texts: Sequence[str], turns: bool, where: str) -> list[float]:
                 if turns
                 else "is a length: write the number alone, in the unit of length of the mechanism"
             )
-            refuse(where, f"unit {unit or last!r} in {text!r}: the freedom {what}")
+            refuse(where, f"unit {unit or last!r} in {text if unit else texts[-1]!r}: the freedom {what}")
         out.append(value * scales[unit or last])
     return out
 
@@ -82,7 +82,7 @@ def named_value(text: str, what: str) -> tuple[str, str]:
 
 def duration(text: str, m: Mechanism) -> float:
     """A time span: ``10`` or ``10s`` (``ms`` too), in the unit of time that the mechanism declares (seconds where it declares none)."""
-    value, unit = _number(text, f"--for {text!r}")
+    value, unit = _number(text, f"--for {text!r}", "10 or 10s")
     declared, known = m.units.get("time", "s"), KNOWN["time"]
     scales = {"": 1.0, declared: 1.0}
     if declared in known:
@@ -107,10 +107,10 @@ def _coordinate_turns(m: Mechanism, name: str, where: str) -> bool:
     return found
 
 
-def parse_drive(m: Mechanism, text: str) -> tuple[str, Motion]:
+def parse_drive(m: Mechanism, text: str, option: str = "--drive") -> tuple[str, Motion]:
     """Freedom and motion of ``A=start:stop:step@rate@acceleration``, the end excluded; a single value in place of the range."""
-    where = f"--drive {text!r}"
-    name, rest = named_value(text, "--drive")
+    where = f"{option} {text!r}"
+    name, rest = named_value(text, option)
     turns = _coordinate_turns(m, name, where)
     spec, *rates = rest.split("@")
     parts = spec.split(":")
@@ -132,15 +132,15 @@ def parse_drive(m: Mechanism, text: str) -> tuple[str, Motion]:
     return name, Motion(positions, velocity, acceleration)
 
 
-def drives_of(m: Mechanism, texts: Sequence[str]) -> dict[str, Motion]:
+def drives_of(m: Mechanism, texts: Sequence[str], option: str = "--drive") -> dict[str, Motion]:
     """The motions of all drives."""
     out: dict[str, Motion] = {}
     known: set[str] = set()
     for text in texts:
-        name, motion = parse_drive(m, text)
+        name, motion = parse_drive(m, text, option)
         full = name if m.freedom_fault(name, single=True) else m.full_name(name)
         if full in known:
-            refuse(f"--drive {text!r}", f"{name} is given twice")
+            refuse(f"{option} {text!r}", f"{name} is given twice")
         known.add(full)
         out[name] = motion
     return out

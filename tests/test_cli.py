@@ -195,6 +195,34 @@ def test_loads_on_a_link(tmp_path: Path) -> None:
     assert "expected worst, all" in bad("loads", "rcsr", "link1", "--at", "30deg")
 
 
+def test_what_makes_forces_doubtful_is_said_beside_loads_and_pictures(tmp_path: Path) -> None:
+    """A ball that its plane can only push, with a load that takes it off."""
+    m = mg.Mechanism("ball", pairs=[
+        mg.Pair("A", "P", "frame", "ball", point=(0, 0, 0), axis=(1, 0, 0)),
+        mg.Pair("B", "Sp", "frame", "ball", point=(0, 0, 0), axis=(1, 0, 0), closed="force"),
+    ], loads=[mg.Effort("A", 1.0)])  # fmt: skip
+    mg.save(m, tmp_path / "ball.toml")
+    for command in (
+        ("loads", tmp_path / "ball.toml", "ball"),
+        ("plot", tmp_path / "ball.toml", "ranges", "--out", tmp_path / "b.svg"),
+    ):
+        assert "would have to pull" in run(*command).stderr
+
+
+def test_messages_name_the_option_and_the_text_that_was_typed(tmp_path: Path) -> None:
+    assert "unit 'grad' in '10grad'" in bad("solve", "four-bar", "--drive", "A=0:360:10grad")
+    assert "write e.g. 10 or 10s" in bad("respond", "four-bar", "--for", "one")
+    assert "--at 'A=30grad'" in bad("equations", "four-bar", "--at", "A=30grad")
+
+
+def test_assemblies_with_other_drives_at_their_start(tmp_path: Path) -> None:
+    points = [(-1, 0, 0), (-1, 1, 0), (0, 2, 0), (1, 1, 0), (1, 0, 0)]
+    links = ["frame", "a", "b", "c", "d", "frame"]
+    pairs = [mg.Pair(f"J{i}", "R", *links[i : i + 2], point=p, axis=(0, 0, 1)) for i, p in enumerate(points)]
+    mg.save(mg.Mechanism("five-bar", pairs=pairs, drives=["J0", "J4"]), tmp_path / "m.toml")
+    assert "J0.Rz = 5 deg, J4.Rz = 0 deg" in run("assemblies", tmp_path / "m.toml", "--at", "J0=5deg").stdout
+
+
 def test_equations_with_numbers() -> None:
     """{Q}, {C} and {U} at a position with its rates are those of the solution there."""
     shown = run("equations", "rcsr", "--at", "O1=160deg@0.1").stdout

@@ -233,6 +233,7 @@ def test_energy_that_is_lost_is_said():
     with pytest.warns(mg.MechgraphWarning, match="energy balance: off by .* of the greatest energy, from t = "):
         lost = mg.respond(m, t, method="RK23", rtol=0.03, atol=0.03)
     assert np.abs(lost.energy.balance).max() > 1e-3 * lost.energy.kinetic.max()
+    assert "Doubtful: energy balance: off by" in str(lost)  # all that the command line shows
     assert not mg.respond(m, t).warnings
 
 

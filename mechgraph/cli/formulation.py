@@ -21,7 +21,7 @@ from mechgraph.writing import formats_text
 
 def solved_at(m: mg.Mechanism, at: list[str]) -> mg.Solution:
     """The one position that is named, with its rates."""
-    motions = drives_of(m, at)
+    motions = drives_of(m, at, "--at")
     if any(np.ndim(motion.position) for motion in motions.values()):
         refuse("--at", "expected one position, e.g. A=30deg@10")
     with working("solving"), warnings.catch_warnings():

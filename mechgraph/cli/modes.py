@@ -28,7 +28,7 @@ Picture = Annotated[
 def assemblies(mechanism: Named, at: At = None, out: Picture = None, json: AsJson = False) -> None:
     """Find all real assemblies with drivers at given values, and say how sure it is that these are all.
 
-    Without --at the declared drives stay at their start.
+    Declared drives stay at their start, those that --at does not name as well.
 
     Example: mechgraph assemblies four-bar --at A=30deg
 
@@ -37,7 +37,9 @@ def assemblies(mechanism: Named, at: At = None, out: Picture = None, json: AsJso
     _check_picture(out, mechanism)
     m = loaded(mechanism)
     at_start = {m.full_name(d.freedom): m.start.get(m.full_name(d.freedom), 0.0) for d in m.drives}
-    values = dict(parse_at(m, text) for text in at or ()) or at_start
+    values = {m.full_name(name): value for name, value in (parse_at(m, text) for text in at or ())}
+    if values.keys() <= at_start.keys():
+        values = at_start | values
     with working(f"assemblies of {m.name}"):
         found = mg.assemblies(m, values)
         figure = found.plot() if out is not None and len(found) else None

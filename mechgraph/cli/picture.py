@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -133,8 +132,7 @@ def plot(
     still = what == "skeleton" and not (film or drive or any(d.motion is not None for d in m.drives))
     moves = kind.moves and not still
     motions = (motions_of if moves else drives_of)(m, drive or ())
-    with working(f"drawing {m.name}"), warnings.catch_warnings():
-        warnings.simplefilter("ignore", mg.MechgraphWarning)
+    with working(f"drawing {m.name}"):
         drawn: Any = m
         if moves:
             how: dict[str, Any] = {"on_reach": on_reach, "tol": tol}

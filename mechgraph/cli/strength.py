@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import warnings
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -60,8 +59,7 @@ def loads(
     options = {"model": model, "held": held, "couples": couples, "inertia": inertia}
     m.place_of_link(link)
     motions = motions_of(m, drive or ()) or None
-    with working(f"solving {m.name}"), warnings.catch_warnings():
-        warnings.simplefilter("ignore", mg.MechgraphWarning)
+    with working(f"solving {m.name}"):
         s = mg.solve(m, motions, actuate=actuate, redundant=redundant, on_reach=on_reach, engine=engine, tol=tol)
         body = mg.free_body(s, link)
         document = body.document(places)

@@ -141,7 +141,7 @@ class Parts(Formatted):
     def _index(self, name: str, places: Mapping[str, int], what: str) -> int:
         if not isinstance(name, str) or name not in places:
             raise DeclarationError(
-                f"mechanism {self.name!r}", [f"unknown {what} {shown(name)} ({what}s: {', '.join(places)})"]
+                f"mechanism {self.name!r}", [f"unknown {what} {shown(name)} ({what}s: {', '.join(places) or 'none'})"]
             )
         return places[name]
 

@@ -117,12 +117,13 @@ class Response(Solution):
         return (*super().warnings, EnergyLost(float(off.max()) / self._course.greatest, float(lost.min())))
 
     def document(self, asked: bool = False) -> Document:
-        """The summary of a Solution, with the balance of energies, and what happened."""
+        """The summary of a Solution, with the balance of energies, whether the motion is doubtful, and what happened."""
         largest = float(np.abs(self.energy.kinetic).max(initial=0.0)) or 1.0
         balance = ("energy balance, of the largest kinetic energy", self.energy.balance / largest)
         made = summary(self._values, asked, (balance,))
         events = Heading("Events" if self.events else "", 2), Bullets([str(one) for one in self.events])
-        return replace(made, blocks=(Paragraph(self.stopped), *made.blocks, *events))
+        lost = [Paragraph(f"Doubtful: {one}.") for one in self.warnings if isinstance(one, EnergyLost)]
+        return replace(made, blocks=(Paragraph(self.stopped), *lost, *made.blocks, *events))
 
     def to_dict(self) -> dict[str, Any]:
         """What the summary tells as plain data."""

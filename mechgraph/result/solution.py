@@ -117,7 +117,14 @@ class Solution(Shown):
         count = len(self.mechanism.loads)
         if type(index) is not int or not 0 <= index < count:
             raise DeclarationError(
-                f"load of {self.mechanism.name!r}", [wrong(index, "index", f"a number below {count}, counted from 0")]
+                f"load of {self.mechanism.name!r}",
+                [
+                    wrong(
+                        index,
+                        "index",
+                        f"a number below {count}, counted from 0" if count else "none, as there are no loads",
+                    )
+                ],
             )
         return self._values.load(index)
 
