@@ -78,6 +78,7 @@ class DriverPath:
         self.rows = system.single_rows[self.columns]
         self.size = (system.n_freedoms, len(self.columns))
         self.paced = bool(system.is_length[self.columns].any())
+        self.bend = system.bend
         self.carries = True
         """Whether what is left free can be carried on by periods of the motion."""
         self._system_of, self._start = system_of, start

@@ -24,6 +24,7 @@ from mechgraph.model.once import of_graph
 from mechgraph.model.pair_type import PairType
 from mechgraph.model.parameters import Parameters
 from mechgraph.model.row_parts import Component
+from mechgraph.model.travelling import Travelling
 from mechgraph.numerics.linear import Place, compact
 from mechgraph.topology.linkgraph import LinkGraph
 
@@ -279,6 +280,12 @@ class Places:
     def moving_batches(self) -> list[FactorBatch]:
         """The factors whose twists move with their coordinates."""
         return [b for b in self.batches if b.stack.constant_twists(self.par.pitch[b.pairs]) is None]
+
+    @sized
+    def bend(self) -> float:
+        """Greatest curvature of curves, over one of the length of the mechanism; 0 where there are none."""
+        factors = [factor for b in self.moving_batches for factor in b.factors]
+        return max((factor.bend for factor in factors if isinstance(factor, Travelling)), default=0.0)
 
     @shared
     def chord_nodes(self) -> tuple[Index, Index]:

@@ -91,6 +91,11 @@ class AlongCurve(Travelling):
         return np.asarray((self._frame(here) * here.dt[:, None]).sum(axis=0))
 
     @cached_property
+    def bend(self) -> float:
+        """At the points between which the curve is smooth."""
+        return self.unit * float(np.abs(self.travel.curvature(self.travel.s)).max())
+
+    @cached_property
     def held(self) -> bool:
         """Whether the frame keeps its orientation."""
         return self.curve is not None and self.curve.frame == "held"

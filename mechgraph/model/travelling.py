@@ -33,6 +33,11 @@ class Travelling(Factor):
     def start(self) -> Array:
         """The frame at coordinates zero on its link ``(3, 4)``."""
 
+    @property
+    def bend(self) -> float:
+        """Greatest curvature of a curve, over one of ``unit``; that of surfaces is not looked for."""
+        return 0.0
+
     @abstractmethod
     def place_of(self, x: Array) -> Any:
         """The place at coordinates ``x``."""

@@ -34,7 +34,8 @@ def smooth(problem: Problem, a: Nodes, m: Nodes, b: Nodes, correction: Array, fr
     of the step, the other at a quarter, so never both. Motions left ``free (F, p, n)`` do not count: corrections move nodes along them.
 
     Nor need they be so smooth (accelerations of cams jump) where no other branch is as near. An end on another branch, ``d`` away from
-    where the step should lead, makes ``2 h |r_m - ...| + 4 |correction| >= d``; and two solutions are at least ``2 / (|J^-1| |J'|)`` apart.
+    where the step should lead, makes ``2 h |r_m - ...| + 4 |correction| >= d``; and two solutions are at least ``2 / (|J^-1| |J'|)`` apart
+    (``|J'|`` grows with the curvature of curves, which may bend between two nodes and nowhere else).
     """
     h = b.place - a.place
     direction = (b.drive - a.drive) / h
@@ -56,4 +57,5 @@ def smooth(problem: Problem, a: Nodes, m: Nodes, b: Nodes, correction: Array, fr
     # pivots do not tell how the inverse grows along a chain of loops, rates do
     size = np.max([np.abs(r).max(axis=0, initial=1.0) for r in rates], axis=0)
     size *= np.max([np.ones_like(h), a.condition, m.condition, b.condition], axis=0)
+    size *= max(1.0, problem.bend / PATH.round)
     return np.asarray(on_cubic | (2.0 * h * gap + 4.0 * correction <= PATH.alone / size))

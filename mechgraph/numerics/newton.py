@@ -75,6 +75,8 @@ class Problem(Protocol):
     """Numbers of increments F and of path values d."""
     paced: bool
     """Whether the equations may change more slowly than the path values, see ``pace``."""
+    bend: float
+    """Greatest curvature of curves in the equations; 0 where there are none."""
 
     def at(self, x: Array, drive: Array, tracks: Index) -> Any:
         """The equations at (a copy of) states, the path values put in."""

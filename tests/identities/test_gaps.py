@@ -138,6 +138,27 @@ def test_slider_crank_with_rod_about_as_long_as_the_crank(exponent, longer):
         assert (error * np.maximum(root[ok], 1e-9)).max() < 1e-11
 
 
+@pytest.mark.parametrize("size", [3e-4, 1e-3])
+def test_a_small_bend_of_a_slot_that_leads_back_is_not_leapt_over(size):
+    """Between two nodes, on a slot that is straight elsewhere: past the place where the slot turns back the pin does not get along it."""
+    v = np.sinh(np.linspace(-1, 1, 140) * np.arcsinh(2 / size))
+    x = size * (v - 3 * v * np.exp(-v * v))
+    slot = mg.Curve.through(points=np.stack([x, 2 * size * np.tanh(v), np.zeros(140)], axis=1))
+    begin = np.argmin(np.abs(x + 1))
+    here = (x[begin], 2 * size * np.tanh(v[begin]), 0)
+    pairs = [
+        mg.Pair("X", "P", "frame", "carriage", point=here, axis=(1, 0, 0)),
+        mg.Pair("Y", "P", "carriage", "pin", point=here, axis=(0, 1, 0)),
+        mg.Pair("G", "Sg", "frame", "pin", point=here, curve=slot),
+    ]
+    along = np.linspace(-2, 0, 10_001)
+    back = (size * (along - 3 * along * np.exp(-along * along))).max() - here[0]
+    for n in (2, 10):
+        q = np.linspace(0, 2, n)
+        s = mg.kinematics(mg.Mechanism("slot", None, pairs, ["X"]), {"X": q}, on_reach="flag")
+        np.testing.assert_array_equal(s.status == "ok", q < back)
+
+
 def test_first_position_out_of_reach_and_later_ones_within():
     """B3 of issue 11: positions behind one that is out of reach, back inside, are solved."""
     bar = Bars(1.0, 0.6, 0.6, 1.3)
