@@ -425,3 +425,32 @@ def test_a_gear_has_one_module():
     with pytest.raises(mg.DeclarationError, match=said):
         train(61)
     assert train(61, module=0.002).couplings  # two rims, as is said
+
+
+@pytest.mark.parametrize("module", [None, 0.002])
+def test_a_gear_has_one_hand(module):
+    """Sun and planet have opposite hands, planet and ring the same: by hand the axial forces tilt the planet, and cancel in sum."""
+    beta = 0.3
+    r, rp = 0.021 / np.cos(beta), 0.018 / np.cos(beta)
+
+    def train(hand):
+        pairs = [
+            mg.Pair("S", "R", "frame", "sun", point=(0, 0, 0), axis=Z),
+            mg.Pair("C", "R", "frame", "arm", point=(0, 0, 0), axis=Z),
+            mg.Pair("P", "R", "arm", "planet", point=(2 * r, 0, 0), axis=Z),
+        ]
+        inner = mg.SpurGears("inner", "S", "P", teeth=(24, 18), helix_angle=beta, module=module)
+        outer = mg.SpurGears("outer", "P", "C", teeth=(18, 60), internal=True, helix_angle=hand, module=module)
+        return mg.Mechanism("train", pairs=pairs, couplings=[inner, outer], drives=["S"], loads=[mg.Effort("C", -7.0)])
+
+    s = mg.solve(train(-beta), {"S": 0.0})
+    across = 2.0 / (0.024 / np.cos(beta))  # 7 N m on the arm are 2 on the sun
+    np.testing.assert_allclose(s["P"].force, [0, -2 * across, 0], atol=1e-9)
+    np.testing.assert_allclose(s["P"].moment, [0, 2 * across * np.tan(beta) * rp, 0], atol=1e-9)
+    if module is not None:  # two rims
+        assert train(beta).couplings
+        return
+    with pytest.raises(
+        mg.DeclarationError, match=r"the 18 teeth on 'P' would have the helix angle -0\.3 in one and 0\.3 in"
+    ):
+        train(beta)

@@ -21,6 +21,8 @@ from mechgraph.units import LENGTH, PURE
 _TEETH = TWO_WHOLE("numbers of teeth of both gears")
 _PRESSURE = NUMBER("of the flanks, in the normal section", PURE, degrees=True, minimum=0.0)
 _FULL = float(np.deg2rad(20.0))
+ONE_HELIX = 0.02
+"""Radians by which the helix angles of one gear in two meshes may differ: more than tolerances, less than another hand."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,7 @@ class SpurGears(Contact):
         return []
 
     def faults(self, m: Any) -> list[str]:
-        """See ``Contact``; also gears whose teeth would have two modules, because the distances of the axes ask for it."""
+        """See ``Contact``; also gears that would have two modules, because the distances of the axes ask for it, or two helices."""
         return super().faults(m) or list(self._shared(m))
 
     def _shared(self, m: Any) -> Iterator[str]:
@@ -86,14 +88,28 @@ class SpurGears(Contact):
             if not isinstance(other, SpurGears) or (self.module and other.module) or Contact.faults(other, m):
                 continue
             mine, yours = self._module(m), other._module(m)
-            for q, teeth in zip((self.a, self.b), self.teeth, strict=True):
-                ends = zip((other.a, other.b), other.teeth, strict=True)
-                if (m.full_name(q), teeth) in [(m.full_name(p), n) for p, n in ends] and not _near(mine, yours, m):
+            gears = {(m.full_name(p), n): helix for p, n, helix in other._gears}
+            for q, teeth, helix in self._gears:
+                if (theirs := gears.get((m.full_name(q), teeth))) is None:
+                    continue
+                if abs(helix - theirs) > ONE_HELIX:
+                    yield (
+                        f"couplings {self.name!r} and {other.name!r}: the {teeth:g} teeth on {q!r} would have the helix angle {helix:.7g} "
+                        f"in one and {theirs:.7g} in the other (gear b has the opposite of helix_angle, in an internal pair the same); "
+                        "change one, or give module= in both where the gear has two rims"
+                    )
+                if not _near(mine, yours, m):
                     yield (
                         f"couplings {self.name!r} and {other.name!r}: the {teeth:g} teeth on {q!r} would have the module {mine:.7g} in one "
                         f"and {yours:.7g} in the other, as the distances of the axes ask for; change the teeth or the places, or give "
                         "module= in both where the gear has two rims"
                     )
+
+    @property
+    def _gears(self) -> tuple[tuple[str, float, float], ...]:
+        """Freedom, teeth and helix angle, right-hand positive, of both gears."""
+        helix = self.helix_angle if self.internal else -self.helix_angle
+        return (self.a, self.teeth[0], self.helix_angle), (self.b, self.teeth[1], helix)
 
     def _module(self, m: Any) -> float:
         """The normal module, that which the distance of the axes asks for where none is given."""
