@@ -59,8 +59,9 @@ class Certificate:
     rows, dependent : numbers of independent rows, on which it rests, and of those that depend on them.
     dependence : ``"structure"`` where all motions of the loops lie in one group, which makes them follow; otherwise ``"checked"``.
     residual : largest closure error in all rows.
-    apart : bound from below of how far any other root that is proved at this position is (radians, lengths / L), in the coordinate in
-        which they differ most; at most zero where they may be one, None where there is no other.
+    apart : bound from below of how far any other root that is proved at this position is (radians, lengths / L), in the coordinate or
+        pose in which they differ most, of links in the frames in which they are solved (not those of ``modes.poses``); at most zero
+        where they may be one, None where there is no other.
     """
 
     proved: bool
