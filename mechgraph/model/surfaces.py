@@ -233,7 +233,7 @@ class Turned(AboutAxis):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Sphere(Turned):
-    """A sphere, by longitude and latitude, which goes on over the poles; for paths beside a pole see ``closure.poles``."""
+    """A sphere, by longitude and latitude, which goes on over the poles; beside a pole the axis of the solution is another one."""
 
     kind = "sphere"
     radius: Annotated[float, POSITIVE("radius", LENGTH)]
