@@ -93,7 +93,8 @@ class AlongCurve(Travelling):
     @cached_property
     def bend(self) -> float:
         """At the points between which the curve is smooth."""
-        return self.unit * float(np.abs(self.travel.curvature(self.travel.s)).max())
+        with self.named():
+            return self.unit * float(np.abs(self.travel.curvature(self.travel.s)).max())
 
     @cached_property
     def held(self) -> bool:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -56,8 +57,14 @@ class Travelling(Factor):
 
     def here(self, x: Array) -> Any:
         """The place at coordinates ``x``; what its shape cannot answer is named with the pair."""
-        try:
+        with self.named():
             return self.place_of(x)
+
+    @contextmanager
+    def named(self) -> Iterator[None]:
+        """What a shape cannot answer is named with the pair."""
+        try:
+            yield
         except ShapeError as error:
             raise error.of(self.pair) from error.__cause__
 

@@ -73,7 +73,7 @@ def _fault(m: Mechanism, name: str, what: Any) -> str | None:
         f"'{pair.freedom_names[0] if pair.freedom_names else pair.name}', '{pair.name}:{(*pair.type.component_names, 'Fx')[0]}', "
         f"'{m.links[-1].name}.center', 'shaking', or a function of a Solution"
     )
-    said = shown(name) if name == what else f"{shown(name)}: {shown(what)}"
+    said = shown(name) if isinstance(what, str) and name == what else f"{shown(name)}: {shown(what)}"
     return f"{said}: {_missing(m, what)}; {hint or example}"
 
 
