@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from mechgraph.arguments import items_of, option_faults
+from mechgraph.call import Options
 from mechgraph.closure.assembly import assembled_at, last_closed
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
@@ -30,7 +31,7 @@ from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism, check_mechanism
 from mechgraph.model.parameters import declared
 from mechgraph.outcome import Outcome
-from mechgraph.pipeline import Options, Pipeline
+from mechgraph.pipeline import Pipeline
 from mechgraph.quantities import wrong
 from mechgraph.report.report import check, hinted
 from mechgraph.result.solution import Solution
@@ -41,8 +42,6 @@ ReachName = Literal["raise", "flag"]
 RedundantName = Literal["nan", "minimum_norm"]
 ON_REACH: tuple[ReachName, ...] = ("raise", "flag")
 REDUNDANT: tuple[RedundantName, ...] = ("nan", "minimum_norm")
-
-
 AXES_TRIED = 4
 """Axes of spheres that are tried for a path: each keeps far from what is known of it, which may be a part."""
 SOLVED = (Status.OK.value, Status.CHANGE_POINT.value, Status.ACTUATORS_REST.value)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mechgraph.call import Call, Starts
 from mechgraph.closure.assembly import CLOSED
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.coordinates import continued
@@ -21,9 +21,6 @@ from mechgraph.result.kept import BlockMotion
 from mechgraph.result.trajectory import Trajectory
 from mechgraph.structure.actuation import stand_still
 
-if TYPE_CHECKING:
-    from mechgraph.pipeline import Pipeline, Starts
-
 CONTRADICTION = 1e-6
 """Relative part of the closure rates that drivers may leave open before they count as contradicting each other."""
 
@@ -32,7 +29,7 @@ class Outcome:
     """Positions found, turned into a trajectory block by block."""
 
     def __init__(
-        self, line: Pipeline, starts: Starts, batch: tuple[int, ...], variant: Index, found: Positions, path: DriverPath
+        self, line: Call, starts: Starts, batch: tuple[int, ...], variant: Index, found: Positions, path: DriverPath
     ) -> None:
         self.line, self.starts, self.batch, self.found, self.path = line, starts, batch, found, path
         self.solver: ClosureSolver = path.solver

@@ -4,29 +4,27 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.arguments import option_faults
+from mechgraph.call import Options, Starts
 from mechgraph.closure.assembly import closed_start, named_columns
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.closure.driver_path import FARTHEST, DriverPath, Positions, far_faults, requests
 from mechgraph.closure.following import follow
-from mechgraph.closure.indexing import Index, System
+from mechgraph.closure.indexing import Index
 from mechgraph.closure.passive_motion import PassiveMotion, are_alone
 from mechgraph.closure.passive_rest import unspun
 from mechgraph.closure.ranges import end_at_ranges
 from mechgraph.closure.rates import distance_to_dead_point
 from mechgraph.closure.reduced_path import follow_reduced
-from mechgraph.closure.reduction import FORMS, Reduction, reduction_of
+from mechgraph.closure.reduction import Reduction, reduction_of
 from mechgraph.closure.solver import closure_solver, engine_for, solver_at_start
 from mechgraph.errors import DeclarationError, IndeterminateError
-from mechgraph.model.load_base import Load
 from mechgraph.numerics.linear import independent_rows
 from mechgraph.numerics.tolerances import PATH
 from mechgraph.outcome import Outcome
@@ -46,39 +44,6 @@ from mechgraph.structure.mobility import Freedoms, free_motion
 CLOSING = 1e-13
 """Part of the condition number within which a start is not told from a dead point: some hundred roundings of its closing."""
 Made = TypeVar("Made")
-
-
-@dataclass(frozen=True)
-class Options:
-    """How to solve: force ``method`` (None: motion alone), what becomes of ``redundant`` reactions, and the ``engine``.
-
-    ``form`` says by which form of the equations paths are followed, ``"full"`` or ``"reduced"``, or ``"auto"``: the faster one.
-    ``progress`` is called with the numbers of positions done and of all that were reached, block by block.
-    """
-
-    method: str | None = "loop_wrench"
-    redundant: str = "nan"
-    engine: str = "auto"
-    progress: Callable[[int, int], None] | None = field(default=None, compare=False)
-    form: str = "auto"
-
-    def __post_init__(self) -> None:
-        if faults := option_faults({"form": (self.form, FORMS)}):
-            raise DeclarationError("options of a solution", faults)
-
-
-@dataclass(frozen=True)
-class Starts:
-    """Where the paths begin: a closed state ``x (nx, V)`` for every variant, and the systems with the numbers of variants.
-
-    ``system_of(variants)`` for variants ``(T,)``; ``loads`` act with the numbers of every variant. ``sharing`` is the number of variants
-    that differ in masses and loads alone and move alike, from the only state: their motion is found once.
-    """
-
-    x: Array
-    system_of: Callable[[Index], System]
-    loads: tuple[Load, ...]
-    sharing: int = 1
 
 
 class Pipeline:

@@ -134,3 +134,23 @@ def test_a_pair_on_a_curve_has_no_certificate() -> None:
     assert modes.completeness == "searched"
     assert all(sure is None for sure in modes.certificates)
     assert "none" in str(modes)
+
+
+def test_couplings_are_rows_of_certificates() -> None:
+    """A four-bar whose crank goes half a turn for each of its motor: the two assemblies of the four-bar, both proved."""
+    bare = linked_four_bar(1.0, 2.5, 2.0, 3.0, 0.5)
+    motor = mg.Pair("M", "R", "ground", "motor", on_a=mg.Marker((-2.0, 0.0, 0.0)), on_b=mg.Marker())
+    couplings = [mg.Coupling({"M": 1.0, "O0": 2.0})]
+    links = [*bare.links, mg.Link("motor")]
+    geared = bare.replace(links=links, pairs=[motor, *bare.pairs], couplings=couplings, drives=["M"])
+    here = Question(geared, {"M": -0.6}).start
+    opened, turned = rows(here)
+    assert (np.abs(opened.mid - here.residual[:, 0]) <= opened.rad + 1e-13).all()
+    assert np.abs(turned.mid - here.J[:, :, 0]).max() < 1e-12
+    modes, alone = mg.assemblies(geared, {"M": -0.6}), mg.assemblies(bare, {"O0": 0.5 + 0.3})
+    assert len(modes) == len(alone) == 2
+    assert [one.proved for one in modes.certificates] == [True, True]
+    for mode, other in zip(modes, alone, strict=True):
+        assert mode.start["O0.Rz"] == pytest.approx(0.5 + 0.3, abs=1e-12)
+        for name, value in other.start.items():
+            assert np.cos(mode.start[name] - value) == pytest.approx(1.0, abs=1e-14)

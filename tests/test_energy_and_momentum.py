@@ -152,9 +152,8 @@ def test_the_slider_of_the_governor_rises_and_sinks_as_published():
     assert 10.0 / t[low + np.argmin(height[low:])] == pytest.approx(9.7, abs=0.1)
 
     def inertia_and_potential(s):
-        down = (
-            1.0 - s
-        ) / 1.0  # sine of the angle of the arms: their middles are as far from the slider as from the hinge
+        # sine of the angle of the arms, of length 1: their middles are as far from the slider as from the hinge
+        down = 1.0 - s
         balls, own = (0.05 + np.sqrt(1 - down**2)) ** 2, 0.3 * (0.05 + 0.5 * np.sqrt(1 - down**2)) ** 2
         spin = 0.3 / 12 * (1 - down**2) + 0.3 * 0.01**2 / 12 * (1 + down**2)
         inertia = 2 * (5.0 * balls + own + spin) + 3.0 * 0.1**2 / 6 + 0.3 * 0.01**2 / 6

@@ -30,7 +30,7 @@ import numpy as np
 from mechgraph.algebra.se3 import cross, rotate
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
-from mechgraph.modes.balls import UP, Ball, Open, exact, loop_rows, rod_row
+from mechgraph.modes.balls import STORED, UP, Ball, Open, exact, loop_rows, rod_row
 from mechgraph.modes.family import Array, Family
 from mechgraph.modes.rods import RodSystem
 
@@ -128,9 +128,11 @@ def told_apart(family: Family, x: Array, sure: Sequence[Certificate | None]) -> 
 
 
 def rows(here: Configuration) -> tuple[Ball, Ball]:
-    """What loops and rods leave open ``(n,)`` and their derivatives ``(n, F)``, with bounds of their rounding."""
+    """What rows leave open ``(n,)`` and their derivatives ``(n, F)``, with bounds of their rounding; those of couplings are linear."""
     s = here.system
-    f, A = (Ball(np.zeros(shape), np.zeros(shape)) for shape in ((s.n_rows,), (s.n_rows, s.n_freedoms)))
+    J, size = here.J[:, :, 0], np.abs(here.J[:, :, 0])
+    largest = s.n_freedoms * (1.0 + size.sum(axis=1) * np.abs(here.x).max(initial=1.0))
+    f, A = Ball(here.residual[:, 0].copy(), STORED * largest), Ball(J.copy(), STORED * size)
     for loop, (columns, _) in enumerate(s.loop_columns):
         _put(f, A, slice(6 * loop, 6 * loop + 6), columns, loop_rows(here, loop))
     if isinstance(s, RodSystem):
@@ -142,6 +144,7 @@ def rows(here: Configuration) -> tuple[Ball, Ball]:
 
 def _put(f: Ball, A: Ball, at: slice, columns: Index, found: tuple[Ball, Ball]) -> None:
     for part in ("mid", "rad"):
+        getattr(A, part)[at] = 0.0
         getattr(f, part)[at], getattr(A, part)[at, columns] = (getattr(ball, part) for ball in found)
 
 

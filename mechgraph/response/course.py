@@ -107,14 +107,12 @@ class Response(Solution):
     def warnings(self) -> tuple[Any, ...]:
         """What makes reactions doubtful, and the motion itself: see ``Solution.warnings``; energies that do not balance."""
         off = np.abs(self.energy.balance)
-        # in question at few times, which may be those of little energy: beside the whole motion
-        if (
-            not off.max() > LOST_ENERGY * self.energy.greatest
-            or not off.max() > LOST_ENERGY * self._course.greatest > 0
-        ):
+        # times asked for may be few and of little energy: what is lost counts beside the whole motion too
+        whole, largest = self._course.greatest, float(np.nan_to_num(off).max(initial=0.0))
+        if largest <= LOST_ENERGY * max(self.energy.greatest, whole) or not whole:
             return super().warnings
-        lost = np.asarray(self.t)[off > 0.5 * off.max()]
-        return (*super().warnings, EnergyLost(float(off.max()) / self._course.greatest, float(lost.min())))
+        lost = np.asarray(self.t)[off > 0.5 * largest]
+        return (*super().warnings, EnergyLost(largest / whole, float(lost.min())))
 
     def document(self, asked: bool = False) -> Document:
         """The summary of a Solution, with the balance of energies, whether the motion is doubtful, and what happened."""

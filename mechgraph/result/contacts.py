@@ -34,8 +34,6 @@ from mechgraph.units import FORCE, LENGTH, PRESSURE, TIME, unit_of
 
 PULL = 1e-10
 """Part of the greatest normal force of a contact below which a pull is rounding."""
-
-
 STANDS = 1e-10
 """Part of the greatest velocity of a link at a contact below which it is rounding."""
 

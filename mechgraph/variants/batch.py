@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.call import Options, Starts
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.closure.driver_path import DriverPath
@@ -24,7 +25,7 @@ from mechgraph.model.motion import Motion
 from mechgraph.model.parameters import Parameters
 from mechgraph.numerics.continuation import End, Follower, Tracks
 from mechgraph.numerics.tracks import Paths
-from mechgraph.pipeline import Options, Pipeline, Starts
+from mechgraph.pipeline import Pipeline
 from mechgraph.result.solution import Solution
 from mechgraph.structure.snapping import declared_closure
 from mechgraph.variants.fields import Variants

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.call import Options
 from mechgraph.closure.driver_motion import Motions
 from mechgraph.closure.driver_path import Status
 from mechgraph.closure.solver import EngineName
@@ -18,7 +19,6 @@ from mechgraph.force.dalembert import MethodName
 from mechgraph.kinetostatics import RedundantName, solve_quietly
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
-from mechgraph.pipeline import Options
 from mechgraph.result.contacts import LiftOff
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import LoadBearing

@@ -17,8 +17,9 @@ import mechanisms as known
 import numpy as np
 
 import mechgraph as mg
+from mechgraph.call import Options
 from mechgraph.closure.driver_motion import DriverMotion
-from mechgraph.pipeline import Options, Pipeline
+from mechgraph.pipeline import Pipeline
 
 ROUNDS = 5
 FORMS = ("full", "reduced")

@@ -9,9 +9,10 @@ from attack import Bars, anywhere, four_bars, just_out_of_reach, nearly_folded, 
 from mechanisms import Z
 
 import mechgraph as mg
+from mechgraph.call import Options
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.numerics.tolerances import PATH
-from mechgraph.pipeline import Options, Pipeline
+from mechgraph.pipeline import Pipeline
 
 COUNTS = (4, 5, 7, 10, 20, 36, 41, 100, 181)
 LIMIT = 1e-6

@@ -10,8 +10,9 @@ from attack import differences
 
 import mechgraph as mg
 import mechgraph.pipeline as pipeline
+from mechgraph.call import Options
 from mechgraph.closure.driver_motion import DriverMotion
-from mechgraph.pipeline import Options, Pipeline
+from mechgraph.pipeline import Pipeline
 from mechgraph.result.solution import Solution
 
 SAME = 1e-11
