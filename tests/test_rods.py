@@ -15,6 +15,7 @@ from mechgraph.algebra.se3 import quaternion_matrix, rotation_exp
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import indexed
 from mechgraph.model.factors import ConstantScrew
+from mechgraph.modes.bounds import bound
 from mechgraph.modes.family import Member
 from mechgraph.modes.finding import Finder
 from mechgraph.modes.form import _ball, _two_turns, rods_of
@@ -88,6 +89,36 @@ def test_a_platform_on_three_joints_has_sixteen(feet: tuple[int, ...], heads: tu
     place = [link.name for link in m.links].index("platform")
     gaps = np.abs(modes.poses[:, place] - np.eye(4)).max(axis=(1, 2))
     assert gaps.min() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("symbol", "flipped", "rods", "count"),
+    [
+        ("R", False, 1, 2),
+        ("P", False, 1, 2),
+        ("S", False, 3, 8),
+        ("Sp", False, 5, 40),
+        ("Sp", True, 5, 40),
+        ("C", False, 2, None),
+    ],
+)
+def test_a_body_on_one_pair_and_rods_has_a_bound(symbol: str, flipped: bool, rods: int, count: int | None) -> None:
+    """A ball on a plane, carried by a crank: a rod from far away, so that five rods more make a platform."""
+    rng = np.random.default_rng(1)
+    links = ("body", "crank") if flipped else ("crank", "body")
+    pairs = [
+        mg.Pair("D", "R", "base", "crank", point=(0, 0, 0), axis=(0.1, 0.2, 1)),
+        mg.Pair("J", symbol, *links, point=(1, 0.3, 0.2), axis=(0.4, 0.2, 1)),
+    ]
+    for i in range(rods):
+        pairs.append(mg.Pair(f"A{i}", "S", "base", f"rod{i}", point=rng.normal(size=3)))
+        pairs.append(mg.Pair(f"B{i}", "S", f"rod{i}", "body", point=rng.normal(size=3) + 3 * Z))
+    m = mg.Mechanism("body on rods", pairs=pairs, drives=["D"], frame="base")
+    found = bound(Question(m, {"D": 0.1}).form.family)
+    assert (None if found is None else found.count) == count
+    if count == 8:
+        modes = mg.assemblies(m, {"D": 0.1})
+        assert (modes.total, modes.completeness) == (count, "proved")
 
 
 def test_rods_are_chains_between_balls_or_two_turns_with_nothing_free_between() -> None:

@@ -32,11 +32,16 @@ LOOPS: tuple[tuple[int, str, int, str], ...] = (
 """Dimension of the group, freedoms still unknown (R turns, T slides), the bound, and its source."""
 
 
-PLATFORMS: tuple[tuple[tuple[int, ...], int, str], ...] = (
-    ((2, 2, 2), 16, NANUA),
-    ((1, 1, 1, 1, 1, 1), 40, RONGA),
+PLATFORMS: tuple[tuple[str, int, tuple[int, ...], int, str], ...] = (
+    ("R", 1, (), 2, "a circle and a sphere meet in two points"),
+    ("T", 1, (), 2, "a line and a sphere meet in two points"),
+    ("S", 3, (), 8, "three quadrics in the quaternion of a rotation meet in 8 points or fewer (Bezout)"),
+    ("TTTS", 6, (2, 2, 2), 16, NANUA),
+    ("TTTS", 6, (), 40, RONGA),
+    ("TTS", 5, (), 40, f"{RONGA}; a point on a plane is on a rod from far away"),
 )
-"""Rods at each joint of the one body of a platform on six rods, whatever their joints on the other; the bound, and its source."""
+"""What lets one body move against another (R turns, T slides, S is a ball), and rods between them: their number, how many have each joint
+of the one body in common, whatever their joints on the other (nothing where it does not matter), the bound, and its source."""
 TRIADS = (6, "a coupler curve, of degree six and threefold in the circular points, meets a circle in 12 - 6 others")
 """The bound of two bodies in a plane joined by three links, and its source."""
 PLANE_MOTIONS = (3, 2)
@@ -57,17 +62,24 @@ def bound(family: Family) -> Bound | None:
 
 
 def _of_platform(family: RodFamily) -> Bound | None:
-    """The bound of two bodies joined by six rods and nothing else, those one between which all is driven."""
+    """The bound of two bodies joined by rods and one pair, those one between which all is driven."""
     s = family.system
     driven = set(family.columns.tolist())
-    columns = [range(s.first_column[k], s.first_column[k + 1]) for k in range(len(s.m.pairs))]
+    columns = [set(range(s.first_column[k], s.first_column[k + 1])) for k in range(len(s.m.pairs))]
     moving = [k for k, own in enumerate(columns) if not driven.issuperset(own)]
     body = components_of_edges(len(s.m.links), [ends for k, ends in enumerate(s.graph.ends) if k not in moving])
     joined = {tuple(sorted(body[[a, b]].tolist())) for a, b in zip(s.points.a, s.points.b, strict=True)}
-    if family.rods != 6 or len(moving) != 1 or len(columns[moving[0]]) != 6 or joined != {(0, 1)}:
+    if len(moving) != 1 or not driven.isdisjoint(columns[moving[0]]) or joined != {(0, 1)}:
         return None
-    shared = [tuple(sorted(Counter(side.tolist()).values())) for side in np.split(family.joints, 2)]
-    return next((Bound(count, source) for joints, count, source in PLATFORMS if joints in shared), None)
+    word = "".join(
+        "S" if step.holds_rotation else "R" if step.freedoms[0].turns else "T"
+        for step in s.m.pairs[moving[0]].type.steps
+    )
+    shared = [(), *(tuple(sorted(Counter(side.tolist()).values())) for side in np.split(family.joints, 2))]
+    for letters, rods, joints, count, source in PLATFORMS:
+        if letters in (word, word[::-1]) and rods == family.rods and joints in shared:
+            return Bound(count, source)
+    return None
 
 
 def _of_loops(family: Family) -> Bound | None:
