@@ -194,10 +194,10 @@ def test_a_track_led_round_to_no_assembly_is_at_infinity_only_if_a_second_run_sa
     """Of 300 platforms two were said to have all 40 with 39: a track that strayed near its end counted as one at infinity."""
     m = hexapod("SPS")
     q = Question(m, {f"P{k}": 0.0 for k in range(1, 7)})
-    family, start = q.form.family, Finder(q, 0, True, None).start
-    assert start is not None
-    every = ends(family, start, q.form.drive, np.random.default_rng(0), None)[0].x
-    at, stray = Member(family.target, q.form.drive), np.arange(every.shape[1]) == 0
+    family, (start,) = q.form.family, Finder(q, 0, True, None).starts
+    at = Member(family.target, q.form.drive)
+    every = ends(family, start, at, np.random.default_rng(0), None)[0].x
+    stray = np.arange(every.shape[1]) == 0
     none, off = np.zeros(len(stray), dtype=bool), every.copy()
     off[:, 0] = 1e3 * (1 + 1j)
     astray, whole = _Run(off, ~stray, stray, none), _Run(every, ~none, none, none)

@@ -44,6 +44,11 @@ class Member:
     markers: Array
     drive: Array
 
+    def taken(self, which: Index) -> Member:
+        """Some of the members; markers of one serve for all."""
+        one = self.markers.shape[-1] == 1
+        return Member(self.markers if one else self.markers[..., which], self.drive[:, which])
+
     @staticmethod
     def joined(members: Sequence[Member]) -> Member:
         """Several members, one after the other along the last axis."""
@@ -251,19 +256,17 @@ class Family:
             markers[:, :, P + chords] = compose(inverse(T), moved)
         found = Member(markers, self.drive_of(markers, x))
         closed = Configuration(self.system_of(found), x)
-        if not closed.closure[0] < MEMBER_CLOSED or not self._within(markers):
+        if not closed.closure[0] < MEMBER_CLOSED or not self.within(markers, P + chords):
             return None
         return found, x[:, 0]
 
-    def _within(self, markers: Array) -> bool:
-        """Whether markers of chords lie in the class."""
-        P = len(self.system.m.pairs)
-        at = P + self.system.chords
+    def within(self, markers: Array, at: Index) -> bool:
+        """Whether markers of pairs, those with the numbers ``at``, lie in the class."""
         marker, target = markers[:, :, at], self.target[:, :, at]
         e = finite_twist(multiplied(marker[:, :3], target[:, :3].swapaxes(0, 1)), marker[:, 3], target[:, 3])
-        e = move_twist(self.here.poses[:, :, self.system.b[self.system.chords]], e)[:, :, 0]
-        for i, chord in enumerate(self.system.chords.tolist()):
-            basis = self.algebras[chord]
+        e = move_twist(self.here.poses[:, :, self.bearers[at]], e)[:, :, 0]
+        for i, k in enumerate((at % len(self.system.m.pairs)).tolist()):
+            basis = self.algebras[k]
             if np.abs(e[:, i] - basis @ (basis.T @ e[:, i])).max() > 1e3 * MEMBER_CLOSED * max(
                 1.0, np.abs(e[:, i]).max()
             ):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, cmp_to_key
+from math import prod
 
 import numpy as np
 
@@ -13,21 +14,21 @@ from mechgraph.closure.configuration import Configuration
 from mechgraph.errors import counted
 from mechgraph.force.applied_loads import user_poses
 from mechgraph.modes.balls import TINY
-from mechgraph.modes.bounds import Bound, bound
+from mechgraph.modes.bounds import bound
 from mechgraph.modes.certificate import Certificate, certificate, told_apart
-from mechgraph.modes.family import Array
+from mechgraph.modes.family import Array, Family
 from mechgraph.modes.form import Form, Whole
+from mechgraph.modes.groups import Group, Undivided, groups_of
 from mechgraph.modes.monodromy import Irregular, StartSet, distinct, start_set
+from mechgraph.modes.product import MOST_FOLLOWED, REAL, Product, is_real
 from mechgraph.modes.question import Question
-from mechgraph.modes.result import Assemblies, ComplexModes
+from mechgraph.modes.result import Assemblies, ComplexModes, weakest
 from mechgraph.modes.search import searched
 from mechgraph.modes.store import keep, kept
-from mechgraph.modes.targets import Ends, ends
+from mechgraph.modes.targets import Ends
 
-REAL = 1e-6
-"""Imaginary part of link poses up to which an assembly counts as real."""
-REAL_SINGULAR, REAL_CLOSED = 1e-3, 1e-9
-"""The same at singular ends, which are known to the root of rounding only; closure error of what is real."""
+REAL_CLOSED = 1e-9
+"""Closure error of what is real."""
 SINGULAR = 1e-5
 """Smallest singular value of the closure rows, as part of the largest, below which an assembly is no regular point."""
 LARGE_STATE = 10.0
@@ -71,31 +72,42 @@ class Finder:
         self.fault = self.family.fault
 
     @cached_property
-    def start(self) -> StartSet | None:
-        """The start set of the class; None where there is none."""
+    def groups(self) -> Sequence[Undivided | Group]:
+        """What is solved, one after the other."""
+        return groups_of(self.family)
+
+    @cached_property
+    def starts(self) -> list[StartSet]:
+        """The start sets of the groups; none where no class is known."""
         if self.fault:
-            return None
-        known = kept(self.family) if self.cache else None
-        if known is not None:
-            return known
+            return []
         try:
-            made = start_set(self.family, self.rng, self.progress)
+            return [self._start(group.family) for group in self.groups]
         except Irregular:
+            if len(self.groups) > 1:
+                self.groups = [Undivided(self.family)]
+                return self.starts
             self.fault = "random mechanisms of its class are not closed by regular equations"
             self.form = Whole(self.question.family, self.question.drive)
             self.family = self.form.family
-            return None
+            return []
+
+    def _start(self, family: Family) -> StartSet:
+        known = kept(family) if self.cache else None
+        if known is not None:
+            return known
+        made = start_set(family, self.rng, self.progress)
         if self.cache and made.whole:
-            keep(self.family, made)
+            keep(family, made)
         return made
 
     def solutions(self, guesses: int = GUESSES, turns: float = GUESSED_TURNS) -> list[_Solutions]:
         """What is found at all positions."""
         q = self.question
-        if self.start is None:
+        if not self.starts:
             return [self._searched(q.drive[:, i], guesses, turns) for i in range(q.drive.shape[1])]
-        found = ends(self.family, self.start, self.form.drive, self.rng, self.progress)
-        return [self._tracked(one, self.start, i) for i, one in enumerate(found)]
+        found = Product(self.family, self.groups, self.starts, self.form.drive).ends(self.rng, self.progress)
+        return [self._tracked(one, i) for i, one in enumerate(found)]
 
     def positions(self, guesses: int, turns: float) -> list[Assemblies]:
         """The assemblies at all positions."""
@@ -115,16 +127,14 @@ class Finder:
         x = x[:, distinct(q.family.prints(Configuration(q.system, x)))]
         return _Solutions(x, x, np.zeros((q.system.n_state, 0), dtype=complex), "searched", (why,), None, 0)
 
-    def _tracked(self, found: Ends, start: StartSet, i: int) -> _Solutions:
-        system, N = self.form.at(i), start.x.shape[1]
-        size = np.maximum(1.0, np.abs(found.poses).max(axis=0, initial=0.0))
-        imaginary = np.abs(found.poses.imag).max(axis=0, initial=0.0) / size
-        real = imaginary < np.where(found.singular, REAL_SINGULAR, REAL)
+    def _tracked(self, found: Ends, i: int) -> _Solutions:
+        system, real = self.form.at(i), is_real(found.poses, found.singular)
         solved, error = close_all(system, found.x[:, real].real, self.family.columns)
         solved = self._distinct(solved[:, error < REAL_CLOSED], i)
         if (self._irregular(found.x[:, ~real & found.singular])).any():
             solved = np.concatenate([solved, self._of_continuum(i)], axis=1)
-        word, evidence = _completeness(found, start, N, bound(self.family))
+        word, evidence = _completeness(found, self.groups, self.starts)
+        N = prod(start.x.shape[1] for start in self.starts)
         # rods that would need complex turns to be put back are not real
         x, others = self.form.lifted(solved, i), self.form.lifted(found.x[:, ~real], i)
         complex_ = np.abs(x.imag).max(axis=0, initial=0.0) > REAL
@@ -222,29 +232,52 @@ class Finder:
         return False
 
 
-def _completeness(found: Ends, start: StartSet, N: int, known: Bound | None) -> tuple[str, tuple[str, ...]]:
+def _completeness(
+    found: Ends, groups: Sequence[Undivided | Group], starts: Sequence[StartSet]
+) -> tuple[str, tuple[str, ...]]:
     """The word for how sure it is that no assembly is missing, and what it rests on."""
-    many = counted(N, "mode")
-    loops = (
-        f"A random complex mechanism of the class has {many}: {counted(start.loops, 'loop')} of such mechanisms brought no further one "
-        f"(chance of one missed {start.chance:.1g} where all permutations are as likely), {start.lost} of {start.followed} tracks lost."
-    )
-    tracks = (
-        f"{counted(N, 'track')} to this position in {counted(found.runs, 'run')}: {found.x.shape[1]} different ends, "
+    told = [_of_class(group.family, start) for group, start in zip(groups, starts, strict=True)]
+    evidence = list(told[0][1])
+    if len(groups) > 1:
+        counts = ", ".join(
+            f"{start.x.shape[1]} ({' '.join(group.names)})" for group, start in zip(groups, starts, strict=True)
+        )
+        evidence = [f"{len(groups)} groups are solved one after the other, modes of each: {counts}."]
+        evidence += [
+            f"{group.names[0]}: {text}" for group, (_, texts) in zip(groups, told, strict=True) for text in texts
+        ]
+    if found.partial:
+        evidence.append(
+            f"More than {MOST_FOLLOWED} tracks: those of complex modes of a group are not gone on with, nor counted."
+        )
+    evidence.append(
+        f"{counted(found.tracks, 'track')} to this position in {counted(found.runs, 'run')}: {found.x.shape[1]} different ends, "
         f"{found.infinite} at infinity, {found.lost} lost in the best run."
     )
-    if not start.whole or not found.clean:
-        return "searched", (loops, tracks, "Tracks that are lost, or meet, leave open whether these are all.")
+    if not found.clean:
+        return "searched", (*evidence, "Tracks that are lost, or meet, leave open whether these are all.")
+    return weakest(word for word, _ in told), tuple(evidence)
+
+
+def _of_class(family: Family, start: StartSet) -> tuple[str, tuple[str, ...]]:
+    """The word for a start set, and what it rests on."""
+    N, known, trace = start.x.shape[1], bound(family), start.trace
+    loops = (
+        f"A random complex mechanism of the class has {counted(N, 'mode')}: {counted(start.loops, 'loop')} of such mechanisms brought no "
+        f"further one (chance of one missed {start.chance:.1g} where all permutations are as likely), {start.lost} of {start.followed} "
+        "tracks lost."
+    )
+    if not start.whole:
+        return "searched", (loops, "Others were not looked for any further.")
     if known is not None and known.count == N:
-        return "proved", (f"The class has at most {N}: {known.source}.", tracks)
-    trace = start.trace
+        return "proved", (f"The class has at most {N}: {known.source}.",)
     if not trace.passed:
-        return "searched", (loops, "No trace test was passed, so that others may exist.", tracks)
+        return "searched", (loops, "No trace test was passed, so that others may exist.")
     words = (
         f"Trace test passed: over {trace.samples} random mechanisms of the class a sum over all assemblies is a rational function of "
         f"degree {trace.degree} (the singular values of its Loewner matrix end there: {trace.last:.1g}, {trace.beyond:.1g})."
     )
-    return "tested", (words, loops, tracks)
+    return "tested", (words, loops)
 
 
 def _said_apart(sure: Sequence[Certificate | None]) -> tuple[str, ...]:

@@ -120,6 +120,17 @@ def rods_of(system: System, columns: Index) -> list[Rod]:
     return out
 
 
+def behind(system: System, step: Step, x: Array) -> Array:
+    """Pose ``(3, 4, T)`` of the link behind a pair, seen from the link before it, at states ``x (nx, T)``."""
+    par, pair = system.par, step.pair
+    row, states = system.m.pairs[pair].type.scaled(par.L), x[system.first_row[pair] : system.first_row[pair + 1], None]
+    moved = (
+        pair_kinematics.frames_of(row, par.pitch[[pair]], states)[-1][:, :, 0] if row.steps else identity(x.shape[1])
+    )
+    D = compose(compose(par.marker_a[:, :, pair], moved), inverse(par.marker_b[:, :, pair]))
+    return D if step.sign > 0 else inverse(D)
+
+
 def _columns(system: System, pair: int) -> range:
     return range(system.first_column[pair], system.first_column[pair + 1])
 
@@ -179,27 +190,11 @@ class WithoutRods:
             out.append((int(self.place[body]), marker[:, 3, step.pair, 0]))
         return out
 
-    def _pose(self, pair: int, x: Array) -> Array:
-        """Pose ``(3, 4, T)`` of marker B in marker A at states ``x (nx, T)``."""
-        s = self.full
-        row, states = s.m.pairs[pair].type.scaled(s.par.L), x[s.first_row[pair] : s.first_row[pair + 1], None]
-        if not row.steps:
-            return identity(x.shape[1])
-        return np.asarray(pair_kinematics.frames_of(row, s.par.pitch[[pair]], states)[-1][:, :, 0])
-
-    def _behind(self, step: Step, x: Array) -> Array:
-        """Pose ``(3, 4, T)`` of the link behind a pair, seen from the link before it."""
-        par = self.full.par
-        D = compose(
-            compose(par.marker_a[:, :, step.pair], self._pose(step.pair, x)), inverse(par.marker_b[:, :, step.pair])
-        )
-        return D if step.sign > 0 else inverse(D)
-
     def _inside(self, rod: Rod, x: Array) -> tuple[Array, Array]:
         """From the first link of a rod to its last ``(3, 4, T)``, and the way between its ends ``(3, T)`` seen from the first."""
         C = identity(x.shape[1])
         for step in rod.steps[1:-1]:
-            C = compose(C, self._behind(step, x))
+            C = compose(C, behind(self.full, step, x))
         par, (near, far) = self.full.par, (rod.steps[0], rod.steps[-1])
         begin = (par.marker_b if near.sign > 0 else par.marker_a)[:, 3, near.pair]
         end = (par.marker_a if far.sign > 0 else par.marker_b)[:, 3, far.pair]
@@ -310,7 +305,7 @@ class WithoutRods:
         row = s.m.pairs[near.pair].type
         out[rows] = _ball(of, to, begin[rows]) if _is_ball(row) else _two_turns(row, of, to, begin[rows])
         # the ball at the other end, from both its markers
-        last = compose(compose(bodies[0], self._behind(near, out)), C)
+        last = compose(compose(bodies[0], behind(self.full, near, out)), C)
         A, B = (last, bodies[1]) if far.sign > 0 else (bodies[1], last)
         D = compose(inverse(compose(A, par.marker_a[:, :, far.pair])), compose(B, par.marker_b[:, :, far.pair]))
         out[s.first_row[far.pair] : s.first_row[far.pair + 1]] = matrix_quaternion(D[:, :3])

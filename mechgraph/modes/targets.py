@@ -38,7 +38,10 @@ ENDLESS = 6.0
 
 @dataclass
 class Ends:
-    """Ends of all tracks at one position: states ``(nx, n)``, each once, and what became of the tracks in the best run."""
+    """Ends of all ``tracks`` to one position: states ``(nx, n)``, each once, and what became of the tracks in the best run.
+
+    ``partial`` where only what is real was gone on with (see ``modes.product``).
+    """
 
     x: Array
     poses: Array
@@ -48,27 +51,29 @@ class Ends:
     runs: int = 0
     met: int = 0
     clean: bool = field(default=False)
+    tracks: int = 0
+    partial: bool = False
 
 
 def ends(
-    family: Family, start: StartSet, drive: Array, rng: np.random.Generator, progress: Callable[[str], None] | None
+    family: Family, start: StartSet, goals: Member, rng: np.random.Generator, progress: Callable[[str], None] | None
 ) -> list[Ends]:
-    """Ends at driver values ``drive (d, n)``, one after the other."""
-    n, N = drive.shape[1], start.x.shape[1]
+    """Ends at members ``goals`` of the class, one after the other."""
+    n, N = goals.drive.shape[1], start.x.shape[1]
     out: list[Ends] = []
     block = max(1, TRACKS_TOGETHER // N)
     for i in range(0, n, block):
         if progress is not None:
             progress(f"{N} tracks to each of positions {i + 1} to {min(i + block, n)} of {n}")
-        out += _block(family, start, drive[:, i : i + block], rng)
+        out += _block(family, start, goals.taken(np.arange(i, min(i + block, n))), rng)
     return out
 
 
-def _block(family: Family, start: StartSet, drive: Array, rng: np.random.Generator) -> list[Ends]:
-    n, N = drive.shape[1], start.x.shape[1]
+def _block(family: Family, start: StartSet, goals: Member, rng: np.random.Generator) -> list[Ends]:
+    n, N = goals.drive.shape[1], start.x.shape[1]
     equations = Equations(family, start.mixing)
     nothing = np.zeros((len(start.x), 0), dtype=complex)
-    every = [Ends(nothing, np.zeros((0, 0)), np.zeros(0, dtype=bool)) for _ in range(n)]
+    every = [Ends(nothing, np.zeros((0, 0)), np.zeros(0, dtype=bool), tracks=N) for _ in range(n)]
     left = np.arange(n)
     for run in range(RUNS):
         care = Care() if run < 2 else Care().finer
@@ -79,13 +84,11 @@ def _block(family: Family, start: StartSet, drive: Array, rng: np.random.Generat
             begin, x = detour, there.x[:, there.arrived]
         lost_before = N - x.shape[1]
         which = np.repeat(np.arange(len(left)), x.shape[1])
-        goal = Member(family.target, drive[:, left])
-        leg = Leg(equations, begin, goal, which)
+        leg = Leg(equations, begin, goals.taken(left), which)
         run_ends = _run(leg, np.tile(x, len(left)), care)
         for j, place in enumerate(left.tolist()):
             mine = np.flatnonzero(which == j)
-            at = Member(family.target, drive[:, [place]])
-            _account(family, at, every[place], run_ends.taken(mine), lost_before)
+            _account(family, goals.taken(np.array([place])), every[place], run_ends.taken(mine), lost_before)
         left = left[[not every[place].clean for place in left]]
         if not left.size:
             break

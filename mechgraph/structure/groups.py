@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from mechgraph.structure.link_rows import Constraint, LinkRows
+from mechgraph.structure.link_rows import Constraint, Constraints, LinkRows
 
 MOST_SPLIT = 40
 """Links up to which sets are made smaller by their ranks: some seconds."""
@@ -127,13 +127,13 @@ def _by_rank(rows: LinkRows, links: set[int]) -> Iterator[list[int]]:
     """The smallest determined sets, one after the other."""
     solved, left = {rows.position.graph.frame}, set(links)
     while left:
-        mine = _smallest(rows, left, solved) if len(left) <= MOST_SPLIT else left
+        mine = smallest(rows, left, solved) if len(left) <= MOST_SPLIT else left
         yield sorted(mine)
         solved |= mine
         left -= mine
 
 
-def _smallest(rows: LinkRows, links: set[int], solved: set[int]) -> set[int]:
+def smallest(rows: Constraints, links: set[int], solved: set[int]) -> set[int]:
     """A determined set none of whose parts is: links are taken away, the last ones first, as long as something stays determined."""
     mine, kept = set(links), set[int]()
     while mine - kept:

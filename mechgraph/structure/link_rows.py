@@ -35,55 +35,19 @@ class Constraint:
         return next(iter(self.rows.values())).shape[0] if self.rows else 0
 
 
-class LinkRows:
-    """The constraints of a position with the freedoms ``fixed`` at rest, in the directions ``twists (6, b)``."""
+def rows_of_pair(S: Array, twists: Array) -> Array:
+    """Rows ``(s, b)`` of the wrenches that free twists ``S (6, f)`` of a pair leave, in the directions ``twists (6, b)``."""
+    wrenches = np.linalg.svd(S)[0][:, S.shape[1] :] if S.size else np.eye(6)
+    _, s, Vt = np.linalg.svd(wrenches.T @ twists, full_matrices=False)
+    return np.asarray(Vt[s > RANKS.position])
 
-    def __init__(self, position: Position, fixed: Index, twists: Array) -> None:
-        self.position, self.twists = position, twists
-        self.b = twists.shape[1]
-        free = np.ones(position.n_freedoms, dtype=bool)
-        free[fixed] = False
-        self._free = free
 
-    def freedoms(self, k: int) -> Array:
-        """Free twists ``(6, f)`` of a pair."""
-        columns = np.array(self.position.columns(k), dtype=np.intp)
-        return np.asarray(self.position.rows.S[:, columns[self._free[columns]]])
+class Constraints:
+    """Constraints between links whose motions have ``b`` directions."""
 
-    @cached_property
-    def pairs(self) -> list[Constraint]:
-        """The constraints of all pairs."""
-        out = []
-        for k, (a, b) in enumerate(self.position.graph.ends):
-            S = self.freedoms(k)
-            wrenches = np.linalg.svd(S)[0][:, S.shape[1] :] if S.size else np.eye(6)
-            asked = wrenches.T @ self.twists
-            _, s, Vt = np.linalg.svd(asked, full_matrices=False)
-            rows = Vt[s > RANKS.position]
-            out.append(Constraint(k, {a: -rows, b: rows}))
-        return out
-
-    @cached_property
-    def couplings(self) -> list[Constraint]:
-        """The constraints of rows behind those of the loops."""
-        more = self.position.rows.more
-        out = []
-        for i in range(self.position.rows.further):
-            coefficients = more[[i]].toarray()[0] * self._free  # type: ignore[index]
-            rows: dict[int, Array] = {}
-            for k, (a, b) in enumerate(self.position.graph.ends):
-                mine = coefficients[list(self.position.columns(k))]
-                if mine.any():
-                    S = self.position.rows.S[:, list(self.position.columns(k))]
-                    row = (mine @ np.linalg.pinv(S) @ self.twists)[None]
-                    rows[a], rows[b] = rows.get(a, 0.0) - row, rows.get(b, 0.0) + row
-            out.append(Constraint(len(self.position.graph.ends) + i, rows))
-        return out
-
-    @cached_property
-    def constraints(self) -> list[Constraint]:
-        """Those of pairs, then those of couplings."""
-        return [c for c in (*self.pairs, *self.couplings) if c.count]
+    def __init__(self, constraints: Iterable[Constraint], b: int) -> None:
+        self.constraints = [c for c in constraints if c.count]
+        self.b = b
 
     def matrix(self, links: Iterable[int], solved: Iterable[int]) -> Array:
         """Rows of all constraints among ``links`` and links ``solved`` before, in the ``links`` alone: ``(rows, b links)``."""
@@ -117,6 +81,47 @@ class LinkRows:
                 break
             mine -= moving
         return mine
+
+
+class LinkRows(Constraints):
+    """The constraints of a position with the freedoms ``fixed`` at rest, in the directions ``twists (6, b)``."""
+
+    def __init__(self, position: Position, fixed: Index, twists: Array) -> None:
+        self.position, self.twists = position, twists
+        self._free = np.ones(position.n_freedoms, dtype=bool)
+        self._free[fixed] = False
+        super().__init__((*self.pairs, *self.couplings), twists.shape[1])
+
+    def freedoms(self, k: int) -> Array:
+        """Free twists ``(6, f)`` of a pair."""
+        columns = np.array(self.position.columns(k), dtype=np.intp)
+        return np.asarray(self.position.rows.S[:, columns[self._free[columns]]])
+
+    @cached_property
+    def pairs(self) -> list[Constraint]:
+        """The constraints of all pairs."""
+        out = []
+        for k, (a, b) in enumerate(self.position.graph.ends):
+            rows = rows_of_pair(self.freedoms(k), self.twists)
+            out.append(Constraint(k, {a: -rows, b: rows}))
+        return out
+
+    @cached_property
+    def couplings(self) -> list[Constraint]:
+        """The constraints of rows behind those of the loops."""
+        more = self.position.rows.more
+        out = []
+        for i in range(self.position.rows.further):
+            coefficients = more[[i]].toarray()[0] * self._free  # type: ignore[index]
+            rows: dict[int, Array] = {}
+            for k, (a, b) in enumerate(self.position.graph.ends):
+                mine = coefficients[list(self.position.columns(k))]
+                if mine.any():
+                    S = self.position.rows.S[:, list(self.position.columns(k))]
+                    row = (mine @ np.linalg.pinv(S) @ self.twists)[None]
+                    rows[a], rows[b] = rows.get(a, 0.0) - row, rows.get(b, 0.0) + row
+            out.append(Constraint(len(self.position.graph.ends) + i, rows))
+        return out
 
 
 AT_REST = 1e-7

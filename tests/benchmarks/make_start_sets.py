@@ -18,6 +18,8 @@ from mechgraph.model.chain import chain_symbols
 from mechgraph.model.library import library_path
 from mechgraph.modes import store
 from mechgraph.modes.bounds import bound
+from mechgraph.modes.family import Family
+from mechgraph.modes.groups import groups_of
 from mechgraph.modes.monodromy import Irregular, start_set
 from mechgraph.modes.question import Question
 
@@ -61,26 +63,36 @@ def wanted() -> Iterator[tuple[mg.Mechanism, dict[str, Any]]]:
     yield arm, {"L6": mg.kinematics(arm, {f"A{i}": 0.3 * i for i in range(6)}).link("L6").pose}
 
 
+def families() -> Iterator[tuple[str, Family]]:
+    """Classes of the groups of these mechanisms, where they are known, each once, with the names of their mechanisms."""
+    keys = set()
+    for m, at in wanted():
+        try:
+            whole = Question(m, at).form.family
+        except mg.MechgraphError as error:
+            print(f"{m.name}: {type(error).__name__}", flush=True)
+            continue
+        for group in [] if whole.fault else groups_of(whole):
+            if (key := store.key(group.family)) not in keys:
+                keys.add(key)
+                yield m.name, group.family
+
+
 def main() -> None:
     """Work them out and write them."""
     found: dict[str, Any] = {}
-    for m, at in wanted():
+    for name, family in families():
         begin = time.process_time()
         try:
-            family = Question(m, at).form.family
-            name = store.key(family)
-            if family.fault or f"{name}/x" in found:
-                print(f"{m.name}: {family.fault or 'known'}", flush=True)
-                continue
             start = store.packed(family) or start_set(family, np.random.default_rng(0))
-        except (mg.MechgraphError, Irregular) as error:
-            print(f"{m.name}: {type(error).__name__}", flush=True)
+        except Irregular:
+            print(f"{name}: irregular", flush=True)
             continue
         known, N = bound(family), start.x.shape[1]
         sure = start.trace.passed or (known is not None and known.count == N)
-        print(f"{m.name}: {N}, {'sure' if sure else 'not sure'}, {time.process_time() - begin:.1f} s", flush=True)
+        print(f"{name}: {N}, {'sure' if sure else 'not sure'}, {time.process_time() - begin:.1f} s", flush=True)
         if sure and N <= MOST:
-            found |= {f"{name}/{part}": value for part, value in store.arrays(start).items()}
+            found |= {f"{store.key(family)}/{part}": value for part, value in store.arrays(start).items()}
     np.savez_compressed(store.PACKED, **found)
 
 
