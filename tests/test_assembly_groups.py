@@ -64,9 +64,7 @@ def test_rods_belong_to_the_groups_of_the_bodies_that_they_join() -> None:
     ("m", "at"),
     [
         pytest.param(planar("Stephenson", "A", **STEPHENSON), {"A": 0.1}, marks=pytest.mark.slow),
-        pytest.param(
-            planar("coupler", "A", **ON_A_COUPLER), {"A": 0.1, "G": [0.05, -0.1]}, marks=pytest.mark.slow
-        ),
+        pytest.param(planar("coupler", "A", **ON_A_COUPLER), {"A": 0.1, "G": [0.05, -0.1]}, marks=pytest.mark.slow),
         (RODS, {"O0": 0.1}),
     ],
 )
