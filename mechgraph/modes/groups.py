@@ -31,7 +31,7 @@ from mechgraph.structure.groups import MOST_SPLIT, smallest
 from mechgraph.structure.link_rows import Constraint, Constraints, rows_of_pair
 from mechgraph.topology.components import components_of_edges
 
-MOVED = 0.3
+KNOWN_MOVED = 0.3
 """Change of what is known (radians, lengths over L) at which a group must still be a member of its class."""
 
 
@@ -126,7 +126,7 @@ class Group:
         if family.whole:
             return True
         rng, s = np.random.default_rng(0), self.whole.system
-        dq = rng.uniform(-MOVED, MOVED, (s.n_freedoms, 1))
+        dq = rng.uniform(-KNOWN_MOVED, KNOWN_MOVED, (s.n_freedoms, 1))
         markers = self._carried(s.advance(self.whole.here.x, dq))
         return family.within(markers, np.arange(2 * len(self.pairs)))
 
