@@ -334,7 +334,7 @@ def test_the_table_of_assemblies_shows_their_coordinates() -> None:
 
 
 @pytest.mark.usefixtures("empty")
-@pytest.mark.parametrize("letters", ["RSSR", pytest.param("R-Sc-C-R", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("letters", ["R-Sg-C", pytest.param("R-Sc-C-R", marks=pytest.mark.slow)])
 def test_the_trace_test_passes_with_all_assemblies_and_with_none_left_out(
     letters: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
