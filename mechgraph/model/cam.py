@@ -12,7 +12,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
 from mechgraph.model.curves import ORDERS, WHOLE_TURN, Centred
 from mechgraph.model.field_kinds import NUMBER, POSITIVE, SAMPLES, TEXT
-from mechgraph.model.pieces import Pieces, parted
+from mechgraph.model.pieces import Pieces, derivatives, parted
 from mechgraph.quantities import wrong
 from mechgraph.units import LENGTH
 
@@ -47,23 +47,27 @@ class Cam(Centred):
         return cls(angle=motion.t, base_radius=base_radius, **rates, **more)
 
     @cached_property
-    def _lift(self) -> Pieces:
-        return Pieces.meeting(np.array(self.angle), [np.array(self.lift), np.array(self.slope), np.array(self.bend)])
+    def _beside_follower(self) -> Pieces:
+        """``y_k`` with ``x^(k) = R(-u) y_k``, both components of each: polynomials, as ``x' = R(-u) (y' - J y)``."""
+        meets = [np.array(self.lift), np.array(self.slope), np.array(self.bend)]
+        s = derivatives(Pieces.meeting(np.array(self.angle), meets).coefficients[::-1], ORDERS + 1)
+        flat = self.follower == "flat"
+        a, b = s[:ORDERS].copy(), -s[1:] if flat else np.zeros_like(s[:ORDERS])
+        a[0, 0] += self.base_radius if flat else np.sqrt((self.base_radius + self.roller_radius) ** 2 - self.offset**2)
+        if not flat:
+            b[0, 0] = self.offset
+        found = []
+        for _ in range(ORDERS):
+            found.append([a[0], b[0]])
+            a, b = a[1:] + b[:-1], b[1:] - a[:-1]
+        return Pieces(np.array(self.angle), np.moveaxis(found, (0, 1), (2, 3))[::-1], orders=1)
 
     def at(self, u: Array) -> Array:
         """Roller: ``R(-u) ((d + lift) e1 + offset e2)``; flat: ``R(-u) ((r + lift) e1 - lift' e2)``."""
-        s = self._lift.at(u, ORDERS + 1)
-        flat = self.follower == "flat"
-        far = self.base_radius if flat else np.sqrt((self.base_radius + self.roller_radius) ** 2 - self.offset**2)
-        a, b = s[:ORDERS].copy(), -s[1:] if flat else np.zeros_like(s[:ORDERS])
-        a[0] += far
-        if not flat:
-            b[0] = self.offset
-        c, sine = np.cos(u), np.sin(u)
-        out = np.zeros((ORDERS, 3, *u.shape), dtype=s.dtype)
-        for k in range(ORDERS):  # seen from the cam: x = R(-u) y, x' = R(-u) (y' - J y)
-            out[k, 0], out[k, 1] = c * a[0] + sine * b[0], c * b[0] - sine * a[0]
-            a, b = a[1:] + b[:-1], b[1:] - a[:-1]
+        y = self._beside_follower.at(u)[0]
+        c, s = np.cos(u), np.sin(u)
+        out = np.zeros((ORDERS, 3, *u.shape), dtype=y.dtype)
+        out[:, 0], out[:, 1] = c * y[:, 0] + s * y[:, 1], c * y[:, 1] - s * y[:, 0]
         return self._placed(out)
 
     @property

@@ -42,11 +42,11 @@ class Through(Curve):
         made: Any = scipy.interpolate.make_interp_spline(lengths, given, degree, bc_type=ends)
         breaks = np.unique(np.clip(made.t, lengths[0], lengths[-1]))
         terms = [made.derivative(k)(breaks[:-1]) / math.factorial(k) for k in range(degree, 0, -1)]
-        return Pieces(breaks, np.stack([*terms, made(breaks[:-1])]))
+        return Pieces(breaks, np.stack([*terms, made(breaks[:-1])]), ORDERS)
 
     def at(self, u: Array) -> Array:
         """The spline."""
-        return self._spline.at(u, ORDERS)
+        return self._spline.at(u)
 
     @property
     def ends(self) -> tuple[float, float]:

@@ -17,38 +17,47 @@ DERIVATIVES = 4
 
 @dataclass(frozen=True)
 class Pieces:
-    """Polynomials ``(degree + 1, pieces, ...)``, highest power first, between ``breaks``: evaluated for complex arguments too."""
+    """Polynomials ``(degree + 1, pieces, ...)``, highest power first, between ``breaks``: evaluated for complex arguments too.
+
+    ``orders``: of how many, the value and its derivatives, the coefficients are kept.
+    """
 
     breaks: Array
     coefficients: Array
+    orders: int = DERIVATIVES + 1
 
     @cached_property
     def _terms(self) -> Array:
         """Coefficients of value and derivatives, ``(pieces, orders, components, degree + 1)``, lowest power first."""
         c = self.coefficients[::-1].reshape(len(self.coefficients), len(self.breaks) - 1, -1)
-        out = np.zeros((DERIVATIVES + 1, *c.shape))
-        for order in range(DERIVATIVES + 1):
-            for power in range(order, len(c)):
-                out[order, power - order] = math.perm(power, order) * c[power]
-        return np.ascontiguousarray(out.transpose(2, 0, 3, 1))
+        return np.ascontiguousarray(derivatives(c, self.orders).transpose(2, 0, 3, 1))
 
-    def at(self, u: Array, orders: int) -> Array:
+    def at(self, u: Array) -> Array:
         """Values and derivatives ``(orders, ..., *u.shape)``; of the first and last piece beyond the ends."""
         flat = u.reshape(-1)
         piece = self.breaks[1:-1].searchsorted(flat.real, side="right")
-        terms = self._terms[:, :orders].take(piece, axis=0)
-        powers = np.empty((flat.size, 1, terms.shape[3], 1), dtype=u.dtype)
-        powers[:, 0, 0, 0] = 1.0
-        beyond = np.broadcast_to((flat - self.breaks[piece])[:, None], (flat.size, terms.shape[3] - 1))
-        np.multiply.accumulate(beyond, axis=1, out=powers[:, 0, 1:, 0])
-        out = (terms @ powers)[..., 0].transpose(1, 2, 0)
-        return np.asarray(out.reshape(orders, *self.coefficients.shape[2:], *u.shape))
+        terms = self._terms.take(piece, axis=0)
+        powers = np.empty((flat.size, terms.shape[3]), dtype=u.dtype)
+        powers[:, 0] = 1.0
+        powers[:, 1:] = (flat - self.breaks[piece])[:, None]
+        np.multiply.accumulate(powers, axis=1, out=powers)
+        out = (terms @ powers[:, None, :, None])[..., 0].transpose(1, 2, 0)
+        return np.asarray(out.reshape(self.orders, *self.coefficients.shape[2:], *u.shape))
 
     @classmethod
-    def meeting(cls, breaks: Array, values: Sequence[Array]) -> Pieces:
+    def meeting(cls, breaks: Array, values: Sequence[Array], orders: int = DERIVATIVES + 1) -> Pieces:
         """The polynomials that meet values and derivatives ``(n, ...)`` at the breaks."""
         ends = [y[:-1] for y in values], [y[1:] for y in values]
-        return cls(np.asarray(breaks), hermite(np.diff(breaks), *ends)[::-1])
+        return cls(np.asarray(breaks), hermite(np.diff(breaks), *ends)[::-1], orders)
+
+
+def derivatives(c: Array, orders: int) -> Array:
+    """Coefficients of polynomials ``c (degree + 1, ...)``, lowest power first, and of their derivatives, ``(orders, degree + 1, ...)``."""
+    out = np.zeros((orders, *c.shape))
+    for order in range(orders):
+        for power in range(order, len(c)):
+            out[order, power - order] = math.perm(power, order) * c[power]
+    return out
 
 
 def hermite(length: Array, begin: Sequence[Array], end: Sequence[Array]) -> Array:

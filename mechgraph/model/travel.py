@@ -12,13 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 import scipy
 
+from mechgraph.algebra.components import Library, by_components
 from mechgraph.algebra.se3 import Array, cross
-from mechgraph.model.curves import CLOSED_GAP, ORDERS, Curve, turned
+from mechgraph.model.curves import CLOSED_GAP, ORDERS, Curve
 from mechgraph.model.numeric import second_direction
 from mechgraph.model.pieces import Pieces, hermite
 from mechgraph.quantities import shown
@@ -33,6 +35,8 @@ COMPLEX_STEP = 1e-30
 """Imaginary step of a derivative."""
 INTEGRAL_ERROR, INTEGRAL_HALVINGS = 1e-15, 8
 """Error of an integral over its range that is rounding, and times that an interval is halved for it."""
+GAUSS_NODES, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(6)
+"""Rule of an integral over an interval that is short enough for a polynomial of degree 7."""
 NEAREST_STEPS = 40
 """Steps of Newton's method to the nearest point, at most."""
 
@@ -70,7 +74,8 @@ class Travel:
         self.length = float(s[-1] - s[0])
         self.is_closed = curve.is_closed
         self.guide, self.is_plane = self._guide()
-        self._quarter = np.cross(self.guide, np.eye(3)).T
+        self._frame_in_plane = by_components(partial(_in_plane, self.guide.tolist()))
+        self._frame_guided = by_components(partial(_guided, self.guide.tolist()))
         self.minimizing = curve.frame == "minimizing"
         self.closing = 0.0
         self._turn: Pieces | None = None
@@ -107,7 +112,7 @@ class Travel:
         inside = (
             s.real - self._rounds(s.real) * self.length if self.is_closed else np.clip(s.real, self.begin, self.end)
         )
-        u = self._parameter.at(inside, 1)[0]
+        u = self._parameter.at(inside)[0]
         beyond = s - s.real if self.is_closed else s - inside
         return np.asarray(u + beyond * _parameter_rates(self.curve.at(u))[0]) if np.any(beyond) else u
 
@@ -125,35 +130,24 @@ class Travel:
 
     def guided(self, s: Array) -> tuple[Array, ...]:
         """``x, t, t', t'', y, k, r, r'`` of the frame guided by the direction."""
-        x, t, dt, ddt = self._rates(self._parameter_at(s))
-        d = np.broadcast_to(self.guide.reshape(3, *(1,) * s.ndim), t.shape)
-        c, dc = _dot(d, t), _dot(d, dt)
-        m = np.sqrt(1.0 - c * c)
-        k = (d - c * t) / m
-        y = cross(k, t)
-        bend = _dot(dt, y)
-        r = c * bend / m
-        dy = cross(cross(t, dt) + r * t, y)
-        dr = (dc * bend + c * (_dot(ddt, y) + _dot(dt, dy))) / m + c * c * dc * bend / m**3
-        return x, t, dt, ddt, y, k, r, dr
+        x = self.curve.at(self._parameter_at(s))
+        found = self._frame_guided(x[1], x[2], x[3])
+        return x[0], *found[:15].reshape(5, 3, *s.shape), found[15], found[16]
 
     def at(self, s: Array) -> Place:
         """Position and frame at arc lengths ``(...)``, real or complex."""
-        if self.is_plane:  # y = k x t, t x t' = (t' . y) k
-            x, t, dt, ddt = self._rates(self._parameter_at(s))
-            k = self.guide.reshape(3, *(1,) * s.ndim)
-            y = turned(self._quarter, t)
-            return Place(x, t, dt, y, np.broadcast_to(k, t.shape), _dot(dt, y) * k, _dot(ddt, y) * k)
+        if self.is_plane:
+            x = self.curve.at(self._parameter_at(s))
+            return Place(x[0], *self._frame_in_plane(x[1], x[2], x[3]).reshape(6, 3, *s.shape))
         x, t, dt, ddt, y, k, r, dr = self.guided(s)
         w, dw = cross(t, dt), cross(t, ddt)
         if not self.minimizing:
             w, dw = w + r * t, dw + dr * t + r * dt
         if self._turn is not None:
-            again = self.is_closed or np.isinf(
-                self.begin
-            )  # endless curves repeat what the grid holds, two turns of a helix
+            # endless curves repeat what the grid holds, two turns of a helix
+            again = self.is_closed or np.isinf(self.begin)
             rounds = self._rounds(s.real) if again else np.zeros(s.shape)
-            a = self._turn.at(s.real - rounds * self.length, 1)[0] + rounds * self._gain - (s - s.real) * r
+            a = self._turn.at(s.real - rounds * self.length)[0] + rounds * self._gain - (s - s.real) * r
             y, k = np.cos(a) * y + np.sin(a) * k, np.cos(a) * k - np.sin(a) * y
         return Place(x, t, dt, y, k, w, dw)
 
@@ -174,7 +168,7 @@ class Travel:
 
         s = _refined(self.s, strays)
         a = np.concatenate([[0.0], np.cumsum(_integrals(rate, s[:-1], s[1:]))])
-        self._turn = Pieces.meeting(s, [a, *rates(s)])
+        self._turn = Pieces.meeting(s, [a, *rates(s)], orders=1)
         self._gain = float(a[-1])
         self.closing = self._gain if self.is_closed else 0.0
 
@@ -220,6 +214,47 @@ class Travel:
         return float(s[np.argmin(np.linalg.norm(x - p[:, None], axis=0))])
 
 
+def _in_plane(k: list[float], lib: Library, *x: Any) -> tuple[Any, ...]:
+    """``t, t', y, k, w, w'`` from three derivatives of a curve in the plane at right angles to ``k``, by its parameter.
+
+    With the curvature ``c = (x'' . y) / |x'|^2`` towards ``y = k x t``: ``t' = c y``, ``w = c k`` and
+    ``c' = ((x''' . y) - 3 c (x' . x'')) / |x'|^3``.
+    """
+    x1, y1, z1, x2, y2, z2, x3, y3, z3 = x
+    a, b, c = k
+    per_length = 1.0 / lib.sqrt(x1 * x1 + y1 * y1 + z1 * z1)
+    t = x1 * per_length, y1 * per_length, z1 * per_length
+    p, q, r = b * t[2] - c * t[1], c * t[0] - a * t[2], a * t[1] - b * t[0]
+    square = per_length * per_length
+    bend = (x2 * p + y2 * q + z2 * r) * square
+    rate = (x3 * p + y3 * q + z3 * r - 3.0 * bend * (x1 * x2 + y1 * y2 + z1 * z2)) * (square * per_length)
+    return *t, bend * p, bend * q, bend * r, p, q, r, a, b, c, bend * a, bend * b, bend * c, rate * a, rate * b, rate * c
+
+
+def _guided(d: list[float], lib: Library, *x: Any) -> tuple[Any, ...]:
+    """``t, t', t'', y, k, r, r'`` of the frame guided by ``d`` from three derivatives of a curve by its parameter."""
+    x1, x2, x3 = x[:3], x[3:6], x[6:]
+
+    def dot(u: Any, v: Any) -> Any:
+        return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+
+    u1 = 1.0 / lib.sqrt(dot(x1, x1))
+    square = u1 * u1
+    a, b = dot(x1, x2) * square, (dot(x2, x2) + dot(x1, x3)) * square
+    u2, u3 = -a * square, (4 * a * a - b) * square * u1
+    t = [p * u1 for p in x1]
+    dt = [p * square + q * u2 for p, q in zip(x2, x1, strict=True)]
+    ddt = [o * (square * u1) + 3 * p * (u1 * u2) + q * u3 for o, p, q in zip(x3, x2, x1, strict=True)]
+    c, dc = dot(d, t), dot(d, dt)
+    m = lib.sqrt(1.0 - c * c)
+    k = [(p - c * q) / m for p, q in zip(d, t, strict=True)]
+    y = k[1] * t[2] - k[2] * t[1], k[2] * t[0] - k[0] * t[2], k[0] * t[1] - k[1] * t[0]
+    bend = dot(dt, y)
+    r = c * bend / m
+    dr = (dc * bend + c * (dot(ddt, y) + r * dot(dt, k))) / m + c * c * dc * bend / m**3
+    return *t, *dt, *ddt, *y, *k, r, dr
+
+
 def _parameter_rates(x: Array) -> tuple[Array, Array, Array]:
     """Three derivatives of the parameter by the arc length, from position and derivatives ``(4, 3, ...)`` by the parameter."""
     u1 = 1.0 / np.sqrt(_dot(x[1], x[1]))
@@ -230,9 +265,8 @@ def _parameter_rates(x: Array) -> tuple[Array, Array, Array]:
 
 def _integrals(f: Callable[[Array], Array], begin: Array, end: Array) -> Array:
     """Integrals over intervals, by Gauss's rule."""
-    nodes, weights = np.polynomial.legendre.leggauss(10)
     half = (end - begin) / 2
-    return np.asarray((f(begin[:, None] + half[:, None] * (1 + nodes)) @ weights) * half)
+    return np.asarray((f(begin[:, None] + half[:, None] * (1 + GAUSS_NODES)) @ GAUSS_WEIGHTS) * half)
 
 
 def _refined(grid: Array, strays: Callable[[Array, Array], Array]) -> Array:
@@ -270,7 +304,7 @@ def _by_arc_length(curve: Curve) -> tuple[Array, Pieces]:
     most = INTEGRAL_ERROR * (curve.breaks[-1] - curve.breaks[0])
     u = _refined(curve.breaks, strays)
     s = np.concatenate([[0.0], np.cumsum(_integrals(speed, u[:-1], u[1:]))])
-    return s, Pieces.meeting(s, [u, *_parameter_rates(curve.at(u))])
+    return s, Pieces.meeting(s, [u, *_parameter_rates(curve.at(u))], orders=1)
 
 
 def _right_handed(normal: Array, x: Array) -> Array:
