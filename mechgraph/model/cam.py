@@ -83,7 +83,7 @@ class Cam(Centred):
     @cached_property
     def breaks(self) -> Array:
         """Parts of the intervals between samples."""
-        return parted(np.array(self.angle), max(2, 360 // len(self.angle)))
+        return parted(np.array(self.angle), -(-360 // (len(self.angle) - 1)))
 
     def faults(self, where: str) -> list[str]:
         """Samples that make no closed cam."""

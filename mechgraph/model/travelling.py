@@ -90,12 +90,14 @@ class Travelling(Factor):
 
     def _pose_seen(self, R: Array, p: Array) -> Array:
         """The frame with axes ``R (3, 3, ...)`` at ``p (3, ...)``, seen from that at coordinates zero, ``(3, 4, ...)``."""
-        back = self.start[:, :3].T
-        return np.concatenate([turned(back, R), turned(back, self._off(p))[:, None]], axis=1)
+        X = np.empty((3, 4, *p.shape[1:]), dtype=p.dtype)
+        X[:, :3], X[:, 3] = R, self._off(p)
+        return turned(self.start[:, :3].T, X)
 
     def _screw_seen(self, p: Array, w: Array, v: Array) -> Array:
         """The screw ``(w, v)`` at ``p``, ``(3, ...)`` each, seen from the frame at coordinates zero, ``(w, v + w x (0 - p)) (6, ...)``."""
-        return np.concatenate([turned(self.start[:, :3].T, part) for part in (w, v - cross(w, self._off(p)))])
+        screw = np.stack([w, v - cross(w, self._off(p))])
+        return np.matmul(self.start[:, :3].T, screw.reshape(2, 3, -1)).reshape(6, *p.shape[1:])
 
 
 class TravellingStack(PoseStack):
@@ -107,9 +109,10 @@ class TravellingStack(PoseStack):
         self._last: tuple[Array, Any] | None = None
 
     def _here(self, x: Array) -> Any:
-        if self._last is None or not np.array_equal(self._last[0], x):
-            self._last = x, self.travelling.here(x)
-        return self._last[1]
+        last = self._last
+        if last is None or last[0].shape != x.shape or np.count_nonzero(last[0] != x):
+            last = self._last = x, self.travelling.here(x)
+        return last[1]
 
     def values(self, x: Array) -> Array:
         """Entries of the pose and of its inverse."""

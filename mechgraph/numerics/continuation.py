@@ -109,7 +109,7 @@ class Follower(Marching):
         while len(march.last):
             last = march.last
             at, drive, x, order = self.predicted(march)
-            found = self.newton.nodes(x, drive, last.track, last.which, PATH.quick)
+            found = self.newton.nodes(x, drive, last.track, last.which, PATH.correction)
             good = found.done & (found.correction <= PATH.correction) & (found.condition <= PATH.singular)
             new = Nodes.closed(found, drive, last.track, at, sure=False)
             longest = PATH.ahead * self.longest(last, new, drive)
@@ -150,7 +150,7 @@ class Follower(Marching):
         if not len(nodes):
             return nodes
         found = self.newton.nodes(nodes.x, nodes.drive, nodes.track, nodes.which, PATH.node)
-        stays = found.done & (found.correction <= PATH.quick) & (found.which == nodes.which)
+        stays = found.done & (found.correction <= PATH.correction) & (found.which == nodes.which)
         condition = np.where(stays, found.condition, np.inf)
         return replace(nodes, x=found.x, Z=found.Z, condition=condition)
 

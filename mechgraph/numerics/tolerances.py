@@ -93,10 +93,9 @@ class PathTolerances:
     """Sum of corrections above which Newton stops: the correction exceeds the trust radius of the prediction."""
     correction: float = 0.06
     """Largest correction that a prediction may need; the certificate of the step asks for more than that."""
-    aim: float = 0.005
-    """Correction that the step control aims at: one Newton step from there leaves 2.5e-5, two leave 1e-9."""
-    quick: float = 0.02
-    """Correction up to which one Newton step makes a node of the first march; all nodes are closed together afterwards."""
+    aim: float = 0.02
+    """Correction that the step control aims at: a third of what is allowed. One Newton step from there leaves 4e-4, which does for a node
+    of the first march (all nodes are closed together afterwards)."""
     node: float = 1e-8
     """Last Newton step of a node that counts as closed: its square is rounding."""
     rates: float = 1e-6
