@@ -379,3 +379,20 @@ def test_a_point_may_miss_its_surface_by_a_part_of_its_size(size):
     assert mg.Mechanism(
         "plane", pairs=[mg.Pair("E", "Sp", "f", "b", point=(0, 0, 1e-17), surface=mg.Surface.plane())]
     ).pairs
+
+
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e4])
+def test_a_point_is_kept_to_rounding_at_any_size(size):
+    """A place on a plane, a cylinder, a line or a circle is no farther from the point given than its digits; its own place is the same."""
+    point = size * np.array([0.6, 0.8, np.pi])
+    shapes = [
+        {"surface": mg.Surface.plane(center=point + size * np.array([0.3, -0.2, 0]))},
+        {"surface": mg.Surface.cylinder(radius=size)},
+        {"surface": mg.Surface.cone(half_angle=0.3, center=point - size * np.array([np.tan(0.3), 0, 1]))},
+        {"curve": mg.Curve.line(point=point - size * np.array([1, 2, 0.5]), direction=(1, 2, 0.5))},
+        {"curve": mg.Curve.circle(radius=size, center=point - size * np.array([0, 1, 0]))},
+    ]
+    for shape in shapes:
+        pair = mg.Pair("K", "Sp" if "surface" in shape else "Sg", "a", "b", point=point, **shape)
+        assert_allclose(pair.point, point, atol=1e-13 * size)
+        assert pair.replace(point=pair.point) == pair

@@ -283,7 +283,7 @@ class Places:
 
     @sized
     def bend(self) -> float:
-        """Greatest curvature of curves, over one of the length of the mechanism; 0 where there are none."""
+        """Greatest curvature of curves and surfaces, over one of the length of the mechanism; 0 where there are none."""
         factors = [factor for b in self.moving_batches for factor in b.factors]
         return max((factor.bend for factor in factors if isinstance(factor, Travelling)), default=0.0)
 

@@ -17,7 +17,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.model.along_curve import AlongCurve, Beside, X, Z
 from mechgraph.model.curves import Curve, Line
 from mechgraph.model.pair_type import PairType
-from mechgraph.model.placed_rows import OFF_CURVE, PLACE_STEP, Contact, filled, of_function, pair_row
+from mechgraph.model.placed_rows import OFF_CURVE, PLACE_STEP, Contact, extent, filled, of_function, pair_row, rounded
 from mechgraph.model.row_parts import Touching
 from mechgraph.model.travel import Travel, outside, roller_faults, shape_faults
 from mechgraph.quantities import is_numeric
@@ -171,11 +171,13 @@ def _side(curve: Curve, point: Sequence[float] | None) -> float:
 
 def _placed(place: AlongCurve, curve: Curve, point: Sequence[float] | Array | None) -> AlongCurve:
     travel: Travel = curve.once(Travel)
-    begin = travel.begin if np.isfinite(travel.begin) else 0.0
-    home = begin if point is None else travel.nearest(np.asarray(point))[0]
-    steps = round(home / (PLACE_STEP * travel.length))
-    again = round(1 / PLACE_STEP) if travel.is_closed else 0  # the end of a closed curve is where it begins
-    return replace(place, curve=curve, home=PLACE_STEP * travel.length * (0 if steps == again else steps))
+    ends = np.isfinite(travel.begin)
+    home = (travel.begin if ends else 0.0) if point is None else travel.nearest(np.asarray(point))[0]
+    size = max(extent(curve, travel.at(np.array(home)).x), travel.length if ends else 0.0)
+    again = (
+        travel.is_closed and travel.length - home < PLACE_STEP * size
+    )  # the end of a closed curve is where it begins
+    return replace(place, curve=curve, home=0.0 if again else rounded(home, size))
 
 
 def _off(factor: AlongCurve, point: Sequence[float] | Array | None) -> float:

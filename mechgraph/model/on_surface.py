@@ -75,6 +75,14 @@ class OnSurface(Travelling):
         found = self.surface.curvatures(*self._parameters(x))
         return -found[::-1] if self.turned else found
 
+    @cached_property
+    def bend(self) -> float:
+        """Where the surface is looked at, and at coordinates zero."""
+        assert self.surface is not None
+        with self.named():
+            here = np.abs(self.surface.curvatures(*np.array(self.home)[:, None])).max()
+            return self.unit * max(self.surface.bend, float(here))
+
     def _parameters(self, x: Array) -> Array:
         """Parameters ``(2, ...)`` at coordinates ``(2, ...)``."""
         return np.stack([at + self.unit / size * q for at, size, q in zip(self.home, self.sizes, x, strict=True)])

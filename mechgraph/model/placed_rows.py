@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
@@ -13,16 +14,20 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.errors import ShapeError
 from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.model.along_curve import AlongCurve
+from mechgraph.model.curves import Curve
 from mechgraph.model.on_surface import OnSurface
 from mechgraph.model.pair_type import PairType, fill_row
 from mechgraph.model.row_parts import Touching
+from mechgraph.model.surfaces import Surface
+from mechgraph.units import LENGTH
 
 OFF_CURVE = 1e-6
 """Part of the extent of a curve, or angle, by which the contact may miss it."""
 UNIT_ROUNDING = 1e-12
 """Miss (in the unit of length) that is rounding at any size of a mechanism, as of a point in a plane through the origin."""
-PLACE_STEP = 1e-12
-"""Part of its length to which a place on a curve is rounded, so that the place of that place is the same."""
+PLACE_STEP = 1e-14
+"""Part of the greatest length by which a place on a curve or surface is found to which it is rounded, so that the place of that place is
+the same: some fifty roundings."""
 TRIED_PLACES = 16
 """Places at which it is tried whether components do work."""
 
@@ -53,6 +58,18 @@ class Contact:
     marker: Array
     misses: tuple[float, ...]
     marker_b: Array | None = None
+
+
+def extent(shape: Curve | Surface, x: Array) -> float:
+    """The greatest length among those declared of a curve or surface and the coordinates of its point ``x (3,)``."""
+    named = [getattr(shape, name) for name, of in shape.formats.items() if of.slide == LENGTH]
+    return max(float(np.abs(values).max()) for values in (x, *(v for v in named if v is not None)))
+
+
+def rounded(at: float, size: float) -> float:
+    """A place to ``PLACE_STEP`` of the ``size`` of the numbers behind it; steps are powers of two, so that sizes near by have the same."""
+    step = math.ldexp(1.0, math.frexp(PLACE_STEP * size)[1])
+    return step * round(at / step)
 
 
 def travels(row: Any) -> bool:

@@ -15,18 +15,18 @@ from mechgraph.model.pair_table import TABLE
 from mechgraph.model.pair_type import PairType
 from mechgraph.model.placed_rows import (
     OFF_CURVE,
-    PLACE_STEP,
     UNIT_ROUNDING,
     Contact,
+    extent,
     filled,
     of_function,
     pair_row,
+    rounded,
     travels,
 )
 from mechgraph.model.row_parts import Touching
 from mechgraph.model.surfaces import Surface
 from mechgraph.quantities import is_numeric
-from mechgraph.units import LENGTH
 
 SURFACE_ROWS = {
     "Sp": pair_row(
@@ -80,7 +80,9 @@ def on_surface(
         for low, high in surface.ends
     )
     home = middle if point is None else surface.nearest(np.asarray(point))
-    placed = OnSurface(surface, tuple(PLACE_STEP * round(at / PLACE_STEP) for at in home))  # type: ignore[arg-type]
+    x, *along = surface.at(*np.array(home)[:, None])[:3, :, 0]
+    u, v = map(rounded, home, extent(surface, x) / np.linalg.norm(along, axis=1))
+    placed = OnSurface(surface, (u, v))
     if axis is not None and placed.start[:, 2] @ np.asarray(axis) < 0:
         placed = replace(placed, turned=True)
     off = 0.0 if point is None or on_b is not None else float(np.linalg.norm(placed.start[:, 3] - point))
@@ -138,8 +140,7 @@ def surface_miss(contact: Contact, tol: float, where: str) -> Iterator[str]:
     surface = next(
         step.surface for step in contact.row.steps if isinstance(step, OnSurface) and step.surface is not None
     )
-    lengths = [np.abs(getattr(surface, name)).max() for name, of in surface.formats.items() if of.slide == LENGTH]
-    size = max(float(np.linalg.norm(contact.marker[:, 3])), *lengths, UNIT_ROUNDING / OFF_CURVE)
+    size = max(extent(surface, contact.marker[:, 3]), UNIT_ROUNDING / OFF_CURVE)
     if contact.misses[0] > max(OFF_CURVE, tol) * size:
         at = ", ".join(f"{v:.6g}" for v in contact.marker[:, 3])
         yield (

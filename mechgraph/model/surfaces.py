@@ -108,6 +108,19 @@ class Surface(Described):
         apart = np.sqrt(np.maximum(mean * mean - gauss, 0.0))
         return np.stack([mean - apart, mean + apart])
 
+    @property
+    def looked_at(self) -> tuple[Array, Array]:
+        """Parameters ``(n,)`` between which the surface is smooth."""
+        u, v = np.meshgrid(*(_between(end, 1.0) for end in self.ends))
+        return u.ravel(), v.ravel()
+
+    @cached_property
+    def bend(self) -> float:
+        """Greatest curvature there."""
+        with np.errstate(divide="ignore", invalid="ignore"):  # where a meridian meets its axis
+            found = np.abs(self.curvatures(*self.looked_at))
+        return float(found.max(initial=0.0, where=np.isfinite(found)))
+
     def nearest(self, p: Array) -> tuple[float, float]:
         """Parameters of the point of the surface that is nearest to ``p (3,)``, by Newton's method."""
         u, v = self.grid(p)
@@ -226,6 +239,12 @@ class Turned(AboutAxis):
         u, v = np.meshgrid(_between((0.0, WHOLE_TURN), size), _between(self._curve.ends, size))
         return u.ravel(), v.ravel()
 
+    @property
+    def looked_at(self) -> tuple[Array, Array]:
+        """The meridian."""
+        v = self._curve.breaks
+        return np.zeros(len(v)), v
+
     def _circle(self, radius: float, away: float = 0.0, **more: Any) -> Circle:
         e1, e2, _ = self._basis
         return Circle(center=np.asarray(self.center) + away * e1, radius=radius, axis=-e2, second=e1, **more)
@@ -315,6 +334,11 @@ class Cone(Turned):
     def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """The apex."""
         return NO_ENDS, (0.0, np.inf)
+
+    @property
+    def looked_at(self) -> tuple[Array, Array]:
+        """Nowhere: it is sharper and sharper towards the apex."""
+        return np.zeros(0), np.zeros(0)
 
     def faults(self, where: str) -> list[str]:
         """An angle that makes no cone."""

@@ -228,7 +228,24 @@ def _in_plane(k: list[float], lib: Library, *x: Any) -> tuple[Any, ...]:
     square = per_length * per_length
     bend = (x2 * p + y2 * q + z2 * r) * square
     rate = (x3 * p + y3 * q + z3 * r - 3.0 * bend * (x1 * x2 + y1 * y2 + z1 * z2)) * (square * per_length)
-    return *t, bend * p, bend * q, bend * r, p, q, r, a, b, c, bend * a, bend * b, bend * c, rate * a, rate * b, rate * c
+    return (
+        *t,
+        bend * p,
+        bend * q,
+        bend * r,
+        p,
+        q,
+        r,
+        a,
+        b,
+        c,
+        bend * a,
+        bend * b,
+        bend * c,
+        rate * a,
+        rate * b,
+        rate * c,
+    )
 
 
 def _guided(d: list[float], lib: Library, *x: Any) -> tuple[Any, ...]:

@@ -35,9 +35,9 @@ class Travelling(Factor):
         """The frame at coordinates zero on its link ``(3, 4)``."""
 
     @property
+    @abstractmethod
     def bend(self) -> float:
-        """Greatest curvature of a curve, over one of ``unit``; that of surfaces is not looked for."""
-        return 0.0
+        """Greatest curvature, over one of ``unit``."""
 
     @abstractmethod
     def place_of(self, x: Array) -> Any:

@@ -35,7 +35,7 @@ def smooth(problem: Problem, a: Nodes, m: Nodes, b: Nodes, correction: Array, fr
 
     Nor need they be so smooth (accelerations of cams jump) where no other branch is as near. An end on another branch, ``d`` away from
     where the step should lead, makes ``2 h |r_m - ...| + 4 |correction| >= d``; and two solutions are at least ``2 / (|J^-1| |J'|)`` apart
-    (``|J'|`` grows with the curvature of curves, which may bend between two nodes and nowhere else).
+    (``|J'|`` grows with the curvature of curves and surfaces, which may bend between two nodes and nowhere else).
     """
     h = b.place - a.place
     direction = (b.drive - a.drive) / h

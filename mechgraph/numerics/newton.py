@@ -76,7 +76,7 @@ class Problem(Protocol):
     paced: bool
     """Whether the equations may change more slowly than the path values, see ``pace``."""
     bend: float
-    """Greatest curvature of curves in the equations; 0 where there are none."""
+    """Greatest curvature of curves and surfaces in the equations; 0 where there are none."""
 
     def at(self, x: Array, drive: Array, tracks: Index) -> Any:
         """The equations at (a copy of) states, the path values put in."""

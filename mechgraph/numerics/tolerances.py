@@ -132,7 +132,7 @@ class PathTolerances:
     """Part of the inverse condition number, over rates above one, up to which another branch is not as near: matrices change by at most
     forty a radian (near the limits of four-bars the other branch is 170 times as far)."""
     round: float = 10.0
-    """Curvature of curves, over one of the length of the mechanism, above which that part falls as it grows: to half of a radius."""
+    """Curvature of curves and surfaces, over one of the length of the mechanism, above which that part falls: to half of a radius."""
     tiny: float = 1e-9
     """Distance between states below which ``smooth`` is not tested: differences of rounding and of numerical derivatives."""
     fair: float = 1e3

@@ -139,9 +139,13 @@ def test_slider_crank_with_rod_about_as_long_as_the_crank(exponent, longer):
         assert (error * np.maximum(root[ok], 1e-9)).max() < 1e-11
 
 
+@pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("size", [3e-4, 1e-3])
-def test_a_small_bend_of_a_slot_that_leads_back_is_not_leapt_over(size):
-    """Between two nodes, on a slot that is straight elsewhere: past the place where the slot turns back the pin does not get along it."""
+def test_a_small_bend_of_a_slot_that_leads_back_is_not_leapt_over(size, turned):
+    """Between two nodes, on a slot that is straight elsewhere: past the place where the slot turns back the pin does not get along it.
+
+    Nor does a ball along the ridge of a surface, which is the slot turned about an axis.
+    """
     v = np.sinh(np.linspace(-1, 1, 140) * np.arcsinh(2 / size))
     x = size * (v - 3 * v * np.exp(-v * v))
     slot = mg.Curve.through(points=np.stack([x, 2 * size * np.tanh(v), np.zeros(140)], axis=1))
@@ -150,7 +154,16 @@ def test_a_small_bend_of_a_slot_that_leads_back_is_not_leapt_over(size):
     pairs = [
         mg.Pair("X", "P", "frame", "carriage", point=here, axis=(1, 0, 0)),
         mg.Pair("Y", "P", "carriage", "pin", point=here, axis=(0, 1, 0)),
-        mg.Pair("G", "Sg", "frame", "pin", point=here, curve=slot),
+        mg.Pair(
+            "G",
+            "Sp",
+            "frame",
+            "pin",
+            point=here,
+            surface=mg.Surface.revolution(profile=slot, center=(0, -5, 0), axis=(1, 0, 0)),
+        )
+        if turned
+        else mg.Pair("G", "Sg", "frame", "pin", point=here, curve=slot),
     ]
     along = np.linspace(-2, 0, 10_001)
     back = (size * (along - 3 * along * np.exp(-along * along))).max() - here[0]
