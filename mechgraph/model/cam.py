@@ -60,7 +60,7 @@ class Cam(Centred):
         for _ in range(ORDERS):
             found.append([a[0], b[0]])
             a, b = a[1:] + b[:-1], b[1:] - a[:-1]
-        return Pieces(np.array(self.angle), np.moveaxis(found, (0, 1), (2, 3))[::-1], orders=1)
+        return Pieces(np.array(self.angle), np.moveaxis(np.array(found), (0, 1), (2, 3))[::-1], orders=1)
 
     def at(self, u: Array) -> Array:
         """Roller: ``R(-u) ((d + lift) e1 + offset e2)``; flat: ``R(-u) ((r + lift) e1 - lift' e2)``."""
