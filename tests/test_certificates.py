@@ -9,7 +9,7 @@ import pytest
 from mechanisms import hexapod, linked_four_bar, ring
 
 import mechgraph as mg
-from mechgraph.closure.assembly import close_all, scaled_start
+from mechgraph.closure.assembly import close_all, closed_start, scaled_start
 from mechgraph.closure.configuration import Configuration
 from mechgraph.modes import certificate as certificates
 from mechgraph.modes.balls import Ball, loop_rows
@@ -47,6 +47,22 @@ def test_loops_of_balls_are_those_of_the_closure_rows(name: str) -> None:
         assert (np.abs(opened.mid - q.start.residual[at, 0]) <= opened.rad + 1e-13).all()
         assert np.abs(twists.mid - q.start.loop_jacobian[at, columns, 0]).max() < 1e-12
         assert max(opened.rad.max(), twists.rad.max()) < 1e-11
+
+
+@pytest.mark.parametrize("turned", [(), (1,), (2,), (1, 2, 3), (0, 1, 2, 3, 4)])
+def test_pairs_declared_against_the_way_of_a_loop_have_their_columns_in_order(turned: tuple[int, ...]) -> None:
+    """Of a pair of several freedoms that is passed from link b to a, the last is passed first: two columns were exchanged."""
+    rng, pairs = np.random.default_rng(2), []
+    for i, symbol in enumerate(("R", "C", "U", "Sp", "E")):
+        links = [f"L{i}", f"L{(i + 1) % 5}"]
+        axis = rng.normal(size=3)
+        more = {"second": np.cross(axis, rng.normal(size=3))} if symbol == "U" else {}
+        links = links[::-1] if i in turned else links
+        pairs.append(mg.Pair(f"P{i}", symbol, *links, point=rng.normal(size=3), axis=axis, **more))
+    here = closed_start(mg.Mechanism("loop", pairs=pairs, frame="L0"))
+    found = rows(here)[1].mid
+    assert np.abs(found - here.J[:, :, 0]).max() < 1e-12
+    assert np.abs(found).max() > 0.5
 
 
 @pytest.mark.parametrize("make", [hexapod, lambda: mg.load("rssr")])

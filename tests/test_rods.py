@@ -20,7 +20,9 @@ from mechgraph.modes.family import Member
 from mechgraph.modes.finding import Finder
 from mechgraph.modes.form import _ball, _two_turns, rods_of
 from mechgraph.modes.homotopy import Equations, Leg
+from mechgraph.modes.monodromy import distinct
 from mechgraph.modes.question import Question
+from mechgraph.modes.search import searched
 from mechgraph.modes.targets import Ends, _account, _Run, ends
 
 
@@ -119,6 +121,40 @@ def test_a_body_on_one_pair_and_rods_has_a_bound(symbol: str, flipped: bool, rod
     if count == 8:
         modes = mg.assemblies(m, {"D": 0.1})
         assert (modes.total, modes.completeness) == (count, "proved")
+
+
+def leg_between(*middle: mg.Pair) -> mg.Mechanism:
+    """A crank and a rocker, joined by pairs from the one to the other; a cylindrical pair carries the rocker where two turns lead to it."""
+    ground = mg.Pair("G", "C" if len(middle) == 2 else "R", "rocker", "frame", point=(1, 3, 0), axis=(0.3, 0.1, 1))
+    crank = mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=(0.1, 0.2, 1))
+    return mg.Mechanism("leg", pairs=[crank, *middle, ground], drives=["A"], frame="frame")
+
+
+NEAR, FAR = np.array((1.0, 0, 0.1)), np.array((1.5, 2, 0.8))
+ALONG, ACROSS = FAR - NEAR, np.cross(FAR - NEAR, Z)
+
+
+def test_two_turns_of_which_one_lies_along_the_leg_are_no_rod() -> None:
+    """That turn is a spin of the leg, which rests; it was taken for a rod, and its spin for one that all mechanisms of the class have."""
+    two_turns = mg.Pair("U", "U", "leg", "crank", point=NEAR, axis=ALONG, second=ACROSS)
+    m = leg_between(two_turns, mg.Pair("B", "S", "leg", "rocker", point=FAR))
+    modes, q = mg.assemblies(m, {"A": 0.05}), Question(m, {"A": 0.05})
+    assert [q.m.freedom_names()[k] for k in q.family.held] == ["U.Rz"]
+    assert (modes.total, len(modes), modes.completeness) == (4, 2, "tested")
+    assert all(sure is not None and sure.proved and sure.apart > 0.5 for sure in modes.certificates)
+    x = searched(q.system, q.x, q.columns, q.drive[:, 0], 200, 1.0, np.random.default_rng(3))
+    prints = np.concatenate([q.family.prints(Configuration(q.system, some)) for some in (states(q, modes), x)], axis=1)
+    assert len(distinct(prints)) == 2
+
+
+def test_a_rod_of_two_halves_that_turn_about_it_is_a_rod() -> None:
+    m = leg_between(
+        mg.Pair("S", "S", "crank", "half", point=NEAR),
+        mg.Pair("T", "R", "half", "other", point=(NEAR + FAR) / 2, axis=ALONG),
+        mg.Pair("B", "S", "other", "rocker", point=FAR),
+    )
+    modes = mg.assemblies(m, {"A": 0.05})
+    assert (modes.total, len(modes), modes.completeness) == (2, 2, "proved")
 
 
 def test_rods_are_chains_between_balls_or_two_turns_with_nothing_free_between() -> None:

@@ -125,7 +125,7 @@ class _Walk:
         self.twists: list[Ball] = []
 
     def along(self, pair: int, sign: int) -> None:
-        """One pair, from its link a to b or back."""
+        """One pair, from its link a to b or back; its twists are kept in the order of its freedoms either way."""
         par, s = self.system.par, self.system
         if self.pose is None:
             first = s.a[pair] if sign > 0 else s.b[pair]
@@ -135,14 +135,15 @@ class _Walk:
         if sign < 0:
             ends = ends[::-1]
             steps = [(_inverse(step), -unit) for step, unit in steps[::-1]]
-        self.pose = self.pose @ ends[0]
+        self.pose, passed = self.pose @ ends[0], []
         for step, unit in steps:
             if sign > 0:
-                self._pass(unit)
+                passed.append(self._outside(unit))
             self.pose = self.pose @ step
             if sign < 0:
-                self._pass(unit)
+                passed.append(self._outside(unit))
         self.pose = self.pose @ _inverse(ends[1])
+        self.twists += passed[::sign]
 
     def _steps(self, pair: int) -> list[tuple[Ball, Array]]:
         """Motions of the factors of a pair, with unit twists ``(6, n)`` in the frame before each."""
@@ -161,10 +162,11 @@ class _Walk:
                 raise Open
         return out
 
-    def _pass(self, unit: Array) -> None:
+    def _outside(self, unit: Array) -> Ball:
+        """Twists ``(6, n)`` in the frame reached, in outer directions about the middle."""
         assert self.pose is not None
         w = self.pose[:3, :3] @ exact(unit[:3])
-        self.twists.append(_stacked(w, self.pose[:3, :3] @ exact(unit[3:]) + crossed(self.pose[:3, 3], w)))
+        return _stacked(w, self.pose[:3, :3] @ exact(unit[3:]) + crossed(self.pose[:3, 3], w))
 
     def rows(self) -> tuple[Ball, Ball]:
         """See ``loop_rows``."""

@@ -64,12 +64,12 @@ def bound(family: Family) -> Bound | None:
 def _of_platform(family: RodFamily) -> Bound | None:
     """The bound of two bodies joined by rods and one pair, those one between which all is driven."""
     s = family.system
-    driven = set(family.columns.tolist())
+    free = set(family.free.tolist())
     columns = [set(range(s.first_column[k], s.first_column[k + 1])) for k in range(len(s.m.pairs))]
-    moving = [k for k, own in enumerate(columns) if not driven.issuperset(own)]
+    moving = [k for k, own in enumerate(columns) if not free.isdisjoint(own)]
     body = components_of_edges(len(s.m.links), [ends for k, ends in enumerate(s.graph.ends) if k not in moving])
     joined = {tuple(sorted(body[[a, b]].tolist())) for a, b in zip(s.points.a, s.points.b, strict=True)}
-    if len(moving) != 1 or not driven.isdisjoint(columns[moving[0]]) or joined != {(0, 1)}:
+    if len(moving) != 1 or not free.issuperset(columns[moving[0]]) or joined != {(0, 1)}:
         return None
     word = "".join(
         "S" if step.holds_rotation else "R" if step.freedoms[0].turns else "T"
@@ -85,8 +85,8 @@ def _of_platform(family: RodFamily) -> Bound | None:
 def _of_loops(family: Family) -> Bound | None:
     """The product over loops solved one after the other, where the table has one for each of them."""
     s = family.system
-    known = np.zeros(s.n_freedoms, dtype=bool)
-    known[family.columns] = True
+    known = np.ones(s.n_freedoms, dtype=bool)
+    known[family.free] = False
     if family.passive.shape[1]:
         return None
     left, count, sources = list(range(s.graph.n_loops)), 1, []
@@ -121,9 +121,9 @@ def _entry(dimension: int, letters: str) -> Bound | None:
 def _of_triad(family: Family) -> Bound | None:
     """The bound of two bodies in a plane joined by three links; links between which all is driven are one."""
     s, P = family.system, range(len(family.system.m.pairs))
-    driven = set(family.columns.tolist())
+    free = set(family.free.tolist())
     columns = [range(s.first_column[k], s.first_column[k + 1]) for k in P]
-    locked = [k for k in P if driven.issuperset(columns[k])]
+    locked = [k for k in P if free.isdisjoint(columns[k])]
     body = components_of_edges(len(s.m.links), [s.graph.ends[k] for k in locked])
     joints: dict[int, list[int]] = {}
     for k in P:

@@ -149,10 +149,10 @@ def _put(f: Ball, A: Ball, at: slice, columns: Index, found: tuple[Ball, Ball]) 
 
 
 def _columns_of_rods(s: RodSystem) -> list[Index]:
-    """Freedoms between the bodies of every rod, in the order of the way."""
+    """Freedoms between the bodies of every rod, pair by pair along the way."""
     first = s.first_column
     ways = (s.way(rod) for rod in range(len(s.points.a)))
-    return [np.concatenate([np.arange(first[k], first[k + 1])[::sign] for k, sign in way]) for way in ways]
+    return [np.concatenate([np.arange(first[k], first[k + 1]) for k, _ in way]) for way in ways]
 
 
 def curvature(here: Configuration) -> float:

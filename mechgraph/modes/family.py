@@ -33,6 +33,8 @@ Array = NDArray[Any]
 """Numbers, real or complex."""
 MEMBER_CLOSED = 1e-9
 """Closure error up to which a member of a class counts as closed."""
+NOTHING: Index = np.zeros(0, dtype=np.intp)
+"""No freedoms, no links."""
 GENERIC = 1e-7
 """Singular value, as part of the largest, below which it counts as zero at random members."""
 
@@ -58,13 +60,23 @@ class Member:
 class Family:
     """The class of a mechanism with drivers ``columns``, told at a closed position ``here``.
 
-    ``passive (F, p)`` are passive motions, ``rods`` numbers of links by which assemblies are not told apart (see ``modes.form``).
+    ``idle (F, p)`` are passive motions, by which assemblies are not told apart, of which rest of ``held`` freedoms stops some: ``passive``
+    are those left. ``rods`` are numbers of links by which assemblies are not told apart either (see ``modes.form``).
     """
 
-    def __init__(self, here: Configuration, columns: Index, passive: Array, rods: Index | None = None) -> None:
-        self.here, self.system, self.columns, self.passive = here, here.system, columns, passive
-        self._rods = np.zeros(0, dtype=np.intp) if rods is None else rods
-        self.free = complement(columns, self.system.n_freedoms)
+    def __init__(
+        self, here: Configuration, columns: Index, idle: Array, held: Index = NOTHING, rods: Index = NOTHING
+    ) -> None:
+        self.here, self.system, self.columns, self.idle, self.held, self._rods = (
+            here,
+            here.system,
+            columns,
+            idle,
+            held,
+            rods,
+        )
+        self.passive = at_rest(idle, held)
+        self.free = complement(np.concatenate([columns, held]), self.system.n_freedoms)
         self.rows = self.system.single_rows[columns]
         par = self.system.par
         self.target: Array = np.concatenate([par.marker_a, par.marker_b], axis=2).astype(complex)
@@ -138,7 +150,7 @@ class Family:
     @cached_property
     def settled_links(self) -> Index:
         """Links that no passive motion moves, and that are not parts of rods."""
-        V = [self.here.link_twists(rates[:, None]) for rates in self.passive.T]
+        V = [self.here.link_twists(rates[:, None]) for rates in self.idle.T]
         links = np.arange(len(self.system.m.links))
         still = np.abs(V).max(axis=(0, 1, 3)) < SPAN if V else np.ones(len(links), dtype=bool)
         return links[still & ~np.isin(links, self._rods)]
@@ -155,7 +167,7 @@ class Family:
         """State rows of freedoms that come back and of those that do not, which no passive motion changes, and that are not in rods."""
         s = self.system
         inside = np.isin(s.a, self._rods) | np.isin(s.b, self._rods)
-        still = (s.single_rows >= 0) & (np.abs(self.passive).max(axis=1, initial=0.0) < SPAN)
+        still = (s.single_rows >= 0) & (np.abs(self.idle).max(axis=1, initial=0.0) < SPAN)
         still &= ~inside[s.pair_of_freedom]
         back = np.isfinite(self.periods)
         return s.single_rows[still & back], s.single_rows[still & ~back]
@@ -166,7 +178,7 @@ class Family:
         if self.system.rotations is None:
             return np.zeros((4, 0), dtype=np.intp)
         columns, rows = self.system.rotations
-        still = np.abs(self.passive).max(axis=1, initial=0.0) < SPAN
+        still = np.abs(self.idle).max(axis=1, initial=0.0) < SPAN
         return rows[:, still[columns].all(axis=0)]
 
     def prints(self, here: Configuration) -> Array:
@@ -246,6 +258,7 @@ class Family:
         member, s = self.random_member(rng), self.system
         dq = rng.uniform(-np.pi, np.pi, s.n_freedoms) + 0.4j * rng.normal(size=s.n_freedoms)
         dq[s.is_length] = rng.normal(size=(int(s.is_length.sum()), 2)) @ [0.5, 0.3j]
+        dq[self.held] = 0.0
         x = s.advance(self.here.x, dq[:, None])
         markers, P = member.markers.copy(), len(s.m.pairs)
         chords, b = s.chords, s.b[s.chords]
@@ -292,6 +305,14 @@ def generated(S: Array) -> Array:
         if larger.shape[1] == k:
             return basis
         basis = larger
+
+
+def at_rest(motions: Array, held: Index) -> Array:
+    """Those of ``motions (F, p)`` in which freedoms ``held`` rest."""
+    if not held.size:
+        return motions
+    _, sigma, Vt = np.linalg.svd(motions[held])
+    return np.asarray(motions @ Vt[int((sigma > SPAN).sum()) :].T)
 
 
 def span(S: Array) -> Array:

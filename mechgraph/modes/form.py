@@ -94,7 +94,7 @@ class Rod(NamedTuple):
 
 
 def rods_of(system: System, columns: Index) -> list[Rod]:
-    """The rods of a mechanism with drivers ``columns``; no pair and no link belongs to two."""
+    """The rods of a mechanism with freedoms ``columns`` at rest; no pair and no link belongs to two."""
     driven, rows = set(columns.tolist()), [pair.type for pair in system.m.pairs]
     at: list[list[Step]] = [[] for _ in system.m.links]
     for k, (a, b) in enumerate(system.graph.ends):
@@ -152,10 +152,10 @@ def _points(row: PairType) -> bool:
 
 
 class WithoutRods:
-    """What is left of a mechanism that stands at ``start``, with drivers ``columns`` at ``drive (d, n)``, when ``rods`` fall away."""
+    """What is left of the mechanism of a class, with drivers at ``drive (d, n)``, when ``rods`` fall away."""
 
-    def __init__(self, start: Configuration, columns: Index, passive: Array, drive: Array, rods: list[Rod]) -> None:
-        self.start, self.full, self._rows = start, start.system, start.system.single_rows[columns]
+    def __init__(self, whole: Family, drive: Array, rods: list[Rod]) -> None:
+        self.start, self.full, self._rows = whole.here, whole.system, whole.rows
         self._drive = drive
         s = self.full
         # the frame comes first, so that a start set serves whatever the order of declaration
@@ -172,13 +172,14 @@ class WithoutRods:
             np.array([i for k in self.pairs for i in range(to[k], to[k + 1])], dtype=np.intp)
             for to in (s.first_row, s.first_column)
         )
-        own = np.isin(columns, self.kept)
+        own = np.isin(whole.columns, self.kept)
         self.drive = np.concatenate([drive[own], self._squares()])
         both = sum(not _is_ball(s.m.pairs[rod.steps[0].pair].type) for rod in rods)
         self.told: tuple[str, ...] = (f"{WAYS} ({counted(both, 'leg')} here).",) if both else ()
         self._small = self._mechanism()
         here = Configuration(self.at(0), self._state())
-        self.family: Family = RodFamily(here, np.searchsorted(self.kept, columns[own]), self._passive(here, passive))
+        columns, held = (np.searchsorted(self.kept, of[np.isin(of, self.kept)]) for of in (whole.columns, whole.held))
+        self.family: Family = RodFamily(here, columns, self._passive(here, whole.idle), held)
 
     # --- numbers -----------------------------------------------------------------------------------------------------
 

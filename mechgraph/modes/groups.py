@@ -69,7 +69,8 @@ class Group:
         self._plan(known)
         own = np.isin(whole.columns, kept)
         self._drives = np.concatenate([np.flatnonzero(own), len(whole.columns) + rods]).astype(np.intp)
-        self.family = self._class(np.searchsorted(kept, whole.columns[own]), self._passive(kept, known))
+        columns, held = (np.searchsorted(kept, of[np.isin(of, kept)]) for of in (whole.columns, whole.held))
+        self.family = self._class(columns, self._idle(kept, known), held)
 
     def _plan(self, known: Index) -> None:
         """Bodies: links that known pairs join, each with a first link that bears a marker; ways from there to the others."""
@@ -130,9 +131,9 @@ class Group:
         markers = self._carried(s.advance(self.whole.here.x, dq))
         return family.within(markers, np.arange(2 * len(self.pairs)))
 
-    def _passive(self, kept: Index, known: Index) -> Array:
+    def _idle(self, kept: Index, known: Index) -> Array:
         """Passive motions ``(F, p)`` of the group alone."""
-        s, rates = self.whole.system, self.whole.passive
+        s, rates = self.whole.system, self.whole.idle
         solved = [i for k in known.tolist() for i in range(s.first_column[k], s.first_column[k + 1])]
         others = complement(np.array([*kept.tolist(), *solved], dtype=np.intp), s.n_freedoms)
         if not rates.shape[1]:
@@ -142,7 +143,7 @@ class Group:
         U, sigma, _ = np.linalg.svd(own, full_matrices=False)
         return np.asarray(U[:, sigma > SPAN])
 
-    def _class(self, columns: Index, passive: Array) -> Family:
+    def _class(self, columns: Index, idle: Array, held: Index) -> Family:
         """The class, told where the whole is."""
         here, s = self.whole.here, self.whole.system
         P, n, full, par = len(self.pairs), len(self.rods), s.m, s.par
@@ -168,14 +169,14 @@ class Group:
         )
         x = here.x[self.state_rows, :1]
         if not n:
-            return Family(Configuration(System(m, None, numbers), x), columns, passive)
+            return Family(Configuration(System(m, None, numbers), x), columns, idle, held)
         assert isinstance(s, RodSystem)
         a, b = (np.array([place[link] for link in side]) for side in np.split(ends[2 * P :], 2))
         at_a, at_b = np.split(markers[:, 3, 2 * P :], 2, axis=1)
         points = PointNumbers(
             a, b, at_a, at_b, s.points.length[self.rods], np.zeros((3, 0, 1)), np.full(n, -1), np.zeros((n, 1))
         )
-        return RodFamily(Configuration(RodSystem(m, None, numbers, points), x), columns, passive)
+        return RodFamily(Configuration(RodSystem(m, None, numbers, points), x), columns, idle, held)
 
 
 def groups_of(family: Family) -> Sequence[Undivided | Group]:
@@ -199,8 +200,8 @@ def _sets(family: Family) -> Iterator[tuple[Index, Index, Index]]:
     """Pairs and rods of the groups, one after the other, with the pairs known before."""
     s, rows = family.system, _constraints(family)
     columns = [range(s.first_column[k], s.first_column[k + 1]) for k in range(len(s.m.pairs))]
-    driven = set(family.columns.tolist())
-    known = {k for k, own in enumerate(columns) if driven.issuperset(own)}
+    free = set(family.free.tolist())
+    known = {k for k, own in enumerate(columns) if free.isdisjoint(own)}
     rods = list(zip(*family.points[:2], strict=True))
     left = set(range(len(rods)))
     while len(known) < len(columns):

@@ -14,8 +14,8 @@ import numpy as np
 
 from mechgraph.closure.configuration import Configuration
 from mechgraph.modes.bounds import bound
-from mechgraph.modes.family import GENERIC, MEMBER_CLOSED, Array, Family, Member
-from mechgraph.modes.homotopy import Care, Equations, Leg, follow
+from mechgraph.modes.family import GENERIC, MEMBER_CLOSED, SPAN, Array, Family, Member
+from mechgraph.modes.homotopy import Care, Equations, Leg, Linear, follow
 from mechgraph.modes.trace import NOT_PASSED, Trace, trace_test
 from mechgraph.numerics.linear import rank_of, singular_values
 
@@ -104,9 +104,19 @@ def start_set(family: Family, rng: np.random.Generator, progress: Callable[[str]
         equations = Equations(family, family.mixing(rng))
         leg = Leg(equations, member, member)
         here = leg.at(x[:, None], np.zeros(1), np.zeros(1, dtype=np.intp))
-        if rank_of(singular_values(here.J[:, :, 0]), GENERIC) == family.rank:
+        if rank_of(singular_values(here.J[:, :, 0]), GENERIC) == family.rank and not _told_by_idle(family, here):
             return _permuted(equations, member, x, rng, progress)
     raise Irregular
+
+
+def _told_by_idle(family: Family, here: Linear) -> bool:
+    """Whether motions that the equations leave free move what tells assemblies apart: such members have not the passive motions."""
+    s, idle = family.system, here.idle()[0].conj()
+    rates = np.zeros((s.n_freedoms, len(idle)), dtype=complex)
+    rates[family.free] = idle.T
+    moved = [here.here.link_twists(rate[:, None])[:, family.settled_links] for rate in rates.T]
+    single = np.flatnonzero(np.isin(s.single_rows, np.concatenate(family.settled_rows)))
+    return bool(np.abs(np.array(moved)).max(initial=0.0) > SPAN or np.abs(rates[single]).max(initial=0.0) > SPAN)
 
 
 def _permuted(

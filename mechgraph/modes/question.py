@@ -11,9 +11,10 @@ import numpy as np
 from mechgraph.closure.assembly import CLOSED, close_all, closed_start, named_columns
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
+from mechgraph.closure.indexing import Index
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.modes.family import Array, Family
+from mechgraph.modes.family import SPAN, Array, Family, at_rest
 from mechgraph.modes.form import Form, Whole, WithoutRods, rods_of
 from mechgraph.report.refused import dead_point_error, undriven_error
 from mechgraph.structure.mobility import free_motion
@@ -65,17 +66,33 @@ class Question:
         """What can move at the start, and the class there."""
         self.x = self.start.x[:, 0]
         self.freedoms = free_motion(self.system, self.x, self.columns)
-        passive = [p.rates for p in self.freedoms.passive]
-        rates = np.stack(passive, axis=1) if passive else np.zeros((self.system.n_freedoms, 0))
-        self.rods = [] if self.m.couplings else rods_of(self.system, self.columns)
+        idle = np.stack([*(p.rates for p in self.freedoms.passive), np.zeros(self.system.n_freedoms)], axis=1)[:, :-1]
+        held = self._held(idle)
+        self.rods = [] if self.m.couplings else rods_of(self.system, np.concatenate([self.columns, held]))
         links = np.array([link for rod in self.rods for link in rod.links], dtype=np.intp)
-        self.family = Family(self.start, self.columns, rates, links)
+        self.family = Family(self.start, self.columns, idle, held, links)
+
+    def _held(self, idle: Array) -> Index:
+        """Freedoms that may rest, as one of the passive motions ``idle (F, p)`` goes on for ever with them, evenly in all freedoms.
+
+        Other members of the class need not have such a motion; that of a rod between balls they all have.
+        """
+        s, out = self.system, []
+        for k in np.flatnonzero((s.single_rows >= 0) & (np.abs(idle) > SPAN).any(axis=1)).tolist():
+            part = idle[k] @ idle[k]
+            if (
+                part > SPAN**2
+                and Configuration(s, s.advance(self.start.x, idle @ idle[[k]].T / part)).closure[0] < CLOSED
+            ):
+                out.append(k)
+                idle = at_rest(idle, np.array([k]))
+        return np.array(out, dtype=np.intp)
 
     @cached_property
     def form(self) -> Form:
         """The equations in which assemblies are looked for: without rods, where these can be left out."""
         if self.rods:
-            found = WithoutRods(self.start, self.columns, self.family.passive, self.drive, self.rods)
+            found = WithoutRods(self.family, self.drive, self.rods)
             if not found.family.fault:
                 return found
         return Whole(self.family, self.drive)

@@ -102,8 +102,8 @@ class RodFamily(Family):
 
     system: RodSystem
 
-    def __init__(self, here: Configuration, columns: Index, passive: Array) -> None:
-        super().__init__(here, columns, passive)
+    def __init__(self, here: Configuration, columns: Index, idle: Array, held: Index) -> None:
+        super().__init__(here, columns, idle, held)
         k = self.system.points
         self.rods = len(k.a)
         self.bearers = np.concatenate([self.bearers, k.a, k.b])

@@ -51,6 +51,8 @@ def key(family: Family) -> str:
         "passive": family.passive.shape[1],
         "geometry": None if family.whole else (np.round(family.target.real, 9) + 0.0).tolist(),
     }
+    if family.held.size:
+        parts["held"] = family.held.tolist()
     if family.points:
         parts["points"] = family.points
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
