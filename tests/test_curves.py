@@ -59,6 +59,15 @@ SAMPLE = {
     "function": mg.Curve.function(position=spiral, ends_at=(0.0, 5.0)),
     "roller": cam(roller_radius=0.2, offset=0.1),
     "flat": cam(follower="flat"),
+    "arm": mg.Curve.arm_cam(
+        angle=ANGLE,
+        swing=0.2 * (1 - np.cos(ANGLE)),
+        slope=0.2 * np.sin(ANGLE),
+        bend=0.2 * np.cos(ANGLE),
+        base_radius=1.0,
+        arm=1.5,
+        pivot=2.0,
+    ),
 }
 
 

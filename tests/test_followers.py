@@ -175,6 +175,52 @@ def test_a_cam_of_a_law_lifts_by_it(follower):
     assert_allclose(between[:100], half.position, atol=1e-9)
 
 
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_a_cam_of_a_law_swings_an_arm_by_it(mirrored):
+    """The arm has the law's swing, slope times 3 and bend times 9; the lengths of the triangle are those declared."""
+    law_ = law()
+    curve = mg.Curve.arm_cam.of(law_, 0.9, roller_radius=0.2, arm=1.4, pivot=1.6, second=(1, 0, 0), mirrored=mirrored)
+    pivot, at = np.array([1.6, 0, 0]), curve.at(np.array(0.0))[0]
+    assert np.linalg.norm(at) == pytest.approx(1.1, rel=1e-14)
+    assert np.linalg.norm(at - pivot) == pytest.approx(1.4, rel=1e-14)
+    assert (at[1] < 0) == mirrored
+    m = driven_cam(
+        mg.Pair("F", "R", "frame", "follower", point=pivot, axis=Z),
+        mg.Pair("K", "Ps", "cam", "follower", curve=curve, point=at),
+        point=at,
+    )
+    s = mg.solve(m, {"A": mg.Motion(ANGLE[::10], 3.0, 0.0)})
+    sense = 1.0 if mirrored else -1.0
+    for found, expected, tolerance in (
+        (s["F"].position, law_.position, 1e-11),
+        (s["F"].velocity, 3 * law_.velocity, 1e-10),
+        (s["F"].acceleration, 9 * law_.acceleration, 1e-8),
+    ):
+        assert_allclose(found[:, 0], sense * expected[::10], atol=tolerance)
+    assert s.checks.power.max() < 1e-12
+    # by virtual work: the load acts at the centre of the roller
+    arm = s.link("follower").point(at)[0] - pivot
+    power = s["A"].effort[:, 0] * 3.0 - 5.0 * arm[:, 0] * s["F"].velocity[:, 0]
+    turning = 0.3 + 1.0 * 1.4**2  # the arm about its pivot, its mass at the roller; the cam turns at a constant rate
+    expected = turning * s["F"].acceleration[:, 0] * s["F"].velocity[:, 0]
+    assert_allclose(power, expected, atol=1e-10 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize(
+    ("arm", "radius", "times", "words"),
+    [
+        (0.4, 0.2, 1, r"arm = 0\.4: does not reach the base circle; give one between 0\.5 and 2\.7"),
+        (1.4, 0.2, 8, r"swing: runs from 0 to 3\.2; the arm would pass the line through axis and pivot at -0\.73"),
+        (1.4, 1.099, 1, r"undercut: the roller of radius 1\.099 is larger than the radius of curvature"),
+    ],
+)
+def test_an_arm_that_does_not_fit_its_cam_is_refused(arm, radius, times, words):
+    motion = mg.Motion(*(times * getattr(law(), name) for name in ("position", "velocity", "acceleration")), t=ANGLE)
+    curve = mg.Curve.arm_cam.of(motion, 1.1 - radius, roller_radius=radius, pivot=1.6, arm=arm)
+    with pytest.raises(mg.DeclarationError, match=words):
+        mg.Mechanism("m", None, [mg.Pair("K", "Ps", "a", "b", curve=curve)])
+
+
 def test_jumps_of_a_jerk_take_no_more_nodes_than_a_circle():
     """Where the pieces of a law meet no step is halved time after time: no other branch of the motion is near."""
     lobe = mg.Curve.cam.of(law(), 0.9, second=(0, 1, 0), roller_radius=0.2, offset=0.15)

@@ -48,6 +48,7 @@ class Curve(Described, Once):
     through: ClassVar[Any]
     function: ClassVar[Any]
     cam: ClassVar[Any]
+    arm_cam: ClassVar[Any]
 
     frame: Annotated[str, TEXT("how the frame turns about the tangent", choices=FRAMES)] = "minimizing"
     guide: Annotated[

@@ -12,7 +12,7 @@ import scipy
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.model.asked import asked, inner, slope_faults
-from mechgraph.model.cam import Cam
+from mechgraph.model.cam import ArmCam, Cam
 from mechgraph.model.curves import CLOSED_GAP, ORDERS, Circle, Curve, Ellipse, Helix, Involute, Line
 from mechgraph.model.field_kinds import FLAG, FUNCTION, INTERVAL, POINT_LIST
 from mechgraph.model.pieces import Pieces, parted
@@ -123,8 +123,9 @@ class Function(Curve):
 
 
 CURVES: dict[str, type[Curve]] = {
-    kind.kind: kind for kind in (Line, Circle, Ellipse, Helix, Involute, Through, Function, Cam)
+    kind.kind: kind for kind in (Line, Circle, Ellipse, Helix, Involute, Through, Function, Cam, ArmCam)
 }
 """Curves by the names that they have in files."""
 Curve.line, Curve.circle, Curve.ellipse, Curve.helix = Line, Circle, Ellipse, Helix
-Curve.involute, Curve.through, Curve.function, Curve.cam = Involute, Through, Function, Cam
+Curve.involute, Curve.through, Curve.function = Involute, Through, Function
+Curve.cam, Curve.arm_cam = Cam, ArmCam
