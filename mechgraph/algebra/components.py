@@ -48,11 +48,11 @@ class by_components:
         """Vectors ``(k, ...)``; the batch axes of arguments may be broadcast."""
         batch = vectors[0].shape[1:]
         count = math.prod(batch)
-        if 0 < count <= FEW_VECTORS and all(v.shape[1:] == batch for v in vectors):
-            library = COMPLEX_NUMBERS if any(v.dtype.kind == "c" for v in vectors) else REAL_NUMBERS
-            columns = zip(*[v.reshape(len(v), count).T.tolist() for v in vectors], strict=True)
+        if 0 < count <= FEW_VECTORS:
             try:
-                found = np.array([self.formula(library, *chain(*column)) for column in columns])
+                joined = np.concatenate(vectors).reshape(-1, count)
+                library = COMPLEX_NUMBERS if joined.dtype.kind == "c" else REAL_NUMBERS
+                found = np.array([self.formula(library, *column) for column in joined.T.tolist()])
                 return found.T.reshape(-1, *batch)
             except (ArithmeticError, ValueError):
                 pass  # where plain numbers have no value arrays have NaN or infinity

@@ -16,6 +16,7 @@ from mechgraph.algebra.screw import cross_twist, move_twist
 from mechgraph.algebra.se3 import Array, compose, cross, finite_twist, multiplied
 from mechgraph.closure.batches import Index, ScrewTable
 from mechgraph.closure.indexing import System
+from mechgraph.closure.one_state import OneState
 from mechgraph.closure.tree import run_sums
 from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.numerics.kept import kept
@@ -27,10 +28,12 @@ ROUNDINGS = 20
 class Configuration:
     """Poses, twists of freedoms and closure of a batch of states; parts are computed when first asked for."""
 
-    def __init__(self, system: System, x: Array) -> None:
+    def __init__(self, system: System, x: Array, one: OneState | None = None) -> None:
+        """States ``x (nx, T)``; ``one``: the same, evaluated as one state alone."""
         self.system = system
         self.x = x
         self.T = x.shape[1]
+        self._one = one
 
     @kept
     def solvers(self) -> dict[Any, Any]:
@@ -104,6 +107,8 @@ class Configuration:
     @kept
     def _nodes(self) -> Array:
         """Poses of the frames behind all factors ``(3, 4, nodes, T)``, see ``Walk``."""
+        if self._one is not None:
+            return self._one.nodes
         return self.system.walk.poses(self._steps, self.system.par.frame)
 
     @kept
@@ -241,7 +246,10 @@ class Configuration:
     @property
     def loop_errors(self) -> Array:
         """Closure errors of the loops about their middles, stacked ``(6 loops, T)``."""
-        s, errors = self.system, self.chord_errors
+        s = self.system
+        if self._one is not None:
+            return self._one.loop_errors
+        errors = self.chord_errors
         if s.many_loops:
             per_pair = np.zeros((6, len(s.m.pairs), self.T), dtype=errors.dtype)
             per_pair[:, s.chords] = errors
@@ -292,16 +300,19 @@ class Configuration:
     def loop_jacobian(self) -> Array:
         """Twists of the freedoms about the middles of the loops, with their signs in the rows of every loop, ``(6 loops, F, T)``."""
         s, e = self.system, self.system.entries
-        twists, origins = self._twists
-        parts, arms = twists.take(e.column, axis=2), origins.take(e.column, axis=1)
-        parts *= e.signs
-        arms -= self.middles[:, e.loops]
-        parts[1] += cross(arms, parts[0])
-        rows = parts.reshape(6, *parts.shape[2:])
+        if self._one is not None and not s.moving_batches:
+            rows = self._one.entries
+        else:
+            twists, origins = self._twists
+            parts, arms = twists.take(e.column, axis=2), origins.take(e.column, axis=1)
+            parts *= e.signs
+            arms -= self.middles[:, e.loops]
+            parts[1] += cross(arms, parts[0])
+            rows = parts.reshape(6, *parts.shape[2:])
         if s.entry_places is None:
             return rows
         n = 6 * s.graph.n_loops
-        out = np.zeros((n * s.n_freedoms, self.T), dtype=parts.dtype)
+        out = np.zeros((n * s.n_freedoms, self.T), dtype=rows.dtype)
         out[s.entry_places] = rows
         return out.reshape(n, s.n_freedoms, self.T)
 

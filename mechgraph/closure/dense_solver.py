@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
-from mechgraph.numerics.linear import Choice, ChosenSystem, choose, parabola_is_regular, scaled_norm
+from mechgraph.numerics.kept import kept
+from mechgraph.numerics.linear import Choice, ChosenSystem, Lu, choose, parabola_is_regular, scaled_norm
 from mechgraph.numerics.tolerances import PATH
 
 TRIES = 8
@@ -68,11 +69,17 @@ class DenseFactored:
         self._forms, self._fixed = forms, fixed
         self._sensitivity: Array | None = None
         self._motions: Array | None = None
+
+    @kept
+    def _parts(self) -> list[tuple[Form, Index, ChosenSystem]]:
+        """The positions by form, and their equations."""
+        forms, J, which = self._forms, self.J, self.which
         used = list(dict.fromkeys(which.tolist()))
-        self._parts = []
-        for i in used:
-            at = np.arange(self.T) if len(used) == 1 else np.flatnonzero(which == i)
-            self._parts.append((forms[i], at, _chosen(forms[i].rows(_at(J, at)), forms[i].choice)))
+        places = [np.arange(self.T)] if len(used) == 1 else [np.flatnonzero(which == i) for i in used]
+        return [
+            (forms[i], at, _chosen(forms[i].rows(_at(J, at)), forms[i].choice))
+            for i, at in zip(used, places, strict=True)
+        ]
 
     def _joined(self, values: list[Array], shape: tuple[int, ...]) -> Array:
         """Values of the forms at all positions."""
@@ -162,6 +169,35 @@ class DenseFactored:
         return [(np.array(held, dtype=np.intp), np.sort(np.concatenate(at))) for held, at in same.items()]
 
 
+class OneFactored(DenseFactored):
+    """One position, without the calls that a batch takes: a path is followed from one position to the next."""
+
+    def __init__(self, forms: list[Form], fixed: Index, J: Array, which: Index) -> None:
+        super().__init__(forms, fixed, J, which)
+        self._form = form = forms[int(which[0])]
+        rows, cols = form.choice.places
+        self._lu = Lu(form.rows(J)[rows][:, cols, 0])
+
+    @kept
+    def condition(self) -> Array:
+        """See the protocol in ``closure.solver``."""
+        return np.array([self._lu.condition])
+
+    def solve(self, b: Array) -> Array:
+        """See the protocol in ``closure.solver``."""
+        rows, cols = self._form.choice.places
+        out = np.zeros((self.freedoms, *b.shape[1:]))
+        out[cols, :, 0] = self._lu.solve(self._form.rows(b)[rows, :, 0])
+        return out
+
+    def solve_transposed(self, b: Array) -> Array:
+        """See the protocol in ``closure.solver``."""
+        rows, cols = self._form.choice.places
+        out = np.zeros((self.rows, *b.shape[1:]))
+        out[rows, :, 0] = self._lu.solve(b[cols, :, 0], transposed=True)
+        return self._form.back(out)
+
+
 def _independent_rows(matrices: list[Array], choice: Choice) -> list[Array]:
     """The chosen columns of matrices ``(m, F, T)`` in an orthonormal basis of those of the first, ``(n, n, T)`` each."""
     columns = [np.moveaxis(matrix[:, choice.cols], -1, 0) for matrix in matrices]
@@ -217,9 +253,7 @@ class DenseSolver:
 
     def corrigible(self, dq: Array, which: Index) -> Array:
         """See the protocol in ``closure.solver``."""
-        if not any(form.choice.held.size for form in self.forms):
-            return dq
-        for i in np.unique(which):
+        for i in set(which.tolist()):
             held = self.forms[i].choice.held
             if held.size:
                 dq[np.ix_(held, which == i)] = 0.0
@@ -229,7 +263,8 @@ class DenseSolver:
         """See the protocol in ``closure.solver``; those of the last positions are kept for who asks next."""
         known = self._of(here)
         if known is None or np.count_nonzero(known.which != which):
-            known = DenseFactored(self.forms, self.fixed, here.J, which.copy())
+            one = here.T == 1 and self.forms[which[0]].choice.cols.size
+            known = (OneFactored if one else DenseFactored)(self.forms, self.fixed, here.J, which.copy())
             self._last = weakref.ref(here), known
         return known
 

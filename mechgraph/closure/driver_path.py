@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index, System
+from mechgraph.closure.one_state import OneState
 from mechgraph.closure.solver import ClosureSolver, FactoredClosure
 from mechgraph.numerics.continuation import Follower, Tracks
 from mechgraph.numerics.crossings import Crossing
@@ -82,16 +83,20 @@ class DriverPath:
         self.carries = True
         """Whether what is left free can be carried on by periods of the motion."""
         self._system_of, self._start = system_of, start
+        self._start_bytes = b"" if start is None else start.x.tobytes()
         self.variant_of: Index = np.zeros(0, dtype=np.intp)
 
     def at(self, x: Array, drive: Array, tracks: Index) -> Configuration:
         """See ``numerics.newton.Problem``."""
         x = x.copy()
         x[self.rows] = drive
-        start = self._start
-        if start is not None and x.shape == start.x.shape and not np.count_nonzero(x != start.x):
-            return start
-        return Configuration(self.system_on(tracks), x)
+        if x.shape[1] != 1:
+            return Configuration(self.system_on(tracks), x)
+        if self._start is not None and x.tobytes() == self._start_bytes:
+            return self._start
+        system = self.system_on(tracks)
+        matrices = system.one_state
+        return Configuration(system, x, None if matrices is None else OneState(matrices, x))
 
     def system_on(self, tracks: Index) -> System:
         """The system with the numbers of the variants that tracks follow."""

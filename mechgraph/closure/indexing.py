@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.batches import Index as Index
 from mechgraph.closure.coefficients import FACTORS_AT_ONCE, Numbers
+from mechgraph.closure.one_state import FEW_NODES, OneStateMatrices
 from mechgraph.closure.rows import CouplingRows, LoopRows, PositionRows, Rows
 from mechgraph.closure.states import States
 from mechgraph.model.mechanism import Mechanism
@@ -102,6 +103,17 @@ class System(States):
     def numbers(self) -> Numbers:
         """What follows from the parameters."""
         return Numbers(self.par, self.walk, self.batches, self.n_factors, self.n_freedoms)
+
+    @cached_property
+    def one_state(self) -> OneStateMatrices | None:
+        """What evaluates one state, kept with the numbers; None for a large mechanism, one without loops, and for variants."""
+        known = vars(self.numbers)
+        if "one_state" not in known:
+            one = self.numbers.constants.shape[3] == self.par.pitch.shape[1] == 1
+            small = one and self.graph.n_loops > 0 and len(self.walk.parents) < FEW_NODES
+            known["one_state"] = OneStateMatrices(self, self.numbers, self.middle_numbers) if small else None
+        found: OneStateMatrices | None = known["one_state"]
+        return found
 
     @cached_property
     def effort_numbers(self) -> Array:

@@ -189,7 +189,7 @@ class ScrewStack:
     def values(self, x: Array) -> Array:
         """``1, sin q, 1 - cos q, q``."""
         q = x[0]
-        if not np.iscomplexobj(q):
+        if q.dtype.kind != "c":
             return screw_values(q)
         # a slide needs no sine, which of a long imaginary one has no value
         out = screw_values(np.where(self._turns, q, 0.0))

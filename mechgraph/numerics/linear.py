@@ -232,32 +232,50 @@ def factor_of(A: Array) -> Factor:
     return LuFactors(A) if A.size > 0 and A.shape[2] <= FEW_MATRICES else Inverses(A)
 
 
-class LuFactors:
-    """LU factors of a few matrices, one by one."""
+class Lu:
+    """LU factors of one matrix ``(n, n)`` by LAPACK."""
 
     def __init__(self, A: Array) -> None:
         self._A = A
-        self._factors = [self._lapack.dgetrf(A[:, :, t]) for t in range(A.shape[2])]
+        self._lu, self._pivots, self._singular = self._lapack.dgetrf(A)
 
     @property
     def _lapack(self) -> Any:
         """LAPACK; not kept, as modules cannot be pickled."""
         return scipy.linalg.lapack
 
+    @property
+    def condition(self) -> float:
+        """See ``Factor``."""
+        if self._singular:
+            return np.inf
+        norm, inverse = self._lapack.dlange, self._lapack.dgetri(self._lu, self._pivots)[0]
+        found: float = max(norm("I", self._A), 1.0) * norm("I", inverse)
+        return found if found == found else np.inf
+
+    def solve(self, b: Array, transposed: bool = False) -> Array | float:
+        """Solution ``(n, k)`` for ``b (n, k)``; NaN for a singular matrix."""
+        if self._singular or not b.size:
+            return np.nan
+        return np.asarray(self._lapack.dgetrs(self._lu, self._pivots, b, trans=transposed)[0])
+
+
+class LuFactors:
+    """LU factors of a few matrices, one by one."""
+
+    def __init__(self, A: Array) -> None:
+        self._each = [Lu(A[:, :, t]) for t in range(A.shape[2])]
+
     @kept
     def condition(self) -> Array:
         """See ``Factor``."""
-        norm, out = self._lapack.dlange, np.full(len(self._factors), np.inf)
-        for t, (lu, pivots, singular) in enumerate(self._factors):
-            if not singular:
-                out[t] = max(norm("I", self._A[:, :, t]), 1.0) * norm("I", self._lapack.dgetri(lu, pivots)[0])
-        return np.fmin(out, np.inf)
+        return np.array([lu.condition for lu in self._each])
 
     def solve(self, b: Array, transposed: bool = False) -> Array:
         """See ``Factor``."""
         out = np.empty(b.shape)
-        for t, (lu, pivots, singular) in enumerate(self._factors if b.size else ()):
-            out[:, :, t] = np.nan if singular else self._lapack.dgetrs(lu, pivots, b[:, :, t], trans=transposed)[0]
+        for t, lu in enumerate(self._each):
+            out[:, :, t] = lu.solve(b[:, :, t], transposed)
         return out
 
     def applied(self, B: Array) -> Array:

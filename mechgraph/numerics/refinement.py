@@ -23,7 +23,7 @@ def refined(follower: Follower, nodes: Nodes, count: int) -> Nodes:
     """
     left, _ = nodes.steps
     parts = np.full(len(left), 2)
-    if not len(left) or len(nodes) > count:
+    if not len(left) or int(parts.sum()) * PATH.worth > count:
         return nodes
     exact = follower.newton.nodes(nodes.x, nodes.drive, nodes.track, nodes.which, PATH.exact)
     nodes = replace(nodes, x=exact.x, Z=np.where(exact.done, exact.Z, nodes.Z))

@@ -200,3 +200,23 @@ def test_loops_without_any_freedom(freedoms):
     driven = m.replace(drives=[f"C{i}" for i in range(freedoms)])
     if freedoms:
         assert_engines_agree(driven, {d.freedom: np.array([0.1, 0.3]) for d in driven.drives})
+
+
+@pytest.mark.parametrize("make", [known.bennett, known.hexapod, known.sarrus, known.planar, known.rssr_sc])
+def test_one_position_is_solved_as_many_are(make):
+    """The dense engine factors one position by LAPACK itself, many in a batch: redundant loops, held freedoms, several drivers."""
+    m = make()
+    system, x = assembled(m)
+    columns = np.array([m.freedom_names().index(m.full_name(d.freedom)) for d in m.drives] or [0])
+    solver = closure_solver("dense", columns)
+    here, many = Configuration(system, x[:, None]), Configuration(system, np.repeat(x[:, None], 9, axis=1))
+    one = solver.factored(here, solver.chosen(here, np.full(1, -1)))
+    others = solver.factored(many, np.repeat(one.which, 9))
+    rng = np.random.default_rng(1)
+    b, c = rng.normal(size=(system.n_rows, 2, 1)), rng.normal(size=(system.n_freedoms, 2, 1))
+    found = [
+        (f.condition, f.sensitivity(), f.motions(), f.self_stresses(), f.solve(y), f.solve_transposed(z))
+        for f, y, z in ((one, b, c), (others, np.repeat(b, 9, axis=2), np.repeat(c, 9, axis=2)))
+    ]
+    for alone, among in zip(*found, strict=True):
+        np.testing.assert_allclose(alone[..., 0], among[..., 4], rtol=0, atol=1e-13 * one.condition[0])
