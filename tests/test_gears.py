@@ -202,6 +202,54 @@ def test_planetary_gears_obey_willis(planets, engine):
         )
 
 
+def test_a_planet_may_be_named_before_the_ring():
+    """The arm carries both: pairs between it and the ring turn about the axis of the ring, which may be gear a or gear b."""
+    forces = []
+    for planet_first in (False, True):
+        gears = ("P", "G") if planet_first else ("G", "P")
+        m = mg.Mechanism(
+            "train",
+            pairs=[
+                mg.Pair("S", "R", "frame", "sun", point=(0, 0, 0), axis=(0, 0, 1)),
+                mg.Pair("C", "R", "arm", "frame", point=(0, 0, 0.02), axis=(0, 0, -1)),
+                mg.Pair("G", "R", "frame", "ring", point=(0, 0, 0.04), axis=(0, 0, 1)),
+                mg.Pair("P", "R", "arm", "planet", point=(0.042, 0, 0), axis=(0, 0, 1)),
+            ],
+            couplings=[
+                mg.SpurGears("inner", "S", "P", teeth=(24, 18), module=0.002),
+                mg.SpurGears(
+                    "outer", *gears, teeth=(18, 60) if planet_first else (60, 18), module=0.002, internal=True
+                ),
+            ],
+            drives=["S", "G"],
+            loads=[mg.Effort("C", -50.0)],
+        )
+        s = mg.solve(m, {"S": mg.Motion([0.0, 1.0], 3.0), "G": mg.Motion([0.0, 0.2], -1.0)})
+        # Willis; C counts turns of the arm as positive
+        np.testing.assert_allclose(s["C"].velocity[:, 0], (24 * 3.0 - 60 * 1.0) / 84, rtol=1e-12)
+        np.testing.assert_allclose(s["G"].effort[:, 0], 50.0 * 60 / 84, rtol=1e-12)
+        np.testing.assert_allclose(s["S"].effort[:, 0], 50.0 * 24 / 84, rtol=1e-12)
+        forces.append(np.concatenate([s["P"].force[:, :2], s["G"].force[:, :2], s["C"].force[:, :2]], axis=1))
+    np.testing.assert_allclose(*forces, rtol=1e-10, atol=1e-8)
+
+
+def test_the_report_has_the_ratios():
+    """Of a planetary train by Willis; of a rack behind a pinion in its own unit of length."""
+    assert mg.check(planetary(3)).ratios["C.Rz"] == {"S.Rz": pytest.approx(24 / 84)}
+    rack = mg.Mechanism(
+        "rack",
+        pairs=[
+            mg.Pair("A", "R", "frame", "pinion", point=(0, 0, 0), axis=(0, 0, 1)),
+            mg.Pair("B", "P", "frame", "rack", point=(0, -5.0, 0), axis=(1, 0, 0)),
+        ],
+        couplings=[mg.Rack("g", "A", "B", radius=3.0)],
+    )
+    assert mg.check(rack).ratios == {}
+    assert mg.check(rack.replace(drives=["A"])).ratios == {"B.Tz": {"A.Rz": pytest.approx(3.0)}}
+    assert mg.check(rack.replace(drives=["B"])).ratios == {"A.Rz": {"B.Tz": pytest.approx(1 / 3.0)}}
+    assert "per A.Rz" in mg.check(rack.replace(drives=["A"])).text(full=True)
+
+
 def test_bevel_differential():
     """Both axle shafts turn as their mean with the cage, and carry equal torques whatever their speeds."""
     pairs = [

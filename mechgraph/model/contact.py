@@ -78,7 +78,7 @@ class Contact(BaseCoupling):
     """What gears, racks and belts share.
 
     ``a`` and ``b`` are the freedoms of the two gears on their carrier: pairs R (of a rack P) that share a link, or that pairs R about the
-    axis of a connect, as a sun wheel on the frame and a planet on its arm.
+    axis of a or of b connect with it, as a planet on its arm and a sun wheel or a ring on the frame.
     """
 
     kind: ClassVar[str]
@@ -133,7 +133,7 @@ class Contact(BaseCoupling):
         if any(not pair.has_geometry or pair.faults() for pair in m.pairs):
             return []
         placed = self._axes(m, steps)
-        wrong = [placed] if isinstance(placed, str) else self.misfits(placed[0], fitting_of(m))
+        wrong = [placed] if isinstance(placed, str) else self.misfits(placed.axes, fitting_of(m))
         return [where + fault for fault in wrong]
 
     def _way(self, m: Any) -> tuple[Step, ...] | str:
@@ -142,7 +142,7 @@ class Contact(BaseCoupling):
         if first == last:
             return f"a and b are the same freedom {self.a!r}; name those of two gears"
         alone = (
-            f"{self.a!r} and {self.b!r} have no link in common that could carry both gears, and no pairs R about the axis of {self.a!r} "
+            f"{self.a!r} and {self.b!r} have no link in common that could carry both gears, and no pairs R about the axis of one of them "
             "connect them; gears need a common carrier"
         )
         reached: dict[str, tuple[str, int] | None] = dict.fromkeys((m.pairs[first].a, m.pairs[first].b))
@@ -169,42 +169,34 @@ class Contact(BaseCoupling):
         ]
         return tuple(Step(k, 1.0 if m.pairs[k].a == start else -1.0) for start, k in ways)
 
-    def _axes(self, m: Any, steps: tuple[Step, ...]) -> tuple[Axes, list[float]] | str:
-        """The axes of the gears in the frame of the carrier, in the declared configuration, and the senses (1, -1) of the axes of the pairs
-        between them, seen along that of gear a; or what is wrong with them.
+    def _axes(self, m: Any, steps: tuple[Step, ...]) -> _OnCarrier | str:
+        """The gears seen from their carrier in the declared configuration: between gear a and it pairs turn about the axis of a, between
+        it and gear b about that of b; or what is wrong with them.
         """
-        pairs: list[Pair] = [m.pairs[step.pair] for step in steps]
-        fitting, senses = fitting_of(m), []
-        p, z = _line(_marker(pairs[0], steps[0], behind=True))
-        for pair, step in zip(pairs[1:-1], steps[1:-1], strict=True):
-            q, w = _line(_marker(pair, step, behind=False))
-            off = np.abs(cross(q - p, z)).max()
-            if np.abs(cross(z, w)).max() > fitting or off > fitting * max(1.0, float(np.abs(q - p).max())):
-                return (
-                    f"pair {pair.name!r} between the gears is not about the axis of {self.a!r} (off by {off:.3g}); {self.a!r} and "
-                    f"{self.b!r} need a common carrier"
-                )
-            senses.append(float(np.sign((z * w).sum())))
-            along = ((p - q) * z).sum()
-            p, w = _line(_marker(pair, step, behind=True))
-            z = senses[-1] * w
-            p = p + along * z
-        q, w = _line(_marker(pairs[-1], steps[-1], behind=False))
-        return Axes(p, z, q, w), senses
+        fitting = fitting_of(m)
+        p, z, senses_a, off = _turned_about(m, steps[:-1], fitting)
+        back = tuple(Step(step.pair, -step.sense) for step in reversed(steps[1 + len(senses_a) :]))
+        q, w, senses_b, _ = _turned_about(m, back, fitting)
+        if len(senses_a) + len(senses_b) < len(steps) - 2:
+            stray = m.pairs[steps[1 + len(senses_a)].pair].name
+            return (
+                f"pair {stray!r} between the gears is not about the axis of {self.a!r} (off by {off:.3g}); {self.a!r} and "
+                f"{self.b!r} need a common carrier"
+            )
+        return _OnCarrier(Axes(p, z, q, w), senses_a, senses_b[::-1])
 
     def placed(self, m: Any) -> Self:
         """The same with the coefficients of its freedoms, by their full names; needs sound faults-free gears."""
         steps = self._way(m)
         assert not isinstance(steps, str)
-        senses, sign = [1.0] * (len(steps) - 2), 1.0
+        values = [1.0] * (len(steps) - 1) + [self.ratio]
         if all(pair.has_geometry for pair in m.pairs):
             placed = self._axes(m, steps)
             assert not isinstance(placed, str)
-            axes, senses = placed
-            P, n = (part[:, 0] for part in self.lines(axes))
-            va, vb = self._velocities(axes, P)
-            sign = float(np.sign((n * va).sum() * (n * vb).sum()))
-        values = [1.0, *senses, sign * self.ratio]
+            P, n = (part[:, 0] for part in self.lines(placed.axes))
+            va, vb = self._velocities(placed.axes, P)
+            ratio = float(np.sign((n * va).sum() * (n * vb).sum())) * self.ratio
+            values = [1.0, *placed.senses_a, *(ratio * sense for sense in placed.senses_b), ratio]
         names = [m.pairs[step.pair].freedom_names[0] for step in steps]
         terms = [(name, v * steps[0].sense * s.sense) for name, v, s in zip(names, values, steps, strict=True)]
         out = self.replace(**{side: m.full_name(getattr(self, side)) for side in "ab"})
@@ -229,6 +221,36 @@ class Contact(BaseCoupling):
     def converted(self, length: float, turns: Any) -> Self:
         """See ``BaseCoupling``."""
         return self.in_units((length, 1.0, 1.0))
+
+
+class _OnCarrier(NamedTuple):
+    """The axes of two gears in the frame of their carrier, and the senses (1, -1) of those of the pairs between a gear and the carrier,
+    seen along the axis of that gear.
+    """
+
+    axes: Axes
+    senses_a: list[float]
+    senses_b: list[float]
+
+
+def _turned_about(m: Any, steps: tuple[Step, ...], fitting: float) -> tuple[Array, Array, list[float], float]:
+    """The axis of the pair of a gear, point and direction, in the last frame to which pairs about it lead on a way, with their senses, and
+    by how much the next one is off it.
+    """
+    pairs: list[Pair] = [m.pairs[step.pair] for step in steps]
+    senses: list[float] = []
+    p, z = _line(_marker(pairs[0], steps[0], behind=True))
+    for pair, step in zip(pairs[1:], steps[1:], strict=True):
+        q, w = _line(_marker(pair, step, behind=False))
+        off = float(np.abs(cross(q - p, z)).max())
+        if np.abs(cross(z, w)).max() > fitting or off > fitting * max(1.0, float(np.abs(q - p).max())):
+            return p, z, senses, off
+        senses.append(float(np.sign((z * w).sum())))
+        along = ((p - q) * z).sum()
+        p, w = _line(_marker(pair, step, behind=True))
+        z = senses[-1] * w
+        p = p + along * z
+    return p, z, senses, 0.0
 
 
 def fitting_of(m: Any) -> float:

@@ -119,7 +119,7 @@ class SpurGears(Contact):
         assert not isinstance(steps, str)
         placed = self._axes(m, steps)
         assert not isinstance(placed, str)
-        return float(2 * np.linalg.norm(placed[0].across) * np.cos(self.helix_angle) / self._sum)
+        return float(2 * np.linalg.norm(placed.axes.across) * np.cos(self.helix_angle) / self._sum)
 
     def lines(self, axes: Axes) -> Lines:
         """See ``Contact``."""

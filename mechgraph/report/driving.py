@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mechgraph.algebra.se3 import Array
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.rank import EngineName
 from mechgraph.numerics.linear import independent_rows
@@ -44,3 +45,16 @@ def suggested(
         columns = independent
         after = freedoms_at(freedoms.position, columns, engine)
     return [int(c) for c in np.sort(columns[len(moving) :])]
+
+
+def ratios(freedoms: Freedoms, driven: Index, of: Index) -> Array:
+    """Rates of freedoms ``of (n,)`` for unit rates of the drivers, ``(n, d)`` in the user's units, passive motions at rest.
+
+    No columns where the drivers do not say all other motions.
+    """
+    null, fixed = freedoms.null, np.concatenate([driven, freedoms.hold])
+    if len(fixed) != null.shape[1] or freedoms.dependent or freedoms.undriven:
+        return np.zeros((len(of), 0))
+    rates = null[of] @ np.linalg.solve(null[fixed], np.eye(len(fixed), len(driven)))
+    units = freedoms.position.declared.system.in_user_units(np.ones(len(null)))
+    return np.asarray(units[of, None] * rates / units[driven])

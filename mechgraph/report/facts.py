@@ -315,6 +315,17 @@ class Facts(GraphFacts):
         g = self.geometry
         return findings.proportional(g.freedoms, self.drivable) if g and (self.inputs or 0) > 1 else ()
 
+    @cached_property
+    def ratios(self) -> dict[str, dict[str, float]]:
+        """Rates of freedoms that stand in couplings for a unit rate of each driver, the others at rest: ratios of gear trains."""
+        if not (g := self.geometry) or not self.mechanism.couplings or not len(g.driven) or self.dead_point:
+            return {}
+        names = self.mechanism.freedom_names()
+        of = np.setdiff1d(g.system.coupled_freedoms, g.driven)
+        found = driving.ratios(g.freedoms, g.driven, of)
+        drives = [names[c] for c in g.driven]
+        return {names[c]: dict(zip(drives, row, strict=True)) for c, row in zip(of, found.tolist(), strict=True) if row}
+
     # --- reactions -------------------------------------------------------------------------------------------------------
 
     @cached_property

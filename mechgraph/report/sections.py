@@ -105,6 +105,20 @@ def _drivers(r: Facts) -> Iterator[Block]:
     yield from _listed(lines)
 
 
+def _ratios(r: Facts) -> Iterator[Block]:
+    if not r.ratios:
+        return
+    drives = next(iter(r.ratios.values()))
+    rows = [(name, *(f"{v:.6g}" for v in rates.values())) for name, rates in list(r.ratios.items())[:LISTED]]
+    if len(r.ratios) > LISTED:
+        rows.append((f"... and {len(r.ratios) - LISTED} more", *("" for _ in drives)))
+    yield Table(("rate of", *(f"per {name}" for name in drives)), tuple(rows), align="l" + "r" * len(drives))
+    yield Paragraph(
+        "The other drivers at rest, here in this position. Without friction they are the split of loads too: against an effort of 1 in a "
+        "freedom a driver holds minus its ratio."
+    )
+
+
 def _reactions(r: Facts) -> Iterator[Block]:
     if not r.unique:
         return
@@ -232,6 +246,7 @@ SECTIONS = (
         ("drivable", "contradicting_drives", "dependent_drives", "not_drivable", "suggested_drives", "replaced_drives"),
         _drivers,
     ),
+    Section("Ratios", ("ratios",), _ratios),
     Section("Reactions", ("unique", "near_other_uniqueness"), _reactions),
     Section("Self-stresses", ("self_stress_count", "self_stresses"), _stresses),
     Section(
