@@ -16,9 +16,11 @@ from mechgraph.force.applied_loads import user_poses
 from mechgraph.model.chain import chain_symbols
 from mechgraph.modes import store
 from mechgraph.modes.bounds import bound
+from mechgraph.modes.family import Member
 from mechgraph.modes.homotopy import Equations
 from mechgraph.modes.monodromy import start_set
 from mechgraph.modes.question import Question
+from mechgraph.modes.targets import Ends, _account, _Run
 from mechgraph.modes.trace import rational, trace_test
 
 
@@ -103,6 +105,34 @@ def test_every_regular_assembly_of_7r_is_certified_and_goes_on_in_solve() -> Non
     for mode, poses in zip(modes, modes.poses, strict=True):
         s = mg.kinematics(mode, {"O1": 0.3})
         assert np.abs(np.array([s.link(link.name).pose for link in m.links]) - poses).max() < 1e-9
+
+
+def test_two_loops_are_tested_though_complex_modes_lie_far_away() -> None:
+    """Two of the four ways to close the first loop are not real and 400 lengths away: known to few digits, they were lost."""
+    m = mg.load("rcsr-csr")
+    modes = mg.assemblies(m, {"O1": m.start["O1.Rz"]})
+    assert (len(modes), modes.total, modes.completeness) == (4, 16, "tested")
+    assert all(sure is not None and sure.proved for sure in modes.certificates)
+
+
+def test_ends_far_away_count_where_they_are_plainly_not_real_and_once() -> None:
+    """What is known to few digits may be the end of another track too, or real: then one may be missing."""
+    m = mg.load("four-bar")
+    family, here = Question(m, {"A": 0.5}).form.family, Question(m, {"A": 0.5}).start
+    at = Member(family.target, here.x[family.rows])
+
+    def account(*angles: complex) -> Ends:
+        x = np.repeat(here.x[:, :1], len(angles), axis=1).astype(complex)
+        x[family.free[0]] = angles
+        known = Ends(x[:, :0], np.zeros((0, 0)), np.zeros(0, dtype=bool), tracks=len(angles))
+        none, every = np.zeros(len(angles), dtype=bool), np.ones(len(angles), dtype=bool)
+        _account(family, at, known, _Run(x, every, none, none), 0)
+        return known
+
+    far = 9.0j  # cosines of some 4,000
+    assert account(0.3, 1.0 + far, -1.0 - far).clean
+    assert not account(0.3, 1.0 + far, 1.001 + far).clean
+    assert account(0.3, 1.0, 1.001).clean
 
 
 @pytest.mark.slow

@@ -248,7 +248,7 @@ def _completeness(
         ]
     if found.partial:
         evidence.append(
-            f"More than {MOST_FOLLOWED} tracks: those of complex modes of a group are not gone on with, nor counted."
+            f"Complex modes of a group that lie far away, or lead to more than {MOST_FOLLOWED} tracks, are not gone on with, nor counted."
         )
     evidence.append(
         f"{counted(found.tracks, 'track')} to this position in {counted(found.runs, 'run')}: {found.x.shape[1]} different ends, "

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -175,7 +175,7 @@ class Linear:
     @property
     def noise(self) -> Array:
         """Rounding ``(T,)`` to be expected of a Newton step."""
-        return np.asarray(STEP_NOISE * np.abs(self.here.poses).max(axis=(0, 1, 2)) ** 3)
+        return rounding(np.abs(self.here.poses).max(axis=(0, 1, 2)))
 
     def newton(self, idle: Array) -> Array:
         """The Newton step ``(F, T)``."""
@@ -232,15 +232,18 @@ class Tracked:
 
 @dataclass(frozen=True)
 class Care:
-    """How carefully tracks are followed: size of the first Newton step that is wanted, and that is still accepted."""
+    """How carefully tracks are followed: size of the first Newton step that is wanted, and that is still accepted; ``noise`` is the
+    rounding with which they may end.
+    """
 
     aim: float = 1e-2
     most: float = 5e-2
+    noise: float = MOST_NOISE
 
     @property
     def finer(self) -> Care:
         """Ten times as careful."""
-        return Care(0.1 * self.aim, 0.1 * self.most)
+        return replace(self, aim=0.1 * self.aim, most=0.1 * self.most)
 
 
 Way = Callable[[Array], tuple[Array, Array]]
@@ -270,7 +273,7 @@ def follow(
         march.keep(~(ended | infinite | (march.h < SMALLEST_STEP * np.clip(1.0 - march.s[0], LEFT_OF_WAY, 1.0))))
     done = np.flatnonzero(out.arrived)
     if done.size and polish:
-        out.x[:, done], good = polished(leg, out.x[:, done], way(np.ones(1))[0][0], every[done])
+        out.x[:, done], good = polished(leg, out.x[:, done], way(np.ones(1))[0][0], every[done], care.noise)
         out.arrived[done] = good
     return out
 
@@ -348,7 +351,12 @@ class _March:
                 setattr(self, name, getattr(self, name)[..., going])
 
 
-def polished(leg: Leg, x: Array, t: complex, tracks: Index) -> tuple[Array, Mask]:
+def rounding(size: Array) -> Array:
+    """Rounding to be expected of a Newton step where the largest numbers in poses are of such a ``size``."""
+    return np.asarray(STEP_NOISE * size**3)
+
+
+def polished(leg: Leg, x: Array, t: complex, tracks: Index, most: float = MOST_NOISE) -> tuple[Array, Mask]:
     """States closed by Newton to rounding at one ``t``, passive bodies turned to where they are least imaginary; which closed."""
     eq = leg.equations
     places = np.full(x.shape[1], t)
@@ -371,7 +379,7 @@ def polished(leg: Leg, x: Array, t: complex, tracks: Index) -> tuple[Array, Mask
             last = np.fmin(size, last)
             if (last < POLISHED).all():
                 break
-        noise = np.minimum(here.noise, MOST_NOISE)
+        noise = np.minimum(here.noise, most)
     return x, last < ARRIVED * np.maximum(1.0, np.abs(x).max(axis=0)) + noise
 
 

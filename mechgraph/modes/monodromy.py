@@ -74,15 +74,19 @@ def fingerprints(family: Family, member: Member, x: Array) -> Array:
     return family.prints(Configuration(family.system_of(member), x))
 
 
-def distinct(poses: Array, known: Array | None = None) -> Array:
-    """Places of assemblies that are new, each once: poses ``(n, V)`` that differ from those ``known (n, N)`` and before."""
+def distinct(poses: Array, known: Array | None = None, least: Array | None = None) -> Array:
+    """Places of assemblies that are new, each once: poses ``(n, V)`` that differ from those ``known (n, N)`` and before.
+
+    ``least (V,)`` are differences, against their size, up to which they are one.
+    """
     have = [] if known is None else list(known.T)
     out = []
     for i, p in enumerate(poses.T):
         if not np.isfinite(p).all():
             continue
         size = max(1.0, float(np.abs(p).max()))
-        if all(np.abs(p - q).max() > ONE_ASSEMBLY * size for q in have):
+        one = ONE_ASSEMBLY if least is None else least[i]
+        if all(np.abs(p - q).max() > one * size for q in have):
             have.append(p)
             out.append(i)
     return np.array(out, dtype=np.intp)

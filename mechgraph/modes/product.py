@@ -18,6 +18,8 @@ REAL_SINGULAR = 1e-3
 """The same at singular ends, which are known to the root of rounding only."""
 MOST_FOLLOWED = 5000
 """Tracks of a group to one position, at most: beyond that only real assemblies of the groups before are gone on with."""
+FAR = 700.0
+"""Size of poses of complex assemblies of a group with which the next group is not solved: it would be known to few digits."""
 
 
 def is_real(poses: Array, singular: Array) -> Array:
@@ -59,9 +61,10 @@ class Product:
         return self.family.prints(Configuration(self.family.system_with(target, self.drive[:, self.at[which]]), x))
 
     def _limit(self, count: int) -> None:
-        """Only real assemblies are gone on with where there are too many."""
-        many = np.bincount(self.at, minlength=len(self.out)) * count > MOST_FOLLOWED
-        going = ~many[self.at] | is_real(self._prints(slice(None)), self.singular)
+        """Only real assemblies are gone on with where there are too many, or they lie far away."""
+        many, prints = np.bincount(self.at, minlength=len(self.out)) * count > MOST_FOLLOWED, self._prints(slice(None))
+        far = np.abs(prints).max(axis=0, initial=0.0) > FAR
+        going = ~(many[self.at] | far) | is_real(prints, self.singular)
         for i in np.unique(self.at[~going]).tolist():
             self.out[i].partial = True
         self.x, self.at, self.singular = self.x[:, going], self.at[going], self.singular[going]

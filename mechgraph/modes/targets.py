@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mechgraph.modes.family import GENERIC, Array, Family, Member
-from mechgraph.modes.homotopy import Care, Equations, Leg, follow
-from mechgraph.modes.monodromy import StartSet, distinct, fingerprints
+from mechgraph.modes.homotopy import Care, Equations, Leg, follow, rounding
+from mechgraph.modes.monodromy import ONE_ASSEMBLY, StartSet, distinct, fingerprints
 from mechgraph.numerics.linear import Index
 
 RUNS = 4
@@ -32,6 +32,9 @@ BACK = 1e-5
 """Difference up to which it is back."""
 NEAR_END = 0.7
 """Part of the way up to which a track must have come for its end to be looked for."""
+FAR_NOISE, FAR_APART = 5e-2, 0.1
+"""Rounding with which tracks may end far away, at what is plainly not real; largest difference, against their size, up to which such ends
+count as one."""
 ENDLESS = 6.0
 """Imaginary part of an angle at an end from which on the assembly lies at infinity."""
 
@@ -76,7 +79,7 @@ def _block(family: Family, start: StartSet, goals: Member, rng: np.random.Genera
     every = [Ends(nothing, np.zeros((0, 0)), np.zeros(0, dtype=bool), tracks=N) for _ in range(n)]
     left = np.arange(n)
     for run in range(RUNS):
-        care = Care() if run < 2 else Care().finer
+        care = Care(noise=FAR_NOISE) if run < 2 else Care(noise=FAR_NOISE).finer
         begin, x = start.member, start.x
         if run:
             detour = family.random_member(rng)
@@ -177,10 +180,15 @@ def _account(family: Family, at: Member, known: Ends, run: _Run, lost_before: in
         infinite += doubtful
         # what was led round has come to a regular point, to which no other track comes
         singular[some[rank]], regular[some[rank]] = False, True
+    poses = fingerprints(family, at, x)
+    size = np.maximum(1.0, np.abs(poses).max(axis=0, initial=0.0))
+    least = np.clip(rounding(size), ONE_ASSEMBLY, FAR_APART)
+    # an end that is known to few digits counts where it cannot be a real assembly, which would be missed
+    regular &= (least == ONE_ASSEMBLY) | (np.abs(poses.imag).max(axis=0, initial=0.0) > FAR_APART * size)
     good = np.flatnonzero(regular | singular)
-    poses = fingerprints(family, at, x[:, good])
-    new = distinct(poses, known.poses if known.runs else None)
-    own = distinct(poses[:, regular[good]])
+    poses, least = poses[:, good], least[good]
+    new = distinct(poses, known.poses if known.runs else None, least)
+    own = distinct(poses[:, regular[good]], None, least[regular[good]])
     lost = len(regular) - len(good) - infinite + lost_before
     met = int(regular.sum()) - len(own)
     confirmed = known.runs > 0 and not new.size and infinite == known.infinite
