@@ -33,7 +33,7 @@ Array = NDArray[Any]
 """Numbers, real or complex."""
 MEMBER_CLOSED = 1e-9
 """Closure error up to which a member of a class counts as closed."""
-NOTHING: Index = np.zeros(0, dtype=np.intp)
+NO_NUMBERS: Index = np.zeros(0, dtype=np.intp)
 """No freedoms, no links."""
 GENERIC = 1e-7
 """Singular value, as part of the largest, below which it counts as zero at random members."""
@@ -65,7 +65,7 @@ class Family:
     """
 
     def __init__(
-        self, here: Configuration, columns: Index, idle: Array, held: Index = NOTHING, rods: Index = NOTHING
+        self, here: Configuration, columns: Index, idle: Array, held: Index = NO_NUMBERS, rods: Index = NO_NUMBERS
     ) -> None:
         self.here, self.system, self.columns, self.idle, self.held, self._rods = (
             here,

@@ -18,7 +18,7 @@ REAL_SINGULAR = 1e-3
 """The same at singular ends, which are known to the root of rounding only."""
 MOST_FOLLOWED = 5000
 """Tracks of a group to one position, at most: beyond that only real assemblies of the groups before are gone on with."""
-FAR = 700.0
+FAR_MODE = 700.0
 """Size of poses of complex assemblies of a group with which the next group is not solved: it would be known to few digits."""
 
 
@@ -63,7 +63,7 @@ class Product:
     def _limit(self, count: int) -> None:
         """Only real assemblies are gone on with where there are too many, or they lie far away."""
         many, prints = np.bincount(self.at, minlength=len(self.out)) * count > MOST_FOLLOWED, self._prints(slice(None))
-        far = np.abs(prints).max(axis=0, initial=0.0) > FAR
+        far = np.abs(prints).max(axis=0, initial=0.0) > FAR_MODE
         going = ~(many[self.at] | far) | is_real(prints, self.singular)
         for i in np.unique(self.at[~going]).tolist():
             self.out[i].partial = True
