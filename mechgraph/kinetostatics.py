@@ -15,7 +15,7 @@ from mechgraph.closure.assembly import assembled_at, last_closed
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.closure.driver_path import Status
-from mechgraph.closure.poles import away_from_poles
+from mechgraph.closure.poles import away_from_poles, ends_at_pole
 from mechgraph.closure.solver import ENGINES, EngineName
 from mechgraph.errors import (
     AssemblyError,
@@ -91,6 +91,11 @@ def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exceptio
         why = f"is out of reach: the loops do not stay closed over any stroke from {_listed(reached.items())} (see mechgraph.check)"
     if outcome.found.left[first]:
         why = f"is out of reach: {outcome.found.left[first]} comes to the end of its curve or surface. {FLAG}"
+    elif pole := ends_at_pole(line.m, line.system, outcome.found, int(outcome.found.track[first])):
+        why = (
+            f"lies behind a pole of the sphere of {pole} (reached {_listed(reached.items())}), whose axis is kept because Tu or Tv are "
+            "driven, loaded or coupled; give the surface another axis"
+        )
     asked = _listed(zip(line.drive.names, wanted, strict=True))
     text = f"mechanism {line.m.name!r}: position {first} ({asked}) {why}"
     if not dead:
@@ -150,7 +155,7 @@ def _solved(
     actuate: Iterable[str] | None,
     quiet: bool,
 ) -> Solution:
-    line, outcome = _run(m, motions, options, actuate)
+    m, line, outcome = _run(m, motions, options, actuate)
     _check_drivers(line, outcome)
     _check_actuators(line, outcome)
     if isinstance(m, SnappedMechanism):
@@ -166,16 +171,18 @@ def _solved(
 
 def _run(
     m: Mechanism, motions: Mapping[str, Any] | None, options: Options, actuate: Iterable[str] | None
-) -> tuple[Pipeline, Outcome]:
-    """All positions; again with other axes of spheres where some of them, or what ends the path, lie beside poles."""
+) -> tuple[Mechanism, Pipeline, Outcome]:
+    """All positions; again with other axes of spheres where some of them, or what ends the path, lie beside poles: of that mechanism."""
     for _ in range(AXES_TRIED):
         line = Pipeline(DriverMotion(m, motions, actuate), options)
         outcome = line.run()
-        other = None if isinstance(m, SnappedMechanism) else away_from_poles(m, line.system, outcome.found)
+        meant_with = m.changes.tol if isinstance(m, SnappedMechanism) else None
+        own = m.declared if isinstance(m, SnappedMechanism) else m
+        other = away_from_poles(own, line.system, outcome.found)
         if other is None:
             break
-        m = other
-    return line, outcome
+        m = other if meant_with is None else meant(other, meant_with, "solve")
+    return m, line, outcome
 
 
 def solve_quietly(

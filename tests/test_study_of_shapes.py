@@ -135,6 +135,30 @@ def test_base_radius_and_samples_of_a_cam():
     assert_allclose(np.diff(moved.outputs["F.position"], axis=0)[0], [0, 1e-4, 0], atol=1e-11)
 
 
+def test_variants_beside_a_curve_that_does_not_change_go_together(monkeypatch):
+    """Masses, places of bearings, a function that builds: none is solved alone, and all are as they are alone."""
+    m, at = eccentric()
+    given = {"A": mg.Motion(np.linspace(0, 6, 7), 3.0, 1.0)}
+    kept = {"drive": "A.effort", "force": "K:Fy", "center": "follower.center_acceleration"}
+
+    def build(mass):
+        return m.replace(links=[link.replace(mass=mass) if link.name == "follower" else link for link in m.links])
+
+    monkeypatch.setattr("mechgraph.variants.work._solved_alone", None)
+    for source, numbers in (
+        (m, {"follower.mass": [1.0, 1.3], "A.point.x": [0.0, 1e-3], "F.point.y": [at[1], at[1] + 0.01]}),
+        (build, {"mass": [1.0, 1.3]}),
+    ):
+        study = mg.study(source, numbers, kept, n=2, motions=given, sampling="grid")
+        assert not study.failed.any()
+        for i in range(len(study.failed)):
+            s = mg.solve(study.variant(i), given)
+            alone = s["A"].effort, s["K"].components["Fy"], s.link("follower").center_acceleration
+            for found, expected in zip(study.outputs.values(), alone, strict=True):
+                size = np.abs(expected).max()
+                assert_allclose(found[i], expected.reshape(found[i].shape), atol=1e-11 * size)
+
+
 def test_points_of_a_slot():
     """A pin in a slot through points passes each of them; one of them is moved."""
     s = np.linspace(-1, 1, 9)

@@ -287,6 +287,35 @@ def test_a_ball_by_its_marker_goes_over_poles_too():
     agree(mg.solve(swung((0, 1, 0)), turn), mg.solve(apart, turn))
 
 
+def over_the_pole(off, loads=()):
+    """A ball that slides over a sphere of radius one on a line at the distance ``off`` from its pole."""
+    at = (0.5, off, np.sqrt(0.75 - off**2))
+    pairs = [
+        mg.Pair("X", "P", "frame", "carriage", point=at, axis=(1, 0, 0)),
+        mg.Pair("Z", "P", "carriage", "ball", point=at, axis=(0, 0, 1)),
+        mg.Pair("K", "Sp", "frame", "ball", point=at, surface=mg.Surface.sphere(radius=1.0)),
+    ]
+    return mg.Mechanism("ball", [mg.Link("frame"), mg.Link("carriage"), mg.Link("ball", 1.0, at)], pairs, ["X"], loads)
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-7, 1e-3])
+def test_a_path_over_a_pole_with_a_tolerance(off):
+    x = np.array([0.5, 0.2, 1e-3, 0.0, -0.3])
+    s = mg.solve(over_the_pole(off), {"X": mg.Motion(x - 0.5, 1.0, 0.0)}, tol=1e-6)
+    z = np.sqrt(1 - x**2 - off**2)
+    assert_allclose(s["Z"].position[:, 0], z - z[0], atol=1e-12)
+    assert_allclose(s["Z"].acceleration[:, 0], -(1 + x**2 / z**2) / z, atol=1e-11)
+
+
+def test_a_pole_that_is_kept_is_named_where_it_ends_the_path():
+    m = over_the_pole(1e-7, loads=[mg.Effort("K.Tu", 1.0)])
+    with pytest.raises(mg.ReachError, match=r"lies behind a pole of the sphere of K .* give the surface another axis"):
+        mg.solve(m, {"X": [0.0, -0.3, -0.8]})
+    other = m.replace(pairs=[*m.pairs[:2], m.pair("K").replace(surface=mg.Surface.sphere(radius=1.0, axis=(0, 1, 0)))])
+    found = mg.solve(other, {"X": [0.0, -0.3, -0.8]})["Z"].position[-1, 0]
+    assert found == pytest.approx(np.sqrt(0.91) - np.sqrt(0.75), abs=1e-12)
+
+
 def test_variants_beside_a_pole_are_those_by_themselves():
     m, turn = swung((0, 1e-8, 1)), {"A": mg.Motion(TOP * np.linspace(0, 2, 5), 2.0, 1.0)}
     study = mg.study(m, {"slide.mass": [1.0, 2.0]}, "A.effort", n=2, motions=turn, sampling="grid")

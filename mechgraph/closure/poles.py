@@ -16,6 +16,8 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.model.surface_rows import placed_surface
 
+AT_POLE = 1e-4
+"""Angle from a pole below which a path that ends there ends because of it."""
 NEAR_POLE = 0.01
 """Angle from a pole below which too many digits are lost: nearer, accelerations are off by more than 1e-12."""
 
@@ -41,6 +43,18 @@ def away_from_poles(m: Mechanism, system: System, found: Positions) -> Mechanism
         pairs[k] = pair.reshaped(surface=pair.surface.with_poles_far_from(place.points(q[own][:2])))
         start |= dict(zip(pair.freedom_names, _renamed(pair, pairs[k], begin[own]).tolist(), strict=True))
     return m.replace(pairs=pairs, start=start) if pairs != list(m.pairs) else None
+
+
+def ends_at_pole(m: Mechanism, system: System, found: Positions, track: int) -> str:
+    """The pair on a sphere at whose pole a track ends; empty where it does not."""
+    nodes = found.nodes_of(track)
+    for k, pair in enumerate(m.pairs if len(nodes) else ()):
+        place = placed_surface(pair.type) if pair.surface is not None else None
+        if place is not None:
+            q = system.coordinates_of(nodes.x[:, -1:])[system.first_column[k] :][:2]
+            if place.to_pole(q)[0] < AT_POLE:
+                return pair.name
+    return ""
 
 
 def _renamed(old: Pair, new: Pair, q: Array) -> Array:
