@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,7 @@ from mechgraph.modes.homotopy import Equations
 from mechgraph.modes.monodromy import start_set
 from mechgraph.modes.question import Question
 from mechgraph.modes.targets import Ends, _account, _Run
-from mechgraph.modes.trace import rational, trace_test
+from mechgraph.modes.trace import _beside_poles, rational, trace_test
 
 
 @pytest.fixture
@@ -381,7 +382,7 @@ def test_the_trace_test_passes_with_all_assemblies_and_with_none_left_out(
     assert start.trace.passed
     assert start.trace.beyond < 1e-9 < start.trace.last
     equations = Equations(family, start.mixing)
-    monkeypatch.setattr("mechgraph.modes.trace.SAMPLES", (48, 96))
+    monkeypatch.setattr("mechgraph.modes.trace.MOST_TRACKS", 200 * (start.x.shape[1] - 1))
     for i in range(start.x.shape[1]):
         some = np.delete(start.x, i, axis=1)
         assert not trace_test(equations, start.member, some, np.random.default_rng(i)).passed
@@ -395,6 +396,34 @@ def test_rational_functions_are_told_from_others() -> None:
     assert exact.degree == 7
     for other in (np.sqrt(z - poles[0]), np.exp(z), np.log(z), z.conj()):
         assert not rational(z, other, np.ones(60)).passed
+
+
+def test_samples_beside_poles_tell_a_rational_function_and_no_other() -> None:
+    """Of 24 poles many are hidden among the others; further ones of a root are only ever found where it is sampled more."""
+
+    def told(function: Callable[[np.ndarray], np.ndarray], beside: bool) -> int:
+        rng = np.random.default_rng(0)
+        z = rng.normal(size=(96, 2)) @ [1.0, 1.0j]
+        for _ in range(3):
+            if (found := rational(z, function(z), np.ones(len(z)))).passed:
+                break
+            more = np.exp(1j * _beside_poles(z, function(z), np.ones(len(z)), rng)) if beside else z[:0]
+            z = np.concatenate([z, more, rng.normal(size=(max(0, len(z) - len(more)), 2)) @ [1.0, 1.0j]])
+        return found.degree
+
+    poles = 0.2 * np.random.default_rng(1).normal(size=(24, 2)) @ [1.0, 1.0j] + 0.8
+    assert told(lambda z: (1.0 / (z[:, None] - poles)).sum(axis=1), beside=False) == -1
+    assert told(lambda z: (1.0 / (z[:, None] - poles)).sum(axis=1), beside=True) == 24
+    assert told(lambda z: np.sqrt((z - poles[0]) * (z - poles[1])), beside=True) == -1
+
+
+def test_after_a_stated_effort_what_was_found_is_called_searched(empty: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mechgraph.modes.monodromy.MOST_TRACKED", 1)
+    m = general("RCSR")
+    modes = mg.assemblies(m, {"O1": 0.2})
+    assert (modes.total, modes.completeness) == (4, "searched")
+    assert any("others were not looked for any further" in text for text in modes.evidence)
+    assert not list(store.folder().glob("*"))
 
 
 def test_a_platform_on_a_sphere_has_not_the_bound_of_one_in_a_plane() -> None:

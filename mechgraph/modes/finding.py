@@ -268,7 +268,7 @@ def _of_class(family: Family, start: StartSet) -> tuple[str, tuple[str, ...]]:
         "tracks lost."
     )
     if not start.whole:
-        return "searched", (loops, "Others were not looked for any further.")
+        return "searched", (loops, f"After {counted(start.followed, 'track')} others were not looked for any further.")
     if known is not None and known.count == N:
         return "proved", (f"The class has at most {N}: {known.source}.",)
     if not trace.passed:

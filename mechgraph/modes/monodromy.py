@@ -24,6 +24,8 @@ MISSED, MISSED_AGAIN = 1e-4, 1e-6
 first member, and at the one that is kept."""
 MOST_FOUND = 1200
 """Assemblies of one member from which on they are not looked for any further."""
+ROUNDS, MOST_TRACKED = 60, 60_000
+"""Rounds of loops at a member, and tracks in all, after which they are not either."""
 BATCH = 48
 """Tracks followed together, of as many loops as it takes."""
 CANDIDATES = 6
@@ -137,8 +139,9 @@ def _permuted(
     group.move(*_tame(equations, group.base, group.x, rng))
     group.grow(MISSED_AGAIN, rng, progress)
     N = group.x.shape[1]
-    whole = N < MOST_FOUND
-    test = whole and (known is None or known.count != N)
+    met = known is not None and known.count == N
+    whole = met or (N < MOST_FOUND and group.chance <= MISSED_AGAIN)
+    test = whole and not met
     trace = trace_test(equations, group.base, group.x, rng, progress) if test else NOT_PASSED
     return StartSet(
         group.base, group.x, equations.mixing, group.quiet, group.chance, group.lost, group.followed, whole, trace
@@ -160,7 +163,9 @@ class _Group:
     def grow(self, missed: float, rng: np.random.Generator, progress: Callable[[str], None] | None) -> None:
         """Loops until the chance of one having been missed is small."""
         family = self.equations.family
-        while (N := self.x.shape[1]) < self.most and self.chance > missed:
+        for _ in range(ROUNDS):
+            if (N := self.x.shape[1]) >= self.most or self.chance <= missed or self.followed >= MOST_TRACKED:
+                break
             if progress is not None:
                 progress(f"{N} assemblies of a random member, {self.quiet} loops without a further one")
             loops = max(1, BATCH // N)

@@ -9,7 +9,9 @@ of ``1 / (g - c)`` over all assemblies is the same whichever way ``z`` came: a r
 
 Whether a function is rational its Loewner matrix ``(f(a_i) - f(b_j)) / (a_i - b_j)`` tells: the rank is the degree (Antoulas and
 Anderson, On the scalar rational interpolation problem, IMA J. Math. Control Inform. 3, 1986). The singular values of a rational function
-end at once, in rounding; those of another one fade, each a few times less than the one before.
+end at once, in rounding; those of another one fade, each a few times less than the one before. Samples beside the poles that the matrix
+and its shifted one tell so far (Mayo and Antoulas, A framework for the solution of the generalized realization problem, Linear Algebra
+Appl. 425, 2007) make every pole of a rational function count; of another one there are ever more.
 
 Sources of trace tests: Sommese, Verschelde and Wampler, Symmetric functions applied to decomposing solution sets of polynomial systems,
 SIAM J. Numer. Anal. 40, 2002 (sums linear in a slice moved in parallel); Leykin, Rodriguez and Sottile, Trace
@@ -29,16 +31,26 @@ from mechgraph.modes.family import SPAN, Array, Family, Member
 from mechgraph.modes.homotopy import Care, Equations, Leg, follow
 from mechgraph.topology.components import components_of_edges
 
-SAMPLES = (48, 96, 192, 192, 384)
-"""Members of pencils, one pencil after the other until one tells."""
-MOST_TRACKS = 6500
-"""Tracks over a pencil, at most."""
+SAMPLES, MOST_SAMPLES = 48, 300
+"""Members of a pencil that are sampled first; then as many again, until they tell, or there are so many."""
+PENCILS = 3
+"""Pencils of which one has to tell."""
+MOST_TRACKS = 12_000
+"""Tracks over all of them, at most."""
+BESIDE_POLE = 0.3
+"""Distance of samples from a pole, as part of that to the next one."""
+NEAREST = 1e-3
+"""The least that counts of the distance of two poles, as part of their size."""
+POLE_RANGE = 200.0
+"""Size of ``z`` or ``1 / z`` up to which poles are sampled."""
 PENCIL_SPREAD = 1.2
 """Standard deviation of the imaginary part of ``phi``."""
-RATIONAL = 1e-9
+RATIONAL = 1e-11
 """Singular value, as part of the largest, below which the Loewner matrix of a rational function ends."""
 ENDS = 1e4
 """Ratio of two singular values, one after the other, at which they end; where they fade it is below 300."""
+NOISE = 1e-11
+"""Singular value, as part of the largest, down to which poles are told."""
 SPARE_VALUES = 4
 """Singular values beyond the degree, at least."""
 
@@ -73,25 +85,29 @@ def trace_test(
     progress: Callable[[str], None] | None = None,
 ) -> Trace:
     """The trace test of the assemblies ``x (nx, N)`` of a member."""
-    N = x.shape[1]
-    for n in SAMPLES:
-        if n * N > MOST_TRACKS:
-            break
-        if progress is not None:
-            progress(f"trace test: {N} tracks to each of {n} random mechanisms of the class")
-        found = rational(*_Pencil(equations, base, rng).sums(x, n, rng))
-        if found.passed:
-            return found
+    N, tracks = x.shape[1], 0
+    for _ in range(PENCILS):
+        pencil = _Pencil(equations, base, rng)
+        phi = pencil.anywhere(SAMPLES, rng)
+        z, f, weights = np.zeros(0, dtype=complex), np.zeros(0, dtype=complex), np.zeros(0)
+        while len(z) < MOST_SAMPLES and (tracks := tracks + len(phi) * N) <= MOST_TRACKS:
+            if progress is not None:
+                progress(f"trace test: {N} tracks to each of {len(phi)} random mechanisms of the class")
+            new = pencil.sums(x, phi)
+            z, f, weights = (np.concatenate(pair) for pair in zip((z, f, weights), new, strict=True))
+            found = rational(z, f, weights)
+            if found.passed:
+                return found
+            phi = _beside_poles(z, f, weights, rng)
+            phi = np.concatenate([phi, pencil.anywhere(max(SAMPLES, len(z)) - len(phi), rng)])
     return NOT_PASSED
 
 
 def rational(z: Array, f: Array, weights: Array) -> Trace:
     """Whether a function with values ``f (n,)`` at ``z (n,)`` is rational, and of which degree; ``weights (n,)`` fall with rounding."""
-    half = len(z) // 2
-    if half <= SPARE_VALUES:
+    if len(z) // 2 <= SPARE_VALUES:
         return NOT_PASSED
-    a, b, scale = z[:half, None], z[half : 2 * half], weights / (1.0 + np.abs(f))
-    loewner = scale[:half, None] * scale[half : 2 * half] * (f[:half, None] - f[half : 2 * half]) / (a - b)
+    loewner, _ = _loewner(z, f, weights)
     sigma = np.linalg.svd(loewner, compute_uv=False)
     sigma = np.concatenate([sigma[:1], sigma]) / sigma[0] if sigma[0] > 0 else np.ones(1)
     ends = 1 + np.flatnonzero(
@@ -101,6 +117,30 @@ def rational(z: Array, f: Array, weights: Array) -> Trace:
         return NOT_PASSED
     at = int(ends[0])
     return Trace(at - 1, len(z), float(sigma[at - 1]), float(sigma[at]))
+
+
+def _loewner(z: Array, f: Array, weights: Array) -> tuple[Array, Array]:
+    """The Loewner matrix of every other value against those between, and the shifted one, scaled alike."""
+    scale = weights / (1.0 + np.abs(f))
+    a, fa, wa = (v[::2, None] for v in (z, f, scale))
+    b, fb, wb = (v[1::2] for v in (z, f, scale))
+    over = wa * wb / (a - b)
+    return over * (fa - fb), over * (a * fa - b * fb)
+
+
+def _beside_poles(z: Array, f: Array, weights: Array, rng: np.random.Generator) -> Array:
+    """Two ``phi`` beside every pole that values tell."""
+    loewner, shifted = _loewner(z, f, weights)
+    U, sigma, Vt = np.linalg.svd(loewner)
+    rank = int((sigma > NOISE * sigma[0]).sum())
+    left, right = U[:, :rank].conj().T, Vt[:rank].conj().T
+    poles = np.linalg.eigvals((left @ shifted @ right) / sigma[:rank, None])
+    poles = poles[(np.abs(poles) < POLE_RANGE) & (np.abs(poles) > 1.0 / POLE_RANGE)]
+    gaps = np.abs(poles[:, None] - poles)
+    np.fill_diagonal(gaps, np.abs(poles))
+    gap = np.clip(gaps.min(axis=1, initial=np.inf), NEAREST * np.abs(poles), np.abs(poles))
+    near = np.repeat(poles, 2) + BESIDE_POLE * np.repeat(gap, 2) * np.exp(2j * np.pi * rng.random(2 * len(poles)))
+    return np.asarray(-1j * np.log(near))
 
 
 class _Pencil:
@@ -124,10 +164,14 @@ class _Pencil:
         markers = compose(pose_exp(self.family.in_links(turned)), self.base.markers)
         return Member(markers, self.base.drive + self.drive * (np.exp(1j * phi) - 1.0))
 
-    def sums(self, x: Array, n: int, rng: np.random.Generator) -> tuple[Array, Array, Array]:
-        """``z``, the sum of ``1 / (g - c)`` and weights at those of ``n`` random members to which all tracks from ``x (nx, N)`` come."""
-        phi = rng.uniform(-np.pi, np.pi, n) + 1j * PENCIL_SPREAD * rng.normal(size=n)
-        N, members = x.shape[1], self.members(phi)
+    @staticmethod
+    def anywhere(n: int, rng: np.random.Generator) -> Array:
+        """Random ``phi (n,)``."""
+        return np.asarray(rng.uniform(-np.pi, np.pi, n) + 1j * PENCIL_SPREAD * rng.normal(size=n))
+
+    def sums(self, x: Array, phi: Array) -> tuple[Array, Array, Array]:
+        """``z``, the sum of ``1 / (g - c)`` and weights at pairs of members ``phi (n,)`` to both of which all tracks from ``x`` come."""
+        (n, N), members = (len(phi), x.shape[1]), self.members(phi)
         leg = Leg(self.equations, self.base, members, np.repeat(np.arange(n), N))
         tracked = follow(leg, np.tile(x, n), Care())
         good = tracked.arrived.reshape(n, N).all(axis=1)
@@ -136,6 +180,7 @@ class _Pencil:
             f = (1.0 / (self.weights @ _told(self.family, here) - self.c)).reshape(n, N).sum(axis=1)
             size = np.abs(here.poses).max(axis=(0, 1, 2)).reshape(n, N).max(axis=1)
         good &= np.isfinite(f)
+        good = np.repeat(good.reshape(-1, 2).all(axis=1), 2)
         z = np.exp(1j * phi)
         return z[good], f[good], (np.maximum(1.0, np.abs(z)) / size)[good]
 
