@@ -24,7 +24,7 @@ MISSED, MISSED_AGAIN = 1e-4, 1e-6
 first member, and at the one that is kept."""
 MOST_FOUND = 1200
 """Assemblies of one member from which on they are not looked for any further."""
-ROUNDS, MOST_TRACKED = 60, 60_000
+LOOP_ROUNDS, MOST_TRACKED = 60, 60_000
 """Rounds of loops at a member, and tracks in all, after which they are not either."""
 BATCH = 48
 """Tracks followed together, of as many loops as it takes."""
@@ -163,7 +163,7 @@ class _Group:
     def grow(self, missed: float, rng: np.random.Generator, progress: Callable[[str], None] | None) -> None:
         """Loops until the chance of one having been missed is small."""
         family = self.equations.family
-        for _ in range(ROUNDS):
+        for _ in range(LOOP_ROUNDS):
             if (N := self.x.shape[1]) >= self.most or self.chance <= missed or self.followed >= MOST_TRACKED:
                 break
             if progress is not None:

@@ -37,7 +37,7 @@ PENCILS = 3
 """Pencils of which one has to tell."""
 MOST_TRACKS = 12_000
 """Tracks over all of them, at most."""
-BESIDE_POLE = 0.3
+BY_POLE = 0.3
 """Distance of samples from a pole, as part of that to the next one."""
 NEAREST = 1e-3
 """The least that counts of the distance of two poles, as part of their size."""
@@ -49,7 +49,7 @@ RATIONAL = 1e-11
 """Singular value, as part of the largest, below which the Loewner matrix of a rational function ends."""
 ENDS = 1e4
 """Ratio of two singular values, one after the other, at which they end; where they fade it is below 300."""
-NOISE = 1e-11
+POLES_TOLD = 1e-11
 """Singular value, as part of the largest, down to which poles are told."""
 SPARE_VALUES = 4
 """Singular values beyond the degree, at least."""
@@ -132,14 +132,14 @@ def _beside_poles(z: Array, f: Array, weights: Array, rng: np.random.Generator) 
     """Two ``phi`` beside every pole that values tell."""
     loewner, shifted = _loewner(z, f, weights)
     U, sigma, Vt = np.linalg.svd(loewner)
-    rank = int((sigma > NOISE * sigma[0]).sum())
+    rank = int((sigma > POLES_TOLD * sigma[0]).sum())
     left, right = U[:, :rank].conj().T, Vt[:rank].conj().T
     poles = np.linalg.eigvals((left @ shifted @ right) / sigma[:rank, None])
     poles = poles[(np.abs(poles) < POLE_RANGE) & (np.abs(poles) > 1.0 / POLE_RANGE)]
     gaps = np.abs(poles[:, None] - poles)
     np.fill_diagonal(gaps, np.abs(poles))
     gap = np.clip(gaps.min(axis=1, initial=np.inf), NEAREST * np.abs(poles), np.abs(poles))
-    near = np.repeat(poles, 2) + BESIDE_POLE * np.repeat(gap, 2) * np.exp(2j * np.pi * rng.random(2 * len(poles)))
+    near = np.repeat(poles, 2) + BY_POLE * np.repeat(gap, 2) * np.exp(2j * np.pi * rng.random(2 * len(poles)))
     return np.asarray(-1j * np.log(near))
 
 
