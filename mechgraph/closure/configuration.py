@@ -300,7 +300,7 @@ class Configuration:
     def loop_jacobian(self) -> Array:
         """Twists of the freedoms about the middles of the loops, with their signs in the rows of every loop, ``(6 loops, F, T)``."""
         s, e = self.system, self.system.entries
-        if self._one is not None and not s.moving_batches:
+        if self._one is not None:
             rows = self._one.entries
         else:
             twists, origins = self._twists

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechgraph.algebra.se3 import LEFT_FACTORS, RIGHT_FACTORS, Array, finite_twist, homogeneous
-from mechgraph.closure.batches import Index
+from mechgraph.algebra.se3 import LEFT_FACTORS, RIGHT_FACTORS, Array, finite_twist, homogeneous, skew
+from mechgraph.closure.batches import FactorBatch, Index
 from mechgraph.closure.coefficients import Numbers
 from mechgraph.closure.places import Places
 from mechgraph.numerics.kept import kept
@@ -47,6 +47,28 @@ class OneStateMatrices:
         rows[2 * K :] = -middles.reshape(-1, 4, n).swapaxes(1, 2)[np.concatenate([e.loop, loop, loop])]
         rows[np.arange(2 * K, len(rows)), np.concatenate([nodes, *self.ends]), 3] += 1.0
         self.loops = rows.reshape(len(rows), 4 * n)
+        self.moving = [_Moving(s, numbers, b) for b in s.moving_batches]
+
+
+class _Moving:
+    """Factors whose twists move: ``at`` which entries they stand, from which ``nodes`` seen, and what takes their twists there with the
+    signs of the entries, ``(k, 6, 6)``.
+    """
+
+    def __init__(self, s: Places, numbers: Numbers, b: FactorBatch) -> None:
+        self.stack, self.state_rows, self.pitch = b.stack, b.state_rows, numbers.par.pitch[b.pairs]
+        self.at, self.freedom, self.member = np.nonzero(s.entries.column[:, None, None] == b.columns)
+        self.nodes = s.column_nodes[s.entries.column[self.at]]
+        X = numbers.marker_a_if_first(b)[..., 0]
+        moved = np.zeros((6, 6, X.shape[2]), dtype=X.dtype)
+        moved[:3, :3] = moved[3:, 3:] = X[:, :3]
+        moved[3:, :3] = np.einsum("ijn,jkn->ikn", skew(X[:, 3]), X[:, :3])
+        self.moved = np.moveaxis(moved[:, :, self.member] * s.entries.sign[self.at], -1, 0)
+
+    def entries(self, x: Array, X: Array) -> Array:
+        """Turns and displacements ``(k, 2, 3)`` about the nodes at a state, poses ``X`` of nodes transposed."""
+        S = self.stack.twists(x.take(self.state_rows, axis=0), self.pitch)[:, self.freedom, self.member, 0]
+        return np.asarray((self.moved @ S.T[..., None]).reshape(-1, 2, 3) @ X[self.nodes, :3, :3])
 
 
 def _placed(C: Array, steps: Index, n: int) -> Array:
@@ -61,7 +83,7 @@ class OneState:
     """A state ``x (nx, 1)`` evaluated by these matrices."""
 
     def __init__(self, by: OneStateMatrices, x: Array) -> None:
-        self._by = by
+        self._by, self._x = by, x
         values = [stack.values(x.take(rows, axis=0)).reshape(-1) for stack, rows in by.batches]
         steps = by.poses.dot(values[0] if len(values) == 1 else np.concatenate(values)).reshape(-1, 4, 4)
         self._X = X = np.empty((by.nodes, 4, 4), dtype=steps.dtype)
@@ -93,6 +115,9 @@ class OneState:
     def entries(self) -> Array:
         """Twists of the freedoms along the loops, about the middle of each, with their signs, ``(6, K, 1)``."""
         K, vectors = self._by.entries, self._vectors
+        for part in self._by.moving:
+            found = part.entries(self._x, self._X)
+            vectors[part.at, :3], vectors[K + part.at, :3] = found[:, 0], found[:, 1]
         turns, arms = vectors[:K], vectors[2 * K : 3 * K]
         products = arms.take(LEFT_FACTORS, 1) * turns.take(RIGHT_FACTORS, 1)
         out = np.empty((K, 6), dtype=vectors.dtype)
