@@ -207,6 +207,13 @@ def test_what_makes_forces_doubtful_is_said_beside_loads_and_pictures(tmp_path: 
         ("plot", tmp_path / "ball.toml", "ranges", "--out", tmp_path / "b.svg"),
     ):
         assert "would have to pull" in run(*command).stderr
+    press = mg.Mechanism("press", pairs=[
+        mg.Pair("A", "R", "frame", "arm", point=(0, 0, 0), axis=(0, 0, 1)),
+        mg.Pair("B", "P", "frame", "pin", point=(1, 0, 0), axis=(0, 1, 0)),
+        mg.Pair("C", "Sp", "arm", "pin", point=(1, 0, 0), axis=(0, 1, 0), closed="force"),
+    ], drives=["A"], loads=[mg.Effort("B", 1.0)])  # fmt: skip
+    mg.save(press, tmp_path / "press.toml")
+    assert "would have to pull" in run("equations", tmp_path / "press.toml", "--at", "A=0").stderr
 
 
 def test_messages_name_the_option_and_the_text_that_was_typed(tmp_path: Path) -> None:

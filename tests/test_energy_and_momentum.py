@@ -233,7 +233,10 @@ def test_energy_that_is_lost_is_said():
         lost = mg.respond(m, t, method="RK23", rtol=0.03, atol=0.03)
     assert np.abs(lost.energy.balance).max() > 1e-3 * lost.energy.kinetic.max()
     assert "Doubtful: energy balance: off by" in str(lost)  # all that the command line shows
-    assert not mg.respond(m, t).warnings
+    assert lost.to_dict()["energy_lost"] == {"error": lost.warnings[-1].error, "t": lost.warnings[-1].t}
+    kept = mg.respond(m, t)
+    assert not kept.warnings
+    assert kept.to_dict()["energy_lost"] is None
 
 
 def test_where_it_turns_back_no_energy_is_missed():

@@ -159,8 +159,16 @@ BAD = {
     "sizes": (dict(law=mg.ForceTable(x=[0, 1], v=[0, 1, 2], force=[1, 2])), "expected 2 x 3 numbers"),
     "NaN": (dict(law=mg.ForceTable(x=[0, 1], force=[1, np.nan])), "law.force"),
     "choice": (dict(law=mg.ForceTable(x=[0, 1], force=[1, 2], outside="guess")), "'error' or 'hold'"),  # type: ignore[arg-type]
-    "half a place": (dict(a="frame", freedom=None, law=len), "expected a freedom, e.g. 'D', or two links"),
-    "two places": (dict(a="frame", b="block", p=(0, 0, 0), q=X, law=len), "expected a freedom, e.g. 'D', or two links"),
+    "half a place": (
+        dict(a="frame", freedom=None, law=len),
+        "b, p, q left out; expected a freedom alone, e.g. 'D', or two links",
+    ),
+    "links without points": (
+        dict(freedom="frame", a="block", law=len),
+        "beside it a = 'block'; expected a freedom alone",
+    ),
+    "two links as a place": (dict(freedom=("frame", "block"), law=len), "two links with a point of each"),
+    "two places": (dict(a="frame", b="block", p=(0, 0, 0), q=X, law=len), "beside it a = 'frame'"),
     "scale": (dict(law=len, scale="a"), "scale"),
     "rotation": (dict(freedom="S.Rx", law=len), "unknown freedom 'S.Rx'"),
 }

@@ -362,6 +362,13 @@ def test_the_table_of_assemblies_shows_their_coordinates() -> None:
     for i, mode in enumerate(modes):
         angles = " +".join(f"{np.rad2deg(mode.start[name]):.5g}" for name in ("B.Rz", "C.Rz", "D.Rz"))
         assert re.search(rf"^{i} +{angles} +regular", str(modes), re.MULTILINE)
+    # as it is declared: what is rounding is shown as zero
+    assert re.search(r"^\d +0 +0 +0 +regular", str(mg.assemblies(mg.load("slider-crank"), {"A": 1e-17})), re.MULTILINE)
+
+
+def test_faults_of_what_is_given_name_the_question() -> None:
+    with pytest.raises(mg.DeclarationError, match="assemblies of 'andrews': 1 fault"):
+        mg.assemblies(mg.load("andrews"), {})
 
 
 @pytest.mark.usefixtures("empty")

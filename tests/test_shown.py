@@ -1,6 +1,7 @@
 """Whatever comes back can be read: at a prompt, printed, and in a notebook, through one mechanism."""
 
 import inspect
+import pydoc
 import re
 from collections.abc import Iterator, Mapping
 from html.parser import HTMLParser
@@ -221,3 +222,14 @@ def test_in_a_notebook() -> None:
         assert output.data["text/plain"] == repr(value)
     assert notebook.cells[6].outputs[0].text == f"{s}\n"
     assert notebook.cells[7].outputs[0].data["text/plain"].startswith("(Advice('")
+
+
+def test_help_of_what_has_fields_tells_them_once() -> None:
+    """The signature of names and defaults, a line a field; annotations for programs stay out of it."""
+    shown = pydoc.plain(pydoc.render_doc(mg.Curve.line))
+    assert (
+        "Line(*, frame='minimizing', guide=None, point=(0.0, 0.0, 0.0), direction=(0.0, 0.0, 1.0), ends_at=None)"
+        in shown
+    )
+    assert "point : 3 numbers [L]; where the arc length is zero (left out: 0)." in shown
+    assert pydoc.plain(pydoc.render_doc(mg.Pair)).count("Parameters\n") == 1

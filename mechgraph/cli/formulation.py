@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -24,8 +23,7 @@ def solved_at(m: mg.Mechanism, at: list[str]) -> mg.Solution:
     motions = drives_of(m, at, "--at")
     if any(np.ndim(motion.position) for motion in motions.values()):
         refuse("--at", "expected one position, e.g. A=30deg@10")
-    with working("solving"), warnings.catch_warnings():
-        warnings.simplefilter("ignore", mg.MechgraphWarning)
+    with working("solving"):
         return mg.solve(m, motions)
 
 

@@ -37,15 +37,15 @@ class Motions(dict[str, Motion]):
         self.free = tuple(free)
 
 
-def driven(m: Mechanism, motions: Mapping[str, Any] | None) -> tuple[Mechanism, Motions]:
-    """The mechanism with its drives, and all motions by full name.
+def driven(m: Mechanism, motions: Mapping[str, Any] | None, asked: str = "solve") -> tuple[Mechanism, Motions]:
+    """The mechanism with its drives, and all motions by full name; ``asked`` is what errors name.
 
     Motions given by name go to the declared drives; the others use the motion stored with them. Where a name is no declared drive, the
     names given are the drives of this call, in place of the declared ones.
     """
     if motions is not None and not isinstance(motions, Mapping):
         raise DeclarationError(
-            f"solve {m.name!r}",
+            f"{asked} {m.name!r}",
             [f"motions = {type(motions).__name__}: expected a mapping driver -> motion, e.g. {{'A': angles}}"],
         )
     faults: list[str] = []
@@ -77,20 +77,20 @@ def driven(m: Mechanism, motions: Mapping[str, Any] | None) -> tuple[Mechanism, 
         elif name not in out and not faults:
             faults.append(f"drive {name!r} has no motion; give one: {{{name!r}: angles or mg.Motion(...)}}")
     if faults:
-        raise DeclarationError(f"solve {m.name!r}", faults)
+        raise DeclarationError(f"{asked} {m.name!r}", faults)
     return m, Motions({name: out[name] for name in known} | spatial.motions, spatial.free.values())
 
 
-def _batch(m: Mechanism, motions: Mapping[str, Motion]) -> tuple[int, ...]:
+def _batch(m: Mechanism, motions: Mapping[str, Motion], asked: str) -> tuple[int, ...]:
     try:
         batch = np.broadcast_shapes(*(motion.shape for motion in motions.values()))
         if 0 in batch:
-            raise DeclarationError(f"solve {m.name!r}", ["the motions have no positions; give at least one"])
+            raise DeclarationError(f"{asked} {m.name!r}", ["the motions have no positions; give at least one"])
         return batch
     except ValueError:
         shapes = ", ".join(f"{name} {motion.shape}" for name, motion in motions.items())
         raise DeclarationError(
-            f"solve {m.name!r}", [f"the motions describe different numbers of positions: {shapes}"]
+            f"{asked} {m.name!r}", [f"the motions describe different numbers of positions: {shapes}"]
         ) from None
 
 
@@ -118,10 +118,12 @@ class DriverMotion:
     ``actuated`` are the freedoms in which the unknown efforts stand; None: in those whose motion is prescribed.
     """
 
-    def __init__(self, m: Mechanism, motions: Mapping[str, Any] | None, actuate: Any = None) -> None:
-        self.m, self.motions = driven(m, motions)
+    def __init__(
+        self, m: Mechanism, motions: Mapping[str, Any] | None, actuate: Any = None, asked: str = "solve"
+    ) -> None:
+        self.m, self.motions = driven(m, motions, asked)
         self.actuated = None if actuate is None else actuators(m, actuate)
-        self.batch = _batch(self.m, self.motions)
+        self.batch = _batch(self.m, self.motions, asked)
         self.t = next((motion.t for motion in self.motions.values() if motion.t is not None), None)
 
     @property

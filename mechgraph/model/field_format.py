@@ -8,6 +8,7 @@ of the whole mechanism and the names of numbers in studies all follow from it.
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -104,6 +105,13 @@ class FieldFormat:
             return " or ".join(both).replace("1/", "rad/")
         return both[0] if self.degrees or self.slide != PURE else ""
 
+    @property
+    def told(self) -> str:
+        """The field in a line of a docstring."""
+        kind = " or ".join(map(repr, self.choices)) or self.kind.words
+        default = f" (left out: {self.default})" if self.default else ""
+        return f"{kind}{self.unit and f' [{self.unit}]'}; {self.meaning}{default}."
+
     def fault(self, value: Any, what: str) -> str | None:
         """What is wrong with a value, or None."""
         if self.choices and not (isinstance(value, str) and value in self.choices):
@@ -114,9 +122,18 @@ class FieldFormat:
         return None if self.kind.fault is None else self.kind.fault(value, what, self.minimum)
 
 
+class _Signature:
+    """The signature of a class with fields as ``help`` shows it: what they hold stands in the docstring."""
+
+    def __get__(self, instance: object, cls: type) -> inspect.Signature:
+        every = list(inspect.signature(cls.__init__).parameters.values())[1:]
+        return inspect.Signature([one.replace(annotation=inspect.Parameter.empty) for one in every])
+
+
 class Formatted:
     """A dataclass whose annotations say what its fields hold (``FieldFormat``)."""
 
+    __signature__ = _Signature()
     formats: ClassVar[Mapping[str, FieldFormat]] = {}
     """What the fields hold, by their names."""
     _numeric: ClassVar[tuple[str, ...]] = ()
@@ -130,6 +147,9 @@ class Formatted:
         cls.formats = {name: about for name, about in found.items() if isinstance(about, FieldFormat)}
         cls._numeric = tuple(name for name, about in cls.formats.items() if about.kind.numeric)
         cls._defaults = tuple(getattr(cls, name, NEEDED) for name in cls.formats)
+        if cls.__doc__ and cls.formats and "Parameters\n" not in cls.__doc__:
+            told = [f"    {name} : {about.told}" for name, about in cls.formats.items()]
+            cls.__doc__ = "\n".join([cls.__doc__.rstrip(), "", "    Parameters", "    ----------", *told, "    "])
 
     def __repr__(self) -> str:
         """The fields that differ from what they are where they are left out."""

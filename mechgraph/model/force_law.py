@@ -150,15 +150,19 @@ class _Placed(Law):
     @property
     def where(self) -> str:
         """Which load it is, for messages."""
-        place = f"{shown(self.a)} - {shown(self.b)}" if self.freedom is None else f"in {shown(self.freedom)}"
-        return f"{self.subject} {place}: "
+        links = " - ".join(shown(link) for link in (self.a, self.b) if link is not None)
+        place = links if self.freedom is None else f"in {shown(self.freedom)}"
+        return f"{self.subject} {place}".rstrip() + ": "
 
     def faults(self, names: Nameable) -> list[str]:
         """What is wrong with this load."""
-        given = sum(getattr(self, name) is not None for name in "abpq")
-        if given != (4 if self.freedom is None else 0):
-            return [self.where + "expected a freedom, e.g. 'D', or two links with a point of each, ('a', 'b', p, q)"]
-        return super().faults(names)
+        given = [name for name in "abpq" if getattr(self, name) is not None]
+        expected = "expected a freedom alone, e.g. 'D', or two links with a point of each, ('a', 'b', p, q)"
+        if self.freedom is None and len(given) < 4:
+            return [f"{self.where}{', '.join(name for name in 'abpq' if name not in given)} left out; {expected}"]
+        if self.freedom is not None and given:
+            return [f"{self.where}beside it {', '.join(f'{n} = {shown(getattr(self, n))}' for n in given)}; {expected}"]
+        return [self.where + expected] if isinstance(self.freedom, tuple | list) else super().faults(names)
 
 
 @dataclass(frozen=True, eq=False)

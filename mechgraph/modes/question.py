@@ -37,7 +37,7 @@ class Question:
     start: Configuration
 
     def __init__(self, m: Mechanism, values: Mapping[str, Any] | None) -> None:
-        given = DriverMotion(m, values)
+        given = DriverMotion(m, values, asked="assemblies of")
         if len(given.batch) > 1:
             raise DeclarationError(
                 f"assemblies of {m.name!r}",

@@ -82,7 +82,7 @@ class Assemblies(Shown, Sequence[Mechanism]):
         ]
         shown = [name for name in single if name not in self.at][:COORDINATES]
         places = [m.freedom_names().index(name) for name in shown]
-        units = [180.0 / np.pi if m.turns(name) else 1.0 for name in shown]
+        far = float(np.abs(self.poses[:, :, :3, 3]).max(initial=0.0))
         names = [f"{name} [deg]" if m.turns(name) else name for name in shown]
         header = ("mode", *names, "kind", "condition", "unique within")
         rows = []
@@ -92,7 +92,10 @@ class Assemblies(Shown, Sequence[Mechanism]):
             rows.append(
                 (
                     str(i),
-                    *(f"{u * self.coordinates[i, k]:.5g}" for k, u in zip(places, units, strict=True)),
+                    *(
+                        f"{in_degrees(m, name, self.coordinates[i, k], far):.5g}"
+                        for name, k in zip(shown, places, strict=True)
+                    ),
                     kind,
                     f"{self.condition[i]:.3g}",
                     word,
@@ -165,9 +168,12 @@ def values_text(m: Mechanism, at: Mapping[str, float]) -> str:
     return ", ".join(f"{name} = {in_degrees(m, name, value):.6g}{unit_of(m, name)}" for name, value in at.items())
 
 
-def in_degrees(m: Mechanism, name: str, value: float) -> float:
-    """A value of a freedom or coordinate as it is shown: turns in degrees."""
-    return float(np.rad2deg(value)) if m.turns(name) else value
+def in_degrees(m: Mechanism, name: str, value: float, far: float = 0.0) -> float:
+    """A value of a freedom or coordinate as it is shown: turns in degrees, zero where it is rounding (of lengths beside one of ``far``)."""
+    turns = m.turns(name)
+    if abs(value) <= SHOWN_AS_ZERO * (1.0 if turns else far):
+        return 0.0
+    return float(np.rad2deg(value)) if turns else value
 
 
 def unit_of(m: Mechanism, name: str) -> str:
@@ -175,6 +181,8 @@ def unit_of(m: Mechanism, name: str) -> str:
     return " deg" if m.turns(name) else ""
 
 
+SHOWN_AS_ZERO = 1e-12
+"""Angle (radians), or part of the largest length, that tables show as zero."""
 WORDS = ("proved", "tested", "searched")
 """What completeness may be, the strongest first."""
 

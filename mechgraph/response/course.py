@@ -106,13 +106,16 @@ class Response(Solution):
     @property
     def warnings(self) -> tuple[Any, ...]:
         """What makes reactions doubtful, and the motion itself: see ``Solution.warnings``; energies that do not balance."""
+        lost = self._energy_lost()
+        return super().warnings if lost is None else (*super().warnings, lost)
+
+    def _energy_lost(self) -> EnergyLost | None:
         off = np.abs(self.energy.balance)
         # times asked for may be few and of little energy: what is lost counts beside the whole motion too
         whole, largest = self._course.greatest, float(np.nan_to_num(off).max(initial=0.0))
         if largest <= LOST_ENERGY * max(self.energy.greatest, whole) or not whole:
-            return super().warnings
-        lost = np.asarray(self.t)[off > 0.5 * largest]
-        return (*super().warnings, EnergyLost(largest / whole, float(lost.min())))
+            return None
+        return EnergyLost(largest / whole, float(np.asarray(self.t)[off > 0.5 * largest].min()))
 
     def document(self, asked: bool = False) -> Document:
         """The summary of a Solution, with the balance of energies, whether the motion is doubtful, and what happened."""
@@ -120,8 +123,9 @@ class Response(Solution):
         balance = ("energy balance, of the largest kinetic energy", self.energy.balance / largest)
         made = summary(self._values, asked, (balance,))
         events = Heading("Events" if self.events else "", 2), Bullets([str(one) for one in self.events])
-        lost = [Paragraph(f"Doubtful: {one}.") for one in self.warnings if isinstance(one, EnergyLost)]
-        return replace(made, blocks=(Paragraph(self.stopped), *lost, *made.blocks, *events))
+        lost = self._energy_lost()
+        doubtful = Paragraph("" if lost is None else f"Doubtful: {lost}.")
+        return replace(made, blocks=(Paragraph(self.stopped), doubtful, *made.blocks, *events))
 
     def to_dict(self) -> dict[str, Any]:
         """What the summary tells as plain data."""
@@ -261,6 +265,9 @@ class ResponseData(SolutionData):
     stopped: Annotated[str, "why the motion was not followed to its end; empty where it was"]
     kinetic_energy: Annotated[float, "its greatest value"]
     energy_balance: Annotated[float, "greatest error of the balance of energies, of the greatest kinetic energy"]
+    energy_lost: Annotated[
+        EnergyLost | None, "how much is lost, of the greatest energy, and from when on the motion is doubtful"
+    ]
     events: tuple[EventData, ...]
 
 
@@ -276,5 +283,6 @@ def response_data(r: Response) -> ResponseData:
         stopped=r.stopped,
         kinetic_energy=kinetic,
         energy_balance=off,
+        energy_lost=r._energy_lost(),
         events=events,
     )
