@@ -126,7 +126,7 @@ class _Signature:
     """The signature of a class with fields as ``help`` shows it: what they hold stands in the docstring."""
 
     def __get__(self, instance: object, cls: type) -> inspect.Signature:
-        every = list(inspect.signature(cls.__init__).parameters.values())[1:]
+        every = list(inspect.signature(inspect.getattr_static(cls, "__init__")).parameters.values())[1:]
         return inspect.Signature([one.replace(annotation=inspect.Parameter.empty) for one in every])
 
 
