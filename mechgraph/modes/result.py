@@ -171,7 +171,7 @@ def values_text(m: Mechanism, at: Mapping[str, float]) -> str:
 def in_degrees(m: Mechanism, name: str, value: float, far: float = 0.0) -> float:
     """A value of a freedom or coordinate as it is shown: turns in degrees, zero where it is rounding (of lengths beside one of ``far``)."""
     turns = m.turns(name)
-    if abs(value) <= SHOWN_AS_ZERO * (1.0 if turns else far):
+    if abs(value) <= MODES_ZERO * (1.0 if turns else far):
         return 0.0
     return float(np.rad2deg(value)) if turns else value
 
@@ -181,7 +181,7 @@ def unit_of(m: Mechanism, name: str) -> str:
     return " deg" if m.turns(name) else ""
 
 
-SHOWN_AS_ZERO = 1e-12
+MODES_ZERO = 1e-12
 """Angle (radians), or part of the largest length, that tables show as zero."""
 WORDS = ("proved", "tested", "searched")
 """What completeness may be, the strongest first."""
