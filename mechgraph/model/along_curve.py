@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import ClassVar
+from functools import cached_property, partial
+from typing import Any, ClassVar
 
 import numpy as np
 
+from mechgraph.algebra.components import Library, by_components
 from mechgraph.algebra.se3 import Array, cross
 from mechgraph.model.curves import ORDERS, Curve
 from mechgraph.model.factors import Factor
@@ -175,17 +176,16 @@ class Beside(Curve):
         if self._named is not None:
             return self._named.at(u)
         travel: Travel = self.base.once(Travel)
-        x, t, dt, ddt, y, *_ = travel.guided(u)
-        k, dk = (dt * y).sum(axis=0), (ddt * y).sum(axis=0)
         step: Array = u.real + 1j * COMPLEX_STEP  # type: ignore[assignment]
-        _, _, _, ahead, sideways, *_ = travel.guided(step)
-        ddk = (ahead * sideways).sum(axis=0).imag / COMPLEX_STEP
-        d, g = self.distance, 1.0 - self.distance * k
-        out = np.zeros((ORDERS, *x.shape), dtype=x.dtype)
-        out[0], out[1] = x + d * y, g * t
-        out[2] = g * k * y - d * dk * t
-        out[3] = (g - 2 * d * k) * dk * y - (d * ddk + g * k * k) * t
-        return out
+        ahead = travel.at(step)
+        here = travel.at(u) if np.iscomplexobj(u) else ahead.real
+        (bend, rate), (_, more) = ([(p.k * turn).sum(axis=0) for turn in (p.w, p.dw)] for p in (here, ahead))
+        rates = self._offset(here.t, here.y, np.stack([bend, rate, more.imag / COMPLEX_STEP]))
+        return np.concatenate([here.x + self.distance * here.y, rates]).reshape(ORDERS, *here.x.shape)
+
+    @cached_property
+    def _offset(self) -> by_components:
+        return by_components(partial(_beside, self.distance))
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -219,3 +219,15 @@ class Beside(Curve):
     def breaks(self) -> Array:
         """As the curve."""
         return self.base.once(Travel).s if self._named is None else self._named.breaks
+
+
+def _beside(d: float, lib: Library, *parts: Any) -> tuple[Any, ...]:
+    """Three derivatives of ``x + d y`` from tangent, normal, and curvature with two derivatives."""
+    t, y, (k, dk, ddk) = parts[:3], parts[3:6], parts[6:]
+    g = 1.0 - d * k
+    second, third = (g * k, d * dk), ((g - 2.0 * d * k) * dk, d * ddk + g * k * k)
+    return (
+        *(g * a for a in t),
+        *(second[0] * b - second[1] * a for a, b in zip(t, y, strict=True)),
+        *(third[0] * b - third[1] * a for a, b in zip(t, y, strict=True)),
+    )

@@ -53,6 +53,12 @@ class Place:
     w: Array
     dw: Array
 
+    @property
+    def real(self) -> Place:
+        """Without imaginary parts."""
+        parts = (self.x, self.t, self.dt, self.y, self.k, self.w, self.dw)
+        return Place(*(np.asarray(part.real) for part in parts))
+
 
 def _dot(a: Array, b: Array) -> Array:
     return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])

@@ -1,7 +1,8 @@
 """Cams beside linkages of the same size and motion: ``python tests/benchmarks/bench_cams.py``.
 
 An eccentric with a roller moves as a slider-crank does (``test_followers``), so both do the same work but for the curve; a cam of a
-law, whose jerk jumps, takes more steps. Timed in turn in one run: ``mg.solve`` with rates, reactions and checks.
+law, whose jerk jumps, takes more steps, and so does a roller on a profile through points, whose centre goes beside the spline. Timed in
+turn in one run: ``mg.solve`` with rates, reactions and checks.
 """
 
 import os
@@ -28,12 +29,24 @@ def machines() -> dict[str, mg.Mechanism]:
         mg.Pair("D", "R", "cam", "rod", point=CENTER, axis=Z),
         mg.Pair("E", "R", "rod", "follower", point=at, axis=Z),
     ]
+    t = 2 * np.pi * np.arange(24) / 24
+    points = np.stack([0.3 + np.cos(t), 0.9 * np.sin(t) + 0.05 * np.cos(2 * t), 0 * t], axis=1)
+    profile, beside = mg.Curve.through(points=points, closed=True), points[6] + [0, 0.2, 0]
     lobe = mg.Curve.cam.of(law(), 0.9, second=(0, 1, 0), roller_radius=0.2, offset=0.15)
     top = lobe.at(np.array(0.0))[0]
     return {
         "slider-crank": driven_cam(slide, *rod, point=at, more=["rod"]),
         "eccentric, roller": driven_cam(
             slide, mg.Pair("K", "Ps", "cam", "follower", curve=CIRCLE, roller=ROLLER, point=at), point=at
+        ),
+        "roller on points": mg.assemble(
+            driven_cam(
+                mg.Pair(
+                    "F", "P", "frame", "follower", on_a=mg.Marker(beside, (0, 1, 0)), on_b=mg.Marker(beside, (0, 1, 0))
+                ),
+                mg.Pair("K", "Ps", "cam", "follower", curve=profile, roller=0.2, on_b=mg.Marker(beside, Z)),
+                point=beside,
+            )
         ),
         "cam of a law": driven_cam(
             mg.Pair("F", "P", "frame", "follower", point=top, axis=(0, 1, 0)),
