@@ -183,6 +183,14 @@ class Beside(Curve):
         rates = self._offset(here.t, here.y, np.stack([bend, rate, more.imag / COMPLEX_STEP]))
         return np.concatenate([here.x + self.distance * here.y, rates]).reshape(ORDERS, *here.x.shape)
 
+    def place_at(self, u: Array) -> Place | None:
+        """With the frame of the curve, which turns over shorter or longer ways: ``c / g`` and ``c' / g^3``, ``g = 1 - d c``."""
+        if self._named is not None:
+            return None
+        here: Place = self.base.once(Travel).at(u)
+        g = 1.0 - self.distance * (here.k * here.w).sum(axis=0)
+        return replace(here, x=here.x + self.distance * here.y, dt=here.dt / g, w=here.w / g, dw=here.dw / (g * g * g))
+
     @cached_property
     def _offset(self) -> by_components:
         return by_components(partial(_beside, self.distance))

@@ -97,6 +97,10 @@ class Curve(Described, Once):
         """How many of position and derivatives are known, that of complex arguments counted."""
         return ORDERS + 1
 
+    def place_at(self, u: Array) -> Any:
+        """The place with its frame, where that is known by other means than derivatives; else None."""
+        return None
+
     def beside(self, distance: float, y: Array) -> Curve | None:
         """The curve at a distance towards the normal, which is ``y (3,)`` where it begins, where that is a curve with a name too."""
         return None

@@ -143,7 +143,11 @@ class Travel:
     def at(self, s: Array) -> Place:
         """Position and frame at arc lengths ``(...)``, real or complex."""
         if self.is_plane:
-            x = self.curve.at(self._parameter_at(s))
+            u = self._parameter_at(s)
+            known: Place | None = self.curve.place_at(u)
+            if known is not None:
+                return known
+            x = self.curve.at(u)
             return Place(x[0], *self._frame_in_plane(x[1], x[2], x[3]).reshape(6, 3, *s.shape))
         x, t, dt, ddt, y, k, r, dr = self.guided(s)
         w, dw = cross(t, dt), cross(t, ddt)
