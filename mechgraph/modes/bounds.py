@@ -20,8 +20,14 @@ SIX_TURNS = (
     "Lee, Woernle and Hiller, A complete solution for the inverse kinematic problem of the general 6R robot manipulator, "
     "J. Mech. Des. 113, 1991, page 481"
 )
-RONGA = "Ronga and Vust, Stewart platforms without computer?, Real Analytic and Algebraic Geometry, 1995, page 197"
-NANUA = "Nanua, Waldron and Murthy, Direct kinematic solution of a Stewart platform, IEEE Trans. Robotics and Automation 6, 1990, page 438"
+FORTY = (
+    "Mourrain, The 40 generic positions of a parallel robot, ISSAC 1993; Ronga and Vust, Stewart platforms without computer?, "
+    "Real Analytic and Algebraic Geometry, 1995"
+)
+SIXTEEN = (
+    "three joints on circles at given distances from each other: three equations of degree 2 in the half-angle tangents of two of "
+    "them each have 16 solutions or fewer (Bezout in a product of lines)"
+)
 LOOPS: tuple[tuple[int, str, int, str], ...] = (
     (3, "RRR", 2, "two circles in a plane or on a sphere meet in two points"),
     (3, "RRT", 2, "a circle and a line meet in two points"),
@@ -36,9 +42,9 @@ PLATFORMS: tuple[tuple[str, int, tuple[int, ...], int, str], ...] = (
     ("R", 1, (), 2, "a circle and a sphere meet in two points"),
     ("T", 1, (), 2, "a line and a sphere meet in two points"),
     ("S", 3, (), 8, "three quadrics in the quaternion of a rotation meet in 8 points or fewer (Bezout)"),
-    ("TTTS", 6, (2, 2, 2), 16, NANUA),
-    ("TTTS", 6, (), 40, RONGA),
-    ("TTS", 5, (), 40, f"{RONGA}; a point on a plane is on a rod from far away"),
+    ("TTTS", 6, (2, 2, 2), 16, SIXTEEN),
+    ("TTTS", 6, (), 40, FORTY),
+    ("TTS", 5, (), 40, f"{FORTY}; a point on a plane is on a rod from far away"),
 )
 """What lets one body move against another (R turns, T slides, S is a ball), and rods between them: their number, how many have each joint
 of the one body in common, whatever their joints on the other (nothing where it does not matter), the bound, and its source."""
