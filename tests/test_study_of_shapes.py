@@ -159,6 +159,28 @@ def test_variants_beside_a_curve_that_does_not_change_go_together(monkeypatch):
                 assert_allclose(found[i], expected.reshape(found[i].shape), atol=1e-11 * size)
 
 
+def test_variants_with_curves_of_their_own_are_shared_out(monkeypatch):
+    """Each is solved alone, in parts that all processors take; where the curve stays there is one part."""
+    m, _ = eccentric()
+    monkeypatch.setattr("mechgraph.variants.study.FEW_ALONE", 2)
+    monkeypatch.setattr("os.cpu_count", lambda: 1)
+    parts = {}
+    for name, start in (("K.curve.radius", 1.0), ("follower.mass", 1.0)):
+        study = mg.study(
+            m,
+            {name: start + 1e-3 * np.arange(5)},
+            "A.effort",
+            sampling="grid",
+            motions={"A": mg.Motion(0.5, 3.0)},
+            progress=lambda done, all_, name=name: parts.update({name: all_}),
+        )
+        assert not study.failed.any()
+        for i in (1, 4):
+            alone = mg.solve(study.variant(i), {"A": mg.Motion(0.5, 3.0)})["A"].effort
+            assert_allclose(study.outputs["A.effort"][i], alone[None, 0] if alone.ndim > 1 else alone, rtol=1e-11)
+    assert parts == {"K.curve.radius": 4, "follower.mass": 2}
+
+
 def test_points_of_a_slot():
     """A pin in a slot through points passes each of them; one of them is moved."""
     s = np.linspace(-1, 1, 9)

@@ -32,6 +32,8 @@ POSITIONS_TOGETHER = 60_000
 """Positions of all variants that are solved together: bounds the memory."""
 MOST_TOGETHER = 500
 """Variants that are followed together: their arrays stay in the cache."""
+FEW_ALONE = 20
+"""Variants in a part where each is solved alone: so few that all processors have some."""
 DIFFERENCE = 1e-4
 """Step of the central differences of the sensitivities, as a part of the spread of the parameter."""
 
@@ -123,6 +125,7 @@ def study(
         return Task(source, part, own, kept, method, redundant, engine, acting)
 
     size = max(1, min(MOST_TOGETHER, POSITIONS_TOGETHER // max(motion.shape[-1] for motion in paths.values())))
+    size = min(size, FEW_ALONE) if source.one_by_one else size
     tasks = [task(near, slice(0, 1))]
     tasks += [task(values[:, i : i + size], slice(i, i + size)) for i in range(0, values.shape[1], size)]
     parts = _all_solved(tasks, executor, progress)

@@ -25,6 +25,7 @@ from mechgraph.result.values import LoadBearing
 from mechgraph.structure.snapping import SnappedMechanism, meant, started
 from mechgraph.variants.batch import solve_together
 from mechgraph.variants.fields import AnyField, Variants, stacked, topology_of, varied
+from mechgraph.variants.number_names import ItemField
 from mechgraph.variants.outputs import Output, quantity
 
 Doubt = LoadBearing | LiftOff
@@ -53,6 +54,11 @@ class Source:
     stored: tuple[str, ...] = ()
     redriven: bool = False
     tol: float | None = None
+
+    @property
+    def one_by_one(self) -> bool:
+        """Whether curves, surfaces or contacts vary, so that every variant is solved alone."""
+        return any(isinstance(field, ItemField) and field.what == "pairs" for field in (self.fields or {}).values())
 
     def one(self, values: Array) -> Mechanism:
         """The mechanism for ``values (parameters,)``, as it is meant with the tolerance."""
