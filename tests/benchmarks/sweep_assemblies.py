@@ -1,17 +1,20 @@
 """Large sweeps of all assemblies, too long for the suite: run by hand, one line for every mechanism, faults at the end.
 
-python tests/benchmarks/sweep_assemblies.py arms 100          sixteen postures of random arms of six turns
-python tests/benchmarks/sweep_assemblies.py seeds 20          random topologies: the same set for ten seeds
-python tests/benchmarks/sweep_assemblies.py newton 20 3 10000 Newton from so many random guesses finds nothing outside the set
+python tests/benchmarks/sweep_assemblies.py arms 100               sixteen postures of random arms of six turns
+python tests/benchmarks/sweep_assemblies.py one-by-one 0 20 10 10000   random topologies whose loops can be solved one after the other
+python tests/benchmarks/sweep_assemblies.py together 0 20 10 10000     random topologies of two loops that have to be solved together
 
-The number after the count is that of loops, at most. Small samples are in ``test_sweep_assemblies.py``.
+Of random topologies, with numbers from the first to below the second, so many seeds must give the same set, and Newton from so many random
+guesses nothing outside it; seeds after the first go without the trace test, which says nothing of the set. Small samples are in
+``test_sweep_assemblies.py``.
 """
 
 from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from unittest.mock import patch
 
 import numpy as np
 
@@ -19,6 +22,7 @@ import mechgraph as mg
 from mechgraph.closure.configuration import Configuration
 from mechgraph.modes.question import Question
 from mechgraph.modes.search import searched
+from mechgraph.modes.trace import NOT_PASSED
 
 FREEDOMS = {"R": 1, "P": 1, "C": 2, "U": 2, "S": 3, "Sp": 5, "Sg": 4, "Sc": 3, "E": 3}
 """Pair types of random loops, and how many freedoms each has."""
@@ -55,14 +59,19 @@ def arm(seed: int) -> tuple[mg.Mechanism, dict[str, object]]:
     return m, {"L6": hand}
 
 
-def topology(seed: int, most: int) -> tuple[mg.Mechanism, dict[str, object]]:
-    """One loop to ``most`` loops of random pairs, one freedom of the first pair driven, each further loop with six freedoms."""
+ONE_BY_ONE, TOGETHER = (7, 6, 6), (8, 5)
+"""Freedoms of the first loop, and of the further ones: those that can be solved one after the other, and two that cannot."""
+
+
+def topology(seed: int, most: int = 3, freedoms: Sequence[int] | None = None) -> tuple[mg.Mechanism, dict[str, object]]:
+    """One loop to ``most`` loops of random pairs, one freedom of the first pair driven; or loops of so many ``freedoms``."""
     rng = np.random.default_rng(seed)
+    own = ONE_BY_ONE[: int(rng.integers(1, most + 1))] if freedoms is None else freedoms
     pairs: list[mg.Pair] = []
-    links, loops = ["frame"], int(rng.integers(1, most + 1))
-    for loop in range(loops):
+    links = ["frame"]
+    for loop, count in enumerate(own):
         letters = ["R"] if loop == 0 else []
-        while (left := (7 if loop == 0 else 6) - sum(FREEDOMS[s] for s in letters)) > 0:
+        while (left := count - sum(FREEDOMS[s] for s in letters)) > 0:
             letters.append(str(rng.choice([s for s, f in FREEDOMS.items() if f <= left])))
         begin, end = ("frame", "frame") if loop == 0 else rng.choice(links, 2, replace=False)
         chain = [begin, *(f"b{loop}{i}" for i in range(1, len(letters))), end]
@@ -111,50 +120,46 @@ def arms(count: int) -> list[str]:
     return faults
 
 
-def seeds(count: int, most: int = 3, runs: int = 10) -> list[str]:
-    """Faults of topologies whose set depends on the seed."""
+def sets(first: int, last: int, runs: int, guesses: int, freedoms: Sequence[int] | None = None) -> list[str]:
+    """Faults of topologies whose set depends on the seed, or misses what Newton finds."""
     faults = []
-    for number in range(count):
-        m, at = topology(number, most)
+    for number in range(first, last):
+        m, at = topology(number, freedoms=freedoms)
+        begin, name = time.process_time(), f"{number} {m.name}"
         try:
-            begin = time.process_time()
-            sets = [mg.assemblies(m, at, seed=seed, cache=False, progress=patience()) for seed in range(runs)]
-        except (mg.MechgraphError, GivenUp) as error:
-            print(f"{number} {m.name}: {type(error).__name__}", flush=True)
-            continue
-        totals = {(s.total, len(s), s.completeness) for s in sets}
-        print(f"{number} {m.name}: {sorted(totals, key=str)}, {time.process_time() - begin:.1f} s", flush=True)
-        good = [s for s in sets if s.completeness != "searched"]
-        if len({(s.total, len(s)) for s in good}) > 1:
-            faults.append(f"{number} {m.name}: {sorted(totals, key=str)}")
-        elif good and any(outside(prints(Question(m, at), good[0]), prints(Question(m, at), s)) for s in good[1:]):
-            faults.append(f"{number} {m.name}: other poses")
-    return faults
-
-
-def newton(count: int, most: int = 3, guesses: int = 10_000) -> list[str]:
-    """Faults of topologies in which Newton finds what is not in the set."""
-    faults = []
-    for number in range(count):
-        m, at = topology(number, most)
-        try:
-            modes = mg.assemblies(m, at, progress=patience())
             q = Question(m, at)
+            found = mg.assemblies(m, at, cache=False, progress=patience())
+            took = time.process_time() - begin
+            with patch("mechgraph.modes.monodromy.trace_test", lambda *_: NOT_PASSED):
+                others = [mg.assemblies(m, at, seed=seed, cache=False, progress=patience()) for seed in range(1, runs)]
         except (mg.MechgraphError, GivenUp) as error:
-            print(f"{number} {m.name}: {type(error).__name__}", flush=True)
+            print(f"{name}: {type(error).__name__}", flush=True)
             continue
+        known = prints(q, found)
+        same = [
+            (one.total, len(one)) == (found.total, len(found)) and not outside(prints(q, one), known) for one in others
+        ]
         x = searched(q.system, q.x, q.columns, q.drive[:, 0], guesses, 0.5, np.random.default_rng(number))
-        missed = outside(q.family.prints(Configuration(q.system, x)), prints(q, modes))
+        missed = outside(q.family.prints(Configuration(q.system, x)), known)
         print(
-            f"{number} {m.name}: {len(modes)} real of {modes.total}, {modes.completeness}; {x.shape[1]} guesses closed, "
-            f"{missed} of them outside",
+            f"{name}: {len(found)} real of {found.total}, {found.infinite} at infinity, {found.completeness}, {took:.1f} s; "
+            f"{1 + sum(same)} of {runs} seeds; {x.shape[1]} guesses of {guesses} closed, {missed} outside",
             flush=True,
         )
-        if missed:
-            faults.append(f"{number} {m.name}: {missed} of {x.shape[1]} outside a set called {modes.completeness}")
+        if missed or not all(same):
+            faults.append(f"{name}: {missed} of {x.shape[1]} outside a set called {found.completeness}; seeds {same}")
     return faults
+
+
+def main() -> list[str]:
+    """What the command line asks for."""
+    what, *numbers = sys.argv[1:]
+    counts = [int(n) for n in numbers]
+    if what == "arms":
+        return arms(*counts)
+    return sets(*counts, freedoms=TOGETHER if what == "together" else None)
 
 
 if __name__ == "__main__":
-    found = {"arms": arms, "seeds": seeds, "newton": newton}[sys.argv[1]](*(int(n) for n in sys.argv[2:]))
+    found = main()
     print(f"{len(found)} faults", *found, sep="\n")

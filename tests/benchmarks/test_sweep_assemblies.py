@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sweep_assemblies import outside, prints, topology
+from sweep_assemblies import TOGETHER, outside, prints, topology
 
 import mechgraph as mg
 from mechgraph.closure.configuration import Configuration
@@ -15,12 +15,19 @@ from mechgraph.modes.question import Question
 from mechgraph.modes.search import searched
 
 
-@pytest.mark.parametrize("number", [14, pytest.param(16, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("number", "freedoms"),
+    [
+        (14, None),
+        *(pytest.param(number, None, marks=pytest.mark.slow) for number in (0, 16)),
+        pytest.param(4, TOGETHER, marks=pytest.mark.slow),
+    ],
+)
 def test_random_topologies_have_the_same_assemblies_for_any_seed(
-    number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    number: int, freedoms: tuple[int, ...] | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(store, "PACKED", tmp_path / "none")
-    m, at = topology(number, 3)
+    m, at = topology(number, freedoms=freedoms)
     q = Question(m, at)
     sets = [mg.assemblies(m, at, seed=seed, cache=False) for seed in (0, 1)]
     assert len({(one.total, len(one), one.completeness) for one in sets}) == 1
