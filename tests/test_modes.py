@@ -22,7 +22,7 @@ from mechgraph.modes.homotopy import Equations
 from mechgraph.modes.monodromy import start_set
 from mechgraph.modes.question import Question
 from mechgraph.modes.targets import Ends, _account, _Run
-from mechgraph.modes.trace import _beside_poles, rational, trace_test
+from mechgraph.modes.trace import _beside, _poles, rational, trace_test
 
 
 @pytest.fixture
@@ -414,7 +414,7 @@ def test_samples_beside_poles_tell_a_rational_function_and_no_other() -> None:
         for _ in range(3):
             if (found := rational(z, function(z), np.ones(len(z)))).passed:
                 break
-            more = np.exp(1j * _beside_poles(z, function(z), np.ones(len(z)), rng)) if beside else z[:0]
+            more = np.exp(1j * _beside(_poles(z, function(z), np.ones(len(z))), rng)) if beside else z[:0]
             z = np.concatenate([z, more, rng.normal(size=(max(0, len(z) - len(more)), 2)) @ [1.0, 1.0j]])
         return found.degree
 

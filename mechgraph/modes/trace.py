@@ -31,11 +31,11 @@ from mechgraph.modes.family import SPAN, Array, Family, Member
 from mechgraph.modes.homotopy import Care, Equations, Leg, follow
 from mechgraph.topology.components import components_of_edges
 
-SAMPLES, MOST_SAMPLES = 48, 300
-"""Members of a pencil that are sampled first; then as many again, until they tell, or there are so many."""
-PENCILS = 3
-"""Pencils of which one has to tell."""
-MOST_TRACKS = 12_000
+SAMPLES = 48
+"""Members of a pencil that are sampled first; then as many again, until they tell."""
+ENOUGH, PENCILS = 5, 4
+"""Members for every pole at which a pencil that does not tell is left for another one; pencils of which one has to tell."""
+MOST_TRACKS = 24_000
 """Tracks over all of them, at most."""
 BY_POLE = 0.3
 """Distance of samples from a pole, as part of that to the next one."""
@@ -90,7 +90,7 @@ def trace_test(
         pencil = _Pencil(equations, base, rng)
         phi = pencil.anywhere(SAMPLES, rng)
         z, f, weights = np.zeros(0, dtype=complex), np.zeros(0, dtype=complex), np.zeros(0)
-        while len(z) < MOST_SAMPLES and (tracks := tracks + len(phi) * N) <= MOST_TRACKS:
+        while (tracks := tracks + len(phi) * N) <= MOST_TRACKS:
             if progress is not None:
                 progress(f"trace test: {N} tracks to each of {len(phi)} random mechanisms of the class")
             new = pencil.sums(x, phi)
@@ -98,7 +98,10 @@ def trace_test(
             found = rational(z, f, weights)
             if found.passed:
                 return found
-            phi = _beside_poles(z, f, weights, rng)
+            poles = _poles(z, f, weights)
+            if len(z) > ENOUGH * len(poles):
+                break
+            phi = _beside(poles, rng)
             phi = np.concatenate([phi, pencil.anywhere(max(SAMPLES, len(z)) - len(phi), rng)])
     return NOT_PASSED
 
@@ -128,13 +131,17 @@ def _loewner(z: Array, f: Array, weights: Array) -> tuple[Array, Array]:
     return over * (fa - fb), over * (a * fa - b * fb)
 
 
-def _beside_poles(z: Array, f: Array, weights: Array, rng: np.random.Generator) -> Array:
-    """Two ``phi`` beside every pole that values tell."""
+def _poles(z: Array, f: Array, weights: Array) -> Array:
+    """The poles that values tell."""
     loewner, shifted = _loewner(z, f, weights)
     U, sigma, Vt = np.linalg.svd(loewner)
     rank = int((sigma > POLES_TOLD * sigma[0]).sum())
     left, right = U[:, :rank].conj().T, Vt[:rank].conj().T
-    poles = np.linalg.eigvals((left @ shifted @ right) / sigma[:rank, None])
+    return np.linalg.eigvals((left @ shifted @ right) / sigma[:rank, None])
+
+
+def _beside(poles: Array, rng: np.random.Generator) -> Array:
+    """Two ``phi`` beside every pole that is not far away."""
     poles = poles[(np.abs(poles) < POLE_RANGE) & (np.abs(poles) > 1.0 / POLE_RANGE)]
     gaps = np.abs(poles[:, None] - poles)
     np.fill_diagonal(gaps, np.abs(poles))
