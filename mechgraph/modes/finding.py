@@ -29,6 +29,8 @@ from mechgraph.modes.targets import Ends
 
 REAL_CLOSED = 1e-9
 """Closure error of what is real."""
+UNFIT = 1e-3
+"""Closure error from which on a rod that has no row does not fit; between this and that of what is closed it is open whether it does."""
 SINGULAR = 1e-5
 """Smallest singular value of the closure rows, as part of the largest, below which an assembly is no regular point."""
 LARGE_STATE = 10.0
@@ -138,8 +140,12 @@ class Finder:
         # rods that would need complex turns to be put back are not real
         x, others = self.form.lifted(solved, i), self.form.lifted(found.x[:, ~real], i)
         complex_ = np.abs(x.imag).max(axis=0, initial=0.0) > REAL
-        made = ~complex_ & (Configuration(self.question.system, x.real).closure < REAL_CLOSED)
-        if (lost := int((~made & ~complex_).sum())) > 0:
+        system = self.question.system
+        off = Configuration(system, x.real).closure
+        made, unfit = ~complex_ & (off < REAL_CLOSED), ~complex_ & bool(self.form.spare) & (off > UNFIT)
+        if self.form.spare:
+            others = others[:, Configuration(system, others).closure < UNFIT]
+        if (lost := int((~made & ~complex_ & ~unfit).sum())) > 0:
             word, evidence = "searched", (*evidence, f"Of {counted(lost, 'mode')} the rods could not be put back.")
         others = np.concatenate([others, x[:, complex_]], axis=1)
         return _Solutions(

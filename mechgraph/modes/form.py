@@ -3,7 +3,8 @@
 A rod is a chain of links with a ball at its one end and a ball or two turns at the other, in which all between is driven or welded (S-S,
 S-P-S, U-P-S). Over the complex numbers all that it does is to keep two points at a distance, as both ends turn so that they point at
 each other wherever the bodies are that it joins. So it falls away, and with it its loops of six rows, for one row (see ``modes.rods``);
-a body that nothing else joins to the frame floats on a pair of six freedoms. Put back, a ball turns as little as it can, and two turns
+a body that nothing else joins to the frame floats on a pair of six freedoms. A rod that holds nothing that others do not hold has no
+row: an assembly in which it does not fit is none of the mechanism. Put back, a ball turns as little as it can, and two turns
 go that of their two ways that is nearest to the start: ways of rods are no assemblies of their own.
 """
 
@@ -40,6 +41,8 @@ from mechgraph.model.pair import Pair
 from mechgraph.model.pair_type import PairType
 from mechgraph.modes.family import SPAN, Array, Family
 from mechgraph.modes.rods import RodFamily, RodSystem
+from mechgraph.numerics.linear import rank_of, singular_values
+from mechgraph.numerics.tolerances import RANKS
 from mechgraph.topology.components import components_of_edges
 
 WAYS = "A leg that two turns carry can stand in two ways in the same assembly: nearest to the start, the other does not count"
@@ -54,6 +57,8 @@ class Form(Protocol):
     """Values ``(d, n)`` of the drivers of the class at all positions."""
     told: tuple[str, ...]
     """What is to be said of them, in words."""
+    spare: int
+    """Rods without a row, which may not fit where they are put back."""
 
     def at(self, position: int) -> System:
         """The system at a position."""
@@ -68,6 +73,7 @@ class Whole:
     def __init__(self, family: Family, drive: Array) -> None:
         self.family, self.drive = family, drive
         self.told: tuple[str, ...] = ()
+        self.spare = 0
 
     def at(self, position: int) -> System:
         """The mechanism, of which drivers are freedoms."""
@@ -114,7 +120,7 @@ def rods_of(system: System, columns: Index) -> list[Rod]:
                     break
             last = steps[-1].pair
             # the first end may have two turns, as ends are taken in that order; the second is a ball
-            if len(steps) > 1 and last in ends and _is_ball(rows[last]) and links[-1] not in (body, *links[:-1]):
+            if len(steps) > 1 and last in ends and _is_ball(rows[last]) and links[-1] not in links[:-1]:
                 out.append(Rod(tuple(steps), tuple(links[:-1]), (body, links[-1])))
                 ends -= {k, last}
     return out
@@ -152,9 +158,9 @@ def _points(row: PairType) -> bool:
 
 
 class WithoutRods:
-    """What is left of the mechanism of a class, with drivers at ``drive (d, n)``, when ``rods`` fall away."""
+    """What is left of the mechanism of a class, with drivers at ``drive (d, n)``, when ``rods`` fall away, of which ``rows`` have rows."""
 
-    def __init__(self, whole: Family, drive: Array, rods: list[Rod]) -> None:
+    def __init__(self, whole: Family, drive: Array, rods: list[Rod], rows: list[Rod]) -> None:
         self.start, self.full, self._rows = whole.here, whole.system, whole.rows
         self._drive = drive
         s = self.full
@@ -167,7 +173,7 @@ class WithoutRods:
         part = components_of_edges(len(s.m.links), [s.graph.ends[k] for k in self.pairs])[self.links]
         first = np.unique(part, return_index=True)[1]
         self.afloat = self.links[np.sort(first[first > 0])]
-        self.rods = _sorted(rods, self._points)
+        self.rods, self._all, self.spare = _sorted(rows, self._points), rods, len(rods) - len(rows)
         self.state_rows, self.kept = (
             np.array([i for k in self.pairs for i in range(to[k], to[k + 1])], dtype=np.intp)
             for to in (s.first_row, s.first_column)
@@ -176,10 +182,26 @@ class WithoutRods:
         self.drive = np.concatenate([drive[own], self._squares()])
         both = sum(not _is_ball(s.m.pairs[rod.steps[0].pair].type) for rod in rods)
         self.told: tuple[str, ...] = (f"{WAYS} ({counted(both, 'leg')} here).",) if both else ()
+        if self.spare:
+            self.told += (
+                f"Left out: {counted(self.spare, 'rod')} of what others hold too; assemblies are those in which it closes when it is put back.",
+            )
         self._small = self._mechanism()
         here = Configuration(self.at(0), self._state())
         columns, held = (np.searchsorted(self.kept, of[np.isin(of, self.kept)]) for of in (whole.columns, whole.held))
-        self.family: Family = RodFamily(here, columns, self._passive(here, whole.idle), held)
+        self.family: Family = (RodFamily if self.rods else Family)(here, columns, self._passive(here, whole.idle), held)
+
+    @property
+    def needed(self) -> list[Rod]:
+        """The rods of which the rows do not depend on those of loops and of rods before."""
+        J, n, out = self.family.here.J[:, self.family.free, 0], len(self.rods), []
+        held = J[: len(J) - n]
+        for rod, row in zip(self.rods, J[len(J) - n :], strict=True):
+            more = np.concatenate([held, row[None]])
+            if rank_of(singular_values(more), RANKS.position) > rank_of(singular_values(held), RANKS.position):
+                held = more
+                out.append(rod)
+        return out
 
     # --- numbers -----------------------------------------------------------------------------------------------------
 
@@ -210,9 +232,10 @@ class WithoutRods:
     def _squares(self) -> Array:
         """Squares ``(rods, n)`` of the lengths of the rods at all positions."""
         x = self._driven(self._drive)
-        return np.array([(d * d).sum(axis=0) for _, d in (self._inside(rod, x) for rod in self.rods)])
+        squares = [(d * d).sum(axis=0) for _, d in (self._inside(rod, x) for rod in self.rods)]
+        return np.array(squares).reshape(len(self.rods), x.shape[1])
 
-    def _mechanism(self) -> RodSystem:
+    def _mechanism(self) -> System:
         """What is left, and points of rods, whose lengths are those of the first position."""
         full, par = self.full.m, self.full.par
         taken = {pair.name for pair in full.pairs}
@@ -238,6 +261,8 @@ class WithoutRods:
             inertia=par.inertia[:, :, self.links],
             offset=par.offset[:, self.links],
         )
+        if not self.rods:
+            return System(left, None, numbers)
         ends = list(zip(*(sorted(self._points(rod), key=itemgetter(0)) for rod in self.rods), strict=True))
         (a, at_a), (b, at_b) = (
             (np.array([place for place, _ in side]), np.stack([at for _, at in side], axis=1)[..., None])
@@ -251,6 +276,8 @@ class WithoutRods:
     def at(self, position: int) -> System:
         """What is left at a position."""
         s = self._small
+        if not isinstance(s, RodSystem):
+            return s
         return s.with_points(replace(s.points, length=self.drive[-len(self.rods) :, [position]]))
 
     # --- states ------------------------------------------------------------------------------------------------------
@@ -279,11 +306,11 @@ class WithoutRods:
         out[self.state_rows] = x[: len(self.state_rows)]
         begin = out.copy()
         with np.errstate(all="ignore"):
-            for n, rod in enumerate(self.rods):
-                self._put_back(rod, here, n, out, begin)
+            for rod in self._all:
+                self._put_back(rod, here, out, begin)
         return out
 
-    def _put_back(self, rod: Rod, here: Configuration, n: int, out: Array, begin: Array) -> None:
+    def _put_back(self, rod: Rod, here: Configuration, out: Array, begin: Array) -> None:
         """The numbers of a rod in states ``out``, near those where it ``begin``s."""
         s, par = self.full, self.full.par
         near, far = rod.steps[0], rod.steps[-1]

@@ -92,7 +92,9 @@ class Question:
     def form(self) -> Form:
         """The equations in which assemblies are looked for: without rods, where these can be left out."""
         if self.rods:
-            found = WithoutRods(self.family, self.drive, self.rods)
+            found = WithoutRods(self.family, self.drive, self.rods, self.rods)
+            if found.family.fault:
+                found = WithoutRods(self.family, self.drive, self.rods, found.needed)
             if not found.family.fault:
                 return found
         return Whole(self.family, self.drive)
