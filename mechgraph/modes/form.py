@@ -184,7 +184,7 @@ class WithoutRods:
         self.told: tuple[str, ...] = (f"{WAYS} ({counted(both, 'leg')} here).",) if both else ()
         if self.spare:
             self.told += (
-                f"Left out: {counted(self.spare, 'rod')} of what others hold too; assemblies are those in which it closes when it is put back.",
+                f"Left out: {counted(self.spare, 'rod')} of what others hold too; assemblies are those in which it closes again.",
             )
         self._small = self._mechanism()
         here = Configuration(self.at(0), self._state())
