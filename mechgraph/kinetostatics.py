@@ -72,7 +72,7 @@ def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exceptio
     dead = status in (Status.DEAD_POINT, Status.BEYOND_DEAD_POINT)
     nodes = outcome.found.nodes_of(int(outcome.found.track[first]))
     last, still = outcome.found.reached[:, first], False
-    way = nodes.take(nodes.place <= outcome.found.place[first])
+    way = nodes.take((nodes.place >= 0.0) & (nodes.place <= outcome.found.place[first]))
     if len(way) > 1 and not dead:
         end = last_closed(line.system, way, line.leading)
         still = not end.place[0]

@@ -17,6 +17,7 @@ from mechgraph.closure.driver_path import DriverPath, Positions, Request
 from mechgraph.closure.gaps import along_polygons_with_gaps
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.legs import Legs
+from mechgraph.numerics.beyond import followed
 from mechgraph.numerics.continuation import Follower
 from mechgraph.numerics.tracks import Nodes, Paths
 
@@ -98,16 +99,14 @@ def _find_periods(path: DriverPath, ways: list[_Way], most: int) -> None:
     ends = path.system.periods[path.columns[0]] * np.arange(most + 1.0)
     points = [x[path.rows, v][:, None] + way.sense * ends for v, way in enumerate(ways)]
     follower = Follower(path)
-    tracks = follower.follow(x, Paths(points, [np.ones(most + 1, dtype=bool)] * len(ways)))
+    tracks = followed(follower, x, Paths(points, [np.ones(most + 1, dtype=bool)] * len(ways)))
     crossed = {track for track, _ in tracks.crossings}
     for v, way in enumerate(ways):
         nodes = tracks.nodes.take(tracks.nodes.track == v)
         way.ends = nodes.place[-1] < ends[-1]
         for end in ends[1:]:
-            at = np.flatnonzero(np.abs(nodes.place - end) < 1e-9)
-            shift = (
-                _shift(path, follower, nodes.take(at[:1]), nodes.take(np.array([0])), v in crossed) if at.size else None
-            )
+            at, start = np.flatnonzero(np.abs(nodes.place - end) < 1e-9), nodes.take(nodes.place == 0.0)
+            shift = _shift(path, follower, nodes.take(at[:1]), start, v in crossed) if at.size else None
             if shift is not None:
                 way.period, way.shift = float(end), shift
                 break

@@ -9,6 +9,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.driver_path import DriverPath, Mask, Positions, Request, Status, in_blocks
 from mechgraph.closure.indexing import Index
+from mechgraph.numerics.beyond import followed
 from mechgraph.numerics.continuation import End, Follower, Tracks
 from mechgraph.numerics.crossings import WINDOW, passed
 from mechgraph.numerics.hermite import Interpolation
@@ -79,7 +80,7 @@ class Legs:
         follower = Follower(self.path)
         paths = Paths(self.points, self.stops)
         self._length = paths.length
-        tracks = follower.follow(np.stack(self.starts, axis=1), paths)
+        tracks = followed(follower, np.stack(self.starts, axis=1), paths)
         nodes = refined(follower, tracks.nodes, self.total)
         tracks = replace(tracks, nodes=nodes)
         return self._read(follower, tracks)
@@ -150,6 +151,7 @@ class Legs:
             crossing = passed(out.follower, tracks.nodes, track, place) if beside.size else None
             if crossing is None:
                 continue
+            beside = beside[np.abs(self.place[beside] - place) < crossing.window]
             straight = np.abs(self.values[:, beside] - crossing.drives(self.place[beside])).max(axis=0) < 1e-12
             out.near[beside[straight]] = len(out.crossings)
             out.crossings.append(crossing)

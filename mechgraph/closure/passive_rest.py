@@ -44,7 +44,7 @@ def unspun(path: DriverPath, found: Positions, passive: tuple[PassiveMotion, ...
     Source: Bishop, There is more than one way to frame a curve, Amer. Math. Monthly 82, 1975 (vectors carried along an axis).
     """
     nodes, good = found.tracks.nodes, np.flatnonzero((found.status == Status.OK) & (found.near < 0))
-    if not len(nodes.steps[0]) or not good.size:
+    if not len(nodes.steps[0]) or not found.moved.any():
         return found
     carried = (
         _Carried(path, *parts_of_steps(path, found), found.follower, passive)
@@ -53,7 +53,7 @@ def unspun(path: DriverPath, found: Positions, passive: tuple[PassiveMotion, ...
     )
     x, status = found.x.copy(), found.status.copy()
     turns = np.zeros(found.x.shape[1], dtype=np.intp) if found.turns is None else found.turns
-    for at in in_blocks(good):
+    for at in in_blocks(good) if good.size else ():
         x[:, at], sure = carried.turned(found.x[:, at], found.which[at], found.track[at], found.place[at], turns[at])
         status[at[~sure]] = Status.NOT_CLOSED
 
@@ -226,7 +226,7 @@ class _Carried:
         """The motions at the Gauss points of all steps, twists ``(6, n, T)`` at rest in them, rates ``(6, n, p, T)`` of their own."""
         closed, track, slope = at_points(self.interpolation, self.follower, self._rule, np.arange(len(self._h)))
         step = np.repeat(np.arange(len(self._h)), self._rule.count)
-        self._sure = rest_is_sure(closed, step, self.interpolation.nodes.track[self.interpolation.left])
+        self._sure = rest_is_sure(closed, step, self.interpolation.begin)
         there, f = self._motions(closed.x, closed.which, track)
         dq = (f.sensitivity() * slope).sum(axis=1)
         moving = Velocities(there.here, dq + there.at_rest(there.here.link_twists(dq)))
@@ -236,8 +236,8 @@ class _Carried:
         """One motion, given at the nodes and at the Gauss points; there with the twist ``V`` of its link and the rate of its own."""
         points = self._rule.count
         left, right, n = self.interpolation.left, self.interpolation.right, len(self.interpolation.left)
-        first, last = np.flatnonzero(self._first), np.flatnonzero(np.append(self._first[1:], True))
-        of_track = np.cumsum(self._first) - 1
+        first, of_track = np.unique(self.interpolation.begin, return_inverse=True)
+        last = self.interpolation.last(self.interpolation.nodes.track[left[first]], self.follower.paths.end)
         u = np.concatenate([here.u[:, left, None], between.u.reshape(3, n, points), here.u[:, right, None]], axis=2)
         # one sense along every track; two nodes at one place, of other forms, may have other senses as well
         every = u.reshape(3, -1)

@@ -26,12 +26,13 @@ SETTLED = 1e-10
 """Change of the increments of a step up to which its repetitions have come to an end."""
 
 
-def rest_is_sure(closed: Closed, step: Index, track: Index) -> Mask:
-    """Steps with which, and up to which, the way of a ``track`` is beyond doubt: states ``closed`` in a ``step`` are as foretold."""
-    bad = np.zeros(len(track), dtype=bool)
+def rest_is_sure(closed: Closed, step: Index, begin: Index) -> Mask:
+    """Steps with which, and up to which from where tracks ``begin``, the way is sure: states ``closed`` in a ``step`` are as foretold."""
+    bad = np.zeros(len(begin), dtype=bool)
     bad[step[~closed.done | (closed.correction > PATH.correction)]] = True
     before = np.cumsum(bad)
-    return before == (before - bad)[np.searchsorted(track, track)]
+    behind = np.arange(len(begin)) < begin
+    return (before - bad * behind) == (before - bad)[begin]
 
 
 class PassiveSteps:
@@ -48,21 +49,25 @@ class PassiveSteps:
         nodes, left, right = interpolation.nodes, interpolation.left, interpolation.right
         self._h = nodes.place[right] - nodes.place[left]
         self._series = np.zeros((path.size[0], len(left), rule().count))
-        self._begin = nodes.x[:, left]
+        # before a start, where nodes have places below zero, steps lead away from it as well
+        self._back = nodes.place[left] < 0.0
+        self._begin = nodes.x[:, np.where(self._back, right, left)]
         self._sure = np.ones(len(left), dtype=bool)
-        number = np.arange(len(left)) - np.searchsorted(nodes.track[left], nodes.track[left])
-        for k in range(int(number.max(initial=-1)) + 1):
+        number = np.arange(len(left)) - interpolation.begin
+        for k in [*range(int(number.max(initial=-1)) + 1), *range(-1, int(number.min(initial=0)) - 1, -1)]:
             steps = np.flatnonzero(number == k)
-            if k:
-                before = steps - 1
-                drive = nodes.drive[:, right[before]]
-                closed = self._at(before, np.ones(len(steps)), drive, nodes.which[left[steps]])
+            if k not in (0, -1):
+                way = 1 if k > 0 else -1
+                before = steps - way
+                drive = nodes.drive[:, (right if k > 0 else left)[before]]
+                closed = self._at(before, np.full(len(steps), float(way)), drive, nodes.which[left[steps]])
                 self._begin[:, steps], self._sure[steps] = closed.x, self._sure[before] & closed.done
             self._follow(steps)
 
     def _at(self, step: Index, t: Array, drive: Array, which: Index) -> Closed:
         """States in steps at ``t`` from -1 to 1, closed."""
         dq = np.einsum("fng,ng->fn", self._series[:, step], rule().integrals(t))
+        dq -= np.where(self._back[step], self._series[:, step, 0], 0.0)
         track = self.interpolation.nodes.track[self.interpolation.left[step]]
         return self.follower.newton.close(self.path.advance(self._begin[:, step], dq, track), drive, track, which)
 

@@ -29,7 +29,10 @@ def end_at_ranges(path: DriverPath, found: Positions) -> None:
     outside, over = beyond(system, nodes.x), beyond(system, found.x)
     names = system.m.freedom_names()
     for track in np.unique(found.track).tolist():
-        mine, on_it = np.flatnonzero(nodes.track == track), np.flatnonzero(found.track == track)
+        mine, on_it = (
+            np.flatnonzero((nodes.track == track) & (nodes.place >= 0.0)),
+            np.flatnonzero(found.track == track),
+        )
         late = mine[(outside[:, mine] > BEYOND_END).any(axis=0)]
         places = [*nodes.place[late], *found.place[on_it[(over[:, on_it] > BEYOND_END).any(axis=0)]]]
         if not places:

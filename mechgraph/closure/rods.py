@@ -59,7 +59,7 @@ class Rods:
         self._nodes, self._left, self._first = interpolation.nodes, interpolation.left, R_0
         nodes, left, right = interpolation.nodes, interpolation.left, interpolation.right
         self._h = nodes.place[right] - nodes.place[left]
-        self._find = interpolation.find
+        self._find, self._last, self._ends = interpolation.find, interpolation.last, follower.paths.end
         self.axes = axes(path.at(nodes.x, nodes.drive, nodes.track))[0]
         a, b = self.axes[:, :, left], self.axes[:, :, right]
         u, du, closed = _between(path, follower, interpolation, rule, self.axes[:, :, :0])
@@ -72,17 +72,22 @@ class Rods:
         self._steps = _Steps(rule, a, self._begins(over.at(b, np.arange(len(left)), np.ones(len(left)))), series)
 
     def _begins(self, over: Array) -> Array:
-        """Rotations where all steps begin, from those ``over (3, 3, rods, steps)`` each of them."""
-        track = self._nodes.track[self._left]
+        """Rotations where all steps begin, from those ``over (3, 3, rods, steps)`` each of them; backwards before the starts."""
+        track, place = self._nodes.track[self._left], self._nodes.place[self._left]
         out = np.empty_like(over)
         turns = np.moveaxis(over, (0, 1), (-2, -1))
         R = np.moveaxis(self._first, (0, 1), (-2, -1))
         now = R[:, 0]
-        for k in range(len(track)):
-            if not k or track[k] != track[k - 1]:
+        for k in np.flatnonzero(place >= 0.0):
+            if place[k] == 0.0:
                 now = R[:, track[k]]
             out[:, :, :, k] = np.moveaxis(now, 0, -1)
             now = turns[:, k] @ now
+        for k in np.flatnonzero(place < 0.0)[::-1]:
+            if place[k + 1] == 0.0:
+                now = R[:, track[k]]
+            now = turns[:, k].swapaxes(-1, -2) @ now
+            out[:, :, :, k] = np.moveaxis(now, 0, -1)
         return out
 
     def at(self, here: Configuration, track: Index, place: Array, turns: Index | int = 0) -> Array:
@@ -100,16 +105,16 @@ class Rods:
     @property
     def period(self) -> Array:
         """Angles ``(rods, tracks)`` by which rods are turned about their axes at the end of tracks that come back to where they start."""
-        track = self._nodes.track[self._left]
+        track = np.unique(self._nodes.track[self._left])
         out = np.zeros(self._first.shape[2:])
-        last = np.flatnonzero(np.append(track[1:] != track[:-1], True)) if len(track) else self._left
+        last = self._last(track, self._ends) if len(track) else track
         u = self.axes[:, :, self._left[last] + 1]
-        end, start = self._steps.at(u, last, np.ones(len(last))), self._first[..., track[last]]
+        end, start = self._steps.at(u, last, np.ones(len(last))), self._first[..., track]
         turned = _product(end, np.swapaxes(start, 0, 1))
         sine = 0.5 * (
             np.array([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]]) * u
         ).sum(axis=0)
-        out[:, track[last]] = np.arctan2(sine, 0.5 * (np.trace(turned) - 1.0))
+        out[:, track] = np.arctan2(sine, 0.5 * (np.trace(turned) - 1.0))
         return out
 
 

@@ -172,6 +172,7 @@ class Follower(Marching):
         found = self.newton.nodes(x, drive, a.track, a.which, PATH.node)
         middle = Nodes.closed(found, drive, a.track, place, sure=True)
         ok = found.done & (found.which == a.which) & (found.correction <= PATH.correction)
+        ok &= found.condition <= PATH.singular
         ok &= np.isfinite(a.condition) & np.isfinite(b.condition)
         here = self.problem.at(found.x, drive, a.track)
         f = self.problem.factored(here, a.which)
@@ -220,12 +221,11 @@ class Follower(Marching):
         first, end = (np.searchsorted(nodes.track, tracks, side=side) for side in ("left", "right"))
         last, before = nodes.take(end - 1), nodes.take(np.maximum(end - 2, first))
         march = March(last, before, before.place < last.place, np.full(len(tracks), PATH.shortest_quick))
-        # beyond this condition rounding moves a state by as much as branches that cross are apart (a fold is far beyond its limit there)
-        worst = np.zeros(len(self.paths.end))
-        worst[tracks] = np.maximum(PATH.crossing, 1e3 * nodes.condition[first])
+        least = np.full(len(self.paths.end), np.inf)
+        np.minimum.at(least, nodes.track, nodes.condition)
         found = [nodes]
         while len(march.last):
-            stuck = ~self._careful_step(march, worst, found) & (march.h < PATH.shortest)
+            stuck = ~self._careful_step(march, least, found) & (march.h < PATH.shortest)
             if stuck.any():
                 nodes = Nodes.join(found)
                 for i in np.flatnonzero(stuck):
@@ -236,13 +236,18 @@ class Follower(Marching):
             march.keep(going & reached & (march.last.place < self.paths.end[track]))
         return Nodes.join(found)
 
-    def _careful_step(self, march: March, worst: Array, found: list[Nodes]) -> Mask:
-        """One step of every track that is on its way, put to the nodes ``found`` where it is certified; which are."""
+    def _careful_step(self, march: March, least: Array, found: list[Nodes]) -> Mask:
+        """One step of every track that is on its way, put to the nodes ``found`` where it is certified; which are.
+
+        ``least (V,)``: the least condition numbers on the tracks up to there.
+        """
         last = march.last
         at, drive, x, order = self.predicted(march)
         step = self.newton.nodes(x, drive, last.track, last.which, PATH.node)
         new = Nodes.closed(step, drive, last.track, at, sure=True)
-        good = step.done & (step.correction <= PATH.correction) & (step.condition <= worst[last.track])
+        # beyond this condition rounding moves a state by as much as branches that cross are apart (a fold is far beyond its limit there)
+        worst = np.maximum(PATH.crossing, 1e3 * least[last.track])
+        good = step.done & (step.correction <= PATH.correction) & (step.condition <= worst)
         good &= step.which == last.which
         trial = np.flatnonzero(good)
         if trial.size:
@@ -254,6 +259,7 @@ class Follower(Marching):
         if kept.size:
             self.work.careful += kept.size
             new = new.take(kept)
+            np.minimum.at(least, new.track, new.condition)
             # where the condition grows as towards a fold, as |s* - s|^-1/2: no further than half of what is left
             grown = (new.condition / middle.condition) ** 2 - 1.0
             left_over = 0.5 * (new.place - middle.place) / np.where(grown > 0, grown, 1.0)
@@ -280,7 +286,7 @@ class Follower(Marching):
 
         They are the branch on which the track begins: what the singular point is and how the branch passes it is told by them.
         """
-        if not self.leads or nodes.place[-1] > LEAD:
+        if not self.leads or nodes.place[-1] > LEAD or nodes.place[0] < 0.0:
             return nodes
         if track not in self._leads:
             starts = self.paths.drive(np.arange(len(self.paths.end)), np.zeros(len(self.paths.end)))

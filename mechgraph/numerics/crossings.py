@@ -21,8 +21,10 @@ from mechgraph.numerics.tracks import Nodes
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-WINDOW = 2e-3
+WINDOW = 5e-3
 """Distance from a crossing below which states and rates are interpolated: accelerations lose rounding over its cube."""
+WITHIN = 0.4
+"""Part of the span of the sides within which they are: towards the outermost sides polynomials lose digits."""
 NEAREST = 1e-3
 """Distance from a crossing below which a node is not used: its sensitivities lose rounding over the square."""
 SIDES = np.array([-6, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 6]) / 6
@@ -44,6 +46,11 @@ class Crossing:
     drive: Array
     direction: Array
     sides: Nodes
+
+    @property
+    def window(self) -> float:
+        """Distance from the crossing up to which positions are interpolated."""
+        return min(WINDOW, WITHIN * float(self.sides.place[-1] - self.place))
 
     def drives(self, places: Array) -> Array:
         """Path values ``(d, n)`` at places beside the crossing."""

@@ -89,6 +89,16 @@ class Interpolation:
         self.slope = slope / (nodes.place[self.right] - nodes.place[self.left])
         self._coefficients, self._z = self._polynomials()
 
+    @property
+    def begin(self) -> Index:
+        """For every step the one with which its track begins, at the place zero."""
+        tracks, begin = self.nodes.track[self.left], np.flatnonzero(self.nodes.place[self.left] == 0.0)
+        return np.asarray(begin[np.searchsorted(tracks[begin], tracks)])
+
+    def last(self, tracks: Index, ends: Array) -> Index:
+        """The steps that lead to the ``ends`` of tracks."""
+        return self.find(tracks, np.nextafter(ends[tracks], -np.inf))
+
     def find(self, tracks: Index, at: Array) -> Index:
         """Steps in which places of tracks lie."""
         span = float(self.nodes.place.max(initial=0.0)) + 1.0

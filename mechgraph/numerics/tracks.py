@@ -49,6 +49,8 @@ class Paths:
         self._begin, self._from = self._all[:, begin], self._places[begin]
         self._way, self._added = self._places - self._from, self._all - self._begin
         self._way[self._way == 0] = 1.0
+        if len(self._all) == 1:  # a start alone has the direction of growing values
+            self._added[:, self._first] = 1.0
         self.bent = bool((count > 2).any())
         """Whether there are points between the ends, at which paths may turn."""
 
@@ -62,7 +64,7 @@ class Paths:
         return track[inner[turns]], self._places[inner[turns]]
 
     def drive(self, tracks: Index, at: Array) -> Array:
-        """Path values ``(d, n)`` at places of tracks; behind the end straight on."""
+        """Path values ``(d, n)`` at places of tracks; behind the end and before the start straight on."""
         point = self._last.take(tracks)
         if self.bent:
             found = self._key.searchsorted(at + self._offset.take(tracks))

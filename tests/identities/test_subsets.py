@@ -9,6 +9,10 @@ from mechanisms import Z
 from strategies import chebyshev_rate, chebyshev_times, closed_mechanism, with_drives, with_loads
 
 import mechgraph as mg
+from mechgraph.call import Options
+from mechgraph.closure.driver_motion import DriverMotion
+from mechgraph.pipeline import Pipeline
+from mechgraph.result.solution import Solution
 
 pytestmark = pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
 """Random loads move passive freedoms; ``test_passive_loads`` looks at what is said of it."""
@@ -285,8 +289,9 @@ def test_parallelogram_over_a_turn(step):
         assert_parallel(solved(parallelograms(ONE, start), {"A": q}), ONE, q, start)
 
 
-@pytest.mark.parametrize("engine", ["dense", "sparse"])
-@pytest.mark.parametrize("off", [1e-5, 1e-3, 3e-3, 5e-3])
+@pytest.mark.parametrize(
+    ("off", "engine"), [(1e-5, "dense"), (1e-5, "sparse"), (1e-3, "dense"), (3e-3, "sparse"), (5e-3, "dense")]
+)
 def test_beside_a_change_point_wherever_the_path_ends(engine, off):
     """Behind a change point a position is solved alone, with one before it, and with others behind it."""
     start = np.pi / 2
@@ -320,6 +325,102 @@ def test_several_parallelograms_on_one_crank(seed):
     assert_parallel(whole, bars, q, start)
     pick = rng.choice(len(q), len(q) // 3, replace=False)
     assert not differences(whole, solved(m, {"A": q[pick]}), pick=pick)[2]
+
+
+def assert_same_beside(whole, part, pick, off):
+    """The same statuses, and values but for what rounding leaves: over the distance ``off`` for positions, over its cube at most."""
+    assert (whole.status[pick] == part.status).all(), f"{part.status} at {off} for {whole.status[pick]}"
+    ok = part.status == "ok"
+    for link in part.mechanism.link_names():
+        gap = np.abs(whole.link(link).pose[pick] - part.link(link).pose)[ok]
+        assert gap.max(initial=0.0) < SAME
+        gap = np.abs(whole.link(link).twist[pick] - part.link(link).twist)[ok]
+        assert gap.max(initial=0.0) < 1e-8
+    gap = np.abs(whole["A"].effort[pick, 0] - part["A"].effort[:, 0])[ok] * np.minimum(off[ok], 1.0)
+    assert gap.max(initial=0.0) < 1e-9
+
+
+BESIDE = 10.0 ** np.array([-6.5, -5.0, -4.0, -2.5])
+RHOMBUS = [Bars(1.0, 1.0, 1.0, 1.0)]
+
+
+@pytest.mark.parametrize(
+    ("bars", "begin", "engine"),
+    [
+        (ONE, -0.5, "dense"),
+        (RHOMBUS, -0.5, "sparse"),
+        (ONE, -3e-3, "dense"),
+        (ONE, -1e-4, "dense"),
+        (RHOMBUS, 1e-5, "dense"),
+    ],
+)
+def test_paths_may_begin_and_end_beside_a_change_point(bars, begin, engine):
+    """Positions beside it are solved whether the path passes it or not; from a start beside it no path goes over to the other branch."""
+    m = parallelograms(bars, begin)
+    at = np.sort(np.concatenate([-BESIDE, BESIDE, [begin, -0.3, 0.4]]))
+    whole = solved(m, {"A": mg.Motion(at - begin, 1.0)}, engine=engine)
+    assert_parallel(whole, bars, at - begin, begin)
+    for pick in (np.flatnonzero(at < 0), np.flatnonzero(at > 0), np.array([len(at) // 2])):
+        part = solved(m, {"A": mg.Motion(at[pick] - begin, 1.0)}, engine=engine)
+        assert_same_beside(whole, part, pick, np.abs(at[pick]))
+
+
+def test_cases_and_periods_beside_a_change_point():
+    """Cases of a call, and positions turns later, are solved as those of one path are, and on its branch."""
+    m = parallelograms(ONE, -1e-5)
+    q = np.array([0.0, 1.5e-5, -1e-4, 6 * np.pi - 1e-4, -6 * np.pi - 1e-4])
+    for given in (q, q[:3, None]):
+        s = solved(m, {"A": given})
+        assert (s.status == "ok").all()
+        assert np.abs(s["D0"].position[..., 0] - given).max() < 1e-11
+
+
+def test_several_drivers_beside_a_change_point():
+    """Where the last edge of the polygon leads on over a change point, its end has the values of a longer edge."""
+    parts = [parallelograms(ONE, start) for start in (-0.5, -0.7)]
+    renamed = [
+        mg.Pair(f"{p.name}{i}", "R", *(k if k == "frame" else f"{k}{i}" for k in (p.a, p.b)), point=p.point, axis=Z)
+        for i, part in enumerate(parts)
+        for p in part.pairs
+    ]
+    m = mg.Mechanism("two", None, renamed, ["A0", "A1"], [mg.Effort("D00", -1.0), mg.Effort("D01", -2.0)])
+    for d in (1e-3, 1e-5):
+        end = np.array([0.5 - d, 0.3])
+        on_line = np.array([[0.3], [1.0], [1.8]]) * end
+        whole, part = (
+            solved(m, {"A0": mg.Motion(q[:, 0], 1.0), "A1": mg.Motion(q[:, 1], 0.6)}) for q in (on_line, on_line[1:2])
+        )
+        worst, where, faults = differences(whole, part, pick=np.array([1]))
+        assert not faults
+        assert (part.status == "ok").all()
+        assert worst < 1e-7, where
+
+
+@pytest.mark.parametrize("form", ["full", "reduced"])
+@pytest.mark.parametrize("begin", [-1e-3, 1e-3])
+def test_passive_bodies_beside_a_change_point(begin, form):
+    """A rod on a rocker of a parallelogram stands where it stands, however short the path beside the change point is."""
+    m, rod = parallelograms(ONE, -0.5), mg.Link("rod", mass=1.0, center=(2.5, 0.5, 0.2), inertia=0.01 * np.eye(3))
+    more = [
+        mg.Pair("E", "S", "rocker0", "rod", point=(2.6, -0.3, 0.5)),
+        mg.Pair("F", "S", "rod", "second", point=(2.3, 1.9, 0.1)),
+        mg.Pair("G", "R", "second", "frame", point=(3.8, 0.6, 0.3), axis=(0.3, 0.2, 1)),
+    ]
+    links = [*(mg.Link(k) for k in (*m.link_names(), "second")), rod]
+    m = mg.assemble(m.replace(links=links, pairs=[*m.pairs, *more]), {"A": begin + 0.5})
+    at = np.array([-0.6, -1e-2, -1e-3, 0.0, 3e-5, 1e-3, 0.2]) + begin + 0.5
+
+    def at_rest(q):
+        options = Options(method=None, form=form)
+        found = Pipeline(DriverMotion(m, {"A": mg.Motion(q, 1.0)}), options).run().trajectory
+        return Solution(found)
+
+    whole = at_rest(at)
+    for pick in ([4], [1, 2, 3]):
+        part = at_rest(at[pick])
+        assert (part.status == whole.status[pick]).all()
+        gap = np.abs(part.link("rod").pose - whole.link("rod").pose[pick])
+        assert gap.max() < SAME, f"{pick}: {gap.max():.1e}"
 
 
 # --- several links in one passive motion ------------------------------------------------------------------------------------
