@@ -153,8 +153,9 @@ class Legs:
                 continue
             beside = beside[np.abs(self.place[beside] - place) < crossing.window]
             straight = np.abs(self.values[:, beside] - crossing.drives(self.place[beside])).max(axis=0) < 1e-12
-            out.near[beside[straight]] = len(out.crossings)
-            out.crossings.append(crossing)
+            if straight.any():
+                out.near[beside[straight]] = len(out.crossings)
+                out.crossings.append(crossing)
         out.interpolate()
 
     def _closed(self, out: Positions, interpolation: Interpolation, at: Index, whole: bool) -> Mask:

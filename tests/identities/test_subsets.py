@@ -365,6 +365,14 @@ def test_paths_may_begin_and_end_beside_a_change_point(bars, begin, engine):
         assert_same_beside(whole, part, pick, np.abs(at[pick]))
 
 
+def test_change_points_near_each_other():
+    """Beside one of two change points a position may lie outside of what is interpolated: it is closed alone."""
+    bars, begin = [ONE[0], Bars(0.8, 1.5, 0.8, 1.5, lean=0.02)], -0.5
+    m = parallelograms(bars, begin)
+    for off in (1e-3, 4e-3):
+        assert_parallel(solved(m, {"A": [off - begin, 0.9]}), bars, np.array([off - begin, 0.9]), begin)
+
+
 def test_cases_and_periods_beside_a_change_point():
     """Cases of a call, and positions turns later, are solved as those of one path are, and on its branch."""
     m = parallelograms(ONE, -1e-5)
