@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_modes import FOUR, STEPHENSON, WATT, planar
+from test_modes import FOUR, STEPHENSON, WATT, planar, platform
 
 import mechgraph as mg
 from mechgraph.modes import finding, product
@@ -58,6 +58,15 @@ def test_a_planar_mechanism_falls_into_its_groups(m: mg.Mechanism, driven: str, 
 def test_rods_belong_to_the_groups_of_the_bodies_that_they_join() -> None:
     found = groups_of(Question(RODS, {"O0": 0.1}).form.family)
     assert [(group.names, group.family.rank) for group in found] == [(["O3"], 1), (["O6"], 1)]
+
+
+def test_every_leg_of_a_platform_whose_pose_is_given_is_a_group() -> None:
+    """Legs turn about themselves: that they do so against the platform holds them, not that they stand still alone."""
+    rng = np.random.default_rng(0)
+    m = platform(rng.normal(size=(6, 3)), rng.normal(size=(6, 3)) + [0, 0, 3])
+    pose = mg.kinematics(m, {f"P{i}": 0.0 for i in range(6)}).link("platform").pose
+    found = groups_of(Question(m, {"platform": pose}).form.family)
+    assert [group.names for group in found] == [[f"A{i}", f"P{i}", f"B{i}"] for i in range(6)]
 
 
 @pytest.mark.parametrize(

@@ -224,9 +224,9 @@ def _smallest(rows: Constraints, body: Index, unknown: list[tuple[int, int]], fr
         return every
     merged = _merged(rows, body)
     for root in sorted(every, key=lambda i: i != frame):
-        mine = smallest(merged, every - {root}, {root}) | {root}
+        mine = smallest(merged, merged.determined(every - {root}, {root}), {root}) | {root}
         joined = [(int(body[a]), int(body[b])) for a, b in unknown if mine.issuperset(body[[a, b]].tolist())]
-        if len(mine) < count and len({components_of_edges(count, joined)[i] for i in mine}) == 1:
+        if 1 < len(mine) < count and len({components_of_edges(count, joined)[i] for i in mine}) == 1:
             return mine
     return every
 
@@ -249,7 +249,11 @@ def _constraints(family: Family) -> Constraints:
             out.append(Constraint(len(out), {a: -(w @ T)[None], b: (w @ T)[None]}))
     for rates in family.passive.T:
         V = here.link_twists(rates[:, None])[:, :, 0]
-        out.append(Constraint(len(out), {i: (v @ T)[None] for i, v in enumerate(V.T) if np.abs(v).max() > SPAN}))
+        moved = {i: (v @ T)[None] for i, v in enumerate(V.T) if np.abs(v).max() > SPAN}
+        # against a neighbour that rests
+        rests = next(b if a in moved else a for a, b in s.graph.ends if (a in moved) != (b in moved))
+        moved[rests] = -np.sum(list(moved.values()), axis=0)
+        out.append(Constraint(len(out), moved))
     return Constraints(out, T.shape[1])
 
 
