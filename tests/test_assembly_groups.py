@@ -63,7 +63,7 @@ def test_rods_belong_to_the_groups_of_the_bodies_that_they_join() -> None:
 def test_every_leg_of_a_platform_whose_pose_is_given_is_a_group() -> None:
     """Legs turn about themselves: that they do so against the platform holds them, not that they stand still alone."""
     rng = np.random.default_rng(0)
-    m = platform(rng.normal(size=(6, 3)), rng.normal(size=(6, 3)) + [0, 0, 3])
+    m = platform(rng.normal(size=(6, 3)), rng.normal((0.0, 0.0, 3.0), 1.0, (6, 3)))
     pose = mg.kinematics(m, {f"P{i}": 0.0 for i in range(6)}).link("platform").pose
     found = groups_of(Question(m, {"platform": pose}).form.family)
     assert [group.names for group in found] == [[f"A{i}", f"P{i}", f"B{i}"] for i in range(6)]
