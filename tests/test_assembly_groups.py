@@ -119,6 +119,29 @@ def test_a_group_that_leaves_its_class_is_no_group() -> None:
         assert (group.family.rank, group.within) == (3, stays)
 
 
+def test_feet_at_one_place_of_links_that_part_are_two() -> None:
+    """A body on a ball and three rods, two of them from one place at the start, which only the rocker of an RSSR leaves."""
+    rng, place = np.random.default_rng(3), {}
+    for name in ("crank", "near", "far", "rocker"):
+        place[name] = {"point": rng.normal(size=3), "axis": rng.normal(size=3)}
+    ball, foot, other, *heads = rng.normal(size=(6, 3))
+    pairs = [
+        mg.Pair("A", "R", "ground", "crank", **place["crank"]),
+        mg.Pair("B", "S", "crank", "coupler", point=place["near"]["point"]),
+        mg.Pair("C", "S", "coupler", "rocker", point=place["far"]["point"]),
+        mg.Pair("D", "R", "rocker", "ground", **place["rocker"]),
+        mg.Pair("E", "S", "ground", "body", point=ball),
+    ]
+    for i, (link, at, head) in enumerate(zip(("ground", "rocker", "ground"), (foot, foot, other), heads, strict=True)):
+        pairs += [
+            mg.Pair(f"F{i}", "S", link, f"rod{i}", point=at),
+            mg.Pair(f"G{i}", "S", f"rod{i}", "body", point=head),
+        ]
+    modes = mg.assemblies(mg.Mechanism("feet", pairs=pairs, frame="ground"), {"A": 0.2})
+    assert len(groups_of(Question(modes.mechanism, {"A": 0.2}).form.family)) == 2
+    assert (modes.total, modes.completeness) == (2 * 8, "proved")
+
+
 @pytest.fixture(autouse=True)
 def _empty(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MECHGRAPH_CACHE", str(tmp_path))

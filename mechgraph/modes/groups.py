@@ -171,12 +171,15 @@ class Group:
         if not n:
             return Family(Configuration(System(m, None, numbers), x), columns, idle, held)
         assert isinstance(s, RodSystem)
+        assert isinstance(self.whole, RodFamily)
         a, b = (np.array([place[link] for link in side]) for side in np.split(ends[2 * P :], 2))
         at_a, at_b = np.split(markers[:, 3, 2 * P :], 2, axis=1)
         points = PointNumbers(
             a, b, at_a, at_b, s.points.length[self.rods], np.zeros((3, 0, 1)), np.full(n, -1), np.zeros((n, 1))
         )
-        return RodFamily(Configuration(RodSystem(m, None, numbers, points), x), columns, idle, held)
+        # points of links that known pairs join may lie at one place at the start and part when these move
+        same = self.whole.joints[self._markers[2 * P :] - 2 * len(full.pairs)]
+        return RodFamily(Configuration(RodSystem(m, None, numbers, points), x), columns, idle, held, same)
 
 
 def groups_of(family: Family) -> Sequence[Undivided | Group]:

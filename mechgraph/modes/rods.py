@@ -98,13 +98,18 @@ class RodSystem(System):
 
 
 class RodFamily(Family):
-    """The class of a mechanism with rods: points that are one on a body stay one, all else of points and lengths is free."""
+    """The class of a mechanism with rods: points that are one on a body stay one, all else of points and lengths is free.
+
+    ``same (2 n,)`` are numbers that points which are one share; left out, points at the same place of a link are one.
+    """
 
     system: RodSystem
 
-    def __init__(self, here: Configuration, columns: Index, idle: Array, held: Index) -> None:
+    def __init__(
+        self, here: Configuration, columns: Index, idle: Array, held: Index, same: Index | None = None
+    ) -> None:
         super().__init__(here, columns, idle, held)
-        k = self.system.points
+        k, self._same = self.system.points, same
         self.rods = len(k.a)
         self.bearers = np.concatenate([self.bearers, k.a, k.b])
         points = identity(2 * self.rods, 1).astype(complex)
@@ -114,6 +119,8 @@ class RodFamily(Family):
     @cached_property
     def joints(self) -> Index:
         """For every point ``(2 n,)``, those on links a first, the first one that is the same point of the same link."""
+        if self._same is not None:
+            return np.asarray(np.argmax(self._same[:, None] == self._same, axis=1))
         k = self.system.points
         links, at = np.concatenate([k.a, k.b]), np.concatenate([k.at_a, k.at_b], axis=1)[:, :, 0]
         same = (np.abs(at[:, :, None] - at[:, None]).max(axis=0) < SPAN) & (links[:, None] == links)
