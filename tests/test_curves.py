@@ -489,6 +489,23 @@ def test_the_end_of_an_open_curve_ends_the_reach_by_name(reversed_):
     assert np.isnan(s.link("arm").pose[-1]).any()
 
 
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+def test_a_carriage_that_leaves_its_rail_between_positions_is_out_of_reach_from_there_on(engine):
+    """A slider-crank (crank 1, rod 3) reaches 4 at the crank angle 0, 1e-6 beyond its rail; turns later it has left it as well."""
+    rail = mg.Curve.through(points=[(x, 0, 0) for x in np.linspace(1.9, 4.0 - 1e-6, 6)])
+    head = (np.cos(1.0) + np.sqrt(9.0 - np.sin(1.0) ** 2), 0.0, 0.0)
+    pairs = [
+        mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=(0, 0, 1)),
+        mg.Pair("B", "R", "crank", "rod", point=(np.cos(1.0), np.sin(1.0), 0), axis=(0, 0, 1)),
+        mg.Pair("C", "R", "rod", "slider", point=head, axis=(0, 0, 1)),
+        mg.Pair("D", "P", "frame", "slider", point=head, curve=rail),
+    ]
+    m = mg.Mechanism("slider-crank", None, pairs, ["A"])
+    for q in ([-0.9, -2.0], [2.0, -0.9, -0.1 - 6 * np.pi], np.linspace(-0.9, -2.0, 50)):
+        s = mg.kinematics(m, {"A": q}, on_reach="flag", engine=engine)
+        assert (s.status == np.where(np.array(q) > -1.0, "ok", "out of reach")).all()
+
+
 def test_curves_and_surfaces_are_drawn_where_they_are():
     """The symbol of a pair shows its curve as a line through the marker, on link b that of its own; no straight guide beside it."""
     round_, open_ = mg.Curve.ellipse(a=2.0, b=1.0), mg.Curve.line(point=(2, 0, 0), direction=(0, 1, 0), ends_at=(-1, 1))
