@@ -135,6 +135,24 @@ def test_advice_keeps_freedoms_that_couplings_tie() -> None:
     assert str(report)
 
 
+def test_advice_keeps_pairs_of_gears_and_of_springs_and_can_be_applied() -> None:
+    """A four-bar behind gears, a torsion spring at its rocker: a bearing that floats does not hold a gear, and a ball has no angle."""
+    pairs = [
+        mg.Pair("M", "R", "frame", "pinion", point=(-0.06, 0, 0), axis=known.Z),
+        mg.Pair("A", "R", "frame", "wheel", point=(0, 0, 0), axis=known.Z),
+        mg.Pair("B", "R", "wheel", "rod", point=(0.02, 0, 0), axis=known.Z),
+        mg.Pair("C", "R", "rod", "rocker", point=(0.02, 0.1, 0), axis=known.Z),
+        mg.Pair("D", "R", "frame", "rocker", point=(0.1, 0, 0), axis=known.Z),
+    ]
+    gear = mg.SpurGears("teeth", "M", "A", teeth=(20, 40))
+    m = mg.Mechanism("geared", None, pairs, ["M"], couplings=[gear], loads=[mg.TorsionSpring("D", stiffness=1.0)])
+    report = mg.check(m)
+    assert report.advice
+    for advice in report.advice:
+        assert advice.effect is not None
+        assert mg.check(advice.apply()).redundancy == advice.effect.redundancy[1] < report.redundancy
+
+
 def test_effects_hold_where_pairs_have_moved() -> None:
     """A universal joint away from its zero: made a sphere it adds one passive freedom or mobility, here as where it was declared."""
     declared, moved = mg.check(known.rsur()), mg.check(known.rsur(), at={"A": 0.3})

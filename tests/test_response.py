@@ -390,6 +390,21 @@ def test_loads_along_motions_without_inertia_are_refused(function):
     assert r["A"].velocity[-1, 0] == pytest.approx(1.0, abs=1e-9)
 
 
+@pytest.mark.parametrize("loads", [[], [mg.Effort("A", 1.0)], [mg.TorsionSpring("A", stiffness=1.0, free=1.0)]])
+def test_a_massless_crank_at_its_dead_point_is_refused_and_beside_it_keeps_the_power(loads):
+    """Only the piston has mass: at the dead point nothing says how the crank goes on, there or a rounding beside it."""
+    piston = mg.Mechanism("engine", [mg.Link("frame"), mg.Link("crank"), mg.Link("rod"), mg.Link("piston", 3.0, (0.4, 0, 0))], [
+        mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=Z), mg.Pair("B", "R", "crank", "rod", point=(0.1, 0, 0), axis=Z),
+        mg.Pair("C", "R", "rod", "piston", point=(0.4, 0, 0), axis=Z),
+        mg.Pair("D", "P", "frame", "piston", point=(0.4, 0, 0), axis=(1, 0, 0)),
+    ], loads=loads)  # fmt: skip
+    for at in (0.0, 1e-9):
+        with pytest.raises(mg.ResponseError, match="only links without inertia move in this position"):
+            mg.respond(piston, (0, 0.1), start={"A": at}, rates={"A": 8.0})
+    r = mg.respond(piston, (0, 0.1), start={"A": 0.3}, rates={"A": 8.0})
+    assert np.abs(r.energy.balance).max() < 1e-7 * r.energy.kinetic.max()
+
+
 def test_a_chain_of_sixty_pendulums_starts_as_lagrange_says():
     """M_ij = m l^2 (n - j - 1/2) cos(a_i - a_j) for j > i, m l^2 (n - i - 2/3) on the diagonal, of absolute angles a; batches agree."""
     n, m, rod_length = 60, 0.1, 0.05

@@ -138,6 +138,11 @@ class Load(Described, ABC):
         named = [getattr(self, name) for name, about in self.formats.items() if about.kind is FREEDOM_NAME]
         return named[0] if named else None
 
+    @property
+    def takes_coordinate(self) -> bool:
+        """Whether it depends on the coordinate of its freedom, which then has to be a single one."""
+        return any(about.kind is FREEDOM_NAME and about.single for about in self.formats.values())
+
     def with_full_names(self, full_name: Callable[[str], str]) -> Self:
         """The same with its freedom spelled in full."""
         names = [name for name, about in self.formats.items() if about.kind is FREEDOM_NAME and getattr(self, name)]

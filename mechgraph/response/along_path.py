@@ -30,9 +30,9 @@ from mechgraph.closure.driver_path import DriverPath
 from mechgraph.closure.indexing import System
 from mechgraph.closure.rank import closure_rank
 from mechgraph.closure.solver import closure_solver
-from mechgraph.response.chart import Closed
+from mechgraph.response.chart import Closed, Stopped
 from mechgraph.response.charts import Task
-from mechgraph.response.motion_equations import along_one
+from mechgraph.response.motion_equations import MASSLESS, along_one
 from mechgraph.response.way import POINTS, Piece, Way
 
 FAST = 2.0
@@ -43,6 +43,11 @@ UNEVEN = 0.37
 """Where in its part of a turn loads are compared with those a turn later: not at the quarters, where change points often are."""
 PERIODIC = 1e-9
 """Difference of poses (and part of the largest term) after a turn of the coordinate up to which the path has come back."""
+
+AT_DEAD_POINT = (
+    "only links without inertia move in this position, as a massless crank at its dead point does, and nothing decides how they go "
+    "on. Give them mass or inertia, or start in another position"
+)
 
 
 class Arc:
@@ -139,6 +144,8 @@ class PathStage:
         self._piece: Piece | None = None
         self._turns = 0.0
         self._mass, force = self._terms(u)[:2].tolist()
+        if self._piece is not None and self._mass <= MASSLESS * np.abs(self._piece.series[:, 0]).sum():
+            raise Stopped(AT_DEAD_POINT)
         self.energy = 0.5 * self._mass * v * v + abs(force) or 1.0
 
     def begin(self) -> Array:
@@ -164,6 +171,8 @@ class PathStage:
         """See ``Stage``."""
         u, w = float(y[0]), float(y[1])
         mass, stored, p1, p2 = self._terms(u).tolist()
+        if not mass > 0.0:
+            return np.full(3, np.nan)
         size = math.sqrt(mass / self._mass)
         v = w / size
         rest = p1 + v * p2

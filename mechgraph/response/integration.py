@@ -130,8 +130,8 @@ class Integration:
                         message = stepper.step()
                     if stepper.status == "failed":
                         raise Stopped(
-                            f"{message} Steps collapse where loads are stiff or jump, and at positions where the mechanism locks; for "
-                            "stiff loads use method='Radau'"
+                            f"{message} Steps collapse where loads are stiff or jump, and at positions where the mechanism locks or "
+                            "only links without inertia move; for stiff loads use method='Radau'"
                         )
                     self.work.steps += 1
                     self.segments.append(Segment(t, stepper.t, stage, stepper.dense_output(), work))

@@ -124,15 +124,18 @@ def stresses_of(freedoms: Freedoms) -> Array:
 
 
 def changes_of(freedoms: Freedoms) -> list[Change]:
-    """All single changes that leave the drivers in place, with their power on the self-stresses (drivers free).
+    """All single changes that leave drivers, couplings and loads in place, with their power on the self-stresses (drivers free).
 
-    Random self-stresses give the same rank at one pair as all of them.
+    Random self-stresses give the same rank at one pair as all of them. Pairs between gears keep their types: gears turn about their
+    axes and do nothing else.
     """
     here, rows = freedoms.position.declared, freedoms.position.rows
     system = here.system
     states = stresses_of(freedoms)
     stress = np.moveaxis(pair_states(here, states)[..., 0], 1, 0)
     tied = [d.freedom for d in system.m.drives] + [name for c in system.m.couplings for name, _ in c.terms]
+    tied += [load.in_freedom for load in system.m.loads if load.in_freedom is not None and load.takes_coordinate]
+    geared = {step.pair for c in system.m.couplings for step in c.steps}
     needed: dict[int, set[str]] = {}
     for k, j in map(system.m.freedom, tied):
         needed.setdefault(k, set()).add(system.m.pairs[k].type.freedoms[j].name)
@@ -141,7 +144,7 @@ def changes_of(freedoms: Freedoms) -> list[Change]:
         frames = here.frames[g][-1][..., 0]
         for number, new in enumerate(wider_types(system.m.pairs[int(group.pairs[0])].type)):
             single = {f.name for f, ok in zip(new.freedoms, new.drivable, strict=True) if ok}
-            keeps = [needed.get(k, set()) <= single for k in group.pairs.tolist()]
+            keeps = [k not in geared and needed.get(k, set()) <= single for k in group.pairs.tolist()]
             some = np.flatnonzero(keeps).astype(np.intp)
             pairs = group.pairs[some]
             made = _changes_to(group.row, new, frames[:, :, some], stress[pairs], pairs)
