@@ -573,3 +573,14 @@ def test_a_function_may_yield_its_derivatives():
     listed = mg.Curve.function(position=lambda u: list(helix(u)), ends_at=(0.0, 6.0))
     s = np.linspace(0, 8, 7)
     assert_allclose(curve.once(Travel).at(s).y, listed.once(Travel).at(s).y, atol=1e-15)
+
+
+def test_a_function_is_never_asked_for_nothing():
+    """All positions of a call may be interpolated, as beside a change point."""
+
+    def line(u):
+        assert u.min() >= 0.0
+        zero = 0.0 * u
+        return [np.stack([x, zero, zero]) for x in (u, zero + 1.0, zero, zero)]
+
+    assert mg.Curve.function(position=line, ends_at=(0.0, 1.0)).at(np.zeros(0)).shape == (4, 3, 0)

@@ -26,6 +26,8 @@ def asked(function: Callable[..., Any], at: Sequence[Array], least: int, most: i
     ShapeError
         where the function raises (its cause), or returns anything but ``least`` or more finite arrays ``(3, n)``.
     """
+    if not at[0].size:  # as where all positions are interpolated beside a change point; what reduces nothing raises
+        return np.zeros((most, 3, 0))
     found = _asked(function, at, least, most)
     if isinstance(found, np.ndarray):
         return found
