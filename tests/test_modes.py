@@ -89,6 +89,31 @@ def test_at_its_fold_the_two_assemblies_of_a_four_bar_are_a_double_point() -> No
     assert np.isinf(modes.condition[0])
 
 
+@pytest.mark.parametrize("away", [0.0, 1e-6])
+def test_where_a_single_rod_can_just_reach_there_is_a_double_point(away: float) -> None:
+    """One row has one singular value, which says nothing by comparison with the largest."""
+    foot, head = np.array([2.0, 0, 0]), np.array([0.6, 0.8, 0])
+    pairs = [
+        mg.Pair("A", "R", "ground", "flap", point=(0, 0, 0), axis=Z),
+        mg.Pair("B", "S", "ground", "sleeve", point=foot),
+        mg.Pair("C", "P", "sleeve", "rod", point=foot, axis=head - foot),
+        mg.Pair("D", "S", "rod", "flap", point=head),
+    ]
+    m = mg.Mechanism("flap", pairs=pairs, frame="ground")
+    modes = mg.assemblies(m, {"C": 3.0 - away - np.linalg.norm(head - foot)})
+    assert modes.completeness == "proved"
+    assert modes.kinds == (("regular",) * 2 if away else ("double",))
+    assert modes.condition.min() > 100.0
+
+
+def test_an_open_chain_has_one_assembly() -> None:
+    places = {"A": ("ground", "arm", (0, 0, 0)), "B": ("arm", "hand", (1, 0, 0))}
+    pairs = [mg.Pair(name, "R", a, b, point=point, axis=Z) for name, (a, b, point) in places.items()]
+    modes = mg.assemblies(mg.Mechanism("chain", pairs=pairs, frame="ground"), {"A": 0.3, "B": 0.2})
+    assert (len(modes), modes.total, modes.completeness) == (1, 1, "proved")
+    assert "no loop has to be closed" in modes.evidence[0]
+
+
 def test_a_parallelogram_folded_flat_is_a_double_point_and_a_kite_that_spins_a_continuum() -> None:
     flat = mg.assemblies(linked_four_bar(1.0, 2.0, 1.0, 2.0, 0.5), {"O0": 0.0})
     assert "double" in flat.kinds

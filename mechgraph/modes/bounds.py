@@ -112,7 +112,7 @@ def _of_loops(family: Family) -> Bound | None:
             sources.append(entry.source)
         known[unknown] = True
         left.remove(loop)
-    return Bound(count, "; ".join(sources))
+    return Bound(count, "; ".join(sources) or "no loop has to be closed")
 
 
 def _entry(dimension: int, letters: str) -> Bound | None:

@@ -315,6 +315,11 @@ def at_rest(motions: Array, held: Index) -> Array:
     return np.asarray(motions @ Vt[int((sigma > SPAN).sum()) :].T)
 
 
+def parts(sigma: Array) -> Array:
+    """Singular values ``(..., n)`` of closure rows as parts of the largest, or of 1, the size of rows of turns: a lone rod has but one."""
+    return np.asarray(sigma / np.maximum(sigma[..., :1], 1.0))
+
+
 def span(S: Array) -> Array:
     """Orthonormal basis of the span of columns."""
     if not S.size:

@@ -16,7 +16,7 @@ from mechgraph.force.applied_loads import user_poses
 from mechgraph.modes.balls import TINY
 from mechgraph.modes.bounds import bound
 from mechgraph.modes.certificate import Certificate, certificate, told_apart
-from mechgraph.modes.family import Array, Family
+from mechgraph.modes.family import Array, Family, parts
 from mechgraph.modes.form import Form, Whole
 from mechgraph.modes.groups import Group, Undivided, groups_of
 from mechgraph.modes.monodromy import Irregular, StartSet, distinct, start_set
@@ -156,9 +156,8 @@ class Finder:
         """Which assemblies that are not real are no regular points."""
         J = Configuration(self.family.system, x).J[:, self.family.free].transpose(2, 0, 1)
         sigma = np.linalg.svd(J, compute_uv=False)
-        least = len(self.family.free) - self.family.passive.shape[1] - 1
         large = np.abs(x).max(axis=0, initial=0.0) > LARGE_STATE
-        return np.asarray((sigma[:, least] < SINGULAR * sigma[:, 0]) & ~large)
+        return np.asarray((parts(sigma)[:, : self.family.unknowns] < SINGULAR).any(axis=1) & ~large)
 
     def _of_continuum(self, i: int) -> Array:
         """A real assembly ``(nx, 1)`` of a continuum that tracks met at complex points, the nearest to the start; or none."""
@@ -210,8 +209,9 @@ class Finder:
         family = self.family
         J = here.J[:, family.free, 0]
         _, sigma, Vt = np.linalg.svd(J)
-        rank, wanted = int((sigma > SINGULAR * sigma[0]).sum()) if sigma.size else 0, family.unknowns
-        condition = float(sigma[0] / max(sigma[wanted - 1], TINY)) if wanted else 1.0
+        size = parts(sigma)
+        rank, wanted = int((size > SINGULAR).sum()), family.unknowns
+        condition = float(1.0 / max(size[wanted - 1], TINY)) if wanted else 1.0
         sure = certificate(here, family.free, family.passive.shape[1], not self.fault)
         # what is proved is regular, be it ever so close to a double point
         if rank >= wanted or (sure is not None and sure.proved):

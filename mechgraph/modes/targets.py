@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mechgraph.modes.family import GENERIC, Array, Family, Member
+from mechgraph.modes.family import GENERIC, Array, Family, Member, parts
 from mechgraph.modes.homotopy import Care, Equations, Leg, follow, rounding
 from mechgraph.modes.monodromy import ONE_ASSEMBLY, StartSet, distinct, fingerprints
 from mechgraph.numerics.linear import Index
@@ -223,4 +223,4 @@ def _settled(family: Family, at: Member, x: Array) -> tuple[Array, Array, Array]
     here = leg.at(x, one, tracks)
     closed = np.abs(here.here.residual).max(axis=0, initial=0.0) < 1e-10
     sigma = np.linalg.svd(here.J.transpose(2, 0, 1), compute_uv=False)
-    return x, closed, closed & (sigma[:, family.unknowns - 1] > GENERIC * sigma[:, 0])
+    return x, closed, closed & (parts(sigma)[:, : family.unknowns] > GENERIC).all(axis=1)
