@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from mechanisms import linked_four_bar
+from test_assembly_groups import spatial
 
 import mechgraph as mg
 
@@ -63,6 +64,15 @@ def test_circuits_are_what_solve_runs_through() -> None:
         solved, rocker = s.status == "ok", m.freedom_names().index("D.Rz")
         assert solved.mean() > 0.9
         assert np.abs(s["D"].position[:, 0] - one.coordinates[:, rocker])[solved].max() < 1e-8
+
+
+def test_a_fold_at_which_no_other_branch_ends_leaves_the_map_open() -> None:
+    """The branches that it meets begin between two samples, so that circuits are not told; with samples on them they are one."""
+    m = spatial(("RSSR", "frame", "frame"), ("SSP", "03", "frame"), seed=3)
+    coarse, fine = (mg.branches(m, "O0", over=(0.0, 0.1), samples=n, points=20) for n in (3, 20))
+    assert (len(coarse), len(coarse.circuits), coarse.open_ends) == (2, 2, 2)
+    assert (len(fine), len(fine.circuits), fine.open_ends) == (4, 1, 0)
+    assert "2 ends of branches could not be told" in " ".join(str(coarse).split())
 
 
 def test_branch_circuit_and_order_defects_are_told() -> None:

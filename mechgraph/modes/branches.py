@@ -68,7 +68,8 @@ class Branches(Shown):
     circuits : numbers of the branches of each: what can be run through without taking the mechanism apart.
     completeness : of the assemblies at the samples, see ``Assemblies``.
     resolution : distance of the samples; a branch that begins and ends between two of them is not seen.
-    open_ends : ends of branches that are neither a fold nor another sample's assembly; 0 where the map is whole.
+    open_ends : ends of branches that are neither a fold at which another one ends too nor another sample's assembly; 0 where the map is
+        whole.
     """
 
     mechanism: Mechanism
@@ -168,7 +169,9 @@ class Branches(Shown):
             *(["Each fold is a double point: the assemblies of two branches are one there."] if folds else []),
         ]
         if self.open_ends:
-            words.append(f"{counted(self.open_ends, 'end')} of branches could not be told: the map is not whole.")
+            words.append(
+                f"{counted(self.open_ends, 'end')} of branches could not be told: the map is not whole; more samples may tell."
+            )
         words += [
             f"Branches {', '.join(map(str, b.branches))} cross at {values_text(m, {driver: b.value})}, a double point."
             for b in self.bifurcations

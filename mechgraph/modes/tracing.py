@@ -164,7 +164,8 @@ class Map:
         self.of = {node: number for number, chain in enumerate(self.chains) for node in chain}
         self.folds = self._folds([p for p in pieces if p.fold])
         self.crossings = self._crossings([(p, *at) for p in pieces for at in p.crossings])
-        self.open = sum(p.arrives < 0 and not p.fold for p in pieces)
+        folded = {(p.sample, p.mode, p.sense) for pair in self.folds for p in pair}
+        self.open = sum(p.arrives < 0 and at not in folded for at, p in self.piece.items())
 
     def cyclic(self, number: int) -> bool:
         """Whether a branch comes back to where it begins."""
