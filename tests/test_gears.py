@@ -380,6 +380,7 @@ def test_geared_rotors_swing_as_one():
         (lambda: two(mg.SpurGears("g", "A", "A", teeth=(1, 2))), "the same freedom"),
         (lambda: two(spur(), second="P"), "b = 'B': is a pair P; expected one whose only freedom is a turn"),
         (lambda: two(mg.BevelGears("g", "A", "B", teeth=(1, 2), module=0.1), b=(0.3, 0.1, 0), axis=(1, 0, 0)), "pass each other at 0.1"),
+        (lambda: two(mg.BevelGears("g", "A", "B", teeth=(1, 2), module=0.1), b=(1, 0, 0), axis=(1, 0, 0)), "point of 'A' is where"),
         (lambda: two(mg.WormGear("g", "A", "B", teeth=(1, 30), radius=0.2), b=(0.1, 0, 0), axis=(0, 1, 0)), "more than the radius"),
         (lambda: two(mg.Belt("g", "A", "B", radii=(0.2, 0.2), crossed=True)), "expected more than 0.4"),
         (lambda: two(mg.Belt("g", "A", "B", radii=(0.2, 0.15))), "0.3 apart, and the pulleys overlap; expected more than 0.35"),

@@ -266,6 +266,25 @@ def test_a_round_of_a_closed_curve_makes_no_further_assembly() -> None:
     assert np.abs(q.coordinates(x) - q.coordinates(rounds)).max() < 1e-12
 
 
+@pytest.mark.parametrize(("ends_at", "offsets"), [(None, [-5.97, -0.03]), ((-2.5, 0.5), [-0.03]), ((-0.02, 0.5), [])])
+def test_an_assembly_beyond_the_end_of_a_slot_is_none(ends_at, offsets) -> None:
+    """A crank of 1 at 0.3 rad in a lever that turns 2 below: the pin, 3 from the pivot at the start, is at 2.97 on either side of it."""
+    slot = mg.Curve.line(point=(0, 1, 0), direction=(0, 1, 0), ends_at=ends_at)
+    pairs = [
+        mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=Z),
+        mg.Pair("C", "R", "frame", "lever", point=(0, -2, 0), axis=Z),
+        mg.Pair("S", "Ps", "lever", "crank", point=(0, 1, 0), axis=Z, curve=slot),
+    ]
+    m = mg.Mechanism("quick return", pairs=pairs, drives=["A"])
+    modes = mg.assemblies(m, {"A": 0.3}, guesses=40)
+    assert sorted(round(mode.start["S.Ts"], 2) for mode in modes) == offsets
+    if offsets:
+        assert mg.assemble(m, {"A": 0.3}).start["S.Ts"] == pytest.approx(-0.03, abs=0.01)
+    else:
+        with pytest.raises(mg.AssemblyError, match=r"at A = 0.3; there S.Ts is beyond the end of its curve"):
+            mg.assemble(m, {"A": 0.3})
+
+
 def test_bad_arguments_are_all_named() -> None:
     with pytest.raises(mg.DeclarationError) as caught:
         mg.assemblies(mg.load("four-bar"), {"A": 0.1}, seed=-1, guesses=0, turns=0, progress=3)

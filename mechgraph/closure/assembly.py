@@ -15,6 +15,7 @@ from mechgraph.closure.driver_path import FARTHEST, DriverPath, Request, Status,
 from mechgraph.closure.following import follow
 from mechgraph.closure.indexing import Index, System, indexed
 from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
+from mechgraph.closure.ranges import BEYOND_END, beyond
 from mechgraph.closure.solver import closure_solver, engine_for
 from mechgraph.errors import AssemblyError, DeclarationError
 from mechgraph.model.mechanism import Mechanism
@@ -340,6 +341,7 @@ def assembled_at(
         x, error = close(raw, x, columns)
         if error > CLOSED:
             raise _not_reached(m, raw, x, error, values)
+        _refuse_beyond_ends(m, raw, x, values)
         return _state(scaled(Configuration(raw, x[:, None])))
     system, x = assembled(m, values)
     columns, goal = named_columns(m, system, values)
@@ -349,6 +351,7 @@ def assembled_at(
     x, done = led(system, x, columns, goal)
     if not done:
         raise _not_reached(m, system, x, float(np.abs(x[system.single_rows[columns]] - goal).max()), values)
+    _refuse_beyond_ends(m, system, x, values)
     return _state(scaled(Configuration(system, x[:, None])))
 
 
@@ -360,12 +363,24 @@ def _refuse_far(m: Mechanism, names: Iterable[str], way: Array, unit: Array) -> 
         raise DeclarationError(f"assemble {m.name!r}", faults)
 
 
-def _not_reached(m: Mechanism, system: System, x: Array, error: float, values: Mapping[str, float]) -> AssemblyError:
+def _refuse_beyond_ends(m: Mechanism, system: System, x: Array, values: Mapping[str, float]) -> None:
+    """Refuse a closed state in which a pair is beyond an end of its curve or surface."""
+    over = beyond(system, x[:, None])[:, 0]
+    if (over > BEYOND_END).any():
+        name = m.freedom_names()[int(system.limits[0][over.argmax()])]
+        why = f"there {name} is beyond the end of its curve or surface"
+        raise _not_reached(m, system, x, float(over.max()), values, why)
+
+
+def _not_reached(
+    m: Mechanism, system: System, x: Array, error: float, values: Mapping[str, float], why: str = ""
+) -> AssemblyError:
     best = dict(zip(m.freedom_names(), system.coordinates_of(x[:, None])[:, 0].tolist(), strict=True))
     asked = ", ".join(f"{name} = {value:.6g}" for name, value in values.items())
     reached = ", ".join(f"{name} = {best[m.full_name(name)]:.6g}" for name in values)
     return AssemblyError(
-        f"mechanism {m.name!r}: cannot be assembled at {asked}; came to {reached}, {error:.3g} short (radians, or lengths / L). "
+        f"mechanism {m.name!r}: cannot be assembled at {asked}; "
+        f"{why or f'came to {reached}, {error:.3g} short (radians, or lengths / L)'}. "
         "Take a value in reach, or another start or guess",
         error,
         best,

@@ -173,11 +173,13 @@ class BevelGears(Contact):
         size = max(float(np.abs(p - apex).max()) for p in (axes.pa, axes.pb))
         if off > fitting * max(size, self.module):
             return [f"the axes pass each other at {off:.4g}; bevel gears are on axes that intersect"]
-        if min(float(np.abs(p - apex).max()) for p in (axes.pa, axes.pb)) <= fitting * self.module:
-            return [
-                "the point of a pair is where the axes intersect; give one on the side of the apex on which the gear stands"
-            ]
-        return []
+        at_apex = [
+            q for q, p in ((self.a, axes.pa), (self.b, axes.pb)) if np.abs(p - apex).max() <= fitting * self.module
+        ]
+        return [
+            f"the point of {q!r} is where the axes intersect; give one on the side of the apex on which the gear stands"
+            for q in at_apex
+        ]
 
     def lines(self, axes: Axes) -> Lines:
         """See ``Contact``."""

@@ -98,9 +98,9 @@ class Pair(Described):
     radius : of the ball or cylinder on link b.
     hertz : Hertz, materials and what else the pressure in a contact takes.
     curve : a ``Curve`` in the frame of link a, along which the marker travels: of P, C, Sg, and of the types Ps and Kc that need one. Then
-        ``point`` is a place on it (where it begins if left out), and axis and second direction are those of its frame there. With
-        ``on_b`` instead of a point, coordinates are arc lengths from where the curve is nearest to that of ``on_a`` (where it begins if
-        left out; see ``start``).
+        ``point`` is a place on it (where it begins if left out), and axis and second direction are those of its frame there; in a
+        straight slot (Ps) ``axis`` is that of the pin. With ``on_b`` instead of a point, coordinates are arc lengths from where the
+        curve is nearest to that of ``on_a`` (where it begins if left out; see ``start``).
     curve_b : the curve on link b that touches it (Kc); a straight face where left out.
     surface : a ``Surface`` in the frame of link a, on which the marker of Sp travels; ``point`` is a place on it.
     roller : radius of a roller that runs on the curve, or of a ball on the surface; ``point`` is its centre.

@@ -8,6 +8,7 @@ import numpy as np
 
 from mechgraph.closure.assembly import CLOSED, close_all
 from mechgraph.closure.indexing import Index, System
+from mechgraph.closure.ranges import BEYOND_END, beyond
 from mechgraph.modes.family import Array
 
 GUESSES_TOGETHER = 200
@@ -26,7 +27,10 @@ def searched(
     rng: np.random.Generator,
     progress: Callable[[str], None] | None = None,
 ) -> Array:
-    """Closed states ``(nx, n)`` from ``starts`` random guesses within so many ``turns`` about ``x (nx,)``, drivers at ``drive (d,)``."""
+    """Closed states ``(nx, n)`` from ``starts`` random guesses within so many ``turns`` about ``x (nx,)``, drivers at ``drive (d,)``.
+
+    None has a pair beyond an end of its curve or surface.
+    """
     found = []
     turning = ~system.is_length
     for i in range(0, starts, GUESSES_TOGETHER):
@@ -38,5 +42,5 @@ def searched(
         guess = system.advance(np.repeat(x[:, None], n, axis=1), dq)
         guess[system.single_rows[columns]] = drive[:, None]
         closed, error = close_all(system, guess, columns)
-        found.append(closed[:, error <= CLOSED])
+        found.append(closed[:, (error <= CLOSED) & (beyond(system, closed) <= BEYOND_END).all(axis=0)])
     return np.concatenate(found, axis=1)

@@ -252,10 +252,10 @@ def reasons(r: Facts) -> list[str]:
 
 
 def assumed(r: Facts) -> list[str]:
-    """Second directions that were left out where the pair type needs one."""
+    """Second directions, where the pair type needs one, that are those taken where none is given."""
     return [
-        f"{p.name} ({p.type.symbol}): no second direction was given; x = ({', '.join(f'{v:.4g}' for v in p.second)}) was taken. Give "
-        "second=... if the marker has another direction."
+        f"{p.name} ({p.type.symbol}): its second direction is ({', '.join(f'{v:.4g}' for v in p.second)}), as taken where none is "
+        "given. Give second=... if the marker has another."
         for p in r.mechanism.pairs
         if p.type.square_second and p.point is not None and p.second == second_direction(p.axis)
     ]
