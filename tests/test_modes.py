@@ -106,6 +106,21 @@ def test_where_a_single_rod_can_just_reach_there_is_a_double_point(away: float) 
     assert modes.condition.min() > 100.0
 
 
+@pytest.mark.parametrize("angle", [0.0, 0.3])
+def test_what_is_passive_where_the_mechanism_is_declared_need_not_be_elsewhere(angle: float) -> None:
+    """The output of this RSSR turns about a line through the end of the rod at the crank, at that angle of the crank alone."""
+    near, far, axis = np.array([0.8, 0.3, 0.4]), np.array([2.0, 1.0, 0.5]), np.array([0.3, 0.2, 1.0])
+    pairs = [
+        mg.Pair("A", "R", "ground", "crank", point=(0, 0, 0), axis=Z),
+        mg.Pair("B", "S", "crank", "coupler", point=near),
+        mg.Pair("C", "S", "coupler", "output", point=far),
+        mg.Pair("D", "R", "output", "ground", point=near, axis=axis),
+    ]
+    modes = mg.assemblies(mg.Mechanism("rssr", pairs=pairs, frame="ground"), {"A": angle})
+    assert (modes.total, modes.completeness) == (2, "proved")
+    assert modes.kinds == (("regular",) * 2 if angle else ("continuum",))
+
+
 def test_an_open_chain_has_one_assembly() -> None:
     places = {"A": ("ground", "arm", (0, 0, 0)), "B": ("arm", "hand", (1, 0, 0))}
     pairs = [mg.Pair(name, "R", a, b, point=point, axis=Z) for name, (a, b, point) in places.items()]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -61,6 +61,13 @@ class Question:
                 self.start = declared
                 self._read()
                 self._refuse()
+        elif self.freedoms.passive:
+            # what is passive at the start alone would be taken out of the equations everywhere
+            for moved in self._moved():
+                if len(free_motion(self.system, moved.x[:, 0], self.columns).passive) < len(self.freedoms.passive):
+                    self.start = moved
+                    self._read()
+                    break
 
     def _read(self) -> None:
         """What can move at the start, and the class there."""
@@ -112,6 +119,17 @@ class Question:
         guess = self.system.advance(self.start.x, OFF_DEAD_POINT * rates[:, None] / rates[fastest])
         x, error = close_all(self.system, guess, held)
         return Configuration(self.system, x) if error[0] < CLOSED else self.start
+
+    def _moved(self) -> Iterator[Configuration]:
+        """Closed positions a little away from the start; drivers that stand still there are moved either way."""
+        motions, still = self.freedoms.null, self.columns[self.freedoms.still(self.columns)]
+        rates = motions @ np.random.default_rng(0).normal(size=motions.shape[1])
+        for sign in (1.0, -1.0) if still.size else (1.0,):
+            dq = OFF_DEAD_POINT * rates / np.abs(rates).max()
+            dq[still] = sign * OFF_DEAD_POINT
+            x, error = close_all(self.system, self.system.advance(self.start.x, dq[:, None]), self.columns)
+            if error[0] < CLOSED:
+                yield Configuration(self.system, x)
 
     def _refuse(self) -> None:
         """What is given leaves motions free where the mechanism is declared, and beside it."""
