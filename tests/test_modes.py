@@ -18,6 +18,7 @@ from mechgraph.model.chain import chain_symbols
 from mechgraph.modes import store
 from mechgraph.modes.bounds import bound
 from mechgraph.modes.family import Member
+from mechgraph.modes.finding import Finder
 from mechgraph.modes.homotopy import Equations
 from mechgraph.modes.monodromy import start_set
 from mechgraph.modes.question import Question
@@ -127,6 +128,21 @@ def test_an_open_chain_has_one_assembly() -> None:
     modes = mg.assemblies(mg.Mechanism("chain", pairs=pairs, frame="ground"), {"A": 0.3, "B": 0.2})
     assert (len(modes), modes.total, modes.completeness) == (1, 1, "proved")
     assert "no loop has to be closed" in modes.evidence[0]
+
+
+def test_a_search_finds_a_double_point_once() -> None:
+    """It is known to the root of rounding: guesses come to ends that are a little apart."""
+    a, b, c, d = 2.0, 1.5, 2.5, 3.0
+    fold = np.arccos((a * a + d * d - (b + c) ** 2) / (2 * a * d))
+    question = Question(linked_four_bar(a, b, c, d, 0.5), {"O0": fold})
+    found = [Finder(question, seed, False, None)._searched(question.drive[:, 0], 200, 0.5) for seed in range(2)]
+    assert [one.x.shape[1] for one in found] == [1, 1]
+
+
+def test_the_assembly_shown_of_a_continuum_does_not_depend_on_the_seed() -> None:
+    one, other = (mg.assemblies(linked_four_bar(2.0, 1.0, 1.0, 2.0, 0.7), {"O0": 0.0}, seed=seed) for seed in range(2))
+    assert one.kinds == other.kinds == ("continuum",)
+    assert one.poses == pytest.approx(other.poses, abs=1e-6)
 
 
 def test_a_parallelogram_folded_flat_is_a_double_point_and_a_kite_that_spins_a_continuum() -> None:

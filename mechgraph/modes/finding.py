@@ -19,8 +19,8 @@ from mechgraph.modes.certificate import Certificate, certificate, told_apart
 from mechgraph.modes.family import Array, Family, parts
 from mechgraph.modes.form import Form, Whole
 from mechgraph.modes.groups import Group, Undivided, groups_of
-from mechgraph.modes.monodromy import Irregular, StartSet, distinct, start_set
-from mechgraph.modes.product import MOST_FOLLOWED, REAL, Product, is_real
+from mechgraph.modes.monodromy import ONE_ASSEMBLY, Irregular, StartSet, distinct, start_set
+from mechgraph.modes.product import MOST_FOLLOWED, REAL, REAL_SINGULAR, Product, is_real
 from mechgraph.modes.question import Question
 from mechgraph.modes.result import Assemblies, ComplexModes, weakest
 from mechgraph.modes.search import searched
@@ -34,7 +34,7 @@ UNFIT = 1e-3
 SINGULAR = 1e-5
 """Smallest singular value of the closure rows, as part of the largest, below which an assembly is no regular point."""
 LARGE_STATE = 10.0
-"""Size of a state that is not real from which on small singular values are a matter of scale."""
+"""Size of a state from which on small singular values are a matter of scale."""
 AWAY = 1e-2
 """Step along a motion that the rows leave free, after which a continuum is still closed."""
 GUESSES = 400
@@ -126,7 +126,9 @@ class Finder:
             f"No class is known: {self.fault}. Searched from {guesses} random guesses within {turns:g} turns of the start; "
             "others may exist."
         )
-        x = x[:, distinct(q.family.prints(Configuration(q.system, x)))]
+        # those that are singular are known to the root of rounding only
+        least = np.where(self._irregular(x), REAL_SINGULAR, ONE_ASSEMBLY)
+        x = x[:, distinct(q.family.prints(Configuration(q.system, x)), None, least)]
         return _Solutions(x, x, np.zeros((q.system.n_state, 0), dtype=complex), "searched", (why,), None, 0)
 
     def _tracked(self, found: Ends, i: int) -> _Solutions:
@@ -153,7 +155,7 @@ class Finder:
         )
 
     def _irregular(self, x: Array) -> Array:
-        """Which assemblies that are not real are no regular points."""
+        """Which assemblies are no regular points, as far as they are not large."""
         J = Configuration(self.family.system, x).J[:, self.family.free].transpose(2, 0, 1)
         sigma = np.linalg.svd(J, compute_uv=False)
         large = np.abs(x).max(axis=0, initial=0.0) > LARGE_STATE
@@ -163,7 +165,8 @@ class Finder:
         """A real assembly ``(nx, 1)`` of a continuum that tracks met at complex points, the nearest to the start; or none."""
         family, system = self.family, self.form.at(i)
         drive = self.form.drive[: len(family.columns), i]
-        x = searched(system, family.here.x[:, 0], family.columns, drive, GUESSES // 4, 0.5, self.rng, self.progress)
+        rng = np.random.default_rng(0)  # the same one for any seed
+        x = searched(system, family.here.x[:, 0], family.columns, drive, GUESSES // 4, 0.5, rng, self.progress)
         near = np.argsort(np.abs(system.difference(x, family.here.x)).max(axis=0))
         found = [j for j in near.tolist() if self._point(Configuration(system, x[:, [j]]))[0] == "continuum"]
         return x[:, found[:1]]
