@@ -141,6 +141,8 @@ class Outcome:
         found, path = self.found, self.path
         for number, crossing in enumerate(found.crossings):
             places, sides = np.flatnonzero(found.near == number), crossing.sides
+            if not places.size:  # nearer to another one, or beyond the end of a curve
+                continue
             n, k = len(places), len(sides)
             many = np.tile(np.arange(k), n)
             beside = path.at(sides.x[:, many], sides.drive[:, many], sides.track[many])

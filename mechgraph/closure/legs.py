@@ -211,6 +211,10 @@ class Legs:
             out.status[there & (out.near < 0)] = Status.DEAD_POINT
             out.status[there & (out.near >= 0)] = Status.CHANGE_POINT
             out.reached[:, there] = out.follower.paths.drive(np.array([track]), np.array([crossing]))
+        for number, known in enumerate(out.crossings):
+            at = np.flatnonzero((out.near == number) & (out.status == Status.OK))
+            if at.size:
+                out.status[at[known.at_another(self.place[at])]] = Status.CHANGE_POINT
 
 
 BEYOND = {End.FOLD: Status.OUT_OF_REACH, End.GIVEN_UP: Status.NOT_FOLLOWED}

@@ -20,6 +20,7 @@ from mechgraph.numerics.tracks import Nodes
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
+Mask = NDArray[np.bool_]
 
 WINDOW = 5e-3
 """Distance from a crossing below which states and rates are interpolated: accelerations lose rounding over its cube."""
@@ -34,6 +35,9 @@ SPANS = (0.08, 0.02, 0.005)
 0.5; the others serve where another singular position is near."""
 SCATTER = 3.0
 """Factor within which condition times distance is constant where there is no other singular position near."""
+
+PROBE = 10 * PATH.dead_zone
+"""Distance at which the condition is looked at for another crossing."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +74,17 @@ class Crossing:
         base = x[:, [len(self.sides) // 2]]
         dq = self.problem.difference(x, base) @ self.weights(places)
         return self.problem.advance(np.repeat(base, len(places), axis=1), dq, np.full(len(places), self.track))
+
+    def at_another(self, places: Array) -> Mask:
+        """Which places ``(n,)`` lie on another crossing, passed together with this one: condition times distance from it is constant."""
+        n = len(places)
+        ends = [(places + PROBE * np.array([[far], [-far]])).ravel() for far in (1.0, 2.0)]
+        tracks = np.full(2 * n, self.track)
+        near, far = (self.problem.at(self.states(at), self.drives(at), tracks) for at in ends)
+        which = self.problem.chosen(far, np.full(2 * n, -1))
+        a, b = (self.problem.factored(point, which).condition for point in (near, far))
+        away = np.abs(PROBE - PROBE * b / np.where(a > b, a - b, 1.0))
+        return np.asarray(((a > b) & (away < PATH.dead_zone)).reshape(2, n).all(axis=0))
 
 
 def passed(follower: Follower, nodes: Nodes, track: int, place: float) -> Crossing | None:

@@ -373,6 +373,17 @@ def test_change_points_near_each_other():
         assert_parallel(solved(m, {"A": [off - begin, 0.9]}), bars, np.array([off - begin, 0.9]), begin)
 
 
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.parametrize("lean", [1e-4, 3e-3])
+def test_change_points_that_are_passed_together(lean, engine):
+    """One of two is found, the other leapt over with it: at it forces are not those of a singular matrix, beside it they are right."""
+    begin, bars = -0.5, [Bars(1.0, 2.0, 1.0, 2.0), Bars(1.0, 1.5, 1.0, 1.5, 0.0, 0.0, lean)]
+    m = parallelograms(bars, begin)
+    for at in ([lean], [0.0, lean, lean + 1e-11, lean + 1e-6, 0.5 * lean, 0.2]):
+        q = np.array(at) - begin
+        assert_parallel(solved(m, {"A": q}, engine=engine), bars, q, begin)
+
+
 def test_cases_and_periods_beside_a_change_point():
     """Cases of a call, and positions turns later, are solved as those of one path are, and on its branch."""
     m = parallelograms(ONE, -1e-5)
