@@ -20,7 +20,7 @@ from mechgraph.modes.bounds import bound
 from mechgraph.modes.family import Member
 from mechgraph.modes.finding import Finder
 from mechgraph.modes.homotopy import Equations
-from mechgraph.modes.monodromy import start_set
+from mechgraph.modes.monodromy import _tame, start_set
 from mechgraph.modes.question import Question
 from mechgraph.modes.targets import Ends, _account, _Run
 from mechgraph.modes.trace import _beside, _poles, rational, trace_test
@@ -506,6 +506,17 @@ def test_after_a_stated_effort_what_was_found_is_called_searched(empty: None, mo
     assert (modes.total, modes.completeness) == (4, "searched")
     assert any("others were not looked for any further" in text for text in modes.evidence)
     assert not list(store.folder().glob("*"))
+
+
+def test_an_assembly_that_rounding_had_told_apart_from_itself_is_one() -> None:
+    """One of four is known to a few digits the second time: at another member both are one, so that a bound is not met too early."""
+    q = Question(general("RCSR"), {"O1": 0.2})
+    rng = np.random.default_rng(0)
+    known = start_set(q.family, rng)
+    off = known.x[:, 1] + 1e-5 * rng.normal(size=len(known.x))
+    x = np.concatenate([known.x[:, :2], off[:, None], known.x[:, 2:]], axis=1)
+    _, moved = _tame(Equations(q.family, known.mixing), known.member, x, rng)
+    assert (known.x.shape[1], moved.shape[1]) == (4, 4)
 
 
 def test_a_platform_on_a_sphere_has_not_the_bound_of_one_in_a_plane() -> None:

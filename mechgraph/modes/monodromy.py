@@ -191,14 +191,21 @@ class _Group:
 
 
 def _tame(equations: Equations, base: Member, x: Array, rng: np.random.Generator) -> tuple[Member, Array]:
-    """Of some random members that with the smallest numbers in its assemblies, from which tracks are the least likely to be lost."""
-    family, N = equations.family, x.shape[1]
-    best, least = (base, x), np.abs(fingerprints(family, base, x)).max()
+    """Of some random members that with the smallest numbers in its assemblies, from which tracks are the least likely to be lost.
+
+    Assemblies ``x (nx, N)`` that come to one there are one, which large numbers had told apart by their rounding.
+    """
+    family, found = equations.family, []
+    keep = np.arange(x.shape[1])
     for _ in range(CANDIDATES):
         member = family.random_member(rng)
         there = follow(Leg(equations, base, member), x, Care())
-        poses = fingerprints(family, member, there.x)
-        size = np.abs(poses).max() if there.arrived.all() and len(distinct(poses)) == N else np.inf
+        poses, arrived = fingerprints(family, member, there.x), np.flatnonzero(there.arrived)
+        keep = np.setdiff1d(keep, np.delete(arrived, distinct(poses[:, arrived])))
+        found.append((member, there, poses))
+    best, least = (base, x[:, keep]), np.abs(fingerprints(family, base, x[:, keep])).max()
+    for member, there, poses in found:
+        size = np.abs(poses[:, keep]).max() if there.arrived[keep].all() else np.inf
         if size < least:
-            best, least = (member, there.x), size
+            best, least = (member, there.x[:, keep]), size
     return best
