@@ -118,3 +118,22 @@ def test_a_dead_point_of_kinematics_has_its_position() -> None:
     s = caught.value.solution
     assert not s.has_forces
     np.testing.assert_allclose(s.link("foot").pose, np.eye(4), atol=1e-12)
+
+
+def test_load_values_that_do_not_fit_the_positions_say_what_would():
+    """Three numbers at two positions: an effort takes a number, or one a position; a force three components."""
+    crank = mg.Mechanism(
+        "crank", pairs=[mg.Pair("A", "R", "frame", "p", point=(0, 0, 0), axis=(0, 0, 1))], drives=["A"]
+    )
+    for load, words in [
+        (
+            mg.Effort("A", [1, 2, 3]),
+            r"shape \(3,\) does not fit the positions \(2,\); expected a number, or one a position",
+        ),
+        (
+            mg.Wrench("p", moment=[[0, 0, 1]] * 3),
+            r"shape \(3, 3\) .* expected 3 components, or as many a position, on the last axis",
+        ),
+    ]:
+        with pytest.raises(mg.DeclarationError, match=words):
+            mg.solve(crank.replace(loads=[load]), {"A": [0, 1]})

@@ -145,11 +145,14 @@ class Site:
         try:
             full = np.broadcast_to(array, (*self.batch, width))
         except ValueError:
+            wanted = (
+                "a number, or one a position"
+                if width == 1
+                else f"{width} components, or as many a position, on the last axis"
+            )
             raise DeclarationError(
                 f"load on {link!r}",
-                [
-                    f"value of shape {np.shape(value)} does not fit the positions {self.batch}; the last axis holds the components"
-                ],
+                [f"value of shape {np.shape(value)} does not fit the positions {self.batch}; expected {wanted}"],
             ) from None
         return np.moveaxis(full.reshape(-1, width)[self.good], -1, 0)
 

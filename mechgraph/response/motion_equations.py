@@ -79,7 +79,7 @@ def _inertia(here: Configuration, V: Array, A: Array) -> Array:
 
 
 NO_INERTIA = (
-    "loads act along a motion that no inertia resists, so that its acceleration has no bound. Give mass or inertia to what moves "
+    "there is a motion that no inertia resists, so that its acceleration under loads has no bound. Give mass or inertia to what moves "
     "so, or prescribe its motion"
 )
 
