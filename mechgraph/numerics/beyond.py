@@ -51,7 +51,7 @@ def _begun_before(follower: Follower, tracks: Tracks) -> Tracks:
     poor = np.intersect1d(np.flatnonzero(start.condition > PATH.fair), nodes.track[left[first][beside]])
     if not poor.size:
         return tracks
-    back = _straight_on(follower, start, paths.drive(every, np.full(len(every), -LEAD)), poor)
+    back = _straight_on(follower, nodes, start, paths.drive(every, np.full(len(every), -LEAD)), poor)
     heading = _heading(back, start, -1)
     if not heading.size:
         return tracks
@@ -82,7 +82,7 @@ def _alone_beside(follower: Follower, tracks: Tracks) -> Index:
         return one[:0]
     start = nodes.take(_outermost(nodes.track, np.arange(len(tracks.end)), -1))
     poor = one[nodes.condition[one] > PATH.fair]
-    tried = _straight_on(follower, start, start.drive + HEADING, nodes.track[poor], HEADING, careful=False).nodes
+    tried = _straight_on(follower, nodes, start, start.drive + HEADING, nodes.track[poor], HEADING, careful=False).nodes
     left, right = tried.steps
     return np.setdiff1d(nodes.track[poor], tried.track[left[~_near(tried, left, right)]])
 
@@ -96,9 +96,9 @@ def _followed_on(follower: Follower, tracks: Tracks, side: int, alone: Index) ->
         return tracks
     back, ahead = (follower.paths.drive(every, base.place + way * side * LEAD) for way in (-1.0, 1.0))
     # from well before the crossing, where the branches are apart
-    found = _straight_on(follower, base, back, heading).nodes
+    found = _straight_on(follower, nodes, base, back, heading).nodes
     begin = found.take(_outermost(found.track, every, 1))
-    over = _straight_on(follower, begin, ahead, heading, leads=True)
+    over = _straight_on(follower, nodes, begin, ahead, heading, leads=True)
     for v in heading[begin.place[heading] > 0.0].tolist():
         mine = over.nodes.take(over.nodes.track == v)
         ways = mine.place - begin.place[v]
@@ -127,7 +127,7 @@ def _with_sides(follower: Follower, tracks: Tracks, side: int) -> Tracks:
     short = np.unique([v for v in near if side < 0 or tracks.end[v] is End.REACHED]).astype(np.intp)
     if not short.size:
         return tracks
-    found = _straight_on(follower, base, follower.paths.drive(every, base.place + side * LEAD), short).nodes
+    found = _straight_on(follower, nodes, base, follower.paths.drive(every, base.place + side * LEAD), short).nodes
     found = found.take(found.place > 0.0)
     return replace(
         tracks, nodes=Nodes.join([nodes, replace(found, place=base.place[found.track] + side * found.place)])
@@ -136,6 +136,7 @@ def _with_sides(follower: Follower, tracks: Tracks, side: int) -> Tracks:
 
 def _straight_on(
     follower: Follower,
+    known: Nodes,
     base: Nodes,
     ends: Array,
     some: Index,
@@ -143,11 +144,12 @@ def _straight_on(
     leads: bool = False,
     careful: bool = True,
 ) -> Tracks:
-    """What a follower finds on straight ways of ``some`` tracks from nodes ``base`` to path values ``ends (d, V)``."""
-    begin = base.drive
+    """What a follower finds on straight ways of ``some`` tracks, ``known`` by nodes, from nodes ``base`` to path values ``ends (d, V)``."""
+    begin, least = base.drive, np.full(base.drive.shape[1], np.inf)
+    np.minimum.at(least, known.track, known.condition)
     ways = [np.stack([begin[:, v], ends[:, v]], axis=1) if v in some else begin[:, [v]] for v in range(begin.shape[1])]
     walk = Follower(follower.problem, leads, follower.work)
-    return walk.follow(base.x, Paths(ways), first, base.which, careful)
+    return walk.follow(base.x, Paths(ways), first, base.which, careful, least)
 
 
 def _outermost(track: Index, tracks: Index, side: int) -> Index:

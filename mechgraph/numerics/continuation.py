@@ -59,13 +59,21 @@ class Follower(Marching):
         self.leads = leads
 
     def follow(
-        self, x: Array, paths: Paths, first: float = PATH.first, which: Index | None = None, careful: bool = True
+        self,
+        x: Array,
+        paths: Paths,
+        first: float = PATH.first,
+        which: Index | None = None,
+        careful: bool = True,
+        least: Array | None = None,
     ) -> Tracks:
         """All tracks from their closed states ``x (nx, V)`` in forms ``which``; ``first`` is the first step tried.
 
-        Unless ``careful`` a track ends, not named, where the quick march or its certificate ends.
+        Unless ``careful`` a track ends, not named, where the quick march or its certificate ends. ``least (V,)`` are condition numbers
+        that are known of the branches elsewhere: of a start beside a singular point its own tells nothing of what is ordinary.
         """
         V = x.shape[1]
+        self._least = np.full(V, np.inf) if least is None else least
         self.paths, self._x = paths, x
         self.crossings: list[tuple[int, float]] = []
         self._leads: dict[int, Nodes] = {}
@@ -222,7 +230,7 @@ class Follower(Marching):
         first, end = (np.searchsorted(nodes.track, tracks, side=side) for side in ("left", "right"))
         last, before = nodes.take(end - 1), nodes.take(np.maximum(end - 2, first))
         march = March(last, before, before.place < last.place, np.full(len(tracks), PATH.shortest_quick))
-        least = np.full(len(self.paths.end), np.inf)
+        least = self._least.copy()
         np.minimum.at(least, nodes.track, nodes.condition)
         found = [nodes]
         while len(march.last):
@@ -295,7 +303,8 @@ class Follower(Marching):
             points = list(starts.T[:, :, None])
             points[track] = np.stack([starts[:, track], starts[:, track] - LEAD / PATH.first * direction], axis=1)
             back = Follower(self.problem, leads=False, work=self.work)
-            found = back.follow(self._x, Paths(points)).nodes
+            least = np.full(len(points), np.nanmin(nodes.condition))
+            found = back.follow(self._x, Paths(points), least=least).nodes
             found = found.take((found.track == track) & (found.place > 0.0))
             self._leads[track] = Nodes.join([replace(found, place=-found.place)])
         return Nodes.join([self._leads[track], nodes])

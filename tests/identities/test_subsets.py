@@ -384,6 +384,15 @@ def test_change_points_that_are_passed_together(lean, engine):
         assert_parallel(solved(m, {"A": q}, engine=engine), bars, q, begin)
 
 
+@pytest.mark.parametrize("begin", [4.935e-6, 6.329e-6, 2e-5])
+def test_a_start_right_behind_a_change_point_and_before_another(begin):
+    """The way back over the first change point, which rounding would lead to its other branch, tells nothing of the second one."""
+    bars = [Bars(0.62, 1.7, 0.62, 1.7), Bars(0.62, 1.5, 0.62, 1.5, 0.0, 0.0, 1.5e-3)]
+    m = parallelograms(bars, begin)
+    q = np.array([0.01, 0.2]) - begin
+    assert_parallel(solved(m, {"A": q}), bars, q, begin)
+
+
 def test_cases_and_periods_beside_a_change_point():
     """Cases of a call, and positions turns later, are solved as those of one path are, and on its branch."""
     m = parallelograms(ONE, -1e-5)
