@@ -26,20 +26,6 @@ def between(problem: Problem, a: Nodes, b: Nodes, part: Array | float, drive: Ar
     return problem.advance(a.x, dq, a.track)
 
 
-def bent(problem: Problem, a: Nodes, b: Nodes) -> Mask:
-    """Steps between neighbours whose middles will hardly be found ``smooth``, and whose halves may be.
-
-    By what the mean of the rates at both ends misses the mean rate of the step, ``h^2 |x'''| / 12``. Where that is so much that a node
-    interpolated between the ends might lie off the track by more than nodes may, the step stays whole.
-    """
-    h = b.place - a.place
-    direction = (b.drive - a.drive) / h
-    y = problem.difference(b.x, a.x)
-    ends = (a.Z * direction).sum(axis=1) + problem.tangent(y, (b.Z * direction).sum(axis=1))
-    missed = np.abs(y / h - 0.5 * ends).max(axis=0, initial=0.0)
-    return np.asarray((missed > PATH.uneven) & (missed * h <= PATH.correction))
-
-
 def smooth(problem: Problem, a: Nodes, m: Nodes, b: Nodes, correction: Array, free: Array) -> Mask:
     """Whether states and rates in the middles ``m`` are those of the Hermite cubic of both ends, against the change of rates over the step.
 

@@ -19,7 +19,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.numerics.certificate import bent, between, smooth
+from mechgraph.numerics.certificate import between, smooth
 from mechgraph.numerics.hermite import through
 from mechgraph.numerics.marching import March, Marching, next_step
 from mechgraph.numerics.newton import Problem, Work
@@ -139,11 +139,10 @@ class Follower(Marching):
         return np.asarray(~self.given_up[tracks])
 
     def _filled(self, nodes: Nodes) -> Nodes:
-        """The nodes with others between them, interpolated, where steps are too long or too bent for the certificate."""
+        """The nodes with others between them, interpolated, where steps are too long for the certificate."""
         left, right = nodes.steps
         a, b = nodes.take(left), nodes.take(right)
         parts = np.ceil((b.place - a.place) / self.longest(a, b, b.drive)).astype(np.intp)
-        parts = np.maximum(parts, 1 + bent(self.problem, a, b))
         step = np.repeat(np.arange(len(a)), np.maximum(parts - 1, 0))
         if not step.size:
             return nodes

@@ -128,8 +128,6 @@ class PathTolerances:
     smooth: float = 0.05
     """Part of the change of rates over a step by which the rates in its middle may miss those of the Hermite cubic of its ends (and of
     the sagitta that it makes, by which the state may)."""
-    uneven: float = 0.09
-    """What the mean of the rates at both ends of a step misses its mean rate by, above which the certificate refuses nearly all steps."""
     alone: float = 0.05
     """Part of the inverse condition number, over rates above one, up to which another branch is not as near: matrices change by at most
     forty a radian (near the limits of four-bars the other branch is 170 times as far)."""

@@ -38,14 +38,14 @@ def near_its_dead_point(before):
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize("before", [1e-3, 1e-5, 1e-7])
 def test_from_beside_a_dead_point_and_to_it(engine, before):
-    """Away from it steps double, towards it they halve: a few nodes for every digit of the distance."""
+    """Away from it steps double, towards it they halve: a few nodes for every digit of the distance; a crossing is looked for beside it."""
     m = near_its_dead_point(before)
     begin = m.start["D.Rz"]
     away = mg.kinematics(m, {"D": [begin, -0.05]}, engine=engine)
     towards = mg.kinematics(m, {"D": [begin, 0.5]}, engine=engine, on_reach="flag")
     assert list(away.status) == ["ok", "ok"]
     assert list(towards.status) == ["ok", "out of reach"]
-    assert max(away.work.evaluations, towards.work.evaluations) < 2000
+    assert max(away.work.evaluations, towards.work.evaluations) < 4000
 
 
 def test_variants_near_a_dead_point_are_followed_together(monkeypatch):
