@@ -1,0 +1,1186 @@
+/* mechgraph kernel: see kernel.h for the tables.
+ *
+ * A state is evaluated along the spanning tree: poses of links, twists of all freedoms, and what every chord leaves open of its loop. One
+ * elimination of the closure matrix, rows chosen by pivots, serves Newton, rates, accelerations and, transposed, the loop wrenches of the
+ * forces (reciprocity: J^T x = tau - S^T w_tree). A path is a chain of certified steps, see `certified`; positions are read off them.
+ * Sources: Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 5 and 8; Allgower and Georg, Introduction to Numerical Continuation
+ * Methods, 2003, chapters 2 and 6.
+ */
+#include "kernel.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Tolerances; those of the package in numerics/tolerances.py have the same names there. */
+static const double CLOSED = 2e-14;      /* closure residual that Newton aims at, over the distance from the origin */
+static const double ACCEPTED = 1e-12;    /* residual that counts as closed where rounding lets it come no nearer */
+static const double CORRECTION = 0.06;   /* largest correction that a prediction may need */
+static const double REUSED = 1e-5;       /* correction below which the factors before it serve for the next one */
+static const double FAIR = 1e3;          /* condition number above which nothing is decided here */
+static const double DEPARTURE = 0.5;     /* largest change of the closure matrix over a step, against its inverse at the end */
+static const double ALONE = 0.05;        /* part of the inverse condition, over rates, up to which another branch is not as near */
+static const double LONGEST = 0.35;      /* longest step */
+static const double SHORTEST = 2e-3;     /* step below which the careful follower of the package takes over */
+static const double INDEPENDENT = 1e-9;  /* part of the closure rates that drives may leave open */
+static const double DRIVERS_ALONE = 1e-9;/* part below which the reactions of a self-stress count as none */
+static const double UNIQUE = 1e-7;       /* part of a self-stress in a component above which it is not unique */
+static const double STRAIGHT_ON = 1e-12; /* change of direction up to which a polygon goes straight on */
+enum { ITERATIONS = 8, MOST_STEPS = 20000 };
+
+#define FOR(i, n) for (int i = 0; i < (n); i++)
+
+/* --- tables and memory ------------------------------------------------------------------------------------------------------------- */
+
+typedef struct {
+  int links, pairs, factors, columns, states, loops, steps, couplings, terms, drives, unknowns, loads, frame_link, rows, stresses;
+  const int *first, *kind, *column, *state, *number, *ends, *walk, *chord, *loop_first, *loop_pair, *loop_sign, *owner, *column_state,
+      *is_length, *place, *effort_factor, *effort_at_b, *dual, *drive, *unknown, *term_first, *term_column, *load;
+  const double *unit, *origin, *start, *start_coordinates, *frame, *marker_a, *marker_b, *factor_number, *effort, *mass, *center,
+      *inertia, *base, *coefficient, *constant, *load_number;
+} Model;
+
+/* A place on the path: state, rates along the way, the closure matrix and its rate along the way. */
+typedef struct {
+  double *x, *rate, *matrix, *matrix_rate, *at, condition;
+} Node;
+
+typedef struct {
+  /* kept between calls: state, drives, and where rotation vectors of the user stand */
+  double *x, *drive, *axis, *angle, *begun;
+  /* evaluation of one state */
+  double *pose, *frame, *end, *S, *residual, *middle, reach, closure;
+  /* elimination */
+  double *lu, *inverse;
+  int *row;
+  /* rates and forces */
+  double *dq, *ddq, *V, *A, *bias, *G, *chord_V, *pair_twist, *E, *applied, *inertial, *total, *reaction, *carried, *given, *tau, *coupled, *multiplier;
+  double *null, *stress, *stress_effort, *row_value, *column_value, *trial, *increment, *change, *bound, *record, *direction, *line_begin, *asked, *kept;
+  size_t n_kept;
+  Node a, b, before;
+  double frame_load[6];
+  long steps, evaluations, factorizations;
+} Work;
+
+static void read_tables(const int *I, const double *P, Model *m) {
+  m->links = I[MGK_LINKS], m->pairs = I[MGK_PAIRS], m->factors = I[MGK_FACTORS], m->columns = I[MGK_COLUMNS];
+  m->states = I[MGK_STATES], m->loops = I[MGK_LOOPS], m->steps = I[MGK_STEPS], m->couplings = I[MGK_COUPLINGS];
+  m->terms = I[MGK_TERMS], m->drives = I[MGK_DRIVES], m->unknowns = I[MGK_UNKNOWNS], m->loads = I[MGK_LOADS];
+  m->frame_link = I[MGK_FRAME], m->rows = 6 * m->loops + m->couplings, m->stresses = m->rows - m->unknowns;
+  const int p = m->pairs, f = m->factors, c = m->columns, n = m->links, *i = I + MGK_HEAD;
+  m->first = i, i += p + 1, m->kind = i, i += f, m->column = i, i += f, m->state = i, i += f, m->number = i, i += f;
+  m->ends = i, i += 2 * p, m->walk = i, i += 4 * (p - m->loops), m->chord = i, i += m->loops;
+  m->loop_first = i, i += m->loops + 1, m->loop_pair = i, i += m->steps, m->loop_sign = i, i += m->steps;
+  m->owner = i, i += c, m->column_state = i, i += c, m->is_length = i, i += c, m->place = i, i += c;
+  m->effort_factor = i, i += c, m->effort_at_b = i, i += c, m->dual = i, i += p;
+  m->drive = i, i += m->drives, m->unknown = i, i += m->unknowns;
+  m->term_first = i, i += m->couplings + 1, m->term_column = i, i += m->terms, m->load = i;
+  if (!P) return;
+  const double *d = P;
+  m->unit = d, d += 1, m->origin = d, d += 3, m->start = d, d += m->states, m->start_coordinates = d, d += c, m->frame = d, d += 12;
+  m->marker_a = d, d += 12 * p, m->marker_b = d, d += 12 * p, m->factor_number = d, d += I[MGK_FACTOR_NUMBERS];
+  m->effort = d, d += 6 * c, m->mass = d, d += n, m->center = d, d += 3 * n, m->inertia = d, d += 6 * n, m->base = d, d += 12 * n;
+  m->coefficient = d, d += m->terms, m->constant = d, d += m->couplings, m->load_number = d;
+}
+
+static double *taken(double **memory, size_t *size, size_t count) {
+  double *out = *memory;
+  if (out) *memory += count;
+  *size += count;
+  return out;
+}
+
+/* The memory of a state laid out; its size in bytes. */
+static size_t lay_out(const Model *m, double *memory, Work *w) {
+  size_t size = 0, c = m->columns, n = m->links, p = m->pairs, r = m->rows, u = m->unknowns, s = m->stresses > 0 ? m->stresses : 0;
+  int places[MGK_PARTS + 1];
+#define TAKE(name, count) w->name = taken(&memory, &size, (count))
+  TAKE(x, m->states), TAKE(drive, m->drives), TAKE(axis, 3 * m->factors), TAKE(angle, m->factors), TAKE(begun, m->factors);
+  w->n_kept = size;
+  TAKE(kept, w->n_kept);
+  TAKE(pose, 12 * n), TAKE(frame, 12 * m->factors), TAKE(end, 12 * p), TAKE(S, 6 * c), TAKE(residual, r), TAKE(middle, 3 * m->loops);
+  TAKE(lu, r * u), TAKE(inverse, u * u);
+  w->row = (int *)taken(&memory, &size, r);
+  TAKE(dq, c), TAKE(ddq, c), TAKE(V, 6 * n), TAKE(A, 6 * n), TAKE(bias, 6 * p), TAKE(G, 6 * c), TAKE(chord_V, 6 * m->loops), TAKE(pair_twist, 6 * p), TAKE(E, 6 * c);
+  TAKE(applied, 6 * n), TAKE(inertial, 6 * n), TAKE(total, 6 * p), TAKE(reaction, 6 * p), TAKE(carried, 6 * n), TAKE(given, c);
+  TAKE(tau, c), TAKE(coupled, c), TAKE(multiplier, m->couplings), TAKE(null, s * r), TAKE(stress, 6 * p * s), TAKE(stress_effort, c * s);
+  TAKE(row_value, r), TAKE(column_value, c), TAKE(trial, m->states), TAKE(increment, c), TAKE(change, u * u), TAKE(bound, 4 * u);
+  Node *nodes[3] = {&w->a, &w->b, &w->before};
+  FOR(i, 3) {
+    nodes[i]->x = taken(&memory, &size, m->states), nodes[i]->rate = taken(&memory, &size, c);
+    nodes[i]->matrix = taken(&memory, &size, r * u), nodes[i]->matrix_rate = taken(&memory, &size, r * u);
+    nodes[i]->at = taken(&memory, &size, 1);
+  }
+  TAKE(direction, m->drives), TAKE(line_begin, m->drives), TAKE(asked, 3 * m->drives);
+  int head[MGK_HEAD] = {0};
+  head[MGK_LINKS] = m->links, head[MGK_PAIRS] = m->pairs, head[MGK_COLUMNS] = m->columns, head[MGK_STATES] = m->states;
+  head[MGK_LOOPS] = m->loops, head[MGK_COUPLINGS] = m->couplings, head[MGK_UNKNOWNS] = m->unknowns;
+  mgk_record(head, places);
+  TAKE(record, places[MGK_PARTS]);
+#undef TAKE
+  return size * sizeof(double);
+}
+
+int mgk_record(const int *I, int *places) {
+  const int c = I[MGK_COLUMNS], n = I[MGK_LINKS], p = I[MGK_PAIRS], k = I[MGK_COUPLINGS];
+  const int s = 6 * I[MGK_LOOPS] + k - I[MGK_UNKNOWNS];
+  const int lengths[MGK_PARTS] = {I[MGK_STATES], c, c, c, 1, 3 * p, 6 * p, c, c, 6 * n, 6 * p * s, c * s, c, k, k * s, c * s, 6, 1, 1};
+  places[0] = 0;
+  FOR(i, MGK_PARTS) places[i + 1] = places[i] + lengths[i];
+  return MGK_OK;
+}
+
+size_t mgk_state_size(const int *I) {
+  Model m;
+  Work w;
+  read_tables(I, NULL, &m);
+  return lay_out(&m, NULL, &w);
+}
+
+/* --- vectors, poses, twists -------------------------------------------------------------------------------------------------------- */
+
+static double size_of(const double *v, int n) {
+  double out = 0.0;
+  FOR(i, n) out = fmax(out, fabs(v[i]));
+  return out;
+}
+
+static void cross(const double *a, const double *b, double *out) {
+  const double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2], z = a[0] * b[1] - a[1] * b[0];
+  out[0] = x, out[1] = y, out[2] = z;
+}
+
+static double dot(const double *a, const double *b, int n) {
+  double out = 0.0;
+  FOR(i, n) out += a[i] * b[i];
+  return out;
+}
+
+static void turned(const double *X, const double *v, double *out) {
+  FOR(i, 3) out[i] = X[4 * i] * v[0] + X[4 * i + 1] * v[1] + X[4 * i + 2] * v[2];
+}
+
+static void turned_back(const double *X, const double *v, double *out) {
+  FOR(i, 3) out[i] = X[i] * v[0] + X[4 + i] * v[1] + X[8 + i] * v[2];
+}
+
+static void point_of(const double *X, const double *v, double *out) {
+  turned(X, v, out);
+  FOR(i, 3) out[i] += X[4 * i + 3];
+}
+
+static void product(const double *A, const double *B, double *out) {
+  FOR(i, 3) {
+    FOR(j, 4) out[4 * i + j] = A[4 * i] * B[j] + A[4 * i + 1] * B[4 + j] + A[4 * i + 2] * B[8 + j];
+    out[4 * i + 3] += A[4 * i + 3];
+  }
+}
+
+static void product_back(const double *A, const double *B, double *out) { /* A B^-1 */
+  FOR(i, 3) {
+    FOR(j, 3) out[4 * i + j] = A[4 * i] * B[4 * j] + A[4 * i + 1] * B[4 * j + 1] + A[4 * i + 2] * B[4 * j + 2];
+    out[4 * i + 3] = A[4 * i + 3];
+    FOR(j, 3) out[4 * i + 3] -= out[4 * i + j] * B[4 * j + 3];
+  }
+}
+
+/* ad(V) S: the rate of a twist that moves with a body of twist V */
+static void moved_twist(const double *V, const double *S, double *out) {
+  double part[3];
+  cross(V, S, out);
+  cross(V, S + 3, out + 3);
+  cross(V + 3, S, part);
+  FOR(i, 3) out[3 + i] += part[i];
+}
+
+/* A twist about the origin, taken about a point. */
+static void twist_about(const double *S, const double *point, double *out) {
+  cross(S, point, out + 3);
+  FOR(i, 3) out[i] = S[i], out[3 + i] += S[3 + i];
+}
+
+/* A wrench about a point (sign 1: taken about the origin; -1: the other way round), in place. */
+static void wrench_moved(double *w, const double *point, double sign) {
+  double arm[3];
+  cross(point, w + 3, arm);
+  FOR(i, 3) w[i] += sign * arm[i];
+}
+
+/* --- factors ----------------------------------------------------------------------------------------------------------------------- */
+
+/* X <- X D(q) of a factor, or X D(q)^-1 where sense is -1 */
+static void passed(const Model *m, int f, const double *x, double sense, double *X) {
+  const int kind = m->kind[f];
+  const double *q = x + m->state[f], *number = m->factor_number + m->number[f];
+  if (kind == MGK_POSE) {
+    double Y[12];
+    (sense > 0 ? product : product_back)(X, number, Y);
+    memcpy(X, Y, sizeof Y);
+  } else if (kind >= MGK_SLIDE && kind < MGK_ROTATION) {
+    FOR(r, 3) X[4 * r + 3] += sense * *q * X[4 * r + kind - MGK_SLIDE];
+  } else if (kind < MGK_SLIDE) {
+    const int i = (kind + 1) % 3, j = (kind + 2) % 3;
+    const double s = sense * sin(*q), c = cos(*q), along = sense * *number * *q;
+    FOR(r, 3) {
+      double *row = X + 4 * r;
+      const double u = row[i], v = row[j];
+      row[i] = c * u + s * v, row[j] = c * v - s * u, row[3] += along * row[kind];
+    }
+  } else {
+    const double w = q[0], a = sense * q[1], b = sense * q[2], c = sense * q[3];
+    const double R[9] = {1 - 2 * (b * b + c * c), 2 * (a * b - w * c), 2 * (a * c + w * b), 2 * (a * b + w * c), 1 - 2 * (a * a + c * c),
+                         2 * (b * c - w * a), 2 * (a * c - w * b), 2 * (b * c + w * a), 1 - 2 * (a * a + b * b)};
+    FOR(r, 3) {
+      const double u = X[4 * r], v = X[4 * r + 1], z = X[4 * r + 2];
+      FOR(j, 3) X[4 * r + j] = u * R[j] + v * R[3 + j] + z * R[6 + j];
+    }
+  }
+}
+
+static int width(int kind) { return kind == MGK_POSE ? 0 : kind == MGK_ROTATION ? 3 : 1; }
+
+/* The twists of a factor, X being the frame before it. */
+static void twists_of(const Model *m, int f, const double *X, double *S) {
+  const int kind = m->kind[f];
+  const double at[3] = {X[3], X[7], X[11]};
+  FOR(j, width(kind)) {
+    double *s = S + 6 * (m->column[f] + j);
+    const int axis = kind == MGK_ROTATION ? j : kind % 3;
+    const double line[3] = {X[axis], X[4 + axis], X[8 + axis]};
+    if (kind >= MGK_SLIDE && kind < MGK_ROTATION) {
+      FOR(i, 3) s[i] = 0.0, s[3 + i] = line[i];
+      continue;
+    }
+    memcpy(s, line, sizeof line);
+    cross(at, line, s + 3);
+    if (kind < MGK_SLIDE) FOR(i, 3) s[3 + i] += m->factor_number[m->number[f]] * line[i];
+  }
+}
+
+/* Along a pair, X being the frame of marker A (forward) or B: its frames and twists; X is the frame at the other side afterwards. */
+static void along_pair(const Model *m, Work *w, int k, int forward, const double *x, double *X) {
+  if (!forward) memcpy(w->end + 12 * k, X, 12 * sizeof(double));
+  for (int n = m->first[k + 1] - m->first[k], i = 0; i < n; i++) {
+    const int f = forward ? m->first[k] + i : m->first[k + 1] - 1 - i;
+    if (!forward) passed(m, f, x, -1.0, X);
+    memcpy(w->frame + 12 * f, X, 12 * sizeof(double));
+    twists_of(m, f, X, w->S);
+    if (forward) passed(m, f, x, 1.0, X);
+  }
+  if (forward) memcpy(w->end + 12 * k, X, 12 * sizeof(double));
+}
+
+/* --- states ------------------------------------------------------------------------------------------------------------------------ */
+
+static void quaternion_product(const double *a, const double *b, double *out) {
+  out[0] = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3];
+  out[1] = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2];
+  out[2] = a[0] * b[2] + a[2] * b[0] + a[3] * b[1] - a[1] * b[3];
+  out[3] = a[0] * b[3] + a[3] * b[0] + a[1] * b[2] - a[2] * b[1];
+}
+
+/* The rotation vector of a unit quaternion, at most a half turn. */
+static void quaternion_log(const double *q, double *v) {
+  const double sine = sqrt(dot(q + 1, q + 1, 3)), sign = q[0] < 0.0 ? -1.0 : 1.0;
+  const double part = sign * (sine < 1e-12 ? 2.0 : 2.0 * atan2(sine, sign * q[0]) / sine);
+  FOR(i, 3) v[i] = part * q[1 + i];
+}
+
+/* States after increments dq: x + dq, exp(dq) q. */
+static void advance(const Model *m, const double *x, const double *dq, double *out) {
+  FOR(f, m->factors) {
+    const int s = m->state[f], c = m->column[f];
+    if (m->kind[f] < MGK_ROTATION) out[s] = x[s] + dq[c];
+    if (m->kind[f] != MGK_ROTATION) continue;
+    const double half = 0.5 * sqrt(dot(dq + c, dq + c, 3)), part = half > 0.0 ? 0.5 * sin(half) / half : 0.5;
+    const double turn[4] = {cos(half), part * dq[c], part * dq[c + 1], part * dq[c + 2]};
+    double q[4];
+    quaternion_product(turn, x + s, q);
+    const double size = sqrt(dot(q, q, 4));
+    FOR(i, 4) out[s + i] = q[i] / size;
+  }
+}
+
+/* Increments dq from x0 to x1. */
+static void difference(const Model *m, const double *x1, const double *x0, double *dq) {
+  FOR(f, m->factors) {
+    const int s = m->state[f], c = m->column[f];
+    if (m->kind[f] < MGK_ROTATION) dq[c] = x1[s] - x0[s];
+    if (m->kind[f] != MGK_ROTATION) continue;
+    const double back[4] = {x0[s], -x0[s + 1], -x0[s + 2], -x0[s + 3]};
+    double q[4];
+    quaternion_product(x1 + s, back, q);
+    quaternion_log(q, dq + c);
+  }
+}
+
+/* Rates of increments dq (below a radian) at the state that they lead to: dexp^-1(v) w for rotations. */
+static void tangent(const Model *m, const double *dq, const double *rate, double *out) {
+  memcpy(out, rate, m->columns * sizeof(double));
+  FOR(f, m->factors) {
+    if (m->kind[f] != MGK_ROTATION) continue;
+    const double *v = dq + m->column[f], square = dot(v, v, 3);
+    double *r = out + m->column[f], once[3], twice[3];
+    const double part = 1.0 / 12 + square * (1.0 / 720 + square * (1.0 / 30240 + square / 1209600));
+    cross(v, r, once);
+    cross(v, once, twice);
+    FOR(i, 3) r[i] += part * twice[i] - 0.5 * once[i];
+  }
+}
+
+/* The state at place `at` of Hermite's cubic through two nodes, increments from the first. */
+static void between(const Model *m, Work *w, const Node *a, const Node *b, double at, double *x) {
+  const double h = *b->at - *a->at, s = (at - *a->at) / h;
+  double *y = w->increment, *there = w->column_value;
+  difference(m, b->x, a->x, y);
+  tangent(m, y, b->rate, there);
+  FOR(i, m->columns) y[i] = s * (h * a->rate[i] + s * ((3 * y[i] - h * (2 * a->rate[i] + there[i])) + s * (h * (a->rate[i] + there[i]) - 2 * y[i])));
+  advance(m, a->x, y, x);
+}
+
+/* --- closure ----------------------------------------------------------------------------------------------------------------------- */
+
+/* Poses, twists and what the loops leave open at a state; the residual of a loop is taken at its chord, third order exact. */
+static double evaluate(const Model *m, Work *w, const double *x) {
+  w->evaluations++;
+  memcpy(w->pose + 12 * m->frame_link, m->frame, 12 * sizeof(double));
+  FOR(t, m->pairs - m->loops) {
+    const int *step = m->walk + 4 * t, k = step[0];
+    double *X = w->pose + 12 * step[3];
+    product(w->pose + 12 * step[2], (step[1] ? m->marker_a : m->marker_b) + 12 * k, X);
+    along_pair(m, w, k, step[1], x, X);
+  }
+  double worst = w->closure = 0.0, reach = 1.0;
+  FOR(i, m->links) FOR(r, 3) reach = fmax(reach, fabs(w->pose[12 * i + 4 * r + 3]));
+  w->reach = reach;
+  FOR(l, m->loops) {
+    const int k = m->chord[l];
+    double P[12], Q[12], *e = w->residual + 6 * l;
+    product(w->pose + 12 * m->ends[2 * k], m->marker_a + 12 * k, P);
+    along_pair(m, w, k, 1, x, P);
+    product(w->pose + 12 * m->ends[2 * k + 1], m->marker_b + 12 * k, Q);
+    FOR(i, 3) e[i] = 0.0;
+    FOR(j, 3) {
+      const double p[3] = {P[j], P[4 + j], P[8 + j]}, q[3] = {Q[j], Q[4 + j], Q[8 + j]};
+      double part[3];
+      cross(q, p, part);
+      FOR(i, 3) e[i] += 0.5 * part[i];
+    }
+    FOR(i, 3) {
+      w->middle[3 * l + i] = 0.5 * (P[4 * i + 3] + Q[4 * i + 3]);
+      e[3 + i] = P[4 * i + 3] - Q[4 * i + 3];
+    }
+    /* a turn of more than a right angle has a small sine as well */
+    if (P[0] * Q[0] + P[4] * Q[4] + P[8] * Q[8] < 0.0 || P[1] * Q[1] + P[5] * Q[5] + P[9] * Q[9] < 0.0) e[0] = INFINITY;
+    worst = fmax(worst, size_of(e, 6));
+    w->closure = fmax(w->closure, fmax(sqrt(dot(e, e, 3)), sqrt(dot(e + 3, e + 3, 3))));
+  }
+  FOR(k, m->couplings) {
+    double *e = w->residual + 6 * m->loops + k;
+    *e = -m->constant[k];
+    for (int i = m->term_first[k]; i < m->term_first[k + 1]; i++) *e += m->coefficient[i] * x[m->column_state[m->term_column[i]]];
+    worst = fmax(worst, fabs(*e)), w->closure = fmax(w->closure, fabs(*e));
+  }
+  return worst;
+}
+
+/* Columns of the closure matrix from twists of all freedoms about the origin. `motion`: the velocities of the chords where the rate of
+ * the matrix is asked for and S are rates, `twist` the twists themselves. */
+static void fill(const Model *m, const double *S, const double *middle, const double *twist, const double *motion, double *out) {
+  const int u = m->unknowns;
+  memset(out, 0, (size_t)m->rows * u * sizeof(double));
+  FOR(l, m->loops) for (int i = m->loop_first[l]; i < m->loop_first[l + 1]; i++) {
+    const int k = m->loop_pair[i];
+    const double sign = m->loop_sign[i];
+    for (int f = m->first[k]; f < m->first[k + 1]; f++) FOR(j, width(m->kind[f])) {
+      const int c = m->column[f] + j;
+      double s[6], more[3];
+      if (m->place[c] < 0) continue;
+      twist_about(S + 6 * c, middle + 3 * l, s);
+      if (motion) {
+        cross(twist + 6 * c, motion + 3 * l, more);
+        FOR(r, 3) s[3 + r] += more[r];
+      }
+      FOR(r, 6) out[(6 * l + r) * u + m->place[c]] += sign * s[r];
+    }
+  }
+  if (motion) return;
+  FOR(k, m->couplings) for (int i = m->term_first[k]; i < m->term_first[k + 1]; i++) {
+    const int j = m->place[m->term_column[i]];
+    if (j >= 0) out[(6 * m->loops + k) * u + j] = m->coefficient[i];
+  }
+}
+
+/* Elimination in place, with rows chosen by pivots: the independent rows of a redundant loop come first. Whether all columns are independent. */
+static int eliminate(const Model *m, Work *w) {
+  const int n = m->unknowns, rows = m->rows;
+  double *A = w->lu;
+  w->factorizations++;
+  FOR(r, rows) w->row[r] = r;
+  FOR(i, n) {
+    int best = i;
+    for (int r = i + 1; r < rows; r++) if (fabs(A[r * n + i]) > fabs(A[best * n + i])) best = r;
+    if (best != i) {
+      const int row = w->row[i];
+      w->row[i] = w->row[best], w->row[best] = row;
+      FOR(c, n) { const double t = A[i * n + c]; A[i * n + c] = A[best * n + c], A[best * n + c] = t; }
+    }
+    if (!(fabs(A[i * n + i]) > 1e-12)) return 0;
+    const double d = A[i * n + i] = 1.0 / A[i * n + i];
+    for (int r = i + 1; r < rows; r++) {
+      double *row = A + r * n;
+      if (row[i] == 0.0) continue;
+      const double f = row[i] *= d;
+      for (int c = i + 1; c < n; c++) row[c] -= f * A[i * n + c];
+    }
+  }
+  return 1;
+}
+
+/* Unknowns from the right sides of all rows, by the independent ones. */
+static void solve(const Model *m, const Work *w, const double *right, double *out) {
+  const int n = m->unknowns;
+  const double *A = w->lu;
+  FOR(i, n) {
+    double s = right[w->row[i]];
+    FOR(c, i) s -= A[i * n + c] * out[c];
+    out[i] = s;
+  }
+  for (int i = n - 1; i >= 0; i--) {
+    double s = out[i];
+    for (int c = i + 1; c < n; c++) s -= A[i * n + c] * out[c];
+    out[i] = s * A[i * n + i];
+  }
+}
+
+/* y L = right over the independent rows, in place, given U already: the second half of a transposed solution. */
+static void back_through(const Model *m, const Work *w, double *y) {
+  const int n = m->unknowns;
+  for (int i = n - 2; i >= 0; i--) for (int r = i + 1; r < n; r++) y[i] -= w->lu[r * n + i] * y[r];
+}
+
+/* Multipliers of all rows (dropped ones zero) with A^T x = right; `right` is used up. */
+static void solve_transposed(const Model *m, const Work *w, double *right, double *out) {
+  const int n = m->unknowns;
+  FOR(i, n) {
+    FOR(c, i) right[i] -= w->lu[c * n + i] * right[c];
+    right[i] *= w->lu[i * n + i];
+  }
+  back_through(m, w, right);
+  FOR(r, m->rows) out[w->row[r]] = r < n ? right[r] : 0.0;
+}
+
+/* J q' of all rows, or with `pairs` the sums of twists of pairs along the loops. */
+static void row_sums(const Model *m, Work *w, const double *dq, const double *pairs, double *out) {
+  if (dq) {
+    memset(w->pair_twist, 0, (size_t)6 * m->pairs * sizeof(double));
+    FOR(c, m->columns) FOR(i, 6) w->pair_twist[6 * m->owner[c] + i] += w->S[6 * c + i] * dq[c];
+    pairs = w->pair_twist;
+  }
+  FOR(l, m->loops) {
+    double sum[6] = {0};
+    for (int i = m->loop_first[l]; i < m->loop_first[l + 1]; i++)
+      FOR(r, 6) sum[r] += m->loop_sign[i] * pairs[6 * m->loop_pair[i] + r];
+    twist_about(sum, w->middle + 3 * l, out + 6 * l);
+  }
+  FOR(k, m->couplings) {
+    double *sum = out + 6 * m->loops + k;
+    *sum = 0.0;
+    if (dq) for (int i = m->term_first[k]; i < m->term_first[k + 1]; i++) *sum += m->coefficient[i] * dq[m->term_column[i]];
+  }
+}
+
+/* Rates of all freedoms with J q' + known = 0 for given ones of the drives; what is left of that, relative. */
+static double completed(const Model *m, Work *w, const double *driven, const double *known, double size, double *dq) {
+  double *right = w->row_value, *found = w->column_value;
+  memset(dq, 0, m->columns * sizeof(double));
+  FOR(i, m->drives) dq[m->drive[i]] = driven[i];
+  row_sums(m, w, dq, NULL, right);
+  FOR(r, m->rows) right[r] = -right[r] - (known ? known[r] : 0.0);
+  solve(m, w, right, found);
+  FOR(j, m->unknowns) dq[m->unknown[j]] = found[j];
+  if (!m->stresses) return 0.0;
+  row_sums(m, w, dq, NULL, right);
+  double left = 0.0;
+  FOR(r, m->rows) left = fmax(left, fabs(right[r] + (known ? known[r] : 0.0)));
+  size += size_of(dq, m->columns) + (known ? size_of(known, m->rows) : 0.0);
+  return size > 0.0 ? left / size : 0.0;
+}
+
+/* Closed by Newton from x, in place: evaluated and factored there afterwards, the matrix kept where there is a place for it. */
+static int closed(const Model *m, Work *w, double *x, double *matrix) {
+  double before = INFINITY, sum = 0.0, step = INFINITY;
+  FOR(i, ITERATIONS) {
+    const double left = evaluate(m, w, x);
+    if (!(left < 1.0)) return MGK_STEP;
+    const int done = left <= CLOSED * w->reach || (left >= 0.5 * before && left <= ACCEPTED * w->reach);
+    if (done || !(step < REUSED)) {
+      fill(m, w->S, w->middle, NULL, NULL, w->lu);
+      if (matrix) memcpy(matrix, w->lu, (size_t)m->rows * m->unknowns * sizeof(double));
+      if (!eliminate(m, w)) return MGK_SINGULAR;
+    }
+    if (done) return MGK_OK;
+    double *right = w->row_value, *found = w->column_value;
+    FOR(r, m->rows) right[r] = -w->residual[r];
+    solve(m, w, right, found);
+    step = size_of(found, m->unknowns), sum += step, before = left;
+    if (!(sum <= CORRECTION)) return MGK_STEP;
+    memset(w->increment, 0, m->columns * sizeof(double));
+    FOR(j, m->unknowns) w->increment[m->unknown[j]] = found[j];
+    advance(m, x, w->increment, x);
+  }
+  return MGK_NOT_CLOSED;
+}
+
+/* --- rates ------------------------------------------------------------------------------------------------------------------------- */
+
+/* Twists of all links for rates dq; the velocity part of the relative acceleration of every pair; G: the rate of every twist. */
+static void move(const Model *m, Work *w, const double *dq, double *G) {
+  memset(w->V + 6 * m->frame_link, 0, 6 * sizeof(double));
+  FOR(t, m->pairs) {
+    const int chord = t >= m->pairs - m->loops, *step = m->walk + 4 * t;
+    const int k = chord ? m->chord[t - m->pairs + m->loops] : step[0], forward = chord || step[1];
+    double V[6], *bias = w->bias + 6 * k;
+    memcpy(V, w->V + 6 * (chord ? m->ends[2 * k] : step[2]), sizeof V);
+    memset(bias, 0, sizeof V);
+    for (int n = m->first[k + 1] - m->first[k], i = 0; i < n; i++) {
+      const int f = forward ? m->first[k] + i : m->first[k + 1] - 1 - i;
+      double s[6] = {0}, part[6];
+      FOR(j, width(m->kind[f])) FOR(r, 6) s[r] += w->S[6 * (m->column[f] + j) + r] * dq[m->column[f] + j];
+      if (!forward) FOR(r, 6) V[r] -= s[r];
+      moved_twist(V, s, part);
+      FOR(r, 6) bias[r] += part[r];
+      if (G) FOR(j, width(m->kind[f])) moved_twist(V, w->S + 6 * (m->column[f] + j), G + 6 * (m->column[f] + j));
+      if (forward) FOR(r, 6) V[r] += s[r];
+    }
+    memcpy(chord ? w->chord_V + 6 * (t - m->pairs + m->loops) : w->V + 6 * step[3], V, sizeof V);
+  }
+}
+
+/* Rates and accelerations of all freedoms, twists of all links and their rates. */
+static int rates(const Model *m, Work *w, const double *v, const double *a) {
+  double turning = 0.0;
+  double gap = completed(m, w, v, NULL, 0.0, w->dq);
+  move(m, w, w->dq, NULL);
+  FOR(c, m->columns) turning = fmax(turning, w->dq[c] * w->dq[c]);
+  double *known = w->residual; /* closed: no longer asked for */
+  row_sums(m, w, NULL, w->bias, known);
+  gap = fmax(gap, completed(m, w, a, known, turning, w->ddq));
+  if (gap > INDEPENDENT) return MGK_CONTRADICTION;
+  memset(w->A + 6 * m->frame_link, 0, 6 * sizeof(double));
+  FOR(t, m->pairs - m->loops) {
+    const int *step = m->walk + 4 * t, k = step[0];
+    FOR(i, 6) {
+      double sum = w->bias[6 * k + i];
+      for (int f = m->first[k]; f < m->first[k + 1]; f++) FOR(j, width(m->kind[f])) sum += w->S[6 * (m->column[f] + j) + i] * w->ddq[m->column[f] + j];
+      w->A[6 * step[3] + i] = w->A[6 * step[2] + i] + (step[1] ? sum : -sum);
+    }
+  }
+  return isfinite(size_of(w->A, 6 * m->links) + turning) ? MGK_OK : MGK_NOT_FINITE;
+}
+
+/* --- forces ------------------------------------------------------------------------------------------------------------------------ */
+
+/* Effort wrenches of a pair combined to be dual to its freedoms, E (S^T E)^-1, by Gauss and Jordan. */
+static int made_dual(const Model *m, Work *w, int k) {
+  const int c = m->column[m->first[k]];
+  int n = 0;
+  double U[6][12] = {{0}}, E[36];
+  for (int f = m->first[k]; f < m->first[k + 1]; f++) n += width(m->kind[f]);
+  memcpy(E, w->E + 6 * c, 6 * n * sizeof(double));
+  FOR(i, n) {
+    FOR(j, n) U[i][j] = dot(w->S + 6 * (c + i), E + 6 * j, 6);
+    U[i][n + i] = 1.0;
+  }
+  FOR(i, n) {
+    int best = i;
+    for (int r = i + 1; r < n; r++) if (fabs(U[r][i]) > fabs(U[best][i])) best = r;
+    if (!(fabs(U[best][i]) > 1e-12)) return MGK_SINGULAR;
+    FOR(j, 2 * n) { const double t = U[i][j]; U[i][j] = U[best][j], U[best][j] = t; }
+    const double d = 1.0 / U[i][i];
+    FOR(j, 2 * n) U[i][j] *= d;
+    FOR(r, n) if (r != i) { const double g = U[r][i]; FOR(j, 2 * n) U[r][j] -= g * U[i][j]; }
+  }
+  FOR(j, n) FOR(i, 6) {
+    double sum = 0.0;
+    FOR(g, n) sum += E[6 * g + i] * U[g][n + j];
+    w->E[6 * (c + j) + i] = sum;
+  }
+  return MGK_OK;
+}
+
+/* Effort wrenches of all freedoms. */
+static int efforts(const Model *m, Work *w) {
+  FOR(c, m->columns) {
+    const double *end = w->end + 12 * m->owner[c], *X = m->effort_factor[c] < 0 ? end : w->frame + 12 * m->effort_factor[c];
+    const double *at = m->effort_at_b[c] ? end : X, point[3] = {at[3], at[7], at[11]};
+    double *E = w->E + 6 * c;
+    turned(X, m->effort + 6 * c, E);
+    turned(X, m->effort + 6 * c + 3, E + 3);
+    wrench_moved(E, point, 1.0);
+  }
+  FOR(k, m->pairs) if (m->dual[k] && made_dual(m, w, k)) return MGK_SINGULAR;
+  return MGK_OK;
+}
+
+/* A force at a point, added to the wrench on a link. */
+static void pushed(Work *w, int link, const double *force, const double *at) {
+  double f[6] = {0, 0, 0, force[0], force[1], force[2]};
+  wrench_moved(f, at, 1.0);
+  FOR(i, 6) w->applied[6 * link + i] += f[i];
+}
+
+/* A spring or damper between points of two links. */
+static void between_points(const Model *m, Work *w, int i, int j, const double *number) {
+  double p[3], q[3], d[3], back[3], speed = 0.0, length = 0.0;
+  point_of(w->pose + 12 * i, number, p);
+  point_of(w->pose + 12 * j, number + 3, q);
+  FOR(r, 3) d[r] = q[r] - p[r], length += d[r] * d[r];
+  length = sqrt(length);
+  FOR(side, 2) {
+    const double *V = w->V + 6 * (side ? j : i), *at = side ? q : p;
+    double v[3];
+    cross(V, at, v);
+    FOR(r, 3) speed += (side ? 1.0 : -1.0) * (V[3 + r] + v[r]) * (length > 0.0 ? d[r] / length : 0.0);
+  }
+  const double force = -number[6] * (length - number[7]) - number[8] * speed;
+  FOR(r, 3) d[r] *= force == 0.0 ? 0.0 : force / length, back[r] = -d[r];
+  pushed(w, i, back, p);
+  pushed(w, j, d, q);
+  FOR(side, 2) if ((side ? j : i) == m->frame_link) {
+    double f[6] = {0};
+    memcpy(f + 3, side ? d : back, 3 * sizeof(double));
+    wrench_moved(f, side ? q : p, 1.0);
+    FOR(r, 6) w->frame_load[r] += f[r];
+  }
+}
+
+/* All loads: wrenches on links, efforts in freedoms. */
+static void loads(const Model *m, Work *w, const double *x) {
+  memset(w->applied, 0, (size_t)6 * m->links * sizeof(double));
+  memset(w->given, 0, m->columns * sizeof(double));
+  memset(w->frame_load, 0, sizeof w->frame_load);
+  FOR(l, m->loads) {
+    const int *load = m->load + 4 * l, i = load[1], j = load[2];
+    const double *number = m->load_number + load[3];
+    double at[3], force[6];
+    if (load[0] == MGK_WEIGHT) {
+      FOR(b, m->links) if (m->mass[b] != 0.0) {
+        FOR(r, 3) force[r] = m->mass[b] * number[r];
+        point_of(w->pose + 12 * b, m->center + 3 * b, at);
+        pushed(w, b, force, at);
+      }
+    } else if (load[0] == MGK_WRENCH) {
+      const double *X = w->pose + 12 * i;
+      memcpy(force, number, sizeof force);
+      if (j) turned(X, number, force), turned(X, number + 3, force + 3);
+      point_of(X, number + 6, at);
+      pushed(w, i, force, at);
+      FOR(r, 3) w->applied[6 * i + r] += force[3 + r];
+    } else if (load[0] == MGK_EFFORT) {
+      w->given[i] += number[0];
+    } else if (load[0] == MGK_LAW) {
+      w->given[i] += -number[0] * (x[m->column_state[i]] - number[1]) - number[2] * w->dq[i];
+    } else {
+      between_points(m, w, i, j, number);
+    }
+  }
+}
+
+/* Inertia wrenches -(I A + V x* I V) about the origin; the inertia turns with the link. */
+static void inertia(const Model *m, Work *w) {
+  FOR(b, m->links) {
+    const double *X = w->pose + 12 * b, *V = w->V + 6 * b, *A = w->A + 6 * b, *J = m->inertia + 6 * b;
+    double c[3], v[3], a[3], part[3], turn[3], rate[3], h[3], M[3], out[3], *f = w->inertial + 6 * b;
+    point_of(X, m->center + 3 * b, c);
+    cross(V, c, v);
+    FOR(i, 3) v[i] += V[3 + i];
+    cross(A, c, a);
+    cross(V, v, part);
+    FOR(i, 3) f[i] = 0.0, f[3 + i] = -m->mass[b] * (a[i] + A[3 + i] + part[i]);
+    wrench_moved(f, c, 1.0);
+    turned_back(X, V, turn);
+    turned_back(X, A, rate);
+    const double I[9] = {J[0], J[3], J[4], J[3], J[1], J[5], J[4], J[5], J[2]};
+    FOR(i, 3) h[i] = dot(I + 3 * i, turn, 3), M[i] = dot(I + 3 * i, rate, 3);
+    cross(turn, h, part);
+    FOR(i, 3) M[i] += part[i];
+    turned(X, M, out);
+    FOR(i, 3) f[i] -= out[i];
+  }
+}
+
+/* Pair wrenches of multipliers of the loops: w = C^T x, added. */
+static void add_loops(const Model *m, const Work *w, const double *x, double *pairs) {
+  FOR(l, m->loops) {
+    double f[6];
+    memcpy(f, x + 6 * l, sizeof f);
+    wrench_moved(f, w->middle + 3 * l, 1.0);
+    for (int i = m->loop_first[l]; i < m->loop_first[l + 1]; i++)
+      FOR(r, 6) pairs[6 * m->loop_pair[i] + r] += m->loop_sign[i] * f[r];
+  }
+}
+
+/* Efforts in freedoms of multipliers of the couplings. */
+static void couple(const Model *m, const double *multiplier, double *out) {
+  memset(out, 0, m->columns * sizeof(double));
+  FOR(k, m->couplings) for (int i = m->term_first[k]; i < m->term_first[k + 1]; i++)
+    out[m->term_column[i]] += m->coefficient[i] * multiplier[k];
+}
+
+static void at_points(const Model *m, const Work *w, double *pairs, double sign) {
+  FOR(k, m->pairs) {
+    const double *X = w->end + 12 * k, point[3] = {X[3], X[7], X[11]};
+    wrench_moved(pairs + 6 * k, point, sign);
+  }
+}
+
+/* Self-stresses: one a dropped row, orthonormal in the reactions at the pair points, moments over L; then reactions of least norm. */
+static int self_stresses(const Model *m, Work *w, double *multiplier_stress, double *coupled_stress) {
+  const int n = m->unknowns, p = 6 * m->pairs, c = m->columns, k = m->couplings;
+  double largest = 0.0;
+  memset(w->stress, 0, (size_t)m->stresses * p * sizeof(double));
+  FOR(s, m->stresses) {
+    double *null = w->null + s * m->rows, *stress = w->stress + s * p, *effort = w->stress_effort + s * c, *y = w->column_value;
+    FOR(i, n) y[i] = -w->lu[(n + s) * n + i];
+    back_through(m, w, y);
+    FOR(r, m->rows) null[w->row[r]] = r < n ? y[r] : r == n + s ? 1.0 : 0.0;
+    add_loops(m, w, null, stress);
+    memset(effort, 0, c * sizeof(double));
+    FOR(i, m->drives) effort[m->drive[i]] = dot(w->S + 6 * m->drive[i], stress + 6 * m->owner[m->drive[i]], 6);
+    FOR(i, m->terms) {
+      const int at = m->term_column[i];
+      effort[at] = dot(w->S + 6 * at, stress + 6 * m->owner[at], 6);
+    }
+    FOR(i, c) if (effort[i] != 0.0) FOR(r, 6) stress[6 * m->owner[i] + r] -= w->E[6 * i + r] * effort[i];
+    at_points(m, w, stress, -1.0);
+    FOR(i, k) multiplier_stress[s * k + i] = -null[6 * m->loops + i];
+    largest = fmax(largest, sqrt(dot(stress, stress, p)));
+  }
+  at_points(m, w, w->reaction, -1.0);
+  FOR(s, m->stresses) {
+    double *stress = w->stress + s * p, *effort = w->stress_effort + s * c, *multiplier = multiplier_stress + s * k, size = 0.0;
+    FOR(pass, 2) {
+      FOR(t, s) {
+        const double part = dot(stress, w->stress + t * p, p);
+        FOR(i, p) stress[i] -= part * w->stress[t * p + i];
+        FOR(i, c) effort[i] -= part * w->stress_effort[t * c + i];
+        FOR(i, k) multiplier[i] -= part * multiplier_stress[t * k + i];
+      }
+      size = sqrt(dot(stress, stress, p));
+      if (!(size > DRIVERS_ALONE * largest) || !(largest > DRIVERS_ALONE)) return MGK_STRAIN;
+      FOR(i, p) stress[i] /= size;
+      FOR(i, c) effort[i] /= size;
+      FOR(i, k) multiplier[i] /= size;
+    }
+    const double part = -dot(stress, w->reaction, p);
+    FOR(i, p) w->reaction[i] += part * stress[i];
+    FOR(i, c) w->tau[i] += part * effort[i];
+    FOR(i, k) w->multiplier[i] += part * multiplier[i];
+    couple(m, multiplier, coupled_stress + s * c);
+  }
+  FOR(s, m->stresses) at_points(m, w, w->stress + s * p, 1.0);
+  at_points(m, w, w->reaction, 1.0);
+  return MGK_OK;
+}
+
+/* What is left of the equilibrium of links and of the power, and the largest terms, as the package measures them. */
+static void checks(const Model *m, Work *w, double *balance, double *power, double *largest) {
+  double *left = w->carried, wrench = 0.0, term = 0.0;
+  *balance = *power = 0.0;
+  FOR(i, 6 * m->links) left[i] = w->applied[i] + w->inertial[i];
+  FOR(k, m->pairs) memcpy(w->total + 6 * k, w->reaction + 6 * k, 6 * sizeof(double));
+  FOR(c, m->columns) {
+    const double own = w->column_value[c], acting = own + w->given[c] + w->coupled[c];
+    FOR(r, 6) w->total[6 * m->owner[c] + r] += w->E[6 * c + r] * acting;
+    *power += w->dq[c] * acting;
+    *balance = fmax(*balance, fabs(dot(w->S + 6 * c, w->reaction + 6 * m->owner[c], 6)));
+    const double most = fmax(fabs(own), fmax(fabs(w->given[c]), fabs(w->coupled[c])));
+    wrench = fmax(wrench, most), term = fmax(term, fabs(w->dq[c]) * most);
+  }
+  FOR(k, m->pairs) {
+    const int a = m->ends[2 * k], b = m->ends[2 * k + 1];
+    const double through = size_of(w->total + 6 * k, 6), speed = fmax(size_of(w->V + 6 * a, 6), size_of(w->V + 6 * b, 6));
+    FOR(r, 6) left[6 * b + r] += w->total[6 * k + r], left[6 * a + r] -= w->total[6 * k + r];
+    wrench = fmax(wrench, through), term = fmax(term, speed * through);
+  }
+  FOR(b, m->links) {
+    const double speed = size_of(w->V + 6 * b, 6), on = fmax(size_of(w->applied + 6 * b, 6), size_of(w->inertial + 6 * b, 6));
+    *power += dot(w->V + 6 * b, w->applied + 6 * b, 6) + dot(w->V + 6 * b, w->inertial + 6 * b, 6);
+    wrench = fmax(wrench, on), term = fmax(term, speed * on);
+    if (b != m->frame_link) *balance = fmax(*balance, size_of(left + 6 * b, 6));
+  }
+  largest[0] = fmax(largest[0], wrench), largest[1] = fmax(largest[1], term);
+}
+
+/* All forces at a state with rates; the force parts of a record. */
+static int forces(const Model *m, Work *w, const double *x, double *record, const int *places, double *largest) {
+  double *multiplier_stress = record + places[MGK_MULTIPLIER_STRESS], *coupled_stress = record + places[MGK_COUPLED_STRESS];
+  if (efforts(m, w)) return MGK_SINGULAR;
+  loads(m, w, x);
+  inertia(m, w);
+  FOR(i, 6 * m->links) w->carried[i] = w->applied[i] + w->inertial[i];
+  memset(w->total, 0, (size_t)6 * m->pairs * sizeof(double));
+  for (int t = m->pairs - m->loops - 1; t >= 0; t--) {
+    const int *step = m->walk + 4 * t;
+    FOR(r, 6) {
+      const double on = w->carried[6 * step[3] + r];
+      w->total[6 * step[0] + r] = step[1] ? -on : on;
+      w->carried[6 * step[2] + r] += on;
+    }
+  }
+  double *right = w->column_value;
+  FOR(j, m->unknowns) {
+    const int c = m->unknown[j];
+    right[j] = w->given[c] - dot(w->S + 6 * c, w->total + 6 * m->owner[c], 6);
+  }
+  solve_transposed(m, w, right, w->row_value);
+  add_loops(m, w, w->row_value, w->total);
+  FOR(k, m->couplings) w->multiplier[k] = -w->row_value[6 * m->loops + k];
+  memcpy(w->reaction, w->total, (size_t)6 * m->pairs * sizeof(double));
+  FOR(c, m->columns) {
+    w->tau[c] = dot(w->S + 6 * c, w->total + 6 * m->owner[c], 6);
+    FOR(r, 6) w->reaction[6 * m->owner[c] + r] -= w->E[6 * c + r] * w->tau[c];
+  }
+  if (m->stresses && self_stresses(m, w, multiplier_stress, coupled_stress)) return MGK_STRAIN;
+  couple(m, w->multiplier, w->coupled);
+  double *own = w->column_value;
+  memset(own, 0, m->columns * sizeof(double));
+  FOR(i, m->drives) {
+    const int c = m->drive[i];
+    own[c] = w->tau[c] - w->given[c] - w->coupled[c];
+  }
+  checks(m, w, record + places[MGK_BALANCE], record + places[MGK_POWER], largest);
+  double *shaking = record + places[MGK_SHAKING], *body = record + places[MGK_BODY_LOADS];
+  memcpy(shaking, w->frame_load, sizeof w->frame_load);
+  FOR(b, m->links) FOR(r, 6) {
+    body[6 * b + r] = w->applied[6 * b + r] + w->inertial[6 * b + r];
+    if (b != m->frame_link) shaking[r] += body[6 * b + r];
+  }
+  FOR(k, m->pairs) FOR(r, 3) record[places[MGK_POINTS] + 3 * k + r] = w->end[12 * k + 4 * r + 3];
+#define PUT(part, values) memcpy(record + places[part], values, (size_t)(places[part + 1] - places[part]) * sizeof(double))
+  PUT(MGK_REACTIONS, w->reaction), PUT(MGK_EFFORTS, w->tau), PUT(MGK_GIVEN, w->given), PUT(MGK_COUPLED, w->coupled);
+  PUT(MGK_MULTIPLIERS, w->multiplier), PUT(MGK_STRESS, w->stress), PUT(MGK_STRESS_EFFORTS, w->stress_effort);
+  return isfinite(record[places[MGK_BALANCE]] + record[places[MGK_POWER]]) ? MGK_OK : MGK_NOT_FINITE;
+}
+
+/* --- paths ------------------------------------------------------------------------------------------------------------------------- */
+
+/* Where rotation vectors of the user stand, continued from the last state: signed angles about axes that do not flip, unwrapped. */
+static void coordinates(const Model *m, Work *w, const double *x, double *out) {
+  FOR(f, m->factors) {
+    const int c = m->column[f], s = m->state[f];
+    if (m->kind[f] < MGK_ROTATION) out[c] = x[s] * (m->is_length[c] ? *m->unit : 1.0);
+    if (m->kind[f] != MGK_ROTATION) continue;
+    double *axis = w->axis + 3 * f, *angle = w->angle + f, v[3];
+    quaternion_log(x + s, v);
+    const double size = sqrt(dot(v, v, 3));
+    const int clear = size > 1e-9;
+    memcpy(out + c, v, sizeof v);
+    if (clear) {
+      const double sign = w->begun[f] != 0.0 && dot(v, axis, 3) < 0.0 ? -1.0 : 1.0;
+      FOR(i, 3) axis[i] = sign * v[i] / size;
+      if (w->begun[f] == 0.0) *angle = dot(m->start_coordinates + c, axis, 3);
+      w->begun[f] = 1.0;
+    }
+    if (w->begun[f] == 0.0) continue;
+    const double signed_ = dot(v, axis, 3), turn = 8.0 * atan(1.0);
+    *angle = signed_ + turn * floor((*angle - signed_) / turn + 0.5);
+    if (clear || fabs(*angle) > 1.0) FOR(i, 3) out[c + i] = *angle * axis[i];
+  }
+}
+
+static void set_drives(const Model *m, double *x, const double *q) {
+  FOR(i, m->drives) x[m->column_state[m->drive[i]]] = q[i];
+}
+
+/* What a node is beside its closed state, at which it has just been factored: rates along the path, those of the matrix, the condition. */
+static int made_node(const Model *m, Work *w, Node *node) {
+  const int n = m->unknowns;
+  double largest = 1.0, inverse = 0.0;
+  if (completed(m, w, w->direction, NULL, 0.0, node->rate) > INDEPENDENT) return MGK_CONTRADICTION;
+  move(m, w, node->rate, w->G);
+  FOR(l, m->loops) {
+    double *V = w->chord_V + 6 * l, turn[3];
+    cross(V, w->middle + 3 * l, turn);
+    FOR(i, 3) V[i] = V[3 + i] + turn[i];
+    memmove(w->chord_V + 3 * l, V, 3 * sizeof(double));
+  }
+  fill(m, w->G, w->middle, w->S, w->chord_V, node->matrix_rate);
+  FOR(i, n) {
+    memset(w->row_value, 0, m->rows * sizeof(double));
+    w->row_value[w->row[i]] = 1.0;
+    solve(m, w, w->row_value, w->inverse + i * n); /* column i */
+  }
+  FOR(i, n) {
+    double of_matrix = 0.0, of_inverse = 0.0;
+    FOR(j, n) of_matrix += fabs(node->matrix[w->row[i] * n + j]), of_inverse += fabs(w->inverse[j * n + i]);
+    largest = fmax(largest, of_matrix), inverse = fmax(inverse, of_inverse);
+  }
+  node->condition = largest * inverse;
+  return node->condition <= FAIR ? MGK_OK : MGK_SINGULAR;
+}
+
+/* A bound of the spectral radius of a matrix of sizes (Collatz and Wielandt), independent of the units of rows and columns. */
+static double radius(const double *M, int n, double *v) {
+  double best = INFINITY, *next = v + n;
+  FOR(i, n) v[i] = 1.0;
+  FOR(pass, 4) {
+    double ratio = 0.0, most = 0.0;
+    FOR(i, n) next[i] = dot(M + i * n, v, n), ratio = fmax(ratio, next[i] / v[i]), most = fmax(most, next[i]);
+    best = fmin(best, ratio);
+    FOR(i, n) v[i] = fmax(fmax(next[i], 1e-3 * most), 1e-300);
+  }
+  return n ? best : 0.0;
+}
+
+/* Whether the step from node a to b leads along one regular branch, b being factored; grown: by how much the next one may be longer.
+ *
+ * The closure matrix along the step is, to third order, the Hermite cubic through both ends, which lies in the hull of its Bezier points
+ * C: no matrix of it is singular where |C_b^-1 (C_b - C_i)| < 1 for all of them (Banach's lemma). That b is on the branch of a and not on
+ * another one: the states' own cubic is closed in the middle, where it is furthest from the track, by a correction that is small against
+ * the distance of any two solutions, 2 / (|J^-1| |J'|) at least (see numerics/certificate.py, where the same limit holds). */
+static int certified(const Model *m, Work *w, double *grown) {
+  const int n = m->unknowns;
+  const Node *a = &w->a, *b = &w->b;
+  const double third = (*b->at - *a->at) / 3.0;
+  FOR(i, n) FOR(j, n) {
+    double part[3] = {0};
+    FOR(r, n) {
+      const int at = w->row[r] * n + j;
+      const double g = w->inverse[r * n + i], whole = b->matrix[at] - a->matrix[at];
+      part[0] += g * whole, part[1] += g * (whole - third * a->matrix_rate[at]), part[2] += g * third * b->matrix_rate[at];
+    }
+    w->change[i * n + j] = size_of(part, 3);
+  }
+  const double departure = radius(w->change, n, w->bound);
+  between(m, w, a, b, 0.5 * (*a->at + *b->at), w->trial);
+  if (!isfinite(evaluate(m, w, w->trial))) return 0;
+  solve(m, w, w->residual, w->column_value);
+  double size = fmax(1.0, fmax(size_of(a->rate, m->columns), size_of(b->rate, m->columns)));
+  const double correction = 4.0 * size_of(w->column_value, n), allowed = ALONE / (size * fmax(1.0, fmax(a->condition, b->condition)));
+  *grown = fmin(2.0, fmax(0.4, 0.8 * fmin(DEPARTURE / fmax(departure, 1e-9), sqrt(sqrt(allowed / fmax(correction, 1e-300))))));
+  return departure <= DEPARTURE && correction <= allowed;
+}
+
+/* Rates, forces and the record of a closed state just factored. */
+static int put(const Model *m, Work *w, const double *x, const double *v, const double *a, int with_forces, const int *places, double *record,
+               double *largest) {
+  record[places[MGK_CLOSURE]] = w->closure;
+  const int status = rates(m, w, v, a);
+  if (status) return status;
+  PUT(MGK_X, x), PUT(MGK_DQ, w->dq), PUT(MGK_DDQ, w->ddq);
+  coordinates(m, w, x, record + places[MGK_COORDINATES]);
+  return with_forces ? forces(m, w, x, record, places, largest) : MGK_OK;
+}
+
+/* What is asked of a path: positions and what becomes of them. */
+typedef struct {
+  int count, with_forces, done;
+  const int *order, *places;
+  const double *q, *v, *a;
+  double *out, *largest;
+} Asked;
+
+static int at_place(const Asked *asked, int i) { return asked->order ? asked->order[i] : i; }
+
+/* One position of a certified step, read off its nodes. */
+static int read_off(const Model *m, Work *w, Asked *asked, double at) {
+  const int i = at_place(asked, asked->done), d = m->drives;
+  if (at >= *w->b.at) memcpy(w->x, w->b.x, m->states * sizeof(double));
+  else between(m, w, &w->a, &w->b, at, w->x);
+  set_drives(m, w->x, asked->q + i * d);
+  const int status = closed(m, w, w->x, NULL);
+  if (status) return status;
+  return put(m, w, w->x, asked->v + i * d, asked->a + i * d, asked->with_forces, asked->places, asked->out + (size_t)i * asked->places[MGK_PARTS],
+             asked->largest);
+}
+
+static void swapped(Node *p, Node *q) {
+  const Node t = *p;
+  *p = *q, *q = t;
+}
+
+/* Along a straight line of the drives from node a, which lies at place 0, to `end` at a `length`; `until`: the positions on it. */
+static int follow(const Model *m, Work *w, Asked *asked, const double *begin, const double *end, double length, int until) {
+  double h = fmin(LONGEST, length), *drive = w->column_value;
+  int known = 0, status;
+  while (*w->a.at < length) {
+    if (++w->steps > MOST_STEPS) return MGK_TOO_FAR;
+    const double left = length - *w->a.at, step = h >= left ? left : h > 0.5 * left ? 0.5 * left : h;
+    *w->b.at = step == left ? length : *w->a.at + step;
+    if (known && step < 16.0 * (*w->a.at - *w->before.at)) {
+      between(m, w, &w->before, &w->a, *w->b.at, w->b.x);
+    } else {
+      FOR(c, m->columns) w->increment[c] = step * w->a.rate[c];
+      advance(m, w->a.x, w->increment, w->b.x);
+    }
+    FOR(i, m->drives) drive[i] = step == left ? end[i] : begin[i] + *w->b.at * w->direction[i];
+    set_drives(m, w->b.x, drive);
+    double grown = 0.5;
+    status = closed(m, w, w->b.x, w->b.matrix);
+    if (!status) status = made_node(m, w, &w->b);
+    if (!status && !certified(m, w, &grown)) status = MGK_STEP;
+    if (status) {
+      h = fmin(0.5, grown) * step;
+      if (h < SHORTEST) return status;
+      continue;
+    }
+    for (; asked->done < until; asked->done++) {
+      const double *q = asked->q + at_place(asked, asked->done) * m->drives;
+      double at = 0.0;
+      FOR(i, m->drives) at += w->direction[i] * (q[i] - begin[i]);
+      if (at > *w->b.at && step != left) break;
+      if ((status = read_off(m, w, asked, at))) return status;
+    }
+    swapped(&w->before, &w->a);
+    swapped(&w->a, &w->b);
+    known = 1, h = fmin(LONGEST, grown * step);
+  }
+  return MGK_OK;
+}
+
+/* The first node of a line from the state x. */
+static int first_node(const Model *m, Work *w, const double *x) {
+  memcpy(w->a.x, x, m->states * sizeof(double));
+  *w->a.at = 0.0;
+  const int status = closed(m, w, w->a.x, w->a.matrix);
+  return status ? status : made_node(m, w, &w->a);
+}
+
+/* The direction from p to q; its length. */
+static double towards(int n, const double *p, const double *q, double *out) {
+  double length = 0.0;
+  FOR(i, n) out[i] = q[i] - p[i], length += out[i] * out[i];
+  length = sqrt(length);
+  FOR(i, n) out[i] = length > 0.0 ? out[i] / length : 0.0;
+  return length;
+}
+
+/* The polygon of the drives through all positions asked for, from the state kept. */
+static int along(const Model *m, Work *w, Asked *asked) {
+  const int d = m->drives;
+  while (asked->done < asked->count) {
+    const double *first = asked->q + at_place(asked, asked->done) * d;
+    double length = towards(d, w->drive, first, w->direction);
+    int until = asked->done + 1, status;
+    if (length <= 1e-14 * fmax(1.0, size_of(w->drive, d))) {
+      FOR(i, d) w->direction[i] = i == 0;
+      if ((status = first_node(m, w, w->x))) return status;
+      *w->b.at = 0.0;
+      memcpy(w->b.x, w->a.x, m->states * sizeof(double));
+      if ((status = read_off(m, w, asked, 0.0))) return status;
+      asked->done++;
+      continue;
+    }
+    for (; until < asked->count; until++) {
+      const double *last = asked->q + at_place(asked, until - 1) * d, *next = asked->q + at_place(asked, until) * d;
+      double ahead = 0.0, square = 0.0;
+      FOR(i, d) ahead += (next[i] - last[i]) * w->direction[i], square += (next[i] - last[i]) * (next[i] - last[i]);
+      if (!(ahead >= (1.0 - STRAIGHT_ON) * sqrt(square))) break;
+    }
+    const double *end = asked->q + at_place(asked, until - 1) * d;
+    memcpy(w->line_begin, w->drive, d * sizeof(double));
+    length = towards(d, w->drive, end, w->direction);
+    if ((status = first_node(m, w, w->x))) return status;
+    if ((status = follow(m, w, asked, w->line_begin, end, length, until))) return status;
+    memcpy(w->drive, end, d * sizeof(double));
+    memcpy(w->x, w->a.x, m->states * sizeof(double));
+  }
+  return MGK_OK;
+}
+
+/* --- what is called ---------------------------------------------------------------------------------------------------------------- */
+
+static void begin(const Model *m, Work *w) {
+  memcpy(w->x, m->start, m->states * sizeof(double));
+  FOR(i, m->drives) w->drive[i] = w->x[m->column_state[m->drive[i]]];
+  FOR(f, m->factors) w->begun[f] = w->angle[f] = 0.0;
+}
+
+static void opened(const int *I, const double *P, void *state, Model *m, Work *w) {
+  read_tables(I, P, m);
+  lay_out(m, state, w);
+  memset(w->frame_load, 0, sizeof w->frame_load);
+  w->steps = w->evaluations = w->factorizations = 0;
+}
+
+int mgk_start(const int *I, const double *P, void *state) {
+  Model m;
+  Work w;
+  if (I[MGK_IS_FORMAT] != MGK_FORMAT) return MGK_FORMAT_ERROR;
+  opened(I, P, state, &m, &w);
+  begin(&m, &w);
+  const int status = closed(&m, &w, w.x, NULL);
+  coordinates(&m, &w, w.x, w.record + m.states);
+  return status;
+}
+
+int mgk_path(const int *I, const double *P, void *state, int count, const int *order, const double *q, const double *v, const double *a,
+             int with_forces, double *out, double *largest, int *done, long *work) {
+  Model m;
+  Work w;
+  int places[MGK_PARTS + 1];
+  int status = mgk_start(I, P, state);
+  *done = 0;
+  if (status) return status;
+  opened(I, P, state, &m, &w);
+  mgk_record(I, places);
+  Asked asked = {count, with_forces, 0, order, places, q, v, a, out, largest};
+  status = along(&m, &w, &asked);
+  *done = asked.done;
+  work[0] += w.steps, work[1] += w.evaluations, work[2] += w.factorizations;
+  return status;
+}
+
+/* A wrench about the global origin in the units of the declaration; NaN where a self-stress has a part. */
+static void given_out(const Model *m, const double *record, const int *places, int k, double *out) {
+  const double L = *m->unit, *w = record + places[MGK_REACTIONS] + 6 * k;
+  double size[6] = {0}, far[3], moved[6];
+  FOR(i, 3) far[i] = m->origin[i] / L;
+  FOR(s, m->stresses) {
+    memcpy(moved, record + places[MGK_STRESS] + 6 * (s * m->pairs + k), sizeof moved);
+    wrench_moved(moved, far, 1.0);
+    FOR(i, 6) size[i] += moved[i] * moved[i];
+  }
+  memcpy(moved, w, sizeof moved);
+  wrench_moved(moved, far, 1.0);
+  const double most = UNIQUE * (1.0 + sqrt(dot(far, far, 3)));
+  FOR(i, 6) out[i] = sqrt(size[i]) > most ? NAN : moved[i] * (i < 3 ? L * L : L);
+}
+
+int mgk_solve(const int *I, const double *P, void *state, const double *q, const double *v, const double *a, double *effort,
+              double *reaction, double *position) {
+  Model m;
+  Work w;
+  int places[MGK_PARTS + 1];
+  double largest[2] = {0.0, 0.0};
+  opened(I, P, state, &m, &w);
+  mgk_record(I, places);
+  const double L = *m.unit;
+  const int d = m.drives;
+  double *asked_of = w.asked, *record = w.record;
+  FOR(i, d) {
+    const double unit = m.is_length[m.drive[i]] ? L : 1.0;
+    asked_of[i] = q[i] / unit, asked_of[d + i] = v[i] / unit, asked_of[2 * d + i] = a[i] / unit;
+  }
+  Asked asked = {1, 1, 0, NULL, places, asked_of, asked_of + d, asked_of + 2 * d, record, largest};
+  memcpy(w.kept, w.x, w.n_kept * sizeof(double));
+  const int status = along(&m, &w, &asked);
+  if (status) {
+    memcpy(w.x, w.kept, w.n_kept * sizeof(double));
+    return status;
+  }
+  if (position) memcpy(position, record + places[MGK_COORDINATES], m.columns * sizeof(double));
+  if (reaction) FOR(k, m.pairs) given_out(&m, record, places, k, reaction + 6 * k);
+  if (effort) FOR(i, d) {
+    const int c = m.drive[i];
+    double part = 0.0;
+    FOR(s, m.stresses) {
+      const double strain = record[places[MGK_STRESS_EFFORTS] + s * m.columns + c] - record[places[MGK_COUPLED_STRESS] + s * m.columns + c];
+      part += strain * strain;
+    }
+    const double own = record[places[MGK_EFFORTS] + c] - record[places[MGK_GIVEN] + c] - record[places[MGK_COUPLED] + c];
+    effort[i] = sqrt(part) > UNIQUE ? NAN : own * (m.is_length[c] ? L : L * L);
+  }
+  return MGK_OK;
+}
