@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any, Literal
 
@@ -16,7 +17,7 @@ from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.closure.driver_path import Status
 from mechgraph.closure.poles import away_from_poles, ends_at_pole
-from mechgraph.closure.solver import ENGINES, EngineName
+from mechgraph.closure.solver import MOTION_ENGINES, MotionEngineName
 from mechgraph.errors import (
     AssemblyError,
     DeadPointError,
@@ -64,7 +65,7 @@ REFUSED = {
 def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exception | None:
     """The named error for the first position that was not solved, with the solution so far."""
     bad = np.flatnonzero(~np.isin(solution.status.reshape(-1), SOLVED))
-    if not bad.size:
+    if not bad.size or outcome.found is None:
         return None
     first = int(bad[0])
     status = Status(solution.status.reshape(-1)[first])
@@ -110,7 +111,7 @@ def _listed(values: Iterable[tuple[str, float]]) -> str:
 
 
 def _check_drivers(line: Pipeline, outcome: Outcome) -> None:
-    unsolved = not outcome.found.moved.any()
+    unsolved = not outcome.moved
     if not outcome.contradicting.any() and not (unsolved and line.freedoms.dependent):
         return
     names, mobility = ", ".join(line.drive.names), line.freedoms.mobility
@@ -127,7 +128,7 @@ def _check_actuators(line: Pipeline, outcome: Outcome) -> None:
     status = outcome.trajectory.status().reshape(-1)
     rest = np.flatnonzero(status == Status.ACTUATORS_REST.value)
     if rest.size and not (status == Status.OK.value).any():
-        raise line.actuation_error(Configuration(line.system, outcome.found.x[:, rest[:1]]), line.acting)
+        raise line.actuation_error(Configuration(line.system, outcome.trajectory.states_at(rest[:1])), line.acting)
 
 
 def _solve(
@@ -155,18 +156,29 @@ def _solved(
     actuate: Iterable[str] | None,
     quiet: bool,
 ) -> Solution:
-    m, line, outcome = _run(m, motions, options, actuate)
-    _check_drivers(line, outcome)
-    _check_actuators(line, outcome)
-    if isinstance(m, SnappedMechanism):
-        outcome.trajectory.as_declared(partial(declared_closure, line.system, declared(m.declared)), m.changes.tol)
+    line, outcome = _outcome(m, motions, options, actuate)
     solution = Solution(outcome.trajectory)
+    if outcome.found is None and not np.isin(solution.status, SOLVED).all():  # numpy says how far the path led
+        line, outcome = _outcome(m, motions, replace(options, engine=line.engine), actuate)
+        solution = Solution(outcome.trajectory)
     for warning in () if quiet else solution.warnings:
         warnings.warn(f"mechanism {m.name!r}: {warning}", MechgraphWarning, stacklevel=4)
     error = _unreached(line, outcome, solution) if on_reach == "raise" else None
     if error is not None:
         raise error
     return solution
+
+
+def _outcome(
+    m: Mechanism, motions: Mapping[str, Any] | None, options: Options, actuate: Iterable[str] | None
+) -> tuple[Pipeline, Outcome]:
+    """All positions, with the closure errors of the geometry as it is declared."""
+    m, line, outcome = _run(m, motions, options, actuate)
+    _check_drivers(line, outcome)
+    _check_actuators(line, outcome)
+    if isinstance(m, SnappedMechanism):
+        outcome.trajectory.as_declared(partial(declared_closure, line.system, declared(m.declared)), m.changes.tol)
+    return line, outcome
 
 
 def _run(
@@ -178,7 +190,7 @@ def _run(
         outcome = line.run()
         meant_with = m.changes.tol if isinstance(m, SnappedMechanism) else None
         own = m.declared if isinstance(m, SnappedMechanism) else m
-        other = away_from_poles(own, line.system, outcome.found)
+        other = None if outcome.found is None else away_from_poles(own, line.system, outcome.found)
         if other is None:
             break
         m = other if meant_with is None else meant(other, meant_with, "solve")
@@ -197,12 +209,12 @@ def kinematics(
     motions: Mapping[str, Any] | None = None,
     *,
     on_reach: ReachName = "raise",
-    engine: EngineName = "auto",
+    engine: MotionEngineName = "auto",
     tol: float | None = None,
 ) -> Solution:
     """Positions, velocities and accelerations of all pairs and links, without forces; see ``solve``."""
     check_mechanism(m, "kinematics")
-    faults = option_faults({"on_reach": (on_reach, ON_REACH), "engine": (engine, ENGINES)})
+    faults = option_faults({"on_reach": (on_reach, ON_REACH), "engine": (engine, MOTION_ENGINES)})
     if faults:
         raise DeclarationError(f"kinematics of {m.name!r}", faults)
     return _solve(m, motions, on_reach, Options(None, "nan", engine), tol=tol)
@@ -217,7 +229,7 @@ def solve(
     loads: Iterable[Load] | None = None,
     redundant: RedundantName = "nan",
     on_reach: ReachName = "raise",
-    engine: EngineName = "auto",
+    engine: MotionEngineName = "auto",
     tol: float | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Solution:
@@ -255,7 +267,7 @@ def solve(
             "method": (method, METHODS),
             "redundant": (redundant, REDUNDANT),
             "on_reach": (on_reach, ON_REACH),
-            "engine": (engine, ENGINES),
+            "engine": (engine, MOTION_ENGINES),
         }
     )
     if progress is not None and not callable(progress):

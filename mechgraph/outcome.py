@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 
 import numpy as np
 
+from mechgraph.algebra.se3 import Array
 from mechgraph.call import Call, Starts
 from mechgraph.closure.assembly import CLOSED
 from mechgraph.closure.configuration import Configuration
@@ -17,44 +18,108 @@ from mechgraph.closure.rates import Rates, Velocities, at_dead_points, disagreem
 from mechgraph.closure.solver import ClosureSolver, FactoredClosure, closure_solver
 from mechgraph.errors import DeclarationError
 from mechgraph.force.block import BlockForces, ForceTask, forces_of_block
+from mechgraph.model.load_base import Load
 from mechgraph.result.kept import BlockMotion
 from mechgraph.result.trajectory import Trajectory
 from mechgraph.structure.actuation import stand_still
+
+SystemAt = Callable[[Index], System]
 
 CONTRADICTION = 1e-6
 """Relative part of the closure rates that drivers may leave open before they count as contradicting each other."""
 
 
 class Outcome:
-    """Positions found, turned into a trajectory block by block."""
+    """Positions found, turned into a trajectory block by block.
 
-    def __init__(
-        self, line: Call, starts: Starts, batch: tuple[int, ...], variant: Index, found: Positions, path: DriverPath
-    ) -> None:
-        self.line, self.starts, self.batch, self.found, self.path = line, starts, batch, found, path
-        self.solver: ClosureSolver = path.solver
-        self.variant = variant
-        self.contradicting = np.zeros(len(variant), dtype=bool)
-        self._system_at = partial(_system_at, starts, variant)
-        self._velocity, self._acceleration = (line.values(kind, batch) for kind in ("velocity", "acceleration"))
-        coordinates = np.tile(continued(path, found), starts.sharing) if starts.sharing > 1 else continued(path, found)
+    ``found`` are the positions as they were followed; None where another engine than those of numpy gave states and rates.
+    """
+
+    found: Positions | None = None
+
+    def __init__(self, line: Call, loads: tuple[Load, ...], batch: tuple[int, ...], system_at: SystemAt, q: Array) -> None:
+        """Nothing filled in yet; ``q (F, T)`` the user's coordinates, where they are known."""
+        self.line, self.loads, self.batch, self._system_at = line, loads, batch, system_at
+        self.contradicting = np.zeros(q.shape[1], dtype=bool)
         self.trajectory = Trajectory(
             line.system,
-            self._system_at,
+            system_at,
             batch,
             line.drive.t,
             line.acting,
-            coordinates,
+            q,
             line.options.redundant == "nan",
             line.passive if line.options.method else (),
             line.drive.shown,
             line.drive.names,
         )
+        self.trajectory.loads = loads
+        self.trajectory.method = line.options.method
+
+    @property
+    def moved(self) -> bool:
+        """Whether any position has a state and rates."""
+        return self.found is None or bool(self.found.moved.any())
+
+    def _put(self, motion: BlockMotion, f: FactoredClosure | None) -> None:
+        self.trajectory.has_forces |= self.line.options.method is not None
+        if not self.line.options.method or f is None:
+            self.trajectory.put(motion, None)
+            return
+        if self.line.drive.actuated:
+            rest = stand_still(f.sensitivity(), self.line.acting)
+            if rest.any():
+                self.trajectory.mark(motion.places[rest], Status.ACTUATORS_REST.value)
+                self.trajectory.put(motion.part(np.flatnonzero(rest)), None)
+                motion = motion.part(np.flatnonzero(~rest))
+        if len(motion.places):
+            self.trajectory.put(motion, self._forces(motion, f))
+
+    def _forces(self, motion: BlockMotion, f: FactoredClosure) -> BlockForces:
+        line = self.line
+        if line.acting is not line.columns or len(line.lead) < len(line.columns):  # all their efforts are unknowns
+            solver = closure_solver(line.engine, line.acting, line.hold)
+            f = solver.factored(motion.here, solver.chosen(motion.here, np.full(motion.here.T, -1)))
+        assert line.options.method is not None
+        task = ForceTask(
+            line.options.method,
+            self.loads,
+            line.acting,
+            line.passive,
+            self.batch,
+            line.drive.t,
+            line.options.redundant,
+        )
+        coordinates = self.trajectory.coordinates_at(motion.places)
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = forces_of_block(task, motion.rates, f, coordinates, motion.places)
+            finite = np.isfinite(found.balance + found.power) | self.contradicting[motion.places]
+        if not finite.all():
+            too_large = "forces are beyond the largest number (1.8e308): masses, loads or rates are too large"
+            raise DeclarationError(f"solve {line.m.name!r}", [too_large])
+        return found
+
+
+
+
+class Followed(Outcome):
+    """Positions that were followed, their rates and forces found block by block."""
+
+    found: Positions
+
+    def __init__(
+        self, line: Call, starts: Starts, batch: tuple[int, ...], variant: Index, found: Positions, path: DriverPath
+    ) -> None:
+        self.starts, self.found, self.path = starts, found, path
+        self.solver: ClosureSolver = path.solver
+        self.variant = variant
+        q = continued(path, found)
+        q = np.tile(q, starts.sharing) if starts.sharing > 1 else q
+        super().__init__(line, starts.loads, batch, partial(_system_at, starts, variant), q)
+        self._velocity, self._acceleration = (line.values(kind, batch) for kind in ("velocity", "acceleration"))
         work = found.work
         work.positions, work.nodes = len(variant), len(found.tracks.nodes)
         self.trajectory.engine, self.trajectory.work = line.engine, work
-        self.trajectory.loads = starts.loads
-        self.trajectory.method = line.options.method
         self._fill()
 
     def _fill(self) -> None:
@@ -161,44 +226,6 @@ class Outcome:
                 motion = Rates(Velocities(here, dq[:, mine]), ddq[:, mine], np.zeros(len(mine)))
                 factors = self.solver.factored(here, self.solver.chosen(here, found.which[at])) if regular else None
                 yield self._agreed(motion, at), factors
-
-    def _put(self, motion: BlockMotion, f: FactoredClosure | None) -> None:
-        self.trajectory.has_forces |= self.line.options.method is not None
-        if not self.line.options.method or f is None:
-            self.trajectory.put(motion, None)
-            return
-        if self.line.drive.actuated:
-            rest = stand_still(f.sensitivity(), self.line.acting)
-            if rest.any():
-                self.trajectory.mark(motion.places[rest], Status.ACTUATORS_REST.value)
-                self.trajectory.put(motion.part(np.flatnonzero(rest)), None)
-                motion = motion.part(np.flatnonzero(~rest))
-        if len(motion.places):
-            self.trajectory.put(motion, self._forces(motion, f))
-
-    def _forces(self, motion: BlockMotion, f: FactoredClosure) -> BlockForces:
-        line = self.line
-        if line.acting is not line.columns or len(line.lead) < len(line.columns):  # all their efforts are unknowns
-            solver = closure_solver(line.engine, line.acting, line.hold)
-            f = solver.factored(motion.here, solver.chosen(motion.here, np.full(motion.here.T, -1)))
-        assert line.options.method is not None
-        task = ForceTask(
-            line.options.method,
-            self.starts.loads,
-            line.acting,
-            line.passive,
-            self.batch,
-            line.drive.t,
-            line.options.redundant,
-        )
-        coordinates = self.trajectory.coordinates_at(motion.places)
-        with np.errstate(over="ignore", invalid="ignore"):
-            found = forces_of_block(task, motion.rates, f, coordinates, motion.places)
-            finite = np.isfinite(found.balance + found.power) | self.contradicting[motion.places]
-        if not finite.all():
-            too_large = "forces are beyond the largest number (1.8e308): masses, loads or rates are too large"
-            raise DeclarationError(f"solve {line.m.name!r}", [too_large])
-        return found
 
 
 def _system_at(starts: Starts, variant: Index, places: Index) -> System:

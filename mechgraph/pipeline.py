@@ -23,11 +23,12 @@ from mechgraph.closure.ranges import end_at_ranges
 from mechgraph.closure.rates import distance_to_dead_point
 from mechgraph.closure.reduced_path import follow_reduced
 from mechgraph.closure.reduction import Reduction, reduction_of
-from mechgraph.closure.solver import closure_solver, engine_for, solver_at_start
+from mechgraph.closure.solver import ClosureSolver, closure_solver, engine_for, solver_at_start
+from mechgraph.by_kernel import compiled
 from mechgraph.errors import DeclarationError, IndeterminateError
 from mechgraph.numerics.linear import independent_rows
 from mechgraph.numerics.tolerances import PATH
-from mechgraph.outcome import Outcome
+from mechgraph.outcome import Followed, Outcome
 from mechgraph.report.refused import (
     change_point_error,
     dead_point_error,
@@ -72,6 +73,7 @@ class Pipeline:
         # reactions of least norm are found position by position, where nothing is gained from many of them
         positions = 1 if options.redundant == "minimum_norm" else int(np.prod(drive.batch))
         self.engine = engine_for(self.system.n_rows, positions, options.engine)
+        self.solver: ClosureSolver
         self.solver, proved = solver_at_start(self.engine, self.columns, self.start)
         self.lead = np.arange(len(self.columns))
         self.passive: tuple[PassiveMotion, ...] = ()
@@ -189,6 +191,8 @@ class Pipeline:
     def run(self, starts: Starts | None = None, batch: tuple[int, ...] | None = None) -> Outcome:
         """All positions, rates and forces as a trajectory."""
         batch = self.drive.batch if batch is None else batch
+        if starts is None and (done := compiled(self, batch, self._with_start)) is not None:
+            return done
         start = None if starts else self.start
         starts = starts or Starts(self.x[:, None], self.system.cases, self.m.loads)
         one = starts.x.shape[1] == 1
@@ -200,7 +204,7 @@ class Pipeline:
         path.carries = are_alone(self.passive)
         found = self._followed(path, starts, followed)
         end_at_ranges(path, found)
-        return Outcome(self, starts, batch, variant, found, path)
+        return Followed(self, starts, batch, variant, found, path)
 
     def _followed(self, path: DriverPath, starts: Starts, batch: tuple[int, ...]) -> Positions:
         """The positions along the path, by the reduced form of the mechanism where it has one."""

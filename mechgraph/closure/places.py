@@ -111,6 +111,11 @@ class Places:
         self._sized = {} if self.has_lengths else self._shared
 
     @property
+    def sized_once(self) -> dict[Any, Any]:
+        """What is kept for all systems of the mechanism that have the same unit of length, or whose pair types have no lengths."""
+        return self._sized
+
+    @property
     def types(self) -> list[PairType]:
         """The pair types."""
         return self._types[0]

@@ -141,14 +141,14 @@ class CouplingRows:
         self, coefficients: Array, rows: Index, columns: Index, constant: Array, scale: Array, state_rows: Index
     ) -> None:
         self.coefficients, self.constant, self.scale = coefficients, constant, scale
-        self._rows, self._columns, self._state_rows = rows, columns, state_rows
+        self.term_rows, self.term_columns, self._state_rows = rows, columns, state_rows
         self._first = np.searchsorted(rows, np.arange(len(constant)))
 
     @cached_property
     def matrix(self) -> Array:
         """The coefficients ``(n, F, B)``."""
         out = np.zeros((len(self.constant), len(self._state_rows), self.coefficients.shape[1]))
-        out[self._rows, self._columns] = self.coefficients
+        out[self.term_rows, self.term_columns] = self.coefficients
         return out
 
     def _sums(self, values: Array) -> Array:
@@ -157,7 +157,7 @@ class CouplingRows:
 
     def residual(self, here: Evaluated) -> Array:
         """``sum_j c_j q_j - constant``."""
-        return self._sums(here.x[self._state_rows[self._columns]]) - self.constant
+        return self._sums(here.x[self._state_rows[self.term_columns]]) - self.constant
 
     def error(self, here: Evaluated) -> Array:
         """The largest of them."""
@@ -170,11 +170,11 @@ class CouplingRows:
     def sparse_jacobian(self, t: int) -> scipy.sparse.csr_array:
         """The coefficients ``(n, F)`` at one position, entries at the same places at all of them."""
         values = self.coefficients[:, t if self.coefficients.shape[1] > 1 else 0]
-        return scipy.sparse.csr_array((values, (self._rows, self._columns)), shape=self.matrix.shape[:2])
+        return scipy.sparse.csr_array((values, (self.term_rows, self.term_columns)), shape=self.matrix.shape[:2])
 
     def rates(self, here: Evaluated, dq: Array) -> Array:
         """``sum_j c_j q'_j``."""
-        return self._sums(dq[self._columns])
+        return self._sums(dq[self.term_columns])
 
     def bias(self, here: Evaluated, pairs: Array) -> Array:
         """Zero: the relation is linear."""

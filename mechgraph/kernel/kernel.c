@@ -1154,6 +1154,8 @@ int mgk_solve(const int *I, const double *P, void *state, const double *q, const
   Work w;
   int places[MGK_PARTS + 1];
   double largest[2] = {0.0, 0.0};
+  if (I[MGK_IS_FORMAT] != MGK_FORMAT) return MGK_FORMAT_ERROR;
+  FOR(i, I[MGK_DRIVES]) if (!isfinite(q[i]) || !isfinite(v[i]) || !isfinite(a[i])) return MGK_NOT_FINITE;
   opened(I, P, state, &m, &w);
   mgk_record(I, places);
   const double L = *m.unit;

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from copy import copy
 from dataclasses import dataclass
-from typing import Any, Literal, Self
+from typing import Any, Literal, Protocol, Self
 
 import numpy as np
 
@@ -45,11 +45,25 @@ class BlockMotion:
         return BlockMotion(self.places[at], Rates(rates, self.rates.ddq[:, at], self.rates.contradiction[at]))
 
 
+MOVED = ("x", "dq", "ddq", "closure")
+"""What is kept of the motion at every position."""
 KEPT = (
     "reactions", "efforts", "given", "loads", "hold", "stress", "stress_efforts", "coupled", "multipliers", "multiplier_stress",
     "coupled_stress", "shaking", "balance", "power", "holds", "hold_terms",
 )  # fmt: skip
 """Fields of ``BlockForces`` that are kept for every position."""
+class Records(Protocol):
+    """All positions at once, by the names of what is kept."""
+
+    largest: Array
+
+    def __contains__(self, name: str) -> bool:
+        """Whether there is a part of that name."""
+
+    def __getitem__(self, name: str) -> Array:
+        """That part, component axes first and positions last."""
+
+
 RETAINED = 40_000
 """Links times positions up to which motions evaluated again are retained (some 30 MB), as readers ask for one pair after another."""
 
@@ -92,7 +106,7 @@ class Kept:
         self._solved = np.zeros(self._count, dtype=bool)
         self._motions: list[BlockMotion] = []
         self.has_forces = False
-        self.engine: Literal["dense", "sparse"] = "dense"
+        self.engine: Literal["dense", "sparse", "compiled"] = "dense"
         self.method: str | None = None
         self.work: Any = Work()
 
@@ -106,12 +120,7 @@ class Kept:
         """Keep a block of solved positions."""
         places, rates = motion.places, motion.rates
         self._solved[places] = True
-        for name, values in (
-            ("x", motion.here.x),
-            ("dq", rates.dq),
-            ("ddq", rates.ddq),
-            ("closure", motion.here.closure),
-        ):
+        for name, values in zip(MOVED, (motion.here.x, rates.dq, rates.ddq, motion.here.closure), strict=True):
             self._keep(name, places, values)
         self._motions = [motion] if len(places) == self._count and self._small else []
         if forces is None:
@@ -124,6 +133,12 @@ class Kept:
                 self._keep(name, places, values)
         self._largest = np.maximum(self._largest, forces.largest)
 
+    def take(self, records: Records, forces: bool) -> None:
+        """Keep all positions from the records of a compiled solution."""
+        self._solved[:] = True
+        self._kept |= {name: records[name] for name in (*MOVED, *(("points", *KEPT) if forces else ())) if name in records}
+        self.has_forces, self._largest = forces, records.largest
+
     def _keep(self, name: str, places: Index, values: Array) -> None:
         if len(places) == self._count:
             self._kept[name] = values
@@ -135,6 +150,10 @@ class Kept:
     def coordinates_at(self, places: Index) -> Array:
         """User coordinates ``(F, n)`` at flat places."""
         return self._coordinates[:, places]
+
+    def states_at(self, places: Index) -> Array:
+        """States ``(nx, n)`` at flat places."""
+        return self._of("x")[:, places]
 
     def mark(self, places: Index, status: Any) -> None:
         """Say why positions are not solved."""

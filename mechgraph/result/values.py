@@ -145,7 +145,7 @@ class Values(Protocol):
     batch: tuple[int, ...]
     t: Any
     has_forces: bool
-    engine: Literal["dense", "sparse"]
+    engine: Literal["dense", "sparse", "compiled"]
     method: str | None
     work: Work
     least_norm: bool

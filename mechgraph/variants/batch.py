@@ -128,7 +128,7 @@ def solve_together(
         outcome = line.run(starts, np.broadcast_shapes((V, 1), line.drive.batch))
     except DeclarationError:
         return Together(None, np.ones(V, dtype=bool), q)
-    if away_from_poles(line.m, line.system, outcome.found) is not None:
+    if outcome.found is not None and away_from_poles(line.m, line.system, outcome.found) is not None:
         return Together(None, np.ones(V, dtype=bool), q)
     numbers, tol = variants.declared, line.m.tol
     if numbers is not None and tol is not None:

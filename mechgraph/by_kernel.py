@@ -1,0 +1,139 @@
+"""The compiled kernel in the pipeline: positions, rates and forces from its records, where it carries the mechanism and the call.
+
+What it refuses (a step that is not certified, a poor condition, drives that contradict each other) is left to the careful follower of
+numpy, with all that it says of such positions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numpy as np
+
+from mechgraph.call import Call
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.driver_path import in_blocks
+from mechgraph.closure.indexing import Index
+from mechgraph.closure.rates import Rates, Velocities
+from mechgraph.closure.solver import ClosureSolver
+from mechgraph.errors import DeclarationError
+from mechgraph.kernel import build
+from mechgraph.kernel.path import Kernel, Records
+from mechgraph.kernel.tables import Layout, layout, tables, why_not
+from mechgraph.model.contact import Contact
+from mechgraph.numerics.newton import Work
+from mechgraph.outcome import Outcome
+from mechgraph.result.kept import BlockMotion
+
+COMPILED = "compiled"
+"""Name of the engine."""
+
+
+class Started(Call, Protocol):
+    """A call with its closed start."""
+
+    start: Configuration
+    solver: ClosureSolver
+    x: Any
+
+
+class Compiled(Outcome):
+    """Positions that the kernel has solved; their forces from the records, or by numpy at its states where it does not give them."""
+
+    def __init__(self, line: Started, batch: tuple[int, ...], records: Records, forces: bool) -> None:
+        self.records, self.solver = records, line.solver
+        super().__init__(line, line.m.loads, batch, line.system.cases, records["coordinates"])
+        steps, evaluations, factorizations = records.work
+        count = len(records.values)
+        work = Work(positions=count, nodes=1 + steps, evaluations=evaluations, factorizations=factorizations)
+        self.trajectory.engine, self.trajectory.work = COMPILED, work
+        if forces or line.options.method is None:
+            self.trajectory.take(records, forces)
+        else:
+            whole = not all(load.by_position for load in self.loads)
+            every = np.arange(count)
+            for places in [every] if whole else in_blocks(every):
+                self._put(*self._at(places))
+        if line.options.progress is not None:
+            line.options.progress(count, count)
+
+    def _at(self, places: Index) -> tuple[BlockMotion, Any]:
+        """States and rates of a block, and the closure equations there, factored by numpy."""
+        x, dq, ddq = (self.records[name][:, places] for name in ("x", "dq", "ddq"))
+        here = Configuration(self.line.system, np.ascontiguousarray(x))
+        f = self.solver.factored(here, self.solver.chosen(here, np.full(here.T, -1)))
+        return BlockMotion(places, Rates(Velocities(here, dq), ddq, np.zeros(here.T))), f
+
+
+def compiled(line: Started, batch: tuple[int, ...], keep: Callable[[tuple[object, ...], Callable[[], Any]], Any]) -> Compiled | None:
+    """All positions of a call by the kernel; None where it does not serve: no library, or no certificate.
+
+    ``keep`` keeps what follows from the start and the drives alone.
+
+    Raises
+    ------
+    DeclarationError
+        where the kernel was asked for by name and cannot carry the mechanism or the call; MissingExtraError without a compiler.
+    """
+    asked = line.options.engine == COMPILED
+    if line.options.engine != "auto" and not asked:
+        return None
+    library = build.built() if asked else build.installed()
+    if library is None:
+        return None
+    why = _cannot(line)
+    if why is not None:
+        if asked:
+            raise DeclarationError(f"solve {line.m.name!r}", [f"engine 'compiled' does not serve: {why}. Use engine='auto'"])
+        return None
+    forces = _gives_forces(line)
+    key = COMPILED, line.columns.tobytes(), forces
+    found = keep(key, lambda: _kernel(line, library, forces))
+    kernel, forces = found
+    q, v, a = (np.ascontiguousarray(line.values(kind, batch).T) for kind in ("position", "velocity", "acceleration"))
+    begin = line.x[line.system.single_rows[line.columns]]
+    records = kernel.follow(begin, q, v, a, batch, forces)
+    return None if records is None else Compiled(line, batch, records, forces)
+
+
+def _kernel(line: Started, library: Any, forces: bool) -> tuple[Kernel, bool]:
+    """The tables of a call with the library, and whether they give its forces."""
+    known = _layout(line)
+    assert isinstance(known, Layout)
+    filled = tables(known, line.system, line.x, line.m.loads) if forces else None
+    forces = filled is not None
+    if filled is None:
+        filled = tables(known, line.system, line.x, None)
+        assert filled is not None
+    return Kernel(library, known, *filled), forces
+
+
+def _layout(line: Started) -> Layout | str:
+    """The layout of a mechanism, or what of it cannot be carried; kept with all mechanisms of its graph."""
+    sized = line.system.sized_once
+    key = COMPILED, line.columns.tobytes()
+    if key not in sized:
+        why = why_not(line.system)
+        sized[key] = layout(line.system, line.columns, np.zeros(0, dtype=np.intp)) if why is None else why
+    found: Layout | str = sized[key]
+    return found
+
+
+def _cannot(line: Started) -> str | None:
+    """Why the kernel does not serve a call; None where it does."""
+    if line.passive:
+        return "it has passive freedoms"
+    if len(line.lead) < len(line.columns):
+        return "its drives depend on each other"
+    found = _layout(line)
+    return found if isinstance(found, str) else None
+
+
+def _gives_forces(line: Started) -> bool:
+    """Whether the kernel gives the forces that are asked for; it knows no line along which gears touch each other."""
+    return (
+        line.options.method == "loop_wrench"
+        and line.acting is line.columns
+        and not any(isinstance(c, Contact) for c in line.m.couplings)
+    )

@@ -1,0 +1,128 @@
+"""Loads as numbers of the kernel's tables: those that are constants, in internal units and in the frames that links have there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.closure.indexing import System
+from mechgraph.model.force_law import Damper, Spring, TorsionSpring
+from mechgraph.model.load import Effort, Gravity, Wrench
+from mechgraph.model.load_base import Load
+from mechgraph.model.numeric import PerCase
+
+WEIGHT, WRENCH, EFFORT, LAW, BETWEEN = range(5)
+"""Kinds of loads, as in ``kernel.h``."""
+
+
+@dataclass
+class Acting:
+    """Loads in the tables: kind, two numbers and the place of the numbers of each, and the numbers."""
+
+    entries: list[tuple[int, int, int, int]]
+    numbers: list[float]
+
+    def add(self, kind: int, i: int, j: int, *numbers: Any) -> None:
+        """One load."""
+        self.entries.append((kind, i, j, len(self.numbers)))
+        self.numbers += np.concatenate([np.atleast_1d(part) for part in numbers]).tolist()
+
+
+@dataclass(frozen=True)
+class _Places:
+    """Where loads act: a system, and the poses ``own (3, 4, N)`` of the link frames in those of the tables."""
+
+    system: System
+    own: Array
+
+    @property
+    def L(self) -> float:
+        """The unit of length."""
+        return self.system.par.L
+
+    def link(self, name: str) -> int:
+        """Number of a link."""
+        return self.system.m.link_index[name]
+
+    def point(self, link: str, p: Any) -> Array:
+        """A material point, given in the link's frame or by its name; the mass centre where it is None."""
+        i, par = self.link(link), self.system.par
+        given = self.system.m.links[i].point(p) if isinstance(p, str) else p
+        local = par.center[:, i, 0] if given is None else (np.asarray(given, dtype=float) - par.offset[:, i]) / self.L
+        return np.asarray(self.own[:, :3, i] @ local + self.own[:, 3, i])
+
+    def column(self, freedom: str) -> tuple[int, bool]:
+        """Number of a freedom, and whether it is a slide."""
+        pair, j = self.system.m.freedom(freedom)
+        column = int(self.system.first_column[pair]) + j
+        return column, bool(self.system.is_length[column])
+
+
+def acting(system: System, own: Array, loads: Sequence[Load]) -> Acting | None:
+    """All loads in the tables; None where one of them varies over the positions or is a function."""
+    out, places = Acting([], []), _Places(system, own)
+    for load in loads:
+        put = KINDS.get(type(load))
+        if put is None or _varies(load):
+            return None
+        put(places, load, out)
+    return out
+
+
+def _varies(load: Load) -> bool:
+    """Whether a field is a function, or an array over positions or cases."""
+    values = [getattr(load, name) for name in load.formats]
+    return bool(load.over_positions) or any(callable(value) or isinstance(value, PerCase) for value in values)
+
+
+def _weight(places: _Places, load: Any, out: Acting) -> None:
+    out.add(WEIGHT, 0, 0, np.asarray(load.acceleration, dtype=float) / places.L)
+
+
+def _wrench(places: _Places, load: Any, out: Acting) -> None:
+    i = places.link(load.link)
+    force, moment = (np.zeros(3) if v is None else np.asarray(v, dtype=float) for v in (load.force, load.moment))
+    turning = load.frame == "link"
+    if turning:
+        force, moment = (places.own[:, :3, i] @ part for part in (force, moment))
+    at = np.zeros(3) if load.force is None else places.point(load.link, load.point)
+    out.add(WRENCH, i, int(turning), force / places.L, moment / places.L**2, at)
+
+
+def _effort(places: _Places, load: Any, out: Acting) -> None:
+    column, slides = places.column(load.freedom)
+    out.add(EFFORT, column, 0, float(load.value) / places.L ** (1 if slides else 2))
+
+
+def _law(places: _Places, load: Any, out: Acting, stiffness: float, rest: float, damping: float) -> None:
+    """``F = -stiffness (x - rest) - damping x'`` in a freedom or between points."""
+    if load.in_freedom is not None:
+        column, slides = places.column(load.in_freedom)
+        unit = 1.0 if slides else places.L**-2
+        out.add(LAW, column, 0, stiffness * unit, rest / places.L if slides else rest, damping * unit)
+        return
+    p, q = places.point(load.a, load.p), places.point(load.b, load.q)
+    out.add(BETWEEN, places.link(load.a), places.link(load.b), p, q, stiffness, rest / places.L, damping)
+
+
+def _elastic(places: _Places, load: Any, out: Acting) -> None:
+    _law(places, load, out, load.stiffness, getattr(load, load.rest), load.damping)
+
+
+def _damper(places: _Places, load: Any, out: Acting) -> None:
+    _law(places, load, out, 0.0, 0.0, load.coefficient)
+
+
+KINDS: dict[type[Load], Callable[[_Places, Any, Acting], None]] = {
+    Gravity: _weight,
+    Wrench: _wrench,
+    Effort: _effort,
+    Spring: _elastic,
+    TorsionSpring: _elastic,
+    Damper: _damper,
+}
+"""What puts a load into the tables, by its class."""

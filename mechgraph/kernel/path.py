@@ -1,0 +1,78 @@
+"""Positions of a mechanism by the compiled kernel: its tables with a library, and the records that come back."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.closure.indexing import Index, System
+from mechgraph.kernel.tables import Integers, Layout
+
+
+@dataclass(frozen=True)
+class Records:
+    """What the kernel says of all positions: ``values (T, record)``, the ``largest`` wrench and power, and the ``work`` done."""
+
+    layout: Layout
+    values: Array
+    largest: Array
+    work: tuple[int, int, int]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.layout.places
+
+    def __getitem__(self, name: str) -> Array:
+        """A part, component axes first and positions last, as the package holds it."""
+        part = self.values[:, self.layout.places[name]]
+        return part.reshape(len(part), *self.layout.shapes[name]).T
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """One mechanism in the tables of the kernel, with the library that evaluates them."""
+
+    library: Any
+    layout: Layout
+    I: Integers  # noqa: E741
+    P: Array
+
+    def follow(self, begin: Array, q: Array, v: Array, a: Array, batch: tuple[int, ...], forces: bool) -> Records | None:
+        """Positions, velocities and accelerations of the drives ``(T, d)`` of a batch, from their values ``begin (d,)`` at the start.
+
+        None where a step is not certified, or a position lies where the kernel decides nothing.
+        """
+        size = ctypes.c_size_t(self.library.mgk_state_size(_pointer(self.I))).value
+        state = np.empty(size // 8 + 1)
+        values, largest = np.full((len(q), self.layout.record), np.nan), np.zeros(2)
+        done, work = ctypes.c_int(), np.zeros(3, dtype=ctypes.c_long)
+        for order in _orders(begin, q, batch):
+            status = self.library.mgk_path(
+                _pointer(self.I), _pointer(self.P), _pointer(state), ctypes.c_int(len(order)), _pointer(order),
+                _pointer(q), _pointer(v), _pointer(a), ctypes.c_int(forces), _pointer(values), _pointer(largest),
+                ctypes.byref(done), _pointer(work),
+            )  # fmt: skip
+            if status:
+                return None
+        return Records(self.layout, values, largest, (int(work[0]), int(work[1]), int(work[2])))
+
+
+def _pointer(array: Array | Integers) -> ctypes.c_void_p:
+    return ctypes.c_void_p(array.ctypes.data)
+
+
+def _orders(begin: Array, q: Array, batch: tuple[int, ...]) -> Iterator[Integers]:
+    """In which order positions are taken from the start: of one drive up and down its curve, of several case by case."""
+    if len(begin) > 1:
+        n = batch[-1] if batch else 1
+        yield from np.arange(len(q), dtype=np.int32).reshape(-1, n)
+        return
+    along = q[:, 0] - begin[0]
+    for sense in (1.0, -1.0):
+        there = np.flatnonzero(along >= 0.0 if sense > 0 else along < 0.0)
+        if there.size:
+            yield there[np.argsort(sense * along[there], kind="stable")].astype(np.int32)

@@ -1,0 +1,253 @@
+"""A mechanism as the two flat arrays of the kernel: what it is made of, and its numbers (the layout stands in ``kernel.h``).
+
+What follows from the graph, the types of the pairs and the drives is a ``Layout`` and serves all mechanisms of that graph; the numbers are
+filled in from the parameters of a system. Every link is put into the frame of its pair in the spanning tree, so that a factor turns or
+slides about an axis of coordinates: ``T_b = K_b base_b``, ``K_b = K_a A D(q)``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechgraph.algebra.se3 import Array, compose, identity, inverse, rotate, rotate_back
+from mechgraph.closure.indexing import Index, System
+from mechgraph.closure.rows import CouplingRows
+from mechgraph.kernel.loads import Acting, acting
+from mechgraph.model.factors import ConstantScrew, Factor, Rotation
+from mechgraph.model.load_base import Load
+from mechgraph.model.row_parts import Component, Freedom
+from mechgraph.numerics.linear import complement
+
+Integers = NDArray[np.int32]
+
+FORMAT = 1
+TURN, SLIDE, ROTATION, POSE = 0, 3, 6, 7
+"""Kinds of factors, as in ``kernel.h``."""
+PARTS = (
+    "x", "coordinates", "dq", "ddq", "closure", "points", "reactions", "efforts", "given", "loads", "stress", "stress_efforts", "coupled",
+    "multipliers", "multiplier_stress", "coupled_stress", "shaking", "balance", "power",
+)  # fmt: skip
+"""Parts of a record, in order."""
+MOST_ROWS = 90
+"""Closure rows up to which dense elimination, state by state, serves."""
+
+
+@dataclass(frozen=True)
+class _Step:
+    """One factor in the tables: its kind, the factor of the row that it is part of, and its numbers: ``constant + pitch per_pitch``."""
+
+    kind: int
+    rank: int
+    constant: tuple[float, ...] = ()
+    per_pitch: float = 0.0
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What a mechanism is made of: ``I``, with what its numbers are filled from.
+
+    ``places`` and ``shapes`` of the parts of a record; ``side (N,)``: the pose among identity, markers A and markers B in which every link
+    stands; ``constant``, ``per_pitch``, ``pair``: of every factor number; ``ends``: links a and b of all pairs.
+    """
+
+    I: Integers  # noqa: E741
+    places: dict[str, slice]
+    shapes: dict[str, tuple[int, ...]]
+    side: Index
+    constant: Array
+    per_pitch: Array
+    pair: Index
+    ends: tuple[Index, Index]
+
+    @property
+    def record(self) -> int:
+        """Numbers of a record."""
+        return self.places[PARTS[-1]].stop
+
+
+def why_not(system: System) -> str | None:
+    """What of a mechanism the kernel cannot carry; None where it can."""
+    m = system.m
+    for number, row in enumerate(system.types):
+        if not all(isinstance(step, ConstantScrew | Rotation) for step in row.steps) or row.pushed:
+            name = m.pairs[int(np.flatnonzero(system.type_of == number)[0])].name
+            return f"pair {name!r} ({row.symbol}) travels along a curve or surface"
+    rows = 6 * system.graph.n_loops + len(m.couplings)
+    if rows > MOST_ROWS:
+        return f"it has {rows} closure rows; expected at most {MOST_ROWS}"
+    return None
+
+
+def _steps(factor: Factor, rank: int) -> list[_Step]:
+    """A factor about axes of coordinates, between constant poses where it is about another line."""
+    if isinstance(factor, Rotation):
+        return [_Step(ROTATION, rank)]
+    freedom: Freedom = factor.freedoms[0]
+    base, per_pitch = np.array(freedom.twist), np.array(freedom.per_pitch)
+    line = base[:3] if freedom.turns else base[3:]
+    unit = np.flatnonzero(line)
+    if len(unit) == 1 and line[unit[0]] == 1.0:
+        axis = int(unit[0])
+        if not freedom.turns:
+            return [_Step(SLIDE + axis, rank, (0.0,))]
+        along = np.eye(6)[3 + axis]
+        if not np.delete(base[3:], axis).any() and not (per_pitch - along * per_pitch[3 + axis]).any():
+            return [_Step(TURN + axis, rank, (float(base[3 + axis]),), float(per_pitch[3 + axis]))]
+    C = identity()
+    x = np.cross(line, np.eye(3)[int(np.argmin(np.abs(line)))])
+    C[:, 0] = x / np.sqrt(x @ x)
+    C[:, 1], C[:, 2] = np.cross(line, C[:, 0]), line
+    if not freedom.turns:
+        turn = _Step(SLIDE + 2, rank, (0.0,))
+    else:
+        C[:, 3] = np.cross(line, base[3:])
+        turn = _Step(TURN + 2, rank, (float(line @ base[3:]),), float(line @ per_pitch[3:]))
+    there, back = (tuple(pose.ravel().tolist()) for pose in (C, inverse(C)))
+    return [_Step(POSE, rank, there), turn, _Step(POSE, rank, back)]
+
+
+def off_axis(system: System) -> str | None:
+    """A pair whose pitch moves the axis of a freedom sideways; None where there is none."""
+    for number, row in enumerate(system.types):
+        for freedom in row.freedoms:
+            line, per_pitch = np.array(freedom.twist[:3]), np.array(freedom.per_pitch)
+            if per_pitch[:3].any() or (per_pitch[3:] - line * (line @ per_pitch[3:])).any():
+                name = system.m.pairs[int(np.flatnonzero(system.type_of == number)[0])].name
+                return f"pair {name!r} ({row.symbol}) has a freedom whose axis moves with the pitch"
+    return None
+
+
+def layout(system: System, drives: Index, held: Index) -> Layout:
+    """The layout of a mechanism that the kernel can carry, the freedoms ``drives`` given and ``held`` at rest."""
+    s, g = system, system.graph
+    steps, first, effort_factor = _factors(s)
+    widths = [0 if step.kind == POSE else 3 if step.kind == ROTATION else 1 for _, step in steps]
+    numbers = np.cumsum([0, *(len(step.constant) for _, step in steps)])
+    columns = np.cumsum([0, *widths])
+    states = np.cumsum([0, *(4 if step.kind == ROTATION else w for (_, step), w in zip(steps, widths, strict=True))])
+    unknown = complement(np.union1d(drives, held), s.n_freedoms)
+    place = np.full(s.n_freedoms, -1)
+    place[unknown] = np.arange(len(unknown))
+    tree = g.steps.copy()
+    tree[:, 1] = tree[:, 1] > 0
+    loop, pair, sign = _fundamental(s)
+    rows = _coupling_rows(s)
+    term_rows, term_columns = (rows[0].term_rows, rows[0].term_columns) if rows else np.zeros((2, 0), dtype=np.intp)
+    K = len(s.m.couplings)
+    ends = np.stack([s.a, s.b], axis=1)
+    head = [FORMAT, len(s.m.links), len(s.m.pairs), len(steps), s.n_freedoms, s.n_state, g.n_loops, len(pair), K, len(term_columns),
+            len(drives), len(unknown), 0, g.frame, int(numbers[-1]), 0]  # fmt: skip
+    parts = [
+        head, first, [step.kind for _, step in steps], columns[:-1], states[:-1], numbers[:-1], ends.ravel(), tree.ravel(), g.chords,
+        np.searchsorted(loop, np.arange(g.n_loops + 1)), pair, sign, s.pair_of_freedom, s.single_rows, s.is_length, place, *effort_factor,
+        [row.computed_efforts for row in map(s.types.__getitem__, s.type_of.tolist())], drives, unknown,
+        np.searchsorted(term_rows, np.arange(K + 1)), term_columns,
+    ]  # fmt: skip
+    P = len(s.m.pairs)
+    side = np.zeros(len(s.m.links), dtype=np.intp)
+    side[g.steps[:, 3]] = 1 + g.steps[:, 0] + np.where(g.steps[:, 1] > 0, P, 0)
+    return Layout(
+        np.concatenate([np.asarray(part, dtype=np.int32) for part in parts]),
+        *_record(s, len(unknown)),
+        side,
+        np.array([value for _, step in steps for value in step.constant]),
+        np.array([step.per_pitch for _, step in steps for _ in step.constant]),
+        np.array([k for k, step in steps for _ in step.constant], dtype=np.intp),
+        (s.a, s.b),
+    )
+
+
+def _factors(s: System) -> tuple[list[tuple[int, _Step]], list[int], tuple[list[int], list[bool]]]:
+    """All factors with their pairs, the first of every pair, and of every freedom the factor before which its effort stands (-1: marker
+    B), and whether it acts at marker B.
+    """
+    steps: list[tuple[int, _Step]] = []
+    first, frames, at_b = [0], [], []
+    made = {id(group.row): [_steps(f, r) for r, f in enumerate(group.row.steps)] for group in s.groups}
+    for k, number in enumerate(s.type_of.tolist()):
+        row = s.groups[number].row
+        begins = np.cumsum([len(steps), *map(len, made[id(row)])]).tolist()
+        steps += [(k, step) for part in made[id(row)] for step in part]
+        first.append(len(steps))
+        for effort in row.efforts:
+            rank = next((r for r, columns in enumerate(row.factors) if effort.frame in columns), None)
+            frames.append(-1 if rank is None else begins[rank])
+            at_b.append(effort.at_b)
+    return steps, first, (frames, at_b)
+
+
+def _fundamental(s: System) -> tuple[Index, Index, Index]:
+    """Loop, pair and sign of all steps of the loops that each chord closes with the tree."""
+    ways: list[dict[int, int]] = [{} for _ in s.m.links]
+    for k, sign, parent, child in s.graph.tree:
+        ways[child] = ways[parent] | {k: sign}
+    found = []
+    for number, k in enumerate(s.chords.tolist()):
+        row = {k: 1}
+        for link, sense in ((s.a[k], 1), (s.b[k], -1)):
+            for j, sign in ways[link].items():
+                row[j] = row.get(j, 0) + sense * sign
+        found += [(number, j, sign) for j, sign in sorted(row.items()) if sign]
+    loop, pair, sign = np.array(found, dtype=np.intp).reshape(-1, 3).T
+    return loop, pair, sign
+
+
+def _coupling_rows(s: System) -> list[CouplingRows]:
+    """The rows of the couplings, where there are any."""
+    return [row for row in s.rows if isinstance(row, CouplingRows)]
+
+
+def _record(s: System, unknowns: int) -> tuple[dict[str, slice], dict[str, tuple[int, ...]]]:
+    """The places and shapes of the parts of a record."""
+    c, n, p, k = s.n_freedoms, len(s.m.links), len(s.m.pairs), len(s.m.couplings)
+    stresses = 6 * s.graph.n_loops + k - unknowns
+    shapes: dict[str, tuple[int, ...]] = dict.fromkeys(PARTS, (c,))
+    shapes |= {"x": (s.n_state,), "points": (p, 3), "reactions": (p, 6), "loads": (n, 6), "multipliers": (k,), "shaking": (6,)}
+    shapes |= {"stress": (stresses, p, 6), "stress_efforts": (stresses, c), "coupled_stress": (stresses, c)}
+    shapes |= {"multiplier_stress": (stresses, k), "closure": (), "balance": (), "power": ()}
+    ends = np.cumsum([0, *(int(np.prod(shapes[name])) for name in PARTS)]).tolist()
+    return {name: slice(i, j) for name, i, j in zip(PARTS, ends[:-1], ends[1:], strict=True)}, shapes
+
+
+def tables(known: Layout, system: System, x: Array, loads: Sequence[Load] | None) -> tuple[Integers, Array] | None:
+    """The tables of a mechanism at a start ``x (nx,)`` under loads (None: motion alone); None where a load is no number of the tables."""
+    s, par = system, system.par
+    constants = s.numbers.constants[..., 0]
+    base = constants[:, :, known.side]
+    own = inverse(base)
+    a, b = known.ends
+    P = len(s.m.pairs)
+    A, B = (compose(own[:, :, link], constants[:, :, 1 + i * P : 1 + (i + 1) * P]) for i, link in enumerate((a, b)))
+    pitch = par.pitch[:, 0]
+    effort = s.effort_table
+    moment = effort.free + effort.per_pitch * pitch[effort.pairs]
+    center = rotate(own[:, :3], par.center[..., 0]) + own[:, 3]
+    R = base[:, :3]
+    turned = np.einsum("jin,jkn,kln->iln", R, par.inertia[..., 0], R)
+    inertia = turned[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    acts: Acting | None = Acting([], []) if loads is None else acting(s, own, loads)
+    if acts is None:
+        return None
+    rows = _coupling_rows(s)
+    terms = [row.coefficients[:, 0] for row in rows]
+    numbers = [
+        [par.L], par.origin, x, s.start_coordinates(s.m.start), par.frame[..., 0].ravel(), _flat(A), _flat(B),
+        known.constant + known.per_pitch * pitch[known.pair], np.concatenate([moment, effort.bound]).T.ravel(), par.mass[:, 0],
+        center.T.ravel(), inertia.T.ravel(), _flat(own), *terms, *(row.constant[:, 0] for row in rows), acts.numbers,
+    ]  # fmt: skip
+    I = np.concatenate([known.I, np.array(acts.entries, dtype=np.int32).ravel()])  # noqa: E741
+    I[HEAD_LOADS], I[HEAD_LOAD_NUMBERS] = len(acts.entries), len(acts.numbers)
+    return I, np.concatenate([np.asarray(part, dtype=float) for part in numbers])
+
+
+HEAD_LOADS, HEAD_LOAD_NUMBERS = 12, 15
+"""Places of the numbers of loads in the head."""
+
+
+def _flat(poses: Array) -> Array:
+    """Poses ``(3, 4, n)`` one after the other, by rows."""
+    return np.moveaxis(poses, -1, 0).ravel()
