@@ -24,6 +24,18 @@ FORMULA = ("=", "+", "-", "@")
 NUMBER = re.compile(r"[-+]?[\d.]+(?:e[-+]?\d+)?")
 
 
+def cache_folder() -> Path:
+    """Where files are kept that can be made anew: ``MECHGRAPH_CACHE`` where that is set, else ``mechgraph`` in the user's folder for such
+    files (``XDG_CACHE_HOME``, ``LOCALAPPDATA`` or ``~/.cache``).
+    """
+    if os.environ.get("MECHGRAPH_CACHE"):
+        return Path(os.environ["MECHGRAPH_CACHE"])
+    for name in ("XDG_CACHE_HOME", "LOCALAPPDATA"):
+        if os.environ.get(name):
+            return Path(os.environ[name]) / "mechgraph"
+    return Path.home() / ".cache" / "mechgraph"
+
+
 def write_whole(path: str | os.PathLike[str], text: Iterable[str]) -> None:
     """Write a text in UTF-8, piece by piece, whole or not at all (see ``whole_file``).
 

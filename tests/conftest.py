@@ -8,9 +8,12 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from mechgraph.kernel import build, compiler
+
 settings.register_profile("dev", max_examples=25, deadline=None)
 settings.register_profile("ci", max_examples=60, deadline=None, derandomize=True, database=None)
-settings.load_profile("ci" if os.environ.get("CI", "").lower() not in {"", "0", "false"} else "dev")
+CI = os.environ.get("CI", "").lower() not in {"", "0", "false"}
+settings.load_profile("ci" if CI else "dev")
 
 GOLDEN = Path(__file__).parent / "golden"
 FURTHER = 10_000
@@ -55,8 +58,15 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
 
 @pytest.fixture(scope="session", autouse=True)
 def start_sets(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """Start sets of assemblies are kept for these tests alone, not in the folder of the user."""
+    """Start sets of assemblies, and a kernel that is built, are kept for these tests alone, not in the folder of the user."""
     os.environ["MECHGRAPH_CACHE"] = str(tmp_path_factory.mktemp("start_sets"))
+
+
+@pytest.fixture
+def compiled() -> None:
+    """What a test of the compiled kernel asks for: where no C compiler is, it is skipped, and where CI is set it fails."""
+    if build.installed() is None and not compiler.compilers():
+        (pytest.fail if CI else pytest.skip)("no C compiler here: pip install 'mechgraph[fast]' brings one")
 
 
 @pytest.fixture

@@ -24,6 +24,7 @@ from mechgraph.modes.monodromy import _tame, start_set
 from mechgraph.modes.question import Question
 from mechgraph.modes.targets import Ends, _account, _Run
 from mechgraph.modes.trace import _beside, _poles, rational, trace_test
+from mechgraph.writing import cache_folder
 
 
 @pytest.fixture
@@ -238,7 +239,7 @@ def test_several_positions_are_indexed_by_position_then_mode() -> None:
 def test_a_second_call_takes_the_start_set_that_was_kept() -> None:
     m = general("R-Sp-R", seed=5)
     first = mg.assemblies(m, {"O1": 0.1}, seed=1)
-    assert len(list(store.folder().glob("start-*.npz"))) == 1
+    assert len(list(cache_folder().glob("start-*.npz"))) == 1
     said: list[str] = []
     second = mg.assemblies(general("R-Sp-R", seed=8), {"O1": 0.1}, seed=2, progress=said.append)
     assert not any("random member" in line for line in said)
@@ -249,7 +250,7 @@ def test_a_second_call_takes_the_start_set_that_was_kept() -> None:
 def test_a_damaged_start_set_is_worked_out_anew() -> None:
     m = mg.load("four-bar")
     mg.assemblies(m, {"A": 0.1})
-    for file in store.folder().glob("start-*.npz"):
+    for file in cache_folder().glob("start-*.npz"):
         file.write_bytes(file.read_bytes()[:100])
     assert len(mg.assemblies(m, {"A": 0.1})) == 2
 
@@ -329,7 +330,7 @@ def test_progress_may_interrupt() -> None:
 
     with pytest.raises(KeyboardInterrupt):
         mg.assemblies(mg.load("four-bar"), {"A": 0.1}, progress=stop)
-    assert not list(store.folder().glob("*"))
+    assert not list(cache_folder().glob("*"))
 
 
 def planar(name: str, driver: str, **pairs: tuple[str, str, float, float]) -> mg.Mechanism:
@@ -505,7 +506,7 @@ def test_after_a_stated_effort_what_was_found_is_called_searched(empty: None, mo
     modes = mg.assemblies(m, {"O1": 0.2})
     assert (modes.total, modes.completeness) == (4, "searched")
     assert any("others were not looked for any further" in text for text in modes.evidence)
-    assert not list(store.folder().glob("*"))
+    assert not list(cache_folder().glob("*"))
 
 
 def test_an_assembly_that_rounding_had_told_apart_from_itself_is_one() -> None:

@@ -1,1 +1,1 @@
-"""One compiled kernel over graph tables: states of a mechanism, one at a time, certified from step to step."""
+"""The compiled kernel: one file of C99, generic over tables, and how it is built and loaded."""

@@ -1,15 +1,13 @@
 """Start sets kept in a folder of the user, one file for each class of mechanisms; a file is written whole or not at all.
 
-The folder is ``MECHGRAPH_CACHE`` where that is set, else ``mechgraph`` in that of the user for such files (``XDG_CACHE_HOME``,
-``LOCALAPPDATA`` or ``~/.cache``). Where it cannot be read or written, start sets are worked out anew. Those of the library's mechanisms and
-of common topologies come with the package (``PACKED``, made by ``tests/benchmarks/make_start_sets.py``).
+The folder is ``writing.cache_folder``. Where it cannot be read or written, start sets are worked out anew. Those of the library's
+mechanisms and of common topologies come with the package (``PACKED``, made by ``tests/benchmarks/make_start_sets.py``).
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import os
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -20,22 +18,12 @@ from mechgraph.errors import MechgraphError
 from mechgraph.modes.family import Family, Member
 from mechgraph.modes.monodromy import StartSet
 from mechgraph.modes.trace import Trace
-from mechgraph.writing import whole_file
+from mechgraph.writing import cache_folder, whole_file
 
 PACKED = Path(__file__).with_name("start-sets.npz")
 """Start sets that come with the package, one after the other: names are ``key/array``."""
 START_SET_VERSION = 5
 """Of the files and of what start sets mean."""
-
-
-def folder() -> Path:
-    """Where start sets are kept."""
-    if os.environ.get("MECHGRAPH_CACHE"):
-        return Path(os.environ["MECHGRAPH_CACHE"])
-    for name in ("XDG_CACHE_HOME", "LOCALAPPDATA"):
-        if os.environ.get(name):
-            return Path(os.environ[name]) / "mechgraph"
-    return Path.home() / ".cache" / "mechgraph"
 
 
 def key(family: Family) -> str:
@@ -60,7 +48,7 @@ def key(family: Family) -> str:
 
 def kept(family: Family) -> StartSet | None:
     """The start set of a class, where one is kept and closed: the user's, or else that of the package."""
-    return _read(folder() / f"start-{key(family)}.npz", "", family) or packed(family)
+    return _read(cache_folder() / f"start-{key(family)}.npz", "", family) or packed(family)
 
 
 def packed(family: Family) -> StartSet | None:
@@ -98,8 +86,8 @@ def arrays(start: StartSet) -> dict[str, Any]:
 def keep(family: Family, start: StartSet) -> None:
     """Keep a start set, as far as the folder allows."""
     try:
-        folder().mkdir(parents=True, exist_ok=True)
-        with whole_file(folder() / f"start-{key(family)}.npz") as temporary, temporary.open("xb") as handle:
+        cache_folder().mkdir(parents=True, exist_ok=True)
+        with whole_file(cache_folder() / f"start-{key(family)}.npz") as temporary, temporary.open("xb") as handle:
             np.savez_compressed(handle, **arrays(start))
     except (OSError, RuntimeError, MechgraphError):
         return
