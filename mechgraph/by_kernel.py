@@ -66,7 +66,9 @@ class Compiled(Outcome):
         return BlockMotion(places, Rates(Velocities(here, dq), ddq, np.zeros(here.T))), f
 
 
-def compiled(line: Started, batch: tuple[int, ...], keep: Callable[[tuple[object, ...], Callable[[], Any]], Any]) -> Compiled | None:
+def compiled(
+    line: Started, batch: tuple[int, ...], keep: Callable[[tuple[object, ...], Callable[[], Any]], Any]
+) -> Compiled | None:
     """All positions of a call by the kernel; None where it does not serve: no library, or no certificate.
 
     ``keep`` keeps what follows from the start and the drives alone.
@@ -85,7 +87,9 @@ def compiled(line: Started, batch: tuple[int, ...], keep: Callable[[tuple[object
     why = _cannot(line)
     if why is not None:
         if asked:
-            raise DeclarationError(f"solve {line.m.name!r}", [f"engine 'compiled' does not serve: {why}. Use engine='auto'"])
+            raise DeclarationError(
+                f"solve {line.m.name!r}", [f"engine 'compiled' does not serve: {why}. Use engine='auto'"]
+            )
         return None
     forces = _gives_forces(line)
     key = COMPILED, line.columns.tobytes(), forces

@@ -10,6 +10,7 @@ from typing import TypeVar
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.by_kernel import compiled
 from mechgraph.call import Options, Starts
 from mechgraph.closure.assembly import closed_start, named_columns
 from mechgraph.closure.configuration import Configuration
@@ -24,7 +25,6 @@ from mechgraph.closure.rates import distance_to_dead_point
 from mechgraph.closure.reduced_path import follow_reduced
 from mechgraph.closure.reduction import Reduction, reduction_of
 from mechgraph.closure.solver import ClosureSolver, closure_solver, engine_for, solver_at_start
-from mechgraph.by_kernel import compiled
 from mechgraph.errors import DeclarationError, IndeterminateError
 from mechgraph.numerics.linear import independent_rows
 from mechgraph.numerics.tolerances import PATH

@@ -4,7 +4,17 @@ import ctypes
 
 import numpy as np
 import pytest
-from attack import conditions, differences, four_bars, just_out_of_reach, nearly_folded, solved, warned, without_numbers, wrapped
+from attack import (
+    conditions,
+    differences,
+    four_bars,
+    just_out_of_reach,
+    nearly_folded,
+    solved,
+    warned,
+    without_numbers,
+    wrapped,
+)
 from mechanisms import Z, hexapod
 from strategies import closed_mechanism, motions, with_drives, with_loads
 
@@ -47,7 +57,20 @@ def swing(m, count=5, size=0.3):
     return out
 
 
-SERVED = {"7r", "bennett", "four-bar", "p-sp-r", "phchc", "r-cp-c", "r-sc-c-r", "r-sg-c", "rcsr", "rcsr-csr", "slider-crank", "windows-2"}
+SERVED = {
+    "7r",
+    "bennett",
+    "four-bar",
+    "p-sp-r",
+    "phchc",
+    "r-cp-c",
+    "r-sc-c-r",
+    "r-sg-c",
+    "rcsr",
+    "rcsr-csr",
+    "slider-crank",
+    "windows-2",
+}
 """Members of the library with every kind of pair of constant screws, planar, spatial, overconstrained, of two loops."""
 
 
@@ -158,7 +181,10 @@ def test_loads_that_are_numbers(name):
 def test_forces_that_the_kernel_does_not_give(actuate):
     """Functions, arrays over positions, other freedoms that take the efforts, other methods: by numpy, at the states of the kernel."""
     m = mg.load("four-bar")
-    table = [mg.Effort("D", np.linspace(0.0, 1.0, 5)), mg.Wrench("coupler", moment=lambda pose, twist, t: pose[..., :3, 0])]
+    table = [
+        mg.Effort("D", np.linspace(0.0, 1.0, 5)),
+        mg.Wrench("coupler", moment=lambda pose, twist, t: pose[..., :3, 0]),
+    ]
     assert agreed(m.replace(loads=table), swing(m), actuate=actuate) == "compiled"
     assert agreed(m, swing(m), method="newton_euler", actuate=actuate) == "compiled"
 
@@ -220,7 +246,7 @@ def test_record_and_tables_have_the_layout_of_the_library():
     m = mg.load("rcsr-csr")
     line = Pipeline(DriverMotion(m, swing(m)), Options())
     known = tables.layout(line.system, line.columns, np.zeros(0, dtype=np.intp))
-    I, P = tables.tables(known, line.system, line.x, m.loads)  # noqa: E741
+    I, P = tables.tables(known, line.system, line.x, m.loads)
     places = (ctypes.c_int * (len(tables.PARTS) + 1))()
     build.built().mgk_record(ctypes.c_void_p(I.ctypes.data), places)
     assert list(places) == [known.places[name].start for name in tables.PARTS] + [known.record]
@@ -232,7 +258,7 @@ def test_a_state_that_stays_hot():
     m = mg.load("rcsr-csr")
     line = Pipeline(DriverMotion(m, swing(m)), Options())
     known = tables.layout(line.system, line.columns, np.zeros(0, dtype=np.intp))
-    I, P = tables.tables(known, line.system, line.x, m.loads)  # noqa: E741
+    I, P = tables.tables(known, line.system, line.x, m.loads)
     library = build.built()
     state = np.empty(ctypes.c_size_t(library.mgk_state_size(pointer(I))).value // 8 + 1)
     assert library.mgk_start(pointer(I), pointer(P), pointer(state)) == 0
@@ -248,5 +274,7 @@ def test_a_state_that_stays_hot():
         assert library.mgk_solve(*call) == 0
         pair = m.freedom(m.full_name(name))[0]
         np.testing.assert_allclose(effort, s[m.pairs[pair].name].effort[i, :1], rtol=1e-10)
-        np.testing.assert_allclose(reaction, [s[p.name].reaction[i] for p in m.pairs], atol=1e-10 * np.abs(reaction).max())
+        np.testing.assert_allclose(
+            reaction, [s[p.name].reaction[i] for p in m.pairs], atol=1e-10 * np.abs(reaction).max()
+        )
         np.testing.assert_allclose(position, np.concatenate([s[p.name].position[i] for p in m.pairs]), atol=1e-10)

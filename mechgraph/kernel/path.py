@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.indexing import Index, System
 from mechgraph.kernel.tables import Integers, Layout
 
 
@@ -38,10 +37,12 @@ class Kernel:
 
     library: Any
     layout: Layout
-    I: Integers  # noqa: E741
+    I: Integers
     P: Array
 
-    def follow(self, begin: Array, q: Array, v: Array, a: Array, batch: tuple[int, ...], forces: bool) -> Records | None:
+    def follow(
+        self, begin: Array, q: Array, v: Array, a: Array, batch: tuple[int, ...], forces: bool
+    ) -> Records | None:
         """Positions, velocities and accelerations of the drives ``(T, d)`` of a batch, from their values ``begin (d,)`` at the start.
 
         None where a step is not certified, or a position lies where the kernel decides nothing.
