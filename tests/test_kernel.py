@@ -177,6 +177,14 @@ def test_loads_that_are_numbers(name):
     assert tables.tables(known, line.system, line.x, m.loads) is not None
 
 
+def test_other_loads_on_the_same_start():
+    """Tables are kept with a start, which mechanisms under other loads share."""
+    m = mg.load("four-bar")
+    for load in (mg.Effort("D", 1.0), mg.Effort("D", 3.0), mg.Gravity((0, -5.0, 0))):
+        one, other = (mg.solve(m, {"A": [0.1, 0.2]}, loads=[load], engine=engine)["A"].effort for engine in ("compiled", "dense"))
+        np.testing.assert_allclose(one, other, rtol=1e-10)
+
+
 @pytest.mark.parametrize("actuate", [None, ["D"]])
 def test_forces_that_the_kernel_does_not_give(actuate):
     """Functions, arrays over positions, other freedoms that take the efforts, other methods: by numpy, at the states of the kernel."""

@@ -192,8 +192,8 @@ def _fundamental(s: System) -> tuple[Index, Index, Index]:
             for j, sign in ways[link].items():
                 row[j] = row.get(j, 0) + sense * sign
         found += [(number, j, sign) for j, sign in sorted(row.items()) if sign]
-    loop, pair, sign = np.array(found, dtype=np.intp).reshape(-1, 3).T
-    return loop, pair, sign
+    steps = np.array(found, dtype=np.intp).reshape(-1, 3)
+    return steps[:, 0], steps[:, 1], steps[:, 2]
 
 
 def _coupling_rows(s: System) -> list[CouplingRows]:
