@@ -89,9 +89,9 @@ def compiled(line: Started, batch: tuple[int, ...]) -> Compiled | None:
         return None
     kernel, forces = _kernel(line, library)
     q, v, a = (np.ascontiguousarray(line.values(kind, batch).T) for kind in ("position", "velocity", "acceleration"))
-    begin = line.x[line.system.single_rows[line.columns]]
-    records = kernel.follow(begin, q, v, a, batch, forces)
-    return None if records is None else Compiled(line, batch, records, forces)
+    begin = line.x[line.system.single_rows[line.columns], None]
+    records, whole = kernel.follow(begin, q, v, a, batch, forces)
+    return Compiled(line, batch, records, forces) if whole.all() else None
 
 
 def _kernel(line: Started, library: Any) -> tuple[Kernel, bool]:
@@ -104,9 +104,9 @@ def _kernel(line: Started, library: Any) -> tuple[Kernel, bool]:
     if known is None or known[0] != key or len(known[1]) != len(line.m.loads) or any(map(is_not, known[1], line.m.loads)):
         found = _layout(line)
         assert isinstance(found, Layout)
-        filled = tables(found, line.system, line.x, line.m.loads) if key[1] else None
+        filled = tables(found, line.system, line.x[:, None], line.m.loads) if key[1] else None
         forces = filled is not None
-        filled = filled or tables(found, line.system, line.x, None)
+        filled = filled or tables(found, line.system, line.x[:, None], None)
         assert filled is not None
         kept[COMPILED] = known = key, line.m.loads, Kernel(library, found, *filled), forces
     return known[2], known[3]

@@ -174,7 +174,7 @@ def test_loads_that_are_numbers(name):
     assert agreed(m, swing(m)) == "compiled"
     line = Pipeline(DriverMotion(m, swing(m)), Options())
     known = tables.layout(line.system, line.columns, np.zeros(0, dtype=np.intp))
-    assert tables.tables(known, line.system, line.x, m.loads) is not None
+    assert tables.tables(known, line.system, line.x[:, None], m.loads) is not None
 
 
 def test_other_loads_on_the_same_start():
@@ -254,7 +254,7 @@ def test_record_and_tables_have_the_layout_of_the_library():
     m = mg.load("rcsr-csr")
     line = Pipeline(DriverMotion(m, swing(m)), Options())
     known = tables.layout(line.system, line.columns, np.zeros(0, dtype=np.intp))
-    I, P = tables.tables(known, line.system, line.x, m.loads)
+    I, (P,) = tables.tables(known, line.system, line.x[:, None], m.loads)
     places = (ctypes.c_int * (len(tables.PARTS) + 1))()
     build.built().mgk_record(ctypes.c_void_p(I.ctypes.data), places)
     assert list(places) == [known.places[name].start for name in tables.PARTS] + [known.record]
@@ -266,7 +266,7 @@ def test_a_state_that_stays_hot():
     m = mg.load("rcsr-csr")
     line = Pipeline(DriverMotion(m, swing(m)), Options())
     known = tables.layout(line.system, line.columns, np.zeros(0, dtype=np.intp))
-    I, P = tables.tables(known, line.system, line.x, m.loads)
+    I, (P,) = tables.tables(known, line.system, line.x[:, None], m.loads)
     library = build.built()
     state = np.empty(ctypes.c_size_t(library.mgk_state_size(pointer(I))).value // 8 + 1)
     assert library.mgk_start(pointer(I), pointer(P), pointer(state)) == 0
