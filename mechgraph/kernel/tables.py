@@ -244,9 +244,10 @@ def tables(known: Layout, system: System, x: Array, loads: Sequence[Load] | None
         return None
     rows = _coupling_rows(s)
     parts = [
-        np.full((1, 1), par.L), par.origin[:, None], x, s.start_coordinates(s.m.start)[:, None], par.frame.reshape(12, 1), _flat(A), _flat(B),
-        known.constant[:, None] + known.per_pitch[:, None] * par.pitch[known.pair], _by_item(np.concatenate([moment, force])), par.mass,
-        _by_item(center), _by_item(inertia), _flat(own), *(row.coefficients for row in rows), *(row.constant for row in rows), *acts.numbers,
+        np.full((1, 1), par.L), par.origin[:, None], x, s.start_coordinates(s.m.start)[:, None], par.frame.reshape(12, 1),
+        _flat(A), _flat(B), known.constant[:, None] + known.per_pitch[:, None] * par.pitch[known.pair],
+        _by_item(np.concatenate([moment, force])), par.mass, _by_item(center), _by_item(inertia), _flat(own),
+        *(row.coefficients for row in rows), *(row.constant for row in rows), *acts.numbers,
     ]  # fmt: skip
     I = np.concatenate([known.I, np.array(acts.entries, dtype=np.int32).ravel()])
     I[HEAD_LOADS], I[HEAD_LOAD_NUMBERS] = len(acts.entries), len(acts.numbers)
