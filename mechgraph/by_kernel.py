@@ -6,6 +6,7 @@ numpy, with all that it says of such positions.
 
 from __future__ import annotations
 
+from functools import partial
 from operator import is_not
 from typing import Any, Protocol
 
@@ -25,7 +26,7 @@ from mechgraph.kernel.tables import Layout, layout, tables, why_not
 from mechgraph.model.contact import Contact
 from mechgraph.model.load_base import Load
 from mechgraph.numerics.newton import Work
-from mechgraph.outcome import Outcome
+from mechgraph.outcome import Outcome, system_at
 from mechgraph.result.kept import BlockMotion
 
 COMPILED = "compiled"
@@ -54,9 +55,8 @@ class Compiled(Outcome):
         self.records, self.solver = records, line.solver
         count = len(records.values)
         variant = np.arange(count) // (count // len(whole))
-        super().__init__(
-            line, starts.loads, batch, lambda places: starts.system_of(variant[places]), records["coordinates"]
-        )
+        at = partial(system_at, starts, variant)
+        super().__init__(line, starts.loads, batch, at, records["coordinates"])
         steps, evaluations, factorizations = records.work
         work = Work(positions=count, nodes=len(whole) + steps, evaluations=evaluations, factorizations=factorizations)
         self.trajectory.engine, self.trajectory.work = COMPILED, work

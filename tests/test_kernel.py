@@ -260,7 +260,7 @@ def test_record_and_tables_have_the_layout_of_the_library():
     I, (P,) = tables.tables(known, line.system, line.x[:, None], m.loads)
     places = (ctypes.c_int * (len(tables.PARTS) + 1))()
     build.built().mgk_record(ctypes.c_void_p(I.ctypes.data), places)
-    assert list(places) == [known.places[name].start for name in tables.PARTS] + [known.record]
+    assert list(places) == [known.places[name].start for name in tables.PARTS] + [known.record(True)]
     assert P[0] == line.system.par.L
 
 

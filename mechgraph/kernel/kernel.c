@@ -979,6 +979,7 @@ typedef struct {
   const int *order, *places;
   const double *q, *v, *a;
   double *out, *largest;
+  size_t length;
 } Asked;
 
 static int at_place(const Asked *asked, int i) { return asked->order ? asked->order[i] : i; }
@@ -991,8 +992,7 @@ static int read_off(const Model *m, Work *w, Asked *asked, double at) {
   set_drives(m, w->x, asked->q + i * d);
   const int status = closed(m, w, w->x, NULL);
   if (status) return status;
-  return put(m, w, w->x, asked->v + i * d, asked->a + i * d, asked->with_forces, asked->places, asked->out + (size_t)i * asked->places[MGK_PARTS],
-             asked->largest);
+  return put(m, w, w->x, asked->v + i * d, asked->a + i * d, asked->with_forces, asked->places, asked->out + i * asked->length, asked->largest);
 }
 
 static void swapped(Node *p, Node *q) {
@@ -1126,7 +1126,7 @@ int mgk_path(const int *I, const double *P, void *state, int count, const int *o
   if (status) return status;
   opened(I, P, state, &m, &w);
   mgk_record(I, places);
-  Asked asked = {count, with_forces, 0, order, places, q, v, a, out, largest};
+  Asked asked = {count, with_forces, 0, order, places, q, v, a, out, largest, places[with_forces ? MGK_PARTS : MGK_POINTS]};
   status = along(&m, &w, &asked);
   *done = asked.done;
   work[0] += w.steps, work[1] += w.evaluations, work[2] += w.factorizations;
@@ -1166,7 +1166,7 @@ int mgk_solve(const int *I, const double *P, void *state, const double *q, const
     const double unit = m.is_length[m.drive[i]] ? L : 1.0;
     asked_of[i] = q[i] / unit, asked_of[d + i] = v[i] / unit, asked_of[2 * d + i] = a[i] / unit;
   }
-  Asked asked = {1, 1, 0, NULL, places, asked_of, asked_of + d, asked_of + 2 * d, record, largest};
+  Asked asked = {1, 1, 0, NULL, places, asked_of, asked_of + d, asked_of + 2 * d, record, largest, 0};
   memcpy(w.kept, w.x, w.n_kept * sizeof(double));
   const int status = along(&m, &w, &asked);
   if (status) {
