@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from functools import partial
 from operator import is_not
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
@@ -29,7 +29,7 @@ from mechgraph.numerics.newton import Work
 from mechgraph.outcome import Outcome, system_at
 from mechgraph.result.kept import BlockMotion
 
-COMPILED = "compiled"
+COMPILED: Literal["compiled"] = "compiled"
 """Name of the engine."""
 SERVES = 0.8
 """Part of the variants of which the kernel must have solved more; the others are solved one by one."""
