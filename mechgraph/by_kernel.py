@@ -82,12 +82,12 @@ def compiled(line: Started, batch: tuple[int, ...], keep: Callable[[tuple[object
     library = build.built() if asked else build.installed()
     if library is None:
         return None
-    why = _cannot(line)
+    why = cannot(line)
     if why is not None:
         if asked:
             raise DeclarationError(f"solve {line.m.name!r}", [f"engine 'compiled' does not serve: {why}. Use engine='auto'"])
         return None
-    forces = _gives_forces(line)
+    forces = gives_forces(line)
     key = COMPILED, line.columns.tobytes(), forces
     found = keep(key, lambda: _kernel(line, library, forces))
     kernel, forces = found
@@ -120,7 +120,7 @@ def _layout(line: Started) -> Layout | str:
     return found
 
 
-def _cannot(line: Started) -> str | None:
+def cannot(line: Started) -> str | None:
     """Why the kernel does not serve a call; None where it does."""
     if line.passive:
         return "it has passive freedoms"
@@ -130,7 +130,7 @@ def _cannot(line: Started) -> str | None:
     return found if isinstance(found, str) else None
 
 
-def _gives_forces(line: Started) -> bool:
+def gives_forces(line: Started) -> bool:
     """Whether the kernel gives the forces that are asked for; it knows no line along which gears touch each other."""
     return (
         line.options.method == "loop_wrench"

@@ -29,8 +29,6 @@ def installed() -> ctypes.CDLL | None:
 
     Of several in the cache the one built last.
     """
-    if not compiler.SOURCE.is_file():
-        return None
     files = [file for file in [PACKAGED / f"kernel-{compiler.key()}{compiler.suffix()}"] if file.is_file()]
     folder = cache_folder() / "kernel"
     if folder.is_dir() and not doubt(folder):
