@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ctypes
+import os
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import cache, partial
 from typing import Any, NoReturn
 
@@ -11,12 +13,15 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.compiled.tabled import STATUSES, Tabled, tabled
+from mechgraph.compiled.write import write_tables
 from mechgraph.errors import DeclarationError, listed
 from mechgraph.kernel import build
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import real_array, wrong
 
 WORDS = np.array([word for _, word, _ in STATUSES])
+START = 4
+"""Place of the start in the table of numbers, see ``kernel.h``."""
 HALVINGS = 12
 """Halvings of a change of parameters, until the loops are closed by small corrections."""
 
@@ -230,6 +235,24 @@ class Compiled:
 
     def _shown(self, values: Any) -> Any:
         return values[0] if self._single else values
+
+    def write(self, path: str | os.PathLike[str], name: str | None = None) -> None:
+        """Write the mechanism with its parameters as they are: C99 (``press.c``, ``press.h``), or a unit for co-simulation (``.fmu``).
+
+        The C has no heap and needs the mathematics of the C library alone; its functions are ``press_start``, ``press_state_size`` and
+        ``press_solve``, as the header says. ``name`` is what symbols begin with: left out, the name of the file.
+
+        Raises
+        ------
+        DeclarationError
+            where ``name`` is no identifier of C, or the loops cannot be led to the parameters; FileError where it cannot be written,
+            MissingExtraError for a unit where there is no C compiler.
+        """
+        if self._values != self.parameters.wanted and (status := self._led()):
+            self._refuse(f"the declared position cannot be led to the parameters: {WORDS[status]}")
+        P, x = self.P.copy(), len(self.tables.x)
+        P[START : START + x] = self.home[:x]
+        write_tables(replace(self.tables, P=P), path, name)
 
     # --- parameters --------------------------------------------------------------------------------------------------------
 

@@ -11,6 +11,7 @@ import ctypes
 import os
 import stat
 import subprocess
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
@@ -67,7 +68,12 @@ def built() -> ctypes.CDLL:
             continue
         installed.cache_clear()
         return library
-    raise MissingExtraError(f"{NEEDED} that builds the kernel ({'; '.join(refused)})" if refused else NEEDED, "fast")
+    raise missing(refused)
+
+
+def missing(refused: Sequence[str]) -> MissingExtraError:
+    """The error where there is no C compiler, or where all those that there are have ``refused``."""
+    return MissingExtraError(f"{NEEDED} that builds the kernel ({'; '.join(refused)})" if refused else NEEDED, "fast")
 
 
 def _name(compiled_by: str) -> str:

@@ -70,8 +70,8 @@ def version(command: Sequence[str]) -> str:
     return _digest("\n".join(command).encode(), said.stdout)
 
 
-def compile_library(command: Sequence[str], target: Path, made_for: str = "") -> None:
-    """Compile the kernel beside ``target``, then rename it.
+def compile_library(command: Sequence[str], target: Path, made_for: str = "", sources: Sequence[Path] = ()) -> None:
+    """Compile the kernel, or other ``sources``, beside ``target``, then rename it.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def compile_library(command: Sequence[str], target: Path, made_for: str = "") ->
     """
     with tempfile.TemporaryDirectory(prefix=".kernel-", dir=target.parent) as folder:
         made = Path(folder) / target.name
-        line = [*command, *flags(made_for), "-o", os.fspath(made), *map(os.fspath, SOURCES), "-lm"]
+        line = [*command, *flags(made_for), "-o", os.fspath(made), *map(os.fspath, sources or SOURCES), "-lm"]
         own = {"ZIG_GLOBAL_CACHE_DIR": folder, "ZIG_LOCAL_CACHE_DIR": folder}
         subprocess.run(
             line, env=own | os.environ, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace",
