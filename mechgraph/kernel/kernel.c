@@ -1032,6 +1032,7 @@ static int follow(const Model *m, Work *w, Asked *asked, const double *begin, co
       if (at > *w->b.at && step != left) break;
       if ((status = read_off(m, w, asked, at))) return status;
     }
+    coordinates(m, w, w->b.x, w->column_value); /* rotation vectors are continued from node to node */
     swapped(&w->before, &w->a);
     swapped(&w->a, &w->b);
     known = 1, h = fmin(LONGEST, grown * step);
