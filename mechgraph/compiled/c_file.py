@@ -134,7 +134,7 @@ def source_text(tables: Tabled, name: str, header: str) -> str:
     m = tables.m
     kernel, declarations = (PATHS.sub("", file.read_text(encoding="utf-8")) for file in INCLUDED)
     declarations = re.sub(r"^#(?:ifndef|endif|include|define MECHGRAPH).*\n", "", declarations, flags=re.MULTILINE)
-    kernel = re.sub(r'^#include "kernel.h"\n', "", kernel, flags=re.MULTILINE)
+    kernel = re.sub(r'^#(?:include "kernel.h"|ifndef MGK_COMPLEX|endif)\n', "", kernel, flags=re.MULTILINE)
     both = re.sub(r"^(int|size_t) mgk_", r"static \1 mgk_", f"{declarations}\n{kernel}", flags=re.MULTILINE)
     both = both.replace("mgk_", f"{name}_kernel_").replace("MGK_", f"{name.upper()}_KERNEL_")
     home = ", ".join(f"{full} = {value!r}" for full, value in zip(tables.drives, tables.home.tolist(), strict=True))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from typing import Any, NoReturn
@@ -22,6 +22,8 @@ from mechgraph.quantities import real_array, wrong
 WORDS = np.array([word for _, word, _ in STATUSES])
 START = 4
 """Place of the start in the table of numbers, see ``kernel.h``."""
+SMALL_TURN = 1e-4
+"""Angle below which the series of dexp^-1 has only its first terms."""
 HALVINGS = 12
 """Halvings of a change of parameters, until the loops are closed by small corrections."""
 
@@ -54,6 +56,8 @@ def _functions() -> ctypes.CDLL:
     library.mgk_table.argtypes = [*[pointer] * 3, whole, *[pointer] * 6]
     for of_state in (library.mgk_poses, library.mgk_drives):
         of_state.argtypes, of_state.restype = [pointer] * 4, None
+    library.mgk_derivative_size.argtypes, library.mgk_derivative_size.restype = [pointer, whole], ctypes.c_size_t
+    library.mgk_derivative.argtypes = [*[pointer] * 3, whole, *[pointer] * 6]
     return library
 
 
@@ -117,6 +121,17 @@ class _Room:
         for name in ("motion", "effort", "reaction", "position", "poses", "status"):
             getattr(out, name)[:] = getattr(self, name)
         return out
+
+
+def turn_rate(v: Array, w: Array) -> Array:
+    """The rate ``(3,)`` of a rotation vector ``v (3,)`` where the rotation turns at ``w (3,)``, in the frame before it (dexp^-1)."""
+    angle = float(np.sqrt(v @ v))
+    if angle < SMALL_TURN:
+        part = 1.0 / 12.0
+    else:
+        part = (1.0 - 0.5 * angle / np.tan(0.5 * angle)) / angle**2
+    once = np.cross(v, w)
+    return np.asarray(w - 0.5 * once + part * np.cross(v, once))
 
 
 class Compiled:
@@ -235,6 +250,60 @@ class Compiled:
 
     def _shown(self, values: Any) -> Any:
         return values[0] if self._single else values
+
+    def gradient(self, output: str, names: Sequence[str]) -> Array:
+        """Derivatives of an output at the last position by declared numbers, the drives moving as they do: exact, by complex numbers.
+
+        Parameters
+        ----------
+        output : ``"A.effort"`` of a drive, ``"B.position"`` or ``"B.reaction"``.
+        names : of ``parameters``.
+
+        Returns
+        -------
+        array
+            ``(names,)``; of a pair with ``f`` freedoms ``(f, names)``, of a reaction ``(6, names)``. NaN where the last call was refused.
+
+        Raises
+        ------
+        DeclarationError
+            for names that are none.
+        """
+        of, place = self._output(output)
+        names = [names] if isinstance(names, str) else list(names)
+        columns = [self._derivatives(name)[of].reshape(-1)[place] for name in names]
+        return np.stack(columns, axis=-1) if columns else np.zeros((*np.shape(place), 0))
+
+    def _output(self, output: Any) -> tuple[int, Any]:
+        """Which of efforts, reactions and positions an output is, and its places there."""
+        t = self.tables
+        owner, _, part = output.rpartition(".") if isinstance(output, str) else ("", "", "")
+        if part == "effort" and t.m.freedom_fault(owner, single=True) is None and t.m.full_name(owner) in t.drives:
+            return 0, t.drives.index(t.m.full_name(owner))
+        if part == "reaction" and owner in t.m.pair_index:
+            return 1, 6 * t.m.place_of_pair(owner) + np.arange(6)
+        if part == "position" and owner in t.m.pair_index:
+            columns = np.arange(t.system.n_freedoms)[t.columns(owner)]
+            return 2, columns[0] if len(columns) == 1 else columns
+        example = f"'{t.drives[0]}.effort', '{t.m.pairs[-1].name}.position' or '{t.m.pairs[-1].name}.reaction'"
+        return self._refuse(wrong(output, "output", f"e.g. {example}"))
+
+    def _derivatives(self, name: str) -> list[Array]:
+        """Efforts, reactions and positions, by one number."""
+        t, room = self.tables, self._last
+        values = {name: t.known(name), **self._values}
+        out = [np.full(part.shape[1:], np.nan) for part in (room.effort, room.reaction, room.position)]
+        if room.status[-1]:
+            return out
+        dP, motion = t.derivative(values, name), np.ascontiguousarray(room.motion[:, -1])
+        memory = np.empty(_functions().mgk_derivative_size(self.I.ctypes.data, len(dP)) // 16 + 1, dtype=complex)
+        known = [part.ctypes.data for part in (self.I, self.P, dP)]
+        rest = [part.ctypes.data for part in (memory, self.state, motion, *out)]
+        if _functions().mgk_derivative(*known, len(dP), *rest):
+            return [np.full_like(part, np.nan) for part in out]
+        for g in t.rotations:
+            out[2][g] = turn_rate(room.position[-1, g], out[2][g])
+        return out
 
     def write(self, path: str | os.PathLike[str], name: str | None = None) -> None:
         """Write the mechanism with its parameters as they are: C99 (``press.c``, ``press.h``), or a unit for co-simulation (``.fmu``).

@@ -76,6 +76,11 @@ class Tabled:
         k, first = self.m.place_of_pair(pair), self.system.first_column
         return slice(int(first[k]), int(first[k]) + len(self.m.pairs[k].type.freedoms))
 
+    @property
+    def rotations(self) -> list[slice]:
+        """The freedoms of every rotation."""
+        return [slice(int(c), int(c) + 3) for c in np.flatnonzero(self.system.single_rows < 0)[::3]]
+
     def known(self, name: str) -> float:
         """The declared value of a number; its field is remembered.
 
