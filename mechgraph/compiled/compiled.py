@@ -106,8 +106,7 @@ class _Room:
         """Poses of all links ``(n, N, 4, 4)``; of one position found when they are asked for."""
         if self.n == 1:
             self.library.mgk_poses(*(part.ctypes.data for part in (self.of.I, self.of.P, self.state, self.poses)))
-        internal = np.where(self.status[:, None, None, None] == 0, self.poses, np.nan)
-        return self.of.tables.poses(internal)
+        return np.where(self.status[:, None, None, None] == 0, self.of.tables.poses(self.poses), np.nan)
 
     def refuse(self, status: int) -> None:
         """No results."""
@@ -139,12 +138,13 @@ class Compiled:
 
     Attributes
     ----------
+    drives : the freedoms that are driven, in the order of their numbers in a call.
     parameters : declared numbers by name, to be set in place.
     status : ``"ok"``, or why the last call was refused; of ``(n, d)`` positions an array of words.
     """
 
     def __init__(self, tables: Tabled, like: Compiled | None = None) -> None:
-        self.tables, self.I = tables, tables.I
+        self.tables, self.drives, self.I = tables, tables.drives, tables.I
         size = _functions().mgk_state_size(self.I.ctypes.data) // 8 + 1
         self.P, self.home, self.state = tables.P.copy(), np.zeros(size), np.zeros(size)
         self._values: dict[str, float] = {}
