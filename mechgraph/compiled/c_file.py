@@ -136,7 +136,8 @@ def source_text(tables: Tabled, name: str, header: str) -> str:
     declarations = re.sub(r"^#(?:ifndef|endif|include|define MECHGRAPH).*\n", "", declarations, flags=re.MULTILINE)
     kernel = re.sub(r'^#(?:include "kernel.h"|ifndef MGK_COMPLEX|endif)\n', "", kernel, flags=re.MULTILINE)
     both = re.sub(r"^(int|size_t) mgk_", r"static \1 mgk_", f"{declarations}\n{kernel}", flags=re.MULTILINE)
-    both = both.replace("mgk_", f"{name}_kernel_").replace("MGK_", f"{name.upper()}_KERNEL_")
+    own = {"mgk": f"{name}_kernel", "MGK": f"{name.upper()}_KERNEL"}
+    both = re.sub("mgk(?=_)|MGK(?=_)", lambda found: own[found[0]], both)
     home = ", ".join(f"{full} = {value!r}" for full, value in zip(tables.drives, tables.home.tolist(), strict=True))
     return f"""/* Mechanism {in_comment(m.name)}, written by mechgraph {version("mechgraph")}: see {header}.
  *
@@ -165,7 +166,7 @@ int {name}_solve(void *state, const double *q, const double *v, const double *a,
 
 
 def _unit(text: str) -> str:
-    return f" [{text}]" if text else ""
+    return f" [{in_comment(text)}]" if text else ""
 
 
 def _whole_numbers(tables: Tabled) -> Iterator[str]:
