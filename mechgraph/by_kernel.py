@@ -6,7 +6,7 @@ numpy, with all that it says of such positions.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from operator import is_not
 from typing import Any, Protocol
 
 import numpy as np
@@ -66,10 +66,8 @@ class Compiled(Outcome):
         return BlockMotion(places, Rates(Velocities(here, dq), ddq, np.zeros(here.T))), f
 
 
-def compiled(line: Started, batch: tuple[int, ...], keep: Callable[[tuple[object, ...], Callable[[], Any]], Any]) -> Compiled | None:
+def compiled(line: Started, batch: tuple[int, ...]) -> Compiled | None:
     """All positions of a call by the kernel; None where it does not serve: no library, or no certificate.
-
-    ``keep`` keeps what follows from the start and the drives alone.
 
     Raises
     ------
@@ -85,28 +83,33 @@ def compiled(line: Started, batch: tuple[int, ...], keep: Callable[[tuple[object
     why = cannot(line)
     if why is not None:
         if asked:
-            raise DeclarationError(f"solve {line.m.name!r}", [f"engine 'compiled' does not serve: {why}. Use engine='auto'"])
+            raise DeclarationError(
+                f"solve {line.m.name!r}", [f"engine 'compiled' does not serve: {why}. Use engine='auto'"]
+            )
         return None
-    forces = gives_forces(line)
-    key = COMPILED, line.columns.tobytes(), forces
-    found = keep(key, lambda: _kernel(line, library, forces))
-    kernel, forces = found
+    kernel, forces = _kernel(line, library)
     q, v, a = (np.ascontiguousarray(line.values(kind, batch).T) for kind in ("position", "velocity", "acceleration"))
     begin = line.x[line.system.single_rows[line.columns]]
     records = kernel.follow(begin, q, v, a, batch, forces)
     return None if records is None else Compiled(line, batch, records, forces)
 
 
-def _kernel(line: Started, library: Any, forces: bool) -> tuple[Kernel, bool]:
-    """The tables of a call with the library, and whether they give its forces."""
-    known = _layout(line)
-    assert isinstance(known, Layout)
-    filled = tables(known, line.system, line.x, line.m.loads) if forces else None
-    forces = filled is not None
-    if filled is None:
-        filled = tables(known, line.system, line.x, None)
+def _kernel(line: Started, library: Any) -> tuple[Kernel, bool]:
+    """The tables of a call with the library, and whether they give its forces; those of the last call are kept with the start.
+
+    The start may be shared with mechanisms under other loads.
+    """
+    key, kept = (line.columns.tobytes(), gives_forces(line)), line.start.solvers
+    known = kept.get(COMPILED)
+    if known is None or known[0] != key or len(known[1]) != len(line.m.loads) or any(map(is_not, known[1], line.m.loads)):
+        found = _layout(line)
+        assert isinstance(found, Layout)
+        filled = tables(found, line.system, line.x, line.m.loads) if key[1] else None
+        forces = filled is not None
+        filled = filled or tables(found, line.system, line.x, None)
         assert filled is not None
-    return Kernel(library, known, *filled), forces
+        kept[COMPILED] = known = key, line.m.loads, Kernel(library, found, *filled), forces
+    return known[2], known[3]
 
 
 def _layout(line: Started) -> Layout | str:

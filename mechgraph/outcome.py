@@ -37,7 +37,9 @@ class Outcome:
 
     found: Positions | None = None
 
-    def __init__(self, line: Call, loads: tuple[Load, ...], batch: tuple[int, ...], system_at: SystemAt, q: Array) -> None:
+    def __init__(
+        self, line: Call, loads: tuple[Load, ...], batch: tuple[int, ...], system_at: SystemAt, q: Array
+    ) -> None:
         """Nothing filled in yet; ``q (F, T)`` the user's coordinates, where they are known."""
         self.line, self.loads, self.batch, self._system_at = line, loads, batch, system_at
         self.contradicting = np.zeros(q.shape[1], dtype=bool)
@@ -98,8 +100,6 @@ class Outcome:
             too_large = "forces are beyond the largest number (1.8e308): masses, loads or rates are too large"
             raise DeclarationError(f"solve {line.m.name!r}", [too_large])
         return found
-
-
 
 
 class Followed(Outcome):

@@ -10,6 +10,7 @@ from typing import TypeVar
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.by_kernel import compiled
 from mechgraph.call import Options, Starts
 from mechgraph.closure.assembly import closed_start, named_columns
 from mechgraph.closure.configuration import Configuration
@@ -24,7 +25,6 @@ from mechgraph.closure.rates import distance_to_dead_point
 from mechgraph.closure.reduced_path import follow_reduced
 from mechgraph.closure.reduction import Reduction, reduction_of
 from mechgraph.closure.solver import ClosureSolver, closure_solver, engine_for, solver_at_start
-from mechgraph.by_kernel import compiled
 from mechgraph.errors import DeclarationError, IndeterminateError
 from mechgraph.numerics.linear import independent_rows
 from mechgraph.numerics.tolerances import PATH
@@ -191,7 +191,7 @@ class Pipeline:
     def run(self, starts: Starts | None = None, batch: tuple[int, ...] | None = None) -> Outcome:
         """All positions, rates and forces as a trajectory."""
         batch = self.drive.batch if batch is None else batch
-        if starts is None and (done := compiled(self, batch, self._with_start)) is not None:
+        if starts is None and (done := compiled(self, batch)) is not None:
             return done
         start = None if starts else self.start
         starts = starts or Starts(self.x[:, None], self.system.cases, self.m.loads)

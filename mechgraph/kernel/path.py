@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.indexing import Index, System
 from mechgraph.kernel.tables import Integers, Layout
 
 
@@ -38,30 +37,33 @@ class Kernel:
 
     library: Any
     layout: Layout
-    I: Integers  # noqa: E741
+    I: Integers
     P: Array
 
-    def follow(self, begin: Array, q: Array, v: Array, a: Array, batch: tuple[int, ...], forces: bool) -> Records | None:
+    def follow(
+        self, begin: Array, q: Array, v: Array, a: Array, batch: tuple[int, ...], forces: bool
+    ) -> Records | None:
         """Positions, velocities and accelerations of the drives ``(T, d)`` of a batch, from their values ``begin (d,)`` at the start.
 
         None where a step is not certified, or a position lies where the kernel decides nothing.
         """
-        size = ctypes.c_size_t(self.library.mgk_state_size(_pointer(self.I))).value
+        size = ctypes.c_size_t(self.library.mgk_state_size(pointer(self.I))).value
         state = np.empty(size // 8 + 1)
         values, largest = np.full((len(q), self.layout.record), np.nan), np.zeros(2)
         done, work = ctypes.c_int(), np.zeros(3, dtype=ctypes.c_long)
         for order in _orders(begin, q, batch):
             status = self.library.mgk_path(
-                _pointer(self.I), _pointer(self.P), _pointer(state), ctypes.c_int(len(order)), _pointer(order),
-                _pointer(q), _pointer(v), _pointer(a), ctypes.c_int(forces), _pointer(values), _pointer(largest),
-                ctypes.byref(done), _pointer(work),
+                pointer(self.I), pointer(self.P), pointer(state), ctypes.c_int(len(order)), pointer(order),
+                pointer(q), pointer(v), pointer(a), ctypes.c_int(forces), pointer(values), pointer(largest),
+                ctypes.byref(done), pointer(work),
             )  # fmt: skip
             if status:
                 return None
         return Records(self.layout, values, largest, (int(work[0]), int(work[1]), int(work[2])))
 
 
-def _pointer(array: Array | Integers) -> ctypes.c_void_p:
+def pointer(array: Array | Integers) -> ctypes.c_void_p:
+    """Where an array begins, as the library takes it."""
     return ctypes.c_void_p(array.ctypes.data)
 
 

@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.algebra.se3 import Array, compose, identity, inverse, rotate, rotate_back
+from mechgraph.algebra.se3 import Array, compose, identity, inverse, rotate
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.rows import CouplingRows
 from mechgraph.kernel.loads import Acting, acting
 from mechgraph.model.factors import ConstantScrew, Factor, Rotation
 from mechgraph.model.load_base import Load
-from mechgraph.model.row_parts import Component, Freedom
+from mechgraph.model.row_parts import Freedom
 from mechgraph.numerics.linear import complement
 
 Integers = NDArray[np.int32]
@@ -54,7 +54,7 @@ class Layout:
     stands; ``constant``, ``per_pitch``, ``pair``: of every factor number; ``ends``: links a and b of all pairs.
     """
 
-    I: Integers  # noqa: E741
+    I: Integers
     places: dict[str, slice]
     shapes: dict[str, tuple[int, ...]]
     side: Index
@@ -192,8 +192,8 @@ def _fundamental(s: System) -> tuple[Index, Index, Index]:
             for j, sign in ways[link].items():
                 row[j] = row.get(j, 0) + sense * sign
         found += [(number, j, sign) for j, sign in sorted(row.items()) if sign]
-    loop, pair, sign = np.array(found, dtype=np.intp).reshape(-1, 3).T
-    return loop, pair, sign
+    steps = np.array(found, dtype=np.intp).reshape(-1, 3)
+    return steps[:, 0], steps[:, 1], steps[:, 2]
 
 
 def _coupling_rows(s: System) -> list[CouplingRows]:
@@ -206,7 +206,14 @@ def _record(s: System, unknowns: int) -> tuple[dict[str, slice], dict[str, tuple
     c, n, p, k = s.n_freedoms, len(s.m.links), len(s.m.pairs), len(s.m.couplings)
     stresses = 6 * s.graph.n_loops + k - unknowns
     shapes: dict[str, tuple[int, ...]] = dict.fromkeys(PARTS, (c,))
-    shapes |= {"x": (s.n_state,), "points": (p, 3), "reactions": (p, 6), "loads": (n, 6), "multipliers": (k,), "shaking": (6,)}
+    shapes |= {
+        "x": (s.n_state,),
+        "points": (p, 3),
+        "reactions": (p, 6),
+        "loads": (n, 6),
+        "multipliers": (k,),
+        "shaking": (6,),
+    }
     shapes |= {"stress": (stresses, p, 6), "stress_efforts": (stresses, c), "coupled_stress": (stresses, c)}
     shapes |= {"multiplier_stress": (stresses, k), "closure": (), "balance": (), "power": ()}
     ends = np.cumsum([0, *(int(np.prod(shapes[name])) for name in PARTS)]).tolist()
@@ -239,7 +246,7 @@ def tables(known: Layout, system: System, x: Array, loads: Sequence[Load] | None
         known.constant + known.per_pitch * pitch[known.pair], np.concatenate([moment, effort.bound]).T.ravel(), par.mass[:, 0],
         center.T.ravel(), inertia.T.ravel(), _flat(own), *terms, *(row.constant[:, 0] for row in rows), acts.numbers,
     ]  # fmt: skip
-    I = np.concatenate([known.I, np.array(acts.entries, dtype=np.int32).ravel()])  # noqa: E741
+    I = np.concatenate([known.I, np.array(acts.entries, dtype=np.int32).ravel()])
     I[HEAD_LOADS], I[HEAD_LOAD_NUMBERS] = len(acts.entries), len(acts.numbers)
     return I, np.concatenate([np.asarray(part, dtype=float) for part in numbers])
 

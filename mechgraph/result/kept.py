@@ -52,6 +52,8 @@ KEPT = (
     "coupled_stress", "shaking", "balance", "power", "holds", "hold_terms",
 )  # fmt: skip
 """Fields of ``BlockForces`` that are kept for every position."""
+
+
 class Records(Protocol):
     """All positions at once, by the names of what is kept."""
 
@@ -136,7 +138,9 @@ class Kept:
     def take(self, records: Records, forces: bool) -> None:
         """Keep all positions from the records of a compiled solution."""
         self._solved[:] = True
-        self._kept |= {name: records[name] for name in (*MOVED, *(("points", *KEPT) if forces else ())) if name in records}
+        self._kept |= {
+            name: records[name] for name in (*MOVED, *(("points", *KEPT) if forces else ())) if name in records
+        }
         self.has_forces, self._largest = forces, records.largest
 
     def _keep(self, name: str, places: Index, values: Array) -> None:

@@ -34,9 +34,9 @@ MADE = {"geared": geared, "screw": screw, "four-bar": None, "rssr": None, "7r": 
 def test_far_positions_are_those_followed_all_the_way(name, sense, monkeypatch):
     m = MADE[name]() if MADE[name] else mg.load(name)
     q = {m.drives[0].freedom: mg.Motion(sense * np.array([0.3, 7.0, 60.0, 61.0]), velocity=1.0)}
-    s = mg.kinematics(m, q, on_reach="flag")
+    s = mg.kinematics(m, q, on_reach="flag", engine="dense")
     monkeypatch.setattr(following, "WORTH", 1e9)
-    r = mg.kinematics(m, q, on_reach="flag")
+    r = mg.kinematics(m, q, on_reach="flag", engine="dense")
     assert s.status.tolist() == r.status.tolist()
     for link in m.link_names():
         np.testing.assert_allclose(s.link(link).pose, r.link(link).pose, atol=1e-9)
@@ -51,7 +51,7 @@ def test_far_positions_are_those_followed_all_the_way(name, sense, monkeypatch):
 @pytest.mark.parametrize("name", ["four-bar", "rssr", "geared"])
 def test_a_thousand_radians_take_one_period(name):
     m = MADE[name]() if MADE[name] else mg.load(name)
-    s = mg.kinematics(m, {m.drives[0].freedom: [1000.0]})
+    s = mg.kinematics(m, {m.drives[0].freedom: [1000.0]}, engine="dense")
     assert s.work.nodes < 200
     np.testing.assert_allclose(s[m.drives[0].freedom.split(".")[0]].position[0, 0], 1000.0, rtol=1e-15)
 

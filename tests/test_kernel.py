@@ -1,0 +1,288 @@
+"""The compiled kernel: what it says is what numpy says, what it refuses numpy takes over, and what it cannot carry is named."""
+
+import ctypes
+
+import numpy as np
+import pytest
+from attack import (
+    conditions,
+    differences,
+    four_bars,
+    just_out_of_reach,
+    nearly_folded,
+    solved,
+    warned,
+    without_numbers,
+    wrapped,
+)
+from mechanisms import Z, hexapod
+from strategies import closed_mechanism, motions, with_drives, with_loads
+
+import mechgraph as mg
+from mechgraph.call import Options
+from mechgraph.closure.driver_motion import DriverMotion
+from mechgraph.kernel import build, tables
+from mechgraph.kernel.path import pointer
+from mechgraph.pipeline import Pipeline
+
+pytestmark = [pytest.mark.usefixtures("compiled"), pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")]
+
+SAME = 1e-10
+"""Difference of engines over the condition (largest rate for unit rates of the drivers)."""
+
+
+def agreed(m, given, **how):
+    """Both engines on the same job; the one that ran."""
+    one, other = solved(m, given, engine="compiled", **how), solved(m, given, engine="dense", **how)
+    if isinstance(one, mg.DeclarationError) and "does not serve" in str(one):
+        return "refused"
+    if isinstance(one, Exception) or isinstance(other, Exception):
+        assert type(one) is type(other)
+        assert without_numbers(one) == without_numbers(other)
+        return "error"
+    worst, where, faults = differences(one, other)
+    assert not faults
+    assert worst <= SAME * max(1.0, conditions(other)[other.status == "ok"].max(initial=1.0)), where
+    assert warned(m, given, engine="compiled", **how) == warned(m, given, engine="dense", **how)
+    return one.engine
+
+
+def swing(m, count=5, size=0.3):
+    """A motion of all drives from the start, with rates, on either side of it."""
+    out = {}
+    for i, drive in enumerate(m.drives):
+        at = m.start.get(m.full_name(drive.freedom), 0.0)
+        reach = size if m.turns(drive.freedom) else 0.05 * size
+        out[drive.freedom] = mg.Motion(at + reach * np.sin(np.linspace(-0.5, 1.0 + i, count)), 3.0 + i, 1.5 - i)
+    return out
+
+
+SERVED = {
+    "7r",
+    "bennett",
+    "four-bar",
+    "p-sp-r",
+    "phchc",
+    "r-cp-c",
+    "r-sc-c-r",
+    "r-sg-c",
+    "rcsr",
+    "rcsr-csr",
+    "slider-crank",
+    "windows-2",
+}
+"""Members of the library with every kind of pair of constant screws, planar, spatial, overconstrained, of two loops."""
+
+
+@pytest.mark.parametrize("name", sorted(SERVED))
+def test_library(name):
+    m = mg.load(name)
+    assert agreed(m, swing(m)) == "compiled"
+
+
+@pytest.mark.parametrize("name", sorted({*mg.library()} - SERVED))
+@pytest.mark.slow
+def test_rest_of_the_library(name):
+    m = mg.load(name)
+    if m.drives:
+        agreed(m, swing(m))
+
+
+@pytest.mark.seeds(12)
+def test_random_mechanisms(seed):
+    m = with_drives(closed_mechanism(seed), seed)
+    if m is None:
+        pytest.skip("no drives make it determinate")
+    rng = np.random.default_rng((seed, 31))
+    t = np.linspace(0, rng.choice([0.1, 1.0, 3.0]), int(rng.choice([1, 6])))
+    redundant = str(rng.choice(["nan", "minimum_norm"]))
+    agreed(with_loads(m, seed), motions(m, seed, t, size=float(rng.choice([0.08, 0.5]))), redundant=redundant)
+
+
+def test_several_drives_and_loops():
+    m = hexapod()
+    assert agreed(m, swing(m, size=0.5)) == "compiled"
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_integer_geometry_beside_change_points(side):
+    """A parallelogram: its change points, at which the branches cross, are left to the follower that passes them."""
+    m = mg.Mechanism(
+        "parallelogram",
+        [mg.Link(name) for name in ("frame", "crank", "coupler", "rocker")],
+        [
+            mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=Z),
+            mg.Pair("B", "R", "crank", "coupler", point=(0, side, 0), axis=Z),
+            mg.Pair("C", "R", "coupler", "rocker", point=(2, side, 0), axis=Z),
+            mg.Pair("D", "R", "frame", "rocker", point=(2, 0, 0), axis=Z),
+        ],
+        ["A"],
+    )
+    assert agreed(m, {"A": np.linspace(0.0, 1.0, 4)}) == "compiled"
+    assert agreed(m, {"A": np.linspace(0.0, 2.5, 4)}) == "dense"
+
+
+@pytest.mark.parametrize("margin", [1e-1, 1e-3, 1e-6])
+@pytest.mark.parametrize("seed", range(3))
+def test_branches_are_kept_where_they_come_near(seed, margin):
+    """Against the closed form of the four-bar that misses its stretched position by a margin, in steps up to a right angle."""
+    bar = nearly_folded(np.random.default_rng((seed, 32)), margin)
+    for step in (0.1, 0.7, np.pi / 2):
+        q = np.arange(0.0, 2 * np.pi, step)
+        s = mg.kinematics(four_bars([bar], 1.0), {"A": q}, engine="compiled", on_reach="flag")
+        found = s["D0"].position[:, 0] - (bar.rocker(1.0 + q) - bar.rocker(1.0))
+        assert np.abs(wrapped(found[s.status == "ok"])).max() < 1e-12 / margin
+        assert s.engine == ("compiled" if margin > 0.01 else s.engine)
+
+
+def test_an_end_of_the_reach_is_named_by_numpy():
+    m = four_bars([just_out_of_reach(np.random.default_rng(33), 0.3)], 1.0)
+    assert agreed(m, {"A": np.linspace(0.0, 6.0, 7)}) == "dense"
+    with pytest.raises(mg.ReachError, match="is out of reach; reached A"):
+        mg.solve(m, {"A": np.linspace(0.0, 6.0, 7)}, engine="compiled")
+
+
+def test_rotation_vectors_go_on_beyond_half_a_turn():
+    """On the way to a position alone as well as over all of them."""
+    m = mg.load("haug-slider-crank")
+    (drive,) = m.drives
+    at = m.start.get(m.full_name(drive.freedom), 0.0) + np.array([0.5, 2.0, 3.5, 6.0])
+    for q in (at, at[-1:]):
+        assert agreed(m, {drive.freedom: q}) == "compiled"
+
+
+def loads_of(m):
+    """Loads of every kind that is numbers."""
+    a, b = m.links[1].name, m.links[2].name
+    first, last = m.freedom_names()[0], m.freedom_names()[-1]
+    return [
+        mg.Gravity((1.0, -2.0, -9.81)),
+        mg.Wrench(a, force=(1.0, 2.0, 3.0), moment=(0.1, 0.2, 0.3), point=(0.01, 0.02, 0.03)),
+        mg.Wrench(b, force=(-1.0, 0.5, 2.0), moment=(0.3, -0.1, 0.2), point=(0.1, -0.2, 0.05), frame="link"),
+        mg.Effort(last, 0.7),
+        mg.Spring(a, m.frame, (0.3, 0.1, 0.0), (-0.2, 0.4, 0.3), 12.0, 0.1, 0.5),
+        mg.TorsionSpring(first, 3.0, 0.2, 0.4),
+        mg.Damper(last, coefficient=0.3),
+        mg.Damper((a, b, (0.0, 0.3, 0.2), (0.5, -0.1, 0.1)), coefficient=0.8),
+    ]
+
+
+@pytest.mark.parametrize("name", ["four-bar", "rcsr-csr", "slider-crank"])
+def test_loads_that_are_numbers(name):
+    m = mg.load(name)
+    m = m.replace(loads=loads_of(m))
+    assert agreed(m, swing(m)) == "compiled"
+    line = Pipeline(DriverMotion(m, swing(m)), Options())
+    known = tables.layout(line.system, line.columns, np.zeros(0, dtype=np.intp))
+    assert tables.tables(known, line.system, line.x, m.loads) is not None
+
+
+def test_other_loads_on_the_same_start():
+    """Tables are kept with a start, which mechanisms under other loads share."""
+    m = mg.load("four-bar")
+    for load in (mg.Effort("D", 1.0), mg.Effort("D", 3.0), mg.Gravity((0, -5.0, 0))):
+        one, other = (mg.solve(m, {"A": [0.1, 0.2]}, loads=[load], engine=engine)["A"].effort for engine in ("compiled", "dense"))
+        np.testing.assert_allclose(one, other, rtol=1e-10)
+
+
+@pytest.mark.parametrize("actuate", [None, ["D"]])
+def test_forces_that_the_kernel_does_not_give(actuate):
+    """Functions, arrays over positions, other freedoms that take the efforts, other methods: by numpy, at the states of the kernel."""
+    m = mg.load("four-bar")
+    table = [
+        mg.Effort("D", np.linspace(0.0, 1.0, 5)),
+        mg.Wrench("coupler", moment=lambda pose, twist, t: pose[..., :3, 0]),
+    ]
+    assert agreed(m.replace(loads=table), swing(m), actuate=actuate) == "compiled"
+    assert agreed(m, swing(m), method="newton_euler", actuate=actuate) == "compiled"
+
+
+def test_a_freedom_about_any_line_of_its_marker():
+    """A user's pair: a helical turn about a line askew in its marker, between two others; the kernel's tables turn about axes alone."""
+    w = np.array([1.0, 2.0, 2.0]) / 3.0
+    v = np.cross([0.2, -0.1, 0.3], w) + 0.05 * w
+    askew = mg.PairType("Ha", freedoms=[mg.Freedom("Rw", (*w, *v))])
+    chain = mg.Mechanism(
+        "open",
+        [mg.Link("frame"), mg.Link("a", 1.0, (0.1, 0.2, 0.3)), mg.Link("b", 2.0, (0.5, 0.1, 0.0))],
+        [
+            mg.Pair("P1", askew, "frame", "a", point=(0.1, 0.0, 0.2), axis=(0, 1, 1)),
+            mg.Pair("P2", "U", "a", "b", point=(0.4, 0.1, 0.0), axis=(1, 0, 0), second=(0, 1, 0)),
+        ],
+        ["P1", "P2.Rz", "P2.Rx"],
+        loads=[mg.Gravity((0, 0, -9.81))],
+    )
+    assert agreed(chain, swing(chain, size=1.5)) == "compiled"
+
+
+@pytest.mark.parametrize(
+    ("name", "why"), [("geneva", r"pair 'C' \(Ps\) travels along a curve"), ("rssr", "it has passive freedoms")]
+)
+def test_what_it_cannot_carry_is_named(name, why):
+    m = mg.load(name)
+    with pytest.raises(mg.DeclarationError, match=why):
+        mg.solve(m, swing(m), engine="compiled")
+    assert mg.solve(m, swing(m)).engine == "dense"
+
+
+def test_auto_is_numpy_where_no_library_is(monkeypatch):
+    m = mg.load("four-bar")
+    monkeypatch.setattr(build, "installed", lambda: None)
+    assert mg.solve(m, swing(m)).engine == "dense"
+
+
+def test_auto_takes_the_kernel_where_it_serves():
+    m = mg.load("four-bar")
+    build.built()
+    assert mg.solve(m, swing(m)).engine == "compiled"
+    assert mg.kinematics(m, swing(m)).engine == "compiled"
+
+
+def test_beyond_the_tolerance_numpy_says_how_far_the_path_led():
+    pairs = [p.replace(axis=(1e-4, 0, 1)) if p.name == "C" else p for p in mg.load("four-bar").pairs]
+    m = mg.load("four-bar").replace(pairs=pairs)
+    texts = []
+    for engine in ("compiled", "dense"):
+        with pytest.raises(mg.MechgraphError) as error:
+            mg.solve(m, {"A": np.linspace(0, 1, 5)}, tol=2e-5, engine=engine)
+        texts.append(without_numbers(error.value))
+    assert texts[0] == texts[1]
+
+
+def test_record_and_tables_have_the_layout_of_the_library():
+    """The places of all parts of a record as the library counts them; ``I`` and ``P`` end where its sections end."""
+    m = mg.load("rcsr-csr")
+    line = Pipeline(DriverMotion(m, swing(m)), Options())
+    known = tables.layout(line.system, line.columns, np.zeros(0, dtype=np.intp))
+    I, P = tables.tables(known, line.system, line.x, m.loads)
+    places = (ctypes.c_int * (len(tables.PARTS) + 1))()
+    build.built().mgk_record(ctypes.c_void_p(I.ctypes.data), places)
+    assert list(places) == [known.places[name].start for name in tables.PARTS] + [known.record]
+    assert P[0] == line.system.par.L
+
+
+def test_a_state_that_stays_hot():
+    """``mgk_solve`` led on from state to state, in the units of the declaration; a refused call leaves the state where it was."""
+    m = mg.load("rcsr-csr")
+    line = Pipeline(DriverMotion(m, swing(m)), Options())
+    known = tables.layout(line.system, line.columns, np.zeros(0, dtype=np.intp))
+    I, P = tables.tables(known, line.system, line.x, m.loads)
+    library = build.built()
+    state = np.empty(ctypes.c_size_t(library.mgk_state_size(pointer(I))).value // 8 + 1)
+    assert library.mgk_start(pointer(I), pointer(P), pointer(state)) == 0
+    ((name, motion),) = swing(m).items()
+    s = mg.solve(m, {name: motion}, engine="dense")
+    v, a = np.array([3.0]), np.array([1.5])
+    effort, reaction, position = np.zeros(1), np.zeros((len(m.pairs), 6)), np.zeros(line.system.n_freedoms)
+    for i, q in enumerate(np.asarray(motion.position)):
+        for bad in (np.array([np.nan]), np.array([q + 40.0])):
+            call = [pointer(part) for part in (I, P, state, bad, v, a, effort, reaction, position)]
+            assert library.mgk_solve(*call) != 0
+        call = [pointer(part) for part in (I, P, state, np.array([q]), v, a, effort, reaction, position)]
+        assert library.mgk_solve(*call) == 0
+        pair = m.freedom(m.full_name(name))[0]
+        np.testing.assert_allclose(effort, s[m.pairs[pair].name].effort[i, :1], rtol=1e-10)
+        np.testing.assert_allclose(
+            reaction, [s[p.name].reaction[i] for p in m.pairs], atol=1e-10 * np.abs(reaction).max()
+        )
+        np.testing.assert_allclose(position, np.concatenate([s[p.name].position[i] for p in m.pairs]), atol=1e-10)
