@@ -68,6 +68,8 @@ from mechgraph.variants.result import Study
 from mechgraph.variants.study import study
 
 if TYPE_CHECKING:
+    from mechgraph.compiled.compiled import Compiled
+    from mechgraph.compiled.compiled import compile_mechanism as compile
     from mechgraph.show.page.write import write_report
 
 __all__ = [
@@ -79,6 +81,7 @@ __all__ = [
     "Bookkeeping",
     "Branches",
     "Chain",
+    "Compiled",
     "Component",
     "ContentError",
     "Coupling",
@@ -138,6 +141,7 @@ __all__ = [
     "branches",
     "chain",
     "check",
+    "compile",
     "equilibrium",
     "formulate",
     "free_body",
@@ -165,8 +169,16 @@ __all__ = [
 ]
 
 
+LATER = {
+    "Compiled": ("mechgraph.compiled.compiled", "Compiled"),
+    "compile": ("mechgraph.compiled.compiled", "compile_mechanism"),
+    "write_report": ("mechgraph.show.page.write", "write_report"),
+}
+
+
 def __getattr__(name: str) -> Any:
     """What takes time to load, and few calls need."""
-    if name == "write_report":
-        return importlib.import_module("mechgraph.show.page.write").write_report
+    if name in LATER:
+        module, own = LATER[name]
+        return getattr(importlib.import_module(module), own)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -93,7 +93,7 @@ def compiled(line: Started, batch: tuple[int, ...], starts: Starts | None = None
     library = build.built() if asked else build.installed()
     if library is None:
         return None
-    if (why := _cannot(line)) is not None:
+    if (why := cannot(line)) is not None:
         if asked:
             text = f"engine 'compiled' does not serve: {why}. Use engine='auto'"
             raise DeclarationError(f"solve {line.m.name!r}", [text])
@@ -115,7 +115,7 @@ def _kernel(line: Started, library: Any) -> tuple[Kernel, bool]:
 
     The start may be shared with mechanisms under other loads.
     """
-    key, kept = (line.columns.tobytes(), _gives_forces(line)), line.start.solvers
+    key, kept = (line.columns.tobytes(), gives_forces(line)), line.start.solvers
     known = kept.get(COMPILED)
     loads = line.m.loads
     if known is None or known[0] != key or len(known[1]) != len(loads) or any(map(is_not, known[1], loads)):
@@ -128,7 +128,7 @@ def _filled(line: Started, library: Any, system: System, x: Array, loads: tuple[
     """The tables of all variants at their starts ``x (nx, B)`` with the library, and whether they give the forces."""
     found = _layout(line)
     assert isinstance(found, Layout)
-    filled = tables(found, system, x, loads) if _gives_forces(line) else None
+    filled = tables(found, system, x, loads) if gives_forces(line) else None
     forces = filled is not None
     filled = filled or tables(found, system, x, None)
     assert filled is not None
@@ -146,7 +146,7 @@ def _layout(line: Started) -> Layout | str:
     return found
 
 
-def _cannot(line: Started) -> str | None:
+def cannot(line: Started) -> str | None:
     """Why the kernel does not serve a call; None where it does."""
     if line.passive:
         return "it has passive freedoms"
@@ -156,7 +156,7 @@ def _cannot(line: Started) -> str | None:
     return found if isinstance(found, str) else None
 
 
-def _gives_forces(line: Started) -> bool:
+def gives_forces(line: Started) -> bool:
     """Whether the kernel gives the forces that are asked for; it knows no line along which gears touch each other."""
     return (
         line.options.method == "loop_wrench"

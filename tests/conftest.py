@@ -54,7 +54,12 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     """A seed that is always drawn and then skipped checks nothing: it is a failure, and belongs among those left out."""
     report = yield
-    if report.skipped and item.get_closest_marker("seeds") and item.callspec.params["seed"] < FURTHER:
+    if (
+        report.when == "call"
+        and report.skipped
+        and item.get_closest_marker("seeds")
+        and item.callspec.params["seed"] < FURTHER
+    ):
         report.outcome, report.longrepr = "failed", f"{report.longrepr[2]}: name the seed in without="
     return report
 

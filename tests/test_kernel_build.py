@@ -19,13 +19,16 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     source, header = tmp_path / "k.c", tmp_path / "k.h"
     source.write_text("int answer(void) { return 42; }\n")
     header.write_text("int answer(void);\n")
-    monkeypatch.setattr(compiler, "SOURCE", source)
-    monkeypatch.setattr(compiler, "HEADER", header)
+    monkeypatch.setattr(compiler, "SOURCES", (source,))
+    monkeypatch.setattr(compiler, "INCLUDED", (header,))
     monkeypatch.setenv("MECHGRAPH_CACHE", str(tmp_path / "cache"))
     monkeypatch.delenv("CC", raising=False)
     build.installed.cache_clear()
     yield tmp_path / "cache" / "kernel"
     build.installed.cache_clear()
+
+
+REAL = {"SOURCES": compiler.SOURCES, "INCLUDED": compiler.INCLUDED}
 
 
 def scripted(folder: Path, name: str, text: str) -> Path:
@@ -57,7 +60,7 @@ def test_built_on_request_and_found_afterwards(cache, compiled, monkeypatch, tmp
 def test_what_was_made_of_another_text_is_not_taken(cache, compiled, tmp_path):
     build.built()
     build.installed.cache_clear()
-    compiler.HEADER.write_text("int answer(void); /* newer */\n")
+    compiler.INCLUDED[0].write_text("int answer(void); /* newer */\n")
     assert build.installed() is None
     assert build.built().answer() == 42
     assert len(list(cache.iterdir())) == 2
@@ -128,12 +131,11 @@ def test_pip_installs_with_a_compiler_and_without_one(version, found, cache, com
 
     root = tmp_path / "clone"
     (root / FOLDER).mkdir(parents=True)
-    for made, name in (
-        (compiler.SOURCE, "kernel.c"),
-        (compiler.HEADER, "kernel.h"),
-        (Path(compiler.__file__), "compiler.py"),
-    ):
-        (root / FOLDER / name).write_text(made.read_text(encoding="utf-8"))
+    made = {"calls.c": compiler.SOURCES[0], "compiler.py": Path(compiler.__file__)}
+    for name in ("calls.c", "derivative.c", "kernel.c", "kernel.h", "compiler.py"):
+        (root / FOLDER / name).write_text(
+            made[name].read_text(encoding="utf-8") if name in made else "typedef int none;\n"
+        )
     said = []
     app = SimpleNamespace(display_warning=said.append, display_info=said.append)
     if not found:
@@ -151,6 +153,9 @@ def test_pip_installs_with_a_compiler_and_without_one(version, found, cache, com
         assert data["tag"].startswith("py3-none-")
         assert "manylinux" not in data["tag"]
         monkeypatch.setattr(build, "PACKAGED", libraries[0].parent)
+        for what in ("SOURCES", "INCLUDED"):
+            files = [root / FOLDER / file.name for file in REAL[what]]
+            monkeypatch.setattr(compiler, what, files)
         build.installed.cache_clear()
         assert build.installed().answer() == 42
     else:

@@ -75,8 +75,25 @@ def stage() -> Iterator[None]:
 
 
 def test_what_the_readme_shows_is_what_comes_out() -> None:
+    before, _, after = parts()
+    shows_what_comes_out(before + after)
+
+
+@pytest.mark.usefixtures("compiled")
+def test_so_does_its_section_on_the_compiled_kernel() -> None:
+    shows_what_comes_out(parts()[1])
+
+
+def parts() -> tuple[str, str, str]:
+    """The page, with what needs a C compiler by itself."""
+    before, compiled, rest = README.read_text(encoding="utf-8").partition("### Compiled\n")
+    section, heading, after = rest.partition("\n## ")
+    return before, compiled + section, heading + after
+
+
+def shows_what_comes_out(text: str) -> None:
     with stage():
-        for shown, found in played(README.read_text(encoding="utf-8")):
+        for shown, found in played(text):
             assert comparable(shown) == comparable(found)
 
 

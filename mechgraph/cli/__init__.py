@@ -1,5 +1,6 @@
 """The command line, for a mechanism of the library or a file: one module for each group of commands, here put together."""
 
+from mechgraph.cli.compiled import compile_
 from mechgraph.cli.determinacy import check
 from mechgraph.cli.formulation import equations
 from mechgraph.cli.library import list_library, save
@@ -25,3 +26,4 @@ app.command("loads")(loads)
 app.command("report")(report)
 app.command("assemblies")(assemblies)
 app.command("branches")(branches)
+app.command("compile")(compile_)

@@ -322,6 +322,7 @@ COMMANDS: dict[str, Callable[[Json], Json]] = {
     ),
     "respond": _record(ResponseData, over_time=OverTimeData | None, written=Written | None),
     "save": _record(FileData),
+    "compile": _record(FileData),
     "report": _record(FileData),
     "loads": _record(LoadsData),
     "plot": _record(PlotData),

@@ -11,6 +11,7 @@ import ctypes
 import os
 import stat
 import subprocess
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
@@ -29,8 +30,6 @@ def installed() -> ctypes.CDLL | None:
 
     Of several in the cache the one built last.
     """
-    if not compiler.SOURCE.is_file():
-        return None
     files = [file for file in [PACKAGED / f"kernel-{compiler.key()}{compiler.suffix()}"] if file.is_file()]
     folder = cache_folder() / "kernel"
     if folder.is_dir() and not doubt(folder):
@@ -69,7 +68,12 @@ def built() -> ctypes.CDLL:
             continue
         installed.cache_clear()
         return library
-    raise MissingExtraError(f"{NEEDED} that builds the kernel ({'; '.join(refused)})" if refused else NEEDED, "fast")
+    raise missing(refused)
+
+
+def missing(refused: Sequence[str]) -> MissingExtraError:
+    """The error where there is no C compiler, or where all those that there are have ``refused``."""
+    return MissingExtraError(f"{NEEDED} that builds the kernel ({'; '.join(refused)})" if refused else NEEDED, "fast")
 
 
 def _name(compiled_by: str) -> str:

@@ -17,8 +17,9 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-SOURCE = Path(__file__).with_name("kernel.c")
-HEADER = Path(__file__).with_name("kernel.h")
+SOURCES = tuple(Path(__file__).with_name(name) for name in ("calls.c", "derivative.c"))
+"""What is compiled."""
+INCLUDED = tuple(Path(__file__).with_name(name) for name in ("kernel.c", "kernel.h"))
 FLAGS = ("-O3", "-std=c99", "-ffp-contract=off", "-shared", "-fPIC")
 """No -march and no -ffast-math: the same bits from one build, and from one source the same on every machine to rounding."""
 LONGEST_BUILD = 600.0
@@ -55,7 +56,7 @@ def suffix(target: str = "") -> str:
 
 def key() -> str:
     """What a library is made of: the texts of the kernel, and the options."""
-    return _digest(SOURCE.read_bytes(), HEADER.read_bytes(), " ".join(FLAGS).encode())
+    return _digest(*(file.read_bytes() for file in (*SOURCES, *INCLUDED)), " ".join(FLAGS).encode())
 
 
 def platform() -> str:
@@ -69,8 +70,8 @@ def version(command: Sequence[str]) -> str:
     return _digest("\n".join(command).encode(), said.stdout)
 
 
-def compile_library(command: Sequence[str], target: Path, made_for: str = "") -> None:
-    """Compile the kernel beside ``target``, then rename it.
+def compile_library(command: Sequence[str], target: Path, made_for: str = "", sources: Sequence[Path] = ()) -> None:
+    """Compile the kernel, or other ``sources``, beside ``target``, then rename it.
 
     Raises
     ------
@@ -79,7 +80,7 @@ def compile_library(command: Sequence[str], target: Path, made_for: str = "") ->
     """
     with tempfile.TemporaryDirectory(prefix=".kernel-", dir=target.parent) as folder:
         made = Path(folder) / target.name
-        line = [*command, *flags(made_for), "-o", os.fspath(made), os.fspath(SOURCE), "-lm"]
+        line = [*command, *flags(made_for), "-o", os.fspath(made), *map(os.fspath, sources or SOURCES), "-lm"]
         own = {"ZIG_GLOBAL_CACHE_DIR": folder, "ZIG_LOCAL_CACHE_DIR": folder}
         subprocess.run(
             line, env=own | os.environ, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace",

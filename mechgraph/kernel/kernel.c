@@ -11,20 +11,26 @@
 #include <math.h>
 #include <string.h>
 
+/* What only decides and is no result: real where all else is complex, for derivatives (derivative.c). */
+#ifndef MGK_COMPLEX
+typedef double magnitude;
+#define REAL_PART(x) (x)
+#endif
+
 /* Tolerances; those of the package in numerics/tolerances.py have the same names there. */
-static const double CLOSED = 2e-14;      /* closure residual that Newton aims at, over the distance from the origin */
-static const double ACCEPTED = 1e-12;    /* residual that counts as closed where rounding lets it come no nearer */
-static const double CORRECTION = 0.06;   /* largest correction that a prediction may need */
-static const double REUSED = 1e-5;       /* correction below which the factors before it serve for the next one */
-static const double FAIR = 1e3;          /* condition number above which nothing is decided here */
-static const double DEPARTURE = 0.5;     /* largest change of the closure matrix over a step, against its inverse at the end */
-static const double ALONE = 0.05;        /* part of the inverse condition, over rates, up to which another branch is not as near */
-static const double LONGEST = 0.35;      /* longest step */
-static const double SHORTEST = 2e-3;     /* step below which the careful follower of the package takes over */
-static const double INDEPENDENT = 1e-9;  /* part of the closure rates that drives may leave open */
-static const double DRIVERS_ALONE = 1e-9;/* part below which the reactions of a self-stress count as none */
-static const double UNIQUE = 1e-7;       /* part of a self-stress in a component above which it is not unique */
-static const double STRAIGHT_ON = 1e-12; /* change of direction up to which a polygon goes straight on */
+static const magnitude CLOSED = 2e-14;      /* closure residual that Newton aims at, over the distance from the origin */
+static const magnitude ACCEPTED = 1e-12;    /* residual that counts as closed where rounding lets it come no nearer */
+static const magnitude CORRECTION = 0.06;   /* largest correction that a prediction may need */
+static const magnitude REUSED = 1e-5;       /* correction below which the factors before it serve for the next one */
+static const magnitude FAIR = 1e3;          /* condition number above which nothing is decided here */
+static const magnitude DEPARTURE = 0.5;     /* largest change of the closure matrix over a step, against its inverse at the end */
+static const magnitude ALONE = 0.05;        /* part of the inverse condition, over rates, up to which another branch is not as near */
+static const magnitude LONGEST = 0.35;      /* longest step */
+static const magnitude SHORTEST = 2e-3;     /* step below which the careful follower of the package takes over */
+static const magnitude INDEPENDENT = 1e-9;  /* part of the closure rates that drives may leave open */
+static const magnitude DRIVERS_ALONE = 1e-9;/* part below which the reactions of a self-stress count as none */
+static const magnitude UNIQUE = 1e-7;       /* part of a self-stress in a component above which it is not unique */
+static const magnitude STRAIGHT_ON = 1e-12; /* change of direction up to which a polygon goes straight on */
 enum { ITERATIONS = 8, MOST_STEPS = 20000 };
 
 #define FOR(i, n) for (int i = 0; i < (n); i++)
@@ -48,7 +54,8 @@ typedef struct {
   /* kept between calls: state, drives, and where rotation vectors of the user stand */
   double *x, *drive, *axis, *angle, *begun;
   /* evaluation of one state */
-  double *pose, *frame, *end, *S, *residual, *middle, reach, closure;
+  double *pose, *frame, *end, *S, *residual, *middle;
+  magnitude reach, closure;
   /* elimination */
   double *lu, *inverse;
   int *row;
@@ -138,8 +145,8 @@ size_t mgk_state_size(const int *I) {
 
 /* --- vectors, poses, twists -------------------------------------------------------------------------------------------------------- */
 
-static double size_of(const double *v, int n) {
-  double out = 0.0;
+static magnitude size_of(const double *v, int n) {
+  magnitude out = 0.0;
   FOR(i, n) out = fmax(out, fabs(v[i]));
   return out;
 }
@@ -213,7 +220,7 @@ static void passed(const Model *m, int f, const double *x, double sense, double 
   const double *q = x + m->state[f], *number = m->factor_number + m->number[f];
   if (kind == MGK_POSE) {
     double Y[12];
-    (sense > 0 ? product : product_back)(X, number, Y);
+    (REAL_PART(sense) > 0 ? product : product_back)(X, number, Y);
     memcpy(X, Y, sizeof Y);
   } else if (kind >= MGK_SLIDE && kind < MGK_ROTATION) {
     FOR(r, 3) X[4 * r + 3] += sense * *q * X[4 * r + kind - MGK_SLIDE];
@@ -278,12 +285,14 @@ static void quaternion_product(const double *a, const double *b, double *out) {
   out[3] = a[0] * b[3] + a[3] * b[0] + a[1] * b[2] - a[2] * b[1];
 }
 
+#ifndef MGK_COMPLEX
 /* The rotation vector of a unit quaternion, at most a half turn. */
 static void quaternion_log(const double *q, double *v) {
   const double sine = sqrt(dot(q + 1, q + 1, 3)), sign = q[0] < 0.0 ? -1.0 : 1.0;
   const double part = sign * (sine < 1e-12 ? 2.0 : 2.0 * atan2(sine, sign * q[0]) / sine);
   FOR(i, 3) v[i] = part * q[1 + i];
 }
+#endif
 
 /* States after increments dq: x + dq, exp(dq) q. */
 static void advance(const Model *m, const double *x, const double *dq, double *out) {
@@ -291,7 +300,7 @@ static void advance(const Model *m, const double *x, const double *dq, double *o
     const int s = m->state[f], c = m->column[f];
     if (m->kind[f] < MGK_ROTATION) out[s] = x[s] + dq[c];
     if (m->kind[f] != MGK_ROTATION) continue;
-    const double half = 0.5 * sqrt(dot(dq + c, dq + c, 3)), part = half > 0.0 ? 0.5 * sin(half) / half : 0.5;
+    const double half = 0.5 * sqrt(dot(dq + c, dq + c, 3)), part = fabs(half) > 0.0 ? 0.5 * sin(half) / half : 0.5;
     const double turn[4] = {cos(half), part * dq[c], part * dq[c + 1], part * dq[c + 2]};
     double q[4];
     quaternion_product(turn, x + s, q);
@@ -300,6 +309,7 @@ static void advance(const Model *m, const double *x, const double *dq, double *o
   }
 }
 
+#ifndef MGK_COMPLEX
 /* Increments dq from x0 to x1. */
 static void difference(const Model *m, const double *x1, const double *x0, double *dq) {
   FOR(f, m->factors) {
@@ -336,11 +346,12 @@ static void between(const Model *m, Work *w, const Node *a, const Node *b, doubl
   FOR(i, m->columns) y[i] = s * (h * a->rate[i] + s * ((3 * y[i] - h * (2 * a->rate[i] + there[i])) + s * (h * (a->rate[i] + there[i]) - 2 * y[i])));
   advance(m, a->x, y, x);
 }
+#endif
 
 /* --- closure ----------------------------------------------------------------------------------------------------------------------- */
 
 /* Poses, twists and what the loops leave open at a state; the residual of a loop is taken at its chord, third order exact. */
-static double evaluate(const Model *m, Work *w, const double *x) {
+static magnitude evaluate(const Model *m, Work *w, const double *x) {
   w->evaluations++;
   memcpy(w->pose + 12 * m->frame_link, m->frame, 12 * sizeof(double));
   FOR(t, m->pairs - m->loops) {
@@ -349,7 +360,7 @@ static double evaluate(const Model *m, Work *w, const double *x) {
     product(w->pose + 12 * step[2], (step[1] ? m->marker_a : m->marker_b) + 12 * k, X);
     along_pair(m, w, k, step[1], x, X);
   }
-  double worst = w->closure = 0.0, reach = 1.0;
+  magnitude worst = w->closure = 0.0, reach = 1.0;
   FOR(i, m->links) FOR(r, 3) reach = fmax(reach, fabs(w->pose[12 * i + 4 * r + 3]));
   w->reach = reach;
   FOR(l, m->loops) {
@@ -370,9 +381,10 @@ static double evaluate(const Model *m, Work *w, const double *x) {
       e[3 + i] = P[4 * i + 3] - Q[4 * i + 3];
     }
     /* a turn of more than a right angle has a small sine as well */
-    if (P[0] * Q[0] + P[4] * Q[4] + P[8] * Q[8] < 0.0 || P[1] * Q[1] + P[5] * Q[5] + P[9] * Q[9] < 0.0) e[0] = INFINITY;
+    const magnitude x_axes = REAL_PART(P[0] * Q[0] + P[4] * Q[4] + P[8] * Q[8]);
+    if (x_axes < 0.0 || REAL_PART(P[1] * Q[1] + P[5] * Q[5] + P[9] * Q[9]) < 0.0) e[0] = INFINITY;
     worst = fmax(worst, size_of(e, 6));
-    w->closure = fmax(w->closure, fmax(sqrt(dot(e, e, 3)), sqrt(dot(e + 3, e + 3, 3))));
+    w->closure = fmax(w->closure, fmax(fabs(sqrt(dot(e, e, 3))), fabs(sqrt(dot(e + 3, e + 3, 3)))));
   }
   FOR(k, m->couplings) {
     double *e = w->residual + 6 * m->loops + k;
@@ -490,7 +502,7 @@ static void row_sums(const Model *m, Work *w, const double *dq, const double *pa
 }
 
 /* Rates of all freedoms with J q' + known = 0 for given ones of the drives; what is left of that, relative. */
-static double completed(const Model *m, Work *w, const double *driven, const double *known, double size, double *dq) {
+static magnitude completed(const Model *m, Work *w, const double *driven, const double *known, magnitude size, double *dq) {
   double *right = w->row_value, *found = w->column_value;
   memset(dq, 0, m->columns * sizeof(double));
   FOR(i, m->drives) dq[m->drive[i]] = driven[i];
@@ -500,12 +512,13 @@ static double completed(const Model *m, Work *w, const double *driven, const dou
   FOR(j, m->unknowns) dq[m->unknown[j]] = found[j];
   if (!m->stresses) return 0.0;
   row_sums(m, w, dq, NULL, right);
-  double left = 0.0;
+  magnitude left = 0.0;
   FOR(r, m->rows) left = fmax(left, fabs(right[r] + (known ? known[r] : 0.0)));
   size += size_of(dq, m->columns) + (known ? size_of(known, m->rows) : 0.0);
   return size > 0.0 ? left / size : 0.0;
 }
 
+#ifndef MGK_COMPLEX
 /* Closed by Newton from x, in place: evaluated and factored there afterwards, the matrix kept where there is a place for it. */
 static int closed(const Model *m, Work *w, double *x, double *matrix) {
   double before = INFINITY, sum = 0.0, step = INFINITY;
@@ -530,6 +543,7 @@ static int closed(const Model *m, Work *w, double *x, double *matrix) {
   }
   return MGK_NOT_CLOSED;
 }
+#endif
 
 /* --- rates ------------------------------------------------------------------------------------------------------------------------- */
 
@@ -558,10 +572,9 @@ static void move(const Model *m, Work *w, const double *dq, double *G) {
 
 /* Rates and accelerations of all freedoms, twists of all links and their rates. */
 static int rates(const Model *m, Work *w, const double *v, const double *a) {
-  double turning = 0.0;
-  double gap = completed(m, w, v, NULL, 0.0, w->dq);
+  magnitude turning = 0.0, gap = completed(m, w, v, NULL, 0.0, w->dq);
   move(m, w, w->dq, NULL);
-  FOR(c, m->columns) turning = fmax(turning, w->dq[c] * w->dq[c]);
+  FOR(c, m->columns) turning = fmax(turning, fabs(w->dq[c]) * fabs(w->dq[c]));
   double *known = w->residual; /* closed: no longer asked for */
   row_sums(m, w, NULL, w->bias, known);
   gap = fmax(gap, completed(m, w, a, known, turning, w->ddq));
@@ -640,7 +653,7 @@ static void between_points(const Model *m, Work *w, int i, int j, const double *
     const double *V = w->V + 6 * (side ? j : i), *at = side ? q : p;
     double v[3];
     cross(V, at, v);
-    FOR(r, 3) speed += (side ? 1.0 : -1.0) * (V[3 + r] + v[r]) * (length > 0.0 ? d[r] / length : 0.0);
+    FOR(r, 3) speed += (side ? 1.0 : -1.0) * (V[3 + r] + v[r]) * (fabs(length) > 0.0 ? d[r] / length : 0.0);
   }
   const double force = -number[6] * (length - number[7]) - number[8] * speed;
   FOR(r, 3) d[r] *= force == 0.0 ? 0.0 : force / length, back[r] = -d[r];
@@ -737,7 +750,7 @@ static void at_points(const Model *m, const Work *w, double *pairs, double sign)
 /* Self-stresses: one a dropped row, orthonormal in the reactions at the pair points, moments over L; then reactions of least norm. */
 static int self_stresses(const Model *m, Work *w, double *multiplier_stress, double *coupled_stress) {
   const int n = m->unknowns, p = 6 * m->pairs, c = m->columns, k = m->couplings;
-  double largest = 0.0;
+  magnitude largest = 0.0;
   memset(w->stress, 0, (size_t)m->stresses * p * sizeof(double));
   FOR(s, m->stresses) {
     double *null = w->null + s * m->rows, *stress = w->stress + s * p, *effort = w->stress_effort + s * c, *y = w->column_value;
@@ -754,7 +767,7 @@ static int self_stresses(const Model *m, Work *w, double *multiplier_stress, dou
     FOR(i, c) if (effort[i] != 0.0) FOR(r, 6) stress[6 * m->owner[i] + r] -= w->E[6 * i + r] * effort[i];
     at_points(m, w, stress, -1.0);
     FOR(i, k) multiplier_stress[s * k + i] = -null[6 * m->loops + i];
-    largest = fmax(largest, sqrt(dot(stress, stress, p)));
+    largest = fmax(largest, fabs(sqrt(dot(stress, stress, p))));
   }
   at_points(m, w, w->reaction, -1.0);
   FOR(s, m->stresses) {
@@ -767,7 +780,7 @@ static int self_stresses(const Model *m, Work *w, double *multiplier_stress, dou
         FOR(i, k) multiplier[i] -= part * multiplier_stress[t * k + i];
       }
       size = sqrt(dot(stress, stress, p));
-      if (!(size > DRIVERS_ALONE * largest) || !(largest > DRIVERS_ALONE)) return MGK_STRAIN;
+      if (!(fabs(size) > DRIVERS_ALONE * largest) || !(largest > DRIVERS_ALONE)) return MGK_STRAIN;
       FOR(i, p) stress[i] /= size;
       FOR(i, c) effort[i] /= size;
       FOR(i, k) multiplier[i] /= size;
@@ -784,36 +797,38 @@ static int self_stresses(const Model *m, Work *w, double *multiplier_stress, dou
 }
 
 /* What is left of the equilibrium of links and of the power, and the largest terms, as the package measures them. */
-static void checks(const Model *m, Work *w, double *balance, double *power, double *largest) {
-  double *left = w->carried, wrench = 0.0, term = 0.0;
-  *balance = *power = 0.0;
+static void checks(const Model *m, Work *w, double *balance, double *power, magnitude *largest) {
+  double *left = w->carried;
+  magnitude wrench = 0.0, term = 0.0, worst = 0.0;
+  *power = 0.0;
   FOR(i, 6 * m->links) left[i] = w->applied[i] + w->inertial[i];
   FOR(k, m->pairs) memcpy(w->total + 6 * k, w->reaction + 6 * k, 6 * sizeof(double));
   FOR(c, m->columns) {
     const double own = w->column_value[c], acting = own + w->given[c] + w->coupled[c];
     FOR(r, 6) w->total[6 * m->owner[c] + r] += w->E[6 * c + r] * acting;
     *power += w->dq[c] * acting;
-    *balance = fmax(*balance, fabs(dot(w->S + 6 * c, w->reaction + 6 * m->owner[c], 6)));
-    const double most = fmax(fabs(own), fmax(fabs(w->given[c]), fabs(w->coupled[c])));
+    worst = fmax(worst, fabs(dot(w->S + 6 * c, w->reaction + 6 * m->owner[c], 6)));
+    const magnitude most = fmax(fabs(own), fmax(fabs(w->given[c]), fabs(w->coupled[c])));
     wrench = fmax(wrench, most), term = fmax(term, fabs(w->dq[c]) * most);
   }
   FOR(k, m->pairs) {
     const int a = m->ends[2 * k], b = m->ends[2 * k + 1];
-    const double through = size_of(w->total + 6 * k, 6), speed = fmax(size_of(w->V + 6 * a, 6), size_of(w->V + 6 * b, 6));
+    const magnitude through = size_of(w->total + 6 * k, 6), speed = fmax(size_of(w->V + 6 * a, 6), size_of(w->V + 6 * b, 6));
     FOR(r, 6) left[6 * b + r] += w->total[6 * k + r], left[6 * a + r] -= w->total[6 * k + r];
     wrench = fmax(wrench, through), term = fmax(term, speed * through);
   }
   FOR(b, m->links) {
-    const double speed = size_of(w->V + 6 * b, 6), on = fmax(size_of(w->applied + 6 * b, 6), size_of(w->inertial + 6 * b, 6));
+    const magnitude speed = size_of(w->V + 6 * b, 6), on = fmax(size_of(w->applied + 6 * b, 6), size_of(w->inertial + 6 * b, 6));
     *power += dot(w->V + 6 * b, w->applied + 6 * b, 6) + dot(w->V + 6 * b, w->inertial + 6 * b, 6);
     wrench = fmax(wrench, on), term = fmax(term, speed * on);
-    if (b != m->frame_link) *balance = fmax(*balance, size_of(left + 6 * b, 6));
+    if (b != m->frame_link) worst = fmax(worst, size_of(left + 6 * b, 6));
   }
+  *balance = worst;
   largest[0] = fmax(largest[0], wrench), largest[1] = fmax(largest[1], term);
 }
 
 /* All forces at a state with rates; the force parts of a record. */
-static int forces(const Model *m, Work *w, const double *x, double *record, const int *places, double *largest) {
+static int forces(const Model *m, Work *w, const double *x, double *record, const int *places, magnitude *largest) {
   double *multiplier_stress = record + places[MGK_MULTIPLIER_STRESS], *coupled_stress = record + places[MGK_COUPLED_STRESS];
   if (efforts(m, w)) return MGK_SINGULAR;
   loads(m, w, x);
@@ -860,9 +875,38 @@ static int forces(const Model *m, Work *w, const double *x, double *record, cons
 #define PUT(part, values) memcpy(record + places[part], values, (size_t)(places[part + 1] - places[part]) * sizeof(double))
   PUT(MGK_REACTIONS, w->reaction), PUT(MGK_EFFORTS, w->tau), PUT(MGK_GIVEN, w->given), PUT(MGK_COUPLED, w->coupled);
   PUT(MGK_MULTIPLIERS, w->multiplier), PUT(MGK_STRESS, w->stress), PUT(MGK_STRESS_EFFORTS, w->stress_effort);
-  return isfinite(record[places[MGK_BALANCE]] + record[places[MGK_POWER]]) ? MGK_OK : MGK_NOT_FINITE;
+  return isfinite(fabs(record[places[MGK_BALANCE]] + record[places[MGK_POWER]])) ? MGK_OK : MGK_NOT_FINITE;
 }
 
+/* A wrench about the global origin in the units of the declaration; NaN where a self-stress has a part. */
+static void given_out(const Model *m, const double *record, const int *places, int k, double *out) {
+  const double L = *m->unit, *w = record + places[MGK_REACTIONS] + 6 * k;
+  double size[6] = {0}, far[3], moved[6];
+  FOR(i, 3) far[i] = m->origin[i] / L;
+  FOR(s, m->stresses) {
+    memcpy(moved, record + places[MGK_STRESS] + 6 * (s * m->pairs + k), sizeof moved);
+    wrench_moved(moved, far, 1.0);
+    FOR(i, 6) size[i] += moved[i] * moved[i];
+  }
+  memcpy(moved, w, sizeof moved);
+  wrench_moved(moved, far, 1.0);
+  const magnitude most = UNIQUE * (1.0 + fabs(sqrt(dot(far, far, 3))));
+  FOR(i, 6) out[i] = fabs(sqrt(size[i])) > most ? NAN : moved[i] * (i < 3 ? L * L : L);
+}
+
+/* What the drive in a freedom supplies, in the units of the declaration; NaN where a self-stress has a part. */
+static double effort_out(const Model *m, const double *record, const int *places, int c) {
+  const double L = *m->unit, own = record[places[MGK_EFFORTS] + c] - record[places[MGK_GIVEN] + c] - record[places[MGK_COUPLED] + c];
+  double size = 0.0;
+  FOR(s, m->stresses) {
+    const int at = s * m->columns + c;
+    const double strain = record[places[MGK_STRESS_EFFORTS] + at] - record[places[MGK_COUPLED_STRESS] + at];
+    size += strain * strain;
+  }
+  return fabs(sqrt(size)) > UNIQUE ? NAN : own * (m->is_length[c] ? L : L * L);
+}
+
+#ifndef MGK_COMPLEX
 /* --- paths ------------------------------------------------------------------------------------------------------------------------- */
 
 /* Where rotation vectors of the user stand, continued from the last state: signed angles about axes that do not flip, unwrapped. */
@@ -1133,22 +1177,6 @@ int mgk_path(const int *I, const double *P, void *state, int count, const int *o
   return status;
 }
 
-/* A wrench about the global origin in the units of the declaration; NaN where a self-stress has a part. */
-static void given_out(const Model *m, const double *record, const int *places, int k, double *out) {
-  const double L = *m->unit, *w = record + places[MGK_REACTIONS] + 6 * k;
-  double size[6] = {0}, far[3], moved[6];
-  FOR(i, 3) far[i] = m->origin[i] / L;
-  FOR(s, m->stresses) {
-    memcpy(moved, record + places[MGK_STRESS] + 6 * (s * m->pairs + k), sizeof moved);
-    wrench_moved(moved, far, 1.0);
-    FOR(i, 6) size[i] += moved[i] * moved[i];
-  }
-  memcpy(moved, w, sizeof moved);
-  wrench_moved(moved, far, 1.0);
-  const double most = UNIQUE * (1.0 + sqrt(dot(far, far, 3)));
-  FOR(i, 6) out[i] = sqrt(size[i]) > most ? NAN : moved[i] * (i < 3 ? L * L : L);
-}
-
 int mgk_solve(const int *I, const double *P, void *state, const double *q, const double *v, const double *a, double *effort,
               double *reaction, double *position) {
   Model m;
@@ -1175,15 +1203,7 @@ int mgk_solve(const int *I, const double *P, void *state, const double *q, const
   }
   if (position) memcpy(position, record + places[MGK_COORDINATES], m.columns * sizeof(double));
   if (reaction) FOR(k, m.pairs) given_out(&m, record, places, k, reaction + 6 * k);
-  if (effort) FOR(i, d) {
-    const int c = m.drive[i];
-    double part = 0.0;
-    FOR(s, m.stresses) {
-      const double strain = record[places[MGK_STRESS_EFFORTS] + s * m.columns + c] - record[places[MGK_COUPLED_STRESS] + s * m.columns + c];
-      part += strain * strain;
-    }
-    const double own = record[places[MGK_EFFORTS] + c] - record[places[MGK_GIVEN] + c] - record[places[MGK_COUPLED] + c];
-    effort[i] = sqrt(part) > UNIQUE ? NAN : own * (m.is_length[c] ? L : L * L);
-  }
+  if (effort) FOR(i, d) effort[i] = effort_out(&m, record, places, m.drive[i]);
   return MGK_OK;
 }
+#endif

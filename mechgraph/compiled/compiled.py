@@ -1,0 +1,362 @@
+"""A mechanism that stays hot: efforts, reactions and positions of one state after the other, from the compiled kernel."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import cache, partial
+from typing import Any, NoReturn
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.compiled.tabled import STATUSES, Tabled, tabled
+from mechgraph.compiled.write import write_tables
+from mechgraph.errors import DeclarationError, listed
+from mechgraph.kernel import build
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.quantities import real_array, wrong
+
+WORDS = np.array([word for _, word, _ in STATUSES])
+START = 4
+"""Place of the start in the table of numbers, see ``kernel.h``."""
+SMALL_TURN = 1e-4
+"""Angle below which the series of dexp^-1 has only its first terms."""
+HALVINGS = 12
+"""Halvings of a change of parameters, until the loops are closed by small corrections."""
+
+
+def compile_mechanism(m: Mechanism) -> Compiled:
+    """Keep a mechanism ready in the compiled kernel, for one position after the other: control loops, optimisers, real time.
+
+    ::
+
+        c = mg.compile(m)
+        effort = c(0.3, velocity=10.0)  # every call goes on from the last one
+        c.reaction("B"), c.position("B"), c.link("rod"), c.status
+
+    Raises
+    ------
+    DeclarationError
+        which names what the kernel cannot carry; errors of the start as in ``solve``; MissingExtraError where the kernel was not installed
+        and there is no C compiler (``mechgraph.compiled.write`` writes C without one).
+    """
+    return Compiled(tabled(m))
+
+
+@cache
+def _functions() -> ctypes.CDLL:
+    """The kernel, its functions declared so that addresses are passed as they are."""
+    library = build.built()
+    pointer, whole = ctypes.c_void_p, ctypes.c_int
+    library.mgk_state_size.argtypes, library.mgk_state_size.restype = [pointer], ctypes.c_size_t
+    library.mgk_start.argtypes = [pointer] * 3
+    library.mgk_table.argtypes = [*[pointer] * 3, whole, *[pointer] * 6]
+    for of_state in (library.mgk_poses, library.mgk_drives):
+        of_state.argtypes, of_state.restype = [pointer] * 4, None
+    library.mgk_derivative_size.argtypes, library.mgk_derivative_size.restype = [pointer, whole], ctypes.c_size_t
+    library.mgk_derivative.argtypes = [*[pointer] * 3, whole, *[pointer] * 6]
+    return library
+
+
+class Parameters(Mapping[str, float]):
+    """Declared numbers by the names that studies use (``crank.mass``, ``length[2]``), to be set in place; those that were named are listed.
+
+    What is set counts from the next call on.
+    """
+
+    def __init__(self, tables: Tabled, wanted: Mapping[str, float] | None = None) -> None:
+        self._tables = tables
+        self.wanted = dict(wanted or {})
+
+    def __getitem__(self, name: str) -> float:
+        declared = self._tables.known(name)
+        return self.wanted.get(name, declared)
+
+    def __setitem__(self, name: str, value: float) -> None:
+        self._tables.known(name)
+        number = real_array(value)
+        if number is None or number.shape or not np.isfinite(number):
+            raise DeclarationError(f"parameters of {self._tables.m.name!r}", [wrong(value, name, "a finite number")])
+        self.wanted[name] = float(number)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._tables.fields)
+
+    def __len__(self) -> int:
+        return len(self._tables.fields)
+
+
+class _Room:
+    """Where the motion and the results of ``n`` positions stand, and the call that fills them."""
+
+    def __init__(self, of: Compiled, n: int, state: Array) -> None:
+        t, self.of, self.n, self.state = of.tables, of, n, state
+        self.motion, self.effort = np.zeros((3, n, len(t.drives))), np.zeros((n, len(t.drives)))
+        self.reaction, self.position = np.zeros((n, len(t.m.pairs), 6)), np.zeros((n, t.system.n_freedoms))
+        self.poses, self.status = np.zeros((n, len(t.m.links), 3, 4)), np.zeros(n, dtype=np.intc)
+        self.library = _functions()
+        parts = (of.I, of.P, state), (self.motion, self.effort, self.reaction, self.position, self.status)
+        known, own = ([part.ctypes.data for part in some] for some in parts)
+        self.run = partial(self.library.mgk_table, *known, n, *own, self.poses.ctypes.data if n > 1 else None)
+
+    def links(self) -> Array:
+        """Poses of all links ``(n, N, 4, 4)``; of one position found when they are asked for."""
+        if self.n == 1:
+            self.library.mgk_poses(*(part.ctypes.data for part in (self.of.I, self.of.P, self.state, self.poses)))
+        return np.where(self.status[:, None, None, None] == 0, self.of.tables.poses(self.poses), np.nan)
+
+    def refuse(self, status: int) -> None:
+        """No results."""
+        self.status[:] = status
+        for values in (self.effort, self.reaction, self.position):
+            values[:] = np.nan
+
+    def copied(self, of: Compiled) -> _Room:
+        """The same of another mechanism."""
+        out = _Room(of, self.n, of.state)
+        for name in ("motion", "effort", "reaction", "position", "poses", "status"):
+            getattr(out, name)[:] = getattr(self, name)
+        return out
+
+
+def turn_rate(v: Array, w: Array) -> Array:
+    """The rate ``(3,)`` of a rotation vector ``v (3,)`` where the rotation turns at ``w (3,)``, in the frame before it (dexp^-1)."""
+    angle = float(np.sqrt(v @ v))
+    if angle < SMALL_TURN:
+        part = 1.0 / 12.0
+    else:
+        part = (1.0 - 0.5 * angle / np.tan(0.5 * angle)) / angle**2
+    once = np.cross(v, w)
+    return np.asarray(w - 0.5 * once + part * np.cross(v, once))
+
+
+class Compiled:
+    """A mechanism that stays hot, see ``mechgraph.compile``. Calls release Python's lock; every thread takes a ``copy`` of its own.
+
+    Attributes
+    ----------
+    drives : the freedoms that are driven, in the order of their numbers in a call.
+    parameters : declared numbers by name, to be set in place.
+    status : ``"ok"``, or why the last call was refused; of ``(n, d)`` positions an array of words.
+    """
+
+    def __init__(self, tables: Tabled, like: Compiled | None = None) -> None:
+        self.tables, self.drives, self.I = tables, tables.drives, tables.I
+        size = _functions().mgk_state_size(self.I.ctypes.data) // 8 + 1
+        self.P, self.home, self.state = tables.P.copy(), np.zeros(size), np.zeros(size)
+        self._values: dict[str, float] = {}
+        self.parameters = Parameters(tables)
+        self._one, self._single = _Room(self, 1, self.state), True
+        self._last = self._one
+        if like is None:
+            _functions().mgk_start(*(part.ctypes.data for part in (self.I, self.P, self.home)))
+            self.start()
+            return
+        for mine, theirs in ((self.P, like.P), (self.home, like.home), (self.state, like.state)):
+            mine[:] = theirs
+        self._values, self.parameters = dict(like._values), Parameters(tables, like.parameters.wanted)
+        self._single, self._last = like._single, like._last.copied(self)
+        if self._single:
+            self._one = self._last
+
+    def copy(self) -> Compiled:
+        """The same with a state, parameters and results of its own."""
+        return Compiled(self.tables.copy(), self)
+
+    # --- calls -------------------------------------------------------------------------------------------------------------
+
+    def __call__(self, q: Any, velocity: Any = 0.0, acceleration: Any = 0.0) -> Array:
+        """The efforts ``(d,)`` of the drives at a position with these rates, led there from the last good one along a straight line.
+
+        Steps are certified as in ``solve``. Where one is refused all results are NaN, ``status`` says why, and the next call goes on from
+        the last good position. Components that are not unique are NaN.
+
+        Parameters
+        ----------
+        q : ``(d,)``, a number for one drive; or ``(n, d)``, one after the other: then all results have a leading axis.
+        velocity, acceleration : of the drives, broadcast against ``q``.
+
+        Raises
+        ------
+        DeclarationError
+            where shapes do not fit or numbers are not finite, and where ``parameters`` are those of no mechanism.
+        """
+        room = self._one
+        if type(q) is type(velocity) is type(acceleration) is float and len(self.tables.drives) == 1:
+            single, motion = True, room.motion
+            motion[0], motion[1], motion[2] = q, velocity, acceleration
+        else:
+            room, single = self._read(q, velocity, acceleration)
+        status = self._led() if self._values != self.parameters.wanted else 0
+        if status:
+            room.refuse(status)
+        elif room.run():
+            self._refuse("a coordinate, velocity or acceleration is not finite")
+        self._last, self._single = room, single
+        return room.effort[0].copy() if single else room.effort.copy()
+
+    def start(self) -> None:
+        """Back to the declared position, at rest."""
+        self.state[:] = self.home
+        self(self.tables.home)
+
+    def _read(self, q: Any, velocity: Any, acceleration: Any) -> tuple[_Room, bool]:
+        """The motion in a room for it; whether it is one position."""
+        d, given = len(self.tables.drives), []
+        for name, value in (("q", q), ("velocity", velocity), ("acceleration", acceleration)):
+            found = real_array(value)
+            if found is None:
+                self._refuse(wrong(value, name, "numbers, in the units of the mechanism"))
+            given.append(found)
+        shape = given[0].shape
+        single = shape == (d,) or (d == 1 and shape == ())
+        if not single and (len(shape) != 2 or shape[1] != d):
+            self._refuse(f"q has the shape {shape}; expected ({d},) or (n, {d}), for {listed(self.tables.drives)}")
+        room = self._one if single else _Room(self, shape[0], self.state)
+        try:
+            for kind, value in zip(room.motion, given, strict=True):
+                kind[...] = value
+        except ValueError:
+            rates = " and ".join(str(value.shape) for value in given[1:])
+            self._refuse(
+                f"velocity and acceleration have the shapes {rates}; expected such as go with that of q, {shape}"
+            )
+        return room, single
+
+    def _refuse(self, fault: str) -> NoReturn:
+        raise DeclarationError(f"compiled {self.tables.m.name!r}", [fault])
+
+    # --- results -----------------------------------------------------------------------------------------------------------
+
+    @property
+    def status(self) -> Any:
+        """``"ok"``, or why the last call was refused; of ``(n, d)`` positions an array of words."""
+        return self._shown(WORDS[self._last.status])
+
+    def reaction(self, pair: str) -> Array:
+        """Wrench ``(6,)``, (M, F) about the global origin, that link a exerts on link b, at the last position."""
+        return np.array(self._shown(self._last.reaction[:, self.tables.m.place_of_pair(pair)]))
+
+    def position(self, pair: str) -> Array:
+        """Coordinates ``(f,)`` of a pair at the last position."""
+        return np.array(self._shown(self._last.position[:, self.tables.columns(pair)]))
+
+    def link(self, name: str) -> Array:
+        """Pose ``(4, 4)`` of a link's frame at the last position."""
+        return np.array(self._shown(self._last.links()[:, self.tables.m.place_of_link(name)]))
+
+    def _shown(self, values: Any) -> Any:
+        return values[0] if self._single else values
+
+    def gradient(self, output: str, names: Sequence[str]) -> Array:
+        """Derivatives of an output at the last position by declared numbers, the drives moving as they do: exact, by complex numbers.
+
+        Parameters
+        ----------
+        output : ``"A.effort"`` of a drive, ``"B.position"`` or ``"B.reaction"``.
+        names : of ``parameters``.
+
+        Returns
+        -------
+        array
+            ``(names,)``; of a pair with ``f`` freedoms ``(f, names)``, of a reaction ``(6, names)``. NaN where the last call was refused.
+
+        Raises
+        ------
+        DeclarationError
+            for names that are none.
+        """
+        of, place = self._output(output)
+        names = [names] if isinstance(names, str) else list(names)
+        columns = [self._derivatives(name)[of].reshape(-1)[place] for name in names]
+        return np.stack(columns, axis=-1) if columns else np.zeros((*np.shape(place), 0))
+
+    def _output(self, output: Any) -> tuple[int, Any]:
+        """Which of efforts, reactions and positions an output is, and its places there."""
+        t = self.tables
+        owner, _, part = output.rpartition(".") if isinstance(output, str) else ("", "", "")
+        if part == "effort" and t.m.freedom_fault(owner, single=True) is None and t.m.full_name(owner) in t.drives:
+            return 0, t.drives.index(t.m.full_name(owner))
+        if part == "reaction" and owner in t.m.pair_index:
+            return 1, 6 * t.m.place_of_pair(owner) + np.arange(6)
+        if part == "position" and owner in t.m.pair_index:
+            columns = np.arange(t.system.n_freedoms)[t.columns(owner)]
+            return 2, columns[0] if len(columns) == 1 else columns
+        example = f"'{t.drives[0]}.effort', '{t.m.pairs[-1].name}.position' or '{t.m.pairs[-1].name}.reaction'"
+        return self._refuse(wrong(output, "output", f"e.g. {example}"))
+
+    def _derivatives(self, name: str) -> list[Array]:
+        """Efforts, reactions and positions, by one number."""
+        t, room = self.tables, self._last
+        values = {name: t.known(name), **self._values}
+        out = [np.full(part.shape[1:], np.nan) for part in (room.effort, room.reaction, room.position)]
+        if room.status[-1]:
+            return out
+        dP, motion = t.derivative(values, name), np.ascontiguousarray(room.motion[:, -1])
+        memory = np.empty(_functions().mgk_derivative_size(self.I.ctypes.data, len(dP)) // 16 + 1, dtype=complex)
+        known = [part.ctypes.data for part in (self.I, self.P, dP)]
+        rest = [part.ctypes.data for part in (memory, self.state, motion, *out)]
+        if _functions().mgk_derivative(*known, len(dP), *rest):
+            return [np.full_like(part, np.nan) for part in out]
+        for g in t.rotations:
+            out[2][g] = turn_rate(room.position[-1, g], out[2][g])
+        return out
+
+    def write(self, path: str | os.PathLike[str], name: str | None = None) -> None:
+        """Write the mechanism with its parameters as they are: C99 (``press.c``, ``press.h``), or a unit for co-simulation (``.fmu``).
+
+        The C has no heap and needs the mathematics of the C library alone; its functions are ``press_start``, ``press_state_size`` and
+        ``press_solve``, as the header says. ``name`` is what symbols begin with: left out, the name of the file.
+
+        Raises
+        ------
+        DeclarationError
+            where ``name`` is no identifier of C, or the loops cannot be led to the parameters; FileError where it cannot be written,
+            MissingExtraError for a unit where there is no C compiler.
+        """
+        if self._values != self.parameters.wanted and (status := self._led()):
+            self._refuse(f"the declared position cannot be led to the parameters: {WORDS[status]}")
+        P, x = self.P.copy(), len(self.tables.x)
+        P[START : START + x] = self.home[:x]
+        write_tables(replace(self.tables, P=P), path, name)
+
+    # --- parameters --------------------------------------------------------------------------------------------------------
+
+    def _led(self) -> int:
+        """Lead the declared position and the last good one to the numbers wanted; a status, and nothing changed, where that fails."""
+        goal = dict(self.parameters.wanted)
+        begin = {name: self._values.get(name, self.tables.known(name)) for name in goal}
+        arrays = (self.P, self.home, self.state)
+        before, done, step = [array.copy() for array in arrays], 0.0, 1.0
+        while done < 1.0:
+            part, kept = min(1.0, done + step), [array.copy() for array in arrays]
+            values = {name: (1.0 - part) * begin[name] + part * goal[name] for name in goal}
+            self.P[:] = self.tables.numbers(values)
+            status = self._closed(self.home, self.tables.home) or self._closed(self.state, self._drives())
+            if not status:
+                done = part
+                continue
+            step *= 0.5
+            failed = step < 0.5**HALVINGS
+            for array, old in zip(arrays, before if failed else kept, strict=True):
+                array[:] = old
+            if failed:
+                return status
+        self._values = goal
+        return 0
+
+    def _drives(self) -> Array:
+        """Where the drives stand in the last good position."""
+        out = np.zeros(len(self.tables.drives))
+        _functions().mgk_drives(*(part.ctypes.data for part in (self.I, self.P, self.state, out)))
+        return out
+
+    def _closed(self, state: Array, q: Array) -> int:
+        """Close a state with the numbers as they are now, the drives standing at ``q``; its status."""
+        room = _Room(self, 1, state)
+        room.motion[0] = q
+        room.run()
+        return int(room.status[0])

@@ -1,0 +1,177 @@
+"""A mechanism in the tables of the kernel, its numbers by the names that studies use, and what comes back in the user's units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array, homogeneous
+from mechgraph.by_kernel import cannot, gives_forces
+from mechgraph.call import Options
+from mechgraph.closure.assembly import closed_start
+from mechgraph.closure.driver_motion import DriverMotion
+from mechgraph.closure.indexing import System
+from mechgraph.errors import DeclarationError, listed
+from mechgraph.kernel.tables import Integers, Layout, layout, tables
+from mechgraph.model.mechanism import Mechanism, check_mechanism
+from mechgraph.model.parameters import declared
+from mechgraph.pipeline import Pipeline
+from mechgraph.quantities import shown
+from mechgraph.structure.snapping import meant
+from mechgraph.variants.fields import AnyField, clashes, field_values, find_field, varied
+
+STATUSES = (
+    ("OK", "ok", "solved"),
+    ("NOT_CLOSED", "loops not closed", "the loops of the start are not closed to rounding"),
+    (
+        "SINGULAR",
+        "near a singular position",
+        "the drives do not determine the motion well: a dead point or a change point is near",
+    ),
+    (
+        "STEP",
+        "not certified",
+        "a step could not be certified: a dead point, an end of the reach or another branch is near",
+    ),
+    ("CONTRADICTION", "drives contradict each other", "the motions of the drives contradict each other"),
+    ("NOT_FINITE", "not finite", "a coordinate, rate or load is no finite number"),
+    ("STRAIN", "strained", "drives or couplings strain each other without any reaction"),
+    ("TOO_FAR", "not followed", "the position is further than steps are made"),
+    ("FORMAT_ERROR", "other tables", "tables of another version"),
+)
+"""What the kernel returns, by its number: identifier, word, meaning."""
+REACH = 0.02
+"""Change of the tables over which their derivatives are taken, relative: where differences of order 8 are exact to rounding."""
+DIFFERENCES = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
+"""Central differences of order 8, see B. Fornberg, Mathematics of Computation 51 (1988) 699-706, table 1."""
+DOUBLINGS = 60
+"""Doublings or halvings of a step at most."""
+
+
+@dataclass(frozen=True)
+class Tabled:
+    """A mechanism in the tables: ``I`` what it is made of, ``P`` its numbers; ``home (d,)`` the declared position of the drives.
+
+    ``fields`` are the declared numbers that were asked for by name.
+    """
+
+    m: Mechanism
+    system: System
+    x: Array
+    layout: Layout
+    I: Integers
+    P: Array
+    drives: tuple[str, ...]
+    home: Array
+    fields: dict[str, AnyField] = field(default_factory=dict)
+
+    def copy(self) -> Tabled:
+        """The same with names of its own."""
+        return replace(self, fields=dict(self.fields))
+
+    def columns(self, pair: str) -> slice:
+        """The freedoms of a pair."""
+        k, first = self.m.place_of_pair(pair), self.system.first_column
+        return slice(int(first[k]), int(first[k]) + len(self.m.pairs[k].type.freedoms))
+
+    @property
+    def rotations(self) -> list[slice]:
+        """The freedoms of every rotation."""
+        return [slice(int(c), int(c) + 3) for c in np.flatnonzero(self.system.single_rows < 0)[::3]]
+
+    def known(self, name: str) -> float:
+        """The declared value of a number; its field is remembered.
+
+        Raises
+        ------
+        DeclarationError
+            where there is no such number.
+        """
+        if name not in self.fields:
+            found = find_field(self.m, name) if isinstance(name, str) else f"{shown(name)}: expected a name"
+            if isinstance(found, str):
+                raise DeclarationError(f"parameters of {self.m.name!r}", [found])
+            if faults := clashes(self.m, self.fields | {name: found}):
+                raise DeclarationError(f"parameters of {self.m.name!r}", faults)
+            self.fields[name] = found
+        return field_values(self.m, {name: self.fields[name]})[name]
+
+    def changed(self, values: Mapping[str, float]) -> Mechanism:
+        """The mechanism with other numbers.
+
+        Raises
+        ------
+        DeclarationError
+            where no such mechanism can be.
+        """
+        fields = {name: self.fields[name] for name in values}
+        return varied(self.m, fields, np.array(list(values.values()), dtype=float)[:, None]).one(0)
+
+    def numbers(self, values: Mapping[str, float]) -> Array:
+        """``P`` with other numbers, in the units of the mechanism as it was declared."""
+        if not values:
+            return self.P
+        m, par = self.changed(values), self.system.par
+        system = System(m, self.system.graph, declared(m).parameters(m, par.offset, par.origin, par.L))
+        found = tables(self.layout, system, self.x[:, None], m.loads)
+        assert found is not None
+        return np.asarray(found[1][0])
+
+    def derivative(self, values: Mapping[str, float], name: str) -> Array:
+        """How ``P`` changes with one number."""
+        middle = values[name]
+
+        def at(value: float) -> Array:
+            return self.numbers({**values, name: value})
+
+        step, here = 1e-3 * (abs(middle) or 1.0), at(middle)
+        for _ in range(DOUBLINGS):
+            change = float((np.abs(at(middle + step) - here) / np.maximum(np.abs(here), 1.0)).max())
+            if 0.25 * REACH <= change <= REACH or not change:
+                break
+            step *= 2.0 if change < REACH else 0.5
+        sides = [at(middle + k * step) - at(middle - k * step) for k in range(1, len(DIFFERENCES) + 1)]
+        return np.asarray(sum(c * side for c, side in zip(DIFFERENCES, sides, strict=True)) / step)
+
+    def poses(self, internal: Array) -> Array:
+        """Poses ``(..., 4, 4)`` of the declared link frames from internal ones ``(..., N, 3, 4)``."""
+        par, R = self.system.par, internal[..., :3]
+        p = par.origin + par.L * internal[..., 3] - (R @ par.offset.T[:, :, None])[..., 0]
+        return np.moveaxis(
+            homogeneous(np.moveaxis(np.concatenate([R, p[..., None]], axis=-1), (-2, -1), (0, 1))), (0, 1), (-2, -1)
+        )
+
+
+def tabled(m: Mechanism, asked: str = "compile") -> Tabled:
+    """The tables of a mechanism at its declared position.
+
+    Raises
+    ------
+    DeclarationError
+        which names what the kernel cannot carry; errors of the start as in ``solve``.
+    """
+    check_mechanism(m, asked)
+    subject = f"{asked} {m.name!r}"
+    own = meant(m, None, asked)
+    drives = tuple(own.full_name(drive.freedom) for drive in own.drives)
+    if not drives or not own.has_geometry:
+        missing = "geometry" if drives else "drives: expected the freedoms that are driven, e.g. drives=['A']"
+        raise DeclarationError(subject, [f"the mechanism declares no {missing}"])
+    start = closed_start(own)
+    coordinates = start.system.coordinates_of(start.x, start.system.start_coordinates(own.start))[:, 0]
+    home = coordinates[[own.freedom_names().index(name) for name in drives]]
+    line = Pipeline(DriverMotion(own, dict(zip(drives, home.tolist(), strict=True))), Options())
+    system, x = line.system, line.x
+    if fault := cannot(line) or (
+        None if gives_forces(line) else "it does not find the forces at contacts of gears, racks and belts"
+    ):
+        raise DeclarationError(subject, [f"the compiled kernel does not carry it: {fault}"])
+    places = layout(system, line.columns, np.zeros(0, dtype=np.intp))
+    found = tables(places, system, x[:, None], own.loads)
+    if found is None:
+        known = listed(sorted({load.kind for load in own.loads}))
+        fault = f"a load is a function, a table or varies over positions (loads: {known}); expected constant numbers"
+        raise DeclarationError(subject, [f"the compiled kernel does not carry it: {fault}"])
+    return Tabled(own, system, x, places, found[0], found[1][0], drives, home)

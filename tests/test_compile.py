@@ -1,0 +1,249 @@
+"""A mechanism that stays hot: what a call gives beside ``solve``, its state, parameters, derivatives and refusals."""
+
+import threading
+
+import mpmath
+import numpy as np
+import pytest
+
+import mechgraph as mg
+from mechgraph.compiled import compiled as module
+from mechgraph.kernel import build, compiler
+
+pytestmark = pytest.mark.usefixtures("compiled")
+
+CARRIED = ("four-bar", "rcsr", "7r", "rcsr-csr", "bricard-cube", "rchch", "r-sp-r", "slider-crank")
+
+
+def beside(c: mg.Compiled, m: mg.Mechanism, q: np.ndarray, rates: tuple[float, float] = (2.0, 0.5)) -> float:
+    """The worst difference to ``solve`` at positions ``(n, d)``, over what is largest."""
+    motions = {name: mg.Motion(q[:, i], *rates) for i, name in enumerate(c.drives)}
+    s = mg.solve(m, motions, engine="dense")
+    efforts = c(q, *rates)
+    assert (c.status == "ok").all()
+    pairs = [(c.reaction(p.name), s[p.name].reaction) for p in m.pairs] + [
+        (c.position(p.name), s[p.name].position) for p in m.pairs
+    ]
+    pairs += [(c.link(link.name), s.link(link.name).pose) for link in m.links]
+    pairs += [
+        (efforts[:, i], s[m.pairs[m.freedom(n)[0]].name].effort[:, m.freedom(n)[1]]) for i, n in enumerate(c.drives)
+    ]
+    for mine, theirs in pairs:
+        assert (np.isnan(mine) == np.isnan(theirs)).all()
+    return max(
+        np.nanmax(np.abs(mine - theirs), initial=0) / np.nanmax(np.abs(theirs), initial=1.0) for mine, theirs in pairs
+    )
+
+
+@pytest.mark.parametrize("name", CARRIED)
+def test_every_result_is_that_of_solve(name):
+    m = mg.load(name)
+    c = mg.compile(m)
+    assert beside(c, m, c.tables.home + np.linspace(0.0, 0.1, 4)[:, None]) < 1e-11
+
+
+def test_several_drives():
+    m = mg.Mechanism("arm", [mg.Link("frame"), mg.Link("a", 2.0, (0.5, 0, 0)), mg.Link("b", 1.0, (1.4, 0, 0))], [
+        mg.Pair("A", "R", "frame", "a", point=(0, 0, 0), axis=(0, 0, 1)), mg.Pair("B", "C", "a", "b", point=(1, 0, 0), axis=(0, 0.6, 0.8)),
+    ], drives=["A", "B.Rz", "B.Tz"], loads=[mg.Gravity((0, -9.81, 0))])  # fmt: skip
+    c = mg.compile(m)
+    assert c.drives == ("A.Rz", "B.Rz", "B.Tz")
+    assert beside(c, m, np.array([[0.1, 0.2, 0.3], [0.5, -0.2, 0.1]])) < 1e-12
+    assert c([0.1, 0.2, 0.3]).shape == (3,)
+
+
+def test_calls_go_on_from_the_last_and_back_to_the_start():
+    m = mg.load("four-bar")
+    c = mg.compile(m)
+    begin = c.tables.home[0]
+    first = c(float(begin), 1.0, 0.0)
+    turn = [c(begin + q, 1.0)[0] for q in np.linspace(0.2, 2 * np.pi, 40)]
+    assert c.position("A")[0] == pytest.approx(begin + 2 * np.pi, abs=1e-12)
+    assert turn[-1] == pytest.approx(first[0], rel=1e-9)
+    c.start()
+    assert c.position("A")[0] == pytest.approx(begin)
+    s = mg.solve(m, {"A": mg.Motion(begin + np.linspace(0.2, 2 * np.pi, 40), 1.0)}, engine="dense")
+    np.testing.assert_allclose(turn, s["A"].effort[:, 0], rtol=1e-9)
+
+
+def test_a_refused_call_says_why_and_keeps_the_last_good_state():
+    m = mg.load("rcsr")
+    c = mg.compile(m)
+    good = c(2.8)
+    assert np.isnan(c(4.0)).all()  # beyond the end of its reach, 3.58
+    assert c.status in module.WORDS
+    assert c.status != "ok"
+    assert np.isnan(c.reaction("O1")).all()
+    assert np.isnan(c.link("link1")).all()
+    assert np.isnan(c.gradient("O1.effort", ["length[1]"])).all()
+    np.testing.assert_allclose(c(2.8), good, rtol=1e-12)
+    table = c(np.array([[2.8], [4.0], [2.9]]))
+    assert list(c.status == "ok") == [True, False, True]
+    assert np.isnan(table[1]).all()
+    assert np.isfinite(table[[0, 2]]).all()
+    assert np.isnan(c.link("link1")[1]).all()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (((0.1, 0.2),), r"q has the shape \(2,\); expected \(1,\) or \(n, 1\), for A.Rz"),
+        ((np.zeros((2, 2)),), "shape"),
+        ((0.1, (1.0, 2.0)), "velocity and acceleration"),
+        ((float("nan"),), "not finite"),
+        (([0.1], float("inf")), "not finite"),
+        (("0.1",), "expected numbers"),
+        ((None,), "expected numbers"),
+        ((1j,), "expected numbers"),
+    ],
+)
+def test_wrong_calls(arguments, said):
+    c = mg.compile(mg.load("four-bar"))
+    good = c(0.5)
+    with pytest.raises(mg.DeclarationError, match=said):
+        c(*arguments)
+    np.testing.assert_array_equal(c(0.5), good)
+
+
+def test_unknown_names():
+    c = mg.compile(mg.load("four-bar"))
+    for wrong in (
+        lambda: c.reaction("no"), lambda: c.position("no"), lambda: c.link("no"), lambda: c.parameters["no"], lambda: c.parameters[3],
+        lambda: c.gradient("no.effort", ["coupler.mass"]), lambda: c.gradient("B.effort", ["coupler.mass"]),
+        lambda: c.gradient(None, []), lambda: c.gradient("A.effort", ["no"]), lambda: c.parameters.__setitem__("coupler.mass", "1"),
+        lambda: c.parameters.__setitem__("coupler.mass", float("nan")), lambda: c.parameters.__setitem__("no", 1.0),
+    ):  # fmt: skip
+        with pytest.raises(mg.DeclarationError):
+            wrong()
+    c.parameters["coupler.mass"] = -1.0
+    with pytest.raises(mg.DeclarationError, match="mass"):
+        c(0.3)
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [("7r", {"length[2]": 1.02, "twist[1]": 0.98}), ("four-bar", {"B.point.x": 1.1, "coupler.mass": 3.0})],
+)
+def test_parameters_in_place(name, changes):
+    m = mg.load(name)
+    c = mg.compile(m)
+    c(c.tables.home + 0.2)
+    for number, factor in changes.items():
+        c.parameters[number] = factor * c.parameters[number]
+    changed = c.tables.changed(dict(c.parameters.wanted))
+    assert changed != m
+    at = c.tables.home + np.array([[0.2], [0.3]])
+    assert beside(c, changed, at) < 1e-9
+    c.start()
+    assert beside(c, changed, c.tables.home[None] + 0.0) < 1e-9
+
+
+def test_parameters_that_cannot_be_reached_are_refused():
+    c = mg.compile(mg.load("rcsr"))
+    good, before = c(2.8), c.parameters["length[2]"]
+    c.parameters["length[2]"] = 40.0 * before
+    assert np.isnan(c(2.8)).all()
+    assert c.status != "ok"
+    c.parameters["length[2]"] = before
+    np.testing.assert_allclose(c(2.8), good, rtol=1e-9)
+
+
+def test_gradient_is_exact():
+    """Slider-crank at rest, A at 0, force F on the slider: torque F dx/dq with x = r cos q + sqrt(l^2 - r^2 sin^2 q)."""
+    r, length, force = 0.3, 0.9, 7.0
+    m = mg.Mechanism("press", [mg.Link("frame"), mg.Link("crank"), mg.Link("rod"), mg.Link("slider")], [
+        mg.Pair("A", "R", "frame", "crank", on_a=mg.Marker((0, 0, 0), (0, 0, 1)), on_b=mg.Marker((0, 0, 0), (0, 0, 1))),
+        mg.Pair("B", "R", "crank", "rod", on_a=mg.Marker((r, 0, 0), (0, 0, 1)), on_b=mg.Marker((0, 0, 0), (0, 0, 1))),
+        mg.Pair("C", "R", "rod", "slider", on_a=mg.Marker((length, 0, 0), (0, 0, 1)), on_b=mg.Marker((0, 0, 0), (0, 0, 1))),
+        mg.Pair("D", "P", "frame", "slider", on_a=mg.Marker((0, 0, 0), (1, 0, 0)), on_b=mg.Marker((0, 0, 0), (1, 0, 0))),
+    ], drives=["A"], loads=[mg.Wrench("slider", force=(force, 0, 0), point=(0, 0, 0))], start={"D": r + length})  # fmt: skip
+    c = mg.compile(m)
+    q = 0.7
+    with mpmath.workdps(40):
+
+        def x(q, r, length):
+            return r * mpmath.cos(q) + mpmath.sqrt(length**2 - (r * mpmath.sin(q)) ** 2)
+
+        at = (mpmath.mpf(q), mpmath.mpf(r), mpmath.mpf(length))
+        torque = -force * mpmath.diff(x, at, (1, 0, 0))
+        slopes = [float(-force * mpmath.diff(x, at, n)) for n in ((1, 1, 0), (1, 0, 1))]
+        stroke = [float(mpmath.diff(x, at, n)) for n in ((0, 1, 0), (0, 0, 1))]
+    assert c(q)[0] == pytest.approx(float(torque), rel=1e-12)
+    names = ["B.on_a.point.x", "C.on_a.point.x"]
+    np.testing.assert_allclose(c.gradient("A.effort", names), slopes, rtol=1e-11)
+    np.testing.assert_allclose(c.gradient("D.position", names), stroke, rtol=1e-11)
+    assert c.gradient("C.reaction", names).shape == (6, 2)
+    assert c.gradient("A.effort", ["loads[0].force.x"])[0] == pytest.approx(float(torque) / force, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "number", "output"),
+    [
+        ("rcsr", "length[1]", "O3.position"),
+        ("rcsr-csr", "O2.on_a.point.x", "O1.effort"),
+        ("7r", "twist[1]", "O3.reaction"),
+    ],
+)
+def test_gradient_beside_differences(name, number, output):
+    c = mg.compile(mg.load(name))
+    q, middle = c.tables.home + 0.05, c.parameters[number]
+
+    def value(p):
+        c.parameters[number] = p
+        effort = c(q, 1.0, 0.3)
+        return (
+            effort[0] if output.endswith("effort") else getattr(c, output.rpartition(".")[2])(output.partition(".")[0])
+        )
+
+    h = 2e-3
+    weights = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
+    slope = sum(w * (value(middle + k * h) - value(middle - k * h)) for k, w in enumerate(weights, 1)) / h
+    value(middle)
+    np.testing.assert_allclose(c.gradient(output, [number])[..., 0], slope, rtol=1e-8, atol=1e-8 * np.abs(slope).max())
+
+
+def test_copies_run_in_threads():
+    c = mg.compile(mg.load("7r"))
+    c(c.tables.home + 0.1)
+    q = c.tables.home + np.linspace(0.1, 1.0, 50)[:, None]
+    copies, found = [c.copy() for _ in range(4)], {}
+    assert (copies[0].reaction("O2") == c.reaction("O2")).all()
+    threads = [threading.Thread(target=lambda i=i: found.update({i: copies[i](q)})) for i in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    expected = c(q)
+    assert all((found[i] == expected).all() for i in range(4))
+    copies[1].parameters["link3.mass"] = 2 * c.parameters["link3.mass"]
+    assert copies[1](q)[0] != c(q)[0]
+    assert "link3.mass" not in c.parameters.wanted
+
+
+def test_what_is_not_carried_is_named():
+    with pytest.raises(mg.DeclarationError, match=r"pair 'C' .* travels along a curve"):
+        mg.compile(mg.load("geneva"))
+    with pytest.raises(mg.DeclarationError, match="passive"):
+        mg.compile(mg.load("rssr"))
+    with pytest.raises(mg.DeclarationError, match="a load is a function"):
+        mg.compile(mg.load("four-bar").replace(loads=[mg.ForceLaw("B", law=lambda x, v, t: -x)]))
+    with pytest.raises(mg.DeclarationError, match="no drives"):
+        mg.compile(mg.load("four-bar").replace(drives=[]))
+    with pytest.raises(mg.DeclarationError):
+        mg.compile("four-bar")
+
+
+def test_without_a_compiler(monkeypatch, tmp_path):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setenv("MECHGRAPH_CACHE", str(tmp_path))
+    monkeypatch.setattr(build, "PACKAGED", tmp_path)
+    monkeypatch.setattr(compiler.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.delenv("CC", raising=False)
+    build.installed.cache_clear()
+    module._functions.cache_clear()
+    try:
+        with pytest.raises(mg.MissingExtraError, match=r"^this needs a C compiler: pip install 'mechgraph\[fast\]'$"):
+            mg.compile(mg.load("four-bar"))
+    finally:
+        build.installed.cache_clear()
+        module._functions.cache_clear()
