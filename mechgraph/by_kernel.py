@@ -43,6 +43,11 @@ class Started(Call, Protocol):
     x: Any
 
 
+def at_hand() -> Any:
+    """The library that ``auto`` takes: installed, or built before on request; None where there is none."""
+    return build.installed()
+
+
 class Compiled(Outcome):
     """Positions that the kernel has solved; their forces from the records, or by numpy at its states where it does not give them.
 
@@ -90,7 +95,7 @@ def compiled(line: Started, batch: tuple[int, ...], starts: Starts | None = None
     asked = line.options.engine == COMPILED
     if line.options.engine != "auto" and not asked:
         return None
-    library = build.built() if asked else build.installed()
+    library = build.built() if asked else at_hand()
     if library is None:
         return None
     if (why := cannot(line)) is not None:
