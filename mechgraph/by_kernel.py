@@ -11,10 +11,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from mechgraph.call import Call
+from mechgraph.algebra.se3 import Array
+from mechgraph.call import Call, Starts
 from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.driver_path import in_blocks
-from mechgraph.closure.indexing import Index
+from mechgraph.closure.driver_path import Mask, in_blocks
+from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.rates import Rates, Velocities
 from mechgraph.closure.solver import ClosureSolver
 from mechgraph.errors import DeclarationError
@@ -22,12 +23,15 @@ from mechgraph.kernel import build
 from mechgraph.kernel.path import Kernel, Records
 from mechgraph.kernel.tables import Layout, layout, tables, why_not
 from mechgraph.model.contact import Contact
+from mechgraph.model.load_base import Load
 from mechgraph.numerics.newton import Work
 from mechgraph.outcome import Outcome
 from mechgraph.result.kept import BlockMotion
 
 COMPILED = "compiled"
 """Name of the engine."""
+SERVES = 0.8
+"""Part of the variants of which the kernel must have solved more; the others are solved one by one."""
 
 
 class Started(Call, Protocol):
@@ -39,21 +43,30 @@ class Started(Call, Protocol):
 
 
 class Compiled(Outcome):
-    """Positions that the kernel has solved; their forces from the records, or by numpy at its states where it does not give them."""
+    """Positions that the kernel has solved; their forces from the records, or by numpy at its states where it does not give them.
 
-    def __init__(self, line: Started, batch: tuple[int, ...], records: Records, forces: bool) -> None:
+    Those of variants that are not ``whole (V,)`` count as ``contradicting``: numpy is to solve them.
+    """
+
+    def __init__(
+        self, line: Started, starts: Starts, batch: tuple[int, ...], records: Records, whole: Mask, forces: bool
+    ) -> None:
         self.records, self.solver = records, line.solver
-        super().__init__(line, line.m.loads, batch, line.system.cases, records["coordinates"])
-        steps, evaluations, factorizations = records.work
         count = len(records.values)
-        work = Work(positions=count, nodes=1 + steps, evaluations=evaluations, factorizations=factorizations)
+        variant = np.arange(count) // (count // len(whole))
+        super().__init__(
+            line, starts.loads, batch, lambda places: starts.system_of(variant[places]), records["coordinates"]
+        )
+        steps, evaluations, factorizations = records.work
+        work = Work(positions=count, nodes=len(whole) + steps, evaluations=evaluations, factorizations=factorizations)
         self.trajectory.engine, self.trajectory.work = COMPILED, work
+        self.contradicting[:] = ~whole[variant]
         if forces or line.options.method is None:
             self.trajectory.take(records, forces)
         else:
-            whole = not all(load.by_position for load in self.loads)
-            every = np.arange(count)
-            for places in [every] if whole else in_blocks(every):
+            by_position = all(load.by_position for load in self.loads)
+            every = np.flatnonzero(~self.contradicting)
+            for places in in_blocks(every) if by_position else [every]:
                 self._put(*self._at(places))
         if line.options.progress is not None:
             line.options.progress(count, count)
@@ -61,13 +74,13 @@ class Compiled(Outcome):
     def _at(self, places: Index) -> tuple[BlockMotion, Any]:
         """States and rates of a block, and the closure equations there, factored by numpy."""
         x, dq, ddq = (self.records[name][:, places] for name in ("x", "dq", "ddq"))
-        here = Configuration(self.line.system, np.ascontiguousarray(x))
+        here = Configuration(self._system_at(places), np.ascontiguousarray(x))
         f = self.solver.factored(here, self.solver.chosen(here, np.full(here.T, -1)))
         return BlockMotion(places, Rates(Velocities(here, dq), ddq, np.zeros(here.T))), f
 
 
-def compiled(line: Started, batch: tuple[int, ...]) -> Compiled | None:
-    """All positions of a call by the kernel; None where it does not serve: no library, or no certificate.
+def compiled(line: Started, batch: tuple[int, ...], starts: Starts | None = None) -> Compiled | None:
+    """All positions of a call, or of all its variants, by the kernel; None where it does not serve: no library, or no certificate.
 
     Raises
     ------
@@ -80,18 +93,21 @@ def compiled(line: Started, batch: tuple[int, ...]) -> Compiled | None:
     library = build.built() if asked else build.installed()
     if library is None:
         return None
-    why = cannot(line)
-    if why is not None:
+    if (why := cannot(line)) is not None:
         if asked:
-            raise DeclarationError(
-                f"solve {line.m.name!r}", [f"engine 'compiled' does not serve: {why}. Use engine='auto'"]
-            )
+            text = f"engine 'compiled' does not serve: {why}. Use engine='auto'"
+            raise DeclarationError(f"solve {line.m.name!r}", [text])
         return None
-    kernel, forces = _kernel(line, library)
+    if starts is None:
+        kernel, forces = _kernel(line, library)
+        x, starts = line.x[:, None], Starts(line.x[:, None], line.system.cases, line.m.loads)
+    else:
+        x = np.tile(starts.x, starts.sharing)
+        kernel, forces = _filled(line, library, starts.system_of(np.arange(x.shape[1])), x, starts.loads)
     q, v, a = (np.ascontiguousarray(line.values(kind, batch).T) for kind in ("position", "velocity", "acceleration"))
-    begin = line.x[line.system.single_rows[line.columns]]
-    records = kernel.follow(begin, q, v, a, batch, forces)
-    return None if records is None else Compiled(line, batch, records, forces)
+    begin = x[line.system.single_rows[line.columns]]
+    records, whole = kernel.follow(begin, q, v, a, batch, forces)
+    return Compiled(line, starts, batch, records, whole, forces) if whole.mean() > SERVES else None
 
 
 def _kernel(line: Started, library: Any) -> tuple[Kernel, bool]:
@@ -101,15 +117,22 @@ def _kernel(line: Started, library: Any) -> tuple[Kernel, bool]:
     """
     key, kept = (line.columns.tobytes(), gives_forces(line)), line.start.solvers
     known = kept.get(COMPILED)
-    if known is None or known[0] != key or len(known[1]) != len(line.m.loads) or any(map(is_not, known[1], line.m.loads)):
-        found = _layout(line)
-        assert isinstance(found, Layout)
-        filled = tables(found, line.system, line.x, line.m.loads) if key[1] else None
-        forces = filled is not None
-        filled = filled or tables(found, line.system, line.x, None)
-        assert filled is not None
-        kept[COMPILED] = known = key, line.m.loads, Kernel(library, found, *filled), forces
-    return known[2], known[3]
+    loads = line.m.loads
+    if known is None or known[0] != key or len(known[1]) != len(loads) or any(map(is_not, known[1], loads)):
+        kept[COMPILED] = known = key, loads, _filled(line, library, line.system, line.x[:, None], loads)
+    found: tuple[Kernel, bool] = known[2]
+    return found
+
+
+def _filled(line: Started, library: Any, system: System, x: Array, loads: tuple[Load, ...]) -> tuple[Kernel, bool]:
+    """The tables of all variants at their starts ``x (nx, B)`` with the library, and whether they give the forces."""
+    found = _layout(line)
+    assert isinstance(found, Layout)
+    filled = tables(found, system, x, loads) if gives_forces(line) else None
+    forces = filled is not None
+    filled = filled or tables(found, system, x, None)
+    assert filled is not None
+    return Kernel(library, found, *filled), forces
 
 
 def _layout(line: Started) -> Layout | str:

@@ -251,7 +251,9 @@ def solve(
         moments about the pair points, L the mean radius of the mechanism. That is one assumption of many: every pair as stiff as every
         other, links rigid, nothing strained at assembly. It is the same in any unit and frame.
     on_reach : ``"raise"`` or ``"flag"`` (NaN rows, see ``Solution.status``).
-    engine : ``"dense"`` or ``"sparse"`` linear algebra, or ``"auto"``: the faster one for the size. The values are the same.
+    engine : ``"dense"`` or ``"sparse"`` linear algebra of numpy, ``"compiled"``: the kernel in C, built at first use, a state at a time; or
+        ``"auto"``: the kernel where it was installed or built before and serves, else the faster one for the size. The values are the
+        same. What the kernel refuses on a path (a change point, a dead point, an end of the reach near by) numpy follows.
     tol : accuracy to which directions (radians) and distances (over L, the mean radius) are meant; left out, that of the mechanism, or
         exact. What is solved is ``m.snapped(tol)``; ``checks.closure`` is that of the geometry as declared, and a position at which it
         exceeds ``tol`` is not solved (status "beyond tolerance").

@@ -191,7 +191,7 @@ class Pipeline:
     def run(self, starts: Starts | None = None, batch: tuple[int, ...] | None = None) -> Outcome:
         """All positions, rates and forces as a trajectory."""
         batch = self.drive.batch if batch is None else batch
-        if starts is None and (done := compiled(self, batch)) is not None:
+        if (done := compiled(self, batch, starts)) is not None:
             return done
         start = None if starts else self.start
         starts = starts or Starts(self.x[:, None], self.system.cases, self.m.loads)

@@ -24,6 +24,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     """``--update-golden`` writes the golden files anew; look at the difference before you keep it."""
     parser.addoption("--update-golden", action="store_true", help="write the files of tests/golden anew")
     parser.addoption(
+        "--kernel", action="store_true", help="all tests on the compiled kernel, where it was installed or built"
+    )
+    parser.addoption(
         "--attack", type=int, default=0, metavar="N", help="so many seeds more for every test of random mechanisms"
     )
 
@@ -67,9 +70,23 @@ def start_sets(tmp_path_factory: pytest.TempPathFactory) -> None:
     os.environ["MECHGRAPH_CACHE"] = str(tmp_path_factory.mktemp("start_sets"))
 
 
+@pytest.fixture(autouse=True)
+def engine_of_numpy(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """``auto`` takes numpy, whatever was built before, unless a test asks for the kernel, or ``--kernel`` for all of them."""
+    if "compiled" not in request.fixturenames and not request.config.getoption("--kernel"):
+        monkeypatch.setattr(build, "installed", lambda: None)
+
+
+@pytest.fixture(scope="session")
+def kernel_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where tests of the kernel build it: not where programs that other tests start would find it."""
+    return tmp_path_factory.mktemp("kernel")
+
+
 @pytest.fixture
-def compiled() -> None:
+def compiled(kernel_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What a test of the compiled kernel asks for: where no C compiler is, it is skipped, and where CI is set it fails."""
+    monkeypatch.setenv("MECHGRAPH_CACHE", str(kernel_cache))
     if build.installed() is None and not compiler.compilers():
         (pytest.fail if CI else pytest.skip)("no C compiler here: pip install 'mechgraph[fast]' brings one")
 

@@ -4,6 +4,7 @@ import ctypes
 
 import numpy as np
 import pytest
+import scipy
 from attack import (
     conditions,
     differences,
@@ -174,14 +175,16 @@ def test_loads_that_are_numbers(name):
     assert agreed(m, swing(m)) == "compiled"
     line = Pipeline(DriverMotion(m, swing(m)), Options())
     known = tables.layout(line.system, line.columns, np.zeros(0, dtype=np.intp))
-    assert tables.tables(known, line.system, line.x, m.loads) is not None
+    assert tables.tables(known, line.system, line.x[:, None], m.loads) is not None
 
 
 def test_other_loads_on_the_same_start():
     """Tables are kept with a start, which mechanisms under other loads share."""
     m = mg.load("four-bar")
     for load in (mg.Effort("D", 1.0), mg.Effort("D", 3.0), mg.Gravity((0, -5.0, 0))):
-        one, other = (mg.solve(m, {"A": [0.1, 0.2]}, loads=[load], engine=engine)["A"].effort for engine in ("compiled", "dense"))
+        one, other = (
+            mg.solve(m, {"A": [0.1, 0.2]}, loads=[load], engine=engine)["A"].effort for engine in ("compiled", "dense")
+        )
         np.testing.assert_allclose(one, other, rtol=1e-10)
 
 
@@ -254,7 +257,7 @@ def test_record_and_tables_have_the_layout_of_the_library():
     m = mg.load("rcsr-csr")
     line = Pipeline(DriverMotion(m, swing(m)), Options())
     known = tables.layout(line.system, line.columns, np.zeros(0, dtype=np.intp))
-    I, P = tables.tables(known, line.system, line.x, m.loads)
+    I, (P,) = tables.tables(known, line.system, line.x[:, None], m.loads)
     places = (ctypes.c_int * (len(tables.PARTS) + 1))()
     build.built().mgk_record(ctypes.c_void_p(I.ctypes.data), places)
     assert list(places) == [known.places[name].start for name in tables.PARTS] + [known.record]
@@ -266,7 +269,7 @@ def test_a_state_that_stays_hot():
     m = mg.load("rcsr-csr")
     line = Pipeline(DriverMotion(m, swing(m)), Options())
     known = tables.layout(line.system, line.columns, np.zeros(0, dtype=np.intp))
-    I, P = tables.tables(known, line.system, line.x, m.loads)
+    I, (P,) = tables.tables(known, line.system, line.x[:, None], m.loads)
     library = build.built()
     state = np.empty(ctypes.c_size_t(library.mgk_state_size(pointer(I))).value // 8 + 1)
     assert library.mgk_start(pointer(I), pointer(P), pointer(state)) == 0
@@ -286,3 +289,17 @@ def test_a_state_that_stays_hot():
             reaction, [s[p.name].reaction[i] for p in m.pairs], atol=1e-10 * np.abs(reaction).max()
         )
         np.testing.assert_allclose(position, np.concatenate([s[p.name].position[i] for p in m.pairs]), atol=1e-10)
+
+
+@pytest.mark.parametrize("fields", [("length[0]", "twist[3]", "link2.mass"), ("link1.mass", "link3.mass")])
+def test_studies(fields):
+    """Variants that differ in geometry, or in masses alone."""
+    m = mg.load("rcsr")
+    given = {"O1": mg.Motion(np.deg2rad([150.0, 170.0, 200.0]), 0.1, 0.2)}
+    nominal = {"length[0]": 0.5, "twist[3]": np.deg2rad(15), "link1.mass": 2.0, "link2.mass": 5.0, "link3.mass": 5.0}
+    ways = {name: scipy.stats.uniform(0.99 * nominal[name], 0.02 * nominal[name]) for name in fields}
+    names = ["O1.effort", "O3.force", "O4.position"]
+    one, other = (mg.study(m, ways, names, n=6, seed=1, motions=given, engine=e) for e in ("compiled", "dense"))
+    assert not one.failed.any()
+    for name in names:
+        np.testing.assert_allclose(one.outputs[name], other.outputs[name], rtol=1e-9, atol=1e-9)

@@ -334,7 +334,7 @@ class Compiled:
         while done < 1.0:
             part, kept = min(1.0, done + step), [array.copy() for array in arrays]
             values = {name: (1.0 - part) * begin[name] + part * goal[name] for name in goal}
-            self.P[:] = self.tables.numbers(values)
+            self.P[:] = self.tables.numbers(values)[0]
             status = self._closed(self.home, self.tables.home) or self._closed(self.state, self._drives())
             if not status:
                 done = part

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array
+from mechgraph.algebra.se3 import Array, rotate
 from mechgraph.closure.indexing import System
 from mechgraph.model.force_law import Damper, Spring, TorsionSpring
 from mechgraph.model.load import Effort, Gravity, Wrench
@@ -21,20 +21,21 @@ WEIGHT, WRENCH, EFFORT, LAW, BETWEEN = range(5)
 
 @dataclass
 class Acting:
-    """Loads in the tables: kind, two numbers and the place of the numbers of each, and the numbers."""
+    """Loads in the tables: kind, two numbers and the place of the numbers of each, and the numbers, one row each: ``(1,)`` or ``(B,)``."""
 
     entries: list[tuple[int, int, int, int]]
-    numbers: list[float]
+    numbers: list[Array]
 
-    def add(self, kind: int, i: int, j: int, *numbers: Any) -> None:
-        """One load."""
+    def add(self, kind: int, i: int, j: int, *numbers: Array) -> None:
+        """One load; ``numbers (n, B)``."""
         self.entries.append((kind, i, j, len(self.numbers)))
-        self.numbers += np.concatenate([np.atleast_1d(part) for part in numbers]).tolist()
+        for part in numbers:
+            self.numbers += list(part)
 
 
 @dataclass(frozen=True)
 class _Places:
-    """Where loads act: a system, and the poses ``own (3, 4, N)`` of the link frames in those of the tables."""
+    """Where loads act: a system, and the poses ``own (3, 4, N, B)`` of the link frames in those of the tables."""
 
     system: System
     own: Array
@@ -49,11 +50,15 @@ class _Places:
         return self.system.m.link_index[name]
 
     def point(self, link: str, p: Any) -> Array:
-        """A material point, given in the link's frame or by its name; the mass centre where it is None."""
+        """A material point ``(3, B)``, given in the link's frame or by its name; the mass centre where it is None."""
         i, par = self.link(link), self.system.par
         given = self.system.m.links[i].point(p) if isinstance(p, str) else p
-        local = par.center[:, i, 0] if given is None else (np.asarray(given, dtype=float) - par.offset[:, i]) / self.L
-        return np.asarray(self.own[:, :3, i] @ local + self.own[:, 3, i])
+        local = par.center[:, i] if given is None else (rows(given, 3) - par.offset[:, i, None]) / self.L
+        return self.turned(link, local) + self.own[:, 3, i]
+
+    def turned(self, link: str, v: Array) -> Array:
+        """A vector ``(3, B)`` in the frame of a link, in that of the tables."""
+        return rotate(self.own[:, :3, self.link(link)], v)
 
     def column(self, freedom: str) -> tuple[int, bool]:
         """Number of a freedom, and whether it is a slide."""
@@ -63,7 +68,10 @@ class _Places:
 
 
 def acting(system: System, own: Array, loads: Sequence[Load]) -> Acting | None:
-    """All loads in the tables; None where one of them varies over the positions or is a function."""
+    """All loads in the tables; None where one of them varies over the positions or is a function.
+
+    ``own (3, 4, N, B)``: poses of the link frames in those of the tables.
+    """
     out, places = Acting([], []), _Places(system, own)
     for load in loads:
         put = KINDS.get(type(load))
@@ -74,32 +82,41 @@ def acting(system: System, own: Array, loads: Sequence[Load]) -> Acting | None:
 
 
 def _varies(load: Load) -> bool:
-    """Whether a field is a function, or an array over positions or cases."""
+    """Whether a field is a function, or an array over positions."""
     values = [getattr(load, name) for name in load.formats]
-    return bool(load.over_positions) or any(callable(value) or isinstance(value, PerCase) for value in values)
+    given = [name for name in load.over_positions if not isinstance(getattr(load, name), PerCase)]
+    return bool(given) or any(callable(value) for value in values)
+
+
+def rows(value: Any, width: int = 1) -> Array:
+    """A number or vector as ``(width, 1)``; one that varies from case to case ``(width, B)``."""
+    if isinstance(value, PerCase):
+        return value.values.reshape(len(value.values), width).T
+    return np.asarray(value, dtype=float).reshape(width, 1)
 
 
 def _weight(places: _Places, load: Any, out: Acting) -> None:
-    out.add(WEIGHT, 0, 0, np.asarray(load.acceleration, dtype=float) / places.L)
+    out.add(WEIGHT, 0, 0, rows(load.acceleration, 3) / places.L)
 
 
 def _wrench(places: _Places, load: Any, out: Acting) -> None:
     i = places.link(load.link)
-    force, moment = (np.zeros(3) if v is None else np.asarray(v, dtype=float) for v in (load.force, load.moment))
+    force, moment = (np.zeros((3, 1)) if v is None else rows(v, 3) for v in (load.force, load.moment))
     turning = load.frame == "link"
     if turning:
-        force, moment = (places.own[:, :3, i] @ part for part in (force, moment))
-    at = np.zeros(3) if load.force is None else places.point(load.link, load.point)
+        force, moment = (places.turned(load.link, part) for part in (force, moment))
+    at = np.zeros((3, 1)) if load.force is None else places.point(load.link, load.point)
     out.add(WRENCH, i, int(turning), force / places.L, moment / places.L**2, at)
 
 
 def _effort(places: _Places, load: Any, out: Acting) -> None:
     column, slides = places.column(load.freedom)
-    out.add(EFFORT, column, 0, float(load.value) / places.L ** (1 if slides else 2))
+    out.add(EFFORT, column, 0, rows(load.value) / places.L ** (1 if slides else 2))
 
 
-def _law(places: _Places, load: Any, out: Acting, stiffness: float, rest: float, damping: float) -> None:
+def _law(places: _Places, load: Any, out: Acting, *law: Any) -> None:
     """``F = -stiffness (x - rest) - damping x'`` in a freedom or between points."""
+    stiffness, rest, damping = map(rows, law)
     if load.in_freedom is not None:
         column, slides = places.column(load.in_freedom)
         unit = 1.0 if slides else places.L**-2

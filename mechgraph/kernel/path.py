@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.kernel.tables import Integers, Layout
@@ -42,24 +43,29 @@ class Kernel:
 
     def follow(
         self, begin: Array, q: Array, v: Array, a: Array, batch: tuple[int, ...], forces: bool
-    ) -> Records | None:
-        """Positions, velocities and accelerations of the drives ``(T, d)`` of a batch, from their values ``begin (d,)`` at the start.
+    ) -> tuple[Records, NDArray[np.bool_]]:
+        """Positions, velocities and accelerations of the drives ``(T, d)`` of a batch, from their values ``begin (d, B)`` at the starts
+        of all variants, which share the positions equally.
 
-        None where a step is not certified, or a position lies where the kernel decides nothing.
+        With the records: which variants ``(B,)`` are whole. Another one has a step that is not certified, or a position at which the
+        kernel decides nothing.
         """
-        size = ctypes.c_size_t(self.library.mgk_state_size(pointer(self.I))).value
-        state = np.empty(size // 8 + 1)
+        count, each = begin.shape[1], len(q) // begin.shape[1]
+        state = np.empty(ctypes.c_size_t(self.library.mgk_state_size(pointer(self.I))).value // 8 + 1)
         values, largest = np.full((len(q), self.layout.record), np.nan), np.zeros(2)
-        done, work = ctypes.c_int(), np.zeros(3, dtype=ctypes.c_long)
-        for order in _orders(begin, q, batch):
-            status = self.library.mgk_path(
-                pointer(self.I), pointer(self.P), pointer(state), ctypes.c_int(len(order)), pointer(order),
-                pointer(q), pointer(v), pointer(a), ctypes.c_int(forces), pointer(values), pointer(largest),
-                ctypes.byref(done), pointer(work),
-            )  # fmt: skip
-            if status:
-                return None
-        return Records(self.layout, values, largest, (int(work[0]), int(work[1]), int(work[2])))
+        done, work, whole = ctypes.c_int(), np.zeros(3, dtype=ctypes.c_long), np.ones(count, dtype=bool)
+        I, memory, most, told = (pointer(array) for array in (self.I, state, largest, work))
+        for i in range(count):
+            mine = slice(i * each, (i + 1) * each)
+            moves = [pointer(array[mine]) for array in (q, v, a)]
+            for order in _orders(begin[:, i], q[mine], batch):
+                whole[i] &= not self.library.mgk_path(
+                    I, pointer(self.P[i]), memory, ctypes.c_int(len(order)), pointer(order), *moves, ctypes.c_int(forces),
+                    pointer(values[mine]), most, ctypes.byref(done), told,
+                )  # fmt: skip
+                if not whole[i]:
+                    break
+        return Records(self.layout, values, largest, (int(work[0]), int(work[1]), int(work[2]))), whole
 
 
 def pointer(array: Array | Integers) -> ctypes.c_void_p:

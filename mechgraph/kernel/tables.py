@@ -221,40 +221,54 @@ def _record(s: System, unknowns: int) -> tuple[dict[str, slice], dict[str, tuple
 
 
 def tables(known: Layout, system: System, x: Array, loads: Sequence[Load] | None) -> tuple[Integers, Array] | None:
-    """The tables of a mechanism at a start ``x (nx,)`` under loads (None: motion alone); None where a load is no number of the tables."""
+    """The tables of a mechanism: ``I``, and ``P (B, numbers)`` of all variants at their starts ``x (nx, B)``.
+
+    Under loads (None: motion alone); None where a load is no number of the tables.
+    """
     s, par = system, system.par
-    constants = s.numbers.constants[..., 0]
+    constants, count = s.numbers.constants, x.shape[1]
     base = constants[:, :, known.side]
     own = inverse(base)
     a, b = known.ends
     P = len(s.m.pairs)
     A, B = (compose(own[:, :, link], constants[:, :, 1 + i * P : 1 + (i + 1) * P]) for i, link in enumerate((a, b)))
-    pitch = par.pitch[:, 0]
     effort = s.effort_table
-    moment = effort.free + effort.per_pitch * pitch[effort.pairs]
-    center = rotate(own[:, :3], par.center[..., 0]) + own[:, 3]
+    moment = effort.free[..., None] + effort.per_pitch[..., None] * par.pitch[effort.pairs]
+    force = np.broadcast_to(effort.bound[..., None], moment.shape)
+    center = rotate(own[:, :3], par.center) + own[:, 3]
     R = base[:, :3]
-    turned = np.einsum("jin,jkn,kln->iln", R, par.inertia[..., 0], R)
+    turned = np.einsum("jinb,jknb,klnb->ilnb", R, par.inertia, R)
     inertia = turned[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     acts: Acting | None = Acting([], []) if loads is None else acting(s, own, loads)
     if acts is None:
         return None
     rows = _coupling_rows(s)
-    terms = [row.coefficients[:, 0] for row in rows]
-    numbers = [
-        [par.L], par.origin, x, s.start_coordinates(s.m.start), par.frame[..., 0].ravel(), _flat(A), _flat(B),
-        known.constant + known.per_pitch * pitch[known.pair], np.concatenate([moment, effort.bound]).T.ravel(), par.mass[:, 0],
-        center.T.ravel(), inertia.T.ravel(), _flat(own), *terms, *(row.constant[:, 0] for row in rows), acts.numbers,
+    parts = [
+        np.full((1, 1), par.L), par.origin[:, None], x, s.start_coordinates(s.m.start)[:, None], par.frame.reshape(12, 1),
+        _flat(A), _flat(B), known.constant[:, None] + known.per_pitch[:, None] * par.pitch[known.pair],
+        _by_item(np.concatenate([moment, force])), par.mass, _by_item(center), _by_item(inertia), _flat(own),
+        *(row.coefficients for row in rows), *(row.constant for row in rows), *acts.numbers,
     ]  # fmt: skip
     I = np.concatenate([known.I, np.array(acts.entries, dtype=np.int32).ravel()])
     I[HEAD_LOADS], I[HEAD_LOAD_NUMBERS] = len(acts.entries), len(acts.numbers)
-    return I, np.concatenate([np.asarray(part, dtype=float) for part in numbers])
+    parts = [np.atleast_2d(part) for part in parts]
+    out = np.empty((count, sum(map(len, parts))))
+    at = 0
+    for part in parts:
+        out[:, at : at + len(part)] = part.T
+        at += len(part)
+    return I, out
 
 
 HEAD_LOADS, HEAD_LOAD_NUMBERS = 12, 15
 """Places of the numbers of loads in the head."""
 
 
+def _by_item(values: Array) -> Array:
+    """Vectors ``(k, n, B)`` one after the other, ``(n k, B)``."""
+    return values.swapaxes(0, 1).reshape(-1, values.shape[-1])
+
+
 def _flat(poses: Array) -> Array:
-    """Poses ``(3, 4, n)`` one after the other, by rows."""
-    return np.moveaxis(poses, -1, 0).ravel()
+    """Poses ``(3, 4, n, B)`` one after the other, by rows."""
+    return poses.transpose(2, 0, 1, 3).reshape(-1, poses.shape[-1])

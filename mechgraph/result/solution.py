@@ -145,7 +145,7 @@ class Solution(Shown):
 
     @property
     def engine(self) -> str:
-        """Which engine ran, ``"dense"`` or ``"sparse"`` matrices; the values are the same."""
+        """Which engine ran, ``"dense"`` or ``"sparse"`` matrices, or the kernel, ``"compiled"``; the values are the same."""
         return self._values.engine
 
     @property

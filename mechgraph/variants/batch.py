@@ -72,10 +72,12 @@ class NumbersPath(DriverPath):
     def lead(self, x: Array, valid: Mask) -> Tracks:
         """The ``valid`` variants from states ``x (nx, V)`` of the mechanism itself, in one step where the numbers change by little."""
         V = x.shape[1]
-        begin, end = (Configuration(self.system_at(np.full(V, part), np.arange(V)), x).residual for part in (0.0, 1.0))
-        way = np.nan_to_num(np.abs(end - begin).max(axis=0, initial=0.0))
+        here, there = (Configuration(self.system_at(np.full(V, part), np.arange(V)), x) for part in (0.0, 1.0))
+        way = np.nan_to_num(np.abs(there.residual - here.residual).max(axis=0, initial=0.0))
+        form = self.solver.chosen(here.part(np.arange(1)), np.full(1, -1))  # all begin in the mechanism itself
         self._step = NUMBERS_STEP / np.where(way > 0, np.clip(way, NUMBERS_STEP / LONGEST_STEP, 1.0), 1.0)
-        return Follower(self, leads=False).follow(x, Paths([np.array([[0.0, float(ok)]]) for ok in valid]), first=1.0)
+        paths = Paths([np.array([[0.0, float(ok)]]) for ok in valid])
+        return Follower(self, leads=False).follow(x, paths, first=1.0, which=np.repeat(form, V))
 
 
 NUMBERS_STEP = 1e-7

@@ -14,7 +14,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.arguments import option_faults
 from mechgraph.closure.driver_motion import Motions, actuators, driven
-from mechgraph.closure.solver import ENGINES, EngineName
+from mechgraph.closure.solver import MOTION_ENGINES, MotionEngineName
 from mechgraph.errors import DeclarationError, MechgraphWarning
 from mechgraph.force.dalembert import METHODS, MethodName
 from mechgraph.kinetostatics import REDUNDANT, RedundantName
@@ -58,7 +58,7 @@ def study(
     executor: concurrent.futures.Executor | None = None,
     method: MethodName = "loop_wrench",
     redundant: RedundantName = "nan",
-    engine: EngineName = "auto",
+    engine: MotionEngineName = "auto",
     tol: float | None = None,
     progress: Progress | None = None,
 ) -> Study:
@@ -98,7 +98,7 @@ def study(
         "sampling": (sampling, SAMPLINGS),
         "method": (method, METHODS),
         "redundant": (redundant, REDUNDANT),
-        "engine": (engine, ENGINES),
+        "engine": (engine, MOTION_ENGINES),
     }
     faults = _argument_faults(m, n, seed, executor, progress, named)
     if not ways:

@@ -13,7 +13,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.call import Options
 from mechgraph.closure.driver_motion import Motions
 from mechgraph.closure.driver_path import Status
-from mechgraph.closure.solver import EngineName
+from mechgraph.closure.solver import MotionEngineName
 from mechgraph.errors import DeclarationError, MechgraphError
 from mechgraph.force.dalembert import MethodName
 from mechgraph.kinetostatics import RedundantName, solve_quietly
@@ -115,7 +115,7 @@ class Task:
     outputs: Mapping[str, Output]
     method: MethodName
     redundant: RedundantName
-    engine: EngineName
+    engine: MotionEngineName
     actuate: tuple[str, ...] | None = None
 
 
