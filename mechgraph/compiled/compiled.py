@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array
+from mechgraph.algebra.se3 import Array, turn_tangent
 from mechgraph.compiled.tabled import STATUSES, Tabled, tabled
 from mechgraph.compiled.write import write_tables
 from mechgraph.errors import DeclarationError, listed
@@ -22,9 +22,7 @@ from mechgraph.quantities import real_array, wrong
 WORDS = np.array([word for _, word, _ in STATUSES])
 START = 4
 """Place of the start in the table of numbers, see ``kernel.h``."""
-SMALL_TURN = 1e-4
-"""Angle below which the series of dexp^-1 has only its first terms."""
-HALVINGS = 12
+PARTINGS = 12
 """Halvings of a change of parameters, until the loops are closed by small corrections."""
 
 
@@ -120,17 +118,6 @@ class _Room:
         for name in ("motion", "effort", "reaction", "position", "poses", "status"):
             getattr(out, name)[:] = getattr(self, name)
         return out
-
-
-def turn_rate(v: Array, w: Array) -> Array:
-    """The rate ``(3,)`` of a rotation vector ``v (3,)`` where the rotation turns at ``w (3,)``, in the frame before it (dexp^-1)."""
-    angle = float(np.sqrt(v @ v))
-    if angle < SMALL_TURN:
-        part = 1.0 / 12.0
-    else:
-        part = (1.0 - 0.5 * angle / np.tan(0.5 * angle)) / angle**2
-    once = np.cross(v, w)
-    return np.asarray(w - 0.5 * once + part * np.cross(v, once))
 
 
 class Compiled:
@@ -302,7 +289,7 @@ class Compiled:
         if _functions().mgk_derivative(*known, len(dP), *rest):
             return [np.full_like(part, np.nan) for part in out]
         for g in t.rotations:
-            out[2][g] = turn_rate(room.position[-1, g], out[2][g])
+            out[2][g] = turn_tangent(room.position[-1, g], out[2][g])
         return out
 
     def write(self, path: str | os.PathLike[str], name: str | None = None) -> None:
@@ -340,7 +327,7 @@ class Compiled:
                 done = part
                 continue
             step *= 0.5
-            failed = step < 0.5**HALVINGS
+            failed = step < 0.5**PARTINGS
             for array, old in zip(arrays, before if failed else kept, strict=True):
                 array[:] = old
             if failed:

@@ -42,11 +42,11 @@ STATUSES = (
     ("FORMAT_ERROR", "other tables", "tables of another version"),
 )
 """What the kernel returns, by its number: identifier, word, meaning."""
-REACH = 0.02
+TABLE_CHANGE = 0.02
 """Change of the tables over which their derivatives are taken, relative: where differences of order 8 are exact to rounding."""
-DIFFERENCES = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
+ORDER_8 = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
 """Central differences of order 8, see B. Fornberg, Mathematics of Computation 51 (1988) 699-706, table 1."""
-FIRST, PROBES = 1e-3, 8
+FIRST_CHANGE, STEPS_TRIED = 1e-3, 8
 """First step that is tried, as a part of the number; steps tried at most."""
 
 
@@ -132,16 +132,16 @@ class Tabled:
     def derivative(self, values: Mapping[str, float], name: str) -> Array:
         """How ``P`` changes with one number."""
         middle = values[name]
-        step, here = FIRST * (abs(middle) or 1.0), self.numbers(values)[0]
-        for _ in range(PROBES):
+        step, here = FIRST_CHANGE * (abs(middle) or 1.0), self.numbers(values)[0]
+        for _ in range(STEPS_TRIED):
             there = self.numbers({**values, name: middle + step})[0]
             change = float((np.abs(there - here) / np.maximum(np.abs(here), 1.0)).max())
-            if 0.25 * REACH <= change <= REACH or not change:
+            if 0.25 * TABLE_CHANGE <= change <= TABLE_CHANGE or not change:
                 break
-            step *= 0.5 * REACH / change
-        k = np.arange(1, len(DIFFERENCES) + 1)
+            step *= 0.5 * TABLE_CHANGE / change
+        k = np.arange(1, len(ORDER_8) + 1)
         ahead, behind = (self.numbers({**values, name: middle + sense * step * k}) for sense in (1.0, -1.0))
-        return np.asarray(np.array(DIFFERENCES) @ (ahead - behind) / step)
+        return np.asarray(np.array(ORDER_8) @ (ahead - behind) / step)
 
     def poses(self, internal: Array) -> Array:
         """Poses ``(..., 4, 4)`` of the declared link frames from internal ones ``(..., N, 3, 4)``."""
