@@ -17,7 +17,7 @@ from mechgraph.compiled.write import write_tables
 from mechgraph.errors import DeclarationError, listed
 from mechgraph.kernel import build
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.quantities import real_array, wrong
+from mechgraph.quantities import has_quantity, real_array, without_units, wrong
 
 WORDS = np.array([word for _, word, _ in STATUSES])
 START = 4
@@ -192,12 +192,8 @@ class Compiled:
 
     def _read(self, q: Any, velocity: Any, acceleration: Any) -> tuple[_Room, bool]:
         """The motion in a room for it; whether it is one position."""
-        d, given = len(self.tables.drives), []
-        for name, value in (("q", q), ("velocity", velocity), ("acceleration", acceleration)):
-            found = real_array(value)
-            if found is None:
-                self._refuse(wrong(value, name, "numbers, in the units of the mechanism"))
-            given.append(found)
+        d = len(self.tables.drives)
+        given = [self._plain(*item) for item in enumerate((q, velocity, acceleration))]
         shape = given[0].shape
         single = shape == (d,) or (d == 1 and shape == ())
         if not single and (len(shape) != 2 or shape[1] != d):
@@ -212,6 +208,16 @@ class Compiled:
                 f"velocity and acceleration have the shapes {rates}; expected such as go with that of q, {shape}"
             )
         return room, single
+
+    def _plain(self, order: int, value: Any) -> Array:
+        """Coordinates of the drives (order 0), rates or accelerations as an array; quantities in the units of the mechanism."""
+        m, drives = self.tables.m, self.tables.drives
+        if has_quantity(value) and len({m.turns(name) for name in drives}) == 1:
+            value = without_units(value, (0 if m.turns(drives[0]) else 1, 0, -order), m.units)
+        found = real_array(value)
+        if found is None:
+            self._refuse(wrong(value, ("q", "velocity", "acceleration")[order], "numbers"))
+        return found
 
     def _refuse(self, fault: str) -> NoReturn:
         raise DeclarationError(f"compiled {self.tables.m.name!r}", [fault])
