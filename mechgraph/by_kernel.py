@@ -6,8 +6,9 @@ numpy, with all that it says of such positions.
 
 from __future__ import annotations
 
+from functools import partial
 from operator import is_not
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
@@ -25,10 +26,10 @@ from mechgraph.kernel.tables import Layout, layout, tables, why_not
 from mechgraph.model.contact import Contact
 from mechgraph.model.load_base import Load
 from mechgraph.numerics.newton import Work
-from mechgraph.outcome import Outcome
+from mechgraph.outcome import Outcome, system_at
 from mechgraph.result.kept import BlockMotion
 
-COMPILED = "compiled"
+COMPILED: Literal["compiled"] = "compiled"
 """Name of the engine."""
 SERVES = 0.8
 """Part of the variants of which the kernel must have solved more; the others are solved one by one."""
@@ -40,6 +41,11 @@ class Started(Call, Protocol):
     start: Configuration
     solver: ClosureSolver
     x: Any
+
+
+def at_hand() -> Any:
+    """The library that ``auto`` takes: installed, or built before on request; None where there is none."""
+    return build.installed()
 
 
 class Compiled(Outcome):
@@ -54,9 +60,8 @@ class Compiled(Outcome):
         self.records, self.solver = records, line.solver
         count = len(records.values)
         variant = np.arange(count) // (count // len(whole))
-        super().__init__(
-            line, starts.loads, batch, lambda places: starts.system_of(variant[places]), records["coordinates"]
-        )
+        at = partial(system_at, starts, variant)
+        super().__init__(line, starts.loads, batch, at, records["coordinates"])
         steps, evaluations, factorizations = records.work
         work = Work(positions=count, nodes=len(whole) + steps, evaluations=evaluations, factorizations=factorizations)
         self.trajectory.engine, self.trajectory.work = COMPILED, work
@@ -90,7 +95,7 @@ def compiled(line: Started, batch: tuple[int, ...], starts: Starts | None = None
     asked = line.options.engine == COMPILED
     if line.options.engine != "auto" and not asked:
         return None
-    library = build.built() if asked else build.installed()
+    library = build.built() if asked else at_hand()
     if library is None:
         return None
     if (why := cannot(line)) is not None:

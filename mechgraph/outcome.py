@@ -115,7 +115,7 @@ class Followed(Outcome):
         self.variant = variant
         q = continued(path, found)
         q = np.tile(q, starts.sharing) if starts.sharing > 1 else q
-        super().__init__(line, starts.loads, batch, partial(_system_at, starts, variant), q)
+        super().__init__(line, starts.loads, batch, partial(system_at, starts, variant), q)
         self._velocity, self._acceleration = (line.values(kind, batch) for kind in ("velocity", "acceleration"))
         work = found.work
         work.positions, work.nodes = len(variant), len(found.tracks.nodes)
@@ -228,6 +228,6 @@ class Followed(Outcome):
                 yield self._agreed(motion, at), factors
 
 
-def _system_at(starts: Starts, variant: Index, places: Index) -> System:
+def system_at(starts: Starts, variant: Index, places: Index) -> System:
     """The system with the numbers of the positions at flat places."""
     return starts.system_of(variant[places])

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from mechgraph import by_kernel
 from mechgraph.kernel import build, compiler
 
 settings.register_profile("dev", max_examples=25, deadline=None)
@@ -70,23 +71,24 @@ def start_sets(tmp_path_factory: pytest.TempPathFactory) -> None:
     os.environ["MECHGRAPH_CACHE"] = str(tmp_path_factory.mktemp("start_sets"))
 
 
-@pytest.fixture(autouse=True)
-def engine_of_numpy(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """``auto`` takes numpy, whatever was built before, unless a test asks for the kernel, or ``--kernel`` for all of them."""
-    if "compiled" not in request.fixturenames and not request.config.getoption("--kernel"):
-        monkeypatch.setattr(build, "installed", lambda: None)
-
-
 @pytest.fixture(scope="session")
 def kernel_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Where tests of the kernel build it: not where programs that other tests start would find it."""
     return tmp_path_factory.mktemp("kernel")
 
 
+@pytest.fixture(autouse=True)
+def engine_of_auto(request: pytest.FixtureRequest, kernel_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """``auto`` takes numpy, whatever was built before, unless a test asks for the kernel, or ``--kernel`` for all of them."""
+    if "compiled" in request.fixturenames:
+        monkeypatch.setenv("MECHGRAPH_CACHE", str(kernel_cache))
+    elif not request.config.getoption("--kernel"):
+        monkeypatch.setattr(by_kernel, "at_hand", lambda: None)
+
+
 @pytest.fixture
-def compiled(kernel_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def compiled() -> None:
     """What a test of the compiled kernel asks for: where no C compiler is, it is skipped, and where CI is set it fails."""
-    monkeypatch.setenv("MECHGRAPH_CACHE", str(kernel_cache))
     if build.installed() is None and not compiler.compilers():
         (pytest.fail if CI else pytest.skip)("no C compiler here: pip install 'mechgraph[fast]' brings one")
 

@@ -20,6 +20,7 @@ from mechanisms import Z, hexapod
 from strategies import closed_mechanism, motions, with_drives, with_loads
 
 import mechgraph as mg
+from mechgraph import by_kernel
 from mechgraph.call import Options
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.kernel import build, tables
@@ -230,7 +231,7 @@ def test_what_it_cannot_carry_is_named(name, why):
 
 def test_auto_is_numpy_where_no_library_is(monkeypatch):
     m = mg.load("four-bar")
-    monkeypatch.setattr(build, "installed", lambda: None)
+    monkeypatch.setattr(by_kernel, "at_hand", lambda: None)
     assert mg.solve(m, swing(m)).engine == "dense"
 
 
@@ -260,7 +261,7 @@ def test_record_and_tables_have_the_layout_of_the_library():
     I, (P,) = tables.tables(known, line.system, line.x[:, None], m.loads)
     places = (ctypes.c_int * (len(tables.PARTS) + 1))()
     build.built().mgk_record(ctypes.c_void_p(I.ctypes.data), places)
-    assert list(places) == [known.places[name].start for name in tables.PARTS] + [known.record]
+    assert list(places) == [known.places[name].start for name in tables.PARTS] + [known.record(True)]
     assert P[0] == line.system.par.L
 
 

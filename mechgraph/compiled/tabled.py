@@ -123,6 +123,9 @@ class Tabled:
         variants = varied(self.m, {name: self.fields[name] for name in values}, rows)
         for i in np.flatnonzero(~variants.valid()):
             variants.one(int(i))  # says why
+            raise DeclarationError(
+                f"parameters of {self.m.name!r}", [f"no mechanism has these numbers: {listed(values)}"]
+            )
         par = self.system.par
         system = System(self.m, self.system.graph, variants.numbers.parameters(self.m, par.offset, par.origin, par.L))
         found = tables(self.layout, system, np.tile(self.x[:, None], rows.shape[1]), variants.loads)

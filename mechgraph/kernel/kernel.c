@@ -69,6 +69,7 @@ typedef struct {
 } Work;
 
 static void read_tables(const int *I, const double *P, Model *m) {
+  *m = (Model){0};
   m->links = I[MGK_LINKS], m->pairs = I[MGK_PAIRS], m->factors = I[MGK_FACTORS], m->columns = I[MGK_COLUMNS];
   m->states = I[MGK_STATES], m->loops = I[MGK_LOOPS], m->steps = I[MGK_STEPS], m->couplings = I[MGK_COUPLINGS];
   m->terms = I[MGK_TERMS], m->drives = I[MGK_DRIVES], m->unknowns = I[MGK_UNKNOWNS], m->loads = I[MGK_LOADS];
@@ -987,14 +988,15 @@ static int certified(const Model *m, Work *w, double *grown) {
   const int n = m->unknowns;
   const Node *a = &w->a, *b = &w->b;
   const double third = (*b->at - *a->at) / 3.0;
-  FOR(i, n) FOR(j, n) {
-    double part[3] = {0};
+  double *whole = w->bound, *first = whole + n, *last = first + n;
+  FOR(i, n) {
+    memset(whole, 0, 3 * (size_t)n * sizeof(double));
     FOR(r, n) {
-      const int at = w->row[r] * n + j;
-      const double g = w->inverse[r * n + i], whole = b->matrix[at] - a->matrix[at];
-      part[0] += g * whole, part[1] += g * (whole - third * a->matrix_rate[at]), part[2] += g * third * b->matrix_rate[at];
+      const double g = w->inverse[r * n + i], *A = a->matrix + w->row[r] * n, *B = b->matrix + w->row[r] * n;
+      const double *from_a = a->matrix_rate + w->row[r] * n, *from_b = b->matrix_rate + w->row[r] * n;
+      FOR(j, n) whole[j] += g * (B[j] - A[j]), first[j] += g * from_a[j], last[j] += g * from_b[j];
     }
-    w->change[i * n + j] = size_of(part, 3);
+    FOR(j, n) w->change[i * n + j] = fmax(fabs(whole[j]), fmax(fabs(whole[j] - third * first[j]), third * fabs(last[j])));
   }
   const double departure = radius(w->change, n, w->bound);
   between(m, w, a, b, 0.5 * (*a->at + *b->at), w->trial);
@@ -1023,6 +1025,7 @@ typedef struct {
   const int *order, *places;
   const double *q, *v, *a;
   double *out, *largest;
+  size_t length;
 } Asked;
 
 static int at_place(const Asked *asked, int i) { return asked->order ? asked->order[i] : i; }
@@ -1035,8 +1038,7 @@ static int read_off(const Model *m, Work *w, Asked *asked, double at) {
   set_drives(m, w->x, asked->q + i * d);
   const int status = closed(m, w, w->x, NULL);
   if (status) return status;
-  return put(m, w, w->x, asked->v + i * d, asked->a + i * d, asked->with_forces, asked->places, asked->out + (size_t)i * asked->places[MGK_PARTS],
-             asked->largest);
+  return put(m, w, w->x, asked->v + i * d, asked->a + i * d, asked->with_forces, asked->places, asked->out + i * asked->length, asked->largest);
 }
 
 static void swapped(Node *p, Node *q) {
@@ -1170,7 +1172,7 @@ int mgk_path(const int *I, const double *P, void *state, int count, const int *o
   if (status) return status;
   opened(I, P, state, &m, &w);
   mgk_record(I, places);
-  Asked asked = {count, with_forces, 0, order, places, q, v, a, out, largest};
+  Asked asked = {count, with_forces, 0, order, places, q, v, a, out, largest, places[with_forces ? MGK_PARTS : MGK_POINTS]};
   status = along(&m, &w, &asked);
   *done = asked.done;
   work[0] += w.steps, work[1] += w.evaluations, work[2] += w.factorizations;
@@ -1194,7 +1196,7 @@ int mgk_solve(const int *I, const double *P, void *state, const double *q, const
     const double unit = m.is_length[m.drive[i]] ? L : 1.0;
     asked_of[i] = q[i] / unit, asked_of[d + i] = v[i] / unit, asked_of[2 * d + i] = a[i] / unit;
   }
-  Asked asked = {1, 1, 0, NULL, places, asked_of, asked_of + d, asked_of + 2 * d, record, largest};
+  Asked asked = {1, 1, 0, NULL, places, asked_of, asked_of + d, asked_of + 2 * d, record, largest, 0};
   memcpy(w.kept, w.x, w.n_kept * sizeof(double));
   const int status = along(&m, &w, &asked);
   if (status) {

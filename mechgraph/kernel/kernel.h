@@ -77,7 +77,7 @@ int mgk_solve(const int *I, const double *P, void *state, const double *q, const
               double *reaction, double *position);
 
 /* Positions q, v, a [n][drives] in internal units, taken in the order of order[count] (NULL: 0, 1, ...) along the polygon from the start.
- * A record a position in out[n][length]; forces are left out unless asked for. largest[2]: the largest wrench and power met so far, raised.
+ * A record a position in out[n][length], which ends before MGK_POINTS unless forces are asked for. largest[2]: the largest wrench and power met so far, raised.
  * done: how many positions of the order have come out; work[3]: steps, evaluations and factorizations, raised. */
 int mgk_path(const int *I, const double *P, void *state, int count, const int *order, const double *q, const double *v,
              const double *a, int forces, double *out, double *largest, int *done, long *work);

@@ -52,7 +52,7 @@ class Kernel:
         """
         count, each = begin.shape[1], len(q) // begin.shape[1]
         state = np.empty(ctypes.c_size_t(self.library.mgk_state_size(pointer(self.I))).value // 8 + 1)
-        values, largest = np.full((len(q), self.layout.record), np.nan), np.zeros(2)
+        values, largest = np.full((len(q), self.layout.record(forces)), np.nan), np.zeros(2)
         done, work, whole = ctypes.c_int(), np.zeros(3, dtype=ctypes.c_long), np.ones(count, dtype=bool)
         I, memory, most, told = (pointer(array) for array in (self.I, state, largest, work))
         for i in range(count):

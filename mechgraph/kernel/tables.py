@@ -63,10 +63,9 @@ class Layout:
     pair: Index
     ends: tuple[Index, Index]
 
-    @property
-    def record(self) -> int:
-        """Numbers of a record."""
-        return self.places[PARTS[-1]].stop
+    def record(self, forces: bool) -> int:
+        """Numbers of a record, with forces or of the motion alone."""
+        return self.places[PARTS[-1]].stop if forces else self.places["points"].start
 
 
 def why_not(system: System) -> str | None:
@@ -76,6 +75,9 @@ def why_not(system: System) -> str | None:
         if not all(isinstance(step, ConstantScrew | Rotation) for step in row.steps) or row.pushed:
             name = m.pairs[int(np.flatnonzero(system.type_of == number)[0])].name
             return f"pair {name!r} ({row.symbol}) travels along a curve or surface"
+        if not all(map(_keeps_its_line, row.freedoms)):
+            name = m.pairs[int(np.flatnonzero(system.type_of == number)[0])].name
+            return f"pair {name!r} ({row.symbol}) has a freedom whose axis moves with the pitch"
     rows = 6 * system.graph.n_loops + len(m.couplings)
     if rows > MOST_ROWS:
         return f"it has {rows} closure rows; expected at most {MOST_ROWS}"
@@ -110,15 +112,10 @@ def _steps(factor: Factor, rank: int) -> list[_Step]:
     return [_Step(POSE, rank, there), turn, _Step(POSE, rank, back)]
 
 
-def off_axis(system: System) -> str | None:
-    """A pair whose pitch moves the axis of a freedom sideways; None where there is none."""
-    for number, row in enumerate(system.types):
-        for freedom in row.freedoms:
-            line, per_pitch = np.array(freedom.twist[:3]), np.array(freedom.per_pitch)
-            if per_pitch[:3].any() or (per_pitch[3:] - line * (line @ per_pitch[3:])).any():
-                name = system.m.pairs[int(np.flatnonzero(system.type_of == number)[0])].name
-                return f"pair {name!r} ({row.symbol}) has a freedom whose axis moves with the pitch"
-    return None
+def _keeps_its_line(freedom: Freedom) -> bool:
+    """Whether the pitch of a pair enters along the axis of a freedom alone."""
+    line, per_pitch = np.array(freedom.twist[:3]), np.array(freedom.per_pitch)
+    return not per_pitch[:3].any() and not (per_pitch[3:] - line * (line @ per_pitch[3:])).any()
 
 
 def layout(system: System, drives: Index, held: Index) -> Layout:

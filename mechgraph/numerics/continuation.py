@@ -294,6 +294,8 @@ class Follower(Marching):
 
         They are the branch on which the track begins: what the singular point is and how the branch passes it is told by them.
         """
+        if not len(nodes):
+            return self._leads.get(track, nodes)
         if not self.leads or nodes.place[-1] > LEAD or nodes.place[0] < 0.0:
             return nodes
         if track not in self._leads:

@@ -57,7 +57,9 @@ KEPT = (
 class Records(Protocol):
     """All positions at once, by the names of what is kept."""
 
-    largest: Array
+    @property
+    def largest(self) -> Array:
+        """The largest wrench and power ``(2,)``."""
 
     def __contains__(self, name: str) -> bool:
         """Whether there is a part of that name."""
