@@ -105,6 +105,17 @@ def test_wrong_calls(arguments, said):
     np.testing.assert_array_equal(c(0.5), good)
 
 
+def test_quantities_are_converted():
+    pint = pytest.importorskip("pint")
+    u = pint.UnitRegistry()
+    c = mg.compile(mg.load("four-bar"))
+    plain = c(np.deg2rad(30.0), 2.0)
+    np.testing.assert_allclose(c(30.0 * u.degree, 2000.0 / u.second / 1000.0), plain, rtol=1e-12)
+    np.testing.assert_allclose(c(u.Quantity([30.0], "deg"), u.Quantity(360 / np.pi, "deg/s")), plain, rtol=1e-12)
+    with pytest.raises(mg.DeclarationError, match=r"q = .*m.*expected numbers"):
+        c(30.0 * u.meter)
+
+
 def test_unknown_names():
     c = mg.compile(mg.load("four-bar"))
     for wrong in (

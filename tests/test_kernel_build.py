@@ -23,11 +23,14 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(compiler, "INCLUDED", (header,))
     monkeypatch.setenv("MECHGRAPH_CACHE", str(tmp_path / "cache"))
     monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setattr(build, "installed", INSTALLED)
     build.installed.cache_clear()
     yield tmp_path / "cache" / "kernel"
-    build.installed.cache_clear()
+    INSTALLED.cache_clear()
 
 
+INSTALLED = build.installed
+"""As it is, whatever other tests put in its place."""
 REAL = {"SOURCES": compiler.SOURCES, "INCLUDED": compiler.INCLUDED}
 
 
@@ -45,7 +48,7 @@ def without_compilers(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
     monkeypatch.setattr(compiler.importlib.util, "find_spec", lambda name: None)
 
 
-def test_built_on_request_and_found_afterwards(cache, compiled, monkeypatch, tmp_path):
+def test_built_on_request_and_found_afterwards(compiled, cache, monkeypatch, tmp_path):
     assert build.installed() is None
     assert not cache.exists()
     assert build.built().answer() == 42
@@ -57,7 +60,7 @@ def test_built_on_request_and_found_afterwards(cache, compiled, monkeypatch, tmp
     assert build.built().answer() == 42
 
 
-def test_what_was_made_of_another_text_is_not_taken(cache, compiled, tmp_path):
+def test_what_was_made_of_another_text_is_not_taken(compiled, cache, tmp_path):
     build.built()
     build.installed.cache_clear()
     compiler.INCLUDED[0].write_text("int answer(void); /* newer */\n")
@@ -73,7 +76,7 @@ def test_without_a_compiler_the_extra_is_named(cache, monkeypatch, tmp_path):
         build.built()
 
 
-def test_a_compiler_that_fails_leaves_nothing_and_the_next_one_is_tried(cache, compiled, monkeypatch, tmp_path):
+def test_a_compiler_that_fails_leaves_nothing_and_the_next_one_is_tried(compiled, cache, monkeypatch, tmp_path):
     broken = scripted(tmp_path / "broken", "cc", "echo 'k.c:1: error: no such header' >&2; exit 1")
     with monkeypatch.context() as alone:
         alone.setenv("PATH", str(broken))
@@ -86,7 +89,7 @@ def test_a_compiler_that_fails_leaves_nothing_and_the_next_one_is_tried(cache, c
 
 
 @pytest.mark.parametrize("right", [stat.S_IWGRP, stat.S_IWOTH])
-def test_a_folder_that_others_may_write_is_refused(cache, compiled, right):
+def test_a_folder_that_others_may_write_is_refused(compiled, cache, right):
     build.built()
     build.installed.cache_clear()
     cache.chmod(0o700 | right)
@@ -95,7 +98,7 @@ def test_a_folder_that_others_may_write_is_refused(cache, compiled, right):
         build.built()
 
 
-def test_a_file_that_others_may_write_is_not_loaded_but_built_anew(cache, compiled):
+def test_a_file_that_others_may_write_is_not_loaded_but_built_anew(compiled, cache):
     build.built()
     (file,) = cache.iterdir()
     file.chmod(0o722)
@@ -105,7 +108,7 @@ def test_a_file_that_others_may_write_is_not_loaded_but_built_anew(cache, compil
     assert not build.doubt(file)
 
 
-def test_a_folder_that_others_may_exchange_is_refused(cache, compiled):
+def test_a_folder_that_others_may_exchange_is_refused(compiled, cache):
     build.built()
     build.installed.cache_clear()
     cache.parent.chmod(0o777)
@@ -115,7 +118,7 @@ def test_a_folder_that_others_may_exchange_is_refused(cache, compiled):
     assert not build.doubt(cache)
 
 
-def test_what_belongs_to_another_user_is_refused(cache, compiled, monkeypatch):
+def test_what_belongs_to_another_user_is_refused(compiled, cache, monkeypatch):
     build.built()
     build.installed.cache_clear()
     monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
@@ -124,7 +127,7 @@ def test_what_belongs_to_another_user_is_refused(cache, compiled, monkeypatch):
 
 
 @pytest.mark.parametrize(("version", "found"), [("standard", True), ("editable", True), ("standard", False)])
-def test_pip_installs_with_a_compiler_and_without_one(version, found, cache, compiled, monkeypatch, tmp_path):
+def test_pip_installs_with_a_compiler_and_without_one(version, found, compiled, cache, monkeypatch, tmp_path):
     """The build hook: a library and a platform's wheel, or the plain wheel; never a failure."""
     pytest.importorskip("hatchling")
     from mechgraph.kernel.hatch_build import FOLDER, KernelBuildHook

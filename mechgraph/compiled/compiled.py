@@ -11,20 +11,18 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array
+from mechgraph.algebra.se3 import Array, turn_tangent
 from mechgraph.compiled.tabled import STATUSES, Tabled, tabled
 from mechgraph.compiled.write import write_tables
 from mechgraph.errors import DeclarationError, listed
 from mechgraph.kernel import build
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.quantities import real_array, wrong
+from mechgraph.quantities import has_quantity, real_array, without_units, wrong
 
 WORDS = np.array([word for _, word, _ in STATUSES])
 START = 4
 """Place of the start in the table of numbers, see ``kernel.h``."""
-SMALL_TURN = 1e-4
-"""Angle below which the series of dexp^-1 has only its first terms."""
-HALVINGS = 12
+PARTINGS = 12
 """Halvings of a change of parameters, until the loops are closed by small corrections."""
 
 
@@ -122,17 +120,6 @@ class _Room:
         return out
 
 
-def turn_rate(v: Array, w: Array) -> Array:
-    """The rate ``(3,)`` of a rotation vector ``v (3,)`` where the rotation turns at ``w (3,)``, in the frame before it (dexp^-1)."""
-    angle = float(np.sqrt(v @ v))
-    if angle < SMALL_TURN:
-        part = 1.0 / 12.0
-    else:
-        part = (1.0 - 0.5 * angle / np.tan(0.5 * angle)) / angle**2
-    once = np.cross(v, w)
-    return np.asarray(w - 0.5 * once + part * np.cross(v, once))
-
-
 class Compiled:
     """A mechanism that stays hot, see ``mechgraph.compile``. Calls release Python's lock; every thread takes a ``copy`` of its own.
 
@@ -205,12 +192,8 @@ class Compiled:
 
     def _read(self, q: Any, velocity: Any, acceleration: Any) -> tuple[_Room, bool]:
         """The motion in a room for it; whether it is one position."""
-        d, given = len(self.tables.drives), []
-        for name, value in (("q", q), ("velocity", velocity), ("acceleration", acceleration)):
-            found = real_array(value)
-            if found is None:
-                self._refuse(wrong(value, name, "numbers, in the units of the mechanism"))
-            given.append(found)
+        d = len(self.tables.drives)
+        given = [self._plain(*item) for item in enumerate((q, velocity, acceleration))]
         shape = given[0].shape
         single = shape == (d,) or (d == 1 and shape == ())
         if not single and (len(shape) != 2 or shape[1] != d):
@@ -225,6 +208,16 @@ class Compiled:
                 f"velocity and acceleration have the shapes {rates}; expected such as go with that of q, {shape}"
             )
         return room, single
+
+    def _plain(self, order: int, value: Any) -> Array:
+        """Coordinates of the drives (order 0), rates or accelerations as an array; quantities in the units of the mechanism."""
+        m, drives = self.tables.m, self.tables.drives
+        if has_quantity(value) and len({m.turns(name) for name in drives}) == 1:
+            value = without_units(value, (0 if m.turns(drives[0]) else 1, 0, -order), m.units)
+        found = real_array(value)
+        if found is None:
+            self._refuse(wrong(value, ("q", "velocity", "acceleration")[order], "numbers"))
+        return found
 
     def _refuse(self, fault: str) -> NoReturn:
         raise DeclarationError(f"compiled {self.tables.m.name!r}", [fault])
@@ -302,7 +295,7 @@ class Compiled:
         if _functions().mgk_derivative(*known, len(dP), *rest):
             return [np.full_like(part, np.nan) for part in out]
         for g in t.rotations:
-            out[2][g] = turn_rate(room.position[-1, g], out[2][g])
+            out[2][g] = turn_tangent(room.position[-1, g], out[2][g])
         return out
 
     def write(self, path: str | os.PathLike[str], name: str | None = None) -> None:
@@ -334,13 +327,13 @@ class Compiled:
         while done < 1.0:
             part, kept = min(1.0, done + step), [array.copy() for array in arrays]
             values = {name: (1.0 - part) * begin[name] + part * goal[name] for name in goal}
-            self.P[:] = self.tables.numbers(values)
+            self.P[:] = self.tables.numbers(values)[0]
             status = self._closed(self.home, self.tables.home) or self._closed(self.state, self._drives())
             if not status:
                 done = part
                 continue
             step *= 0.5
-            failed = step < 0.5**HALVINGS
+            failed = step < 0.5**PARTINGS
             for array, old in zip(arrays, before if failed else kept, strict=True):
                 array[:] = old
             if failed:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,6 @@ from mechgraph.closure.indexing import System
 from mechgraph.errors import DeclarationError, listed
 from mechgraph.kernel.tables import Integers, Layout, layout, tables
 from mechgraph.model.mechanism import Mechanism, check_mechanism
-from mechgraph.model.parameters import declared
 from mechgraph.pipeline import Pipeline
 from mechgraph.quantities import shown
 from mechgraph.structure.snapping import meant
@@ -42,12 +42,12 @@ STATUSES = (
     ("FORMAT_ERROR", "other tables", "tables of another version"),
 )
 """What the kernel returns, by its number: identifier, word, meaning."""
-REACH = 0.02
+TABLE_CHANGE = 0.02
 """Change of the tables over which their derivatives are taken, relative: where differences of order 8 are exact to rounding."""
-DIFFERENCES = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
+ORDER_8 = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
 """Central differences of order 8, see B. Fornberg, Mathematics of Computation 51 (1988) 699-706, table 1."""
-DOUBLINGS = 60
-"""Doublings or halvings of a step at most."""
+FIRST_CHANGE, STEPS_TRIED = 1e-3, 8
+"""First step that is tried, as a part of the number; steps tried at most."""
 
 
 @dataclass(frozen=True)
@@ -109,31 +109,42 @@ class Tabled:
         fields = {name: self.fields[name] for name in values}
         return varied(self.m, fields, np.array(list(values.values()), dtype=float)[:, None]).one(0)
 
-    def numbers(self, values: Mapping[str, float]) -> Array:
-        """``P`` with other numbers, in the units of the mechanism as it was declared."""
+    def numbers(self, values: Mapping[str, Any]) -> Array:
+        """``P (B, numbers)`` of variants with other numbers, one number or an array ``(B,)`` of each.
+
+        Raises
+        ------
+        DeclarationError
+            where no such mechanism can be.
+        """
         if not values:
-            return self.P
-        m, par = self.changed(values), self.system.par
-        system = System(m, self.system.graph, declared(m).parameters(m, par.offset, par.origin, par.L))
-        found = tables(self.layout, system, self.x[:, None], m.loads)
+            return self.P[None]
+        rows = np.array(np.broadcast_arrays(*np.atleast_1d(*values.values(), 0.0)), dtype=float)[:-1]
+        variants = varied(self.m, {name: self.fields[name] for name in values}, rows)
+        for i in np.flatnonzero(~variants.valid()):
+            variants.one(int(i))  # says why
+            raise DeclarationError(
+                f"parameters of {self.m.name!r}", [f"no mechanism has these numbers: {listed(values)}"]
+            )
+        par = self.system.par
+        system = System(self.m, self.system.graph, variants.numbers.parameters(self.m, par.offset, par.origin, par.L))
+        found = tables(self.layout, system, np.tile(self.x[:, None], rows.shape[1]), variants.loads)
         assert found is not None
-        return np.asarray(found[1][0])
+        return found[1]
 
     def derivative(self, values: Mapping[str, float], name: str) -> Array:
         """How ``P`` changes with one number."""
         middle = values[name]
-
-        def at(value: float) -> Array:
-            return self.numbers({**values, name: value})
-
-        step, here = 1e-3 * (abs(middle) or 1.0), at(middle)
-        for _ in range(DOUBLINGS):
-            change = float((np.abs(at(middle + step) - here) / np.maximum(np.abs(here), 1.0)).max())
-            if 0.25 * REACH <= change <= REACH or not change:
+        step, here = FIRST_CHANGE * (abs(middle) or 1.0), self.numbers(values)[0]
+        for _ in range(STEPS_TRIED):
+            there = self.numbers({**values, name: middle + step})[0]
+            change = float((np.abs(there - here) / np.maximum(np.abs(here), 1.0)).max())
+            if 0.25 * TABLE_CHANGE <= change <= TABLE_CHANGE or not change:
                 break
-            step *= 2.0 if change < REACH else 0.5
-        sides = [at(middle + k * step) - at(middle - k * step) for k in range(1, len(DIFFERENCES) + 1)]
-        return np.asarray(sum(c * side for c, side in zip(DIFFERENCES, sides, strict=True)) / step)
+            step *= 0.5 * TABLE_CHANGE / change
+        k = np.arange(1, len(ORDER_8) + 1)
+        ahead, behind = (self.numbers({**values, name: middle + sense * step * k}) for sense in (1.0, -1.0))
+        return np.asarray(np.array(ORDER_8) @ (ahead - behind) / step)
 
     def poses(self, internal: Array) -> Array:
         """Poses ``(..., 4, 4)`` of the declared link frames from internal ones ``(..., N, 3, 4)``."""
@@ -174,4 +185,5 @@ def tabled(m: Mechanism, asked: str = "compile") -> Tabled:
         known = listed(sorted({load.kind for load in own.loads}))
         fault = f"a load is a function, a table or varies over positions (loads: {known}); expected constant numbers"
         raise DeclarationError(subject, [f"the compiled kernel does not carry it: {fault}"])
-    return Tabled(own, system, x, places, found[0], found[1][0], drives, home)
+    I, P = found
+    return Tabled(own, system, x, places, I, P[0], drives, home)
