@@ -119,7 +119,10 @@ def test_what_is_passive_where_the_mechanism_is_declared_need_not_be_elsewhere(a
     ]
     modes = mg.assemblies(mg.Mechanism("rssr", pairs=pairs, frame="ground"), {"A": angle})
     assert (modes.total, modes.completeness) == (2, "proved")
-    assert modes.kinds == (("regular",) * 2 if angle else ("continuum",))
+    assert modes.kinds == (("regular",) * 2 if angle else ())
+    assert [(one.dimension, "D.Rz" in one.moves, "A.Rz" in one.moves) for one in modes.continua] == (
+        [] if angle else [(1, True, False)]
+    )
 
 
 def test_an_open_chain_has_one_assembly() -> None:
@@ -139,17 +142,57 @@ def test_a_search_finds_a_double_point_once() -> None:
     assert [one.x.shape[1] for one in found] == [1, 1]
 
 
-def test_the_assembly_shown_of_a_continuum_does_not_depend_on_the_seed() -> None:
-    one, other = (mg.assemblies(linked_four_bar(2.0, 1.0, 1.0, 2.0, 0.7), {"O0": 0.0}, seed=seed) for seed in range(2))
-    assert one.kinds == other.kinds == ("continuum",)
-    assert one.poses == pytest.approx(other.poses, abs=1e-6)
-
-
 def test_a_parallelogram_folded_flat_is_a_double_point_and_a_kite_that_spins_a_continuum() -> None:
     flat = mg.assemblies(linked_four_bar(1.0, 2.0, 1.0, 2.0, 0.5), {"O0": 0.0})
-    assert "double" in flat.kinds
-    kite = mg.assemblies(linked_four_bar(2.0, 1.0, 1.0, 2.0, 0.7), {"O0": 0.0})
-    assert "continuum" in kite.kinds
+    assert (flat.kinds, flat.continua) == (("double",), ())
+    kite, other = (mg.assemblies(linked_four_bar(2.0, 1.0, 1.0, 2.0, 0.7), {"O0": 0.0}, seed=seed) for seed in range(2))
+    assert kite.continua[0].point.start == pytest.approx(other.continua[0].point.start, abs=1e-6)
+    assert (len(kite), len(kite.complex), kite.on_continua, kite.completeness) == (0, 0, 2, "proved")
+    assert [(one.dimension, one.moves) for one in kite.continua] == [(1, ("O1.Rz", "O3.Rz"))]
+    assert "Continuum of dimension 1: O1.Rz, O3.Rz move with the drivers at rest" in str(kite)
+
+
+def wristed(bend: float) -> tuple[mg.Mechanism, np.ndarray]:
+    """An arm whose last three axes meet, declared elsewhere, and its hand with the middle one of these at an angle."""
+    points = [(0, 0, 0), (0, 0.2, 0.5), (0.5, 0.2, 0.9), *[(1.1, 0.3, 0.5)] * 3]
+    axes = [(0, 0, 1), (0, 1, 0), (0, 1, 0), (1, 0, 0), (0, 1, 0), (1, 0, 1)]
+    pairs = [
+        mg.Pair(f"A{i}", "R", f"L{i}", f"L{i + 1}", point=point, axis=axis)
+        for i, (point, axis) in enumerate(zip(points, axes, strict=True))
+    ]
+    arm = mg.Mechanism("arm", pairs=pairs)
+    angles = dict(zip([f"A{i}" for i in range(6)], (0.3, 0.4, -0.9, 0.2, bend, 0.5), strict=True))
+    return arm, mg.kinematics(arm, angles).link("L6").pose
+
+
+def test_beside_the_continuum_of_a_singular_wrist_isolated_postures_are_counted_and_certified() -> None:
+    """Where the last axis lies along the fourth, both may turn against each other; six other postures have bent wrists."""
+    arm, hand = wristed(np.pi / 4)
+    modes = mg.assemblies(arm, {"L6": hand})
+    assert modes.kinds == ("regular",) * 6
+    assert all(sure is not None and sure.proved for sure in modes.certificates)
+    assert len(modes) + len(modes.complex) + modes.on_continua + modes.infinite == modes.total == 16
+    assert [(one.dimension, one.moves) for one in modes.continua] == [(1, ("A3.Rz", "A5.Rz"))]
+    start = modes.continua[0].point.start
+    assert start["A3.Rz"] + start["A5.Rz"] == pytest.approx(0.7)
+    assert start["A3.Rz"] == pytest.approx(0.35)  # of A3 + A5 = 0.7 what is nearest to the start
+
+
+@pytest.mark.parametrize("away", [1e-10, 1e-11, -1e-11])
+def test_beyond_a_fold_there_is_no_assembly_and_before_it_are_two(away: float) -> None:
+    a, b, c, d = 2.0, 1.5, 2.5, 3.0
+    fold = np.arccos((a * a + d * d - (b + c) ** 2) / (2 * a * d))
+    modes = mg.assemblies(linked_four_bar(a, b, c, d, 0.5), {"O0": fold + away})
+    assert (modes.kinds, len(modes.complex)) == (((), 2) if away > 0 else (("regular",) * 2, 0))
+    assert modes.completeness == "proved"
+
+
+@pytest.mark.parametrize("longer", [1e-6, 1e-8])
+def test_an_ill_conditioned_assembly_is_not_double(longer: float) -> None:
+    """A rhombus of which one side is longer: with the crank on the frame two assemblies are left of a continuum, far apart."""
+    modes = mg.assemblies(linked_four_bar(1.0, 1.0, 1.0, 1.0 + longer, 0.5), {"O0": 0.0})
+    assert modes.kinds == ("regular",) * 2
+    assert sorted(mode.start["O1.Rz"] for mode in modes) == pytest.approx([-np.pi / 2, np.pi / 2], abs=1e-5)
 
 
 def test_every_regular_assembly_of_7r_is_certified_and_goes_on_in_solve() -> None:
@@ -181,7 +224,7 @@ def test_ends_far_away_count_where_they_are_plainly_not_real_and_once() -> None:
     def account(*angles: complex) -> Ends:
         x = np.repeat(here.x[:, :1], len(angles), axis=1).astype(complex)
         x[family.free[0]] = angles
-        known = Ends(x[:, :0], np.zeros((0, 0)), np.zeros(0, dtype=bool), tracks=len(angles))
+        known = Ends.none(len(x), len(angles))
         none, every = np.zeros(len(angles), dtype=bool), np.ones(len(angles), dtype=bool)
         _account(family, at, known, _Run(x, every, none, none), 0)
         return known
