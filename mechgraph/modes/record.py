@@ -49,7 +49,7 @@ class BranchData:
     """A branch: its interval of the driver, and the range of every freedom."""
 
     interval: tuple[float, float]
-    full_turn: bool
+    full_turn: Annotated[bool | None, "null where an end could not be told"]
     turns: Annotated[int, "turns of the driver that bring it back"]
     circuit: int
     ranges: Mapping[str, tuple[float, float]]
