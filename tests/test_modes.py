@@ -463,6 +463,57 @@ def test_a_driver_at_its_dead_point_where_the_mechanism_is_declared_has_its_asse
     assert sorted(round(fold.value, 9) for fold in over.folds) == [-2.0, 0.0]
 
 
+def test_where_the_start_alone_is_flat_its_assemblies_are_those_of_any_other_start() -> None:
+    """A parallelogram declared flat can begin two ways, which refuses no position; flat itself both are one."""
+    places = {
+        "A": ("ground", "crank", 0),
+        "B": ("crank", "coupler", 1),
+        "C": ("coupler", "rocker", 3),
+        "D": ("rocker", "ground", 2),
+    }
+    pairs = [mg.Pair(name, "R", a, b, point=(x, 0, 0), axis=Z) for name, (a, b, x) in places.items()]
+    bent, flat = mg.assemblies(mg.Mechanism("flat", pairs=pairs, frame="ground"), {"A": [0.4, 0.0]})
+    assert (bent.kinds, bent.completeness) == (("regular",) * 2, "proved")
+    # one is a parallelogram, the other that with its upper corner beyond the diagonal from the crank's tip
+    tip = np.exp(0.4j)
+    along = (2 - tip) / abs(2 - tip)
+    corners = [tip + 2, tip + along * along * 2]
+    rockers = sorted(-mode.start["D.Rz"] for mode in bent)
+    assert rockers == pytest.approx(sorted(float(np.angle(corner - 2)) for corner in corners), abs=1e-11)
+    assert (flat.kinds, flat.total) == (("double",), 2)
+
+
+def test_couplings_whose_freedoms_are_driven_are_a_substitution() -> None:
+    """Cranks of a five-bar geared to each other by two couplings, four turns of a motor on: two circles meet in two points."""
+    places = {
+        "A": ("ground", "left", 0, 0),
+        "B": ("left", "one", 0.3, 1),
+        "C": ("one", "two", 1.5, 2),
+        "D": ("two", "right", 2.8, 0.8),
+    }
+    pairs = [mg.Pair(name, "R", a, b, point=(x, y, 0), axis=Z) for name, (a, b, x, y) in places.items()]
+    pairs += [
+        mg.Pair("E", "R", "ground", "right", point=(3, 0, 0), axis=Z),
+        mg.Pair("M", "R", "ground", "motor", point=(9, 0, 0), axis=Z),
+    ]
+    couplings = [mg.Coupling({"A": 2.0, "E": 1.0, "M": 1.0}), mg.Coupling({"E": 1.0, "M": 0.5})]
+    m = mg.Mechanism("geared", pairs=pairs, couplings=couplings, frame="ground")
+    turn = 8 * np.pi + 0.2
+    modes = mg.assemblies(m, {"M": turn})
+    assert (modes.total, modes.completeness, len(modes)) == (2, "proved", 2)
+    left = (0.3 + 1j) * np.exp(-0.25j * turn)
+    right = 3 + (-0.2 + 0.8j) * np.exp(-0.5j * turn)
+    way = right - left
+    a, b = abs(1.2 + 1j), abs(1.3 - 1.2j)
+    along = (a * a - b * b + abs(way) ** 2) / (2 * abs(way))
+    pins = [left + way / abs(way) * (along + side * 1j * np.sqrt(a * a - along**2)) for side in (-1, 1)]
+    one = [link.name for link in m.links].index("one")
+    turned = modes.poses[:, one]
+    found = (turned @ [1.5, 2.0, 0.0, 1.0])[:, :2] @ [1.0, 1.0j]
+    assert sorted(found, key=lambda z: z.imag) == pytest.approx(sorted(pins, key=lambda z: z.imag), abs=1e-11)
+    assert all(mode.start["E.Rz"] == pytest.approx(-0.5 * turn, abs=1e-12) for mode in modes)
+
+
 def test_a_driver_that_can_never_drive_is_named() -> None:
     """Two loops side by side, one of them left alone."""
     pairs = []

@@ -87,7 +87,6 @@ class Branches(Shown):
     completeness: str
     resolution: float
     open_ends: int
-    question: Question = field(repr=False)
 
     def __len__(self) -> int:
         return len(self.branches)
@@ -121,10 +120,10 @@ class Branches(Shown):
         DeclarationError
             where no branch of the map leads to a position.
         """
-        places, faults = [], []
+        places, faults, q = [], [], Question(self.mechanism, _at(self.mechanism, self.driver, [0.0]))
         for number, position in enumerate(positions):
             start = position.start if isinstance(position, Mechanism) else position
-            place = self._place({self.mechanism.full_name(k): float(v) for k, v in start.items()})
+            place = self._place(q, {self.mechanism.full_name(k): float(v) for k, v in start.items()})
             places.append(place or (-1, 0.0))
             if place is None:
                 faults.append(
@@ -136,10 +135,9 @@ class Branches(Shown):
         circuits = tuple(self.branches[number].circuit for number in numbers)
         return Defects(numbers, circuits, len(set(numbers)) > 1, len(set(circuits)) > 1, self._disordered(places))
 
-    def _place(self, start: Mapping[str, float]) -> tuple[int, float] | None:
+    def _place(self, q: Question, start: Mapping[str, float]) -> tuple[int, float] | None:
         """The branch that leads to a position, and the driver value there; None where none does."""
-        q, place = self.question, self.question.names.index(self.driver)
-        s, turns = q.system, self.mechanism.turns(self.driver)
+        s, place, turns = q.system, q.names.index(self.driver), self.mechanism.turns(self.driver)
         given = s.state_of(s.start_coordinates(start)[:, None])[:, 0]
         x, error = close(s, given, q.columns)
         if error > CLOSED or np.abs(s.difference(x[:, None], given[:, None])).max() > TOUCHES:
@@ -334,7 +332,6 @@ class _Mapper:
             weakest(found.word for found in solutions),
             step,
             self.found.open,
-            q,
         )
 
     def _branch(self, i: int, circuit: int) -> Branch:

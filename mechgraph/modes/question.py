@@ -11,11 +11,12 @@ import numpy as np
 from mechgraph.closure.assembly import CLOSED, close_all, closed_start, named_columns
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
-from mechgraph.closure.indexing import Index
+from mechgraph.closure.indexing import Index, System
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.family import NO_NUMBERS, SPAN, Array, Family, at_rest
-from mechgraph.modes.form import Form, Whole, WithoutRods, rods_of
+from mechgraph.modes.form import Form, Rod, Whole, WithoutRods, rods_of
+from mechgraph.numerics.linear import rank_of, singular_values
 from mechgraph.report.refused import dead_point_error, undriven_error
 from mechgraph.structure.mobility import free_motion
 
@@ -86,14 +87,38 @@ class Question:
 
     @cached_property
     def form(self) -> Form:
-        """The equations in which assemblies are looked for: without rods, where these can be left out."""
-        if self.rods:
-            found = WithoutRods(self.family, self.drive, self.rods, self.rods)
+        """The equations in which assemblies are looked for: without couplings and rods, where these can be left out."""
+        family, drive, rods = self._uncoupled()
+        if rods:
+            found = WithoutRods(family, drive, rods, rods)
             if found.family.fault:
-                found = WithoutRods(self.family, self.drive, self.rods, found.needed)
+                found = WithoutRods(family, drive, rods, found.needed)
             if not found.family.fault:
                 return found
-        return Whole(self.family, self.drive)
+        return Whole(family, drive)
+
+    def _uncoupled(self) -> tuple[Family, Array, list[Rod]]:
+        """The class, what is given, and rods; without couplings, where these say as much of freedoms as there are that are not given.
+
+        With ``G_d`` and ``G`` the coefficients of what is given and of the others, ``q = q_0 - G^-1 G_d (d - d_0)``.
+        """
+        if not self.m.couplings:
+            return self.family, self.drive, self.rods
+        s, terms = self.system, self.system.coupling_matrix[:, :, 0]
+        others = np.setdiff1d(s.coupled_freedoms, self.columns)
+        if rank_of(singular_values(terms[:, others])) < max(len(terms), len(others)):
+            return self.family, self.drive, []
+        begin = self.start.x[:, :1]
+        turned = np.linalg.solve(
+            terms[:, others], terms[:, self.columns] @ (self.drive - begin[s.single_rows[self.columns]])
+        )
+        columns = np.concatenate([self.columns, others])
+        bare = System(self.m.replace(couplings=[]), None, s.par)
+        idle, held = self.family.idle, self.family.held
+        rods = rods_of(bare, np.concatenate([columns, held]))
+        links = np.array([link for rod in rods for link in rod.links], dtype=np.intp)
+        family = Family(Configuration(bare, begin), columns, idle, np.setdiff1d(held, others), links)
+        return family, np.concatenate([self.drive, begin[s.single_rows[others]] - turned]), rods
 
     @property
     def _loose(self) -> bool:
@@ -147,9 +172,10 @@ class Question:
 
     @property
     def periods(self) -> Array:
-        """By how much single freedoms grow until all is as it was, user units; infinite where they go on, and for rotations."""
-        s = self.system
-        return np.where(s.single_rows >= 0, s.in_user_units(self.family.periods), np.inf)
+        """By how much single freedoms grow until all is as it was, user units; infinite where they go on or are coupled, for rotations too."""
+        s, alone = self.system, self.system.single_rows >= 0
+        alone[s.coupled_freedoms] = False
+        return np.where(alone, s.in_user_units(self.family.periods), np.inf)
 
     def complex_coordinates(self, x: Array) -> Array:
         """User coordinates ``(n, F)`` of complex states ``(nx, n)``."""
