@@ -172,7 +172,7 @@ class Question:
 
     @property
     def periods(self) -> Array:
-        """By how much single freedoms grow until all is as it was, user units; infinite where they go on or are coupled, for rotations too."""
+        """By how much single freedoms grow until all is as it was, user units; infinite where they go on or are coupled, and for balls."""
         s, alone = self.system, self.system.single_rows >= 0
         alone[s.coupled_freedoms] = False
         return np.where(alone, s.in_user_units(self.family.periods), np.inf)
