@@ -150,6 +150,7 @@ def test_a_parallelogram_folded_flat_is_a_double_point_and_a_kite_that_spins_a_c
     assert (len(kite), len(kite.complex), kite.on_continua, kite.completeness) == (0, 0, 2, "proved")
     assert [(one.dimension, one.moves) for one in kite.continua] == [(1, ("O1.Rz", "O3.Rz"))]
     assert "Continuum of dimension 1: O1.Rz, O3.Rz move with the drivers at rest" in str(kite)
+    assert [ax.get_title() for ax in kite.plot().axes] == ["0 (continuum)"]
 
 
 def wristed(bend: float) -> tuple[mg.Mechanism, np.ndarray]:
@@ -165,6 +166,7 @@ def wristed(bend: float) -> tuple[mg.Mechanism, np.ndarray]:
     return arm, mg.kinematics(arm, angles).link("L6").pose
 
 
+@pytest.mark.slow
 def test_beside_the_continuum_of_a_singular_wrist_isolated_postures_are_counted_and_certified() -> None:
     """Where the last axis lies along the fourth, both may turn against each other; six other postures have bent wrists."""
     arm, hand = wristed(np.pi / 4)
