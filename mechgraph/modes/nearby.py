@@ -31,7 +31,7 @@ GONE = 0.2
 """Part of that step by which what tells assemblies apart must have changed."""
 CURVED = 1e-3
 """Step of second differences: their rounding is 1e-10."""
-FEWEST = 0.1
+INDEPENDENT_WAYS = 0.1
 """Singular value of motions, as part of the largest, from which on they count for the dimension of a continuum."""
 
 
@@ -100,7 +100,7 @@ class Nearby:
         """Of the continuum here, where it does not cross others: independent motions along which it goes on."""
         ways = self._prints(self.landed) - self._prints(self.here.x)
         sigma = np.linalg.svd(ways, compute_uv=False)
-        return int((sigma > FEWEST * sigma[0]).sum()) if sigma.size else 0
+        return int((sigma > INDEPENDENT_WAYS * sigma[0]).sum()) if sigma.size else 0
 
     @cached_property
     def _bent(self) -> tuple[Array, Array, Array]:
