@@ -21,6 +21,8 @@ from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import System
 from mechgraph.modes.family import Array, Family, parts
 
+VANISHED = 1e-200
+"""What stands for a curvature of zero, by which is divided."""
 SINGULAR = 1e-5
 """Smallest singular value of the closure rows, as part of the largest, below which an assembly is looked at more closely."""
 LARGE_STATE = 10.0
@@ -40,7 +42,7 @@ def least_value(family: Family, here: Configuration) -> Array:
     if not family.unknowns:
         return np.ones(here.T)
     sigma = np.linalg.svd(here.J[:, family.free].transpose(2, 0, 1), compute_uv=False)
-    return np.asarray(np.maximum(parts(sigma)[:, family.unknowns - 1], 1e-300))
+    return np.asarray(np.maximum(parts(sigma)[:, family.unknowns - 1], VANISHED))
 
 
 def irregular(family: Family, here: Configuration) -> Array:
@@ -103,15 +105,16 @@ class Nearby:
         return int((sigma > INDEPENDENT_WAYS * sigma[0]).sum()) if sigma.size else 0
 
     @cached_property
-    def _bent(self) -> tuple[Array, Array, Array]:
+    def _bent(self) -> tuple[complex, complex, float]:
         """What the rows leave open, its rate and ``kappa`` along the only motion, each in the direction of rows that these two have."""
         dq = self.motions
         ahead, back = (Configuration(self.system, self._stepped(sign * CURVED * dq)).residual[:, 0] for sign in (1, -1))
         f = self.here.residual[:, 0]
         across = self._U[:, self.rank :].conj().T
         kappa = across @ (ahead + back - 2 * f) / CURVED**2
-        u = kappa.conj() / max(float(np.linalg.norm(kappa)), 1e-300)
-        return u @ (across @ f), u @ (across @ (self.here.J[:, self.family.free, 0] @ dq[:, 0])), u @ kappa
+        size = max(float(np.linalg.norm(kappa)), VANISHED)
+        u = kappa.conj() / size
+        return u @ (across @ f), u @ (across @ (self.here.J[:, self.family.free, 0] @ dq[:, 0])), size
 
     @property
     def gap(self) -> float:
@@ -121,14 +124,14 @@ class Nearby:
         if self.motions.shape[1] > 1:
             return 0.0
         f, sigma, kappa = self._bent
-        return float(2 * np.abs(np.sqrt(sigma**2 - 2 * kappa * f + 0j)) / max(abs(kappa), 1e-300))
+        return float(2 * np.abs(np.sqrt(sigma**2 - 2 * kappa * f + 0j)) / kappa)
 
     def both(self) -> Array:
         """The two roots near here ``(nx, 2)``, closed each for itself, the nearer one first."""
         f, sigma, kappa = self._bent
         apart = np.sqrt(sigma**2 - 2 * kappa * f + 0j)
-        s = np.sort_complex(np.array([-sigma + apart, -sigma - apart]) / kappa)
-        s = s[np.argsort(np.abs(s), kind="stable")]
+        larger = max(sigma + apart, sigma - apart, key=abs)
+        s = np.array([-2 * f / larger, -larger / kappa])
         return close_all(self.system, self._stepped(self.motions * s), self.family.columns)[0]
 
     def _stepped(self, part: Array) -> Array:
