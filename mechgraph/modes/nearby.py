@@ -114,7 +114,8 @@ class Nearby:
         kappa = across @ (ahead + back - 2 * f) / CURVED**2
         size = max(float(np.linalg.norm(kappa)), VANISHED)
         u = kappa.conj() / size
-        return u @ (across @ f), u @ (across @ (self.here.J[:, self.family.free, 0] @ dq[:, 0])), size
+        rates = self.here.J[:, self.family.free, 0] @ dq[:, 0]
+        return complex(u @ (across @ f)), complex(u @ (across @ rates)), size
 
     @property
     def gap(self) -> float:
