@@ -18,6 +18,7 @@ from mechgraph.algebra.inertia import physical
 from mechgraph.algebra.se3 import Array
 from mechgraph.model.coupling import BaseCoupling
 from mechgraph.model.drive import Drive
+from mechgraph.model.gears import rim_faults
 from mechgraph.model.link import NO_POINTS, Link
 from mechgraph.model.load import LOADS
 from mechgraph.model.numeric import tolerance_fault
@@ -202,9 +203,8 @@ def _markers_are_sound(markers: Sequence[Any], most: Array) -> bool:
 
 
 def item_faults(m: Parts) -> list[str]:
-    """Faults of drives and loads alone, for links and pairs that were checked before."""
-    faults = _kind_faults(m)
-    return faults if faults else _reference_faults(m) + _coupling_faults(m)
+    """Faults of drives and loads alone, for links, pairs and couplings that were checked before."""
+    return _kind_faults(m) or _reference_faults(m)
 
 
 def _connection_faults(m: Parts) -> list[str]:
@@ -240,7 +240,9 @@ def _reference_faults(m: Parts) -> list[str]:
 
 
 def _coupling_faults(m: Parts) -> list[str]:
-    faults = [fault for coupling in m.couplings for fault in coupling.faults(m)]
+    own = [coupling.faults(m) for coupling in m.couplings]
+    faults = [fault for found in own for fault in found]
+    faults += rim_faults([c for c, found in zip(m.couplings, own, strict=True) if not found], m)
     names = [c.name for c in m.couplings if isinstance(c.name, str) and c.name]
     shared = [name for name in dict.fromkeys(names) if name in m.pair_index]
     faults += [f"coupling {name!r}: a pair has that name; names must differ" for name in shared]

@@ -96,8 +96,10 @@ class Mechanism(Parts, Once, Shown):
         if not faults:
             faults = declaration_faults(self)
             if faults and self._take_quantities():
+                self._set(_kept={})  # what was found of pairs with quantities
                 faults = declaration_faults(self)
         self._finish(start, faults + mapping_faults(units=units, start=start, expected=expected))
+        self._set(couplings=tuple(c.placed(self) for c in self.couplings))
 
     def _set(self, **fields: Any) -> None:
         for key, value in fields.items():
@@ -130,7 +132,7 @@ class Mechanism(Parts, Once, Shown):
         return True
 
     def _finish(self, start: Any, faults: list[str]) -> None:
-        """Raise all faults at once, those of ``start`` too; keep start values and couplings by full freedom names."""
+        """Raise all faults at once, those of ``start`` too; keep start values by full freedom names."""
         flat: dict[str, float] = {}
         if _are_pairs(self.pairs):
             flat, start_faults = flat_start(self, start if isinstance(start, Mapping) else {})
@@ -138,7 +140,6 @@ class Mechanism(Parts, Once, Shown):
         if faults:
             raise DeclarationError(f"mechanism {shown(self.name)}", faults)
         self._set(start=MappingProxyType(flat))
-        self._set(couplings=tuple(c.placed(self) for c in self.couplings))
         if self.response is not None:
             self._set(response=self.response.with_full_names(self.full_name))
 
