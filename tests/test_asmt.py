@@ -424,7 +424,7 @@ def test_every_joint_of_the_table_is_tested():
 @pytest.mark.parametrize(
     "text",
     ["2*pi*time", "4.0d*pi*time", "-time^3+2.5", "1/(2+time)", "(1+time)^0.5", "2^3*time", "3", "-(time)", "+time",
-     *(f"{f}(0.3+0.4*time)*time" for f in FUNCTIONS), "sin(cos(2*time)^2)"],
+     *(f"{f}(0.3+0.4*time)*time" for f in FUNCTIONS), "sin(cos(2*time)^2)", "1.5e-1d*time", "(0-2)^3*time", "sqrt(0)+time"],
 )  # fmt: skip
 def test_rates_of_formulas_are_their_derivatives(text):
     t = np.linspace(0.1, 0.9, 9)
@@ -442,7 +442,8 @@ def test_rates_of_formulas_are_their_derivatives(text):
 @pytest.mark.parametrize(
     "text",
     ["", "time time", "x", "__import__('os')", "time.real", "[1]", "2**time", "1/0", "ln(-1)", "sin(1, 2)", "9" * 5000,
-     "(" * 500 + "1" + ")" * 500, "10^(10^10)", "lambda: 1", "'a'", "True", "1j"],
+     "(" * 500 + "1" + ")" * 500, "10^(10^10)", "lambda: 1", "'a'", "True", "1j", "(0-2)^(1/3)", "((0-2)^(1/3))^3",
+     "0*ln(0-1)", "sqrt(time)", "0x10", "0b1", "1_0", "2 # 3", "3d0", "1.2.3", "2time", "1" * 1900 + "?"],
 )  # fmt: skip
 def test_what_is_no_formula_is_refused(text):
     with pytest.raises(FormulaFault):

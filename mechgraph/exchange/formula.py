@@ -19,8 +19,11 @@ from mechgraph.quantities import shown
 
 LONGEST_FORMULA = 2000
 """Characters of a formula."""
-DOUBLE = re.compile(r"(?<=[\d.])d(?![a-z])")
-"""The letter that Smalltalk writes after a number of double precision: ``4.0d*pi*time``."""
+DECIMAL = r"(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?"
+DOUBLE = re.compile(rf"({DECIMAL})d(?!\w)", re.ASCII)
+"""A number with the letter that Smalltalk writes after one of double precision: ``4.0d*pi*time``."""
+TOKENS = re.compile(rf"(?:{DECIMAL}d?(?![\w.])|[a-z]\w*|[-+*/^()]|\s)*+", re.ASCII)
+"""What a formula consists of: not all that is an expression to Python (``0x10``, ``1_0``, what stands behind ``#``) is one."""
 
 
 class FormulaFault(Exception):
@@ -61,7 +64,9 @@ class Jet:
         return self.through(lambda u: u**n, rate, second)
 
     def through(self, f: Callable[[Any], Any], rate: Callable[[Any], Any], second: Callable[[Any], Any]) -> Jet:
-        """``f(u)``, ``f'(u) u'`` and ``f''(u) u'^2 + f'(u) u''``."""
+        """``f(u)``, ``f'(u) u'`` and ``f''(u) u'^2 + f'(u) u''``; a constant has no rates, also where f has no slope (``sqrt(0)``)."""
+        if not (np.any(self.v) or np.any(self.a)):
+            return Jet(f(self.s))
         slope = rate(self.s)
         return Jet(f(self.s), slope * self.v, second(self.s) * self.v**2 + slope * self.a)
 
@@ -97,11 +102,13 @@ def evaluated(formula: str, t: Array) -> tuple[Array, Array, Array]:
     FormulaFault
         where it is none, holds what is not known here, or has no finite value.
     """
-    text = DOUBLE.sub("", formula.strip().lower()).replace("^", "**")
+    text = formula.strip().lower()
     if len(text) > LONGEST_FORMULA:
         raise FormulaFault(f"longer than {LONGEST_FORMULA} characters")
     try:
-        tree = ast.parse(text, mode="eval").body
+        if not TOKENS.fullmatch(text):
+            raise SyntaxError
+        tree = ast.parse(DOUBLE.sub(r"\1", text).replace("^", "**"), mode="eval").body
         with np.errstate(all="ignore"):
             jet = _jet(tree, Jet(t, np.ones_like(t), np.zeros_like(t)))
     except (SyntaxError, ValueError, OverflowError, MemoryError, RecursionError, ZeroDivisionError):
@@ -116,7 +123,7 @@ def _jet(node: ast.expr, time: Jet) -> Jet:
     """The jet of a part of a formula."""
     match node:
         case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
-            return Jet(float(number))
+            return Jet(np.float64(number))  # a root of a negative number is none; that of a Python float is complex
         case ast.Name(id="time"):
             return time
         case ast.Name(id="pi"):
