@@ -51,6 +51,11 @@ class OfLaw(Centred):
         return True
 
     @property
+    def is_profile(self) -> bool:
+        """Yes."""
+        return True
+
+    @property
     def roller(self) -> float:
         """As declared."""
         return self.roller_radius

@@ -106,6 +106,11 @@ class Curve(Described, Once):
         return None
 
     @property
+    def is_profile(self) -> bool:
+        """Whether it says the outline of a body, not a slot: a cam."""
+        return False
+
+    @property
     def roller(self) -> float:
         """Radius of the roller whose centre the curve is the path of, on the outside of the shape."""
         return 0.0

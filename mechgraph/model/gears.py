@@ -114,15 +114,16 @@ def rim_faults(couplings: Iterable[BaseCoupling], m: Any) -> Iterator[str]:
     The meshes of one rim are compared with the first that leaves the module to the axes: the time is proportional to their number.
     """
     rims: dict[tuple[str, float], list[tuple[SpurGears, str, float]]] = {}
-    for coupling in couplings:
-        for q, teeth, helix in coupling.rims if isinstance(coupling, SpurGears) else ():
-            rims.setdefault((m.full_name(q), teeth), []).append((coupling, q, helix))
+    for gears in couplings:
+        if isinstance(gears, SpurGears):
+            for q, teeth, helix in gears.rims:
+                rims.setdefault((m.full_name(q), teeth), []).append((gears, q, helix))
     for (_, teeth), meshes in rims.items():
-        open_ = next((i for i, (gears, *_) in enumerate(meshes) if not gears.module), None)
-        for i in range(len(meshes)) if open_ is not None else ():
-            if i == open_:
+        first = next((i for i, (gears, *_) in enumerate(meshes) if not gears.module), len(meshes))
+        for i in range(len(meshes)) if first < len(meshes) else ():
+            if i == first:
                 continue
-            (one, q, helix), (two, _, other) = (meshes[k] for k in sorted((i, open_)))
+            (one, q, helix), (two, _, other) = (meshes[k] for k in sorted((i, first)))
             if abs(helix - other) > ONE_HELIX:
                 yield (
                     f"couplings {one.name!r} and {two.name!r}: the {teeth:g} teeth on {q!r} would have the helix angle {helix:.7g} "

@@ -94,7 +94,8 @@ class Pair(Described):
     pitch, lead : advance per radian or per turn, right-hand positive; exactly one where the type needs it.
     on_a, on_b : instead of point/axis, a Marker on each link in that link's own frame.
     closed : of a contact, "form" (b is held on both sides) or "force" (a can only push b, along the axis of a plane, along ``second`` of a
-        groove: where it would have to pull, the solution says that b lifts off).
+        groove: where it would have to pull, the solution says that b lifts off). Left out, b is held; where the profile is open (two
+        curves, a cam, a roller or ball on a curve or surface) and would have to pull, the solution asks for it.
     radius : of the ball or cylinder on link b.
     hertz : Hertz, materials and what else the pressure in a contact takes.
     curve : a ``Curve`` in the frame of link a, along which the marker travels: of P, C, Sg, and of the types Ps and Kc that need one. Then
@@ -137,8 +138,12 @@ class Pair(Described):
     on_b: Annotated[Marker | None, NESTED("marker on link b, in its frame", table="marker")] = None
     closed: Annotated[
         str,
-        TEXT('of a contact: b is held on both sides, `"form"`, or only pushed, `"force"`', choices=("form", "force")),
-    ] = "form"
+        TEXT(
+            'of a contact: b is held on both sides, `"form"`, or only pushed, `"force"`',
+            choices=("form", "force"),
+            default='as `"form"`; an open profile that would have to pull asks for it',
+        ),
+    ] = ""
     radius: Annotated[float | None, POSITIVE("of the ball or cylinder of a contact, on b", LENGTH)] = None
     hertz: Annotated[Hertz | None, NESTED("materials of a contact, for its pressure", table="hertz")] = None
     curve: Annotated[Curve | None, NESTED("curve on link a along which the marker travels", table="curve")] = None
@@ -170,7 +175,7 @@ class Pair(Described):
         lead: float | None = None,
         on_a: Marker | None = None,
         on_b: Marker | None = None,
-        closed: str = "form",
+        closed: str = "",
         radius: float | None = None,
         hertz: Hertz | None = None,
         curve: Curve | None = None,

@@ -18,7 +18,8 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.newton import Work
 from mechgraph.quantities import wrong
 from mechgraph.result import export
-from mechgraph.result.contacts import ContactResult, LiftOff, contacts_of, lift_offs, place_of_contact
+from mechgraph.result.contact_ranges import LiftOff, Overlap
+from mechgraph.result.contacts import ContactResult, contacts_of, lift_offs, overlaps, place_of_contact
 from mechgraph.result.places import OK, Places
 from mechgraph.result.record import solution_data
 from mechgraph.result.summary import summary
@@ -183,9 +184,9 @@ class Solution(Shown):
         return self._values.passive_efforts()
 
     @property
-    def warnings(self) -> tuple[LoadBearing | LiftOff, ...]:
-        """What makes reactions doubtful: passive freedoms that carry load, and contacts that would have to pull."""
-        return (*self._values.load_bearing(), *lift_offs(self._values))
+    def warnings(self) -> tuple[LoadBearing | LiftOff | Overlap, ...]:
+        """What is doubtful: passive freedoms that carry load, contacts that would have to pull or whose elements cut into each other."""
+        return (*self._values.load_bearing(), *lift_offs(self._values), *overlaps(self._values))
 
     def document(self, asked: bool = False) -> Document:
         """What ``print`` shows; ``asked`` as in ``summary()``, also what takes long."""
