@@ -242,7 +242,7 @@ class Turned(AboutAxis):
     @property
     def looked_at(self) -> tuple[Array, Array]:
         """The meridian."""
-        v = self._curve.breaks
+        v = self._curve.grid
         return np.zeros(len(v)), v
 
     def _circle(self, radius: float, away: float = 0.0, **more: Any) -> Circle:
