@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import itertools
+import math
+import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,12 +17,13 @@ import numpy as np
 
 from mechgraph.arguments import items_of
 from mechgraph.document import Document, Shown
-from mechgraph.errors import DeclarationError
+from mechgraph.errors import DeclarationError, MechgraphWarning
 from mechgraph.model.coupling import BaseCoupling
 from mechgraph.model.declaration import declaration_faults, flat_start, item_faults, mapping_faults
 from mechgraph.model.describe import mechanism_document
 from mechgraph.model.drive import Drive
 from mechgraph.model.link import Link
+from mechgraph.model.load import Gravity
 from mechgraph.model.load_base import Load
 from mechgraph.model.numeric import plain, same_fields
 from mechgraph.model.once import Once
@@ -31,7 +34,7 @@ from mechgraph.model.placed_rows import travels
 from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.model.surface_rows import row_of
 from mechgraph.quantities import is_numeric, shown, wrong
-from mechgraph.units import base_factors
+from mechgraph.units import base_factors, gravity_hint
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +103,7 @@ class Mechanism(Parts, Once, Shown):
                 faults = declaration_faults(self)
         self._finish(start, faults + mapping_faults(units=units, start=start, expected=expected))
         self._set(couplings=tuple(c.placed(self) for c in self.couplings))
+        self._doubt()
 
     def _set(self, **fields: Any) -> None:
         for key, value in fields.items():
@@ -142,6 +146,13 @@ class Mechanism(Parts, Once, Shown):
         self._set(start=MappingProxyType(flat))
         if self.response is not None:
             self._set(response=self.response.with_full_names(self.full_name))
+
+    def _doubt(self) -> None:
+        """Warn of what is sound and hardly meant: gravity in other units than those declared."""
+        for load in self.loads if self.units else ():
+            g = load.acceleration if isinstance(load, Gravity) else (0.0, 0.0, 0.0)
+            if hint := gravity_hint(self.units, math.hypot(*g)):
+                warnings.warn(f"mechanism {self.name!r}: {hint}", MechgraphWarning, stacklevel=3)
 
     def __eq__(self, other: object) -> bool:
         return same_fields(self, other)
@@ -203,6 +214,8 @@ class Mechanism(Parts, Once, Shown):
         if faults and out._take_quantities():
             faults = item_faults(out)
         out._finish(start, wrong_kinds + faults + mapping_faults(start=start))
+        if "loads" in changes:
+            out._doubt()
         return out
 
     def has_graph_of(self, other: Mechanism) -> bool:

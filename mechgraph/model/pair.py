@@ -88,7 +88,7 @@ class Pair(Described):
     Parameters
     ----------
     name : its name in the graph; freedoms are named ``"name.Rz"`` after it.
-    type : a symbol of the pair table or a PairType.
+    type : a symbol of the pair table or its name there (``"R"``, ``"revolute"``), or a PairType.
     a, b : the links. Groove, plane and slot belong to ``a``.
     point, axis, second : marker in global coordinates at the declared configuration (all coordinates zero).
     pitch, lead : advance per radian or per turn, right-hand positive; exactly one where the type needs it.
@@ -140,7 +140,7 @@ class Pair(Described):
         str,
         TEXT(
             'of a contact: b is held on both sides, `"form"`, or only pushed, `"force"`',
-            choices=("form", "force"),
+            choices=("form", "force", ""),
             default='as `"form"`; an open profile that would have to pull asks for it',
         ),
     ] = ""

@@ -16,8 +16,7 @@ from mechgraph.quantities import wrong
 
 def contact_faults(pair: Any, where: str) -> Iterator[str | None]:
     """What is wrong with what it says as a contact of two elements."""
-    if not isinstance(pair.closed, str) or pair.closed:
-        yield pair.formats["closed"].fault(pair.closed, f"{where}closed")
+    yield pair.formats["closed"].fault(pair.closed, f"{where}closed")
     form, given = pair.type.touching, {"radius": pair.radius, "hertz": pair.hertz}
     if form is None:
         said = [name for name, value in given.items() if value is not None]
