@@ -430,7 +430,7 @@ def test_a_point_is_kept_to_rounding_at_any_size(size):
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("name", list(SAMPLE))
 def test_the_frame_on_a_surface_turns_by_its_twists(name, turned):
-    """``R' = w x R`` and ``x' = v`` along both coordinates, against differences of the frame: first and second derivatives of the surface."""
+    """``R' = w x R`` and ``x' = v`` along both coordinates, against differences of the frame."""
     place = OnSurface(SAMPLE[name], INSIDE.get(name, (0.7, 0.4)), turned=turned)
     x, h = np.array([[0.05, -0.1], [0.08, 0.03]]), 1e-5
     _, _, twists = place.here(x)

@@ -19,6 +19,7 @@ from mechgraph.algebra.inertia import physical_faults
 from mechgraph.algebra.se3 import Array, compose, inverse
 from mechgraph.errors import DeclarationError, listed
 from mechgraph.exchange.asmt import Assembly, Connection, Part
+from mechgraph.exchange.asmt_gears import GEARED, geared
 from mechgraph.exchange.asmt_joints import JOINTS, REFUSED, SLIDES, Directions, Row, free, motion_type
 from mechgraph.exchange.exact import FITS, Snapping
 from mechgraph.exchange.formula import FormulaFault, evaluated
@@ -89,6 +90,8 @@ class Builder:
         for joint in self.assembly.joints:
             ends = self.ends(joint)
             row = JOINTS.get(joint.kind)
+            if joint.kind in GEARED:
+                continue
             if row is None:
                 why = REFUSED.get(joint.kind, f"not known here (known: {', '.join(JOINTS)})")
                 self.faults.append(f"{joint.title}: {why}")
@@ -357,6 +360,7 @@ class Builder:
         a = self.assembly
         pairs, drives, start = self.driven(self.seats())
         links = self.links(pairs)
+        couplings = [geared(self, joint, pairs) for joint in a.joints if joint.kind in GEARED]
         if self.moved:
             far = max(self.moved, key=lambda path: max(self.moved[path][0] / self.size, self.moved[path][1]))
             distance, angle = self.moved[far]
@@ -370,6 +374,7 @@ class Builder:
             raise DeclarationError(f"assembly {shown(a.name)}", self.faults)
         made = Mechanism(
             a.name, links, pairs, drives, [Gravity(tuple(a.gravity))] if a.gravity.any() else [],
+            couplings=[coupling for coupling in couplings if coupling is not None],
             start=start, source="a FreeCAD assembly", description=". ".join(notes),
         )  # fmt: skip
         return made, notes
