@@ -423,7 +423,8 @@ def test_every_joint_of_the_table_is_tested():
 @pytest.mark.parametrize(
     "text",
     ["2*pi*time", "4.0d*pi*time", "-time^3+2.5", "1/(2+time)", "(1+time)^0.5", "2^3*time", "3", "-(time)", "+time",
-     *(f"{f}(0.3+0.4*time)*time" for f in FUNCTIONS), "sin(cos(2*time)^2)", "1.5e-1d*time", "(0-2)^3*time", "sqrt(0)+time"],
+     *(f"{f}(0.3+0.4*time)*time" for f in FUNCTIONS), "sin(cos(2*time)^2)", "1.5e-1d*time", "(0-2)^3*time", "sqrt(0)+time",
+     '"2*pi<n>*time"'],
 )  # fmt: skip
 def test_rates_of_formulas_are_their_derivatives(text):
     t = np.linspace(0.1, 0.9, 9)
@@ -433,7 +434,10 @@ def test_rates_of_formulas_are_their_derivatives(text):
     assert v == pytest.approx((after - before) / (2 * h), abs=1e-6)
     assert a == pytest.approx((after - 2 * s + before) / h**2, abs=1e-5)
     assert s == pytest.approx(
-        eval(re.sub(r"(?<=\d)d\b", "", text).replace("^", "**"), {"pi": np.pi, "time": t, "ln": np.log, **vars(np)})
+        eval(
+            re.sub(r"(?<=\d)d\b|<n>", "", text).strip('"').replace("^", "**"),
+            {"pi": np.pi, "time": t, "ln": np.log, **vars(np)},
+        )
         + 0 * t
     )
 
@@ -700,3 +704,56 @@ def test_gears_without_a_carrier_or_a_radius_are_named(tmp_path):
     message = refused(tmp_path, w.text())
     assert "GearJoint 'odd': no part carries both" in message
     assert "RackPinionJoint 'flat': pitchRadius = 0: expected no zero" in message
+
+
+# --- constant distances --------------------------------------------------------------------------------------------------
+
+
+def sliding(kind, z=(0.0, 0.0, 1.0), height=0.0, distance=0.5):
+    """Two blocks that slide along x and y, at (0.3, 0) and (0, 0.4), the second raised by ``height``, 0.5 apart, axes along ``z``."""
+    w = Writer()
+    x, y = np.eye(4), np.eye(4)
+    x[:3, :3] = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])
+    y[:3, :3] = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+    for name, X, along in (("one", at(0.3, 0), x), ("two", at(0, 0.4, height), y)):
+        w.part(name, X, 1.0, (0, 0, 0.1), moments=(1, 2, 2.5))
+        along = X @ along
+        w.joint("TranslationalJoint", f"P{name}", w.name, along, name, along)
+    w.joint(kind, "rod", "one", at(0.3, 0), "two", at(0, 0.4, height), "distanceIJ", distance)
+    w.motion("TranslationalMotion", "drive", "Pone", "TranslationZ", "0.1*time")
+    return w
+
+
+@pytest.mark.parametrize(
+    ("kind", "height"), [("SphSphJoint", 0.0), ("RevRevJoint", 0.0), ("CylSphJoint", 0.2), ("RevCylJoint", 0.2)]
+)
+def test_a_constant_distance_of_a_file_is_a_rod(tmp_path, kind, height):
+    """x^2 + y^2 = 0.5^2 across the axes, whatever the height of what may slide along one; the rod carries a force along itself."""
+    made, _ = loaded(tmp_path, sliding(kind, height=height).text())
+    assert made.link("rod").mass == 0
+    s = mg.solve(made, redundant="minimum_norm")
+    x, y = s.link("one").pose[:, 0, 3], s.link("two").pose[:, 1, 3]
+    assert np.ptp(x) == pytest.approx(0.1)
+    assert x**2 + y**2 == pytest.approx(0.25, abs=1e-12)
+    assert s.link("two").pose[:, 2, 3] == pytest.approx(height)
+
+
+def test_a_distance_that_is_another_as_the_parts_stand_is_closed(tmp_path):
+    made, _ = loaded(tmp_path, sliding("SphSphJoint", distance=0.6).text())
+    s = mg.kinematics(made)
+    assert s.link("one").pose[:, 0, 3] ** 2 + s.link("two").pose[:, 1, 3] ** 2 == pytest.approx(0.36, abs=1e-12)
+
+
+def test_no_distance_is_named(tmp_path):
+    assert "distanceIJ = 0: expected a distance above 0" in refused(
+        tmp_path, sliding("RevRevJoint", distance=0.0).text()
+    )
+
+
+def test_a_motion_that_allows_a_turn_drives_nothing(tmp_path):
+    w = four_bar()
+    drives = len(loaded(tmp_path, w.text())[0].drives)
+    w.motions += ["AllowRotation", ["Name", ["loose"], "MotionJoint", ["/Assembly1/A"]]]
+    made, notes = loaded(tmp_path, w.text(), silent=False)
+    assert len(made.drives) == drives
+    assert any("AllowRotation 'loose' drives nothing" in note for note in notes)

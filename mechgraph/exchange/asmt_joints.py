@@ -144,12 +144,7 @@ JOINTS: dict[str, Row] = {
 }
 """Joints that have a pair."""
 
-_DISTANCE = "a constant distance is no pair; put a rod with a joint at each end in its place in FreeCAD"
 REFUSED = {
     "ConstantVelocityJoint": "there is no such pair; two UniversalJoints with a shaft between them do the same",
-    "SphSphJoint": _DISTANCE,
-    "CylSphJoint": _DISTANCE,
-    "RevCylJoint": _DISTANCE,
-    "RevRevJoint": _DISTANCE,
 }
 """Joints that have none, and what to do."""

@@ -21,6 +21,7 @@ from mechgraph.errors import DeclarationError, listed
 from mechgraph.exchange.asmt import Assembly, Connection, Part
 from mechgraph.exchange.asmt_gears import GEARED, geared
 from mechgraph.exchange.asmt_joints import JOINTS, REFUSED, SLIDES, Directions, Row, free, motion_type
+from mechgraph.exchange.asmt_rods import RODS, rod
 from mechgraph.exchange.exact import FITS, Snapping
 from mechgraph.exchange.formula import FormulaFault, evaluated
 from mechgraph.model.drive import Drive
@@ -90,7 +91,7 @@ class Builder:
         for joint in self.assembly.joints:
             ends = self.ends(joint)
             row = JOINTS.get(joint.kind)
-            if joint.kind in GEARED:
+            if joint.kind in (*GEARED, *RODS):
                 continue
             if row is None:
                 why = REFUSED.get(joint.kind, f"not known here (known: {', '.join(JOINTS)})")
@@ -207,6 +208,9 @@ class Builder:
         }
         drives: dict[str, Drive] = {}
         for motion in self.assembly.motions:
+            if motion.kind == "AllowRotation":
+                self.notes.append(f"{motion.kind} {motion.name!r} drives nothing: the turn of its joint is free anyway")
+                continue
             found, formulas = self.moved_by(motion, seats), self.formulas(motion)
             if found is None:
                 continue
@@ -255,7 +259,7 @@ class Builder:
                 **{f"R{axis}": f"angIJJ{k}" for k, axis in enumerate(axes, 1)},
             },
         }.get(motion.kind, {})
-        found = {freedom: node.word(key) for freedom, key in keys.items()}
+        found = {freedom: " ".join(line.text for line in node.under(key)) for freedom, key in keys.items()}
         if keys and not any(found.values()):
             self.faults.append(f"{motion.title}: has no formula ({', '.join(keys.values())})")
         return {freedom: text for freedom, text in found.items() if text}
@@ -359,7 +363,9 @@ class Builder:
         """
         a = self.assembly
         pairs, drives, start = self.driven(self.seats())
-        links = self.links(pairs)
+        rods = [found for joint in a.joints if joint.kind in RODS and (found := rod(self, joint)) is not None]
+        pairs += [pair for _, ends in rods for pair in ends]
+        links = [*self.links(pairs), *(link for link, _ in rods)]
         couplings = [geared(self, joint, pairs) for joint in a.joints if joint.kind in GEARED]
         if self.moved:
             far = max(self.moved, key=lambda path: max(self.moved[path][0] / self.size, self.moved[path][1]))

@@ -22,6 +22,8 @@ LONGEST_FORMULA = 2000
 DECIMAL = r"(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?"
 DOUBLE = re.compile(rf"({DECIMAL})d(?!\w)", re.ASCII)
 """A number with the letter that Smalltalk writes after one of double precision: ``4.0d*pi*time``."""
+QUOTED = re.compile(r'^"(.*)"$', re.DOTALL)
+"""A whole formula in quotes; a line break within it is written ``<n>``."""
 TOKENS = re.compile(rf"(?:{DECIMAL}d?(?![\w.])|[a-z]\w*|[-+*/^()]|\s)*+", re.ASCII)
 """What a formula consists of: not all that is an expression to Python (``0x10``, ``1_0``, what stands behind ``#``) is one."""
 
@@ -102,7 +104,7 @@ def evaluated(formula: str, t: Array) -> tuple[Array, Array, Array]:
     FormulaFault
         where it is none, holds what is not known here, or has no finite value.
     """
-    text = formula.strip().lower()
+    text = QUOTED.sub(r"\1", formula.strip()).replace("<n>", " ").lower()
     if len(text) > LONGEST_FORMULA:
         raise FormulaFault(f"longer than {LONGEST_FORMULA} characters")
     try:
