@@ -757,3 +757,51 @@ def test_a_motion_that_allows_a_turn_drives_nothing(tmp_path):
     made, notes = loaded(tmp_path, w.text(), silent=False)
     assert len(made.drives) == drives
     assert any("AllowRotation 'loose' drives nothing" in note for note in notes)
+
+
+# --- forces along a line -------------------------------------------------------------------------------------------------
+
+
+def sprung(tension, twist="0.0"):
+    """A block that is driven along x from 0.5 on, and a force between it and the ground's origin."""
+    w = sliding("SphSphJoint")
+    w.joints, w.motions = w.joints[:2], []
+    w.parts.pop("two")
+    w.joints = w.joints[:2]
+    i, j = w.marker(w.name, "anchor", at(0, 0)), w.marker("one", "hook", at(0.3, 0))
+    w.forces += [
+        "InLineForceTorque", ["Name", ["spring"], "MarkerI", [i], "MarkerJ", [j], "tension", [tension], "twist", [twist]]
+    ]  # fmt: skip
+    w.motion("TranslationalMotion", "drive", "Pone", "TranslationZ", "0.1*time")
+    return w
+
+
+@pytest.mark.parametrize(
+    ("tension", "by_hand"),
+    [
+        ("100.0d*(rIJ(self) - 0.1d) + 5.0*vrIJ(self)", lambda r, v, t: 100 * (r - 0.1) + 5 * v),
+        ('"50*rIJ(self)^2<n>+ time"', lambda r, v, t: 50 * r**2 + t),
+        ("7.0", lambda r, v, t: 7.0 + 0 * r),
+    ],
+    ids=["spring", "law", "constant"],
+)
+def test_a_force_along_a_line_of_a_file_pulls_its_markers_together(tmp_path, tension, by_hand):
+    """What drives the block away from the anchor supplies the tension, by the formula read by hand."""
+    made, _ = loaded(tmp_path, sprung(tension).text())
+    assert isinstance(made.loads[0], mg.Spring if "0.1d" in tension else mg.ForceLaw)
+    s = mg.solve(made)
+    t = made.drives[0].motion.t
+    r = 0.3 + 0.1 * t
+    assert s["Pone"].effort[:, 0] == pytest.approx(by_hand(r, 0.1, t), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("tension", "twist", "words"),
+    [
+        ("100*(rIJ(other) - 0.1)", "0", r"InLineForceTorque 'spring': .* is not known in a formula"),
+        ("0x10", "0", "'0x10' is no formula"),
+        ("1.0", "2*time", "twist: a couple about the line"),
+    ],
+)
+def test_a_force_along_a_line_that_is_none_is_named(tmp_path, tension, twist, words):
+    assert re.search(words, refused(tmp_path, sprung(tension, twist).text()))

@@ -19,6 +19,7 @@ from mechgraph.algebra.inertia import physical_faults
 from mechgraph.algebra.se3 import Array, compose, inverse
 from mechgraph.errors import DeclarationError, listed
 from mechgraph.exchange.asmt import Assembly, Connection, Part
+from mechgraph.exchange.asmt_forces import force
 from mechgraph.exchange.asmt_gears import GEARED, geared
 from mechgraph.exchange.asmt_joints import JOINTS, REFUSED, SLIDES, Directions, Row, free, motion_type
 from mechgraph.exchange.asmt_rods import RODS, rod
@@ -367,6 +368,7 @@ class Builder:
         pairs += [pair for _, ends in rods for pair in ends]
         links = [*self.links(pairs), *(link for link, _ in rods)]
         couplings = [geared(self, joint, pairs) for joint in a.joints if joint.kind in GEARED]
+        loads = [load for found in a.forces if (load := force(self, found)) is not None]
         if self.moved:
             far = max(self.moved, key=lambda path: max(self.moved[path][0] / self.size, self.moved[path][1]))
             distance, angle = self.moved[far]
@@ -379,7 +381,7 @@ class Builder:
         if self.faults:
             raise DeclarationError(f"assembly {shown(a.name)}", self.faults)
         made = Mechanism(
-            a.name, links, pairs, drives, [Gravity(tuple(a.gravity))] if a.gravity.any() else [],
+            a.name, links, pairs, drives, [*([Gravity(tuple(a.gravity))] if a.gravity.any() else []), *loads],
             couplings=[coupling for coupling in couplings if coupling is not None],
             start=start, source="a FreeCAD assembly", description=". ".join(notes),
         )  # fmt: skip

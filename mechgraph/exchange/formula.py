@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -104,39 +104,73 @@ def evaluated(formula: str, t: Array) -> tuple[Array, Array, Array]:
     FormulaFault
         where it is none, holds what is not known here, or has no finite value.
     """
-    text = QUOTED.sub(r"\1", formula.strip()).replace("<n>", " ").lower()
-    if len(text) > LONGEST_FORMULA:
-        raise FormulaFault(f"longer than {LONGEST_FORMULA} characters")
-    try:
-        if not TOKENS.fullmatch(text):
-            raise SyntaxError
-        tree = ast.parse(DOUBLE.sub(r"\1", text).replace("^", "**"), mode="eval").body
-        with np.errstate(all="ignore"):
-            jet = _jet(tree, Jet(t, np.ones_like(t), np.zeros_like(t)))
-    except (SyntaxError, ValueError, OverflowError, MemoryError, RecursionError, ZeroDivisionError):
-        raise FormulaFault(f"{shown(formula)} is no formula of time, such as 2*pi*time") from None
+    jet = _found(formula, _tree(formula), {"time": Jet(t, np.ones_like(t), np.zeros_like(t))})
     value, rate, acceleration = (np.array(np.broadcast_to(part, t.shape), float) for part in (jet.s, jet.v, jet.a))
     if not all(np.isfinite(part).all() for part in (value, rate, acceleration)):
         raise FormulaFault(f"{shown(formula)} has no finite value, rate or acceleration at some of the times")
     return value, rate, acceleration
 
 
-def _jet(node: ast.expr, time: Jet) -> Jet:
+def law(formula: str) -> Callable[[Array, Array, Array], Array]:
+    """A force by the formula of it: a function of distance ``rIJ(self)``, its rate ``vrIJ(self)`` and time, ``(T,)`` each.
+
+    Raises
+    ------
+    FormulaFault
+        where it is none, or holds what is not known here.
+    """
+    tree = _tree(formula)
+
+    def value(x: Array, v: Array, t: Array) -> Array:
+        found = _found(formula, tree, {"rij(self)": Jet(x), "vrij(self)": Jet(v), "time": Jet(t)})
+        return np.array(np.broadcast_to(found.s, np.shape(x)), float)
+
+    value(*np.ones((3, 1)))
+    return value
+
+
+def _tree(formula: str) -> ast.expr:
+    """The syntax tree of a formula."""
+    text = QUOTED.sub(r"\1", formula.strip()).replace("<n>", " ").lower()
+    if len(text) > LONGEST_FORMULA:
+        raise FormulaFault(f"longer than {LONGEST_FORMULA} characters")
+    try:
+        if TOKENS.fullmatch(text):
+            return ast.parse(DOUBLE.sub(r"\1", text).replace("^", "**"), mode="eval").body
+    except (SyntaxError, ValueError, MemoryError, RecursionError):
+        pass
+    raise FormulaFault(_none(formula))
+
+
+def _none(formula: str) -> str:
+    return f"{shown(formula)} is no formula of time, such as 2*pi*time"
+
+
+def _found(formula: str, tree: ast.expr, known: Mapping[str, Jet]) -> Jet:
+    """The jet of a formula where what is ``known`` has these."""
+    try:
+        with np.errstate(all="ignore"):
+            return _jet(tree, {"pi": Jet(np.pi), **known})
+    except (ValueError, OverflowError, MemoryError, RecursionError, ZeroDivisionError):
+        raise FormulaFault(_none(formula)) from None
+
+
+def _jet(node: ast.expr, known: Mapping[str, Jet]) -> Jet:
     """The jet of a part of a formula."""
     match node:
         case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
             return Jet(np.float64(number))  # a root of a negative number is none; that of a Python float is complex
-        case ast.Name(id="time"):
-            return time
-        case ast.Name(id="pi"):
-            return Jet(np.pi)
+        case ast.Name(id=name) if name in known:
+            return known[name]
+        case ast.Call(func=ast.Name(id=name), args=[ast.Name(id="self")], keywords=[]) if f"{name}(self)" in known:
+            return known[f"{name}(self)"]
         case ast.UnaryOp(op=ast.USub(), operand=inner):
-            return -_jet(inner, time)
+            return -_jet(inner, known)
         case ast.UnaryOp(op=ast.UAdd(), operand=inner):
-            return _jet(inner, time)
+            return _jet(inner, known)
         case ast.BinOp(left=left, op=op, right=right) if type(op) in OPERATIONS:
-            return OPERATIONS[type(op)](_jet(left, time), _jet(right, time))
+            return OPERATIONS[type(op)](_jet(left, known), _jet(right, known))
         case ast.Call(func=ast.Name(id=name), args=[inner], keywords=[]) if name in FUNCTIONS:
-            return _jet(inner, time).through(*FUNCTIONS[name])
-    known = ", ".join(["time", "pi", *FUNCTIONS])
-    raise FormulaFault(f"{shown(ast.unparse(node))} is not known in a formula (known: {known}, + - * / ^)")
+            return _jet(inner, known).through(*FUNCTIONS[name])
+    names = ", ".join(["time", "pi", *(name for name in known if name not in ("time", "pi")), *FUNCTIONS])
+    raise FormulaFault(f"{shown(ast.unparse(node))} is not known in a formula (known: {names}, + - * / ^)")
