@@ -6,37 +6,33 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.exchange.asmt import Connection
+from mechgraph.exchange.asmt_standing import Standing
 from mechgraph.exchange.formula import FormulaFault, law
 from mechgraph.model.force_law import ForceLaw, Spring
 
-if TYPE_CHECKING:
-    from mechgraph.exchange.asmt import Connection
-    from mechgraph.exchange.asmt_mechanism import Builder
-
 LINEAR = 1e-12
 """Part of the force by which a formula may differ from a line in distance and rate."""
-TRIED = np.array([[0.0, 1.0, 0.0, 0.7, 1.9, 0.7], [0.0, 0.0, 1.0, -1.3, 0.4, -1.3], [0.0, 0.0, 0.0, 0.0, 0.6, 2.0]])
+LOOKED_AT = np.array([[0.0, 1.0, 0.0, 0.7, 1.9, 0.7], [0.0, 0.0, 1.0, -1.3, 0.4, -1.3], [0.0, 0.0, 0.0, 0.0, 0.6, 2.0]])
 """Distances, rates and times at which it is looked at."""
 
 
-def force(builder: Builder, found: Connection) -> Spring | ForceLaw | None:
+def force(builder: Standing, found: Connection) -> Spring | ForceLaw | None:
     """The load of a force; None, and a fault, where a marker is not there or a formula is none."""
     ends = builder.ends(found)
     if ends is None:
         return None
     try:
         tension = law(found.node.word("tension"))
-        if law(found.node.word("twist") or "0")(*TRIED).any():
+        if law(found.node.word("twist") or "0")(*LOOKED_AT).any():
             builder.faults.append(
                 f"{found.title}: twist: a couple about the line of two points is no load here; delete it there"
             )
             return None
-        T = tension(*TRIED)
+        T = tension(*LOOKED_AT)
     except FormulaFault as fault:
         builder.faults.append(f"{found.title}: {fault}")
         return None
@@ -46,7 +42,7 @@ def force(builder: Builder, found: Connection) -> Spring | ForceLaw | None:
         for path, part in zip((found.i, found.j), ends, strict=True)
     )
     stiffness, damping = float(T[1] - T[0]), float(T[2] - T[0])
-    off = np.abs(T - (T[0] + stiffness * TRIED[0] + damping * TRIED[1])).max()
+    off = np.abs(T - (T[0] + stiffness * LOOKED_AT[0] + damping * LOOKED_AT[1])).max()
     if np.isfinite(T).all() and stiffness and T[0] / stiffness <= 0 and off <= LINEAR * np.abs(T).max():
         return Spring(*ends, p, q, stiffness, float(-T[0] / stiffness), damping)
 

@@ -15,18 +15,15 @@ joints.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, compose
+from mechgraph.exchange.asmt import Connection
+from mechgraph.exchange.asmt_standing import Standing
 from mechgraph.exchange.exact import FITS
 from mechgraph.model.coupling import Coupling
-
-if TYPE_CHECKING:
-    from mechgraph.exchange.asmt import Connection
-    from mechgraph.exchange.asmt_mechanism import Builder
-    from mechgraph.model.pair import Pair
+from mechgraph.model.pair import Pair
 
 GEARED = ("GearJoint", "RackPinionJoint")
 """Joints that are couplings."""
@@ -34,7 +31,7 @@ Terms = dict[str, float]
 """Freedoms with coefficients."""
 
 
-def geared(builder: Builder, joint: Connection, pairs: Sequence[Pair]) -> Coupling | None:
+def geared(builder: Standing, joint: Connection, pairs: Sequence[Pair]) -> Coupling | None:
     """The coupling of a gear or rack joint; None, and a fault, where its parts have no carrier in common or a radius is zero."""
     if builder.ends(joint) is None:
         return None
@@ -65,7 +62,7 @@ def geared(builder: Builder, joint: Connection, pairs: Sequence[Pair]) -> Coupli
     return Coupling({name: value for name, value in terms.items() if value}, name=joint.name)
 
 
-def _turns(builder: Builder, marker: str, pairs: Sequence[Pair], z: Array) -> dict[str, Terms]:
+def _turns(builder: Standing, marker: str, pairs: Sequence[Pair], z: Array) -> dict[str, Terms]:
     """Parts to which pairs about the z axis of a marker lead, the nearest first, and the turn about ``z`` of its part against them."""
     at, part = builder.pose(marker)[:, 3], builder.assembly.markers[marker].part
     found: dict[str, Terms] = {part: {}}
@@ -85,7 +82,7 @@ def _turns(builder: Builder, marker: str, pairs: Sequence[Pair], z: Array) -> di
     return found
 
 
-def _slides(builder: Builder, marker: str, pairs: Sequence[Pair]) -> dict[str, Terms]:
+def _slides(builder: Standing, marker: str, pairs: Sequence[Pair]) -> dict[str, Terms]:
     """Parts on which the part of a marker slides along its x, and the slide against them."""
     x, part = builder.pose(marker)[:, 0], builder.assembly.markers[marker].part
     found: dict[str, Terms] = {}
@@ -98,7 +95,7 @@ def _slides(builder: Builder, marker: str, pairs: Sequence[Pair]) -> dict[str, T
     return found
 
 
-def _marker(builder: Builder, pair: Pair) -> Array:
+def _marker(builder: Standing, pair: Pair) -> Array:
     """The marker of a pair on link a, in the assembly."""
     own = pair.markers[0].pose()
     return own if pair.a == builder.assembly.name else compose(builder.part(pair.a).pose, own)

@@ -8,9 +8,8 @@ fit less are left as they are, and the loops are closed from there.
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -23,6 +22,7 @@ from mechgraph.exchange.asmt_forces import force
 from mechgraph.exchange.asmt_gears import GEARED, geared
 from mechgraph.exchange.asmt_joints import JOINTS, REFUSED, SLIDES, Directions, Row, free, motion_type
 from mechgraph.exchange.asmt_rods import RODS, rod
+from mechgraph.exchange.asmt_standing import UNMENTIONED, Standing
 from mechgraph.exchange.exact import FITS, Snapping
 from mechgraph.exchange.formula import FormulaFault, evaluated
 from mechgraph.model.drive import Drive
@@ -32,9 +32,6 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.quantities import shown
-
-UNMENTIONED = 1e-12
-"""Corrections up to here are not worth a word."""
 
 
 @dataclass
@@ -55,35 +52,8 @@ class Seat:
         return float(np.linalg.norm(self.given[:, 3] - self.on_b[:, 3])), self.directions.error
 
 
-@dataclass
-class Builder:
-    """Builds a mechanism and collects what is wrong (``faults``) and what was taken otherwise than it stands (``notes``)."""
-
-    assembly: Assembly
-    faults: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-    moved: dict[str, tuple[float, float]] = field(default_factory=dict)
-
-    def part(self, name: str) -> Part:
-        """The part, or the ground."""
-        return self.assembly.parts.get(name, self.assembly.ground)
-
-    def ends(self, found: Connection) -> tuple[str, str] | None:
-        """The parts of the two markers; None, and a fault, where a marker is not there."""
-        markers = self.assembly.markers
-        missing = [path for path in (found.i, found.j) if path not in markers]
-        if missing:
-            known = listed(markers, 8)
-            self.faults.append(
-                f"{found.title}: there is no marker {', '.join(map(shown, missing))} (there are: {known})"
-            )
-            return None
-        return markers[found.i].part, markers[found.j].part
-
-    def pose(self, marker: str) -> Array:
-        """A marker in the assembly, where the parts stand."""
-        found = self.assembly.markers[marker]
-        return compose(self.part(found.part).pose, found.pose)
+class Builder(Standing):
+    """Builds a mechanism."""
 
     # --- joints ----------------------------------------------------------------------------------------------------
 
@@ -153,15 +123,6 @@ class Builder:
         R = np.column_stack([x / np.linalg.norm(x), np.cross(z, x / np.linalg.norm(x)), z])
         is_line = row.slides in (JOINTS["RevoluteJoint"].slides, JOINTS["CylindricalJoint"].slides)
         return R, snap.on_line(I[:, 3], z) if is_line else I[:, 3]
-
-    @functools.cached_property
-    def size(self) -> float:
-        """Mean radius of the markers and of the mass centres; 1 where all are one point."""
-        a = self.assembly
-        centers = [part.pose @ [*part.center, 1.0] for part in a.parts.values() if part.center is not None]
-        points = np.array([self.pose(path)[:, 3] for path in a.markers] + centers or [np.zeros(3)])
-        radius = float(np.sqrt(((points - points.mean(axis=0)) ** 2).sum(axis=1).mean()))
-        return radius if radius > UNMENTIONED * max(1.0, float(np.abs(points).max())) else 1.0
 
     def pair(self, seat: Seat) -> Pair:
         """The pair, marker J moved to its place where it is meant to be there."""

@@ -5,25 +5,27 @@ A joint holds two points (``Sph``), axes (``Rev``: at a point of the axis; ``Cyl
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, compose, inverse
+from mechgraph.exchange.asmt import Connection
+from mechgraph.exchange.asmt_standing import Standing
 from mechgraph.exchange.exact import FITS
 from mechgraph.model.link import Link
 from mechgraph.model.numeric import second_direction
 from mechgraph.model.pair import Marker, Pair
 
-if TYPE_CHECKING:
-    from mechgraph.exchange.asmt import Connection
-    from mechgraph.exchange.asmt_mechanism import Builder
+BALL, HINGE, SLEEVE = ("S", False), ("R", False), ("C", True)
+RODS = {
+    "SphSphJoint": (BALL, BALL),
+    "RevRevJoint": (HINGE, HINGE),
+    "CylSphJoint": (SLEEVE, BALL),
+    "RevCylJoint": (HINGE, SLEEVE),
+}
+"""The pairs at I and at J, and whether they slide along the axis of the marker."""
 
-RODS = {"SphSphJoint": "SS", "RevRevJoint": "RR", "CylSphJoint": "CS", "RevCylJoint": "RC"}
-"""The pairs at I and at J."""
 
-
-def rod(builder: Builder, joint: Connection) -> tuple[Link, list[Pair]] | None:
+def rod(builder: Standing, joint: Connection) -> tuple[Link, list[Pair]] | None:
     """The rod of a joint and its two pairs; None, and a fault, where its ends say no direction.
 
     The rod's frame is that of the assembly where the parts stand; where the distance is another there, the loops are closed from there.
@@ -37,8 +39,8 @@ def rod(builder: Builder, joint: Connection) -> tuple[Link, list[Pair]] | None:
     if np.linalg.norm(np.cross(axes[0], axes[1])) <= FITS:
         axes[1] = axes[0] * np.sign(axes[0] @ axes[1])
     feet = [
-        p + z * (z @ (q - p)) if kind == "C" else p
-        for kind, p, q, z in zip(kinds, points, points[::-1], axes, strict=True)
+        p + z * (z @ (q - p)) if slides else p
+        for (_, slides), p, q, z in zip(kinds, points, points[::-1], axes, strict=True)
     ]
     across = feet[1] - feet[0]
     if not (length > 0 and np.linalg.norm(across) > FITS * builder.size):
@@ -48,7 +50,7 @@ def rod(builder: Builder, joint: Connection) -> tuple[Link, list[Pair]] | None:
         return None
     ends = [feet[0], feet[0] + length * across / np.linalg.norm(across)]
     pairs = []
-    for side, kind, path, foot, end, z in zip("IJ", kinds, (joint.i, joint.j), feet, ends, axes, strict=True):
+    for side, (kind, _), path, foot, end, z in zip("IJ", kinds, (joint.i, joint.j), feet, ends, axes, strict=True):
         part = builder.assembly.markers[path].part
         X = np.column_stack([_axes(z), foot])
         own = X if part == builder.assembly.name else compose(inverse(builder.part(part).pose), X)
