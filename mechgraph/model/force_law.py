@@ -135,11 +135,11 @@ Place = str | tuple[str, str, Any, Any]
 class _Placed(Law):
     """A law placed by its first argument: the name of a freedom, or ``(link a, link b, p, q)``."""
 
-    freedom: Annotated[Place | None, FREEDOM_NAME("a single turn or slide", default="this,")] = None
-    a: Annotated[str | None, LINK_NAME("first link", default="or these four")] = None
-    b: Annotated[str | None, LINK_NAME("second link", default="likewise")] = None
-    p: Annotated[Any, NAMED_POINT("point of link a, or its name", LENGTH, of="a", default="likewise")] = None
-    q: Annotated[Any, NAMED_POINT("point of link b, or its name", LENGTH, of="b", default="likewise")] = None
+    freedom: Annotated[Place | None, FREEDOM_NAME("a single turn or slide", default="a, b, p and q")] = None
+    a: Annotated[str | None, LINK_NAME("first link", default="freedom")] = None
+    b: Annotated[str | None, LINK_NAME("second link", default="freedom")] = None
+    p: Annotated[Any, NAMED_POINT("point of link a, or its name", LENGTH, of="a", default="freedom")] = None
+    q: Annotated[Any, NAMED_POINT("point of link b, or its name", LENGTH, of="b", default="freedom")] = None
 
     def __post_init__(self) -> None:
         if isinstance(self.freedom, tuple | list) and len(self.freedom) == 4:
