@@ -26,6 +26,7 @@ from mechgraph.errors import (
     ReachError,
     ResponseError,
     ShapeError,
+    StudyError,
 )
 from mechgraph.exchange.files import load, save
 from mechgraph.kinetostatics import assemble, kinematics, solve
@@ -126,6 +127,7 @@ __all__ = [
     "Stop",
     "Structure",
     "Study",
+    "StudyError",
     "Surface",
     "SystemGroup",
     "TorsionSpring",
@@ -163,6 +165,11 @@ __all__ = [
     "transmission",
     "write_report",
 ]
+
+
+def __dir__() -> list[str]:
+    """The public names."""
+    return sorted(__all__)
 
 
 def __getattr__(name: str) -> Any:

@@ -22,6 +22,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.arguments import door
 from mechgraph.data import plain
 from mechgraph.document import Document, Paragraph, Shown
 from mechgraph.errors import DeclarationError, MechgraphWarning
@@ -86,6 +87,7 @@ class TransmissionData:
     greatest: float | None
 
 
+@door
 def transmission(s: Solution, output: str, driver: str | None = None) -> Transmission:
     """How well the drivers move an output at all positions of a solution.
 

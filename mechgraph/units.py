@@ -118,6 +118,8 @@ def unit_of(units: Mapping[str, str], dimension: Sequence[float]) -> str:
     ):
         return ""
     force = force_unit(units)
+    if tuple(dimension) == POWER and (force, units["length"], units["time"]) == ("N", "m", "s"):
+        return "W"
     names = {"F": force, "L": units.get("length", ""), "M": units.get("mass", ""), "T": units.get("time", "")}
     powers = {names[letter]: n for letter, n in _shortest(dimension, bool(force)).items() if n}
     angle = "rad" if not any(dimension[:2]) and dimension[2] <= 0 else ""

@@ -21,8 +21,10 @@ import numpy as np
 from mechgraph.algebra.se3 import Array, cross
 from mechgraph.model.coupling import BaseCoupling
 from mechgraph.model.field_kinds import FREEDOM_NAME, TEXT
+from mechgraph.model.numeric import sound_tol
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.pair_type import PairType
+from mechgraph.quantities import shown
 
 FITTING = 1e-6
 """Part of a length, or angle, by which gears may miss the place that their teeth ask for; twice the tolerance of the mechanism if more."""
@@ -114,7 +116,7 @@ class Contact(BaseCoupling):
 
     def faults(self, m: Any) -> list[str]:
         """What is wrong with it in a mechanism, one line each."""
-        where = f"coupling {self.name!r}: "
+        where = f"coupling {shown(self.name)}: "
         found = [where + fault for fault in self.value_faults("")]
         ends = {side: getattr(self, side) for side in "ab"}
         found += [where + fault for fault in (m.freedom_fault(q, single=True) for q in ends.values()) if fault]
@@ -254,7 +256,7 @@ def _turned_about(m: Any, steps: tuple[Step, ...], fitting: float) -> tuple[Arra
 
 def fitting_of(m: Any) -> float:
     """Part of a length, or angle, by which gears may miss their place in a mechanism."""
-    return max(FITTING, 2.0 * (m.tol or 0.0))
+    return max(FITTING, 2.0 * sound_tol(m.tol))
 
 
 def _are_placed(m: Any) -> bool:

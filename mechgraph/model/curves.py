@@ -18,7 +18,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.model.field_format import Described
 from mechgraph.model.field_kinds import DIRECTION, FLAG, INTERVAL, NUMBER, POINT, POSITIVE, TEXT
-from mechgraph.model.numeric import filled_second
+from mechgraph.model.numeric import filled_second, parallel_faults
 from mechgraph.model.once import Once
 from mechgraph.units import LENGTH
 
@@ -202,6 +202,10 @@ class Centred(Curve):
         super().__post_init__()
         if self.second is None:
             object.__setattr__(self, "second", filled_second(self.axis))
+
+    def faults(self, where: str) -> list[str]:
+        """What is wrong with what is declared, one line each."""
+        return super().faults(where) or parallel_faults(self.axis, self.second, where)
 
     @property
     def normal(self) -> Array:

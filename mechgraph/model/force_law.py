@@ -192,11 +192,11 @@ Place = str | tuple[str, str, Any, Any]
 class _Placed(_ByPlace):
     """A law placed by its first arguments: the name of a freedom, ``(link a, link b, p, q)``, or these four."""
 
-    freedom: Annotated[Place | None, FREEDOM_NAME("a single turn or slide", default="this,")] = None
-    a: Annotated[str | None, LINK_NAME("first link", default="or these four")] = None
-    b: Annotated[str | None, LINK_NAME("second link", default="likewise")] = None
-    p: Annotated[Any, NAMED_POINT("point of link a, or its name", LENGTH, of="a", default="likewise")] = None
-    q: Annotated[Any, NAMED_POINT("point of link b, or its name", LENGTH, of="b", default="likewise")] = None
+    freedom: Annotated[Place | None, FREEDOM_NAME("a single turn or slide", default="a, b, p and q")] = None
+    a: Annotated[str | None, LINK_NAME("first link", default="freedom")] = None
+    b: Annotated[str | None, LINK_NAME("second link", default="freedom")] = None
+    p: Annotated[Any, NAMED_POINT("point of link a, or its name", LENGTH, of="a", default="freedom")] = None
+    q: Annotated[Any, NAMED_POINT("point of link b, or its name", LENGTH, of="b", default="freedom")] = None
 
     def __post_init__(self) -> None:
         if self.freedom is not None and self.q is None:

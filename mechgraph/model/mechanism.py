@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from mechgraph.arguments import items_of
+from mechgraph.arguments import door, items_of
 from mechgraph.document import Document, Shown
 from mechgraph.errors import DeclarationError, MechgraphWarning
 from mechgraph.model.coupling import BaseCoupling
@@ -58,6 +58,9 @@ class Mechanism(Parts, Once, Shown):
     DeclarationError
         with all faults at once.
     """
+
+    _every_method_is_a_door = False
+    _wanted = "a Mechanism; mg.load(name) reads one"
 
     def __init__(
         self,
@@ -230,6 +233,7 @@ class Mechanism(Parts, Once, Shown):
             )
         )
 
+    @door
     def with_pair_type(self, pair: str, type: str | PairType, *, pitch: float | None = None) -> Mechanism:
         """A copy in which one pair has another type, at the same markers; drives that it cannot take are dropped."""
         old = self.pair(pair)
@@ -262,6 +266,7 @@ class Mechanism(Parts, Once, Shown):
         response = None if self.response is None else self.response.without(lost)
         return self.replace(pairs=pairs, drives=drives, loads=loads, start=start, response=response)
 
+    @door
     def to_units(self, **units: str) -> Mechanism:
         """The same mechanism in other units, e.g. ``m.to_units(length="mm", mass="g")`` (``units`` extra).
 
@@ -282,6 +287,7 @@ class Mechanism(Parts, Once, Shown):
             units={**self.units, **units},
         )
 
+    @door
     def snapped(self, tol: float) -> Mechanism:
         """The mechanism with the smallest change that makes near-special geometry exact; ``changes`` of it prints what was moved.
 
@@ -299,6 +305,7 @@ class Mechanism(Parts, Once, Shown):
         made: Mechanism = importlib.import_module("mechgraph.structure.snapping").snapped(self, tol)
         return made
 
+    @door
     def equivalent(self, at: Mapping[str, float] | None = None, *, rollers: str = "removed") -> Mechanism:
         """The planar mechanism with links and lower pairs in place of higher pairs, gears and belts, with freedoms at values ``at``.
 
@@ -325,6 +332,7 @@ class Mechanism(Parts, Once, Shown):
         """
         return importlib.import_module("mechgraph.show.page.widget").view(self)
 
+    @door
     def moved(self, pose: Any) -> Mechanism:
         """The whole mechanism after a rigid motion: a 4 x 4 (or 3 x 4) pose. Coordinates of the pairs stay what they are."""
         fits = is_numeric(pose, (4, 4)) or is_numeric(pose, (3, 4))
@@ -337,12 +345,6 @@ class Mechanism(Parts, Once, Shown):
             pairs=[pair.moved(G) for pair in self.pairs],
             loads=[load.moved(G) for load in self.loads],
         )
-
-
-def check_mechanism(m: Any, call: str) -> None:
-    """Raise DeclarationError where ``m`` is no Mechanism."""
-    if not isinstance(m, Mechanism):
-        raise DeclarationError(call, [wrong(m, "mechanism", "a Mechanism; mg.load(name) reads one")])
 
 
 def _ends(pairs: Iterable[Any]) -> list[str]:

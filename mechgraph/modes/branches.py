@@ -5,16 +5,17 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+from mechgraph.arguments import Index, at_least, door
 from mechgraph.closure.assembly import CLOSED, close, led
 from mechgraph.closure.configuration import Configuration
 from mechgraph.data import plain
 from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, counted
-from mechgraph.model.mechanism import Mechanism, check_mechanism
+from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.family import Array
 from mechgraph.modes.finding import Finder
 from mechgraph.modes.question import Question
@@ -123,6 +124,9 @@ class Branches(Shown):
         places, faults, q = [], [], Question(self.mechanism, _at(self.mechanism, self.driver, [0.0]))
         for number, position in enumerate(positions):
             start = position.start if isinstance(position, Mechanism) else position
+            if not isinstance(start, Mapping) or not all(is_numeric(value, ()) for value in start.values()):
+                wanted = "an assembly, or coordinates of freedoms"
+                raise DeclarationError(f"defects of {self.mechanism.name!r}", [wrong(position, "position", wanted)])
             place = self._place(q, {self.mechanism.full_name(k): float(v) for k, v in start.items()})
             places.append(place or (-1, 0.0))
             if place is None:
@@ -247,14 +251,15 @@ def _turns(b: Branch) -> str:
     return "yes" if b.turns == 1 else f"yes, back after {b.turns} turns"
 
 
+@door
 def branches(
     m: Mechanism,
     driver: str,
     *,
     over: tuple[float, float] | None = None,
-    samples: int = SAMPLES_A_TURN,
-    points: int = MAP_POINTS,
-    seed: int = 0,
+    samples: Annotated[int, at_least(3)] = SAMPLES_A_TURN,
+    points: Annotated[int, at_least(3)] = MAP_POINTS,
+    seed: Index = 0,
     cache: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> Branches:
@@ -274,13 +279,9 @@ def branches(
     ------
     DeclarationError, AssemblyError, IndeterminateError
     """
-    check_mechanism(m, "branches")
     why = m.freedom_fault(driver, single=True)
     faults = [f"driver {driver!r}: {why}"] if why else []
-    for name, number, least in (("samples", samples, 3), ("points", points, 3)):
-        if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < least:
-            faults.append(wrong(number, name, f"a whole number, {least} or more"))
-    if over is not None and not (is_numeric(over, (2,)) and over[0] < over[1]):
+    if over is not None and not over[0] < over[1]:
         faults.append(wrong(over, "over", "the smallest and the largest value"))
     if faults:
         raise DeclarationError(f"branches of {m.name!r}", faults)

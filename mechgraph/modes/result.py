@@ -88,7 +88,7 @@ class Assemblies(Shown, Sequence[Mechanism]):
     def __len__(self) -> int:
         return len(self.modes)
 
-    def __getitem__(self, i: Any) -> Any:
+    def __getitem__(self, i: int | slice) -> Any:
         return self.modes[i]
 
     def __iter__(self) -> Iterator[Mechanism]:
@@ -164,7 +164,7 @@ class AssembliesOver(Shown, Sequence[Assemblies]):
     def __len__(self) -> int:
         return len(self.positions)
 
-    def __getitem__(self, i: Any) -> Any:
+    def __getitem__(self, i: int | slice) -> Any:
         return self.positions[i]
 
     @property

@@ -131,6 +131,13 @@ class Part:
     warnings: tuple[Doubt, ...] = ()
 
 
+def unsolved(task: Task, why: str) -> Part:
+    """A part of which nothing came."""
+    count, positions = task.values.shape[1], max(motion.shape[-1] for motion in task.motions.values())
+    status = np.full((count, positions), len(STATUSES) - 1, dtype=np.int8)
+    return Part(None, status, dict.fromkeys(range(count), why))
+
+
 def worst(found: Iterable[Doubt]) -> tuple[Doubt, ...]:
     """Of every passive freedom the warning with the greatest effort, of every contact that with the greatest pull, and the deepest cut."""
     out: dict[tuple[type, str], tuple[float, Doubt]] = {}
