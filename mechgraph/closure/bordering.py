@@ -9,7 +9,8 @@ or column, placed at the loop where it lies. What results,
         [   G     0 ]
 
 is square. Where its pivots are all well away from zero the rank of J is proved: the bordering cannot make up for a rank below that
-of the matching. Then q solves the rates, x gives the loop wrenches, a random ``c`` a random self-stress. Many positions are factored
+of the matching. Where geometry makes the rank lower, or the borders do not meet what it leaves, the borders are random throughout, and
+as many more as the rank is lower. Then q solves the rates, x gives the loop wrenches, a random ``c`` a random self-stress. Many positions are factored
 group by group where that is faster: the blocks of B in block triangular form are the structural groups with these drivers.
 Sources: Duff, Erisman and Reid, Direct Methods for Sparse Matrices, 2017, chapters 5 and 6 (matching, structural rank); Govaerts, Numerical
 Methods for Bifurcations of Dynamical Equilibria, 2000, chapter 3 (bordered systems).
@@ -25,6 +26,7 @@ from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.elimination import Elimination
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
 from mechgraph.numerics.block_triangular import BlockFactor, BlockTriangular
@@ -54,15 +56,17 @@ class LoopSystem(ReducedRows):
     ``regular`` whether its pivots prove the rank there; ``rank`` of J without the fixed columns; ``smallest`` pivot; ``redundant``
     number of self-stresses; ``held`` number of motions left; ``kept (loops,)`` rows of every loop that are
     independent there, ``dropped`` the largest singular value among the others; ``shared`` number of self-stresses that connect loops,
-    ``shared_in`` a loop of each.
+    ``shared_in`` a loop of each; ``deficient`` by how much the rank is below that of the matching, which has to be said: then the borders
+    go through all rows and columns; None where they are local.
     """
 
-    def __init__(self, rows: ClosureRows, fixed: Index) -> None:
+    def __init__(self, rows: ClosureRows, fixed: Index, deficient: int | None = None) -> None:
         super().__init__(rows, fixed)
+        self.deficient = deficient
         self._match()
         self.pattern, self._constant = self._border(beside=False)
         self.first = self.factor(rows)
-        if self.shared and not self.first.smallest_pivot > RETRY:
+        if deficient is None and self.shared and not self.first.smallest_pivot > RETRY:
             own = self.first, self.pattern, self._constant
             self.pattern, self._constant = self._border(beside=True)
             self.first = self.factor(rows)
@@ -71,12 +75,15 @@ class LoopSystem(ReducedRows):
         self.smallest = self.first.smallest_pivot
         self.regular = self.smallest > PIVOT
         self.pivot_limit = max(PIVOT, WORSE * self.smallest)
-        self.rank = self._matched - self._motions
+        self.rank = self._matched - self._motions - (deficient or 0)
 
     @classmethod
     def at(cls, here: Configuration, fixed: Index) -> LoopSystem:
-        """The system chosen at the first position of a configuration."""
-        return cls(ClosureRows.at(here), fixed)
+        """The system chosen at the first position of a configuration, which is regular there."""
+        out = cls(ClosureRows.at(here), fixed)
+        if out.regular:
+            return out
+        return cls(out.rows, fixed, out.rank - Elimination(out.matrix, out.owners, RANKS.position).rank)
 
     # --- the choice ------------------------------------------------------------------------------------------------------
 
@@ -144,8 +151,9 @@ class LoopSystem(ReducedRows):
         left[match[match >= 0]] = False
         self._left_cols = np.flatnonzero(left)
         self._matched = int((match >= 0).sum())
-        self.shared, self.held = len(self._left_rows), self._motions + len(self._left_cols)
-        self.redundant = self.rows.count - (self._matched - self._motions)
+        more = self.deficient or 0
+        self.shared, self.held = len(self._left_rows) + more, self._motions + len(self._left_cols) + more
+        self.redundant = self.rows.count - (self._matched - self._motions - more)
         owner = np.concatenate([self.owners, np.zeros(self._motions, dtype=np.intp)])
         self.shared_in = owner[self._left_rows]
 
@@ -161,19 +169,25 @@ class LoopSystem(ReducedRows):
         """The pattern of the square system and its constant values.
 
         A random column for every row left over, in the rows of its loop, or where it is ``beside`` them also in those of the
-        neighbours; a random row for every column left over.
+        neighbours; a random row for every column left over. Where the rank had to be said, each in all rows and columns.
         """
         rows, cols, data = self._inner
         rng = np.random.default_rng(BORDERS_SEED)
-        if beside:
+        if self.deficient is not None:
+            height = self._m + self._motions
+            number, support = np.repeat(np.arange(self.shared), height), np.tile(np.arange(height), self.shared)
+        elif beside:
             number, support = _shares(self._touch, self._touch.T.tocsr(), self._left_rows)
         else:
             height = np.concatenate([self.kept, np.ones(self.rows.further, dtype=np.intp)])
             count = height[self.shared_in]
-            number = np.repeat(np.arange(self.shared), count)
+            number = np.repeat(np.arange(len(count)), count)
             first = np.cumsum(height)[self.shared_in] - count
             support = first[number] + np.arange(len(number)) - (np.cumsum(count) - count)[number]
         held, columns = _shares(self._touch.T.tocsr(), self._touch, self._left_cols.astype(np.intp))
+        if self.deficient is not None:
+            rest = self.held - self._motions
+            held, columns = np.repeat(np.arange(rest), self._n), np.tile(np.arange(self._n), rest)
         self._size = self._n + self.shared
         constant = np.concatenate([data, _random_units(rng, number), _random_units(rng, held)])
         pattern = Pattern(

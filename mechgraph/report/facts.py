@@ -13,6 +13,7 @@ from mechgraph.closure.assembly import at_position
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.rank import EngineName
 from mechgraph.errors import DeclarationError
+from mechgraph.force.passive_hold import hold_names
 from mechgraph.numerics.tolerances import RANKS
 from mechgraph.quantities import wrong
 from mechgraph.report import driving, findings
@@ -248,6 +249,12 @@ class Facts(GraphFacts):
     def undriven(self) -> tuple[Finding, ...]:
         """Freedoms that are neither driven nor passive."""
         return findings.left_free(self.geometry.freedoms) if self.geometry else ()
+
+    @property
+    def passive_here_only(self) -> tuple[str, ...]:
+        """Names of motions that are passive in this position only: they move other links in all others, and are free."""
+        g = self.geometry
+        return tuple(hold_names(self.mechanism, g.freedoms.passing)) if g else ()
 
     @cached_property
     def passive(self) -> tuple[PassiveFinding, ...]:

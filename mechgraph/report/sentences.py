@@ -114,9 +114,14 @@ def _left_free(r: Facts) -> str:
     free = f"{plural(len(r.undriven), 'freedom')} {verb} neither driven nor passive"
     if not r.change_point:
         shaky = " The mobility is infinitesimal only: a shaky structure." if _shaky(r) else ""
-        return f"Under-driven: mobility {r.mobility}, {drivers}; {free}.{shaky}"
+        return f"Under-driven: mobility {r.mobility}, {drivers}; {free}{here_only(r.passive_here_only)}.{shaky}"
     state = "under-driven at" if r.suggested_drives else "at"
     return f"Finite mobility {r.finite_mobility}, {drivers}, {state} a change point: mobility {r.mobility} here; {free} here."
+
+
+def here_only(names: Sequence[str]) -> str:
+    """What looks passive where the mechanism stands, behind the freedoms that are not; empty where nothing does."""
+    return f" ({joined(names)}: passive in this position only)" if names else ""
 
 
 def _driven_structure(r: Facts) -> str:

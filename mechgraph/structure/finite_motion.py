@@ -19,6 +19,7 @@ takes no step on a branch along which the rank is nowhere full (a shaky part car
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -104,6 +105,13 @@ class _Closed:
         v = self.N.T @ rng.normal(size=self.N.shape[0])
         return np.asarray(v / np.linalg.norm(v))
 
+    def steps(self, rng: np.random.Generator) -> Iterator[tuple[Array, Array]]:
+        """States to which random steps lead, and the increments from here; those that do not close or come back left out."""
+        for _ in range(RANDOM_STEPS):
+            x = self.moved(self.random(rng), TRIAL_STEPS[0])
+            if x is not None and np.abs(self.change(x)).max() > MOVED * TRIAL_STEPS[0]:
+                yield x, self.change(x)
+
     def regular(self, v: Array) -> float:
         """Length of the first step after which the rows that are independent here close all loops; 0 where there is none.
 
@@ -185,6 +193,11 @@ class FiniteMotion:
         return self.closure_nearby.motions if self.closure_nearby else None
 
 
+def states_nearby(system: System, x: Array, closure: ClosureRank) -> Iterator[tuple[Array, Array]]:
+    """Closed states random steps away from a closed state ``x (nx,)``, and the increments ``(F,)`` that lead there."""
+    return _Closed(system, x, closure, closure.engine).steps(np.random.default_rng(STEPS_SEED))
+
+
 def finite_motion(system: System, x: Array, closure: ClosureRank, engine: EngineName = "auto") -> FiniteMotion:
     """Follow the motions of a closed state ``x (nx,)`` where ``closure`` is the rank of its closure equations.
 
@@ -206,15 +219,8 @@ def _near_by(start: _Closed, rng: np.random.Generator) -> FiniteMotion:
     """The mobility about a position that is not regular: the largest of those at positions reached from it."""
     best = FiniteMotion(0, start.closure.rank)
     rank = best.rank_nearby
-    for _ in range(RANDOM_STEPS):
-        x = start.moved(start.random(rng), TRIAL_STEPS[0])
-        if x is None:
-            continue
-        change = start.change(x)
-        length = float(np.abs(change).max())
-        if not length > MOVED * TRIAL_STEPS[0]:
-            continue
-        there = start.reached(x)
+    for x, change in start.steps(rng):
+        length, there = float(np.abs(change).max()), start.reached(x)
         rank = max(rank, there.closure.rank)
         if not there.N.shape[1]:
             continue
