@@ -73,7 +73,10 @@ class _Closed:
 
     @cached_property
     def N(self) -> Array:
-        return np.linalg.qr(self.closure.motions / self.closure.reduced.scale[:, None])[0]
+        """Ordered by how much they meet the rows, whatever the engine: what returns meets them a little (see ``RANKS.nearby``)."""
+        rows = self.closure.reduced
+        N = np.linalg.qr(self.closure.motions / rows.scale[:, None])[0]
+        return np.asarray(N @ np.linalg.svd(rows.matrix @ N[rows.free], full_matrices=True)[2].T)
 
     def increments(self, v: Array) -> Array:
         """The motion ``N v`` with its largest increment one."""
