@@ -20,6 +20,7 @@ from mechgraph.report import driving, findings
 from mechgraph.report.advice import Advice, driving_advice, variants
 from mechgraph.report.findings import Finding, LoopFact, PassiveFinding
 from mechgraph.report.graph_facts import GraphFacts
+from mechgraph.report.rounding import LIMIT
 from mechgraph.structure.advice import advice
 from mechgraph.structure.decomposition import Decomposition, decomposition
 from mechgraph.structure.families import Families, families
@@ -64,6 +65,7 @@ class Facts(GraphFacts):
     note: str = ""
     geometry: Geometry | None = None
     asked: EngineName = "auto"
+    limit: float = LIMIT
 
     # --- what the topology decides ---------------------------------------------------------------------------------------
 

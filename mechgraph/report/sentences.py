@@ -16,6 +16,8 @@ from mechgraph.structure.uniqueness import Uniqueness
 
 DROPPED = 1e-9
 """Part of the margin above which a dropped singular value is reported rather than the margin."""
+LINE = 80
+"""Longest list of names in a sentence that is not counted instead."""
 SETS = 3
 """Most sets of components that the verdict names."""
 
@@ -121,7 +123,10 @@ def _left_free(r: Facts) -> str:
 
 def here_only(names: Sequence[str]) -> str:
     """What looks passive where the mechanism stands, behind the freedoms that are not; empty where nothing does."""
-    return f" ({joined(names)}: passive in this position only)" if names else ""
+    if not names:
+        return ""
+    shown = joined(names) if len(names) <= SETS and len(joined(names)) <= LINE else f"{len(names)} motions"
+    return f" ({shown}: passive in this position only)"
 
 
 def _driven_structure(r: Facts) -> str:

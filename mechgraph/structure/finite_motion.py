@@ -54,6 +54,8 @@ FROZEN = 12
 """Corrections with the equations of the position left."""
 SLOW = 0.2
 """Part of the closure error that such a correction may leave."""
+MOST_GIVEN = 200
+"""Freedoms up to which a motion is followed with all of them given; of more a trial step says enough, and takes no gigabytes of rates."""
 STEPS_SEED = 7
 
 
@@ -145,6 +147,8 @@ class _Closed:
         """
         single = np.flatnonzero(self.system.single_rows >= 0)
         given = np.array(independent_rows(self.N, single.tolist(), self.N.shape[1]), dtype=np.intp)
+        if len(given) > MOST_GIVEN:
+            return 0.0
         ahead = STROKE * self.increments(v)[given]
         if not np.abs(ahead).max(initial=0.0) > MOVED * TRIAL_STEPS[0]:
             return 0.0
