@@ -228,11 +228,10 @@ class Pipeline:
             return
         some = here.part(closed)
         strays = PassiveMotions(some, self.passive, f.part(closed, some).motions()).strays > MOTIONS.nearby
-        if strays.any():
+        moves = strays.any(axis=1).tolist()
+        if any(moves):
             first = closed[int(np.argmax(strays.any(axis=0)))]
-            names = [
-                name for name, stray in zip(hold_names(self.m, self.passive), strays.any(axis=1), strict=True) if stray
-            ]
+            names = [name for name, stray in zip(hold_names(self.m, self.passive), moves, strict=True) if stray]
             values = nodes.drive[:, first] * self.unit[self.lead]
             drives = dict(zip(np.array(self.drive.names)[self.lead].tolist(), values.tolist(), strict=True))
             raise no_longer_passive_error(self.drive.m, names, drives)

@@ -145,11 +145,11 @@ FOLDED = {
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("name", FOLDED)
 def test_folded_bars_name_their_branches(name: str, engine: str) -> None:
-    """Two pins coincide: the bars between them turn about both, which is passive there alone. By hand: a kite keeps its line of symmetry."""
+    """Two pins coincide: the bars between them turn about both. By hand: a kite keeps its line of symmetry."""
     corners, rates = FOLDED[name]
     m = loop(*(("R", (*corner, 0.0), Z) for corner in corners), drive="O1")
     for values in ([0.0], [0.0, 0.1, 0.2]):
-        with pytest.raises(mg.DeadPointError, match="2 branches meet there.*O1.Rz at rest") as error:
+        with pytest.raises(mg.DeadPointError, match=r"2 branches meet there.*O1\.Rz at rest") as error:
             mg.kinematics(m, {"O1": values}, engine=engine, on_reach="flag")
         ways = sorted(
             ([way[f"O{k}.Rz"] for k in range(1, 5)] for way in error.value.branches), key=lambda way: abs(way[0])
