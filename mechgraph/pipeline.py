@@ -228,9 +228,9 @@ class Pipeline:
             return
         some = here.part(closed)
         strays = PassiveMotions(some, self.passive, f.part(closed, some).motions()).strays > MOTIONS.nearby
-        moves = strays.any(axis=1).tolist()
+        moves: list[bool] = np.any(strays, axis=1).tolist()
         if any(moves):
-            first = closed[int(np.argmax(strays.any(axis=0)))]
+            first = closed[int(np.argmax(np.any(strays, axis=0)))]
             names = [name for name, stray in zip(hold_names(self.m, self.passive), moves, strict=True) if stray]
             values = nodes.drive[:, first] * self.unit[self.lead]
             drives = dict(zip(np.array(self.drive.names)[self.lead].tolist(), values.tolist(), strict=True))
