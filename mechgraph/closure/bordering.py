@@ -80,8 +80,13 @@ class LoopSystem(ReducedRows):
 
     @classmethod
     def at(cls, here: Configuration, fixed: Index) -> LoopSystem:
-        """The system chosen at the first position of a configuration, which is regular there."""
-        out = cls(ClosureRows.at(here), fixed)
+        """The system chosen at the first position of a configuration."""
+        return cls(ClosureRows.at(here), fixed)
+
+    @classmethod
+    def of_rank(cls, here: Configuration, fixed: Index) -> LoopSystem:
+        """The same with the rank that the position has, be it below that of the graph."""
+        out = cls.at(here, fixed)
         return out if out.regular else cls(out.rows, fixed, out.null_spaces())
 
     @classmethod

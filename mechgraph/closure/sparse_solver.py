@@ -254,5 +254,5 @@ class SparseSolver:
         """A form made at a position."""
         at = np.array([t])
         part, like = here if here.T == 1 else here.part(at), self.forms[0] if self.forms else self.like
-        self.forms.append(LoopSystem.like(like, part) if like else LoopSystem.at(part, self.fixed))
+        self.forms.append(LoopSystem.like(like, part) if like else LoopSystem.of_rank(part, self.fixed))
         self._known(here)[len(self.forms) - 1] = at, SparseFactors([self.forms[-1].first])
