@@ -98,8 +98,9 @@ def branches(
         return ()
     unit = np.where(system.is_length, system.par.L, 1.0)
     names = system.m.freedom_names()
-    rates = sorted((way * unit / unit[columns[0]]).tolist() for way in ways)
-    return tuple(dict(zip(names, one, strict=True)) for one in rates)
+    # in an order that rounding does not change
+    rates = sorted((way * unit / unit[columns[0]] for way in ways), key=lambda way: np.round(way / SAME).tolist())
+    return tuple(dict(zip(names, one.tolist(), strict=True)) for one in rates)
 
 
 def _ways(curvature: _Curvature, rng: np.random.Generator) -> list[Array]:
