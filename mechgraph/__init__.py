@@ -26,6 +26,7 @@ from mechgraph.errors import (
     ReachError,
     ResponseError,
     ShapeError,
+    StudyError,
 )
 from mechgraph.exchange.files import load, save
 from mechgraph.kinetostatics import assemble, kinematics, solve
@@ -129,6 +130,7 @@ __all__ = [
     "Stop",
     "Structure",
     "Study",
+    "StudyError",
     "Surface",
     "SystemGroup",
     "TorsionSpring",
@@ -174,6 +176,11 @@ LATER = {
     "compile": ("mechgraph.compiled.compiled", "compile_mechanism"),
     "write_report": ("mechgraph.show.page.write", "write_report"),
 }
+
+
+def __dir__() -> list[str]:
+    """The public names."""
+    return sorted(__all__)
 
 
 def __getattr__(name: str) -> Any:

@@ -1,5 +1,6 @@
 """Hypothesis profiles: ``dev`` at the desk, ``ci`` (more examples, always the same ones) where CI is set. Golden files."""
 
+import importlib
 import itertools
 import os
 from collections.abc import Callable, Generator
@@ -91,6 +92,12 @@ def compiled() -> None:
     """What a test of the compiled kernel asks for: where no C compiler is, it is skipped, and where CI is set it fails."""
     if build.installed() is None and not compiler.compilers():
         (pytest.fail if CI else pytest.skip)("no C compiler here: pip install 'mechgraph[fast]' brings one")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def spoken_warnings() -> None:
+    """What numpy says of values that are none, users never see; here it is a warning, and so an error."""
+    importlib.import_module("mechgraph.arguments").FLOATING |= {"all": "warn", "under": "ignore"}
 
 
 @pytest.fixture
