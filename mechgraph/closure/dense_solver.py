@@ -15,7 +15,16 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
 from mechgraph.numerics.kept import kept
-from mechgraph.numerics.linear import Choice, ChosenSystem, Lu, choose, parabola_is_regular, scaled_norm
+from mechgraph.numerics.linear import (
+    RANK_TOLERANCE,
+    Choice,
+    ChosenSystem,
+    Lu,
+    choose,
+    complement,
+    parabola_is_regular,
+    scaled_norm,
+)
 from mechgraph.numerics.tolerances import PATH
 
 TRIES = 8
@@ -278,8 +287,13 @@ class DenseSolver:
         if known is not None and (which < 0).all():
             return known.which.copy()
         which = which.copy()
-        for t in np.flatnonzero(which < 0):
-            which[t] = self._fitting(here.J[:, :, t])
+        new = np.flatnonzero(which < 0)
+        while new.size:
+            which[new[0]] = number = self._fitting(here.J[:, :, new[0]])
+            new = new[1:]
+            if new.size:
+                fits = self._serves(number, here if new.size == here.T else here.part(new))
+                which[new[fits]], new = number, new[~fits]
         for _ in range(TRIES):
             poorness = self._poorness(here, which)
             poor = np.flatnonzero(poorness > 1.0)
@@ -309,6 +323,15 @@ class DenseSolver:
                 return i
         self.forms.append(made)
         return len(self.forms) - 1
+
+    def _serves(self, number: int, here: Configuration) -> NDArray[np.bool_]:
+        """At which positions a form made at another one is fair, and of their rank."""
+        fair = self._poorness(here, np.full(here.T, number)) <= 1.0
+        rank, free = len(self.forms[number].choice.cols), complement(self.fixed, here.J.shape[1])
+        if fair.any() and rank < min(len(here.J), free.size):
+            sigma = np.linalg.svd(np.moveaxis(here.J[:, free], -1, 0), compute_uv=False)
+            fair &= (sigma > RANK_TOLERANCE * sigma[:, :1]).sum(axis=1) == rank
+        return np.asarray(fair)
 
     def _poorness(self, here: Configuration, which: Index) -> Array:
         """Condition number over what is fair, or where motions are held the largest rate over what is fair."""

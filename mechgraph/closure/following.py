@@ -53,7 +53,7 @@ class _Way:
 
 def follow(path: DriverPath, requests: list[Request], total: int) -> Positions:
     """States at all positions asked for; ``total`` positions in all."""
-    if path.size[1] > 1:
+    if path.size[1] != 1:
         return along_polygons_with_gaps(path, requests, total)
     found = _along_curves(path, requests, total)
     end_at_ranges(path, found)

@@ -19,7 +19,7 @@ from mechgraph.numerics.tracks import Nodes
 
 BEYOND_END = 1e-9
 """Lengths over L by which a coordinate may be beyond its range: rounding."""
-HALVINGS = 52
+BISECTIONS = 52
 """Times that a step is halved for the place where a coordinate leaves its range: to rounding."""
 NONE = np.zeros(0, dtype=np.intp)
 TURNS_FOUND = 4
@@ -78,7 +78,7 @@ def range_ends(path: DriverPath, follower: Follower, nodes: Nodes, outside: Arra
         return far, nodes.take(NONE)
     low, high = near[left], far[left]
     between = Interpolation(path, nodes)
-    for _ in range(HALVINGS if (high > low).any() else 0):
+    for _ in range(BISECTIONS if (high > low).any() else 0):
         middle = 0.5 * (low + high)
         x = between(between.find(left, middle), middle, follower.paths.drive(left, middle))
         over = (beyond(system, x) > BEYOND_END).any(axis=0)

@@ -13,6 +13,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.call import Options
 from mechgraph.closure.driver_motion import Motions
 from mechgraph.closure.driver_path import Status
+from mechgraph.closure.indexing import Index
 from mechgraph.closure.solver import EngineName
 from mechgraph.errors import DeclarationError, MechgraphError
 from mechgraph.force.dalembert import MethodName
@@ -130,6 +131,16 @@ class Part:
     messages: dict[int, str]
     warnings: tuple[Doubt, ...] = ()
 
+    def cut(self, count: int) -> tuple[Part, Part]:
+        """The first ``count`` variants, and the others; what makes reactions doubtful stays with the first."""
+
+        def part(some: slice, begin: int, warnings: tuple[Doubt, ...]) -> Part:
+            outputs = None if self.outputs is None else {name: values[some] for name, values in self.outputs.items()}
+            messages = {i - begin: why for i, why in self.messages.items() if i in range(len(self.status))[some]}
+            return Part(outputs, self.status[some], messages, warnings)
+
+        return part(slice(count), 0, self.warnings), part(slice(count, None), count, ())
+
 
 def worst(found: Iterable[Doubt]) -> tuple[Doubt, ...]:
     """Of every passive freedom the warning with the greatest effort, of every contact that with the greatest pull."""
@@ -224,9 +235,9 @@ def as_rows(motion: Motion) -> Motion:
     return Motion(rows(motion.position), rows(motion.velocity), rows(motion.acceleration), rows(motion.t))
 
 
-def motion_of_case(motion: Motion, cases: int | slice) -> Motion:
+def motion_of_case(motion: Motion, cases: int | Index) -> Motion:
     """The motion of some cases, ``(1 or count, N)``."""
-    one = slice(cases, cases + 1) if isinstance(cases, int) else cases
+    one = np.atleast_1d(cases)
 
     def part(values: Any) -> Any:
         return None if values is None else values[one] if np.shape(values)[0] > 1 else values
