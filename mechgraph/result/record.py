@@ -11,7 +11,7 @@ import numpy as np
 from mechgraph.result.contacts import LiftOff, lift_offs
 from mechgraph.result.extremes import Greatest, Range, efforts, multipliers, reactions
 from mechgraph.result.places import OK, Places, coupling_unit
-from mechgraph.result.values import LoadBearing, Values
+from mechgraph.result.values import LoadBearing, PassedCrossing, Values
 from mechgraph.units import unit_of
 
 Index = Annotated[int, "number of the position, counted from 0 over all of them in order"]
@@ -87,6 +87,7 @@ class ChecksData:
     closure: float | None
     equilibrium: float | None
     power: float | None
+    accuracy: Annotated[float | None, "estimated relative error of rates and forces"]
 
 
 @dataclass(frozen=True)
@@ -108,6 +109,7 @@ class SolutionData:
     reactions: tuple[ReactionData, ...]
     warnings: Annotated[tuple[LoadBearing, ...], "passive freedoms that carry load"]
     lift_off: Annotated[tuple[LiftOff, ...], "positions at which contacts that are only pushed would have to pull"]
+    crossings: Annotated[tuple[PassedCrossing, ...], "crossings of branches that the path was led over"]
     passive: Annotated[tuple[str, ...], "names of all passive freedoms"]
     checks: ChecksData
     engine: str
@@ -122,7 +124,7 @@ def solution_data(values: Values) -> SolutionData:
     own, applied = efforts(values) if forces else (None, None)
     worst = [
         float(np.nanmax(np.abs(of))) if np.isfinite(of).any() else None
-        for of in (checks.closure, checks.equilibrium, checks.power)
+        for of in (checks.closure, checks.equilibrium, checks.power, checks.accuracy)
     ]
     names = values.whole.freedom_names()
     driven = [names.index(name) for name in values.actuated]
@@ -145,6 +147,7 @@ def solution_data(values: Values) -> SolutionData:
         _reactions(places) if forces else (),
         values.load_bearing(),
         lift_offs(values),
+        values.crossings(),
         tuple(values.passive_efforts()) if forces else (),
         ChecksData(*worst),
         values.engine,

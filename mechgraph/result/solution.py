@@ -16,6 +16,7 @@ from mechgraph.equations.state import State
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.newton import Work
+from mechgraph.numerics.tolerances import PATH
 from mechgraph.quantities import wrong
 from mechgraph.result import export
 from mechgraph.result.contacts import ContactResult, LiftOff, contacts_of, lift_offs, place_of_contact
@@ -23,7 +24,7 @@ from mechgraph.result.places import OK, Places
 from mechgraph.result.record import solution_data
 from mechgraph.result.summary import summary
 from mechgraph.result.table import Include, table_of
-from mechgraph.result.values import Checks, LoadBearing, LoadResult, Mask, Values
+from mechgraph.result.values import Checks, Inaccurate, LoadBearing, LoadResult, Mask, PassedCrossing, Values
 from mechgraph.result.views import CouplingResult, LinkResult, PairResult
 
 if TYPE_CHECKING:
@@ -160,7 +161,7 @@ class Solution(Shown):
 
     @property
     def checks(self) -> Checks:
-        """Closure error, equilibrium residual and power balance at every position."""
+        """Closure error, equilibrium residual, power balance and estimated accuracy at every position."""
         return self._values.checks()
 
     @property
@@ -183,9 +184,19 @@ class Solution(Shown):
         return self._values.passive_efforts()
 
     @property
-    def warnings(self) -> tuple[LoadBearing | LiftOff, ...]:
+    def doubts(self) -> tuple[LoadBearing | LiftOff, ...]:
         """What makes reactions doubtful: passive freedoms that carry load, and contacts that would have to pull."""
         return (*self._values.load_bearing(), *lift_offs(self._values))
+
+    @property
+    def warnings(self) -> tuple[LoadBearing | LiftOff | PassedCrossing | Inaccurate, ...]:
+        """What makes reactions doubtful (``doubts``); crossings of branches that were passed, with place, miss and the other branches;
+        rates and forces that rounding spoils (see ``checks.accuracy``).
+        """
+        error = self.checks.accuracy.reshape(-1)
+        poor = np.flatnonzero(error > PATH.inaccurate)
+        worst = [Inaccurate(float(error[i]), int(i), len(poor)) for i in poor[np.argsort(-error[poor])][:1]]
+        return (*self.doubts, *self._values.crossings(), *worst)
 
     def document(self, asked: bool = False) -> Document:
         """What ``print`` shows; ``asked`` as in ``summary()``, also what takes long."""

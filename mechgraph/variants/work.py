@@ -172,7 +172,7 @@ def solved(task: Task) -> Part:
     if together.solution is not None:
         status[~alone] = together.solution.status[~alone]
         found = {name: _writable(quantity(together.solution, name, what)) for name, what in task.outputs.items()}
-    messages, warnings = {}, [] if together.solution is None else [*together.solution.warnings]
+    messages, warnings = {}, [] if together.solution is None else [*together.solution.doubts]
     for i in np.flatnonzero(alone):
         try:
             s = _solved_alone(task, int(i), together.starts[:, i])
@@ -181,7 +181,7 @@ def solved(task: Task) -> Part:
             s = None
         if s is not None:
             status[i] = s.status[0]
-            warnings += s.warnings
+            warnings += s.doubts
             values = {name: quantity(s, name, what) for name, what in task.outputs.items()}
             found = found or {name: np.full((count, *v.shape[1:]), np.nan) for name, v in values.items()}
             for name, v in values.items():
