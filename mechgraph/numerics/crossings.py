@@ -36,7 +36,7 @@ SPANS = (0.08, 0.02, 0.005)
 0.5; the others serve where another singular position is near."""
 SCATTER = 3.0
 """Factor within which the answer to a residual times the distance is constant where there is no other singular position near."""
-SEED = 3
+PROBE_SEED = 3
 BETWEEN = np.linspace(-1.0, 1.0, 8)
 """Places between the nearest sides at which interpolated states are asked how they close; not the crossing itself."""
 CLOSES = 1e-12
@@ -166,7 +166,7 @@ def passed(follower: Follower, nodes: Nodes, track: int, place: float) -> Crossi
 def _answer(problem: Problem, x: Array, drive: Array, tracks: Index, which: Index) -> Array:
     """How much states ``(nx, n)`` answer to a random residual: as the condition one over the distance, but no matter of pivots."""
     point = problem.at(x, drive, tracks)
-    b = np.random.default_rng(SEED).normal(size=len(point.residual))
+    b = np.random.default_rng(PROBE_SEED).normal(size=len(point.residual))
     return largest(problem.factored(point, which).solve(np.repeat(b[:, None, None], x.shape[1], axis=2))[:, 0])
 
 

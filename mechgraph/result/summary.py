@@ -323,7 +323,8 @@ class _View(Places):
         rows = [("closure error (angle, length / L)", checks.closure)]
         if self.values.has_forces:
             rows += [("equilibrium, relative", checks.equilibrium), ("power balance, relative", checks.power)]
-        rows.append(("accuracy of rates and forces, estimated", checks.accuracy))
+        if np.isfinite(checks.accuracy).any():  # of a motion in time it is not estimated
+            rows.append(("accuracy of rates and forces, estimated", checks.accuracy))
         worst = tuple((name, f"{np.nanmax(np.abs(value)):.0e}") for name, value in (*rows, *more))
         yield Heading("Checks", 2)
         yield Table(("check", "worst"), worst, align="lr")

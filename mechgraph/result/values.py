@@ -20,7 +20,7 @@ from mechgraph.numerics.tolerances import PATH
 from mechgraph.result.numbers import ranges
 
 Mask = NDArray[np.bool_]
-APART = 1e-6
+RATES_APART = 1e-6
 """Difference of rates on two branches from which on they are shown."""
 
 
@@ -35,6 +35,7 @@ class Checks(Shown):
     accuracy : estimated error of rates and forces (reactions that are unique), relative to the largest of the position: what rounding
         does to them over the condition of the closure equations. Some 1e-14 in ordinary positions; it grows towards dead points (with the
         square of the condition) and beside crossings of branches (with its cube). Above 1e-6 ``Solution.warnings`` says so.
+        NaN for a motion in time.
     """
 
     closure: Array
@@ -156,7 +157,7 @@ class PassedCrossing:
         """The warning in one sentence."""
         at = ", ".join(f"{name} = {value:.6g}" for name, value in self.drivers.items())
         ways = [
-            ", ".join(f"{k} {v:.4g}" for k, v in way.items() if abs(v - self.branches[0][k]) > APART)
+            ", ".join(f"{k} {v:.4g}" for k, v in way.items() if abs(v - self.branches[0][k]) > RATES_APART)
             for way in self.branches[1:]
         ]
         ways = [way for way in ways if way]
