@@ -158,7 +158,7 @@ def _solved(
     if isinstance(m, SnappedMechanism):
         outcome.trajectory.as_declared(partial(declared_closure, line.system, declared(m.declared)), m.changes.tol)
     solution = Solution(outcome.trajectory)
-    for warning in () if quiet else solution.warnings:
+    for warning in () if quiet else solution.doubts:
         warnings.warn(f"mechanism {m.name!r}: {warning}", MechgraphWarning, stacklevel=5)
     error = _unreached(line, outcome, solution) if on_reach == "raise" else None
     if error is not None:
