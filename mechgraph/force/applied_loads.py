@@ -34,6 +34,9 @@ def inertia_wrenches(here: Configuration, rates: Rates) -> Array:
     return np.concatenate([cross(c, force) - rotate(R, turning), force])
 
 
+NOT_FINITE = "gives a value that is not finite at some position; check its callable, or a spring of length 0"
+
+
 class Site:
     """Collects loads on links and efforts in freedoms; speaks the user's units, about the internal origin.
 
@@ -59,10 +62,7 @@ class Site:
             load.act(self)
         if not self._finite():
             wrong = next((load for load in loads if not self._alone(load)), loads[-1])
-            raise DeclarationError(
-                f"load {wrong.where.removesuffix(': ')}",
-                ["gives a value that is not finite at some position; check its callable, or a spring of length 0"],
-            )
+            raise DeclarationError(f"load {wrong.where.removesuffix(': ')}", [NOT_FINITE])
 
     def _finite(self) -> bool:
         return all(np.isfinite(part).all() for part in (self.wrenches, self.efforts))
@@ -115,11 +115,8 @@ class Site:
         if isinstance(value, PerCase):
             return np.asarray(self.number(value)).reshape(width, self.here.T)
         if callable(value):
-            i = self._link[link]
-            pose = self._spread(user_poses(self.here)[i])
-            twist = self._spread(np.moveaxis(user_twists(self.here, self.rates.V)[:, i], 0, -1))
             try:
-                given = value(pose, twist, self.t)
+                given = value(*self.motion_of(link), self.t)
             except Exception as error:
                 raise DeclarationError(
                     f"load on {link!r}", [f"its callable (pose, twist, t) failed: {type(error).__name__}: {error}"]
@@ -143,6 +140,12 @@ class Site:
                 [f"value of shape {np.shape(value)} does not fit the positions {self.batch}; expected {wanted}"],
             ) from None
         return np.moveaxis(full.reshape(-1, width)[self.good], -1, 0)
+
+    def motion_of(self, link: str) -> tuple[Array, Array]:
+        """Pose ``(..., 4, 4)`` and twist ``(..., 6)`` of a link in the user's batch."""
+        i = self._link[link]
+        twists = user_twists(self.here, self.rates.V)[:, i]
+        return self._spread(user_poses(self.here)[i]), self._spread(np.moveaxis(twists, 0, -1))
 
     def _spread(self, rows: Array) -> Array:
         """Values of the solved positions in the user's batch shape, NaN elsewhere."""

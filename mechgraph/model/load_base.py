@@ -5,19 +5,24 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol, Self
+from typing import Annotated, Any, ClassVar, Protocol, Self
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.model.field_format import Described
-from mechgraph.model.field_kinds import FREEDOM_NAME, LINK_NAME
+from mechgraph.model.field_kinds import FREEDOM_NAME, LINK_NAME, SAMPLES
 from mechgraph.model.nameable import Nameable
 from mechgraph.model.numeric import same_fields
 from mechgraph.quantities import shown
+from mechgraph.units import TIME
 
 Value = Any
 """A number or vector, an array over positions, or a callable ``(pose, twist, t)``."""
+
+
+Breaks = Annotated[Any, SAMPLES("times at which a function jumps or bends, for `respond`", TIME, default="none")]
+"""Field of a load that may be a function of time; steps end there."""
 
 
 class LoadSite(Protocol):
@@ -126,6 +131,16 @@ class Load(Described, ABC):
             for name, value in given.items()
             if value is not None and not callable(value) and np.ndim(value) > len(self.formats[name].kind.shape or ())
         )
+
+    @property
+    def of_time(self) -> bool:
+        """Whether it may depend on time by itself."""
+        return not self.by_position
+
+    @property
+    def break_times(self) -> tuple[float, ...]:
+        """Times at which it is known not to be smooth."""
+        return tuple(np.ravel(getattr(self, "breaks", ())).tolist())
 
     @property
     def smooth(self) -> bool:

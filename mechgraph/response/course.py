@@ -185,6 +185,16 @@ class Course:
         kinetic, potential, work = (part.reshape(times.shape) for part in parts)
         return Response(trajectory, Energy(kinetic, potential, work, self._energy_at_start, times), self)
 
+    def moments(self, t: Array) -> list[Response]:
+        """The responses at each of several times ``(T,)``, evaluated together."""
+        (whole, *parts), out = self._read(t), []
+        for i, at in enumerate(t.tolist()):
+            values = whole.part(slice(i, i + 1))
+            values.batch, values.t = (), np.array(at)
+            kinetic, potential, work = (part[i] for part in parts)
+            out.append(Response(values, Energy(kinetic, potential, work, self._energy_at_start, values.t), self))
+        return out
+
     @cached_property
     def _energy_at_start(self) -> float:
         _, kinetic, potential, work = self._read(np.array(self.begin))

@@ -27,7 +27,7 @@ from mechgraph.model.declaration import mapping_faults
 from mechgraph.model.mechanism import Mechanism, check_mechanism
 from mechgraph.response.chart import Chart, Closed
 from mechgraph.response.charts import Task
-from mechgraph.response.motion_equations import MASSLESS, Columns, Loads, in_unit_inertias
+from mechgraph.response.motion_equations import MASSLESS, Columns, Loads, applied, in_unit_inertias
 from mechgraph.response.prescribed import OVER_POSITIONS, Prescribed
 from mechgraph.response.reading import trajectory_of
 from mechgraph.result.numbers import bracket, number
@@ -97,7 +97,7 @@ class _Place:
         """Generalized forces ``(n, T)`` and masses ``(n, n, T)`` at closed states with rates ``v (n, T)``, the drives at rest."""
         columns, loads = Columns(closed.here, closed.f, self.n), self.task.loads
         velocities, _, inertia = columns.bound((columns.Z * v).sum(axis=1))
-        wrenches, efforts = columns.applied((*loads.stored, *loads.rest), velocities, np.zeros(closed.here.T))
+        wrenches, efforts = applied(closed.here, (*loads.stored, *loads.rest), velocities, np.zeros(closed.here.T))
         return columns.force(wrenches + inertia, efforts), columns.mass
 
     def largest(self) -> float:
@@ -105,8 +105,8 @@ class _Place:
         closed, loads = self.closed(np.zeros((self.n, 1))), self.task.loads
         columns = Columns(closed.here, closed.f, self.n)
         still = Velocities(closed.here, np.zeros((self.task.system.n_freedoms, 1)))
-        applied = [columns.applied(some, still, np.zeros(1)) for some in (loads.stored, loads.rest)]
-        return columns.largest(*zip(*applied, strict=True))
+        acting = [applied(closed.here, some, still, np.zeros(1)) for some in (loads.stored, loads.rest)]
+        return columns.largest(*zip(*acting, strict=True))
 
     def derivatives(self) -> tuple[Array, Array, Array, Array]:
         """Force ``(n,)``, mass, damping and stiffness ``(n, n)`` where the chart was laid out."""
