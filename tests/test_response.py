@@ -276,8 +276,11 @@ def test_at_other_times():
         ({"t": 3.0}, "begin, end"),
         ({"t": (1.0, 0.0)}, "rising"),
         ({"rates": {"A0": 1.0, "A1": 2.0}}, "contradict the closure"),
-        ({"rates": {"A0": 1.0}, "motions": {"A0": lambda t: (0.0, 2.0, 0.0)}}, "A0"),
-        ({"start": {"A0": 0.3}, "motions": {"A0": lambda t: (0.0, 2.0, 0.0)}}, "its motion is prescribed, 0 at t = 0"),
+        ({"rates": {"A0": 1.0}, "motions": {"A0": lambda t: (2.0 * t, 2.0, 0.0)}}, "A0"),
+        (
+            {"start": {"A0": 0.3}, "motions": {"A0": lambda t: (2.0 * t, 2.0, 0.0)}},
+            "its motion is prescribed, 0 at t = 0",
+        ),
         ({"rates": {"Q": 1.0}}, "unknown freedom"),
         ({"start": {"Q": 1.0}}, "unknown freedom"),
         ({"motions": {"A0": np.zeros(3)}}, "expected a Motion with t"),
