@@ -237,3 +237,26 @@ def test_a_stop_that_is_just_grazed_is_met(limit):
     r = mg.respond(m, (0, 6), start=start, stops=mg.Stop("P", upper=limit, restitution=1.0))
     np.testing.assert_allclose([one.t for one in r.events], [np.arccos(-limit)], atol=1e-7)
     assert not mg.respond(m, (0, 6), start=start, stops=mg.Stop("P", upper=1 + 1e-6)).events
+
+
+@pytest.mark.parametrize("law", [np.sign, lambda v: np.where(v > 0, 1.0, -1.0)])
+@pytest.mark.parametrize("place", ["P", ("frame", "body", (-9, 0, 0), (0, 0, 0))])
+def test_dry_friction_in_a_law_is_named_where_it_sticks(law, place):
+    """v = 1 - 2 t: up to there as it should be, then at once said which law, where and when."""
+    m = block(mg.ForceLaw(place, law=lambda x, v, t: -2.0 * law(v)))
+    with pytest.raises(
+        mg.ResponseError, match=r"force law .*jumps by 4 where its rate changes sign.* at t = 0.5.*np.tanh"
+    ) as stopped:
+        mg.respond(m, (0, 3), rates={"P": 1.0})
+    r = stopped.value.solution
+    assert r.work.steps < 100
+    np.testing.assert_allclose(r["P"].position[-1], 0.25, atol=1e-6)
+
+
+def test_friction_that_slides_on_or_rises_with_the_rate_is_followed():
+    """Turned round by a strong spring without sticking: amplitudes fall by 4 F / k a period; and a steep tanh."""
+    m = block(mg.ForceLaw("P", law=lambda x, v, t: -0.01 * np.sign(v)), mg.TorsionSpring("P", stiffness=1.0))
+    r = mg.respond(m, np.array([0.0, np.pi, 2 * np.pi]), start={"P": 1.0})
+    np.testing.assert_allclose(r["P"].position[:, 0], [1.0, -0.98, 0.96], atol=1e-5)
+    smooth = block(mg.ForceLaw("P", law=lambda x, v, t: -2.0 * np.tanh(v / 1e-2)))
+    assert abs(mg.respond(smooth, (0, 1), rates={"P": 1.0})["P"].velocity[-1, 0]) < 1e-6

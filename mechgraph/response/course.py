@@ -11,11 +11,14 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import CLOSED
+from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_path import in_blocks
 from mechgraph.closure.indexing import Index
+from mechgraph.closure.rates import Velocities
 from mechgraph.data import plain
 from mechgraph.document import Bullets, Document, Heading, Paragraph, Shown
 from mechgraph.errors import DeclarationError, ResponseError
+from mechgraph.force.applied_loads import Site
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import declared
 from mechgraph.quantities import real_array, wrong
@@ -248,6 +251,12 @@ class Course:
             rates = moved(closed, v, task.prescribed_at(at)[1:], task.loads, at).rates
             out[0][:, places], out[1][:, places] = rates.dq, rates.ddq
         return out
+
+    def site(self, t: Array) -> Site:
+        """What loads see of the motion at times ``(T,)``."""
+        here = Configuration(self.task.system, self.positions(t))
+        velocities = Velocities(here, self.rates(t)[0])
+        return Site(here, velocities, self.task.system.coordinates_of(here.x), (len(t),), np.arange(len(t)), t)
 
     def freedom(self, name: str, t: Array) -> Array:
         """Position, velocity and acceleration ``(3, T)`` of a freedom at times ``(T,)``, user's units."""

@@ -35,6 +35,7 @@ from mechgraph.report.report import hinted
 from mechgraph.response.along_path import Arc, PathStage
 from mechgraph.response.chart import Stopped
 from mechgraph.response.charts import ChartStage, Task
+from mechgraph.response.chatter import Chatter
 from mechgraph.response.course import Course, Response
 from mechgraph.response.events import LOOKS_IN_STEP, Occurrence, Watch, first_root, read_events, with_turns
 from mechgraph.response.initial import read_rates, read_start, start_rates, started
@@ -215,6 +216,7 @@ def _occurrences(
 ) -> Iterable[Occurrence]:
     """Follow the motion to its end; yields what happens, in the order of time."""
     it, end, t, crowd = course.integration, float(course.times[-1]), course.begin, 0
+    chatter = Chatter(course, course.mechanism.loads, end - t)
     dq, _, first, found = stops.after(t, x, dq)
     yield from found
     while t < end:
@@ -224,6 +226,7 @@ def _occurrences(
         ):
             if progress is not None:
                 progress(segment.end)
+            chatter.look(segment.begin, segment.end)
             met = stops.met(course, segment.begin, segment.end) if stops.limits else None
             _end_at_ranges(course, segment.begin, segment.end if met is None else met)
             if met is not None:
