@@ -260,3 +260,11 @@ def test_friction_that_slides_on_or_rises_with_the_rate_is_followed():
     np.testing.assert_allclose(r["P"].position[:, 0], [1.0, -0.98, 0.96], atol=1e-5)
     smooth = block(mg.ForceLaw("P", law=lambda x, v, t: -2.0 * np.tanh(v / 1e-2)))
     assert abs(mg.respond(smooth, (0, 1), rates={"P": 1.0})["P"].velocity[-1, 0]) < 1e-6
+
+
+def test_breaks_belong_to_functions():
+    for load in (mg.Effort("P", 1.0, breaks=(1,)), mg.ForceLaw("P", law=mg.ForceTable(x=[0, 1], force=[0, 1]), breaks=2.0)):
+        with pytest.raises(mg.DeclarationError, match="breaks = .* beside no function of time"):
+            block(load)
+    with pytest.raises(mg.DeclarationError, match="breaks = 'soon': expected finite numbers"):
+        block(mg.ForceLaw("P", law=lambda x, v, t: -x, breaks="soon"))
