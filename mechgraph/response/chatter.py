@@ -12,11 +12,11 @@ from mechgraph.model.force_law import Law
 from mechgraph.model.load_base import Load
 from mechgraph.response.chart import Stopped
 
-TINY = 1e-5
+TINY_STEP = 1e-5
 """Part of the time of a motion below which a step is one of those that chatter."""
 IN_A_ROW = 12
 """Such steps, one after the other, after which the laws are looked at."""
-NEARER = 1e-4
+NEARER_RATES = 1e-4
 """Part of the rates at which a law is asked again: what jumps does so however near to zero they are."""
 JUMPS = 0.5
 """Part of the difference of the forces to both sides that is left then."""
@@ -45,7 +45,7 @@ class Chatter:
         Stopped
             where a law makes steps chatter.
         """
-        if not self.laws or end - begin > TINY * self.span:
+        if not self.laws or end - begin > TINY_STEP * self.span:
             self._ends = []
             return
         self._ends.append(end)
@@ -57,7 +57,7 @@ class Chatter:
             if (np.diff(np.sign(v)) != 0).sum() < 2:
                 continue
             fast = np.abs(v).max()
-            both = (np.full(len(v), rate) for rate in (fast, NEARER * fast))
+            both = (np.full(len(v), rate) for rate in (fast, NEARER_RATES * fast))
             wide, near = (law.force(site, x, rate) - law.force(site, x, -rate) for rate in both)
             if np.abs(near).min() > JUMPS * np.abs(wide).max():
                 raise Stopped(

@@ -18,7 +18,7 @@ from mechgraph.response.place import STEP, Derivatives, Place
 from mechgraph.result.solution import Solution
 from mechgraph.structure.mobility import free_motion
 
-EQUILIBRIUM_STEPS = 100
+EQUILIBRIUM_STEPS = 60
 """Most steps to an equilibrium."""
 LONGEST_EQUILIBRIUM_STEP = 0.3
 """Longest of them (radians, lengths / L)."""
@@ -126,8 +126,8 @@ def _largest(d: Derivatives) -> float:
 
 def _left(d: Derivatives) -> str:
     return (
-        f" near start in {EQUILIBRIUM_STEPS} steps; generalized forces of {np.abs(d.Q).max():.3g} are left (internal units). Give another "
-        "start; loads that drive it on and on have none"
+        f" near start in {EQUILIBRIUM_STEPS} steps or fewer; generalized forces of {np.abs(d.Q).max():.3g} are left (internal units). "
+        "Give another start; loads that drive it on and on have none"
     )
 
 
@@ -141,8 +141,10 @@ def _newton(place: Place) -> Derivatives | str:
             return d
         step: Array = np.asarray(np.linalg.lstsq(d.K, d.Q, rcond=1e-12)[0], dtype=float)
         size = float(np.abs(step).max())
+        if not size:
+            return _left(d)
         for part in (1.0, 0.1):
-            closed = place.closed(step[:, None] * part * min(1.0, LONGEST_EQUILIBRIUM_STEP / size if size else 1.0))
+            closed = place.closed(step[:, None] * part * min(1.0, LONGEST_EQUILIBRIUM_STEP / size))
             if closed.done[0]:
                 break
         else:

@@ -24,7 +24,7 @@ LOOKS = 8
 """Parts of a step at whose ends a height is looked at."""
 BESIDE_ENDS = 1e-5
 """Part of a step beside its ends at which is looked too, so that a height that turns in the first or last part is seen to."""
-TURNING = 1e-9
+TURN_FOUND = 1e-9
 """Part of a step to which the place of a turn is found; the height there is found to the square of it."""
 LOOKS_IN_STEP = np.unique(
     np.concatenate([np.linspace(0.0, 1.0, LOOKS + 1), [BESIDE_ENDS, 1.0 - BESIDE_ENDS], 0.5 ** np.arange(4, 20)])
@@ -111,7 +111,7 @@ def with_turns(height: Callable[[Array], Array], t: Array, h: Array) -> tuple[Ar
             lambda at, side=side: side * float(height(np.array([at]))[0]),
             bounds=(t[i - 1], t[i + 1]),
             method="bounded",
-            options={"xatol": TURNING * (t[i + 1] - t[i - 1])},
+            options={"xatol": TURN_FOUND * (t[i + 1] - t[i - 1])},
         )
         if found.fun < 0.0:
             times.append(np.array([found.x]))
