@@ -167,7 +167,10 @@ class Solution(Shown):
 
     @property
     def shaking(self) -> Array:
-        """Wrench ``(..., 6)`` about the global origin that pairs and springs transmit to the frame."""
+        """Wrench ``(..., 6)`` about the global origin of all that acts on the frame: pairs, springs, loads on it, its own weight.
+
+        What supports the frame bears it: it is the sum of the loads on all links and of their inertia.
+        """
         return self._values.shaking()
 
     @property

@@ -292,7 +292,7 @@ class Values(Protocol):
         """Kinetic energy of all links, ``(...)``."""
 
     def shaking(self) -> Array:
-        """Wrench on the frame about the global origin, ``(..., 6)``."""
+        """Wrench of all that acts on the frame about the global origin, ``(..., 6)``."""
 
     def load(self, index: int) -> LoadResult:
         """What one load does."""
