@@ -26,6 +26,7 @@ from mechgraph.errors import (
     ReachError,
     ResponseError,
     ShapeError,
+    StudyError,
 )
 from mechgraph.exchange.files import load, save
 from mechgraph.kinetostatics import assemble, kinematics, solve
@@ -68,8 +69,7 @@ from mechgraph.variants.result import Study
 from mechgraph.variants.study import study
 
 if TYPE_CHECKING:
-    from mechgraph.compiled.compiled import Compiled
-    from mechgraph.compiled.compiled import compile_mechanism as compile
+    from mechgraph.compiled.compiled import Compiled, compile
     from mechgraph.show.page.write import write_report
 
 __all__ = [
@@ -129,6 +129,7 @@ __all__ = [
     "Stop",
     "Structure",
     "Study",
+    "StudyError",
     "Surface",
     "SystemGroup",
     "TorsionSpring",
@@ -171,9 +172,14 @@ __all__ = [
 
 LATER = {
     "Compiled": ("mechgraph.compiled.compiled", "Compiled"),
-    "compile": ("mechgraph.compiled.compiled", "compile_mechanism"),
+    "compile": ("mechgraph.compiled.compiled", "compile"),
     "write_report": ("mechgraph.show.page.write", "write_report"),
 }
+
+
+def __dir__() -> list[str]:
+    """The public names."""
+    return sorted(__all__)
 
 
 def __getattr__(name: str) -> Any:

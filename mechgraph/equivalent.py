@@ -21,6 +21,7 @@ from functools import cached_property
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.arguments import door
 from mechgraph.atlas.multiple import MultipleJoint
 from mechgraph.closure.assembly import assembled, assembled_at, at_position
 from mechgraph.closure.configuration import Configuration
@@ -223,12 +224,14 @@ def _in_place_of_gears(parts: _Parts) -> list[str]:
 # --- multiple joints -----------------------------------------------------------------------------------------------------
 
 
+@door
 def multiple_joints(m: Mechanism, at: Mapping[str, float] | None = None) -> tuple[MultipleJoint, ...]:
     """The turning joints of three or more links on one axis (see ``structure.multiple_joints``), at a closed position."""
     system, x = assembled_at(m, at) if at else assembled(m)
     return joints_at(Position.at(Configuration(system, x[:, None])))
 
 
+@door
 def split_joint(m: Mechanism, pair: str, on: str, at: Mapping[str, float] | None = None) -> Mechanism:
     """The same mechanism with a multiple joint declared as pairs of the link ``on`` with each of the others.
 

@@ -189,6 +189,14 @@ class ResponseError(MechgraphError):
         super().__init__(message)
 
 
+class StudyError(MechgraphError):
+    """A study could not be finished; ``study`` is the Study, in which the variants that were not come to are not solved."""
+
+    def __init__(self, message: str, study: Any = None) -> None:
+        self.study = study
+        super().__init__(message)
+
+
 class MissingExtraError(MechgraphError, ImportError):
     """An optional package is needed; the message names the extra to install."""
 

@@ -10,30 +10,27 @@ from typing import Any, Literal
 
 import numpy as np
 
-from mechgraph.arguments import items_of, option_faults
+from mechgraph.arguments import door
 from mechgraph.call import Options
 from mechgraph.closure.assembly import assembled_at, last_closed
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.closure.driver_path import Status
 from mechgraph.closure.poles import away_from_poles, ends_at_pole
-from mechgraph.closure.solver import MOTION_ENGINES, MotionEngineName
+from mechgraph.closure.solver import MotionEngineName
 from mechgraph.errors import (
     AssemblyError,
     DeadPointError,
-    DeclarationError,
     IndeterminateError,
     MechgraphWarning,
     ReachError,
 )
-from mechgraph.force.dalembert import METHODS, MethodName
-from mechgraph.model.declaration import mapping_faults
+from mechgraph.force.dalembert import MethodName
 from mechgraph.model.load_base import Load
-from mechgraph.model.mechanism import Mechanism, check_mechanism
+from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import declared
 from mechgraph.outcome import Outcome
 from mechgraph.pipeline import Pipeline
-from mechgraph.quantities import wrong
 from mechgraph.report.report import check, hinted
 from mechgraph.result.solution import Solution
 from mechgraph.structure.branching import branches, branches_text
@@ -162,7 +159,7 @@ def _solved(
         line, outcome = _outcome(m, motions, replace(options, engine=line.engine), actuate)
         solution = Solution(outcome.trajectory)
     for warning in () if quiet else solution.warnings:
-        warnings.warn(f"mechanism {m.name!r}: {warning}", MechgraphWarning, stacklevel=4)
+        warnings.warn(f"mechanism {m.name!r}: {warning}", MechgraphWarning, stacklevel=5)
     error = _unreached(line, outcome, solution) if on_reach == "raise" else None
     if error is not None:
         raise error
@@ -204,6 +201,7 @@ def solve_quietly(
     return _solve(m, motions, "flag", options, actuate, quiet=True)
 
 
+@door
 def kinematics(
     m: Mechanism,
     motions: Mapping[str, Any] | None = None,
@@ -213,13 +211,10 @@ def kinematics(
     tol: float | None = None,
 ) -> Solution:
     """Positions, velocities and accelerations of all pairs and links, without forces; see ``solve``."""
-    check_mechanism(m, "kinematics")
-    faults = option_faults({"on_reach": (on_reach, ON_REACH), "engine": (engine, MOTION_ENGINES)})
-    if faults:
-        raise DeclarationError(f"kinematics of {m.name!r}", faults)
     return _solve(m, motions, on_reach, Options(None, "nan", engine), tol=tol)
 
 
+@door
 def solve(
     m: Mechanism,
     motions: Mapping[str, Any] | None = None,
@@ -263,25 +258,12 @@ def solve(
     ------
     DeclarationError, AssemblyError, ReachError, DeadPointError, IndeterminateError
     """
-    check_mechanism(m, "solve")
-    faults = option_faults(
-        {
-            "method": (method, METHODS),
-            "redundant": (redundant, REDUNDANT),
-            "on_reach": (on_reach, ON_REACH),
-            "engine": (engine, MOTION_ENGINES),
-        }
-    )
-    if progress is not None and not callable(progress):
-        faults.append(wrong(progress, "progress", "a function of the positions done and of all"))
-    given = () if loads is None else items_of(loads, "loads", faults)
-    if faults:
-        raise DeclarationError(f"solve {m.name!r}", faults)
     if loads is not None:
-        m = m.replace(loads=given)
+        m = m.replace(loads=loads)
     return _solve(m, motions, on_reach, Options(method, redundant, engine, progress), actuate, tol)
 
 
+@door
 def assemble(
     m: Mechanism, values: Mapping[str, float] | None = None, guess: Mapping[str, Any] | None = None
 ) -> Mechanism:
@@ -294,10 +276,6 @@ def assemble(
     ------
     AssemblyError, ReachError
     """
-    check_mechanism(m, "assemble")
-    faults = mapping_faults(values=values, guess=guess)
-    if faults:
-        raise DeclarationError(f"assemble {m.name!r}", faults)
     system, x = assembled_at(m, {} if values is None else values, guess)
     wanted = {m.full_name(name): float(m.in_own_units(name, value)) for name, value in (values or {}).items()}
     q = system.coordinates_of(x[:, None], system.start_coordinates(m.start))[:, 0]

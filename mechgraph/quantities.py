@@ -91,7 +91,7 @@ def column(values: Sequence[Any], shape: tuple[int, ...]) -> NDArray[np.float64]
 
 def is_quantity(value: Any) -> bool:
     """Whether a value carries a unit of its own, as those of pint do (those of other packages are not converted, and refused)."""
-    return hasattr(value, "units") or hasattr(value, "unit")
+    return (hasattr(value, "units") or hasattr(value, "unit")) and hasattr(value, "to")
 
 
 def has_quantity(value: Any, depth: int = DEEPEST) -> bool:

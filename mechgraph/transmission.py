@@ -1,7 +1,8 @@
 """How well the drivers move an output against a load: transmission angle, deviation angle, and their form for any mechanism.
 
 The mechanism at rest and without mass, a unit effort in the freedom of the output: pairs (and gears) k transmit wrenches (F, M) to the
-output link, M about the point of the pair, where a unit rate of the freedom makes the velocity v and the angular velocity w:
+output link, M about the point of the pair (of a contact where its elements touch, of a ball or roller its centre), where a unit rate of
+the freedom makes the velocity v and the angular velocity w:
 
     sin mu = cos delta = |sum_k F_k . v_k + M_k . w| / sum_k (|F_k| |v_k| + |M_k| |w|),
 
@@ -21,6 +22,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.arguments import door
 from mechgraph.data import plain
 from mechgraph.document import Document, Paragraph, Shown
 from mechgraph.errors import DeclarationError, MechgraphWarning
@@ -85,6 +87,7 @@ class TransmissionData:
     greatest: float | None
 
 
+@door
 def transmission(s: Solution, output: str, driver: str | None = None) -> Transmission:
     """How well the drivers move an output at all positions of a solution.
 
@@ -154,8 +157,7 @@ def _wrenches(s: Solution, link: str, guide: str) -> list[tuple[Array, Array, Ar
     for pair in m.pairs:
         if link in (pair.a, pair.b) and pair.name != guide:
             total = s[pair.name].total
-            X = s.link(pair.b).pose
-            p = X[..., :3, :3] @ np.asarray(pair.markers[1].point) + X[..., :3, 3]
+            p = s.contact(pair.name).center if pair.type.touching else s.link(pair.b).point(pair.markers[1].point)[0]
             found.append((total[..., 3:], total[..., :3] - np.cross(p, total[..., 3:]), p))
     for coupling in m.couplings:
         if isinstance(coupling, Contact) and link in coupling.gears(m):

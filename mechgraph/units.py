@@ -54,6 +54,8 @@ KNOWN: dict[str, dict[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6},
 }
 """Units of a base in terms of m, kg, s, as far as they make forces that have names."""
+EARTH, EARTHLY = 9.80665, 0.005
+"""Acceleration of gravity on earth in m/s^2, and by what part of it it varies and is rounded."""
 FORCES = {"N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "µN": 1e-6, "nN": 1e-9, "dyn": 1e-5, "lbf": 0.45359237 * 9.80665}
 """Units of force in N."""
 USUAL = ("N", "kN", "MN", "lbf")
@@ -83,6 +85,20 @@ def force_hint(units: Mapping[str, str]) -> str:
     return f"Units: {set_} belong to the force {name} ({FORCES[name]:g} N), in which loads are read and results given; {advice}."
 
 
+def gravity_hint(units: Mapping[str, str], size: float) -> str:
+    """What to say of an acceleration of gravity that is the earth's in other units than those declared; empty where there is nothing."""
+    length, time = KNOWN["length"].get(units.get("length", "")), KNOWN["time"].get(units.get("time", ""))
+    if length is None or time is None or isclose(size * length / time**2, EARTH, rel_tol=EARTHLY):
+        return ""
+    meant = next((name for name, known in KNOWN["length"].items() if isclose(size * known, EARTH, rel_tol=EARTHLY)), "")
+    unit, right = f"{units['length']}/{units['time']}^2", EARTH * time**2 / length
+    return (
+        f"gravity of {size:.6g} {unit}: on earth it is {size:.6g} {meant}/s^2, which is {right:.6g} {unit}"
+        if meant
+        else ""
+    )
+
+
 def _shortest(dimension: Sequence[float], force: bool = True) -> dict[str, float]:
     """Powers by the letters L, M, T and F = M L/T^2, whichever way is shorter."""
     a, b, c = dimension
@@ -102,6 +118,8 @@ def unit_of(units: Mapping[str, str], dimension: Sequence[float]) -> str:
     ):
         return ""
     force = force_unit(units)
+    if tuple(dimension) == POWER and (force, units["length"], units["time"]) == ("N", "m", "s"):
+        return "W"
     names = {"F": force, "L": units.get("length", ""), "M": units.get("mass", ""), "T": units.get("time", "")}
     powers = {names[letter]: n for letter, n in _shortest(dimension, bool(force)).items() if n}
     angle = "rad" if not any(dimension[:2]) and dimension[2] <= 0 else ""

@@ -8,8 +8,10 @@ import io
 import os
 import re
 import shutil
+import signal
 import stat
 import tempfile
+import threading
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -73,7 +75,7 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     folder = target.parent if regular else Path(tempfile.gettempdir())
     temporary = folder / f".mechgraph-{uuid.uuid4().hex}"
     try:
-        with _refused(path):
+        with _ended_in_order(), _refused(path):
             yield temporary
             if not regular:
                 with temporary.open("rb") as made, open(target, "wb", opener=_as_it_is) as handle:
@@ -82,8 +84,33 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
             if target.exists():
                 _take_after(temporary, target.stat())
             os.replace(temporary, target)
+    except _Ended:
+        temporary.unlink(missing_ok=True)
+        os.kill(os.getpid(), signal.SIGTERM)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+class _Ended(BaseException):
+    """The system asks the program to end (SIGTERM)."""
+
+
+@contextmanager
+def _ended_in_order() -> Iterator[None]:
+    """What asks the program to end, and would end it at once, ends it when what is in the making is taken away."""
+
+    def ended(*_: Any) -> None:
+        raise _Ended
+
+    ours = threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+    if not ours:
+        yield
+        return
+    signal.signal(signal.SIGTERM, ended)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 @contextmanager

@@ -1,5 +1,6 @@
 """Hypothesis profiles: ``dev`` at the desk, ``ci`` (more examples, always the same ones) where CI is set. Golden files."""
 
+import importlib
 import itertools
 import os
 from collections.abc import Callable, Generator
@@ -69,6 +70,12 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
 def start_sets(tmp_path_factory: pytest.TempPathFactory) -> None:
     """Start sets of assemblies, and a kernel that is built, are kept for these tests alone, not in the folder of the user."""
     os.environ["MECHGRAPH_CACHE"] = str(tmp_path_factory.mktemp("start_sets"))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def spoken_warnings() -> None:
+    """What numpy says of values that are none, users never see; here it is a warning, and so an error."""
+    importlib.import_module("mechgraph.arguments").FLOATING |= {"all": "warn", "under": "ignore"}
 
 
 @pytest.fixture(scope="session")

@@ -6,6 +6,7 @@ reproduction.
 
 from __future__ import annotations
 
+import contextlib
 import datetime
 import decimal
 import functools
@@ -19,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 import scipy
+from public import every_door
 
 import mechgraph as mg
 from mechgraph.model import toml
@@ -304,207 +306,24 @@ WRONG = [
 ]
 
 
-@functools.cache
-def _doors() -> list[tuple[str, Callable, tuple, dict]]:
-    m = mg.load("four-bar").replace(drives=["A"])
-    law = {"law": mg.ForceTable(x=(0, 1), force=(1, 2)), "free": 0.0, "scale": 1.0}
-    s, report, f = mg.solve(m, {"A": [0.0, 0.1]}), mg.check(m), mg.formulate(m)
-    Z, mass = (0, 0, 1), (1.0, (0, 0, 0), np.eye(3))
-    gears = mg.Mechanism(
-        "gears",
-        None,
-        [
-            mg.Pair("A", "R", "frame", "p", point=(0, 0, 0), axis=Z),
-            mg.Pair("B", "R", "frame", "w", point=(1, 0, 0), axis=Z),
-        ],
-        couplings=[mg.Coupling({"A": 1, "B": 2}, name="g")],
-        drives=["A"],
-    )
-
-    def built(kind: Callable, where: str) -> Callable:
-        """A declared thing in a mechanism."""
-        return lambda *args, **more: m.replace(**{where: [*getattr(m, where), kind(*args, **more)]})
-
-    study = functools.partial(mg.study, executor=None)
-    return [
-        (
-            "Mechanism",
-            mg.Mechanism,
-            ("m", m.links, m.pairs, ["A"], m.loads),
-            {
-                "couplings": [],
-                "frame": "frame",
-                "start": {"A": 0.1},
-                "units": {"length": "m"},
-                "source": "",
-                "description": "",
-                "expected": {},
-            },
-        ),
-        ("Link", built(mg.Link, "links"), ("new", *mass), {"unphysical": False}),
-        (
-            "Pair",
-            built(mg.Pair, "pairs"),
-            ("N", "R", "frame", "crank"),
-            {"point": (0, 0, 0), "axis": Z, "second": (1, 0, 0), "pitch": None, "lead": None},
-        ),
-        (
-            "Pair by markers",
-            built(mg.Pair, "pairs"),
-            ("N", "R", "frame", "crank"),
-            {"on_a": mg.Marker(), "on_b": mg.Marker()},
-        ),
-        (
-            "Marker",
-            lambda *a: built(mg.Pair, "pairs")("N", "R", "frame", "crank", on_a=mg.Marker(*a), on_b=mg.Marker()),
-            ((0, 0, 0), Z, (1, 0, 0)),
-            {},
-        ),
-        ("Drive", lambda *a: m.replace(drives=[mg.Drive(*a)]), ("A", mg.Motion(0.0)), {}),
-        ("Gravity", built(mg.Gravity, "loads"), ((0, 0, -9.81),), {}),
-        ("Wrench", built(mg.Wrench, "loads"), ("crank", (1, 0, 0), (0, 0, 1), (0, 0, 0), "link"), {}),
-        ("Effort", built(mg.Effort, "loads"), ("A", 1.0), {}),
-        ("Spring", built(mg.Spring, "loads"), ("frame", "crank", (0, 0, 0), (1, 0, 0), 1.0, 0.0, 0.0), {}),
-        ("TorsionSpring", built(mg.TorsionSpring, "loads"), ("A", 1.0, 0.0, 0.0), {}),
-        ("Damper", built(mg.Damper, "loads"), ("A",), {"coefficient": 1.0}),
-        ("ForceLaw", built(mg.ForceLaw, "loads"), (None, "frame", "crank", (0, 0, 0), (1, 0, 0)), law),
-        ("ForceLaw by one argument", built(mg.ForceLaw, "loads"), (("frame", "crank", (0, 0, 0), (1, 0, 0)),), law),
-        (
-            "ForceTable",
-            lambda *a: built(mg.ForceLaw, "loads")("A", law=mg.ForceTable(*a)),
-            ((0, 1), (0, 1, 2), ((1, 2, 3), (4, 5, 6)), "cubic", "hold"),
-            {},
-        ),
-        ("Coupling", built(mg.Coupling, "couplings"), ({"A": 1.0, "B": 2.0},), {"name": "g", "constant": 0.0}),
-        (
-            "PairType",
-            mg.PairType,
-            ("Q", "mine"),
-            {
-                "freedoms": ["Rz", mg.Freedom("Tx", (0, 0, 0, 1, 0, 0))],
-                "reactions": None,
-                "efforts": None,
-                "bookkeeping": mg.Bookkeeping((), ()),
-                "directed": True,
-                "square_second": False,
-            },
-        ),
-        ("Freedom", lambda *a: mg.PairType("Q", freedoms=[mg.Freedom(*a)]), ("Rz", (0, 0, 1, 0, 0, 0), (0,) * 6), {}),
-        (
-            "Component",
-            lambda *a: mg.PairType("Q", freedoms=["Rz"], reactions=["Fx", "Fy", "Fz", "Mx", mg.Component(*a)]),
-            ("My", (0, 1, 0, 0, 0, 0), 0, (0,) * 6, False),
-            {},
-        ),
-        ("Bookkeeping", lambda *a: mg.PairType("Q", freedoms=["Rz"], bookkeeping=mg.Bookkeeping(*a)), ((), ()), {}),
-        (
-            "chain",
-            mg.chain,
-            ("RRRR",),
-            {
-                "twist": [0] * 4,
-                "length": [1, 2, 2.5, 3],
-                "offset": [0] * 4,
-                "pitch": None,
-                "name": "c",
-                "drive": "O1",
-                "links": [],
-            },
-        ),
-        ("Motion", mg.Motion, (0.0, 1.0, 2.0, 3.0), {}),
-        ("law", mg.Motion.law, ("cycloidal", 1.0, 2.0, [0.0, 1.0]), {"start": 0.0}),
-        (
-            "law by samples",
-            mg.Motion.law,
-            ("sampled",),
-            {"t": [0.0], "samples": ([0, 1, 2, 3], [0, 1, 2, 3]), "degree": 3},
-        ),
-        ("law of speed", mg.Motion.law, ("constant_speed",), {"t": [0.0], "speed": 2.0, "start": 1.0}),
-        ("law by function", mg.Motion.law, (np.sin,), {"t": [0.0, 1.0]}),
-        ("load", mg.load, ("four-bar",), {}),
-        ("check", mg.check, (m, {"A": 0.1}), {"engine": "dense"}),
-        ("assemble", mg.assemble, (m, {"A": 0.1}, {"B": 0.1}), {}),
-        ("formulate", mg.formulate, (m, "lee", ["A"]), {"unknowns": "kinetostatics"}),
-        (
-            "solve",
-            mg.solve,
-            (m, {"A": [0.0, 0.1]}),
-            {"method": "newton_euler", "loads": [], "redundant": "nan", "on_reach": "flag", "engine": "auto"},
-        ),
-        ("kinematics", mg.kinematics, (m, {"A": [0.0, 0.1]}), {"on_reach": "flag", "engine": "auto"}),
-        ("motion in a call", lambda *a: mg.solve(m, {"A": mg.Motion(*a)}), (0.0, 1.0), {}),
-        ("load in a call", lambda *a: mg.solve(m, {"A": [0.0, 0.1]}, loads=[mg.Effort("D", *a)]), (1.0,), {}),
-        (
-            "wrench in a call",
-            lambda *a: mg.solve(m, {"A": [0.0, 0.1]}, loads=[mg.Wrench("rocker", *a)]),
-            ((0, 0, 1), None, (0, 0, 0)),
-            {},
-        ),
-        (
-            "study",
-            study,
-            (m, {"crank.mass": [1.0, 2.0]}, "A.effort", 2, 0),
-            {
-                "motions": {"A": 0.1},
-                "sampling": "random",
-                "method": "loop_wrench",
-                "redundant": "nan",
-                "engine": "auto",
-                "progress": None,
-            },
-        ),
-        (
-            "study by function",
-            study,
-            (lambda x: m, {"x": scipy.stats.norm(1, 0.1)}, {"y": "A.effort"}, 2),
-            {"motions": {"A": 0.1}},
-        ),
-        (
-            "study of outputs",
-            lambda *a: study(m, {"crank.mass": [1.0]}, {"y": a[0]}, 2, motions={"A": 0.1}),
-            (lambda s: s["A"].effort,),
-            {},
-        ),
-        ("replace", m.replace, (), {"drives": ["A"], "loads": [], "start": {"A": 0.0}}),
-        ("replace more", m.replace, (), {"name": "x", "links": m.links, "pairs": m.pairs, "units": {}}),
-        ("with_pair_type", m.with_pair_type, ("A", "H"), {"pitch": 0.1}),
-        ("to_units", m.to_units, (), {"length": "mm", "mass": "g", "time": "s"}),
-        ("moved", m.moved, (np.eye(4),), {}),
-        ("link", m.link, ("crank",), {}),
-        ("pair", m.pair, ("A",), {}),
-        ("coupling", gears.coupling, ("g",), {}),
-        ("s[]", lambda a: s[a].effort, ("A",), {}),
-        ("s.link", s.link, ("crank",), {}),
-        ("s.coupling", s.coupling, ("g",), {}),
-        ("s.link.point", s.link("crank").point, ((0, 0, 0),), {}),
-        ("s.state", s.state, (1,), {}),
-        ("ledger", report.ledger, ("lee",), {}),
-        ("assemble equations", f.assemble, (s.state(0),), {}),
-        ("rod", mg.inertia.rod, (1.0, (0, 0, 0), (1, 0, 0)), {}),
-        ("box", mg.inertia.box, (1.0, (1, 2, 3)), {"axes": np.eye(3)}),
-        ("cylinder", mg.inertia.cylinder, (1.0, 1.0, 1.0, Z), {}),
-        ("sphere", mg.inertia.sphere, (1.0, 1.0), {}),
-        ("components", mg.inertia.from_components, (1.0, 1.0, 1.0, 0.0, 0.0, 0.0), {}),
-        ("shifted", mg.inertia.shifted, (np.eye(3), 1.0, (0, 0, 1)), {}),
-        ("physical", mg.inertia.physical_faults, (np.eye(3),), {"tol": 1e-9}),
-    ]
-
-
-def attack_call(seed: int) -> None:
+def attack_call(seed: int, folder: Path) -> None:
     """A call with some of its arguments replaced by something else."""
     rng = random.Random(seed)
-    name, call, args, more = rng.choice(_doors())
+    name, call, args, more = rng.choice(every_door(folder))
     given, named = list(args), dict(more)
     for _ in range(rng.choice([1, 1, 2])):
         i = rng.randrange(len(given) + len(named))
         wrong = rng.choice(WRONG)
         if rng.random() < 0.25:
             wrong = rng.choice([[wrong], (wrong, wrong, wrong), {"A": wrong}, [wrong, 1.0], np.array([0, 1, 2, 3.0])])
+        if callable(wrong) and [*[""] * len(given), *named][i] == "progress":
+            continue  # what a user's function raises is the user's
         if i < len(given):
             given[i] = wrong
         else:
             named[list(named)[i - len(given)]] = wrong
-    answered(lambda: call(*given, **named), f"{name}, seed {seed}")
+    with contextlib.chdir(folder):  # a wrong path may be a good name of a file
+        answered(lambda: call(*given, **named), f"{name}, seed {seed}")
 
 
 # --- mechanisms --------------------------------------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ from mechanisms import linked_four_bar
 from test_assembly_groups import spatial
 
 import mechgraph as mg
+from mechgraph.modes.branches import GOLDEN
 
 
 def angle_at(a: float, d: float, reach: float) -> float:
@@ -69,7 +70,7 @@ def test_circuits_are_what_solve_runs_through() -> None:
 def test_a_fold_at_which_no_other_branch_ends_leaves_the_map_open() -> None:
     """The branches that it meets begin between two samples, so that circuits are not told; with samples on them they are one."""
     m = spatial(("RSSR", "frame", "frame"), ("SSP", "03", "frame"), seed=3)
-    coarse, fine = (mg.branches(m, "O0", over=(0.0, 0.1), samples=n, points=20) for n in (3, 20))
+    coarse, fine = (mg.branches(m, "O0", over=(0.0, 0.09), samples=n, points=20) for n in (3, 20))
     assert (len(coarse), len(coarse.circuits), coarse.open_ends) == (2, 2, 2)
     assert (len(fine), len(fine.circuits), fine.open_ends) == (4, 1, 0)
     assert "2 ends of branches could not be told" in " ".join(str(coarse).split())
@@ -90,6 +91,20 @@ def test_branch_circuit_and_order_defects_are_told() -> None:
     assert (wrong.branch, wrong.circuit) == (True, True)
 
 
+def test_a_position_is_on_the_branch_that_leads_there() -> None:
+    """Next to its change point branches of a four-bar pass each other closely; on each the rocker is on one side of the coupler."""
+    m = linked_four_bar(1.17, 1.93, 1.1295, 1.97, 0.5)
+    b = mg.branches(m, "O0", samples=12, points=60)
+    rocker = m.freedom_names().index("O2.Rz")
+    for angle in (-0.05, -0.02, 0.02, 0.05):
+        for mode in mg.assemblies(m, {"O0": angle}):
+            branch = b.branches[b.defects([mode]).branches[0]]
+            assert branch.interval[0] - 2 * np.pi < angle < branch.interval[1]
+            assert np.sin(mode.start["O2.Rz"]) * np.sin(branch.coordinates[3, rocker]) > 0
+    with pytest.raises(mg.DeclarationError, match="position 1: expected one to which a branch of the map leads"):
+        b.defects([mode, mode.start | {"O3.Rz": 0.2}])
+
+
 def test_bad_arguments_of_a_map_are_all_named() -> None:
     with pytest.raises(mg.DeclarationError) as caught:
         mg.branches(mg.load("four-bar"), "Q", samples=1, points=0, over=(1.0, 0.0))
@@ -103,3 +118,21 @@ def test_turns_are_those_next_to_the_start() -> None:
     ranges = [found["D.Rz"] for found in mg.branches(m, "A", samples=12, points=24).ranges]
     assert any(np.allclose(one, (s.min(), s.max()), atol=0.02) for one in ranges)
     assert all(-np.pi < middle <= np.pi for middle in map(np.mean, ranges))
+
+
+@pytest.mark.parametrize("samples", [12, 13])
+def test_whether_the_driver_turns_right_round_does_not_depend_on_the_samples(samples: int) -> None:
+    """Declared at a right angle, samples of a parallelogram at whole parts of a turn from there would lie where its branches cross."""
+    b = mg.branches(linked_four_bar(1.0, 2.0, 1.0, 2.0, np.pi / 2), "O0", samples=samples, points=5 * samples)
+    assert (b.full_turn, b.circuits, b.open_ends) == ((True, True), ((0, 1),), 0)
+
+
+def test_samples_that_lie_on_double_points_are_moved_and_ends_that_are_not_told_are_no_ends(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    m = linked_four_bar(1.0, 2.0, 1.0, 2.0, np.pi - 2 * np.pi / 12 * (2 + GOLDEN))
+    assert mg.branches(m, "O0", samples=12, points=60).full_turn == (True, True)
+    monkeypatch.setattr("mechgraph.modes.branches.SPREADS", 1)
+    b = mg.branches(m, "O0", samples=12, points=60)
+    assert (set(b.full_turn), b.open_ends > 0) == ({None}, True)
+    assert "not told" in str(b)

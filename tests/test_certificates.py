@@ -144,6 +144,26 @@ def test_a_root_lies_within_its_bound_and_what_is_no_root_has_no_certificate() -
         assert not found.proved
 
 
+def test_certificates_hold_for_every_matrix_within_the_bounds_of_rounding(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rows known so coarsely that the inverse may be half as large again: the product is that of the worst of them, or more."""
+    q = Question(linked_four_bar(1.0, 2.5, 2.0, 3.0, 0.5), {"O0": 0.5})
+    free = q.family.free
+    f, A = rows(q.start)
+    U, sigma, Vt = np.linalg.svd(A.mid[:, free])
+    u, v, least = U[:, 2], Vt[2], sigma[2]
+    rad, open_ = A.rad.copy(), 1e-6 * u
+    rad[:, free] += 0.35 * least * np.abs(np.outer(u, v))
+    monkeypatch.setattr(certificates, "rows", lambda here: (Ball(open_, f.rad), Ball(A.mid, rad)))
+    found = certificate(q.start, free, 0, True)
+    assert found is not None
+    worst = A.mid[:, free] - 0.34 * least * np.outer(u, v)
+    inverse, step = np.linalg.pinv(worst), np.linalg.pinv(worst) @ open_
+    K = curvature(q.start)
+    assert np.linalg.norm(inverse, 2) * K * np.linalg.norm(step) <= found.product < 0.5
+    assert np.linalg.norm(step) <= found.error
+    assert found.radius <= 1 / (np.linalg.norm(inverse, 2) * K)
+
+
 def test_a_pair_on_a_curve_has_no_certificate() -> None:
     """Bounds of second derivatives hold for screws and rotations; the word says so."""
     modes = mg.assemblies(mg.load("geneva"), guesses=20)[0]

@@ -1,5 +1,6 @@
 """Markers that travel along curves: limits that are other pairs, identities of mechanics, and what is said of curves that will not do."""
 
+import math
 import pickle
 
 import numpy as np
@@ -584,3 +585,115 @@ def test_a_function_is_never_asked_for_nothing():
         return [np.stack([x, zero, zero]) for x in (u, zero + 1.0, zero, zero)]
 
     assert mg.Curve.function(position=line, ends_at=(0.0, 1.0)).at(np.zeros(0)).shape == (4, 3, 0)
+
+
+# --- what contradicts itself, and what does not --------------------------------------------------------------------------------
+
+
+def dwelling(u):
+    """A polar curve that rises by 5 mm from a sixth to a third of a turn (poly345) and falls half a turn later: derivative 3 jumps."""
+    r = np.zeros((5, u.size))
+    for begin, height in ((np.pi / 3, 0.005), (4 * np.pi / 3, -0.005)):
+        x, w = np.clip((u - begin) / (np.pi / 3), 0, 1), 3 / np.pi
+        inside = (u > begin) & (u < begin + np.pi / 3)
+        r[0] += height * x**3 * (10 - 15 * x + 6 * x**2)
+        rates = (
+            30 * x**2 - 60 * x**3 + 30 * x**4, 60 * x - 180 * x**2 + 120 * x**3, 60 - 360 * x + 360 * x**2, 720 * x - 360
+        )  # fmt: skip
+        for k, part in enumerate(rates, 1):
+            r[k] += height * w**k * part * inside
+    r[0] += 0.03
+    return polar(r, u)
+
+
+def polar(r, u):
+    """``r e^(iu)`` and four derivatives from those of r, by Leibniz."""
+    turn = np.exp(1j * u)
+    z = [sum(math.comb(n, k) * r[k] * 1j ** (n - k) for k in range(n + 1)) * turn for n in range(5)]
+    return [np.stack([part.real, part.imag, 0 * u]) for part in z]
+
+
+def wavy(waves, depth):
+    def position(u):
+        r = [depth * waves**k * np.cos(waves * u + k * np.pi / 2) for k in range(5)]
+        r[0] = r[0] + 0.05
+        return polar(r, u)
+
+    return position
+
+
+@pytest.mark.parametrize(
+    ("position", "more"),
+    [(dwelling, {}), (dwelling, {"breaks": np.pi * np.array([1, 2, 4, 5]) / 3}),
+     (wavy(50, 0.004), {}), (wavy(150, 1e-4), {}), (wavy(1000, 1e-6), {})],
+    ids=["dwells", "dwells with breaks", "50 waves", "150 waves", "1000 waves"],
+)  # fmt: skip
+def test_a_right_function_is_taken(position, more):
+    curve = mg.Curve.function(position=position, ends_at=(0, 2 * np.pi), closed=True, **more)
+    assert mg.Mechanism("m", None, [mg.Pair("K", "Ps", "a", "b", curve=curve, point=curve.at(np.array(0.0))[0])]).pairs
+    assert curve.grid.size < 5000
+
+
+def test_the_length_of_a_wavy_curve_is_found():
+    curve = mg.Curve.function(position=wavy(50, 0.004), ends_at=(0, 2 * np.pi), closed=True)
+    u = 2 * np.pi * np.arange(20000) / 20000  # the trapezoidal rule is exact for what is periodic
+    exact = np.linalg.norm(curve.at(u)[1], axis=0).mean() * 2 * np.pi
+    assert curve.once(Travel).length == pytest.approx(exact, rel=1e-12)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("place", ["everywhere", "behind a break", "a hundredth"])
+def test_a_wrong_derivative_is_found_where_it_is(order, place):
+    """By 2 % everywhere, and by its size in a piece, or a hundredth of the range, that a few places would not see."""
+
+    def position(u):
+        out = wavy(3, 0.005)(u)
+        at = {
+            "everywhere": 0.02 + 0 * u,
+            "behind a break": u > 6.1,
+            "a hundredth": np.abs(u - 2.0) < 0.03,
+        }[place]
+        out[order] = out[order] * (1 + at)
+        return out
+
+    more = {"breaks": (6.1,)} if "break" in place else {}
+    curve = mg.Curve.function(position=position, ends_at=(0, 2 * np.pi), closed=True, **more)
+    with pytest.raises(mg.DeclarationError, match=f"derivative {order} differs from the slope of .* at u = "):
+        mg.Mechanism("m", None, [mg.Pair("K", "Ps", "a", "b", curve=curve)])
+
+
+@pytest.mark.parametrize("breaks", [(0.0,), (2.0, 1.0), (7.0,), "no", (np.nan,)])
+def test_breaks_that_are_none_are_refused(breaks):
+    curve = mg.Curve.function(position=dwelling, ends_at=(0, 2 * np.pi), closed=True, breaks=breaks)
+    with pytest.raises(mg.DeclarationError, match="breaks"):
+        mg.Mechanism("m", None, [mg.Pair("K", "Ps", "a", "b", curve=curve)])
+
+
+def rise_and_fall(law, samples):
+    """A rise and a fall of 10 mm over 120 degrees each, dwells between."""
+    u, third = np.linspace(0, 2 * np.pi, samples + 1), 2 * np.pi / 3
+    up, down = (mg.Motion.law(law, h, third, np.maximum(u - at, -1.0)) for h, at in ((0.01, 0.3), (-0.01, 3.5)))
+    fields = {"lift": "position", "slope": "velocity", "bend": "acceleration"}
+    return {"angle": u, **{name: getattr(up, of) + getattr(down, of) for name, of in fields.items()}}
+
+
+@pytest.mark.parametrize("law", ["cycloidal", "harmonic", "poly345", "poly4567"])
+@pytest.mark.parametrize("samples", [9, 24, 72, 73, 360])
+def test_laws_are_compared_with_their_rates_within_the_error_of_a_spline(law, samples):
+    """True ones pass, rounded to three digits too; slopes 45 % too large do not, nor 5 % from 5 degrees on, nor one wrong sample."""
+    given = rise_and_fall(law, samples)
+
+    def said(**changes):
+        return mg.Curve.cam(**{**given, **changes}, base_radius=0.05, second=(0, 1, 0)).faults("")
+
+    assert said() == []
+    assert said(**{k: np.round(given[k], 5) for k in ("lift", "slope", "bend")}) == []
+    if samples >= 24:
+        assert "slope: is not the derivative of lift" in said(slope=1.45 * given["slope"])[0]
+        assert "slope: is not the derivative of lift" in said(lift=0.6 * given["lift"])[0]
+    if samples >= 72:
+        assert said(slope=1.05 * given["slope"])
+        assert said(bend=1.45 * given["bend"])
+        wrong = given["slope"].copy()
+        wrong[samples // 6] *= 1.5
+        assert said(slope=wrong)

@@ -1,19 +1,30 @@
 """Wrong types at the public doors: one sentence that names the argument, never an error of Python's own; options known to type checkers."""
 
+import base64
 import inspect
+import pickle
+import signal
+import subprocess
+import sys
 import typing
 
 import numpy as np
 import pytest
 
 import mechgraph as mg
+from mechgraph import show
 from mechgraph.equations.build import BOOKKEEPINGS, BookkeepingName
 from mechgraph.force.dalembert import METHODS, MethodName
+from mechgraph.show.page.write import report_page
 from mechgraph.variants.sampling import SAMPLINGS, SamplingName
 
 M = mg.load("four-bar")
 Z = (0, 0, 1)
 HINGE = mg.Pair("A", "R", "frame", "door", point=(0, 0, 0), axis=Z)
+
+
+BALL = mg.Pair("A", "Sp", "frame", "door", on_b=mg.Marker(), surface=mg.Surface.plane())
+S = mg.free_body(mg.solve(M, {"A": 0.0}), "crank")
 
 
 def door(**more):
@@ -37,8 +48,8 @@ WRONG = {
     "save to a number": (lambda: mg.save(M, 3), "path = 3"),
     "load a number": (lambda: mg.load(3), "name = 3"),
     "load bytes": (lambda: mg.load(b"four-bar"), "name = "),
-    "chain of a list": (lambda: mg.chain(["R"]), "pairs = ['R']"),
-    "chain with links by name": (lambda: mg.chain("RRRR", links=["link1"]), "link 'link1'"),
+    "chain of a list": (lambda: mg.chain(["R"]), "letters = ['R']: expected a text"),
+    "chain with links by name": (lambda: mg.chain("RRRR", links=["link1"]), "links = ['link1']: expected a list, each a Link"),
     "chain with a text for lengths": (lambda: mg.chain("RRRR", length="1 2 3 4"), "length = "),
     "markers that are none": (lambda: door(pairs=[mg.Pair("A", "R", "frame", "door", on_a=3, on_b=4)]), "on_a = 3"),
     "ends that are links": (lambda: door(pairs=[mg.Pair("A", "R", mg.Link("frame"), "door")]), "expected the name of a link"),
@@ -77,6 +88,23 @@ WRONG = {
     "a link by number": (lambda: M.link(0), "unknown link 0"),
     "a pair by list": (lambda: M.pair([]), "unknown pair []"),
     "a pose of text": (lambda: M.moved("up"), "expected a 4 x 4 pose"),
+    "a mechanism where a solution is due": (lambda: mg.free_body(M, "crank"), "expected a Solution; mg.solve(mechanism)"),
+    "a mechanism over time": (lambda: mg.over_time(M), "solution = "),
+    "the transmission of a mechanism": (lambda: mg.transmission(M, "D"), "solution = "),
+    "the curve of a mechanism": (lambda: show.effort_curve(M, "A"), "solution = "),
+    "multiple joints by name": (lambda: mg.multiple_joints("four-bar"), "mechanism = 'four-bar'"),
+    "joints that are none": (lambda: mg.identify(M, joints=[mg.MultipleJoint(("A",), 3)]), "joints[0]: pairs = 3"),
+    "axes that are none": (lambda: show.draw_graph(M, ax=3), "ax = 3: expected axes of matplotlib"),
+    "options of a load deck": (lambda: S.write("x.inp", nonsense=1), "unexpected keyword argument 'nonsense'"),
+    "options of a table": (lambda: S.write("x.csv", nonsense=1), "for a load deck"),
+    "an argument too many": (lambda: mg.check(M, {}, {}), "too many positional arguments; it takes m, at, engine, tol"),
+    "an argument too few": (lambda: mg.solve(), "missing a required argument: 'm'"),
+    "a field that no chain has": (lambda: mg.chain("RRRR", nonsense=1), "unknown field 'nonsense'"),
+    "a tolerance in a list": (lambda: door(tol=[1], pairs=[BALL]), "tol = (1.0,): expected radians"),
+    "a curve without a second direction": (
+        lambda: door(pairs=[HINGE.replace(type="Sg", radius=0.1, curve=mg.Curve.circle(radius=1, second=(0, 0, 2)))]),
+        "curve.second = (0.0, 0.0, 2.0): parallel to the axis",
+    ),
     "a study of a name": (lambda: mg.study("four-bar", {"crank.mass": [1]}, "A.effort"), "mechanism = 'four-bar'"),
     "a study of a list": (lambda: mg.study(M, ["crank.mass"], "A.effort"), "expected a mapping"),
     "a study with a wrong sampling": (lambda: mg.study(M, {"crank.mass": [1]}, "A.effort", sampling=[]), "sampling = []"),
@@ -115,3 +143,111 @@ def test_options_are_literals(call):
 def test_chain_takes_arrays():
     lengths = np.array([1.0, 2.0, 2.5, 3.0])
     assert mg.chain("RRRR", length=lengths) == mg.chain("RRRR", length=lengths.tolist())
+
+
+def test_no_setting_of_numpy_and_no_warning_of_it_reaches_a_result():
+    """Underflow is everywhere, and a motion that rests has zeros to divide by: whatever a program has set, the numbers are the same."""
+    swung = M.replace(drives=[])
+
+    def results():
+        response = mg.respond(swung, [0.0, 0.05])
+        return response["A"].position, mg.assemblies(M, {"A": 0.1}).coordinates, mg.equilibrium(swung).start["A.Rz"]
+
+    calm = results()
+    with np.errstate(all="raise"):
+        for found, expected in zip(results(), calm, strict=True):
+            np.testing.assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize("what", ["events", "progress", "loads"])
+def test_a_function_that_raises_keeps_the_motion_so_far(what):
+    def fails(t):
+        if np.max(t) > 0.02:
+            raise ValueError("mine")
+        return 0.0 * t + 1.0
+
+    given = {
+        "events": mg.Event(lambda s: float(fails(s.t)), 0.5),
+        "progress": fails,
+        "loads": [mg.Effort("A", lambda pose, twist, t: fails(t))],
+    }
+    with pytest.raises(mg.ResponseError, match="mine") as caught:
+        mg.respond(M.replace(drives=[]), (0.0, 0.05), **{what: given[what]})
+    assert 0 < caught.value.solution.t[-1] < 0.05
+    assert isinstance(caught.value.__cause__, ValueError if what != "loads" else mg.DeclarationError)
+
+
+def test_what_is_declared_shows_itself_alike_after_pickling():
+    for one in (mg.Event("A"), mg.Wrench("crank", moment=Z), mg.Stop("A", 0.0), mg.ResponseSetup((0.0, 1.0))):
+        assert repr(pickle.loads(pickle.dumps(one))) == repr(one)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "1",
+        "[" * 100_000,
+        "9" * 6000,
+        '{"links": 1000000000000000, "joints": [[0, 1]], "types": ["R"], "family": 3}',
+        '{"links": 1e999, "joints": [], "types": [], "family": 3}',
+        '{"links": 2, "joints": [[0, [1]]], "types": ["R"], "family": 3}',
+        '{"links": 2, "joints": [[0, 1]], "types": [["R"]], "family": 3}',
+    ],
+)
+def test_what_is_no_chain_is_refused_with_its_line(line, tmp_path):
+    path = tmp_path / "chains"
+    path.write_text(line)
+    with pytest.raises(mg.FileError, match="line 1: expected a chain as save_chains writes it"):
+        list(mg.load_chains(path))
+
+
+def test_a_program_that_is_ended_leaves_no_temporary_file(tmp_path):
+    code = f"""
+import os, signal
+from mechgraph.writing import whole_file
+with whole_file({str(tmp_path / "x.csv")!r}) as temporary:
+    temporary.write_text("half")
+    os.kill(os.getpid(), signal.SIGTERM)
+"""
+    ended = subprocess.run([sys.executable, "-c", code], check=False)
+    assert ended.returncode == -signal.SIGTERM
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_names_of_the_package_are_the_public_ones():
+    assert dir(mg) == sorted(mg.__all__)
+
+
+def test_a_notebook_shows_a_picture():
+    """Also of a view, where what is exported from the notebook runs no widget."""
+    start = b"\x89PNG"
+    assert show.draw_graph(M)._repr_png_().startswith(start)
+    assert base64.b64decode(M.view()._repr_mimebundle_()[0]["image/png"]).startswith(start)
+
+
+def test_the_path_of_a_response_is_a_curve():
+    coarse = mg.respond(M.replace(drives=[]), np.linspace(0.0, 0.3, 4))
+    drawn = show.point_path(coarse, "B").lines[0].get_xydata()
+    assert len(drawn) > 300
+    np.testing.assert_allclose(np.hypot(*drawn.T), 0.1, rtol=1e-9)
+
+
+def test_power_and_revolutions_in_words():
+    turned = mg.solve(M, {"A": mg.Motion(np.linspace(0, 2 * np.pi, 25), 1.0)})
+    text = str(mg.over_time(turned))
+    assert "power of A.Rz [W]" in text
+    assert "a whole cycle of 1 revolution;" in text
+
+
+def test_named_points_are_outputs_of_studies():
+    m = M.replace(links=[one.replace(points={"tip": (0, 0.1, 0)}) for one in M.links], drives=["A"])
+    names = ["crank.tip", "crank.tip.velocity"]
+    study = mg.study(m, {"crank.mass": [1.0, 2.0]}, names, n=2, motions={"A": mg.Motion([0.3], 2.0)})
+    tip = mg.solve(m, {"A": mg.Motion([0.3], 2.0)}).link("crank").at("tip")
+    for name, expected in zip(names, (tip.position, tip.velocity), strict=True):
+        np.testing.assert_allclose(study.outputs[name], np.stack([expected, expected]), atol=1e-14)
+    assert [study.units[name] for name in names] == ["m", "m/s"]
+
+
+def test_a_planar_model_all_of_which_is_unique_is_green():
+    assert "All that a planar model has is unique" in report_page(M)

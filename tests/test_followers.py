@@ -158,7 +158,7 @@ def test_a_cam_of_a_law_lifts_by_it(follower):
     kind = "Kc" if follower == "flat" else "Ps"
     m = driven_cam(
         mg.Pair("F", "P", "frame", "follower", point=at, axis=(0, 1, 0)),
-        mg.Pair("K", kind, "cam", "follower", curve=curve, point=at),
+        mg.Pair("K", kind, "cam", "follower", curve=curve, point=at, closed="form"),
         point=at,
     )
     given, fine = ANGLE[::10], law()
@@ -186,7 +186,7 @@ def test_a_cam_of_a_law_swings_an_arm_by_it(mirrored):
     assert (at[1] < 0) == mirrored
     m = driven_cam(
         mg.Pair("F", "R", "frame", "follower", point=pivot, axis=Z),
-        mg.Pair("K", "Ps", "cam", "follower", curve=curve, point=at),
+        mg.Pair("K", "Ps", "cam", "follower", curve=curve, point=at, closed="form"),
         point=at,
     )
     s = mg.solve(m, {"A": mg.Motion(ANGLE[::10], 3.0, 0.0)})
@@ -279,7 +279,7 @@ def lifted():
     top = lobe.at(np.array(0.0))[0]
     return driven_cam(
         mg.Pair("F", "P", "frame", "follower", point=top, axis=(0, 1, 0)),
-        mg.Pair("K", "Ps", "cam", "follower", curve=lobe, point=top),
+        mg.Pair("K", "Ps", "cam", "follower", curve=lobe, point=top, closed="form"),
         point=top,
     )
 
@@ -348,7 +348,7 @@ def test_two_cams_in_contact_by_their_closed_form():
     at = ca + ra * (cb - ca) / (ra + rb)
     bearing = mg.Pair("F", "R", "frame", "follower", point=pivot, axis=Z)
     discs = mg.Pair(
-        "K", "Kc", "cam", "follower", point=at,
+        "K", "Kc", "cam", "follower", point=at, closed="form",
         curve=mg.Curve.circle(radius=ra, center=ca), curve_b=mg.Curve.circle(radius=rb, center=cb),
     )  # fmt: skip
     rod = [

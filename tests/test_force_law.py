@@ -279,3 +279,51 @@ def test_a_motion_that_leaves_its_table_says_so() -> None:
     m = block(mg.ForceLaw("P", law=mg.ForceTable(x=[0, 1], force=[2, 2])), drives=())
     with pytest.raises(mg.MechgraphError, match=r"force law in 'P'.*\n?.*lies outside of the table"):
         mg.respond(m, [0.0, 9.0])
+
+
+@pytest.mark.parametrize(
+    "place", [("D",), ("frame", "bar", (0, 0, 0), (1, 0, 0)), (("frame", "bar", (0, 0, 0), (1, 0, 0)),)]
+)
+def test_springs_and_dampers_take_the_same_arguments(place):
+    """A freedom, two links with a point of each, or these four as one tuple."""
+    spring, damper = mg.Spring(*place, stiffness=3.0, free_length=0.2, damping=0.5), mg.Damper(*place, coefficient=0.5)
+    assert [getattr(spring, n) for n in ("freedom", *"abpq")] == [getattr(damper, n) for n in ("freedom", *"abpq")]
+    assert spring.replace(damping=1.0).b == damper.b
+    pairs = [mg.Pair("D", "R", "frame", "bar", point=(0, 1, 0), axis=(0, 0, 1))]
+
+    def effort(*loads):
+        m = mg.Mechanism("bar", [mg.Link("frame"), mg.Link("bar", 1.0, (1, 0, 0))], pairs, ["D"], loads)
+        return mg.solve(m, {"D": mg.Motion([0.3, 0.7], 2.0)})["D"].effort[:, 0]
+
+    mixed = effort(spring.replace(damping=0.0), damper)
+    np.testing.assert_allclose(effort(spring), mixed, rtol=1e-13)
+    if len(place) == 1 and place[0] == "D":
+        same = effort(mg.TorsionSpring("D", 3.0, 0.2, 0.5))
+        np.testing.assert_allclose(effort(spring), same, rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("spring", "words"),
+    [
+        (mg.Spring("D"), "spring in 'D': stiffness = None: expected a finite number"),
+        (mg.Spring("D", "bar", stiffness=1.0), "spring 'D' - 'bar': p, q left out; expected a freedom alone"),
+        (
+            mg.Spring("frame", freedom="D", stiffness=1.0),
+            "spring in 'D': beside it a = 'frame'; expected a freedom alone",
+        ),
+        (mg.Spring(stiffness=1.0), "a, b, p, q left out"),
+        (mg.Spring("E", stiffness=1.0), "unknown freedom 'E'"),
+        (
+            mg.Spring("frame", "bar", (0, 0, 0), (1, 0, 0), 1.0, -0.1),
+            "free_length = -0.1: expected a number of 0 or more",
+        ),
+        (mg.Spring("D", stiffness=1.0, free_length=-0.1), None),
+    ],
+)
+def test_a_spring_at_no_place_is_named(spring, words):
+    pairs = [mg.Pair("D", "R", "frame", "bar", point=(0, 1, 0), axis=(0, 0, 1))]
+    if words is None:
+        assert mg.Mechanism("bar", pairs=pairs, loads=[spring]).loads
+        return
+    with pytest.raises(mg.DeclarationError, match=words):
+        mg.Mechanism("bar", pairs=pairs, loads=[spring])

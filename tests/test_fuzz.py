@@ -4,6 +4,9 @@ from pathlib import Path
 
 import pytest
 from fuzz import attack_call, attack_file, attack_mechanism
+from public import every_door, functions, methods, results
+
+import mechgraph as mg
 
 PER_SEED = 10
 """Inputs of a seed."""
@@ -17,10 +20,35 @@ def test_mutated_files(seed: int, tmp_path: Path) -> None:
         attack_file(seed * PER_SEED + i, tmp_path)
 
 
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the doors write."""
+    return tmp_path_factory.mktemp("doors")
+
+
 @pytest.mark.seeds(40)
-def test_wrong_types_at_every_door(seed: int) -> None:
+def test_wrong_types_at_every_door(seed: int, folder: Path) -> None:
     for i in range(PER_SEED):
-        attack_call(seed * PER_SEED + i)
+        attack_call(seed * PER_SEED + i, folder)
+
+
+def test_every_public_callable_is_attacked(folder: Path) -> None:
+    """Each is there under its own name."""
+    public = {*functions(), *(f"{cls.__name__}.{name}" for cls in results() for name in methods(cls))}
+    assert {name.split()[0] for name, *_ in every_door(folder)} == public
+
+
+@pytest.mark.slow
+def test_what_is_attacked_takes_its_arguments(folder: Path) -> None:
+    """So that what is wrong is what was put in their place."""
+    taken = set()
+    for name, call, args, more in every_door(folder):
+        try:
+            call(*args, **more)
+        except mg.MechgraphError:
+            continue
+        taken.add(name.split()[0])
+    assert {name.split()[0] for name, *_ in every_door(folder)} == taken
 
 
 @pytest.mark.seeds(2)

@@ -1,5 +1,7 @@
 """Gears, racks and belts: forces against hand calculations, motion against Willis' equation, and what holds for every contact."""
 
+import sys
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -503,3 +505,57 @@ def test_a_gear_has_one_hand(module):
         mg.DeclarationError, match=r"the 18 teeth on 'P' would have the helix angle -0\.3 in one and 0\.3 in"
     ):
         train(beta)
+
+
+# --- declaring many gears ------------------------------------------------------------------------------------------------------
+
+
+def calls_of(work):
+    """How many functions ``work`` calls."""
+    count = 0
+
+    def note(frame, event, arg):
+        nonlocal count
+        count += event in ("call", "c_call")
+
+    sys.setprofile(note)
+    try:
+        work()
+    finally:
+        sys.setprofile(None)
+    return count
+
+
+@pytest.mark.parametrize("sun", [False, True])
+def test_declaring_a_train_takes_time_in_proportion_to_its_gears(sun):
+    """Twice as many gears, without module=, take twice as many calls; another load or source does not check each against all again."""
+
+    def train(n):
+        places = [(3.0 * i, 0, 0) for i in range(n)]
+        if sun:
+            places[1:] = [(3 * np.cos(a), 3 * np.sin(a), 0) for a in 2 * np.pi * np.arange(1, n) / n]
+        pairs = [mg.Pair(f"R{i}", "R", "frame", f"gear{i}", point=p, axis=Z) for i, p in enumerate(places)]
+        meshes = [mg.SpurGears(f"m{i}", f"R{0 if sun else i}", f"R{i + 1}", teeth=(20, 20)) for i in range(n - 1)]
+        return lambda: mg.Mechanism("train", pairs=pairs, couplings=meshes, drives=["R0"])
+
+    def counts(n):
+        m = train(n)()
+        loads = [mg.Effort("R1", 1.0)]
+        return np.array(
+            [calls_of(f) for f in (train(n), lambda: m.replace(source="x"), lambda: m.replace(loads=loads))]
+        )
+
+    counts(3)
+    few, many = counts(12), counts(24)
+    assert (many < 2.2 * few).all()
+
+
+def test_a_wrong_pair_beside_gears_is_named():
+    pairs = [
+        mg.Pair("A", "R", "frame", "one", point=(0, 0, 0), axis=Z),
+        mg.Pair("B", "R", "two", "three", point=(1, 0, 0), axis=Z),
+        mg.Pair("C", "ZZ", "frame", "two"),
+        mg.Pair("D", "R", "frame", [3], point=(0, 0, 0), axis=Z),
+    ]
+    with pytest.raises(mg.DeclarationError, match=r"unknown type 'ZZ'(.|\n)*b = \[3\](.|\n)*no link in common"):
+        mg.Mechanism("x", pairs=pairs, couplings=[mg.SpurGears("g", "A", "B", teeth=(20, 20))])

@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+import warnings
 from dataclasses import FrozenInstanceError
 
 import numpy as np
@@ -526,3 +527,42 @@ def test_start_values_of_a_pair_in_one_sequence(values):
     assert dict(m.start) == {"O1.Rz": 0.5, "O2.Rz": 0.1, "O2.Tz": 0.2}
     with pytest.raises(mg.DeclarationError, match="has 2 freedoms; name one of"):
         m.replace(start={"O2": np.array([[0.1, 0.2]])})
+
+
+@pytest.mark.parametrize("row", list(mg.pair_types().values()), ids=lambda row: row.symbol)
+def test_full_names_are_pair_types_too(row):
+    symbol, name = (mg.Pair("A", kind, "a", "b") for kind in (row.symbol, row.name.capitalize()))
+    assert symbol == name
+    assert mg.Pair("A", row.name.split(" (")[0].split(",")[0].replace(" ", "_"), "a", "b") == symbol
+
+
+def test_full_names_with_curves_and_in_files(tmp_path):
+    rail = {"curve": mg.Curve.circle(radius=1.0)}
+    assert mg.Pair("K", "pin in curved slot", "a", "b", **rail) == mg.Pair("K", "Ps", "a", "b", **rail)
+    assert mg.Pair("K", "prismatic", "a", "b", **rail) == mg.Pair("K", "P", "a", "b", **rail)
+    path = tmp_path / "m.toml"
+    path.write_text(
+        'schema = 1\nname = "m"\n[[pair]]\nname = "A"\ntype = "revolute"\na = "frame"\nb = "crank"\n', "utf-8"
+    )
+    assert mg.load(path).pair("A").type.symbol == "R"
+    with pytest.raises(mg.DeclarationError, match="unknown type 'revolut'"):
+        mg.Mechanism("m", None, [mg.Pair("A", "revolut", "a", "b")])
+
+
+@pytest.mark.parametrize(
+    ("length", "g", "meant"),
+    [("mm", 9.81, "m"), ("mm", 981, "cm"), ("m", 9810, "mm"), ("ft", 386.1, "in"), ("mm", 9.80665, "m"),
+     ("m", 9.81, ""), ("mm", 9810, ""), ("ft", 32.174, ""), ("m", 1.62, ""), ("mm", 1620, ""), ("m", 0.0, ""), ("furlong", 9.81, "")],
+)  # fmt: skip
+def test_gravity_in_other_units_than_those_declared_is_doubted(length, g, meant):
+    pairs = [mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=(0, 0, 1))]
+    load, units = mg.Gravity((0.6 * g, -0.8 * g, 0)), {"length": length, "mass": "kg", "time": "s"}
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        m = mg.Mechanism("m", pairs=pairs, loads=[load], units=units)
+        m.replace(source="x", loads=[])
+    assert [meant + "/s^2, which is" in str(w.message) for w in said] == [True] * bool(meant)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        m.replace(loads=[]).replace(loads=[load])
+    assert len(said) == bool(meant)

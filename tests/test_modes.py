@@ -120,7 +120,10 @@ def test_what_is_passive_where_the_mechanism_is_declared_need_not_be_elsewhere(a
     ]
     modes = mg.assemblies(mg.Mechanism("rssr", pairs=pairs, frame="ground"), {"A": angle})
     assert (modes.total, modes.completeness) == (2, "proved")
-    assert modes.kinds == (("regular",) * 2 if angle else ("continuum",))
+    assert modes.kinds == (("regular",) * 2 if angle else ())
+    assert [(one.dimension, "D.Rz" in one.moves, "A.Rz" in one.moves) for one in modes.continua] == (
+        [] if angle else [(1, True, False)]
+    )
 
 
 def test_an_open_chain_has_one_assembly() -> None:
@@ -140,17 +143,59 @@ def test_a_search_finds_a_double_point_once() -> None:
     assert [one.x.shape[1] for one in found] == [1, 1]
 
 
-def test_the_assembly_shown_of_a_continuum_does_not_depend_on_the_seed() -> None:
-    one, other = (mg.assemblies(linked_four_bar(2.0, 1.0, 1.0, 2.0, 0.7), {"O0": 0.0}, seed=seed) for seed in range(2))
-    assert one.kinds == other.kinds == ("continuum",)
-    assert one.poses == pytest.approx(other.poses, abs=1e-6)
-
-
 def test_a_parallelogram_folded_flat_is_a_double_point_and_a_kite_that_spins_a_continuum() -> None:
     flat = mg.assemblies(linked_four_bar(1.0, 2.0, 1.0, 2.0, 0.5), {"O0": 0.0})
-    assert "double" in flat.kinds
-    kite = mg.assemblies(linked_four_bar(2.0, 1.0, 1.0, 2.0, 0.7), {"O0": 0.0})
-    assert "continuum" in kite.kinds
+    assert (flat.kinds, flat.continua) == (("double",), ())
+    kite, other = (mg.assemblies(linked_four_bar(2.0, 1.0, 1.0, 2.0, 0.7), {"O0": 0.0}, seed=seed) for seed in range(2))
+    assert kite.continua[0].point.start == pytest.approx(other.continua[0].point.start, abs=1e-6)
+    assert (len(kite), len(kite.complex), kite.on_continua, kite.completeness) == (0, 0, 2, "proved")
+    assert [(one.dimension, one.moves) for one in kite.continua] == [(1, ("O1.Rz", "O3.Rz"))]
+    assert "Continuum of dimension 1: O1.Rz, O3.Rz move with the drivers at rest" in str(kite)
+    assert [ax.get_title() for ax in kite.plot().axes] == ["0 (continuum)"]
+
+
+def wristed(bend: float) -> tuple[mg.Mechanism, np.ndarray]:
+    """An arm whose last three axes meet, declared elsewhere, and its hand with the middle one of these at an angle."""
+    points = [(0, 0, 0), (0, 0.2, 0.5), (0.5, 0.2, 0.9), *[(1.1, 0.3, 0.5)] * 3]
+    axes = [(0, 0, 1), (0, 1, 0), (0, 1, 0), (1, 0, 0), (0, 1, 0), (1, 0, 1)]
+    pairs = [
+        mg.Pair(f"A{i}", "R", f"L{i}", f"L{i + 1}", point=point, axis=axis)
+        for i, (point, axis) in enumerate(zip(points, axes, strict=True))
+    ]
+    arm = mg.Mechanism("arm", pairs=pairs)
+    angles = dict(zip([f"A{i}" for i in range(6)], (0.3, 0.4, -0.9, 0.2, bend, 0.5), strict=True))
+    return arm, mg.kinematics(arm, angles).link("L6").pose
+
+
+@pytest.mark.slow
+def test_beside_the_continuum_of_a_singular_wrist_isolated_postures_are_counted_and_certified() -> None:
+    """Where the last axis lies along the fourth, both may turn against each other; six other postures have bent wrists."""
+    arm, hand = wristed(np.pi / 4)
+    modes = mg.assemblies(arm, {"L6": hand})
+    assert modes.kinds == ("regular",) * 6
+    assert all(sure is not None and sure.proved for sure in modes.certificates)
+    assert len(modes) + len(modes.complex) + modes.on_continua + modes.infinite == modes.total == 16
+    assert [(one.dimension, one.moves) for one in modes.continua] == [(1, ("A3.Rz", "A5.Rz"))]
+    start = modes.continua[0].point.start
+    assert start["A3.Rz"] + start["A5.Rz"] == pytest.approx(0.7)
+    assert start["A3.Rz"] == pytest.approx(0.35)  # of A3 + A5 = 0.7 what is nearest to the start
+
+
+@pytest.mark.parametrize("away", [1e-10, 1e-11, -1e-11])
+def test_beyond_a_fold_there_is_no_assembly_and_before_it_are_two(away: float) -> None:
+    a, b, c, d = 2.0, 1.5, 2.5, 3.0
+    fold = np.arccos((a * a + d * d - (b + c) ** 2) / (2 * a * d))
+    modes = mg.assemblies(linked_four_bar(a, b, c, d, 0.5), {"O0": fold + away})
+    assert (modes.kinds, len(modes.complex)) == (((), 2) if away > 0 else (("regular",) * 2, 0))
+    assert modes.completeness == "proved"
+
+
+@pytest.mark.parametrize("longer", [1e-6, 1e-8])
+def test_an_ill_conditioned_assembly_is_not_double(longer: float) -> None:
+    """A rhombus of which one side is longer: with the crank on the frame two assemblies are left of a continuum, far apart."""
+    modes = mg.assemblies(linked_four_bar(1.0, 1.0, 1.0, 1.0 + longer, 0.5), {"O0": 0.0})
+    assert modes.kinds == ("regular",) * 2
+    assert sorted(mode.start["O1.Rz"] for mode in modes) == pytest.approx([-np.pi / 2, np.pi / 2], abs=1e-5)
 
 
 def test_every_regular_assembly_of_7r_is_certified_and_goes_on_in_solve() -> None:
@@ -182,7 +227,7 @@ def test_ends_far_away_count_where_they_are_plainly_not_real_and_once() -> None:
     def account(*angles: complex) -> Ends:
         x = np.repeat(here.x[:, :1], len(angles), axis=1).astype(complex)
         x[family.free[0]] = angles
-        known = Ends(x[:, :0], np.zeros((0, 0)), np.zeros(0, dtype=bool), tracks=len(angles))
+        known = Ends.none(len(x), len(angles))
         none, every = np.zeros(len(angles), dtype=bool), np.ones(len(angles), dtype=bool)
         _account(family, at, known, _Run(x, every, none, none), 0)
         return known
@@ -419,6 +464,57 @@ def test_a_driver_at_its_dead_point_where_the_mechanism_is_declared_has_its_asse
     assert mg.assemblies(m, {"D": 0.0}).kinds == ("double",)
     over = mg.branches(m, "D", samples=8, points=40)
     assert sorted(round(fold.value, 9) for fold in over.folds) == [-2.0, 0.0]
+
+
+def test_where_the_start_alone_is_flat_its_assemblies_are_those_of_any_other_start() -> None:
+    """A parallelogram declared flat can begin two ways, which refuses no position; flat itself both are one."""
+    places = {
+        "A": ("ground", "crank", 0),
+        "B": ("crank", "coupler", 1),
+        "C": ("coupler", "rocker", 3),
+        "D": ("rocker", "ground", 2),
+    }
+    pairs = [mg.Pair(name, "R", a, b, point=(x, 0, 0), axis=Z) for name, (a, b, x) in places.items()]
+    bent, flat = mg.assemblies(mg.Mechanism("flat", pairs=pairs, frame="ground"), {"A": [0.4, 0.0]})
+    assert (bent.kinds, bent.completeness) == (("regular",) * 2, "proved")
+    # one is a parallelogram, the other that with its upper corner beyond the diagonal from the crank's tip
+    tip = np.exp(0.4j)
+    along = (2 - tip) / abs(2 - tip)
+    corners = [tip + 2, tip + along * along * 2]
+    rockers = sorted(-mode.start["D.Rz"] for mode in bent)
+    assert rockers == pytest.approx(sorted(float(np.angle(corner - 2)) for corner in corners), abs=1e-11)
+    assert (flat.kinds, flat.total) == (("double",), 2)
+
+
+def test_couplings_whose_freedoms_are_driven_are_a_substitution() -> None:
+    """Cranks of a five-bar geared to each other by two couplings, four turns of a motor on: two circles meet in two points."""
+    places = {
+        "A": ("ground", "left", 0, 0),
+        "B": ("left", "one", 0.3, 1),
+        "C": ("one", "two", 1.5, 2),
+        "D": ("two", "right", 2.8, 0.8),
+    }
+    pairs = [mg.Pair(name, "R", a, b, point=(x, y, 0), axis=Z) for name, (a, b, x, y) in places.items()]
+    pairs += [
+        mg.Pair("E", "R", "ground", "right", point=(3, 0, 0), axis=Z),
+        mg.Pair("M", "R", "ground", "motor", point=(9, 0, 0), axis=Z),
+    ]
+    couplings = [mg.Coupling({"A": 2.0, "E": 1.0, "M": 1.0}), mg.Coupling({"E": 1.0, "M": 0.5})]
+    m = mg.Mechanism("geared", pairs=pairs, couplings=couplings, frame="ground")
+    turn = 8 * np.pi + 0.2
+    modes = mg.assemblies(m, {"M": turn})
+    assert (modes.total, modes.completeness, len(modes)) == (2, "proved", 2)
+    left = (0.3 + 1j) * np.exp(-0.25j * turn)
+    right = 3 + (-0.2 + 0.8j) * np.exp(-0.5j * turn)
+    way = right - left
+    a, b = abs(1.2 + 1j), abs(1.3 - 1.2j)
+    along = (a * a - b * b + abs(way) ** 2) / (2 * abs(way))
+    pins = [left + way / abs(way) * (along + side * 1j * np.sqrt(a * a - along**2)) for side in (-1, 1)]
+    one = [link.name for link in m.links].index("one")
+    turned = modes.poses[:, one]
+    found = (turned @ [1.5, 2.0, 0.0, 1.0])[:, :2] @ [1.0, 1.0j]
+    assert sorted(found, key=lambda z: z.imag) == pytest.approx(sorted(pins, key=lambda z: z.imag), abs=1e-11)
+    assert all(mode.start["E.Rz"] == pytest.approx(-0.5 * turn, abs=1e-12) for mode in modes)
 
 
 def test_a_driver_that_can_never_drive_is_named() -> None:

@@ -248,6 +248,6 @@ def test_positions_without_a_value_leave_figures_open() -> None:
 
 def test_it_can_be_read() -> None:
     text = str(mg.over_time(mg.solve(crank(), {"A": mg.Motion(uneven(90), velocity=4.0)})))
-    assert "1.5708 s, over a whole cycle of 1 revolutions" in text
+    assert "1.5708 s, over a whole cycle of 1 revolution;" in text
     assert "effort of A.Rz [N m]" in text
     assert "Work per revolution" in text

@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import concurrent.futures
+import contextlib
 import dataclasses
+import functools
+import multiprocessing
+import os
+from pathlib import Path
 from typing import Any
 
 import mechanisms as known
@@ -379,6 +384,62 @@ def test_what_is_not_begun_is_cancelled_where_a_study_ends_early(monkeypatch: py
         )
     assert len(lazy.futures) == 4
     assert [future.cancelled() for future in lazy.futures] == [False, True, True, True]
+
+
+def deadly(ground: float, once: str = "") -> mg.Mechanism:
+    """A builder that ends its process above 2.6, of several; ``once``: where there is no such file yet."""
+    if ground > 2.6 and multiprocessing.parent_process() is not None:
+        if not once:
+            os._exit(9)
+        with contextlib.suppress(FileExistsError), open(once, "x", encoding="utf-8"):
+            os._exit(9)
+    return four_bar(ground)
+
+
+@pytest.mark.parametrize("again", [True, False])
+def test_a_process_that_is_killed_takes_only_what_kills_it_again(
+    again: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "FEW_ALONE", 2)
+    monkeypatch.setattr(module, "POSITIONS_TOGETHER", 2)
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    grounds = [2.45, 2.46, 2.47, 2.48, 2.7, 2.71]
+    build = functools.partial(deadly, once="" if again else str(tmp_path / "once"))
+
+    def study() -> mg.Study:
+        return mg.study(build, {"ground": grounds}, "A.effort", n=6, motions={"A": [0.5]})
+
+    expected = mg.study(four_bar, {"ground": grounds}, "A.effort", n=6, motions={"A": [0.5]}).outputs["A.effort"]
+    if not again:
+        assert np.array_equal(study().outputs["A.effort"], expected)
+        return
+    with pytest.raises(mg.StudyError, match="the process of 1 part of 4 ended before it was done") as caught:
+        study()
+    found = caught.value.study
+    assert np.array_equal(found.outputs["A.effort"][:4], expected[:4])
+    assert np.isnan(found.outputs["A.effort"][4:]).all()
+    assert list(found.failed) == [False] * 4 + [True] * 2
+    assert "ended before it was done" in found.messages[4]
+
+
+def test_progress_that_raises_keeps_the_parts_that_are_done(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "POSITIONS_TOGETHER", len(ANGLES))
+    monkeypatch.setattr(os, "cpu_count", lambda: 1)
+
+    def stop(done: int, of: int) -> None:
+        if done == 3:
+            raise ValueError("mine")
+
+    with pytest.raises(mg.StudyError, match="progress raised ValueError: mine") as caught:
+        mg.study(
+            mg.load("rcsr"),
+            {"link1.mass": [1.0, 2.0, 3.0]},
+            "O1.effort",
+            n=3,
+            motions=RCSR,
+            progress=stop,
+        )
+    assert list(caught.value.study.failed) == [False, False, True]
 
 
 def test_same_seed_same_result_whatever_the_executor(monkeypatch: pytest.MonkeyPatch) -> None:

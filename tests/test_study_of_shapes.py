@@ -90,7 +90,9 @@ def eccentric():
     at = np.array([0.1, np.sqrt((1 + ROLLER) ** 2 - 0.2**2), 0])
     slide = mg.Pair("F", "P", "frame", "follower", point=at, axis=Y)
     circle = mg.Curve.circle(radius=1.0, center=CENTER)
-    return driven_cam(slide, mg.Pair("K", "Ps", "cam", "follower", curve=circle, roller=ROLLER, point=at), point=at), at
+    return driven_cam(
+        slide, mg.Pair("K", "Ps", "cam", "follower", curve=circle, roller=ROLLER, point=at, closed="form"), point=at
+    ), at
 
 
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
@@ -250,7 +252,9 @@ def test_curves_of_a_function_that_builds():
         at = np.array([0.1, np.sqrt((radius + ROLLER) ** 2 - 0.2**2), 0])
         slide = mg.Pair("F", "P", "frame", "follower", point=at, axis=Y)
         circle = mg.Curve.circle(radius=radius, center=CENTER)
-        return driven_cam(slide, mg.Pair("K", "Ps", "cam", "follower", curve=circle, roller=ROLLER, point=at), point=at)
+        return driven_cam(
+            slide, mg.Pair("K", "Ps", "cam", "follower", curve=circle, roller=ROLLER, point=at, closed="form"), point=at
+        )
 
     study = mg.study(build, {"radius": [0.9, 1.0, 1.1]}, "F.position", n=3, motions=GIVEN)
     assert not study.failed.any(), study.messages

@@ -406,3 +406,20 @@ def test_the_schema_finds_what_the_loader_finds(tmp_path: Path, old: str, new: s
     text = FOUR_BAR.replace(old, new, 1)
     assert not VALIDATOR.is_valid(tomllib.loads(text))
     assert faults_of(tmp_path, text)
+
+
+def test_a_saved_file_says_what_a_reader_would(tmp_path):
+    """What stands where it is left out is left out, and lists fill their lines: some seven lines a link and pair."""
+    pairs = [mg.Pair(f"P{i}", "R", f"l{i}", f"l{(i + 1) % 8}", point=(i, i * i, 0.5), axis=(0, 0, 1)) for i in range(8)]
+    links = [mg.Link(f"l{i}", 1.0, (i, 0, 0), np.eye(3)) for i in range(8)]
+    m = mg.Mechanism("eight", links, pairs, ["P0"])
+    mg.save(m, tmp_path / "m.toml")
+    text = (tmp_path / "m.toml").read_text()
+    assert mg.load(tmp_path / "m.toml") == m
+    assert "inertia = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]\n" in text
+    assert not re.search("closed|unphysical|second", text)
+    assert text.count("\n") < 120
+    long = m.replace(drives=[mg.Drive("P0", mg.Motion(np.arange(100) / 7))], description="[\n    1.0,\n]")
+    mg.save(long, tmp_path / "m.toml")
+    assert mg.load(tmp_path / "m.toml") == long
+    assert max(map(len, (tmp_path / "m.toml").read_text().splitlines())) <= 125

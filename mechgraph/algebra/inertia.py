@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mechgraph.arguments import door
 from mechgraph.errors import DeclarationError
 from mechgraph.quantities import LARGEST, is_numeric, real_array, shown, wrong
 
@@ -56,6 +57,7 @@ def _direction(vector: Array, what: str) -> Array:
     return unit
 
 
+@door
 def rod(mass: float, start: ArrayLike, end: ArrayLike) -> Array:
     """Return the inertia of a slender uniform rod between two points, about its middle.
 
@@ -85,6 +87,7 @@ def rod(mass: float, start: ArrayLike, end: ArrayLike) -> Array:
     return np.asarray(mass * (along @ along) / 12.0 * (np.eye(3) - np.outer(unit, unit)))
 
 
+@door
 def box(mass: float, size: ArrayLike, axes: ArrayLike | None = None) -> Array:
     """Return the inertia of a uniform box about its centre.
 
@@ -121,6 +124,7 @@ def box(mass: float, size: ArrayLike, axes: ArrayLike | None = None) -> Array:
     return _symmetric((frame * principal) @ frame.T)
 
 
+@door
 def cylinder(mass: float, radius: float, length: float, axis: ArrayLike = (0.0, 0.0, 1.0)) -> Array:
     """Return the inertia of a uniform solid cylinder about its centre.
 
@@ -157,6 +161,7 @@ def cylinder(mass: float, radius: float, length: float, axis: ArrayLike = (0.0, 
     return np.asarray(polar * along + transverse * (np.eye(3) - along))
 
 
+@door
 def sphere(mass: float, radius: float) -> Array:
     """Return the inertia of a uniform solid sphere about its centre, I = 2/5 m r^2 1.
 
@@ -180,6 +185,7 @@ def sphere(mass: float, radius: float) -> Array:
     return np.asarray(0.4 * _mass(mass) * _length(radius, "sphere: radius") ** 2 * np.eye(3))
 
 
+@door
 def from_components(xx: float, yy: float, zz: float, xy: float = 0.0, xz: float = 0.0, yz: float = 0.0) -> Array:
     """Return the tensor of given moments and products of inertia.
 
@@ -208,6 +214,7 @@ def from_components(xx: float, yy: float, zz: float, xy: float = 0.0, xz: float 
     return np.array([[xx, -xy, -xz], [-xy, yy, -yz], [-xz, -yz, zz]], dtype=np.float64)
 
 
+@door
 def shifted(inertia: ArrayLike, mass: ArrayLike, offset: ArrayLike) -> Array:
     """Return the inertia about a point away from the mass centre (parallel axes, Huygens and Steiner).
 
@@ -247,6 +254,7 @@ def shifted(inertia: ArrayLike, mass: ArrayLike, offset: ArrayLike) -> Array:
     return np.asarray(tensor + masses[..., None, None] * (square - outer))
 
 
+@door
 def physical_faults(inertia: ArrayLike, tol: float = 1e-9) -> list[str]:
     """Return what keeps a tensor from being the inertia of a body; an empty list where nothing does.
 
@@ -299,8 +307,11 @@ def physical_faults(inertia: ArrayLike, tol: float = 1e-9) -> list[str]:
     return []
 
 
+@door
 def physical(inertia: Array, tol: float = 1e-9) -> NDArray[np.bool_]:
     """Which symmetric tensors ``(3, 3, ...)`` a body can have: ``a >= 0`` and ``a + b >= c`` for principal moments a <= b <= c."""
+    if np.shape(inertia)[:2] != (3, 3):
+        raise DeclarationError("inertia", [wrong(inertia, "tensors", "an array (3, 3, ...)")])
     moments = np.linalg.eigvalsh(np.moveaxis(inertia, (0, 1), (-2, -1)))
     slack = tol * np.abs(inertia).max(axis=(0, 1))
     return np.asarray((moments[..., 0] >= -slack) & (moments[..., 0] + moments[..., 1] >= moments[..., 2] - slack))

@@ -6,12 +6,15 @@ import json
 from collections.abc import Iterable, Iterator, Sequence
 from os import PathLike
 from pathlib import Path
+from typing import Annotated
 
-from mechgraph.atlas.chain import Chain, family_faults
+from mechgraph.arguments import Count, Index, at_least, door
+from mechgraph.atlas.chain import Chain, data_faults, family_faults
 from mechgraph.atlas.generate import Wanted, chains
 from mechgraph.errors import DeclarationError, FileError, counted
 from mechgraph.model.pair_table import TABLE
 from mechgraph.quantities import wrong
+from mechgraph.reading import text_of
 from mechgraph.writing import write_whole
 
 MOST_JOINTS = 60
@@ -20,13 +23,14 @@ FIELDS = ("links", "joints", "types", "family")
 """What a saved chain holds."""
 
 
+@door
 def atlas(
-    links: int,
-    mobility: int = 1,
+    links: Annotated[int, at_least(2)],
+    mobility: Index = 1,
     *,
-    joints: int | None = None,
+    joints: Count | None = None,
     family: int = 3,
-    types: Sequence[str] = ("R",),
+    types: str | Sequence[str] = ("R",),
     multiple: bool = False,
     fractionated: bool = False,
 ) -> Iterator[Chain]:
@@ -47,13 +51,7 @@ def atlas(
     DeclarationError
         with all faults at once.
     """
-    whole = {"links": (links, 2), "mobility": (mobility, 0), "joints": (joints, 1)}
-    faults = [
-        wrong(value, name, f"a whole number from {least}")
-        for name, (value, least) in whole.items()
-        if not (name == "joints" and value is None) and not (type(value) is int and value >= least)
-    ]
-    faults += family_faults(family)
+    faults = family_faults(family)
     symbols = (types,) if isinstance(types, str) else tuple(types)
     faults += [wrong(t, "types", f"symbols of the pair table: {', '.join(TABLE)}") for t in symbols if t not in TABLE]
     if not faults:
@@ -79,24 +77,27 @@ def _fits(wanted: Wanted) -> bool:
     return wanted.loops > 0 and min(freedoms) * wanted.joints <= wanted.freedoms <= max(freedoms) * wanted.joints
 
 
+@door
 def save_chains(chains: Iterable[Chain], path: str | PathLike[str]) -> int:
     """Write chains to a file, one a line (JSON); how many."""
-    lines = [json.dumps({name: getattr(c, name) for name in FIELDS}) for c in chains]
+    lines = []
+    for c in chains:
+        if not isinstance(c, Chain):
+            raise DeclarationError("save_chains", [wrong(c, f"chains[{len(lines)}]", "a Chain")])
+        lines.append(json.dumps({name: getattr(c, name) for name in FIELDS}))
     write_whole(path, (f"{line}\n" for line in lines))
     return len(lines)
 
 
+@door
 def load_chains(path: str | PathLike[str]) -> Iterator[Chain]:
     """The chains of a saved file, one by one."""
-    try:
-        lines = Path(path).read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileError(path, str(error)) from error
-    for number, line in enumerate(lines, start=1):
+    for number, line in enumerate(text_of(Path(path), "file of chains").splitlines(), start=1):
         try:
             data = json.loads(line)
-            yield Chain(
-                int(data["links"]), tuple(map(tuple, data["joints"])), tuple(data["types"]), int(data["family"])
-            )
-        except (ValueError, KeyError, TypeError) as error:
-            raise FileError(path, f"line {number}: expected a chain as save_chains writes it ({error})") from error
+        except (ValueError, RecursionError) as error:
+            raise FileError(path, f"line {number}: expected a chain as save_chains writes it ({error})") from None
+        faults = data_faults(data)
+        if faults:
+            raise FileError(path, f"line {number}: expected a chain as save_chains writes it: {'; '.join(faults)}")
+        yield Chain(data["links"], tuple(map(tuple, data["joints"])), tuple(data["types"]), data["family"])

@@ -29,6 +29,31 @@ def family_faults(family: Any) -> list[str]:
     return [] if type(family) is int and family in FAMILIES else [wrong(family, "family", "a whole number from 0 to 5")]
 
 
+def data_faults(data: Any) -> list[str]:
+    """What is wrong with a chain as plain data, one line each."""
+    if not isinstance(data, dict) or {"links", "joints", "types", "family"} - set(data):
+        return [wrong(data, "chain", "links, joints, types and family")]
+    links, joints, types = data["links"], data["joints"], data["types"]
+    faults = family_faults(data["family"])
+    if not isinstance(joints, list) or not all(isinstance(j, list) and len(j) > 1 for j in joints):
+        return [*faults, wrong(joints, "joints", "lists of the links that meet at each, two or more")]
+    most = sum(len(joint) - 1 for joint in joints) + 1
+    if type(links) is not int or not 1 < links <= most:
+        return [*faults, wrong(links, "links", f"a whole number from 2 to {most}, which the joints can hold together")]
+    places = range(links)
+    if any(type(k) is not int or k not in places for joint in joints for k in joint) or any(
+        len({*joint}) < len(joint) for joint in joints
+    ):
+        faults.append(wrong(joints, "joints", f"different links from 0 to {links - 1} at each"))
+    if (
+        not isinstance(types, list)
+        or len(types) != len(joints)
+        or not all(isinstance(t, str) and t in TABLE for t in types)
+    ):
+        faults.append(wrong(types, "types", f"a symbol of the pair table for each of {len(joints)} joints"))
+    return faults
+
+
 @dataclass(frozen=True)
 class Chain:
     """A kinematic chain of ``links`` numbered from 0.

@@ -6,11 +6,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from mechgraph.arguments import door, items_of
 from mechgraph.atlas.atlas import atlas
 from mechgraph.atlas.chain import Chain, family_faults
 from mechgraph.atlas.multiple import MultipleJoint
 from mechgraph.errors import DeclarationError, counted
-from mechgraph.model.mechanism import Mechanism, check_mechanism
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.quantities import wrong
 
 Joints = tuple[tuple[int, ...], ...]
 
@@ -137,6 +139,7 @@ class Identity:
         return self.text
 
 
+@door
 def identify(m: Mechanism, family: int = 3, joints: Iterable[MultipleJoint] = ()) -> Identity:
     """Which chain a mechanism is: by its links and pairs alone, whatever the dimensions.
 
@@ -147,15 +150,24 @@ def identify(m: Mechanism, family: int = 3, joints: Iterable[MultipleJoint] = ()
     DeclarationError
         for a mechanism with couplings (gears), since a chain has pairs alone, and for a family that is none.
     """
-    check_mechanism(m, "identify")
     faults = family_faults(family)
     if m.couplings:
         names = ", ".join(c.name for c in m.couplings)
         faults.append(f"couplings {names}: a kinematic chain has pairs alone; put m.equivalent() in their place first")
+    joints, place = tuple(joints), m.link_index
+    for i, named in enumerate(joints):
+        pairs, links = (
+            items_of(names, f"joints[{i}]: {what}", faults)
+            for what, names in (("pairs", named.pairs), ("links", named.links))
+        )
+        faults += [
+            wrong(name, f"joints[{i}]", f"names of pairs and links of {m.name!r}")
+            for name, known in (*((p, m.pair_index) for p in pairs), *((k, place) for k in links))
+            if not isinstance(name, str) or name not in known
+        ]
     if faults:
         raise DeclarationError(f"identify {m.name!r}", faults)
-    place = m.link_index
-    shared = {name: joint for joint in joints for name in joint.pairs}
+    shared = {name: one for one in joints for name in one.pairs}
     found: dict[str, tuple[tuple[int, ...], str]] = {}
     for p in m.pairs:
         joint = shared.get(p.name)

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
 
+from mechgraph.arguments import door
 from mechgraph.errors import DeclarationError
 from mechgraph.quantities import wrong
 
@@ -28,6 +29,7 @@ class SystemGroup:
     links: int
 
 
+@door
 def system_groups(contours: int, most: int | None = None) -> Iterator[SystemGroup]:
     """All configurations with so many independent contours, family by family; with no more than ``most`` pairs of any class 1 to 4.
 

@@ -121,7 +121,7 @@ def close_all(
     def least(here: Configuration) -> Array:
         if here.T == 1 and system.n_rows >= SPARSE and not tol:
             return ReducedRows(ClosureRows.at(here), fixed).correction(here.residual[:, 0])[:, None]
-        dq = np.zeros((system.n_freedoms, here.T))
+        dq = np.zeros((system.n_freedoms, here.T), dtype=here.x.dtype)
         dq[free] = least_norm_steps(here.J[:, free], here.residual, max(ASSEMBLY_RANK, tol))
         return dq
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from typing import ClassVar
 
+from mechgraph.arguments import with_doors
 from mechgraph.document.html import to_html
 from mechgraph.document.latex import to_latex
 from mechgraph.document.text import to_text
@@ -17,6 +19,14 @@ class Shown(ABC):
     """
 
     __slots__ = ()
+
+    _every_method_is_a_door: ClassVar[bool] = True
+    """Whether public methods that take arguments check them (``arguments``); a class may name its doors itself."""
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if cls._every_method_is_a_door:
+            with_doors(cls)
 
     @abstractmethod
     def document(self) -> Document:

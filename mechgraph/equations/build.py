@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from mechgraph.arguments import items_of, option_faults
+from mechgraph.arguments import door
 from mechgraph.equations.formulation import Formulation
 from mechgraph.equations.motion import ACCELERATION, MotionWords, has_inertia
 from mechgraph.equations.symbols import (
@@ -24,9 +24,8 @@ from mechgraph.equations.symbols import (
     summed,
 )
 from mechgraph.equations.terms import AXES, Block, Known, ScalarEquation, Screw, Term, Unknown
-from mechgraph.errors import DeclarationError
 from mechgraph.model.coupling import BaseCoupling
-from mechgraph.model.mechanism import Mechanism, check_mechanism
+from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.model.row_parts import Component, Freedom
 
@@ -332,6 +331,7 @@ SoughtName = Literal["kinetostatics", "response"]
 SOUGHT: tuple[SoughtName, ...] = ("kinetostatics", "response")
 
 
+@door
 def formulate(
     m: Mechanism,
     bookkeeping: BookkeepingName = "lee",
@@ -360,17 +360,12 @@ def formulate(
     DeclarationError
         for an unknown bookkeeping or freedom.
     """
-    check_mechanism(m, "formulate")
-    faults = option_faults({"bookkeeping": (bookkeeping, BOOKKEEPINGS), "unknowns": (unknowns, SOUGHT)})
-    named = () if efforts is None else items_of(efforts, "efforts", faults)
-    if faults:
-        raise DeclarationError(f"formulate {m.name!r}", faults)
     draft = _Draft(m, names_of(m))
     for k in range(len(m.pairs)):
         BOOKKEEPINGS[bookkeeping](draft, k)
     words = MotionWords(m) if unknowns == "response" else None
     drives = tuple(d.freedom for d in m.drives) if words is None else ()
-    _driver_efforts(draft, drives if efforts is None else named)
+    _driver_efforts(draft, drives if efforts is None else tuple(efforts))
     _multipliers(draft)
     if words is not None:
         _accelerations(draft, words)

@@ -11,6 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.arguments import place_among
 from mechgraph.document import Document, Shown, Table
 from mechgraph.equations.state import State
 from mechgraph.equations.symbols import Words, factor, summed, written
@@ -99,7 +100,8 @@ class LinearSystem:
         """Coefficients ``(len(equations), len(unknowns))`` at one position, sparse."""
         rows, cols, _, _ = self.pattern
         shape = (len(self.equations), len(self.unknowns))
-        return scipy.sparse.csr_array((self.entries(state)[:, position], (rows, cols)), shape=shape)
+        at = place_among(position, state.loads.shape[2], "position", "equations at a position")
+        return scipy.sparse.csr_array((self.entries(state)[:, at], (rows, cols)), shape=shape)
 
     def assemble(self, state: State, position: int = 0) -> tuple[scipy.sparse.csr_array, Array]:
         """Matrix and right side at one position: ``A u = b``.

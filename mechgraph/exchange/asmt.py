@@ -24,6 +24,8 @@ from mechgraph.quantities import shown
 FIRST_LINES = ("OndselSolver", "freeCAD: 3D CAD with Motion Simulation  by  askoh.com")
 NOT_A_ROTATION = 1e-3
 """Largest entry of ``R^T R - 1`` of a rotation matrix of few digits; it is made orthogonal."""
+IN_LINE = "InLineForceTorque"
+"""The force that is read."""
 RESULTS = "TimeSeries"
 """The line from which on results stand."""
 
@@ -79,6 +81,7 @@ class Assembly:
     joints: Sequence[Connection]
     motions: Sequence[Connection]
     limits: Sequence[Connection]
+    forces: Sequence[Connection]
     gravity: Array
     times: Array
     results: Sequence[str]
@@ -188,7 +191,8 @@ class Reader:
                 self.faults.append(f"line {entry.line}: a part {why}")
             parts[label] = self.container(entry, label, f"/{name}/{label}")
         sets = self.top.child("ConstraintSets") or Node("", 0)
-        for force in self.top.under("ForceTorques"):
+        forces = self.top.under("ForceTorques")
+        for force in (other for other in forces if other.text != IN_LINE):
             self.faults.append(
                 f"line {force.line}: {force.text} {shown(force.word('Name'))}: forces are not read from FreeCAD files; delete it there "
                 "and give the load in Python (mg.Spring, mg.Wrench, mg.Effort)"
@@ -197,8 +201,9 @@ class Reader:
         if self.top.child("ConstantGravity") is not None:
             gravity = self.top.numbers("ConstantGravity", (3,), "assembly", self.faults)
         joints, motions, limits = (self.connections(sets.under(key)) for key in ("Joints", "Motions", "Limits"))
+        in_line = self.connections([force for force in forces if force.text == IN_LINE])
         made = Assembly(
-            name, ground, parts, self.markers, joints, motions, limits,
+            name, ground, parts, self.markers, joints, motions, limits, in_line,
             gravity, self.times(), self.results, self.results_line, self.notes,
         )  # fmt: skip
         if self.faults:

@@ -144,15 +144,7 @@ JOINTS: dict[str, Row] = {
 }
 """Joints that have a pair."""
 
-_CONTACT = "gears, racks and cams arrive with the pairs in contact; leave it out in FreeCAD to check the rest"
-_DISTANCE = "a constant distance is no pair; put a rod with a joint at each end in its place in FreeCAD"
 REFUSED = {
-    "GearJoint": _CONTACT,
-    "RackPinionJoint": _CONTACT,
     "ConstantVelocityJoint": "there is no such pair; two UniversalJoints with a shaft between them do the same",
-    "SphSphJoint": _DISTANCE,
-    "CylSphJoint": _DISTANCE,
-    "RevCylJoint": _DISTANCE,
-    "RevRevJoint": _DISTANCE,
 }
 """Joints that have none, and what to do."""

@@ -8,9 +8,8 @@ fit less are left as they are, and the loops are closed from there.
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -19,7 +18,11 @@ from mechgraph.algebra.inertia import physical_faults
 from mechgraph.algebra.se3 import Array, compose, inverse
 from mechgraph.errors import DeclarationError, listed
 from mechgraph.exchange.asmt import Assembly, Connection, Part
+from mechgraph.exchange.asmt_forces import force
+from mechgraph.exchange.asmt_gears import GEARED, geared
 from mechgraph.exchange.asmt_joints import JOINTS, REFUSED, SLIDES, Directions, Row, free, motion_type
+from mechgraph.exchange.asmt_rods import RODS, rod
+from mechgraph.exchange.asmt_standing import UNMENTIONED, Standing
 from mechgraph.exchange.exact import FITS, Snapping
 from mechgraph.exchange.formula import FormulaFault, evaluated
 from mechgraph.model.drive import Drive
@@ -29,9 +32,6 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.quantities import shown
-
-UNMENTIONED = 1e-12
-"""Corrections up to here are not worth a word."""
 
 
 @dataclass
@@ -52,35 +52,8 @@ class Seat:
         return float(np.linalg.norm(self.given[:, 3] - self.on_b[:, 3])), self.directions.error
 
 
-@dataclass
-class Builder:
-    """Builds a mechanism and collects what is wrong (``faults``) and what was taken otherwise than it stands (``notes``)."""
-
-    assembly: Assembly
-    faults: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-    moved: dict[str, tuple[float, float]] = field(default_factory=dict)
-
-    def part(self, name: str) -> Part:
-        """The part, or the ground."""
-        return self.assembly.parts.get(name, self.assembly.ground)
-
-    def ends(self, found: Connection) -> tuple[str, str] | None:
-        """The parts of the two markers; None, and a fault, where a marker is not there."""
-        markers = self.assembly.markers
-        missing = [path for path in (found.i, found.j) if path not in markers]
-        if missing:
-            known = listed(markers, 8)
-            self.faults.append(
-                f"{found.title}: there is no marker {', '.join(map(shown, missing))} (there are: {known})"
-            )
-            return None
-        return markers[found.i].part, markers[found.j].part
-
-    def pose(self, marker: str) -> Array:
-        """A marker in the assembly, where the parts stand."""
-        found = self.assembly.markers[marker]
-        return compose(self.part(found.part).pose, found.pose)
+class Builder(Standing):
+    """Builds a mechanism."""
 
     # --- joints ----------------------------------------------------------------------------------------------------
 
@@ -89,6 +62,8 @@ class Builder:
         for joint in self.assembly.joints:
             ends = self.ends(joint)
             row = JOINTS.get(joint.kind)
+            if joint.kind in (*GEARED, *RODS):
+                continue
             if row is None:
                 why = REFUSED.get(joint.kind, f"not known here (known: {', '.join(JOINTS)})")
                 self.faults.append(f"{joint.title}: {why}")
@@ -149,15 +124,6 @@ class Builder:
         is_line = row.slides in (JOINTS["RevoluteJoint"].slides, JOINTS["CylindricalJoint"].slides)
         return R, snap.on_line(I[:, 3], z) if is_line else I[:, 3]
 
-    @functools.cached_property
-    def size(self) -> float:
-        """Mean radius of the markers and of the mass centres; 1 where all are one point."""
-        a = self.assembly
-        centers = [part.pose @ [*part.center, 1.0] for part in a.parts.values() if part.center is not None]
-        points = np.array([self.pose(path)[:, 3] for path in a.markers] + centers or [np.zeros(3)])
-        radius = float(np.sqrt(((points - points.mean(axis=0)) ** 2).sum(axis=1).mean()))
-        return radius if radius > UNMENTIONED * max(1.0, float(np.abs(points).max())) else 1.0
-
     def pair(self, seat: Seat) -> Pair:
         """The pair, marker J moved to its place where it is meant to be there."""
         distance, angle = seat.misfit
@@ -204,6 +170,9 @@ class Builder:
         }
         drives: dict[str, Drive] = {}
         for motion in self.assembly.motions:
+            if motion.kind == "AllowRotation":
+                self.notes.append(f"{motion.kind} {motion.name!r} drives nothing: the turn of its joint is free anyway")
+                continue
             found, formulas = self.moved_by(motion, seats), self.formulas(motion)
             if found is None:
                 continue
@@ -252,7 +221,7 @@ class Builder:
                 **{f"R{axis}": f"angIJJ{k}" for k, axis in enumerate(axes, 1)},
             },
         }.get(motion.kind, {})
-        found = {freedom: node.word(key) for freedom, key in keys.items()}
+        found = {freedom: " ".join(line.text for line in node.under(key)) for freedom, key in keys.items()}
         if keys and not any(found.values()):
             self.faults.append(f"{motion.title}: has no formula ({', '.join(keys.values())})")
         return {freedom: text for freedom, text in found.items() if text}
@@ -356,7 +325,11 @@ class Builder:
         """
         a = self.assembly
         pairs, drives, start = self.driven(self.seats())
-        links = self.links(pairs)
+        rods = [found for joint in a.joints if joint.kind in RODS and (found := rod(self, joint)) is not None]
+        pairs += [pair for _, ends in rods for pair in ends]
+        links = [*self.links(pairs), *(link for link, _ in rods)]
+        couplings = [geared(self, joint, pairs) for joint in a.joints if joint.kind in GEARED]
+        loads = [load for found in a.forces if (load := force(self, found)) is not None]
         if self.moved:
             far = max(self.moved, key=lambda path: max(self.moved[path][0] / self.size, self.moved[path][1]))
             distance, angle = self.moved[far]
@@ -369,7 +342,8 @@ class Builder:
         if self.faults:
             raise DeclarationError(f"assembly {shown(a.name)}", self.faults)
         made = Mechanism(
-            a.name, links, pairs, drives, [Gravity(tuple(a.gravity))] if a.gravity.any() else [],
+            a.name, links, pairs, drives, [*([Gravity(tuple(a.gravity))] if a.gravity.any() else []), *loads],
+            couplings=[coupling for coupling in couplings if coupling is not None],
             start=start, source="a FreeCAD assembly", description=". ".join(notes),
         )  # fmt: skip
         return made, notes

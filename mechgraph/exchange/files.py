@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 
+from mechgraph.arguments import door
 from mechgraph.errors import ContentError, DeclarationError, FileError, MechgraphWarning
 from mechgraph.exchange.asmt import Assembly, Reader
 from mechgraph.exchange.asmt_mechanism import mechanism_of
@@ -40,6 +41,7 @@ READERS: dict[str, Callable[[Path], tuple[Mechanism, Notes]]] = {
 """Readers by suffix: the mechanism of a file, and what was taken otherwise than it stands there."""
 
 
+@door
 def load(name: str | os.PathLike[str]) -> Mechanism:
     """A mechanism from the library (by name), from a TOML file, or from a file of another program, by its suffix.
 
@@ -60,7 +62,7 @@ def load(name: str | os.PathLike[str]) -> Mechanism:
     except DeclarationError as error:
         raise ContentError(path, error) from None
     for note in notes:
-        warnings.warn(f"{path.name}: {note}", MechgraphWarning, stacklevel=2)
+        warnings.warn(f"{path.name}: {note}", MechgraphWarning, stacklevel=3)
     return made
 
 
@@ -72,6 +74,7 @@ WRITERS = (
 """What a mechanism can be written as beside TOML, which all other suffixes are."""
 
 
+@door
 def save(m: Mechanism, path: str | os.PathLike[str]) -> None:
     """Write a mechanism as TOML, or as the suffix says; the file is written whole or not at all.
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,8 +19,13 @@ from mechgraph.quantities import shown
 
 LONGEST_FORMULA = 2000
 """Characters of a formula."""
-DOUBLE = re.compile(r"(?<=[\d.])d(?![a-z])")
-"""The letter that Smalltalk writes after a number of double precision: ``4.0d*pi*time``."""
+DECIMAL = r"(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?"
+DOUBLE = re.compile(rf"({DECIMAL})d(?!\w)", re.ASCII)
+"""A number with the letter that Smalltalk writes after one of double precision: ``4.0d*pi*time``."""
+QUOTED = re.compile(r'^"(.*)"$', re.DOTALL)
+"""A whole formula in quotes; a line break within it is written ``<n>``."""
+TOKENS = re.compile(rf"(?:{DECIMAL}d?(?![\w.])|[a-z]\w*|[-+*/^()]|\s)*+", re.ASCII)
+"""What a formula consists of: not all that is an expression to Python (``0x10``, ``1_0``, what stands behind ``#``) is one."""
 
 
 class FormulaFault(Exception):
@@ -61,7 +66,9 @@ class Jet:
         return self.through(lambda u: u**n, rate, second)
 
     def through(self, f: Callable[[Any], Any], rate: Callable[[Any], Any], second: Callable[[Any], Any]) -> Jet:
-        """``f(u)``, ``f'(u) u'`` and ``f''(u) u'^2 + f'(u) u''``."""
+        """``f(u)``, ``f'(u) u'`` and ``f''(u) u'^2 + f'(u) u''``; a constant has no rates, also where f has no slope (``sqrt(0)``)."""
+        if not (np.any(self.v) or np.any(self.a)):
+            return Jet(f(self.s))
         slope = rate(self.s)
         return Jet(f(self.s), slope * self.v, second(self.s) * self.v**2 + slope * self.a)
 
@@ -97,37 +104,73 @@ def evaluated(formula: str, t: Array) -> tuple[Array, Array, Array]:
     FormulaFault
         where it is none, holds what is not known here, or has no finite value.
     """
-    text = DOUBLE.sub("", formula.strip().lower()).replace("^", "**")
-    if len(text) > LONGEST_FORMULA:
-        raise FormulaFault(f"longer than {LONGEST_FORMULA} characters")
-    try:
-        tree = ast.parse(text, mode="eval").body
-        with np.errstate(all="ignore"):
-            jet = _jet(tree, Jet(t, np.ones_like(t), np.zeros_like(t)))
-    except (SyntaxError, ValueError, OverflowError, MemoryError, RecursionError, ZeroDivisionError):
-        raise FormulaFault(f"{shown(formula)} is no formula of time, such as 2*pi*time") from None
+    jet = _found(formula, _tree(formula), {"time": Jet(t, np.ones_like(t), np.zeros_like(t))})
     value, rate, acceleration = (np.array(np.broadcast_to(part, t.shape), float) for part in (jet.s, jet.v, jet.a))
     if not all(np.isfinite(part).all() for part in (value, rate, acceleration)):
         raise FormulaFault(f"{shown(formula)} has no finite value, rate or acceleration at some of the times")
     return value, rate, acceleration
 
 
-def _jet(node: ast.expr, time: Jet) -> Jet:
+def law(formula: str) -> Callable[[Array, Array, Array], Array]:
+    """A force by the formula of it: a function of distance ``rIJ(self)``, its rate ``vrIJ(self)`` and time, ``(T,)`` each.
+
+    Raises
+    ------
+    FormulaFault
+        where it is none, or holds what is not known here.
+    """
+    tree = _tree(formula)
+
+    def value(x: Array, v: Array, t: Array) -> Array:
+        found = _found(formula, tree, {"rij(self)": Jet(x), "vrij(self)": Jet(v), "time": Jet(t)})
+        return np.array(np.broadcast_to(found.s, np.shape(x)), float)
+
+    value(*np.ones((3, 1)))
+    return value
+
+
+def _tree(formula: str) -> ast.expr:
+    """The syntax tree of a formula."""
+    text = QUOTED.sub(r"\1", formula.strip()).replace("<n>", " ").lower()
+    if len(text) > LONGEST_FORMULA:
+        raise FormulaFault(f"longer than {LONGEST_FORMULA} characters")
+    try:
+        if TOKENS.fullmatch(text):
+            return ast.parse(DOUBLE.sub(r"\1", text).replace("^", "**"), mode="eval").body
+    except (SyntaxError, ValueError, MemoryError, RecursionError):
+        pass
+    raise FormulaFault(_none(formula))
+
+
+def _none(formula: str) -> str:
+    return f"{shown(formula)} is no formula of time, such as 2*pi*time"
+
+
+def _found(formula: str, tree: ast.expr, known: Mapping[str, Jet]) -> Jet:
+    """The jet of a formula where what is ``known`` has these."""
+    try:
+        with np.errstate(all="ignore"):
+            return _jet(tree, {"pi": Jet(np.pi), **known})
+    except (ValueError, OverflowError, MemoryError, RecursionError, ZeroDivisionError):
+        raise FormulaFault(_none(formula)) from None
+
+
+def _jet(node: ast.expr, known: Mapping[str, Jet]) -> Jet:
     """The jet of a part of a formula."""
     match node:
         case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
-            return Jet(float(number))
-        case ast.Name(id="time"):
-            return time
-        case ast.Name(id="pi"):
-            return Jet(np.pi)
+            return Jet(np.float64(number))  # a root of a negative number is none; that of a Python float is complex
+        case ast.Name(id=name) if name in known:
+            return known[name]
+        case ast.Call(func=ast.Name(id=name), args=[ast.Name(id="self")], keywords=[]) if f"{name}(self)" in known:
+            return known[f"{name}(self)"]
         case ast.UnaryOp(op=ast.USub(), operand=inner):
-            return -_jet(inner, time)
+            return -_jet(inner, known)
         case ast.UnaryOp(op=ast.UAdd(), operand=inner):
-            return _jet(inner, time)
+            return _jet(inner, known)
         case ast.BinOp(left=left, op=op, right=right) if type(op) in OPERATIONS:
-            return OPERATIONS[type(op)](_jet(left, time), _jet(right, time))
+            return OPERATIONS[type(op)](_jet(left, known), _jet(right, known))
         case ast.Call(func=ast.Name(id=name), args=[inner], keywords=[]) if name in FUNCTIONS:
-            return _jet(inner, time).through(*FUNCTIONS[name])
-    known = ", ".join(["time", "pi", *FUNCTIONS])
-    raise FormulaFault(f"{shown(ast.unparse(node))} is not known in a formula (known: {known}, + - * / ^)")
+            return _jet(inner, known).through(*FUNCTIONS[name])
+    names = ", ".join(["time", "pi", *(name for name in known if name not in ("time", "pi")), *FUNCTIONS])
+    raise FormulaFault(f"{shown(ast.unparse(node))} is not known in a formula (known: {names}, + - * / ^)")

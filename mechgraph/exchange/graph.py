@@ -11,7 +11,7 @@ import os
 from typing import TYPE_CHECKING, Any
 
 from mechgraph.errors import visible
-from mechgraph.model.mechanism import Mechanism, check_mechanism
+from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.topology.linkgraph import link_graph
 from mechgraph.writing import write_whole
@@ -41,7 +41,6 @@ def graph_of(m: Mechanism) -> nx.MultiGraph[str]:
     """The graph with plain attributes; several pairs may join the same two links."""
     import networkx as nx
 
-    check_mechanism(m, "graph")
     graph: nx.MultiGraph[str] = nx.MultiGraph()
     couplings = "; ".join(" + ".join(f"{c:g} {q}" for q, c in one.terms) for one in m.couplings)
     facts = {"name": m.name, "description": m.description, "couplings": couplings}

@@ -25,7 +25,7 @@ from mechgraph.kinetostatics import assemble
 from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.model.factors import ConstantScrew
 from mechgraph.model.load import Gravity
-from mechgraph.model.mechanism import Mechanism, check_mechanism
+from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.quantities import shown
 from mechgraph.writing import write_whole
@@ -275,7 +275,6 @@ def save_mjcf(m: Mechanism, path: str | os.PathLike[str]) -> None:
     FileError
         where MJCF cannot say something (all of it is named), or the file cannot be written; AssemblyError where the loops cannot be closed.
     """
-    check_mechanism(m, "save")
     writer = Writer(m)
     text = "\n".join(writer.lines()) + "\n"
     if writer.faults:

@@ -224,9 +224,9 @@ class Beside(Curve):
         return self.base.once(Travel).guide
 
     @cached_property
-    def breaks(self) -> Array:
+    def grid(self) -> Array:
         """As the curve."""
-        return self.base.once(Travel).s if self._named is None else self._named.breaks
+        return self.base.once(Travel).s if self._named is None else self._named.grid
 
 
 def _beside(d: float, lib: Library, *parts: Any) -> tuple[Any, ...]:

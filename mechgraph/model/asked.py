@@ -12,10 +12,10 @@ from mechgraph.errors import ShapeError
 
 PARAMETERS = "uv"
 """What the parameters are called in messages."""
-INSIDE = 1.5
-"""The range over that part of it in which slopes are taken."""
-SLOPE_STEP, SLOPE_ERROR = 1e-4, 1e-3
-"""Part of the range over which a slope is taken, and part of the size by which a derivative may differ from it."""
+BESIDE = 0.5 * (3.0 - np.sqrt(5.0))
+"""Where in an interval slopes are taken, a part of it that is no ratio of whole numbers, as places where a shape changes are."""
+SLOPE_STEPS, SLOPE_ERROR = (1e-4, 1e-5, 1e-6), 1e-3
+"""Parts of the range over which a slope is taken, and part of the size by which a derivative may differ from it."""
 
 
 def asked(function: Callable[..., Any], at: Sequence[Array], least: int, most: int) -> Array:
@@ -66,8 +66,13 @@ def _named(values: Sequence[float]) -> str:
 
 
 def inner(ends: tuple[float, float]) -> Array:
-    """Parameters in the inner part of a range at which slopes are taken."""
+    """A few simple parameters in a range, at which a function is asked first."""
     return np.linspace(*ends, 7)[1:-1]
+
+
+def between(grid: Array) -> Array:
+    """Parameters ``(n,)`` in the intervals of a grid ``(n + 1,)`` at which slopes are taken."""
+    return np.asarray(grid[:-1] + BESIDE * np.diff(grid))
 
 
 def slope_faults(
@@ -76,18 +81,29 @@ def slope_faults(
     steps: Sequence[tuple[int, int, int]],
     words: Sequence[str],
     where: str,
+    room: Array | float = np.inf,
 ) -> list[str]:
     """Derivatives that are not the slopes of what they belong to.
 
-    ``at``: parameters ``(n,)`` each, as from ``inner``; of ``steps`` each is a derivative, what it is derived from, and the parameter by
-    which: numbers of what ``ask`` returns ``(orders, 3, n)``, called as in ``words``.
+    ``at``: parameters ``(n,)`` each, as from ``between``; of ``steps`` each is a derivative, what it is derived from, and the parameter by
+    which: numbers of what ``ask`` returns ``(orders, 3, n)``, called as in ``words``. Slopes are taken over shorter and shorter steps,
+    none longer than the ``room``: that over one of them fits a true derivative, however fast it changes.
     """
     found, known = [], ask(*at)
     for high, low, by in steps:
-        extent = INSIDE * float(np.ptp(at[by]))
-        h = SLOPE_STEP * extent
-        ahead, back = (ask(*(u + sign * h * (i == by) for i, u in enumerate(at)))[low] for sign in (1.0, -1.0))
-        miss = np.abs((ahead - back) / (2 * h) - known[high]).max()
-        if miss > SLOPE_ERROR * np.abs(known[[low, high]]).max() / min(1.0, extent):
-            found.append(f"{where}position: {words[high]} differs from the slope of {words[low]} by {miss:.3g}")
+        extent = float(np.ptp(at[by]))
+        most = SLOPE_ERROR * np.abs(known[[low, high]]).max() / min(1.0, extent)
+        miss = np.full(at[by].shape, np.inf)
+        for part in SLOPE_STEPS:
+            h = np.minimum(part * extent, room)
+            ahead, back = (ask(*(u + sign * h * (i == by) for i, u in enumerate(at)))[low] for sign in (1.0, -1.0))
+            miss = np.minimum(miss, np.abs((ahead - back) / (2 * h) - known[high]).max(axis=0))
+            if miss.max() <= most:
+                break
+        else:
+            worst = int(np.argmax(miss))
+            at_worst = _named([u[worst] for u in at])
+            found.append(
+                f"{where}position: {words[high]} differs from the slope of {words[low]} by {miss[worst]:.3g} at {at_worst}"
+            )
     return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, Self
@@ -10,11 +11,14 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
-from mechgraph.model.curves import ORDERS, WHOLE_TURN, Centred
+from mechgraph.model.curves import INTERVALS, ORDERS, WHOLE_TURN, Centred
 from mechgraph.model.field_kinds import FLAG, NUMBER, POSITIVE, SAMPLES, TEXT
 from mechgraph.model.pieces import Pieces, derivatives, parted
 from mechgraph.quantities import wrong
 from mechgraph.units import LENGTH
+
+FEW_DIGITS = 2e-3
+"""Part of its range by which a law may stray from its rates: samples are rounded to few digits."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -51,14 +55,19 @@ class OfLaw(Centred):
         return True
 
     @property
+    def is_profile(self) -> bool:
+        """Yes."""
+        return True
+
+    @property
     def roller(self) -> float:
         """As declared."""
         return self.roller_radius
 
-    @cached_property
-    def breaks(self) -> Array:
+    @property
+    def nodes(self) -> Array:
         """Parts of the intervals between samples."""
-        return parted(np.array(self.angle), -(-360 // (len(self.angle) - 1)))
+        return parted(np.array(self.angle), -(-INTERVALS // (len(self.angle) - 1)))
 
     def _turned_back(self, u: Array, y: Array) -> Array:
         """``R(-u) y`` of components ``(4, 2, ...)`` in the plane."""
@@ -82,11 +91,33 @@ class OfLaw(Centred):
             for name, v in zip(names[1:], values, strict=True)
             if abs(v[-1] - v[0]) > 1e-6 * size
         ]
-        return found or [
-            f"{where}{rate}: is not the derivative of {name} by the angle in radians; {name} changes otherwise between the samples"
-            for name, rate, y, dy, most in zip(names[1:], names[2:], values, values[1:], (0.5, 0.8), strict=False)
-            if _strays(angle, y / size, dy / size, most)
-        ]
+        return found or [*self._contradictions(where, angle, values)]
+
+    def _contradictions(self, where: str, u: Array, values: list[Array]) -> Iterator[str]:
+        """Rates that are not those of the samples before them: slopes that do not lead from lift to lift, bends from slope to slope.
+
+        Over an interval h a law changes by ``h (d_0 + d_1) / 2 + h^2 (b_0 - b_1) / 12`` with slopes d and bends b, the spline of degree 3
+        through its slopes; these change by ``h (b_0 + b_1) / 2``. Where bends (their rates) jump by J the error is up to ``h^2 J / 12``
+        (``h J / 2``), elsewhere less than with a first or second difference in the place of J. From sample to sample such errors are
+        summed, and so is what the samples stray, so that rounding does not add up in it.
+        """
+        y, d, b = values
+        h, change = np.diff(u), np.diff(b)
+        second = np.abs(change - np.roll(change, 1))  # about the beginning of every interval; the law is closed
+        jump = np.minimum(np.abs(change), np.maximum(second, np.roll(second, -1)))
+        names = (self.law, "slope", "bend")
+        for (what, rate), given, led, error in (
+            (names[:2], y, 0.5 * h * (d[1:] + d[:-1]) - h * h * change / 12, h * h * jump / 12),
+            (names[1:], d, 0.5 * h * (b[1:] + b[:-1]), 0.5 * h * jump),
+        ):
+            told = np.append(0.0, np.cumsum(led))
+            stray = given - told
+            i, j = sorted((int(np.argmin(stray)), int(np.argmax(stray))))
+            if np.ptp(stray) - error.sum() > FEW_DIGITS * max(np.ptp(given), np.ptp(told)):
+                yield (
+                    f"{where}{rate}: is not the derivative of {what} by the angle in radians; from angle {u[i]:.6g} to {u[j]:.6g} {what} "
+                    f"changes by {given[j] - given[i]:.6g}, by the {rate}s given it would by {told[j] - told[i]:.6g}"
+                )
 
 
 def _by_the_turn(a: Array, b: Array) -> Array:
@@ -208,12 +239,3 @@ class ArmCam(OfLaw):
                 f"and pivot at {-np.arccos(self._cosine):.6g} or {np.pi - np.arccos(self._cosine):.6g}"
             )
         return found
-
-
-def _strays(u: Array, y: Array, rate: Array, most: float) -> bool:
-    """Whether samples change otherwise than the mean of the rates at both ends of each interval, by more than the part ``most`` in all.
-
-    Between coarse samples, and where a bend jumps, true rates stray too; of another unit, sign, or left zero they stray by 1 and more.
-    """
-    change, y = np.diff(u) * (rate[1:] + rate[:-1]) / 2, np.diff(y)
-    return bool(np.abs(y - change).sum() > most * max(np.abs(y).sum(), np.abs(change).sum()) + 1e-6)

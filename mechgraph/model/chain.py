@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mechgraph.algebra.se3 import Array, identity, inverse
-from mechgraph.arguments import items_of
+from mechgraph.arguments import door, items_of
 from mechgraph.errors import DeclarationError
 from mechgraph.model.link import Link
 from mechgraph.model.mechanism import Mechanism
@@ -48,6 +49,7 @@ def _marker(X: Array) -> Marker:
     return Marker(point=X[:, 3].tolist(), axis=X[:, 2].tolist(), second=X[:, 0].tolist())
 
 
+@door
 def chain(
     letters: str,
     *,
@@ -103,6 +105,8 @@ def chain(
             faults.append(
                 f"link {shown(getattr(link, 'name', link))}: is not in this chain (links: {', '.join(names)})"
             )
+    unknown = set(more) - set(inspect.signature(Mechanism).parameters)
+    faults += [f"unknown field {name!r}" for name in sorted(unknown)]
     if faults:
         raise DeclarationError(f"chain {shown(title)}", faults)
     placed = any(v is not None for v in (twist, length, offset))

@@ -21,7 +21,10 @@ import numpy as np
 from mechgraph.algebra.se3 import Array, cross
 from mechgraph.model.coupling import BaseCoupling
 from mechgraph.model.field_kinds import FREEDOM_NAME, TEXT
+from mechgraph.model.numeric import sound_tol
 from mechgraph.model.pair import Marker, Pair
+from mechgraph.model.pair_type import PairType
+from mechgraph.quantities import shown
 
 FITTING = 1e-6
 """Part of a length, or angle, by which gears may miss the place that their teeth ask for; twice the tolerance of the mechanism if more."""
@@ -113,7 +116,7 @@ class Contact(BaseCoupling):
 
     def faults(self, m: Any) -> list[str]:
         """What is wrong with it in a mechanism, one line each."""
-        where = f"coupling {self.name!r}: "
+        where = f"coupling {shown(self.name)}: "
         found = [where + fault for fault in self.value_faults("")]
         ends = {side: getattr(self, side) for side in "ab"}
         found += [where + fault for fault in (m.freedom_fault(q, single=True) for q in ends.values()) if fault]
@@ -130,7 +133,7 @@ class Contact(BaseCoupling):
         steps = self._way(m)
         if isinstance(steps, str):
             return [where + steps]
-        if any(not pair.has_geometry or pair.faults() for pair in m.pairs):
+        if not m.once(_are_placed):
             return []
         placed = self._axes(m, steps)
         wrong = [placed] if isinstance(placed, str) else self.misfits(placed.axes, fitting_of(m))
@@ -150,12 +153,10 @@ class Contact(BaseCoupling):
         for link in queue:
             if link in goal:
                 break
-            for k, pair in enumerate(m.pairs):
-                if k not in (first, last) and _motion(pair) == "turn" and link in (pair.a, pair.b):
-                    other = pair.b if link == pair.a else pair.a
-                    if other not in reached:
-                        reached[other] = (link, k)
-                        queue.append(other)
+            for k, other in m.once(_turns).get(link, ()):
+                if k not in (first, last) and other not in reached:
+                    reached[other] = (link, k)
+                    queue.append(other)
         else:
             return alone
         back, middle = link, []
@@ -190,7 +191,7 @@ class Contact(BaseCoupling):
         steps = self._way(m)
         assert not isinstance(steps, str)
         values = [1.0] * (len(steps) - 1) + [self.ratio]
-        if all(pair.has_geometry for pair in m.pairs):
+        if m.has_geometry:
             placed = self._axes(m, steps)
             assert not isinstance(placed, str)
             P, n = (part[:, 0] for part in self.lines(placed.axes))
@@ -255,7 +256,27 @@ def _turned_about(m: Any, steps: tuple[Step, ...], fitting: float) -> tuple[Arra
 
 def fitting_of(m: Any) -> float:
     """Part of a length, or angle, by which gears may miss their place in a mechanism."""
-    return max(FITTING, 2.0 * (m.tol or 0.0))
+    return max(FITTING, 2.0 * sound_tol(m.tol))
+
+
+def _are_placed(m: Any) -> bool:
+    """Whether every pair says where it sits, without faults."""
+    return all(pair.has_geometry and not pair.faults() for pair in m.pairs)
+
+
+def _turns(m: Any) -> dict[str, list[tuple[int, str]]]:
+    """The pairs on every link whose only freedom is a turn: their places, and the links at their other ends."""
+    found: dict[str, list[tuple[int, str]]] = {}
+    for k, pair in enumerate(m.pairs):
+        if (
+            isinstance(pair.type, PairType)
+            and isinstance(pair.a, str)
+            and isinstance(pair.b, str)
+            and _motion(pair) == "turn"
+        ):
+            for link, other in ((pair.a, pair.b), (pair.b, pair.a)):
+                found.setdefault(link, []).append((k, other))
+    return found
 
 
 def _motion(pair: Pair) -> str:

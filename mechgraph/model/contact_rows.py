@@ -30,6 +30,8 @@ HELD = ("P", "C")
 """Types whose marker may keep its orientation on the way."""
 PLACE_DIGITS = 12
 """Digits to which the direction of a plane is rounded, for the same reason."""
+CONFORMAL = 1e-9
+"""Part of the curvatures of two elements below which their difference is rounding: they bend alike."""
 CLOSING_ANGLE = 1e-9
 """Closing angle of a frame that counts."""
 
@@ -84,6 +86,14 @@ def pressing(row: PairType) -> float:
     else:
         side = outside(curve) if curve.is_closed else 1.0
     return side * place.sideways
+
+
+def is_open(pair: Any) -> bool:
+    """Whether a profile holds b from one side alone, as far as it says: two curves in contact, a cam, what a roller or ball runs on.
+
+    A slot, a groove and a plane hold on both sides unless the pair says otherwise.
+    """
+    return len(takes_curves(pair.type)) > 1 or bool(pair.roller) or (pair.curve is not None and pair.curve.is_profile)
 
 
 def takes_curves(row: PairType) -> tuple[AlongCurve, ...]:
@@ -231,6 +241,21 @@ def curve_faults(row: Any, curve: Curve, curve_b: Any, roller: Any, point: Any, 
 
 def _of_shape(curve: Curve, where: str) -> list[str]:
     return of_function(lambda: curve.faults(where) or shape_faults(curve, where), where)
+
+
+def cut_faults(contact: Contact, where: str) -> Iterator[str]:
+    """A closed curve, inside which link a is, that cuts into what it touches where it is declared: it bends less than a hollow there."""
+    places = takes_curves(contact.row)
+    if len(places) < 2 or contact.marker_b is not None or not places[0].travel.is_closed:
+        return
+    one, two = (pressing(contact.row) * place.curvatures(np.zeros(1))[1, 0] for place in places)
+    if two - one < -CONFORMAL * (abs(one) + abs(two)):
+        at = ", ".join(f"{v:.6g}" for v in contact.marker[:, 3])
+        yield (
+            f"{where}curve_b: cuts into the curve beside ({at}), where they touch: it is hollow there with the radius {-1 / two:.6g}, and "
+            f"the curve, inside which link a is, bends with the radius {-1 / one:.6g}; make the hollow wider or the curve smaller (a disc "
+            "in a ring: name the link of the disc as a, that of the ring as b)"
+        )
 
 
 def miss_faults(contact: Contact, curves: Sequence[Curve | None], tol: float, where: str) -> Iterator[str]:

@@ -18,7 +18,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.model.field_format import Described
 from mechgraph.model.field_kinds import DIRECTION, FLAG, INTERVAL, NUMBER, POINT, POSITIVE, TEXT
-from mechgraph.model.numeric import filled_second
+from mechgraph.model.numeric import filled_second, parallel_faults
 from mechgraph.model.once import Once
 from mechgraph.units import LENGTH
 
@@ -26,6 +26,10 @@ ORDERS = 4
 """Position and derivatives that a curve gives: to the third."""
 CLOSED_GAP = 1e-9
 """Gap over its extent up to which a curve is closed."""
+INTERVALS = 360
+"""Intervals into which a curve is parted before its shape is known."""
+MOST_TURN, GRID_HALVINGS = 0.5, 8
+"""Radians by which the tangent turns between two places at which a curve is looked at, and times that an interval is halved for it."""
 WHOLE_TURN = 2.0 * np.pi
 FRAMES = ("minimizing", "guided", "held")
 
@@ -86,11 +90,25 @@ class Curve(Described, Once):
         """Axis of the curve ``(3,)``, or None: found from its shape then."""
         return None
 
-    @cached_property
-    def breaks(self) -> Array:
-        """Parameters between which the curve is smooth, fine enough for its shape; a few of an endless one."""
+    @property
+    def nodes(self) -> Array:
+        """Parameters between which the curve is smooth; a few of an endless one."""
         begin, end = self.ends
-        return np.linspace(*((begin, end) if np.isfinite(begin) else (-WHOLE_TURN, WHOLE_TURN)), 361)
+        return np.linspace(*((begin, end) if np.isfinite(begin) else (-WHOLE_TURN, WHOLE_TURN)), INTERVALS + 1)
+
+    @cached_property
+    def grid(self) -> Array:
+        """The same, fine enough for its shape: intervals halved in which the tangent turns by more than ``MOST_TURN``."""
+        u = self.nodes
+        for _ in range(GRID_HALVINGS):
+            _, x1, x2, _ = self.at(u)
+            square = (x1 * x1).sum(axis=0)
+            turning = np.sqrt(np.maximum(square * (x2 * x2).sum(axis=0) - (x1 * x2).sum(axis=0) ** 2, 0.0))
+            wide = np.maximum(turning[:-1], turning[1:]) * np.diff(u) > MOST_TURN * np.minimum(square[:-1], square[1:])
+            if not wide.any():
+                break
+            u = np.insert(u, np.flatnonzero(wide) + 1, (0.5 * (u[:-1] + u[1:]))[wide])
+        return u
 
     @property
     def orders(self) -> int:
@@ -104,6 +122,11 @@ class Curve(Described, Once):
     def beside(self, distance: float, y: Array) -> Curve | None:
         """The curve at a distance towards the normal, which is ``y (3,)`` where it begins, where that is a curve with a name too."""
         return None
+
+    @property
+    def is_profile(self) -> bool:
+        """Whether it says the outline of a body, not a slot: a cam."""
+        return False
 
     @property
     def roller(self) -> float:
@@ -179,6 +202,10 @@ class Centred(Curve):
         super().__post_init__()
         if self.second is None:
             object.__setattr__(self, "second", filled_second(self.axis))
+
+    def faults(self, where: str) -> list[str]:
+        """What is wrong with what is declared, one line each."""
+        return super().faults(where) or parallel_faults(self.axis, self.second, where)
 
     @property
     def normal(self) -> Array:

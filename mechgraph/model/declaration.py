@@ -18,10 +18,11 @@ from mechgraph.algebra.inertia import physical
 from mechgraph.algebra.se3 import Array
 from mechgraph.model.coupling import BaseCoupling
 from mechgraph.model.drive import Drive
+from mechgraph.model.gears import rim_faults
 from mechgraph.model.link import NO_POINTS, Link
 from mechgraph.model.load import LOADS
-from mechgraph.model.numeric import tolerance_fault
-from mechgraph.model.pair import PARALLEL_COSINE, Marker, Pair, largest_cosine
+from mechgraph.model.numeric import PARALLEL_COSINE, sound_tol, tolerance_fault
+from mechgraph.model.pair import Marker, Pair, largest_cosine
 from mechgraph.model.pair_type import PairType
 from mechgraph.model.parts import Parts
 from mechgraph.model.placed_rows import travels
@@ -75,8 +76,9 @@ def declaration_faults(m: Parts) -> list[str]:
         faults += [fault for link in m.links for fault in link.faults()]
     names, pair_names = _texts(m.link_names()), _texts([pair.name for pair in m.pairs])
     faults += _repeated(names, "link") + _repeated(pair_names, "pair")
-    if not _pairs_are_sound(m.pairs, m.tol):
-        faults += [fault for pair in m.pairs for fault in pair.faults(m.tol)]
+    tol = sound_tol(m.tol)
+    if not _pairs_are_sound(m.pairs, tol):
+        faults += [fault for pair in m.pairs for fault in pair.faults(tol)]
     faults += _end_faults(m, names)
     for key, value in m.units.items():
         if key not in BASE_UNITS or not isinstance(value, str) or not value:
@@ -164,7 +166,7 @@ def _links_are_sound(links: Sequence[Link]) -> bool:
     return bool(((A.swapaxes(0, 1) == A).all(axis=(0, 1)) & physical(A) | meant).all())
 
 
-def _pairs_are_sound(pairs: Sequence[Pair], tol: float | None) -> bool:
+def _pairs_are_sound(pairs: Sequence[Pair], tol: float) -> bool:
     """Whether every pair passes, checked in columns; False where it takes a closer look."""
     types = _types(pairs)
     if not _are_names([p.name for p in pairs]) or not all(isinstance(t, PairType) for t in types):
@@ -202,9 +204,8 @@ def _markers_are_sound(markers: Sequence[Any], most: Array) -> bool:
 
 
 def item_faults(m: Parts) -> list[str]:
-    """Faults of drives and loads alone, for links and pairs that were checked before."""
-    faults = _kind_faults(m)
-    return faults if faults else _reference_faults(m) + _coupling_faults(m)
+    """Faults of drives and loads alone, for links, pairs and couplings that were checked before."""
+    return _kind_faults(m) or _reference_faults(m)
 
 
 def _connection_faults(m: Parts) -> list[str]:
@@ -240,7 +241,9 @@ def _reference_faults(m: Parts) -> list[str]:
 
 
 def _coupling_faults(m: Parts) -> list[str]:
-    faults = [fault for coupling in m.couplings for fault in coupling.faults(m)]
+    own = [coupling.faults(m) for coupling in m.couplings]
+    faults = [fault for found in own for fault in found]
+    faults += rim_faults([c for c, found in zip(m.couplings, own, strict=True) if not found], m)
     names = [c.name for c in m.couplings if isinstance(c.name, str) and c.name]
     shared = [name for name in dict.fromkeys(names) if name in m.pair_index]
     faults += [f"coupling {name!r}: a pair has that name; names must differ" for name in shared]

@@ -9,7 +9,7 @@ from mechgraph.errors import DeclarationError
 from mechgraph.model.field_format import Described
 from mechgraph.model.field_kinds import FLAG, FREEDOM_NAME, NUMBER, OTHER, POSITION, TEXT
 from mechgraph.model.nameable import Nameable
-from mechgraph.quantities import is_numeric, wrong
+from mechgraph.quantities import is_numeric, shown, wrong
 from mechgraph.units import factor_of
 
 What = Literal["position", "velocity", "acceleration"]
@@ -46,9 +46,9 @@ class Event(Described):
             fault = m.freedom_fault(self.of, single=True)
             found += [f"event: {fault}"] if fault else []
         elif not callable(self.of):
-            found.append(f"event of {self.of!r}: expected the name of a freedom, or a function of a Solution")
+            found.append(f"event of {shown(self.of)}: expected the name of a freedom, or a function of a Solution")
         if not is_numeric(self.value, ()):
-            return [*found, f"event of {self.of!r}: {wrong(self.value, 'value', 'a finite number')}"]
+            return [*found, f"event of {shown(self.of)}: {wrong(self.value, 'value', 'a finite number')}"]
         if self.what not in WHATS:
             found.append(f"event {self.text}: {wrong(self.what, 'what', ', '.join(map(repr, WHATS)))}")
         if self.direction not in (-1, 0, 1):

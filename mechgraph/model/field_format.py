@@ -157,17 +157,17 @@ class Formatted:
         told = [
             f"{name}={dict(value) if isinstance(value, Mapping) else repr(value) if isinstance(value, Formatted) else shown(value)}"
             for name, value in given.items()
-            if not _is_default(type(self), name, value)
+            if not is_default(type(self), name, value)
         ]
         return f"{type(self).__name__}({', '.join(told)})"
 
 
-def _is_default(cls: type, name: str, value: Any) -> bool:
+def is_default(cls: type, name: str, value: Any) -> bool:
     """Whether a value says nothing: that of a field that was left out, or an empty table."""
     default = getattr(cls, name, NEEDED)
     return (
         value is default
-        or (isinstance(value, bool | float | tuple) and value == default)
+        or (isinstance(value, bool | float | str | tuple) and value == default)
         or (isinstance(value, Mapping) and not value)
     )
 

@@ -65,7 +65,9 @@ def _series_fault(width: int) -> Callable[[Any, str, float | None], str | None]:
 
 
 def _samples_fault(value: Any, what: str, minimum: float | None) -> str | None:
-    return None if is_numeric(value, np.shape(value)) else wrong(value, what, "finite numbers")
+    array = real_array(value)
+    good = array is not None and is_numeric(array, array.shape)
+    return None if good else wrong(value, what, "finite numbers")
 
 
 def _tensor_fault(value: Any, what: str, minimum: float | None) -> str | None:
@@ -80,6 +82,11 @@ def _positive_fault(
         return None if good else wrong(value, what, f"{words} above 0")
 
     return fault
+
+
+def _whole_fault(value: Any, what: str, minimum: float | None) -> str | None:
+    good = isinstance(value, int | np.integer) and not isinstance(value, bool) and value >= 0
+    return None if good else wrong(value, what, "a whole number, 0 or more")
 
 
 def _two_fault(value: Any, what: str, minimum: float | None) -> str | None:
@@ -150,7 +157,7 @@ TEXT = Kind("text", {"type": "string"}, str)
 LINK_NAME = Kind("text", {"type": "string"}, str)
 FREEDOM_NAME = Kind("text", {"type": "string"}, str)
 FLAG = Kind("true/false", {"type": "boolean"}, bool)
-INTEGER = Kind("integer", {"type": "integer", "minimum": 0})
+INTEGER = Kind("integer", {"type": "integer", "minimum": 0}, fault=_whole_fault)
 NUMBER = Kind(
     "number", {"type": "number"}, None, (), True, lambda value, what, least: number_fault(value, what, minimum=least)
 )

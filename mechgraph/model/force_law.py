@@ -18,7 +18,7 @@ from mechgraph.model.field_kinds import FREEDOM_NAME, LINK_NAME, NAMED_POINT, NU
 from mechgraph.model.force_table import ForceTable
 from mechgraph.model.load_base import Load, LoadSite
 from mechgraph.model.nameable import Nameable
-from mechgraph.quantities import real_array, shown, wrong
+from mechgraph.quantities import is_numeric, real_array, shown, wrong
 from mechgraph.units import FORCE_PER_LENGTH, FORCE_PER_VELOCITY, LENGTH, MOMENT, MOMENT_PER_RATE
 
 
@@ -73,6 +73,44 @@ class Law(Load):
         return x, v, self.force(site, x, v)
 
 
+class _ByPlace(Law):
+    """Where laws act that take a freedom ``"D"``, or two links with a point of each, ``a, b, p, q`` or these four as one tuple."""
+
+    if TYPE_CHECKING:
+        freedom: Any
+
+    def _take_place(self, first: Any, *more: Any) -> None:
+        """Fields from the first four arguments, as far as they are a freedom, or four in order or in one tuple."""
+        given = [item is not None for item in more]
+        if isinstance(first, tuple | list) and len(first) == 4 and not any(given):
+            place = (None, *first)
+        elif isinstance(first, str) and all(given):
+            place = (None, first, *more)
+        elif isinstance(first, str) and not any(given):
+            place = (first, None, None, None, None)
+        else:
+            return
+        for name, value in zip(("freedom", "a", "b", "p", "q"), place, strict=True):
+            object.__setattr__(self, name, value)
+
+    @property
+    def where(self) -> str:
+        """Which load it is, for messages."""
+        links = " - ".join(shown(link) for link in (self.a, self.b) if link is not None)
+        place = links if self.freedom is None else f"in {shown(self.freedom)}"
+        return f"{self.subject} {place}".rstrip() + ": "
+
+    def faults(self, names: Nameable) -> list[str]:
+        """What is wrong with this load."""
+        given = [name for name in "abpq" if getattr(self, name) is not None]
+        expected = "expected a freedom alone, e.g. 'D', or two links with a point of each, ('a', 'b', p, q)"
+        if self.freedom is None and len(given) < 4:
+            return [f"{self.where}{', '.join(name for name in 'abpq' if name not in given)} left out; {expected}"]
+        if self.freedom is not None and given:
+            return [f"{self.where}beside it {', '.join(f'{n} = {shown(getattr(self, n))}' for n in given)}; {expected}"]
+        return [self.where + expected] if isinstance(self.freedom, tuple | list) else super().faults(names)
+
+
 class Elastic(Law):
     """``F = -stiffness (x - free) - damping x'``; ``rest`` is the name of the free coordinate."""
 
@@ -96,22 +134,41 @@ class Elastic(Law):
 
 
 @dataclass(frozen=True, eq=False)
-class Spring(Elastic):
-    """A straight spring (and damper) between point ``p`` of link ``a`` and point ``q`` of link ``b``.
+class Spring(_ByPlace, Elastic):
+    """A spring (and damper) between point ``p`` of link ``a`` and point ``q`` of link ``b``, or in a freedom, ``Spring("D", ...)``.
 
-    Tension ``stiffness (l - free_length) + damping dl/dt`` along the line of the points; points as in ``Wrench``.
+    Tension ``stiffness (l - free_length) + damping dl/dt`` along the line of the points, points as in ``Wrench``; in a freedom
+    ``-stiffness (q - free_length) - damping dq/dt``, as ``TorsionSpring``.
     """
 
     kind: ClassVar[str] = "spring"
-    subject: ClassVar[str] = "spring {a} - {b}"
+    subject: ClassVar[str] = "spring"
     rest: ClassVar[str] = "free_length"
-    a: Annotated[str, LINK_NAME("first link")]
-    b: Annotated[str, LINK_NAME("second link")]
-    p: Annotated[Any, NAMED_POINT("point of link a, or its name", LENGTH, of="a")]
-    q: Annotated[Any, NAMED_POINT("point of link b, or its name", LENGTH, of="b")]
-    stiffness: Annotated[float, NUMBER("force per length", FORCE_PER_LENGTH)]
-    free_length: Annotated[float, NUMBER("length without tension", LENGTH, minimum=0.0)] = 0.0
-    damping: Annotated[float, NUMBER("force per velocity", FORCE_PER_VELOCITY)] = 0.0
+    a: Annotated[Any, LINK_NAME("first link", default="these four,")] = None
+    b: Annotated[str | None, LINK_NAME("second link", default="likewise")] = None
+    p: Annotated[Any, NAMED_POINT("point of link a, or its name", LENGTH, of="a", default="likewise")] = None
+    q: Annotated[Any, NAMED_POINT("point of link b, or its name", LENGTH, of="b", default="likewise")] = None
+    stiffness: Annotated[
+        float | None,
+        NUMBER("force per length, or effort per coordinate", FORCE_PER_LENGTH, MOMENT, default="must be given"),
+    ] = None
+    free_length: Annotated[float, NUMBER("length, or coordinate, without tension", **POSITION)] = 0.0
+    damping: Annotated[float, NUMBER("force or effort per rate", FORCE_PER_VELOCITY, MOMENT_PER_RATE)] = 0.0
+    freedom: Annotated[str | None, FREEDOM_NAME("a single turn or slide", default="or this alone")] = None
+
+    def __post_init__(self) -> None:
+        if self.freedom is None:
+            self._take_place(self.a, self.b, self.p, self.q)
+        super().__post_init__()
+
+    def faults(self, names: Nameable) -> list[str]:
+        """What is wrong with this load."""
+        found = super().faults(names)
+        if self.stiffness is None:
+            found.append(self.where + wrong(None, "stiffness", "a finite number"))
+        if self.freedom is None and is_numeric(self.free_length, ()) and self.free_length < 0:
+            found.append(self.where + wrong(self.free_length, "free_length", "a number of 0 or more"))
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,37 +189,19 @@ Place = str | tuple[str, str, Any, Any]
 
 
 @dataclass(frozen=True, eq=False)
-class _Placed(Law):
-    """A law placed by its first argument: the name of a freedom, or ``(link a, link b, p, q)``."""
+class _Placed(_ByPlace):
+    """A law placed by its first arguments: the name of a freedom, ``(link a, link b, p, q)``, or these four."""
 
-    freedom: Annotated[Place | None, FREEDOM_NAME("a single turn or slide", default="this,")] = None
-    a: Annotated[str | None, LINK_NAME("first link", default="or these four")] = None
-    b: Annotated[str | None, LINK_NAME("second link", default="likewise")] = None
-    p: Annotated[Any, NAMED_POINT("point of link a, or its name", LENGTH, of="a", default="likewise")] = None
-    q: Annotated[Any, NAMED_POINT("point of link b, or its name", LENGTH, of="b", default="likewise")] = None
+    freedom: Annotated[Place | None, FREEDOM_NAME("a single turn or slide", default="a, b, p and q")] = None
+    a: Annotated[str | None, LINK_NAME("first link", default="freedom")] = None
+    b: Annotated[str | None, LINK_NAME("second link", default="freedom")] = None
+    p: Annotated[Any, NAMED_POINT("point of link a, or its name", LENGTH, of="a", default="freedom")] = None
+    q: Annotated[Any, NAMED_POINT("point of link b, or its name", LENGTH, of="b", default="freedom")] = None
 
     def __post_init__(self) -> None:
-        if isinstance(self.freedom, tuple | list) and len(self.freedom) == 4:
-            for name, value in zip(("freedom", "a", "b", "p", "q"), (None, *self.freedom), strict=True):
-                object.__setattr__(self, name, value)
+        if self.freedom is not None and self.q is None:
+            self._take_place(self.freedom, self.a, self.b, self.p)
         super().__post_init__()
-
-    @property
-    def where(self) -> str:
-        """Which load it is, for messages."""
-        links = " - ".join(shown(link) for link in (self.a, self.b) if link is not None)
-        place = links if self.freedom is None else f"in {shown(self.freedom)}"
-        return f"{self.subject} {place}".rstrip() + ": "
-
-    def faults(self, names: Nameable) -> list[str]:
-        """What is wrong with this load."""
-        given = [name for name in "abpq" if getattr(self, name) is not None]
-        expected = "expected a freedom alone, e.g. 'D', or two links with a point of each, ('a', 'b', p, q)"
-        if self.freedom is None and len(given) < 4:
-            return [f"{self.where}{', '.join(name for name in 'abpq' if name not in given)} left out; {expected}"]
-        if self.freedom is not None and given:
-            return [f"{self.where}beside it {', '.join(f'{n} = {shown(getattr(self, n))}' for n in given)}; {expected}"]
-        return [self.where + expected] if isinstance(self.freedom, tuple | list) else super().faults(names)
 
 
 @dataclass(frozen=True, eq=False)

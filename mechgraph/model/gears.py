@@ -5,7 +5,7 @@ Source: Litvin and Fuentes, Gear Geometry and Applied Theory, 2004, chapters 10 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
@@ -78,40 +78,13 @@ class SpurGears(Contact):
             ]
         return []
 
-    def faults(self, m: Any) -> list[str]:
-        """See ``Contact``; also gears that would have two modules, because the distances of the axes ask for it, or two helices."""
-        return super().faults(m) or list(self._shared(m))
-
-    def _shared(self, m: Any) -> Iterator[str]:
-        place = next(i for i, c in enumerate(m.couplings) if c is self)
-        for other in m.couplings[place + 1 :]:
-            if not isinstance(other, SpurGears) or (self.module and other.module) or Contact.faults(other, m):
-                continue
-            mine, yours = self._module(m), other._module(m)
-            gears = {(m.full_name(p), n): helix for p, n, helix in other._gears}
-            for q, teeth, helix in self._gears:
-                if (theirs := gears.get((m.full_name(q), teeth))) is None:
-                    continue
-                if abs(helix - theirs) > ONE_HELIX:
-                    yield (
-                        f"couplings {self.name!r} and {other.name!r}: the {teeth:g} teeth on {q!r} would have the helix angle {helix:.7g} "
-                        f"in one and {theirs:.7g} in the other (gear b has the opposite of helix_angle, in an internal pair the same); "
-                        "change one, or give module= in both where the gear has two rims"
-                    )
-                if not _near(mine, yours, m):
-                    yield (
-                        f"couplings {self.name!r} and {other.name!r}: the {teeth:g} teeth on {q!r} would have the module {mine:.7g} in one "
-                        f"and {yours:.7g} in the other, as the distances of the axes ask for; change the teeth or the places, or give "
-                        "module= in both where the gear has two rims"
-                    )
-
     @property
-    def _gears(self) -> tuple[tuple[str, float, float], ...]:
+    def rims(self) -> tuple[tuple[str, float, float], ...]:
         """Freedom, teeth and helix angle, right-hand positive, of both gears."""
         helix = self.helix_angle if self.internal else -self.helix_angle
         return (self.a, self.teeth[0], self.helix_angle), (self.b, self.teeth[1], helix)
 
-    def _module(self, m: Any) -> float:
+    def module_in(self, m: Any) -> float:
         """The normal module, that which the distance of the axes asks for where none is given."""
         if self.module is not None:
             return float(self.module)
@@ -135,8 +108,35 @@ class SpurGears(Contact):
         return teeth_lines(P, away, trace, self.pressure_angle)
 
 
-def _near(one: float, other: float, m: Any) -> bool:
-    return abs(one - other) <= fitting_of(m) * max(one, other)
+def rim_faults(couplings: Iterable[BaseCoupling], m: Any) -> Iterator[str]:
+    """Gears that would have two modules, because the distances of the axes ask for it, or two helices, among couplings without faults.
+
+    The meshes of one rim are compared with the first that leaves the module to the axes: the time is proportional to their number.
+    """
+    rims: dict[tuple[str, float], list[tuple[SpurGears, str, float]]] = {}
+    for gears in couplings:
+        if isinstance(gears, SpurGears):
+            for q, teeth, helix in gears.rims:
+                rims.setdefault((m.full_name(q), teeth), []).append((gears, q, helix))
+    for (_, teeth), meshes in rims.items():
+        first = next((i for i, (gears, *_) in enumerate(meshes) if not gears.module), len(meshes))
+        for i in range(len(meshes)) if first < len(meshes) else ():
+            if i == first:
+                continue
+            (one, q, helix), (two, _, other) = (meshes[k] for k in sorted((i, first)))
+            if abs(helix - other) > ONE_HELIX:
+                yield (
+                    f"couplings {one.name!r} and {two.name!r}: the {teeth:g} teeth on {q!r} would have the helix angle {helix:.7g} "
+                    f"in one and {other:.7g} in the other (gear b has the opposite of helix_angle, in an internal pair the same); "
+                    "change one, or give module= in both where the gear has two rims"
+                )
+            mine, yours = one.module_in(m), two.module_in(m)
+            if abs(mine - yours) > fitting_of(m) * max(mine, yours):
+                yield (
+                    f"couplings {one.name!r} and {two.name!r}: the {teeth:g} teeth on {q!r} would have the module {mine:.7g} in one "
+                    f"and {yours:.7g} in the other, as the distances of the axes ask for; change the teeth or the places, or give "
+                    "module= in both where the gear has two rims"
+                )
 
 
 @dataclass(frozen=True)

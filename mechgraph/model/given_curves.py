@@ -11,11 +11,12 @@ import numpy as np
 import scipy
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.model.asked import asked, inner, slope_faults
+from mechgraph.model.asked import BESIDE, asked, between, inner, slope_faults
 from mechgraph.model.cam import ArmCam, Cam
-from mechgraph.model.curves import CLOSED_GAP, ORDERS, Circle, Curve, Ellipse, Helix, Involute, Line
-from mechgraph.model.field_kinds import FLAG, FUNCTION, INTERVAL, POINT_LIST
+from mechgraph.model.curves import CLOSED_GAP, INTERVALS, ORDERS, Circle, Curve, Ellipse, Helix, Involute, Line
+from mechgraph.model.field_kinds import FLAG, FUNCTION, INTERVAL, POINT_LIST, SAMPLES
 from mechgraph.model.pieces import Pieces, parted
+from mechgraph.quantities import wrong
 from mechgraph.units import LENGTH
 
 
@@ -58,8 +59,8 @@ class Through(Curve):
         """As declared."""
         return self.closed
 
-    @cached_property
-    def breaks(self) -> Array:
+    @property
+    def nodes(self) -> Array:
         """Parts of the pieces of the spline."""
         return parted(self._spline.breaks, max(8, 400 // len(self._spline.breaks)))
 
@@ -77,12 +78,24 @@ class Through(Curve):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Function(Curve):
-    """A curve ``x(u)`` by a function: position and first three derivatives (four, to be exact) at ``u (n,)``, ``(3, n)`` each."""
+    """A curve ``x(u)`` by a function: position and first three derivatives (four, to be exact) at ``u (n,)``, ``(3, n)`` each.
+
+    Where it is in pieces, ``breaks`` names the parameters between them, at which a derivative jumps.
+    """
 
     kind = "function"
     position: Annotated[Any, FUNCTION("u -> (x, x', x'', x'''), each (3, n)")]
     ends_at: Annotated[Any, INTERVAL("least and greatest u")]
     closed: Annotated[bool, FLAG("whether it returns to where it begins")] = False
+    breaks: Annotated[Any, SAMPLES("parameters between its pieces, in order", default="none")] = ()
+
+    @property
+    def nodes(self) -> Array:
+        """Parts of its pieces."""
+        begin, end = self.ends
+        pieces = np.array([begin, *self.breaks, end])
+        parts = np.ceil(INTERVALS * np.diff(pieces) / (end - begin)).astype(int) + 1
+        return np.unique(np.concatenate([*map(np.linspace, pieces[:-1], pieces[1:], parts)]))
 
     def at(self, u: Array) -> Array:
         """What the function returns; beyond the ends, and for complex ``u``, by Taylor's series."""
@@ -117,9 +130,15 @@ class Function(Curve):
         found = super().faults(where)
         if found:
             return found
+        within = [self.ends[0], *self.breaks, self.ends[1]]
+        if not (np.diff(within) > 0).all():
+            return [
+                wrong(self.breaks, f"{where}breaks", f"increasing numbers between {within[0]:g} and {within[-1]:g}")
+            ]
+        self.at(inner(self.ends))
         steps = [(order + 1, order, 0) for order in range(ORDERS - 1)]
         words = ("position", "derivative 1", "derivative 2", "derivative 3")
-        return slope_faults(self.at, [inner(self.ends)], steps, words, where)
+        return slope_faults(self.at, [between(self.grid)], steps, words, where, BESIDE * np.diff(self.grid))
 
 
 CURVES: dict[str, type[Curve]] = {

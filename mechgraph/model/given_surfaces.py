@@ -11,7 +11,7 @@ import numpy as np
 import scipy
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.model.asked import asked, inner, slope_faults
+from mechgraph.model.asked import asked, between, slope_faults
 from mechgraph.model.field_kinds import FUNCTION, INTEGER, INTERVAL, POINT_LIST
 from mechgraph.model.surfaces import Cone, Cylinder, Plane, Revolution, Sphere, Surface, Torus
 from mechgraph.units import LENGTH
@@ -102,7 +102,7 @@ class ByFunction(Surface):
         found = super().faults(where)
         if found:
             return found
-        at = [part.ravel() for part in np.meshgrid(*map(inner, self.ends))]
+        at = [part.ravel() for part in np.meshgrid(*(between(np.linspace(*ends, 6)) for ends in self.ends))]
         steps = [
             (k, ORDERS_UV.index((i - (i > 0), j - (i == 0))), int(i == 0)) for k, (i, j) in enumerate(ORDERS_UV) if k
         ]

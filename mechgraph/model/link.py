@@ -94,7 +94,7 @@ class Link(Described):
                 found.append(f"{where}inertia without a center; give center=(x, y, z)")
             if is_numeric(self.mass, ()) and self.mass == 0 and np.any(self.inertia):
                 found.append(f"{where}inertia without mass; give mass=")
-            if not self.unphysical:
+            if isinstance(self.unphysical, bool) and not self.unphysical:
                 impossible = physical_faults(self.inertia)
                 found += [
                     f"{where}inertia: {fault}; no body has it (unphysical=True accepts it)" for fault in impossible

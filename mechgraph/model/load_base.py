@@ -67,6 +67,8 @@ class LoadSite(Protocol):
 class Load(Described, ABC):
     """What all loads share: equality that also holds for arrays, and checks of what their fields hold."""
 
+    _wanted = "mg.Gravity(...) or another load"
+
     kind: ClassVar[str]
     """Name of the kind in files."""
     subject: ClassVar[str]

@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import itertools
+import math
+import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,14 +15,15 @@ from typing import Any
 
 import numpy as np
 
-from mechgraph.arguments import items_of
+from mechgraph.arguments import door, items_of
 from mechgraph.document import Document, Shown
-from mechgraph.errors import DeclarationError
+from mechgraph.errors import DeclarationError, MechgraphWarning
 from mechgraph.model.coupling import BaseCoupling
 from mechgraph.model.declaration import declaration_faults, flat_start, item_faults, mapping_faults
 from mechgraph.model.describe import mechanism_document
 from mechgraph.model.drive import Drive
 from mechgraph.model.link import Link
+from mechgraph.model.load import Gravity
 from mechgraph.model.load_base import Load
 from mechgraph.model.numeric import plain, same_fields
 from mechgraph.model.once import Once
@@ -31,7 +34,7 @@ from mechgraph.model.placed_rows import travels
 from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.model.surface_rows import row_of
 from mechgraph.quantities import is_numeric, shown, wrong
-from mechgraph.units import base_factors
+from mechgraph.units import base_factors, gravity_hint
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +58,9 @@ class Mechanism(Parts, Once, Shown):
     DeclarationError
         with all faults at once.
     """
+
+    _every_method_is_a_door = False
+    _wanted = "a Mechanism; mg.load(name) reads one"
 
     def __init__(
         self,
@@ -96,8 +102,11 @@ class Mechanism(Parts, Once, Shown):
         if not faults:
             faults = declaration_faults(self)
             if faults and self._take_quantities():
+                self._set(_kept={})  # what was found of pairs with quantities
                 faults = declaration_faults(self)
         self._finish(start, faults + mapping_faults(units=units, start=start, expected=expected))
+        self._set(couplings=tuple(c.placed(self) for c in self.couplings))
+        self._doubt()
 
     def _set(self, **fields: Any) -> None:
         for key, value in fields.items():
@@ -130,7 +139,7 @@ class Mechanism(Parts, Once, Shown):
         return True
 
     def _finish(self, start: Any, faults: list[str]) -> None:
-        """Raise all faults at once, those of ``start`` too; keep start values and couplings by full freedom names."""
+        """Raise all faults at once, those of ``start`` too; keep start values by full freedom names."""
         flat: dict[str, float] = {}
         if _are_pairs(self.pairs):
             flat, start_faults = flat_start(self, start if isinstance(start, Mapping) else {})
@@ -138,9 +147,15 @@ class Mechanism(Parts, Once, Shown):
         if faults:
             raise DeclarationError(f"mechanism {shown(self.name)}", faults)
         self._set(start=MappingProxyType(flat))
-        self._set(couplings=tuple(c.placed(self) for c in self.couplings))
         if self.response is not None:
             self._set(response=self.response.with_full_names(self.full_name))
+
+    def _doubt(self) -> None:
+        """Warn of what is sound and hardly meant: gravity in other units than those declared."""
+        for load in self.loads if self.units else ():
+            g = load.acceleration if isinstance(load, Gravity) else (0.0, 0.0, 0.0)
+            if hint := gravity_hint(self.units, math.hypot(*g)):
+                warnings.warn(f"mechanism {self.name!r}: {hint}", MechgraphWarning, stacklevel=3)
 
     def __eq__(self, other: object) -> bool:
         return same_fields(self, other)
@@ -202,6 +217,8 @@ class Mechanism(Parts, Once, Shown):
         if faults and out._take_quantities():
             faults = item_faults(out)
         out._finish(start, wrong_kinds + faults + mapping_faults(start=start))
+        if "loads" in changes:
+            out._doubt()
         return out
 
     def has_graph_of(self, other: Mechanism) -> bool:
@@ -216,6 +233,7 @@ class Mechanism(Parts, Once, Shown):
             )
         )
 
+    @door
     def with_pair_type(self, pair: str, type: str | PairType, *, pitch: float | None = None) -> Mechanism:
         """A copy in which one pair has another type, at the same markers; drives that it cannot take are dropped."""
         old = self.pair(pair)
@@ -248,6 +266,7 @@ class Mechanism(Parts, Once, Shown):
         response = None if self.response is None else self.response.without(lost)
         return self.replace(pairs=pairs, drives=drives, loads=loads, start=start, response=response)
 
+    @door
     def to_units(self, **units: str) -> Mechanism:
         """The same mechanism in other units, e.g. ``m.to_units(length="mm", mass="g")`` (``units`` extra).
 
@@ -268,6 +287,7 @@ class Mechanism(Parts, Once, Shown):
             units={**self.units, **units},
         )
 
+    @door
     def snapped(self, tol: float) -> Mechanism:
         """The mechanism with the smallest change that makes near-special geometry exact; ``changes`` of it prints what was moved.
 
@@ -285,6 +305,7 @@ class Mechanism(Parts, Once, Shown):
         made: Mechanism = importlib.import_module("mechgraph.structure.snapping").snapped(self, tol)
         return made
 
+    @door
     def equivalent(self, at: Mapping[str, float] | None = None, *, rollers: str = "removed") -> Mechanism:
         """The planar mechanism with links and lower pairs in place of higher pairs, gears and belts, with freedoms at values ``at``.
 
@@ -311,6 +332,7 @@ class Mechanism(Parts, Once, Shown):
         """
         return importlib.import_module("mechgraph.show.page.widget").view(self)
 
+    @door
     def moved(self, pose: Any) -> Mechanism:
         """The whole mechanism after a rigid motion: a 4 x 4 (or 3 x 4) pose. Coordinates of the pairs stay what they are."""
         fits = is_numeric(pose, (4, 4)) or is_numeric(pose, (3, 4))
@@ -323,12 +345,6 @@ class Mechanism(Parts, Once, Shown):
             pairs=[pair.moved(G) for pair in self.pairs],
             loads=[load.moved(G) for load in self.loads],
         )
-
-
-def check_mechanism(m: Any, call: str) -> None:
-    """Raise DeclarationError where ``m`` is no Mechanism."""
-    if not isinstance(m, Mechanism):
-        raise DeclarationError(call, [wrong(m, "mechanism", "a Mechanism; mg.load(name) reads one")])
 
 
 def _ends(pairs: Iterable[Any]) -> list[str]:

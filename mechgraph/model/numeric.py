@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import lru_cache
 from typing import Any
@@ -12,6 +13,8 @@ from numpy.typing import NDArray
 
 from mechgraph.quantities import all_floats, is_numeric, real_array, wrong
 
+PARALLEL_COSINE = 1 - 1e-12
+"""Cosine above which a second direction is parallel to the axis."""
 MOST_TOL = 0.1
 """Largest tolerance: beyond, a change is no rounding."""
 
@@ -75,6 +78,19 @@ def vector_fault(value: Any, what: str, *, direction: bool = False) -> str | Non
     return None
 
 
+def cosine(one: Sequence[float], other: Sequence[float]) -> float:
+    """Of the angle between two directions."""
+    along = sum(a * b for a, b in zip(one, other, strict=True))
+    return along / (math.hypot(*one) * math.hypot(*other))
+
+
+def parallel_faults(axis: Sequence[float], second: Sequence[float], where: str) -> list[str]:
+    """A second direction that has no part at right angles to its axis, one line or none."""
+    if abs(cosine(axis, second)) <= PARALLEL_COSINE:
+        return []
+    return [f"{where}second = {second!r}: parallel to the axis {axis!r}; give another direction"]
+
+
 def number_fault(value: Any, what: str, *, minimum: float | None = None) -> str | None:
     """The fault of one number, or None."""
     if not is_numeric(value, ()):
@@ -82,6 +98,11 @@ def number_fault(value: Any, what: str, *, minimum: float | None = None) -> str 
     if minimum is not None and float(value) < minimum:
         return f"{what} = {value!r}: expected a number not below {minimum:g}"
     return None
+
+
+def sound_tol(tol: Any) -> float:
+    """A tolerance of a whole mechanism as far as it is one, else 0."""
+    return float(tol) if tol is not None and tolerance_fault(tol) is None else 0.0
 
 
 def tolerance_fault(tol: Any) -> str | None:

@@ -115,9 +115,8 @@ class OnSurface(Travelling):
         axes = (e1, cross(n, e1), n)
         twists = []
         for xa, xua, xva in ((xu, second[0], second[1]), (xv, second[1], second[2])):
-            de1 = (xua - e1 * (e1 * xua).sum(axis=0)) / lu
-            dN = up * (cross(xua, xv) + cross(xu, xva))
-            dn = (dN - n * (n * dN).sum(axis=0)) / ln
+            # but for parts along e1 and n, in which lengths change: in w they meet themselves, c e1 x e1 and c e2 x e2
+            de1, dn = xua / lu, up * (cross(xua, xv) + cross(xu, xva)) / ln
             rates = (de1, cross(dn, e1) + cross(n, de1), dn)
             w = 0.5 * sum(cross(e, de) for e, de in zip(axes, rates, strict=True))
             twists.append(np.concatenate([w, xa]))

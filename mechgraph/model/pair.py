@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
@@ -17,7 +16,7 @@ from mechgraph.model.field_format import Described
 from mechgraph.model.field_kinds import DIRECTION, LINK_NAME, NUMBER, POINT, POSITIVE, TEXT
 from mechgraph.model.field_kinds import TABLE as NESTED
 from mechgraph.model.hertz import Hertz
-from mechgraph.model.numeric import filled_second, plain
+from mechgraph.model.numeric import PARALLEL_COSINE, cosine, filled_second, parallel_faults, plain
 from mechgraph.model.numeric import second_direction as second_direction
 from mechgraph.model.pair_faults import contact_faults, shape_faults_of
 from mechgraph.model.pair_table import TABLE
@@ -25,18 +24,16 @@ from mechgraph.model.pair_type import PairType
 from mechgraph.model.placed_rows import Contact
 from mechgraph.model.surface_rows import on_surface, row_of, surface_faults
 from mechgraph.model.surfaces import Surface
-from mechgraph.quantities import is_numeric, shown, wrong
+from mechgraph.quantities import shown, wrong
 from mechgraph.units import LENGTH
 
-PARALLEL_COSINE = 1 - 1e-12
-"""Cosine above which a second direction is parallel to the axis."""
 PERPENDICULAR = 1e-6
 """Largest cosine between axis and second direction that counts as perpendicular where a pair type needs it."""
 
 
-def largest_cosine(tol: Any) -> float:
+def largest_cosine(tol: float) -> float:
     """The same in a mechanism whose directions are meant to ``tol``: both directions may be off by so much."""
-    return max(PERPENDICULAR, 2.0 * tol) if is_numeric(tol, ()) else PERPENDICULAR
+    return max(PERPENDICULAR, 2.0 * tol)
 
 
 @dataclass(frozen=True)
@@ -60,15 +57,10 @@ class Marker(Described):
         """What is wrong with this marker; ``most`` is the largest cosine that its axis and second direction may have."""
         found = self.value_faults(where)
         if not found:
-            along = sum(z * x for z, x in zip(self.axis, self.second, strict=True))
-            cosine = along / (math.hypot(*self.axis) * math.hypot(*self.second))
-            if abs(cosine) > PARALLEL_COSINE:
+            found = parallel_faults(self.axis, self.second, where)
+            if not found and abs(off := cosine(self.axis, self.second)) > most:
                 found.append(
-                    f"{where}second = {self.second!r}: parallel to the axis {self.axis!r}; give another direction"
-                )
-            elif abs(cosine) > most:
-                found.append(
-                    f"{where}second = {self.second!r}: not perpendicular to the axis {self.axis!r} (cosine {cosine:.3g}); "
+                    f"{where}second = {self.second!r}: not perpendicular to the axis {self.axis!r} (cosine {off:.3g}); "
                     "this pair type needs the true direction; where numbers are rounded, pass tol= to Mechanism (tol = ... in a file)"
                 )
         return found
@@ -88,13 +80,14 @@ class Pair(Described):
     Parameters
     ----------
     name : its name in the graph; freedoms are named ``"name.Rz"`` after it.
-    type : a symbol of the pair table or a PairType.
+    type : a symbol of the pair table or its name there (``"R"``, ``"revolute"``), or a PairType.
     a, b : the links. Groove, plane and slot belong to ``a``.
     point, axis, second : marker in global coordinates at the declared configuration (all coordinates zero).
     pitch, lead : advance per radian or per turn, right-hand positive; exactly one where the type needs it.
     on_a, on_b : instead of point/axis, a Marker on each link in that link's own frame.
     closed : of a contact, "form" (b is held on both sides) or "force" (a can only push b, along the axis of a plane, along ``second`` of a
-        groove: where it would have to pull, the solution says that b lifts off).
+        groove: where it would have to pull, the solution says that b lifts off). Left out, b is held; where the profile is open (two
+        curves, a cam, a roller or ball on a curve or surface) and would have to pull, the solution asks for it.
     radius : of the ball or cylinder on link b.
     hertz : Hertz, materials and what else the pressure in a contact takes.
     curve : a ``Curve`` in the frame of link a, along which the marker travels: of P, C, Sg, and of the types Ps and Kc that need one. Then
@@ -137,8 +130,12 @@ class Pair(Described):
     on_b: Annotated[Marker | None, NESTED("marker on link b, in its frame", table="marker")] = None
     closed: Annotated[
         str,
-        TEXT('of a contact: b is held on both sides, `"form"`, or only pushed, `"force"`', choices=("form", "force")),
-    ] = "form"
+        TEXT(
+            'of a contact: b is held on both sides, `"form"`, or only pushed, `"force"`',
+            choices=("form", "force", ""),
+            default='as `"form"`; an open profile that would have to pull asks for it',
+        ),
+    ] = ""
     radius: Annotated[float | None, POSITIVE("of the ball or cylinder of a contact, on b", LENGTH)] = None
     hertz: Annotated[Hertz | None, NESTED("materials of a contact, for its pressure", table="hertz")] = None
     curve: Annotated[Curve | None, NESTED("curve on link a along which the marker travels", table="curve")] = None
@@ -170,7 +167,7 @@ class Pair(Described):
         lead: float | None = None,
         on_a: Marker | None = None,
         on_b: Marker | None = None,
-        closed: str = "form",
+        closed: str = "",
         radius: float | None = None,
         hertz: Hertz | None = None,
         curve: Curve | None = None,
@@ -306,7 +303,7 @@ class Pair(Described):
         """The same pair with its numbers, and the lengths in a type of its own, in other units (see ``Described``)."""
         return super().in_units(base, turns).replace(type=self.type.scaled(1 / base[0]))
 
-    def faults(self, tol: float | None = None) -> list[str]:
+    def faults(self, tol: float = 0.0) -> list[str]:
         """What is wrong with this pair alone, one line each, in a mechanism whose directions are meant to ``tol``."""
         where = f"pair {shown(self.name)}: "
         if not isinstance(self.name, str) or not self.name:
@@ -322,7 +319,7 @@ class Pair(Described):
         ]
         if isinstance(self.a, str) and isinstance(self.b, str) and self.a == self.b:
             found.append(f"{where}joins link {self.a!r} to itself; a pair joins two links")
-        curved = [*shape_faults_of(self, where, tol or 0.0)]
+        curved = [*shape_faults_of(self, where, tol)]
         found += [*self._pitch_faults(where), *contact_faults(self, where), *curved]
         most = largest_cosine(tol) if self.type.square_second else PARALLEL_COSINE
         if self.contact is not None or not curved:  # a curve or surface that is at fault says no markers

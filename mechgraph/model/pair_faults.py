@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from mechgraph.model.contact_rows import ROWS, curve_faults, miss_faults, takes_curves
+from mechgraph.model.contact_rows import ROWS, curve_faults, cut_faults, miss_faults, takes_curves
 from mechgraph.model.curves import Curve
 from mechgraph.model.hertz import Hertz
 from mechgraph.model.pair_table import TABLE
@@ -63,6 +63,7 @@ def shape_faults_of(pair: Any, where: str, tol: float) -> Iterator[str | None]:
         yield from surface_faults(pair.type, pair.surface, pair.point, where, pair.roller)
     elif pair.contact is not None:
         yield from miss_faults(pair.contact, (pair.curve, pair.curve_b), tol, where)
+        yield from cut_faults(pair.contact, where)
     elif isinstance(pair.curve, Curve):
         yield from curve_faults(pair.type, pair.curve, pair.curve_b, pair.roller, pair.point, where)
     elif pair.curve_b is not None or pair.roller:

@@ -19,10 +19,14 @@ _SCREW_FZ = Component("Fz", UNIT_WRENCHES["Fz"], 0, (0.0, 0.0, -1.0, 0.0, 0.0, 0
 class PairTable(Mapping[str, PairType], Shown):
     """The pair table: symbol -> PairType; prints as a table."""
 
+    _every_method_is_a_door = False  # a Mapping has KeyErrors
+
     def __init__(self, rows: Sequence[PairType]) -> None:
         self._rows = {row.symbol: row for row in rows}
 
     def __getitem__(self, symbol: str) -> PairType:
+        if not isinstance(symbol, str):
+            raise KeyError(symbol)
         return self._rows[symbol]
 
     def __iter__(self) -> Iterator[str]:

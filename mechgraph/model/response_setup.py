@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, get_args
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.arguments import items_of
+from mechgraph.arguments import items_of, option_faults
 from mechgraph.model.drive import Drive
 from mechgraph.model.event import Event
 from mechgraph.model.field_format import Described
@@ -22,6 +22,7 @@ from mechgraph.model.stop import Stop
 from mechgraph.quantities import is_numeric, real_array, wrong
 from mechgraph.units import LENGTH, PURE, TIME, factor_of
 
+MOST_POINTS = 10_000_000
 MethodName = Literal["auto", "RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"]
 METHODS: tuple[MethodName, ...] = get_args(MethodName)
 PassiveName = Literal["free", "held"]
@@ -103,15 +104,14 @@ class ResponseSetup(Described):
         found: list[str] = []
         read_times(self.time, found)
         points = self.points
-        if points is not None and (type(points) is not int or points < 2 or len(np.atleast_1d(self.time)) != 2):
-            found.append(wrong(points, "points", "a number from 2 on, beside time = (begin, end)"))
+        if points is not None and (
+            type(points) is not int or not 2 <= points <= MOST_POINTS or len(np.atleast_1d(self.time)) != 2
+        ):
+            found.append(wrong(points, "points", f"a number from 2 to {MOST_POINTS}, beside time = (begin, end)"))
         for what in ("start", "rates"):
             found += _value_faults(m, what, getattr(self, what))
         found += tolerance_faults(self.rtol, self.atol)
-        if self.method not in METHODS:
-            found.append(wrong(self.method, "method", f"one of {', '.join(map(repr, METHODS))}"))
-        if self.passive not in get_args(PassiveName):
-            found.append(wrong(self.passive, "passive", "'free' or 'held'"))
+        found += option_faults({"method": (self.method, METHODS), "passive": (self.passive, get_args(PassiveName))})
         for what, kind in (("motions", Drive), ("events", Event), ("stops", Stop)):
             items = items_of(getattr(self, what), what, found)
             found += [

@@ -8,7 +8,7 @@ from typing import Annotated
 from mechgraph.model.field_format import Described
 from mechgraph.model.field_kinds import FREEDOM_NAME, NUMBER, POSITION
 from mechgraph.model.nameable import Nameable
-from mechgraph.quantities import is_numeric, wrong
+from mechgraph.quantities import is_numeric, shown, wrong
 
 
 @dataclass(frozen=True)
@@ -32,4 +32,4 @@ class Stop(Described):
             found.append(f"lower = {self.lower:g}, upper = {self.upper:g}: expected lower < upper")
         if not is_numeric(self.restitution, ()) or not 0.0 <= self.restitution <= 1.0:
             found.append(wrong(self.restitution, "restitution", "a number from 0 to 1"))
-        return [f"stop of {self.freedom!r}: {fault}" for fault in found]
+        return [f"stop of {shown(self.freedom)}: {fault}" for fault in found]

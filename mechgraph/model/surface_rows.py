@@ -42,6 +42,13 @@ SURFACE_ROWS = {
 _BY_SYMBOL = {**ROWS, **TABLE}
 _WITH_CURVE = {**TABLE, **ROWS}
 _WITH_SURFACE = {**TABLE, **SURFACE_ROWS}
+_SYMBOLS = {
+    name: symbol
+    for rows in (ROWS, SURFACE_ROWS, TABLE)
+    for symbol, row in rows.items()
+    for name in (row.name, row.name.partition(" (")[0], row.name.partition(",")[0])
+}
+"""Symbols by full names, ``"revolute"`` or ``"sphere in groove"``, and by what stands there before a bracket or comma."""
 
 
 def row_of(type: Any, curve: Any, surface: Any = None) -> Any:
@@ -51,7 +58,7 @@ def row_of(type: Any, curve: Any, surface: Any = None) -> Any:
     if not isinstance(symbol, str):
         return symbol
     rows = _WITH_SURFACE if surface is not None else _WITH_CURVE if bent else _BY_SYMBOL
-    return rows.get(symbol, type)
+    return rows.get(symbol) or rows.get(_SYMBOLS.get(symbol.lower().replace("_", " "), ""), type)
 
 
 def placed_surface(row: PairType) -> OnSurface | None:

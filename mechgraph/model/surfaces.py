@@ -19,7 +19,7 @@ from mechgraph.model.curves import WHOLE_TURN, Circle, Curve, Line, remade_from
 from mechgraph.model.field_format import Described
 from mechgraph.model.field_kinds import DIRECTION, POINT, POSITIVE
 from mechgraph.model.field_kinds import TABLE as NESTED
-from mechgraph.model.numeric import filled_second
+from mechgraph.model.numeric import filled_second, parallel_faults
 from mechgraph.model.travel import far_from
 from mechgraph.quantities import wrong
 from mechgraph.units import LENGTH, PURE
@@ -168,6 +168,10 @@ class AboutAxis(Surface):
         if self.second is None:
             object.__setattr__(self, "second", filled_second(self.axis))
 
+    def faults(self, where: str) -> list[str]:
+        """What is wrong with what is declared, one line each."""
+        return super().faults(where) or parallel_faults(self.axis, self.second, where)
+
     @cached_property
     def _basis(self) -> Array:
         z = np.asarray(self.axis) / np.linalg.norm(self.axis)
@@ -242,7 +246,7 @@ class Turned(AboutAxis):
     @property
     def looked_at(self) -> tuple[Array, Array]:
         """The meridian."""
-        v = self._curve.breaks
+        v = self._curve.grid
         return np.zeros(len(v)), v
 
     def _circle(self, radius: float, away: float = 0.0, **more: Any) -> Circle:

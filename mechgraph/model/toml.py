@@ -7,6 +7,8 @@ its name with ``_deg`` added. ``library/README.md`` describes the format for peo
 from __future__ import annotations
 
 import os
+import re
+import textwrap
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -17,11 +19,12 @@ import tomli_w
 from mechgraph.errors import ContentError, DeclarationError, FileError
 from mechgraph.model.chain import chain
 from mechgraph.model.curves import Curve
-from mechgraph.model.field_format import STANDS_AS, Described
+from mechgraph.model.field_format import STANDS_AS, Described, is_default
 from mechgraph.model.field_kinds import BY_FREEDOM, COEFFICIENTS, SIX, TABLE, TABLES
 from mechgraph.model.file_format import DEGREES, KINDS, SCHEMA, TABLES_OF_FILE, USUAL
 from mechgraph.model.library import library_names, library_path
-from mechgraph.model.mechanism import Mechanism, check_mechanism
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.numeric import filled_second, sound_tol
 from mechgraph.model.pair_table import TABLE as PAIR_TABLE
 from mechgraph.model.pair_type import PairType
 from mechgraph.model.placed_rows import travels
@@ -30,6 +33,12 @@ from mechgraph.model.sweep import swept
 from mechgraph.quantities import is_numeric, real_array, shown, wrong
 from mechgraph.reading import text_of, toml_of
 from mechgraph.writing import write_whole
+
+LINE = 120
+"""Characters of a line of a written list."""
+LIST = re.compile(r"""\[\n((?:\ +[^\[\]{}"'\n]+,\n)+)\ *\]""")
+LIST_OF_LISTS = re.compile(r"""\[\n((?:\ +\[[^\[\]{}"'\n]*\],\n)+)\ *\]""")
+"""Lists of numbers, and lists of these, one item a line."""
 
 
 class _Reader:
@@ -228,7 +237,9 @@ def parse(data: Mapping[str, Any], subject: str) -> Mechanism:
     chained = reader.fields("chain", top["chain"], "chain") if "chain" in top else {}
     if reader.left_out or ("chain" in top and "pairs" not in chained):
         found = [fault for link in arguments.get("links", ()) for fault in link.faults()]
-        found += [fault for pair in arguments.get("pairs", ()) for fault in pair.faults(arguments.get("tol"))]
+        found += [
+            fault for pair in arguments.get("pairs", ()) for fault in pair.faults(sound_tol(arguments.get("tol")))
+        ]
         raise DeclarationError(subject, reader.faults + found)
     arguments = {"name": "?", **arguments}
     try:
@@ -292,11 +303,17 @@ def _plain(value: Any, where: str, path: str) -> Any:
 
 
 def _data(item: Described, path: str, where: str) -> dict[str, Any]:
-    """The table of a declared thing."""
+    """The table of a declared thing: what differs from what stands where it is left out."""
     out = {}
     for key, about in item.formats.items():
         value = getattr(item, key)
-        if value is not None and not (isinstance(value, Mapping | tuple) and not value):
+        filled = key == "second" and value == filled_second(getattr(item, "axis", value))
+        if (
+            value is not None
+            and not filled
+            and not is_default(type(item), key, value)
+            and not (isinstance(value, tuple) and not value)
+        ):
             out[about.key or key] = dict(value) if about.kind is COEFFICIENTS else _plain(value, f"{where}.{key}", path)
     return out
 
@@ -351,11 +368,25 @@ def written(m: Mechanism, path: str | os.PathLike[str] = "") -> str:
         where a load is a callable.
     """
     try:
-        text = tomli_w.dumps(to_data(m, str(path)))
+        text = _in_few_lines(tomli_w.dumps(to_data(m, str(path))))
         text.encode("utf-8")
     except (TypeError, ValueError, RecursionError) as error:
         raise FileError(path, f"mechanism {m.name!r} cannot be written as TOML: {error}") from None
     return text
+
+
+def _in_few_lines(text: str) -> str:
+    """TOML with lists of numbers, and lists of these, in as few lines as they fill; no text of it goes over the end of a line."""
+
+    def filled(found: re.Match[str]) -> str:
+        items = [line.strip().removesuffix(",") for line in found[1].splitlines()]
+        one = f"[{', '.join(items)}]"
+        if len(one) <= LINE:
+            return one
+        lines = textwrap.wrap(", ".join(items), LINE, break_long_words=False, break_on_hyphens=False)
+        return "[\n" + "".join(f"    {line.removesuffix(',')},\n" for line in lines) + "]"
+
+    return LIST_OF_LISTS.sub(filled, LIST.sub(filled, text))
 
 
 def save(m: Mechanism, path: str | os.PathLike[str]) -> None:
@@ -366,5 +397,4 @@ def save(m: Mechanism, path: str | os.PathLike[str]) -> None:
     FileError
         where a load is a callable, or the file cannot be written.
     """
-    check_mechanism(m, "save")
     write_whole(path, [written(m, path)])

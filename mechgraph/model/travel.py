@@ -72,7 +72,7 @@ class Travel:
         self.speed = curve.speed
         self._origin = curve.ends[0] if np.isfinite(curve.ends[0]) else 0.0
         if self.speed is not None:
-            s = self.speed * (curve.breaks - self._origin)
+            s = self.speed * (curve.grid - self._origin)
         else:
             s, self._parameter = _by_arc_length(curve)
         self.s = s
@@ -104,9 +104,9 @@ class Travel:
             return axis, bool(np.abs(axis @ t).max() < IN_PLANE)
         normal = axes[:, 2]
         if np.abs(normal @ t).max() < IN_PLANE:
-            return _right_handed(normal, self.curve.at(self.curve.breaks)[0]), True
+            return _right_handed(normal, self.curve.at(self.curve.grid)[0]), True
         if self.curve.frame == "guided":
-            return _right_handed(normal, self.curve.at(self.curve.breaks)[0]), False
+            return _right_handed(normal, self.curve.at(self.curve.grid)[0]), False
         return far_from(t), False
 
     # --- by arc length -----------------------------------------------------------------------------------------------
@@ -328,8 +328,8 @@ def _by_arc_length(curve: Curve) -> tuple[Array, Pieces]:
         made = hermite(half + _integrals(speed, middle, end), [0 * half, *rates[0]], [end - begin, *rates[1]])
         return np.asarray(np.abs(_value(made, half) - (middle - begin)) > most)
 
-    most = INTEGRAL_ERROR * (curve.breaks[-1] - curve.breaks[0])
-    u = _refined(curve.breaks, strays)
+    most = INTEGRAL_ERROR * (curve.grid[-1] - curve.grid[0])
+    u = _refined(curve.grid, strays)
     s = np.concatenate([[0.0], np.cumsum(_integrals(speed, u[:-1], u[1:]))])
     return s, Pieces.meeting(s, [u, *_parameter_rates(curve.at(u))], orders=1)
 
@@ -352,13 +352,13 @@ def far_from(t: Array) -> Array:
 
 def shape_faults(curve: Curve, where: str) -> list[str]:
     """Places where a curve cannot be followed: cusps, gaps of one that must be closed, a guide along the tangent."""
-    x, name = curve.at(curve.breaks), where.removesuffix(".")
+    x, name = curve.at(curve.grid), where.removesuffix(".")
     v = np.sqrt(_dot(x[1], x[1]))
     turns = _dot(x[1][:, 1:], x[1][:, :-1]) <= 0
     slow = np.flatnonzero((v < STANDSTILL * v.max()) | np.append(turns, False))
     if slow.size:
         return [
-            f"{name} has a cusp at {_point(x[0][:, slow[0]])} (parameter {curve.breaks[slow[0]]:.6g}); end it before that"
+            f"{name} has a cusp at {_point(x[0][:, slow[0]])} (parameter {curve.grid[slow[0]]:.6g}); end it before that"
         ]
     if curve.roller:
         found = roller_faults(curve, curve.roller, "undercut: ", where)

@@ -5,23 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
-from mechgraph.errors import DeclarationError
-from mechgraph.model.mechanism import Mechanism, check_mechanism
+from mechgraph.arguments import Count, Index, Positive, door
+from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.finding import GUESSED_TURNS, GUESSES, Finder, Progress
 from mechgraph.modes.question import Question
 from mechgraph.modes.result import AssembliesOver
-from mechgraph.quantities import wrong
 
 
+@door
 def assemblies(
     m: Mechanism,
     values: Mapping[str, Any] | None = None,
     *,
-    seed: int = 0,
-    guesses: int = GUESSES,
-    turns: float = GUESSED_TURNS,
+    seed: Index = 0,
+    guesses: Count = GUESSES,
+    turns: Positive = GUESSED_TURNS,
     cache: bool = True,
     progress: Progress | None = None,
 ) -> Any:
@@ -44,18 +42,6 @@ def assemblies(
     ------
     DeclarationError, AssemblyError, IndeterminateError
     """
-    check_mechanism(m, "assemblies")
-    faults = []
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        faults.append(wrong(seed, "seed", "a whole number, 0 or more"))
-    if isinstance(guesses, bool) or not isinstance(guesses, int | np.integer) or guesses < 1:
-        faults.append(wrong(guesses, "guesses", "a whole number, 1 or more"))
-    if not isinstance(turns, int | float) or not 0 < turns < np.inf:
-        faults.append(wrong(turns, "turns", "a number above 0"))
-    if progress is not None and not callable(progress):
-        faults.append(wrong(progress, "progress", "a function of a line of text"))
-    if faults:
-        raise DeclarationError(f"assemblies of {m.name!r}", faults)
     question = Question(m, values)
     found = Finder(question, int(seed), cache, progress).positions(int(guesses), float(turns))
     return AssembliesOver(tuple(found)) if question.batch else found[0]

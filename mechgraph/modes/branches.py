@@ -5,27 +5,33 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+from mechgraph.arguments import Index, at_least, door
+from mechgraph.closure.assembly import CLOSED, close, led
 from mechgraph.closure.configuration import Configuration
 from mechgraph.data import plain
 from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, counted
-from mechgraph.model.mechanism import Mechanism, check_mechanism
+from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.family import Array
 from mechgraph.modes.finding import Finder
 from mechgraph.modes.question import Question
 from mechgraph.modes.record import Bifurcation, BranchData, BranchesData, Fold
 from mechgraph.modes.result import in_degrees, unit_of, values_text, weakest
-from mechgraph.modes.tracing import Map, Tracer
+from mechgraph.modes.tracing import ARRIVES, TOUCHES, Map, Tracer
 from mechgraph.quantities import is_numeric, wrong
 
 SAMPLES_A_TURN = 24
 """Positions of the driver at which all assemblies are found."""
 MAP_POINTS = 720
 """Positions in all."""
+GOLDEN, SPREADS = 0.5 * (3.0 - 5.0**0.5), 3
+"""Place of the first sample, as part of the distance of two; how many such places are tried where samples lie on double points."""
+SAME_VALUE = 1e-9
+"""Difference of driver values (radians, or lengths) up to which points of several branches lie at the same one."""
 SLIDE_STROKE = 2.0
 """Range of a driven slide to both sides of the start, over L, where none is given."""
 
@@ -34,13 +40,14 @@ SLIDE_STROKE = 2.0
 class Branch:
     """An assembly followed as far as the driver goes: driver ``values (n,)``, rising, and ``coordinates (n, F)`` of all freedoms.
 
-    ``interval`` is that of the driver, up to the folds at its ends; ``turns`` of the driver bring it back where it is a ``full_turn``.
+    ``interval`` is that of the driver, up to the folds at its ends; ``turns`` of the driver bring it back where it is a ``full_turn``,
+    which is None where an end could not be told.
     """
 
     values: Array
     coordinates: Array
     interval: tuple[float, float]
-    full_turn: bool
+    full_turn: bool | None
     turns: int
     circuit: int
     prints: Array = field(repr=False)
@@ -68,7 +75,7 @@ class Branches(Shown):
     circuits : numbers of the branches of each: what can be run through without taking the mechanism apart.
     completeness : of the assemblies at the samples, see ``Assemblies``.
     resolution : distance of the samples; a branch that begins and ends between two of them is not seen.
-    open_ends : ends of branches that are neither a fold at which another one ends too nor another sample's assembly; 0 where the map is
+    open_ends : ends of branches that are neither a fold at which another one ends too nor at the end of the range; 0 where the map is
         whole.
     """
 
@@ -91,8 +98,8 @@ class Branches(Shown):
         return tuple(b.interval for b in self.branches)
 
     @property
-    def full_turn(self) -> tuple[bool, ...]:
-        """Whether the driver turns right round on every branch."""
+    def full_turn(self) -> tuple[bool | None, ...]:
+        """Whether the driver turns right round on every branch; None where an end of it could not be told."""
         return tuple(b.full_turn for b in self.branches)
 
     @property
@@ -105,31 +112,60 @@ class Branches(Shown):
         )
 
     def defects(self, positions: Iterable[Mechanism | Mapping[str, float]]) -> Defects:
-        """Branch, circuit and order defects of positions, given as assemblies or as coordinates of all freedoms, in their order."""
-        m, places = self.mechanism, []
-        for position in positions:
+        """Branch, circuit and order defects of positions, given as assemblies or as coordinates of all freedoms, in their order.
+
+        From each, the path is followed to the next point of the map: it is on the branch that leads there.
+
+        Raises
+        ------
+        DeclarationError
+            where no branch of the map leads to a position.
+        """
+        places, faults, q = [], [], Question(self.mechanism, _at(self.mechanism, self.driver, [0.0]))
+        for number, position in enumerate(positions):
             start = position.start if isinstance(position, Mechanism) else position
-            places.append(self._place(m.replace(start={m.full_name(k): float(v) for k, v in start.items()})))
+            if not isinstance(start, Mapping) or not all(is_numeric(value, ()) for value in start.values()):
+                wanted = "an assembly, or coordinates of freedoms"
+                raise DeclarationError(f"defects of {self.mechanism.name!r}", [wrong(position, "position", wanted)])
+            place = self._place(q, {self.mechanism.full_name(k): float(v) for k, v in start.items()})
+            places.append(place or (-1, 0.0))
+            if place is None:
+                faults.append(
+                    f"position {number}: expected one to which a branch of the map leads; it is open, a double point, or missed"
+                )
+        if faults:
+            raise DeclarationError(f"defects of {self.mechanism.name!r}", faults)
         numbers = tuple(number for number, _ in places)
         circuits = tuple(self.branches[number].circuit for number in numbers)
         return Defects(numbers, circuits, len(set(numbers)) > 1, len(set(circuits)) > 1, self._disordered(places))
 
-    def _place(self, m: Mechanism) -> tuple[int, float]:
-        """The branch of a position, and the driver value there."""
-        question = Question(m, {self.driver: m.start.get(self.driver, 0.0)})
-        mine = question.family.prints(question.start)
-        value = float(question.start.x[question.family.rows[0], 0]) * float(question.unit[0])
-        best = [
-            (
-                float(np.abs(b.prints - mine).max(axis=0).min()),
-                i,
-                float(b.values[np.abs(b.prints - mine).max(axis=0).argmin()]),
-            )
-            for i, b in enumerate(self.branches)
-        ]
-        _, number, near = min(best)
-        turns = m.turns(self.driver)
-        return number, value + (2 * np.pi * round((near - value) / (2 * np.pi)) if turns else 0.0)
+    def _place(self, q: Question, start: Mapping[str, float]) -> tuple[int, float] | None:
+        """The branch that leads to a position, and the driver value there; None where none does."""
+        s, place, turns = q.system, q.names.index(self.driver), self.mechanism.turns(self.driver)
+        given = s.state_of(s.start_coordinates(start)[:, None])[:, 0]
+        x, error = close(s, given, q.columns)
+        if error > CLOSED or np.abs(s.difference(x[:, None], given[:, None])).max() > TOUCHES:
+            return None
+        goal = x[s.single_rows[q.columns]]
+        value = float(goal[place] * q.unit[place])
+        for sense in (1.0, -1.0):
+            ways = [sense * (b.values - value) for b in self.branches]
+            ways = [np.mod(way, 2 * np.pi) if turns else np.where(way < 0, np.inf, way) for way in ways]
+            for way, b in zip(ways, self.branches, strict=True):
+                if not b.full_turn:
+                    way[[0, -1]] = np.inf  # singular where they are folds
+            ahead = min(float(way.min()) for way in ways)
+            if not np.isfinite(ahead):
+                continue
+            goal[place] = (value + sense * ahead) / q.unit[place]
+            there, came = led(s, x, q.columns, goal)
+            prints = q.family.prints(Configuration(s, there[:, None]))
+            for number, (b, way) in enumerate(zip(self.branches, ways, strict=True)):
+                at = int(np.argmin(way))
+                near = np.abs(b.prints[:, [at]] - prints).max() < ARRIVES * max(1.0, float(np.abs(prints).max()))
+                if came and near and way[at] - ahead < SAME_VALUE:
+                    return number, float(b.values[at] - sense * ahead)
+        return None
 
     def _disordered(self, places: list[tuple[int, float]]) -> bool:
         """Whether the driver would have to turn back between positions of one branch."""
@@ -211,18 +247,19 @@ class Branches(Shown):
 
 def _turns(b: Branch) -> str:
     if not b.full_turn:
-        return "no"
+        return "no" if b.full_turn is False else "not told"
     return "yes" if b.turns == 1 else f"yes, back after {b.turns} turns"
 
 
+@door
 def branches(
     m: Mechanism,
     driver: str,
     *,
     over: tuple[float, float] | None = None,
-    samples: int = SAMPLES_A_TURN,
-    points: int = MAP_POINTS,
-    seed: int = 0,
+    samples: Annotated[int, at_least(3)] = SAMPLES_A_TURN,
+    points: Annotated[int, at_least(3)] = MAP_POINTS,
+    seed: Index = 0,
     cache: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> Branches:
@@ -242,13 +279,9 @@ def branches(
     ------
     DeclarationError, AssemblyError, IndeterminateError
     """
-    check_mechanism(m, "branches")
     why = m.freedom_fault(driver, single=True)
     faults = [f"driver {driver!r}: {why}"] if why else []
-    for name, number, least in (("samples", samples, 3), ("points", points, 3)):
-        if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < least:
-            faults.append(wrong(number, name, f"a whole number, {least} or more"))
-    if over is not None and not (is_numeric(over, (2,)) and over[0] < over[1]):
+    if over is not None and not over[0] < over[1]:
         faults.append(wrong(over, "over", "the smallest and the largest value"))
     if faults:
         raise DeclarationError(f"branches of {m.name!r}", faults)
@@ -260,27 +293,33 @@ class _Mapper:
 
     def __init__(self, m: Mechanism, driver: str, over: tuple[float, float] | None, samples: int, points: int) -> None:
         probe = Question(m, _at(m, driver, [0.0]))
-        begin = float(probe.start.x[probe.family.rows[probe.names.index(driver)], 0])
-        L = probe.system.par.L
+        place, L = probe.names.index(driver), probe.system.par.L
+        self.begin = float(probe.declared.x[probe.family.rows[place], 0] * probe.unit[place])
         self.closed = over is None and m.turns(driver)
-        low, high = over or (
-            (begin, begin + 2 * np.pi) if self.closed else (L * (begin - SLIDE_STROKE), L * (begin + SLIDE_STROKE))
-        )
-        self.samples = np.linspace(low, high, samples + 1 - self.closed, endpoint=not self.closed)
+        around = (self.begin - SLIDE_STROKE * L, self.begin + SLIDE_STROKE * L)
+        self.low, self.high = (self.begin, self.begin + 2 * np.pi) if self.closed else over or around
+        self.count = samples
         self.between = max(1, round(points / samples))
         self.m, self.driver = m, driver
 
     def mapped(self, seed: int, cache: bool, progress: Callable[[str], None] | None) -> Branches:
         """The map."""
-        q = Question(self.m, _at(self.m, self.driver, self.samples.tolist()))
-        finder = Finder(q, seed, cache, progress)
-        solutions = finder.solutions()
+        step = (self.high - self.low) / self.count
+        # no sample may lie on a double point: which branch leads there is open
+        for again in range(1, SPREADS + 1):
+            self.samples = self.low + (np.arange(self.count) + again * GOLDEN % 1.0) * step
+            q = Question(self.m, _at(self.m, self.driver, self.samples.tolist()))
+            finder = Finder(q, seed, cache, progress)
+            solutions = finder.solutions()
+            if not any(finder.singular(found, i) for i, found in enumerate(solutions)):
+                break
         states = [found.x for found in solutions]
         if progress is not None:
             progress(f"following {sum(x.shape[1] for x in states)} assemblies")
         place = q.names.index(self.driver)
         self.q, self.unit = q, float(q.unit[place])
-        tracer = Tracer(q, q.family, q.drive[place], states, self.between, self.closed, place)
+        rims = None if self.closed else (self.low / self.unit, self.high / self.unit)
+        tracer = Tracer(q, q.family, q.drive[place], states, self.between, rims, place)
         self.found, self.states, self.family = Map(tracer.pieces(), states), states, q.family
         circuits = sorted(sorted(c) for c in self.found.circuits())
         number = {branch: i for i, c in enumerate(circuits) for branch in c}
@@ -292,7 +331,7 @@ class _Mapper:
             tuple(self._bifurcation(value, pieces) for value, pieces in self.found.crossings),
             tuple(tuple(c) for c in circuits),
             weakest(found.word for found in solutions),
-            float(self.samples[1] - self.samples[0]),
+            step,
             self.found.open,
         )
 
@@ -324,16 +363,17 @@ class _Mapper:
         q[:, back] = np.unwrap(q[:, back] * (2 * np.pi / period[back]), axis=0) * (period[back] / (2 * np.pi))
         # whole rounds such that the place nearest to the declared value of the driver is nearest to the start
         back[self.q.columns[self.q.names.index(self.driver)]] = False
-        near = (q[np.argmin(np.abs(along - self.samples[0]))] - s.start_coordinates(self.m.start))[back]
+        near = (q[np.argmin(np.abs(along - self.begin))] - s.start_coordinates(self.m.start))[back]
         q[:, back] -= period[back] * np.round(near / period[back])
         prints = self.family.prints(Configuration(s, x))
         turns = round(len(chain) / len(self.samples)) if cyclic else 0
         if self.closed and not cyclic:
             # whole turns of the driver such that the middle of the interval is nearest to the start
-            shift = 2 * np.pi * np.round((0.5 * (along[0] + along[-1]) - self.samples[0]) / (2 * np.pi))
+            shift = 2 * np.pi * np.round((0.5 * (along[0] + along[-1]) - self.begin) / (2 * np.pi))
             along = along - shift
             q[:, self.q.columns[self.q.names.index(self.driver)]] -= shift
-        return Branch(along, q, (float(along[0]), float(along[-1])), cyclic, turns, circuit, prints)
+        full_turn = None if found.untold(i) else cyclic
+        return Branch(along, q, (float(along[0]), float(along[-1])), full_turn, turns, circuit, prints)
 
     def _fold(self, a: Any, b: Any) -> Fold:
         s = self.q.system
@@ -344,7 +384,7 @@ class _Mapper:
         )
         value = 0.5 * (a.end + b.end) * self.unit
         if self.closed:
-            value -= 2 * np.pi * np.round((value - self.samples[0]) / (2 * np.pi))
+            value -= 2 * np.pi * np.round((value - self.begin) / (2 * np.pi))
         fastest = self.m.freedom_names()[int(np.argmax(gone))]
         one, other = sorted((self.found.branch(a), self.found.branch(b)))
         return Fold(value, a.sense, (one, other), fastest)

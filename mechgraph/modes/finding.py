@@ -11,38 +11,41 @@ import numpy as np
 
 from mechgraph.closure.assembly import close_all
 from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import System
 from mechgraph.errors import counted
 from mechgraph.force.applied_loads import user_poses
+from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.balls import TINY
 from mechgraph.modes.bounds import bound
 from mechgraph.modes.certificate import Certificate, certificate, told_apart
-from mechgraph.modes.family import Array, Family, parts
+from mechgraph.modes.continua import Found, continua
+from mechgraph.modes.family import Array, Family
 from mechgraph.modes.form import Form, Whole
 from mechgraph.modes.groups import Group, Undivided, groups_of
 from mechgraph.modes.monodromy import ONE_ASSEMBLY, Irregular, StartSet, distinct, start_set
-from mechgraph.modes.product import MOST_FOLLOWED, REAL, REAL_SINGULAR, Product, is_real
+from mechgraph.modes.nearby import Nearby, irregular, least_value
+from mechgraph.modes.product import MOST_FOLLOWED, REAL, Product, is_real
 from mechgraph.modes.question import Question
-from mechgraph.modes.result import Assemblies, ComplexModes, weakest
+from mechgraph.modes.result import Assemblies, ComplexModes, Continuum, weakest
 from mechgraph.modes.search import searched
 from mechgraph.modes.store import keep, kept
-from mechgraph.modes.targets import Ends
+from mechgraph.modes.targets import REAL_SINGULAR, Ends
 
-REAL_CLOSED = 1e-9
-"""Closure error of what is real."""
+REAL_CLOSED = 1e-12
+"""Closure error of what is real in the equations that are solved: some roundings."""
+PUT_BACK = 1e-9
+"""Closure error of what is real with its rods put back."""
 UNFIT = 1e-3
 """Closure error from which on a rod that has no row does not fit; between this and that of what is closed it is open whether it does."""
-SINGULAR = 1e-5
-"""Smallest singular value of the closure rows, as part of the largest, below which an assembly is no regular point."""
-LARGE_STATE = 10.0
-"""Size of a state from which on small singular values are a matter of scale."""
-AWAY = 1e-2
-"""Step along a motion that the rows leave free, after which a continuum is still closed."""
 GUESSES = 400
 """Random guesses where no class is known."""
 GUESSED_TURNS = 1.0
 """Turns on either side of the start within which angles are guessed."""
 ORDER = 1e-7
 """Difference of link poses (and coordinates) below which the next number decides the order of assemblies."""
+
+BESIDE = "What can move with the drivers at rest is not counted, and there may be more of that kind."
+"""What is said beside continua."""
 
 Progress = Callable[[str], None]
 
@@ -51,7 +54,7 @@ Progress = Callable[[str], None]
 class _Solutions:
     """Real states ``(nx, M)`` at a position and ``others`` that are not real, with what is said of them (see ``Assemblies``).
 
-    ``solved`` are the real ones as they stand in the equations that were solved.
+    ``solved`` are the real ones as they stand in the equations that were solved, ``continua`` lie in those of the mechanism.
     """
 
     x: Array
@@ -60,7 +63,9 @@ class _Solutions:
     word: str
     evidence: tuple[str, ...]
     total: int | None
-    infinite: int
+    infinite: int = 0
+    on_continua: int = 0
+    continua: Sequence[Found] = ()
 
 
 class Finder:
@@ -111,6 +116,10 @@ class Finder:
         found = Product(self.family, self.groups, self.starts, self.form.drive).ends(self.rng, self.progress)
         return [self._tracked(one, i) for i, one in enumerate(found)]
 
+    def singular(self, found: _Solutions, i: int) -> bool:
+        """Whether a real assembly of those found at a position is, or nearly so, or can move."""
+        return bool(found.continua or irregular(self.family, Configuration(self.form.at(i), found.solved)).any())
+
     def positions(self, guesses: int, turns: float) -> list[Assemblies]:
         """The assemblies at all positions."""
         return [self._result(found, i) for i, found in enumerate(self.solutions(guesses, turns))]
@@ -126,50 +135,50 @@ class Finder:
             f"No class is known: {self.fault}. Searched from {guesses} random guesses within {turns:g} turns of the start; "
             "others may exist."
         )
+        system = q.system
         # those that are singular are known to the root of rounding only
-        least = np.where(self._irregular(x), REAL_SINGULAR, ONE_ASSEMBLY)
-        x = x[:, distinct(q.family.prints(Configuration(q.system, x)), None, least)]
-        return _Solutions(x, x, np.zeros((q.system.n_state, 0), dtype=complex), "searched", (why,), None, 0)
+        least = np.where(irregular(self.family, Configuration(system, x)), REAL_SINGULAR, ONE_ASSEMBLY)
+        x = x[:, distinct(q.family.prints(Configuration(system, x)), None, least)]
+        moving = np.array([Nearby(q.family, system, x[:, [i]]).moves for i in range(x.shape[1])], dtype=bool)
+        more = continua(q.family, system, x[:, moving], drive, self.progress) if moving.any() else []
+        others = np.zeros((system.n_state, 0), dtype=complex)
+        return _Solutions(
+            x[:, ~moving], x[:, ~moving], others, "searched", (why, *([BESIDE] if more else [])), None, continua=more
+        )
 
     def _tracked(self, found: Ends, i: int) -> _Solutions:
-        system, real = self.form.at(i), is_real(found.poses, found.singular)
+        system, real = self.form.at(i), np.flatnonzero(is_real(found.poses, found.error))
         solved, error = close_all(system, found.x[:, real].real, self.family.columns)
-        solved = self._distinct(solved[:, error < REAL_CLOSED], i)
-        if (self._irregular(found.x[:, ~real & found.singular])).any():
-            solved = np.concatenate([solved, self._of_continuum(i)], axis=1)
+        # two that meet at a place that is not real are next to one another there
+        real, solved = real[error < REAL_CLOSED], solved[:, error < REAL_CLOSED]
+        solved, once = self._distinct(solved, i), solved.shape[1]
         word, evidence = _completeness(found, self.groups, self.starts)
+        if solved.shape[1] < once:
+            word, evidence = "searched", (*evidence, "Different ends came to one real assembly.")
+        more = self._continua(found.moving, i)
         N = prod(start.x.shape[1] for start in self.starts)
         # rods that would need complex turns to be put back are not real
-        x, others = self.form.lifted(solved, i), self.form.lifted(found.x[:, ~real], i)
+        x, others = self.form.lifted(solved, i), self.form.lifted(np.delete(found.x, real, axis=1), i)
         complex_ = np.abs(x.imag).max(axis=0, initial=0.0) > REAL
         system = self.question.system
         off = Configuration(system, x.real).closure
-        made, unfit = ~complex_ & (off < REAL_CLOSED), ~complex_ & bool(self.form.spare) & (off > UNFIT)
+        made, unfit = ~complex_ & (off < PUT_BACK), ~complex_ & bool(self.form.spare) & (off > UNFIT)
         if self.form.spare:
             others = others[:, Configuration(system, others).closure < UNFIT]
         if (lost := int((~made & ~complex_ & ~unfit).sum())) > 0:
             word, evidence = "searched", (*evidence, f"Of {counted(lost, 'mode')} the rods could not be put back.")
         others = np.concatenate([others, x[:, complex_]], axis=1)
+        evidence = (*evidence, *self.form.told, *([BESIDE] if more else []))
         return _Solutions(
-            x[:, made].real, solved[:, made], others, word, (*evidence, *self.form.told), N, found.infinite
+            x[:, made].real, solved[:, made], others, word, evidence, N, found.infinite, found.on_continua, more
         )
 
-    def _irregular(self, x: Array) -> Array:
-        """Which assemblies are no regular points, as far as they are not large."""
-        J = Configuration(self.family.system, x).J[:, self.family.free].transpose(2, 0, 1)
-        sigma = np.linalg.svd(J, compute_uv=False)
-        large = np.abs(x).max(axis=0, initial=0.0) > LARGE_STATE
-        return np.asarray((parts(sigma)[:, : self.family.unknowns] < SINGULAR).any(axis=1) & ~large)
-
-    def _of_continuum(self, i: int) -> Array:
-        """A real assembly ``(nx, 1)`` of a continuum that tracks met at complex points, the nearest to the start; or none."""
-        family, system = self.family, self.form.at(i)
-        drive = self.form.drive[: len(family.columns), i]
-        rng = np.random.default_rng(0)  # the same one for any seed
-        x = searched(system, family.here.x[:, 0], family.columns, drive, GUESSES // 4, 0.5, rng, self.progress)
-        near = np.argsort(np.abs(system.difference(x, family.here.x)).max(axis=0))
-        found = [j for j in near.tolist() if self._point(Configuration(system, x[:, [j]]))[0] == "continuum"]
-        return x[:, found[:1]]
+    def _continua(self, moving: Array, i: int) -> list[Found]:
+        """Continua of the mechanism, where tracks came to such."""
+        q = self.question
+        if not moving.shape[1]:
+            return []
+        return continua(q.family, q.system, self.form.lifted(moving, i), q.drive[:, i], self.progress)
 
     def _result(self, found: _Solutions, i: int) -> Assemblies:
         q, m, x = self.question, self.question.asked, found.x
@@ -177,68 +186,56 @@ class Finder:
         poses = np.moveaxis(user_poses(here), 1, 0)
         order = _ordered(q.family.prints(here).T)
         x, poses, solved = x[:, order], poses[order], found.solved[:, order]
-        coordinates = q.coordinates(x)
-        coordinates[:, q.columns] = q.values[:, i]
+        coordinates = self._coordinates(x, i)
         own = [q.m.freedom_names().index(name) for name in m.freedom_names()]
-        kinds, conditions, sure, system = [], [], [], self.form.at(i)
-        for j in range(x.shape[1]):
-            kind, condition, proof = self._point(Configuration(system, solved[:, [j]]))
-            kinds.append(kind)
-            conditions.append(condition)
-            sure.append(proof)
-        sure = told_apart(self.family, solved, sure)
-        modes = tuple(
-            m.replace(start=dict(zip(m.freedom_names(), row[own].tolist(), strict=True))) for row in coordinates
-        )
+        names = m.freedom_names()
+        told = [self._point(self.form.at(i), solved[:, [j]]) for j in range(x.shape[1])]
+        sure = told_apart(self.family, solved, [proof for _, _, proof in told])
         away = Configuration(q.system, found.others)
         return Assemblies(
             m,
             dict(zip(q.names, q.values[:, i].tolist(), strict=True)),
-            modes,
+            tuple(self._assembly(row[own]) for row in coordinates),
             poses,
             coordinates[:, own],
-            tuple(kinds),
-            np.array(conditions),
+            tuple(kind for kind, _, _ in told),
+            np.array([condition for _, condition, _ in told]),
             tuple(sure),
             ComplexModes(q.complex_coordinates(found.others)[:, own], np.moveaxis(user_poses(away), 1, 0)),
             found.word,
             (*found.evidence, *_said_apart(sure)),
             found.total,
             found.infinite,
+            found.on_continua,
+            tuple(
+                Continuum(
+                    self._assembly(self._coordinates(one.x[:, None], i)[0, own]),
+                    one.dimension,
+                    tuple(name for name, k in zip(names, own, strict=True) if one.moves[k]),
+                )
+                for one in found.continua
+            ),
         )
 
-    def _point(self, here: Configuration) -> tuple[str, float, Certificate | None]:
-        """Kind, condition and certificate of a real assembly."""
-        family = self.family
-        J = here.J[:, family.free, 0]
-        _, sigma, Vt = np.linalg.svd(J)
-        size = parts(sigma)
-        rank, wanted = int((size > SINGULAR).sum()), family.unknowns
-        condition = float(1.0 / max(size[wanted - 1], TINY)) if wanted else 1.0
-        sure = certificate(here, family.free, family.passive.shape[1], not self.fault)
-        # what is proved is regular, be it ever so close to a double point
-        if rank >= wanted or (sure is not None and sure.proved):
-            return "regular", condition, sure
-        return ("continuum" if self._moves(here, Vt[rank:]) else "double"), np.inf, None
+    def _coordinates(self, x: Array, i: int) -> Array:
+        """User coordinates ``(M, F)`` of states at a position, given ones as given."""
+        out = self.question.coordinates(x)
+        out[:, self.question.columns] = self.question.values[:, i]
+        return out
 
-    def _moves(self, here: Configuration, left: Array) -> bool:
-        """Whether the loops stay closed along a motion that the rows leave free, with the drivers at rest."""
-        family, s = self.family, here.system
-        if family.passive.shape[1]:
-            held = np.linalg.qr(family.passive[family.free])[0]
-            left = left - (left @ held) @ held.T
-        for direction in left:
-            size = np.abs(direction).max()
-            if size < 1e-3:
-                continue
-            for sign in (1.0, -1.0):
-                dq = np.zeros((s.n_freedoms, 1))
-                dq[family.free, 0] = sign * AWAY * direction / size
-                moved, error = close_all(s, s.advance(here.x, dq), family.columns)
-                gone = np.abs(self.family.prints(Configuration(s, moved)) - self.family.prints(here)).max()
-                if error[0] < 1e-11 and gone > 0.2 * AWAY:
-                    return True
-        return False
+    def _assembly(self, row: Array) -> Mechanism:
+        m = self.question.asked
+        return m.replace(start=dict(zip(m.freedom_names(), row.tolist(), strict=True)))
+
+    def _point(self, system: System, x: Array) -> tuple[str, float, Certificate | None]:
+        """Kind, condition and certificate of a real assembly that cannot move."""
+        family, here = self.family, Configuration(system, x)
+        condition = float(1.0 / max(least_value(family, here)[0], TINY))
+        sure = certificate(here, family.free, family.passive.shape[1], not self.fault)
+        # what is proved is regular, be it ever so close to a double point; so is what is far from any other
+        if (sure is not None and sure.proved) or Nearby(family, system, x).gap > ONE_ASSEMBLY:
+            return "regular", condition, sure
+        return "double", np.inf, None
 
 
 def _completeness(
@@ -246,6 +243,7 @@ def _completeness(
 ) -> tuple[str, tuple[str, ...]]:
     """The word for how sure it is that no assembly is missing, and what it rests on."""
     told = [_of_class(group.family, start) for group, start in zip(groups, starts, strict=True)]
+    N = prod(start.x.shape[1] for start in starts)
     evidence = list(told[0][1])
     if len(groups) > 1:
         counts = ", ".join(
@@ -255,15 +253,23 @@ def _completeness(
         evidence += [
             f"{group.names[0]}: {text}" for group, (_, texts) in zip(groups, told, strict=True) for text in texts
         ]
-    if found.partial:
+    if found.left_out:
         evidence.append(
             f"Complex modes of a group that lie far away, or lead to more than {MOST_FOLLOWED} tracks, are not gone on with, nor counted."
         )
+    single, meet = int((found.count == 1).sum()), found.count[found.count > 1]
+    parts = [f"{single} alone", *([f"{meet.sum()} that meet in {len(meet)}"] if meet.size else [])]
+    parts += [
+        f"{number} {where}"
+        for number, where in ((found.on_continua, "on continua"), (found.left_out, "left out"))
+        if number
+    ]
     evidence.append(
-        f"{counted(found.tracks, 'track')} to this position in {counted(found.runs, 'run')}: {found.x.shape[1]} different ends, "
-        f"{found.infinite} at infinity, {found.lost} lost in the best run."
+        f"{counted(found.tracks, 'track')} to this position in {counted(found.runs, 'run')}: of {N} modes "
+        f"{', '.join(parts)}, {found.infinite} at infinity; {found.lost} lost in the best run."
     )
-    if not found.clean:
+    adds_up = int(found.count.sum()) + found.on_continua + found.infinite + found.left_out == N
+    if not found.clean or not adds_up:
         return "searched", (*evidence, "Tracks that are lost, or meet, leave open whether these are all.")
     return weakest(word for word, _ in told), tuple(evidence)
 

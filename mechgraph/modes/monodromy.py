@@ -195,17 +195,20 @@ def _tame(equations: Equations, base: Member, x: Array, rng: np.random.Generator
 
     Assemblies ``x (nx, N)`` that come to one there are one, which large numbers had told apart by their rounding.
     """
-    family, found = equations.family, []
-    keep = np.arange(x.shape[1])
-    for _ in range(CANDIDATES):
-        member = family.random_member(rng)
-        there = follow(Leg(equations, base, member), x, Care())
-        poses, arrived = fingerprints(family, member, there.x), np.flatnonzero(there.arrived)
+    family, N = equations.family, x.shape[1]
+    members = [family.random_member(rng) for _ in range(CANDIDATES)]
+    which = np.repeat(np.arange(CANDIDATES), N)
+    tracked = follow(Leg(equations, base, Member.joined(members), which), np.tile(x, CANDIDATES), Care())
+    keep, found = np.arange(N), []
+    for number, member in enumerate(members):
+        mine = which == number
+        there, poses = tracked.x[:, mine], fingerprints(family, member, tracked.x[:, mine])
+        arrived = np.flatnonzero(tracked.arrived[mine])
         keep = np.setdiff1d(keep, np.delete(arrived, distinct(poses[:, arrived])))
-        found.append((member, there, poses))
+        found.append((member, there, poses, tracked.arrived[mine]))
     best, least = (base, x[:, keep]), np.abs(fingerprints(family, base, x[:, keep])).max()
-    for member, there, poses in found:
-        size = np.abs(poses[:, keep]).max() if there.arrived[keep].all() else np.inf
+    for member, there, poses, came in found:
+        size = np.abs(poses[:, keep]).max() if came[keep].all() else np.inf
         if size < least:
-            best, least = (member, there.x[:, keep]), size
+            best, least = (member, there[:, keep]), size
     return best

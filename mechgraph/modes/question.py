@@ -11,23 +11,24 @@ import numpy as np
 from mechgraph.closure.assembly import CLOSED, close_all, closed_start, named_columns
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
-from mechgraph.closure.indexing import Index
+from mechgraph.closure.indexing import Index, System
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.modes.family import SPAN, Array, Family, at_rest
-from mechgraph.modes.form import Form, Whole, WithoutRods, rods_of
+from mechgraph.modes.family import NO_NUMBERS, SPAN, Array, Family, at_rest
+from mechgraph.modes.form import Form, Rod, Whole, WithoutRods, rods_of
+from mechgraph.numerics.linear import rank_of, singular_values
 from mechgraph.report.refused import dead_point_error, undriven_error
 from mechgraph.structure.mobility import free_motion
 
 OFF_DEAD_POINT = 0.3
-"""Motion (radians, or lengths over L) of what moves most from a dead point of drivers to where the class is read."""
+"""Motion (radians, or lengths over L) of what moves most from a singular start to where the class is read."""
 
 
 class Question:
-    """Values given at one position or at several, and a closed position of the mechanism, beside dead points of the drivers.
+    """Values given at one position or at several, and a closed position of the mechanism, beside the start where that is singular.
 
     ``m`` is the mechanism with free pairs for points and links that are given (see ``closure.prescription``), ``drive (d, n)`` are the
-    values in internal units; ``batch`` is ``()`` or ``(n,)``.
+    values in internal units; ``batch`` is ``()`` or ``(n,)``; ``declared`` is the closed position next to the start, singular or not.
 
     Raises
     ------
@@ -53,21 +54,10 @@ class Question:
         self.unit = np.where(self.system.is_length[self.columns], self.system.par.L, 1.0)
         self.values = given.values("position", self.batch)
         self.drive = self.values / self.unit[:, None]
+        self.declared = self.start
         self._read()
-        if self._loose:
-            declared, self.start = self.start, self._beside()
-            self._read()
-            if self._loose:
-                self.start = declared
-                self._read()
-                self._refuse()
-        elif self.freedoms.passive:
-            # what is passive at the start alone would be taken out of the equations everywhere
-            for moved in self._moved():
-                if len(free_motion(self.system, moved.x[:, 0], self.columns).passive) < len(self.freedoms.passive):
-                    self.start = moved
-                    self._read()
-                    break
+        if self._loose or self.freedoms.passive:
+            self._leave()
 
     def _read(self) -> None:
         """What can move at the start, and the class there."""
@@ -97,39 +87,69 @@ class Question:
 
     @cached_property
     def form(self) -> Form:
-        """The equations in which assemblies are looked for: without rods, where these can be left out."""
-        if self.rods:
-            found = WithoutRods(self.family, self.drive, self.rods, self.rods)
+        """The equations in which assemblies are looked for: without couplings and rods, where these can be left out."""
+        family, drive, rods = self._uncoupled()
+        if rods:
+            found = WithoutRods(family, drive, rods, rods)
             if found.family.fault:
-                found = WithoutRods(self.family, self.drive, self.rods, found.needed)
+                found = WithoutRods(family, drive, rods, found.needed)
             if not found.family.fault:
                 return found
-        return Whole(self.family, self.drive)
+        return Whole(family, drive)
+
+    def _uncoupled(self) -> tuple[Family, Array, list[Rod]]:
+        """The class, what is given, and rods; without couplings, where these say as much of freedoms as there are that are not given.
+
+        With ``G_d`` and ``G`` the coefficients of what is given and of the others, ``q = q_0 - G^-1 G_d (d - d_0)``.
+        """
+        if not self.m.couplings:
+            return self.family, self.drive, self.rods
+        s, terms = self.system, self.system.coupling_matrix[:, :, 0]
+        others = np.setdiff1d(s.coupled_freedoms, self.columns)
+        if rank_of(singular_values(terms[:, others])) < max(len(terms), len(others)):
+            return self.family, self.drive, []
+        begin = self.start.x[:, :1]
+        turned = np.linalg.solve(
+            terms[:, others], terms[:, self.columns] @ (self.drive - begin[s.single_rows[self.columns]])
+        )
+        columns = np.concatenate([self.columns, others])
+        bare = System(self.m.replace(couplings=[]), None, s.par)
+        idle, held = self.family.idle, self.family.held
+        rods = rods_of(bare, np.concatenate([columns, held]))
+        links = np.array([link for rod in rods for link in rod.links], dtype=np.intp)
+        family = Family(Configuration(bare, begin), columns, idle, np.setdiff1d(held, others), links)
+        return family, np.concatenate([self.drive, begin[s.single_rows[others]] - turned]), rods
 
     @property
     def _loose(self) -> bool:
         """Whether what is given leaves motions free at the start."""
         return bool(self.freedoms.undriven) and (self.family.unknowns > self.family.rank or bool(self.family.fault))
 
-    def _beside(self) -> Configuration:
-        """The start moved off a dead point of drivers: along the motion that they leave free, driven by what moves most in it."""
-        still, rates = self.freedoms.still(self.columns), self.freedoms.undriven[0].rates
-        fastest = int(np.argmax(np.abs(rates)))
-        held = np.append(self.columns[~still], fastest)
-        guess = self.system.advance(self.start.x, OFF_DEAD_POINT * rates[:, None] / rates[fastest])
-        x, error = close_all(self.system, guess, held)
-        return Configuration(self.system, x) if error[0] < CLOSED else self.start
+    def _leave(self) -> None:
+        """Read the class beside the start, where motions are left free, or are passive, at the start alone."""
+        loose, passive = self._loose, len(self.freedoms.passive)
+        for moved in self._beside():
+            self.start = moved
+            self._read()
+            if not self._loose and (loose or len(self.freedoms.passive) < passive):
+                return
+        self.start = self.declared
+        self._read()
+        if loose:
+            self._refuse()
 
-    def _moved(self) -> Iterator[Configuration]:
-        """Closed positions a little away from the start; drivers that stand still there are moved either way."""
-        motions, still = self.freedoms.null, self.columns[self.freedoms.still(self.columns)]
+    def _beside(self) -> Iterator[Configuration]:
+        """Closed positions a little away from the start either way: drivers moved, those too that stand still there, or free to move."""
+        x0, motions, still = self.start.x, self.freedoms.null, self.columns[self.freedoms.still(self.columns)]
         rates = motions @ np.random.default_rng(0).normal(size=motions.shape[1])
-        for sign in (1.0, -1.0) if still.size else (1.0,):
-            dq = OFF_DEAD_POINT * rates / np.abs(rates).max()
-            dq[still] = sign * OFF_DEAD_POINT
-            x, error = close_all(self.system, self.system.advance(self.start.x, dq[:, None]), self.columns)
-            if error[0] < CLOSED:
-                yield Configuration(self.system, x)
+        rates *= OFF_DEAD_POINT / max(float(np.abs(rates).max(initial=0.0)), SPAN)
+        for held in (self.columns, NO_NUMBERS):
+            for sign in (1.0, -1.0):
+                dq = sign * rates[:, None]
+                dq[still] = sign * OFF_DEAD_POINT * bool(held.size)
+                x, error = close_all(self.system, self.system.advance(x0, dq), held)
+                if error[0] < CLOSED:
+                    yield Configuration(self.system, x)
 
     def _refuse(self) -> None:
         """What is given leaves motions free where the mechanism is declared, and beside it."""
@@ -152,9 +172,10 @@ class Question:
 
     @property
     def periods(self) -> Array:
-        """By how much single freedoms grow until all is as it was, user units; infinite where they go on, and for rotations."""
-        s = self.system
-        return np.where(s.single_rows >= 0, s.in_user_units(self.family.periods), np.inf)
+        """By how much single freedoms grow until all is as it was, user units; infinite where they go on or are coupled, and for balls."""
+        s, alone = self.system, self.system.single_rows >= 0
+        alone[s.coupled_freedoms] = False
+        return np.where(alone, s.in_user_units(self.family.periods), np.inf)
 
     def complex_coordinates(self, x: Array) -> Array:
         """User coordinates ``(n, F)`` of complex states ``(nx, n)``."""

@@ -14,9 +14,18 @@ class ModeData:
     """One real assembly; ``condition`` and ``certificate`` of regular ones."""
 
     start: Annotated[Mapping[str, float], "the coordinates of all freedoms"]
-    kind: Annotated[str, "regular, double (assemblies meet) or continuum (it moves with the drivers at rest)"]
+    kind: Annotated[str, "regular or double (assemblies meet)"]
     condition: float | None
     certificate: Certificate | None
+
+
+@dataclass(frozen=True)
+class ContinuumData:
+    """Assemblies that can move with the drivers at rest."""
+
+    start: Annotated[Mapping[str, float], "the coordinates of all freedoms at the one nearest to the start"]
+    dimension: int
+    moves: Annotated[tuple[str, ...], "freedoms that change"]
 
 
 @dataclass(frozen=True)
@@ -29,7 +38,9 @@ class AssembliesData:
     evidence: Annotated[tuple[str, ...], "what that rests on"]
     total: Annotated[int | None, "assemblies of a random complex mechanism of the class, where one is known"]
     infinite: Annotated[int, "how many of these lie at infinity here"]
+    on_continua: Annotated[int, "how many of these lie on continua here"]
     complex: Annotated[int, "how many are not real"]
+    continua: tuple[ContinuumData, ...]
     modes: tuple[ModeData, ...]
 
 
@@ -38,7 +49,7 @@ class BranchData:
     """A branch: its interval of the driver, and the range of every freedom."""
 
     interval: tuple[float, float]
-    full_turn: bool
+    full_turn: Annotated[bool | None, "null where an end could not be told"]
     turns: Annotated[int, "turns of the driver that bring it back"]
     circuit: int
     ranges: Mapping[str, tuple[float, float]]

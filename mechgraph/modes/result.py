@@ -15,7 +15,7 @@ from mechgraph.errors import counted
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.certificate import Certificate
 from mechgraph.modes.family import Array
-from mechgraph.modes.record import AssembliesData, ModeData
+from mechgraph.modes.record import AssembliesData, ContinuumData, ModeData
 
 COORDINATES = 4
 """Most coordinates of an assembly in its table; all are in ``start`` of the mode."""
@@ -32,23 +32,41 @@ class ComplexModes:
         return len(self.poses)
 
 
+@dataclass(frozen=True)
+class Continuum:
+    """Assemblies that can move with the drivers at rest: those in which only the freedoms in ``moves`` differ, of one or several parts.
+
+    Attributes
+    ----------
+    point : the one nearest to the start of the mechanism, as far as was seen.
+    dimension : number of independent motions.
+    moves : freedoms that change.
+    """
+
+    point: Mechanism
+    dimension: int
+    moves: tuple[str, ...]
+
+
 @dataclass(frozen=True, repr=False)
 class Assemblies(Shown, Sequence[Mechanism]):
-    """All real assemblies at one position, each a Mechanism whose ``start`` is that assembly.
+    """All real assemblies at one position that cannot move, each a Mechanism whose ``start`` is that assembly; continua are beside them.
 
     Attributes
     ----------
     mechanism, at : the mechanism, and the values given.
     poses : ``(M, N, 4, 4)`` of all links.
     coordinates : ``(M, F)`` of all freedoms, in the order of ``freedom_names``.
-    kinds : of every assembly ``"regular"``, ``"double"`` (assemblies meet) or ``"continuum"`` (it can move with the drivers at rest).
+    kinds : of every assembly ``"regular"`` or ``"double"`` (assemblies meet).
     condition : condition numbers ``(M,)`` of the closure equations; infinite where singular.
     certificates : of regular ones, else None.
     complex : those that are not real.
     completeness : ``"proved"`` (the count equals a bound), ``"tested"`` (a trace test was passed, loops of random mechanisms of the class
         bring no further one, and no track was lost) or ``"searched"``.
     evidence : what that rests on, in words with numbers.
-    total : assemblies of a random complex mechanism of the class; None where no class is known. ``infinite`` of them lie at infinity here.
+    total : assemblies of a random complex mechanism of the class; None where no class is known. ``infinite`` of them lie at infinity here,
+        ``on_continua`` on continua.
+    continua : what can move with the drivers at rest; ``completeness`` is not about these.
     """
 
     mechanism: Mechanism
@@ -64,11 +82,13 @@ class Assemblies(Shown, Sequence[Mechanism]):
     evidence: tuple[str, ...]
     total: int | None
     infinite: int
+    on_continua: int
+    continua: tuple[Continuum, ...]
 
     def __len__(self) -> int:
         return len(self.modes)
 
-    def __getitem__(self, i: Any) -> Any:
+    def __getitem__(self, i: int | slice) -> Any:
         return self.modes[i]
 
     def __iter__(self) -> Iterator[Mechanism]:
@@ -102,10 +122,12 @@ class Assemblies(Shown, Sequence[Mechanism]):
                 )
             )
         title = f"{m.name}: {counted(len(self), 'mode')} at {values_text(m, self.at)}"
-        return Document(
-            title,
-            (Table(header, tuple(rows)), Paragraph(f"Completeness: {self.completeness}. " + " ".join(self.evidence))),
-        )
+        moving = [
+            f"Continuum of dimension {one.dimension}: {', '.join(one.moves)} move with the drivers at rest."
+            for one in self.continua
+        ]
+        words = " ".join([*moving, f"Completeness: {self.completeness}.", *self.evidence])
+        return Document(title, (Table(header, tuple(rows)), Paragraph(words)))
 
     def plot(self) -> Any:
         """A picture of all assemblies side by side; the figure."""
@@ -122,7 +144,9 @@ class Assemblies(Shown, Sequence[Mechanism]):
             self.evidence,
             self.total,
             self.infinite,
+            self.on_continua,
             len(self.complex),
+            tuple(ContinuumData(one.point.start, one.dimension, one.moves) for one in self.continua),
             tuple(ModeData(mode.start, kind, condition, sure) for mode, kind, condition, sure in modes),
         )
 
@@ -140,7 +164,7 @@ class AssembliesOver(Shown, Sequence[Assemblies]):
     def __len__(self) -> int:
         return len(self.positions)
 
-    def __getitem__(self, i: Any) -> Any:
+    def __getitem__(self, i: int | slice) -> Any:
         return self.positions[i]
 
     @property

@@ -9,13 +9,16 @@ random member makes up for it.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from mechgraph.modes.family import GENERIC, Array, Family, Member, parts
+from mechgraph.closure.assembly import CLOSED, close_all
+from mechgraph.closure.configuration import Configuration
+from mechgraph.modes.family import Array, Family, Member
 from mechgraph.modes.homotopy import Care, Equations, Leg, follow, rounding
-from mechgraph.modes.monodromy import ONE_ASSEMBLY, StartSet, distinct, fingerprints
+from mechgraph.modes.monodromy import ONE_ASSEMBLY, StartSet, distinct
+from mechgraph.modes.nearby import Nearby, irregular, least_value
 from mechgraph.numerics.linear import Index
 
 RUNS = 4
@@ -35,6 +38,8 @@ NEAR_END = 0.7
 FAR_NOISE, FAR_APART = 5e-2, 0.1
 """Rounding with which tracks may end far away, at what is plainly not real; largest difference, against their size, up to which such ends
 count as one."""
+REAL_SINGULAR = 1e-3
+"""Difference of link poses at which ends may be one, or real, where rows are singular, so that they are known to the root of rounding."""
 ENDLESS = 6.0
 """Imaginary part of an angle at an end from which on the assembly lies at infinity."""
 
@@ -43,19 +48,37 @@ ENDLESS = 6.0
 class Ends:
     """Ends of all ``tracks`` to one position: states ``(nx, n)``, each once, and what became of the tracks in the best run.
 
-    ``partial`` where only what is real was gone on with (see ``modes.product``).
+    ``count (n,)`` tracks meet at an end, ``error (n,)`` is how far it may be off; ``moving (nx, k)`` are the ends that lie on continua, and
+    differ from run to run. Of several groups (see ``modes.product``), ``on_continua`` is the number of modes that these count for, and
+    ``left_out`` that of those that were not gone on with.
     """
 
     x: Array
     poses: Array
-    singular: Array
+    error: Array
+    count: Array
+    moving: Array
     infinite: int = 0
     lost: int = 0
     runs: int = 0
     met: int = 0
-    clean: bool = field(default=False)
+    clean: bool = False
     tracks: int = 0
-    partial: bool = False
+    on_continua: int = 0
+    left_out: int = 0
+
+    @staticmethod
+    def none(states: int, tracks: int) -> Ends:
+        """No end is known."""
+        nothing = np.zeros((states, 0), dtype=complex)
+        return Ends(nothing, nothing, np.zeros(0), np.zeros(0, dtype=np.intp), nothing, tracks=tracks)
+
+    def join(self, x: Array, poses: Array, error: Array, count: Array, new: Index) -> None:
+        """Further ends, of which those with the places ``new`` are to be put to them."""
+        self.poses = np.concatenate([self.poses, poses[:, new]], axis=1) if self.runs else poses[:, new]
+        self.x = np.concatenate([self.x, x[:, new]], axis=1)
+        self.error, self.count = np.append(self.error, error[new]), np.append(self.count, count[new])
+        self.runs += 1
 
 
 def ends(
@@ -75,8 +98,7 @@ def ends(
 def _block(family: Family, start: StartSet, goals: Member, rng: np.random.Generator) -> list[Ends]:
     n, N = goals.drive.shape[1], start.x.shape[1]
     equations = Equations(family, start.mixing)
-    nothing = np.zeros((len(start.x), 0), dtype=complex)
-    every = [Ends(nothing, np.zeros((0, 0)), np.zeros(0, dtype=bool), tracks=N) for _ in range(n)]
+    every = [Ends.none(len(start.x), N) for _ in range(n)]
     left = np.arange(n)
     for run in range(RUNS):
         care = Care(noise=FAR_NOISE) if run < 2 else Care(noise=FAR_NOISE).finer
@@ -169,58 +191,76 @@ def _arc(k: int) -> Callable[[Array], tuple[Array, Array]]:
 
 def _account(family: Family, at: Member, known: Ends, run: _Run, lost_before: int) -> None:
     """Put the ends of a run to those that are known."""
-    x, regular, singular, infinite = run.x.copy(), run.regular.copy(), run.singular.copy(), int(run.infinite.sum())
-    doubtful = 0
-    if singular.any():
-        some = np.flatnonzero(singular)
-        x[:, some], closed, rank = _settled(family, at, x[:, some])
-        singular[some[~closed]] = False
-        # a track that is bounded near its end has an assembly there: this one is not, or it was led round to another one
-        doubtful = int((~closed).sum())
-        infinite += doubtful
-        # what was led round has come to a regular point, to which no other track comes
-        singular[some[rank]], regular[some[rank]] = False, True
-    poses = fingerprints(family, at, x)
-    size = np.maximum(1.0, np.abs(poses).max(axis=0, initial=0.0))
-    least = np.clip(rounding(size), ONE_ASSEMBLY, FAR_APART)
-    # an end that is known to few digits counts where it cannot be a real assembly, which would be missed
-    regular &= (least == ONE_ASSEMBLY) | (np.abs(poses.imag).max(axis=0, initial=0.0) > FAR_APART * size)
-    good = np.flatnonzero(regular | singular)
-    poses, least = poses[:, good], least[good]
-    new = distinct(poses, known.poses if known.runs else None, least)
-    own = distinct(poses[:, regular[good]], None, least[regular[good]])
-    lost = len(regular) - len(good) - infinite + lost_before
-    met = int(regular.sum()) - len(own)
+    told, infinite = _Told(family, at, run), int(run.infinite.sum())
+    # a track that is bounded near its end has an assembly there: what closes nowhere is none, or was led round to another one
+    infinite += told.doubtful
+    own = np.flatnonzero(told.regular)
+    once = own[distinct(told.poses[:, own], None, told.least[own])]
+    points, N = np.concatenate([once, np.flatnonzero(told.meet)]), run.x.shape[1] + lost_before
+    met, lost = len(own) - len(once), N - len(own) - int(told.meet.sum()) - int(told.moving.sum()) - infinite
+    least = np.where(told.meet[points], REAL_SINGULAR, told.least[points])
+    new = distinct(told.poses[:, points], known.poses if known.runs else None, least)
     confirmed = known.runs > 0 and not new.size and infinite == known.infinite
-    best = not known.runs or lost + met <= known.lost + known.met
-    known.x = np.concatenate([known.x, x[:, good[new]]], axis=1)
-    known.poses = np.concatenate([known.poses, poses[:, new]], axis=1) if known.runs else poses[:, new]
-    known.singular = np.concatenate([known.singular, singular[good[new]]])
-    known.runs += 1
-    if best:
-        known.lost, known.met, known.infinite = lost, met, infinite
+    if not known.runs or lost + met <= known.lost + known.met:
+        known.lost, known.met, known.infinite, known.moving = lost, met, infinite, told.x[:, told.moving]
+    known.join(told.x, told.poses, told.error, np.maximum(told.meet, 1), points[new])
     # all are accounted for on one run without a loss, on two where it is doubtful what is at infinity, or by different ends of several
-    left = max(0, len(regular) + lost_before - known.x.shape[1])
-    known.infinite = min(known.infinite, left)
-    known.clean = (lost == 0 and met == 0 and (not doubtful or confirmed)) or not left
+    left = N - int(known.count.sum()) - known.moving.shape[1]
+    whole = lost == 0 and met == 0 and (not told.doubtful or confirmed) and left == known.infinite
+    known.clean = whole or not left
+    known.infinite = min(known.infinite, max(left, 0))
 
 
-def _settled(family: Family, at: Member, x: Array) -> tuple[Array, Array, Array]:
-    """Singular ends closed by steps of least norm; which closed, and which of these are regular points nevertheless."""
-    leg = Leg(Equations(family, None), at, at)
-    T = x.shape[1]
-    tracks, one = np.zeros(T, dtype=np.intp), np.ones(T)
-    for _ in range(25):
-        here = leg.at(x, one, tracks)
-        r = here.here.residual
-        if np.abs(r).max(initial=0.0) < 1e-13:
-            break
-        dq = np.zeros((family.system.n_freedoms, T), dtype=complex)
-        inverse = np.linalg.pinv(here.J.transpose(2, 0, 1), rcond=1e-11)
-        dq[family.free] = -np.einsum("tij,jt->it", inverse, r)
-        dq *= np.minimum(1.0, 0.1 / np.maximum(np.abs(dq).max(axis=0, initial=0.0), 1e-300))
-        x = family.system.advance(here.here.x, dq)
-    here = leg.at(x, one, tracks)
-    closed = np.abs(here.here.residual).max(axis=0, initial=0.0) < 1e-10
-    sigma = np.linalg.svd(here.J.transpose(2, 0, 1), compute_uv=False)
-    return x, closed, closed & (parts(sigma)[:, : family.unknowns] > GENERIC).all(axis=1)
+class _Told:
+    """What the ends of a run are: ``regular`` ones, points of continua (``moving``), and doubles, with the number of tracks that ``meet``.
+
+    ``doubtful`` is the number of those that seemed singular and close nowhere, ``error (n,)`` how far ends may be off.
+    """
+
+    def __init__(self, family: Family, at: Member, run: _Run) -> None:
+        self.family, self.system = family, family.system_of(at)
+        self.x, self.regular = run.x.copy(), run.regular.copy()
+        self.moving, self.meet = np.zeros(len(self.regular), dtype=bool), np.zeros(len(self.regular), dtype=np.intp)
+        self._print()
+        # an end that is known to few digits counts where it cannot be a real assembly, which would be missed
+        size = np.maximum(1.0, np.abs(self.poses).max(axis=0, initial=0.0))
+        unreal = np.abs(self.poses.imag).max(axis=0, initial=0.0) > FAR_APART * size
+        self.regular &= (self.least == ONE_ASSEMBLY) | unreal
+        some = np.flatnonzero(run.singular)
+        closed, error = close_all(self.system, self.x[:, some], family.columns)
+        self.doubtful, some = int((error >= CLOSED).sum()), some[error < CLOSED]
+        self.x[:, some] = closed[:, error < CLOSED]
+        ends = np.union1d(np.flatnonzero(self.regular), some)
+        weak = ends[irregular(family, Configuration(self.system, self.x[:, ends]))]
+        # what was led round has come to a regular point, to which no other track comes
+        self.regular[np.setdiff1d(some, weak)] = True
+        near = {i: Nearby(family, self.system, self.x[:, [i]]) for i in weak.tolist()}
+        self.moving[weak] = [about.moves for about in near.values()]
+        self.regular[self.moving] = False
+        self._print()
+        left = weak[~self.moving[weak]]
+        while left.size:
+            apart = np.abs(self.poses[:, left] - self.poses[:, left[:1]]).max(axis=0)
+            mine = left[apart <= REAL_SINGULAR * np.maximum(1.0, np.abs(self.poses[:, left[0]]).max())]
+            self._resolve(mine, next((near[i] for i in mine.tolist() if not self.regular[i]), None))
+            left = np.setdiff1d(left, mine)
+        self._print()
+        self.error = np.where(
+            self.meet, REAL_SINGULAR, rounding(size) / least_value(family, Configuration(self.system, self.x))
+        )
+
+    def _print(self) -> None:
+        self.poses = self.family.prints(Configuration(self.system, self.x))
+        self.least = np.clip(
+            rounding(np.maximum(1.0, np.abs(self.poses).max(axis=0, initial=0.0))), ONE_ASSEMBLY, FAR_APART
+        )
+
+    def _resolve(self, mine: Index, about: Nearby | None) -> None:
+        """Ends next to each other as one double, unless they are roots that can be told; ``about`` is one that is not regular yet."""
+        if about is None:
+            if len(distinct(self.poses[:, mine])) == len(mine):
+                return
+        elif about.gap > ONE_ASSEMBLY and len(mine) <= 2:
+            self.x[:, mine], self.regular[mine] = about.both()[:, : len(mine)], True
+            return
+        self.regular[mine], self.meet[mine[0]] = False, len(mine)

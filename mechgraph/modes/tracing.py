@@ -1,8 +1,8 @@
 """Every assembly followed over the range of one driver, all in one batch: pieces between samples, joined into branches and circuits.
 
-At evenly spread samples of the driver all assemblies are known; from each, the engine's path follower goes to both neighbours. A piece
-that arrives meets an assembly there; a piece that ends at a fold meets the other one that ends there; pieces that pass the same crossing
-meet in it. Pieces that arrive, one after the other, are a branch; branches that meet are a circuit.
+At evenly spread samples of the driver all assemblies are known; from each, the engine's path follower goes to both neighbours, or out to
+the rim of the range. A piece that arrives meets an assembly there; a piece that ends at a fold meets the other one that ends there; pieces
+that pass the same crossing meet in it. Pieces that arrive, one after the other, are a branch; branches that meet are a circuit.
 """
 
 from __future__ import annotations
@@ -36,7 +36,8 @@ TOUCHES = 1e-3
 class Piece:
     """The way of assembly ``mode`` of sample ``sample`` in one ``sense``: states ``x (nx, n)`` at driver values, and its end.
 
-    ``arrives`` is the assembly of the next sample, or -1; ``end`` the driver value where the piece ends at a ``fold``.
+    ``arrives`` is the assembly of the next sample, or -1; ``end`` the driver value where the piece ends at a ``fold``; ``rim`` says that it
+    leads out to the end of the range.
     """
 
     sample: int
@@ -45,6 +46,7 @@ class Piece:
     values: Array
     x: Array
     arrives: int = -1
+    rim: bool = False
     fold: bool = False
     end: float = np.nan
     last: Array = field(default_factory=lambda: np.zeros(0))
@@ -52,7 +54,10 @@ class Piece:
 
 
 class Tracer:
-    """Follows assemblies ``states[i] (nx, M_i)`` at ``samples (S,)`` of a driver to the neighbours, with ``points`` values between."""
+    """Follows assemblies ``states[i] (nx, M_i)`` at ``samples (S,)`` of a driver to the neighbours, with ``points`` values between.
+
+    ``rims`` are the ends of the range of the driver, None where it goes right round.
+    """
 
     def __init__(
         self,
@@ -61,11 +66,11 @@ class Tracer:
         samples: Array,
         states: list[Array],
         points: int,
-        closed: bool,
+        rims: tuple[float, float] | None,
         place: int,
     ) -> None:
         self.question, self.family, self.samples, self.states, self.place = question, family, samples, states, place
-        self.points, self.closed = points, closed
+        self.points, self.rims = points, rims
         self.system = question.system
         self.prints = [self._prints(x) for x in states]
 
@@ -79,13 +84,13 @@ class Tracer:
         for i, x in enumerate(self.states):
             for mode in range(x.shape[1]):
                 for sense in (1, -1):
-                    if not self.closed and not 0 <= i + sense < len(self.states):
-                        continue
-                    values = self.samples[i] + sense * step * part
+                    rim = self.rims is not None and not 0 <= i + sense < len(self.states)
+                    way = self.rims[sense > 0] - self.samples[i] if rim and self.rims else sense * step
+                    values = self.samples[i] + way * part
                     others = np.repeat(x[self.family.rows, mode][:, None], len(part), axis=1)
                     others[self.place] = values
                     requests.append(Request(x[:, mode], 0, others, np.arange(total, total + len(part))))
-                    out.append(Piece(i, mode, sense, values, np.zeros(0)))
+                    out.append(Piece(i, mode, sense, values, np.zeros(0), rim=rim))
                     total += len(part)
         if not requests:
             return []
@@ -117,6 +122,8 @@ class Tracer:
             if t == track
         )
         if stop == len(good):
+            if piece.rim:
+                return
             j = (piece.sample + piece.sense) % len(self.states)
             here = self._prints(piece.x[:, -1:])
             gaps = np.abs(self.prints[j] - here).max(axis=0, initial=0.0)
@@ -164,13 +171,21 @@ class Map:
         self.of = {node: number for number, chain in enumerate(self.chains) for node in chain}
         self.folds = self._folds([p for p in pieces if p.fold])
         self.crossings = self._crossings([(p, *at) for p in pieces for at in p.crossings])
-        folded = {(p.sample, p.mode, p.sense) for pair in self.folds for p in pair}
-        self.open = sum(p.arrives < 0 and at not in folded for at, p in self.piece.items())
+        self._told = {(p.sample, p.mode, p.sense) for pair in self.folds for p in pair}
+        self._told |= {at for at, p in self.piece.items() if p.rim and not p.fold}
+        self.open = sum(self.untold(number) for number in range(len(self.chains)))
 
     def cyclic(self, number: int) -> bool:
         """Whether a branch comes back to where it begins."""
         chain = self.chains[number]
         return self.after.get(chain[-1]) == chain[0]
+
+    def untold(self, number: int) -> int:
+        """How many ends of a branch are neither folds at which another one ends nor at the rim of the range."""
+        if self.cyclic(number):
+            return 0
+        chain = self.chains[number]
+        return sum((*node, sense) not in self._told for node, sense in ((chain[0], -1), (chain[-1], 1)))
 
     def branch(self, piece: Piece) -> int:
         """The branch of a piece."""

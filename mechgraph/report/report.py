@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property, partial
-from typing import Any, get_args
+from typing import Any
 
-from mechgraph.arguments import option_faults
+from mechgraph.arguments import door
 from mechgraph.closure.assembly import assembled, assembled_at, named_columns
 from mechgraph.closure.rank import EngineName
 from mechgraph.data import json_text, plain
 from mechgraph.document import Document, Paragraph, Shown, to_markdown, to_text
-from mechgraph.errors import AssemblyError, DeclarationError, MechgraphError
-from mechgraph.model.declaration import mapping_faults
-from mechgraph.model.mechanism import Mechanism, check_mechanism
+from mechgraph.errors import AssemblyError, MechgraphError
+from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.tolerances import RANKS
 from mechgraph.report import brief, data, sections, sentences
 from mechgraph.report.facts import Facts, Geometry
@@ -84,6 +83,7 @@ def hinted(m: Mechanism, error: MechgraphError) -> MechgraphError:
     return error
 
 
+@door
 def check(
     m: Mechanism, at: Mapping[str, float] | None = None, *, engine: EngineName = "auto", tol: float | None = None
 ) -> DeterminacyReport:
@@ -101,10 +101,6 @@ def check(
     AssemblyError
         where ``at`` is given and cannot be reached. Without it, loops that cannot be closed are reported in ``note``.
     """
-    check_mechanism(m, "check")
-    faults = option_faults({"engine": (engine, get_args(EngineName))}) + mapping_faults(at=at)
-    if faults:
-        raise DeclarationError(f"check {m.name!r}", faults)
     graph = m.once(link_graph)
     if not m.has_geometry:
         return DeterminacyReport(m, graph, "Topology only: no geometry is declared.", asked=engine)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from mechgraph.arguments import items_of
+from mechgraph.arguments import door
 from mechgraph.atlas.identify import Identity, identify
 from mechgraph.atlas.multiple import MultipleJoint
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Shown, Table
@@ -93,7 +93,8 @@ class Structure(Shown):
             yield Table(("driver", "groups"), rows)
 
 
-def structure(m: Mechanism, drives: Iterable[str] | None = None, **options: Any) -> Structure:
+@door
+def structure(m: Mechanism, drives: str | Iterable[str] | None = None, **options: Any) -> Structure:
     """Chain, families and structural groups of a mechanism at its closed start.
 
     Parameters
@@ -113,14 +114,15 @@ def structure(m: Mechanism, drives: Iterable[str] | None = None, **options: Any)
     return Structure(report, _groups(report, drives), families)
 
 
-def groups(m: Mechanism, drives: Iterable[str] | None = None, **options: Any) -> Decomposition:
+@door
+def groups(m: Mechanism, drives: str | Iterable[str] | None = None, **options: Any) -> Decomposition:
     """Driver links and structural groups in the order in which they can be solved: the groups of ``structure`` alone."""
     return _groups(check(m, **options), drives)
 
 
-def _groups(report: DeterminacyReport, drives: Iterable[str] | None) -> Decomposition:
+def _groups(report: DeterminacyReport, drives: str | Iterable[str] | None) -> Decomposition:
     m, faults = report.mechanism, list[str]()
-    names = None if drives is None else items_of((drives,) if isinstance(drives, str) else drives, "drives", faults)
+    names = None if drives is None else (drives,) if isinstance(drives, str) else tuple(drives)
     known = {*m.freedom_names(), *(p.name for p in m.pairs if p.type.f == 1)}
     faults += [
         wrong(name, "drives", f"names of freedoms: {listed(sorted(known))}")

@@ -7,6 +7,8 @@ the other freedoms come to move much faster, a new chart takes over.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Literal
 
@@ -40,6 +42,15 @@ UNMOVED_BY_SPIN = 1e-9
 
 class Stopped(Exception):
     """The motion cannot be followed on; the message says why."""
+
+
+@contextmanager
+def stopping(what: str) -> Iterator[None]:
+    """What a function of a user raises stops the motion, which is kept up to there."""
+    try:
+        yield
+    except Exception as error:
+        raise Stopped(f"{what} raised {type(error).__name__}: {error}") from error
 
 
 @dataclass(frozen=True)

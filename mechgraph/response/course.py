@@ -8,6 +8,7 @@ from functools import cached_property, partial
 from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import CLOSED
@@ -131,7 +132,7 @@ class Response(Solution):
         """What the summary tells as plain data."""
         return dict(plain(response_data(self)))
 
-    def at(self, t: Any) -> Response:
+    def at(self, t: ArrayLike) -> Response:
         """The response at other times within those that were integrated (dense output of the stepper, closed and with all forces).
 
         At the time of an impact it is what was before.

@@ -12,10 +12,10 @@ import scipy
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.arguments import items_of
-from mechgraph.errors import DeclarationError
 from mechgraph.model.event import WHATS, Event
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import real_array, shown, wrong
+from mechgraph.response.chart import Stopped, stopping
 from mechgraph.result.solution import Solution
 
 ACCURACY = 1e-12
@@ -82,9 +82,10 @@ def _heights(event: Event, motion: Watched, t: Array) -> Array:
 
 
 def _height(event: Event, s: Solution) -> float:
-    height = real_array(event.of(s))
+    with stopping(f"event {event.text}"):
+        height = real_array(event.of(s))
     if height is None or height.size != 1 or not np.isfinite(height).all():
-        raise DeclarationError("respond", [f"event {event.text}: gave {shown(height)}; expected one finite number"])
+        raise Stopped(f"event {event.text}: gave {shown(height)}; expected one finite number")
     return float(height.reshape(())) - event.value
 
 

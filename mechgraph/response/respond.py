@@ -11,7 +11,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.arguments import items_of, option_faults
+from mechgraph.arguments import door, items_of, option_faults
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.ranges import BEYOND_END, beyond
 from mechgraph.closure.rank import closure_rank
@@ -20,7 +20,7 @@ from mechgraph.errors import AssemblyError, DeclarationError, MechgraphWarning, 
 from mechgraph.model.declaration import mapping_faults
 from mechgraph.model.event import Event
 from mechgraph.model.load_base import Load
-from mechgraph.model.mechanism import Mechanism, check_mechanism
+from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.response_setup import (
     METHODS,
     MethodName,
@@ -32,7 +32,7 @@ from mechgraph.model.response_setup import (
 from mechgraph.model.stop import Stop
 from mechgraph.report.report import hinted
 from mechgraph.response.along_path import Arc, PathStage
-from mechgraph.response.chart import Stopped
+from mechgraph.response.chart import Stopped, stopping
 from mechgraph.response.charts import ChartStage, Task
 from mechgraph.response.course import Course, Response
 from mechgraph.response.events import Occurrence, Watch, first_root, read_events
@@ -51,6 +51,7 @@ SOON = 1e-9
 """The same as a part of the time that is left."""
 
 
+@door
 def respond(
     m: Mechanism,
     t: Any = None,
@@ -104,7 +105,6 @@ def respond(
     ResponseError
         where the motion cannot be followed to its end, or is interrupted; carries the Response so far.
     """
-    check_mechanism(m, "respond")
     given = {"t": t, "start": start, "rates": rates, "motions": motions, "rtol": rtol, "atol": atol, "method": method}
     how = _how(m, given | {"events": events, "stops": stops, "passive": passive})
     faults = option_faults(
@@ -183,18 +183,20 @@ def _followed(
             if one.event.terminal:
                 last, why = one.t, str(one)
                 break
-    except (Stopped, KeyboardInterrupt) as stop:
+    except (Stopped, KeyboardInterrupt, DeclarationError) as stop:
+        if isinstance(stop, DeclarationError) and not course.integration.segments:
+            raise
         why = str(stop) or "interrupted"
         why = f"mechanism {course.mechanism.name!r}: the motion was followed to t = {course.reached:.6g} of {course.times[-1]:.6g}: {why}"
         out = course.outputs()
         if on_stop == "raise" or out is None:
-            raise ResponseError(why, out) from None
+            raise ResponseError(why, out) from (stop if isinstance(stop, DeclarationError) else stop.__cause__)
     else:
         out = course.outputs(last)
     assert out is not None
     out.stopped, out.events = why, tuple(happened)
     for warning in out.warnings:
-        warnings.warn(f"mechanism {course.mechanism.name!r}: {warning}", MechgraphWarning, stacklevel=3)
+        warnings.warn(f"mechanism {course.mechanism.name!r}: {warning}", MechgraphWarning, stacklevel=4)
     return out
 
 
@@ -211,7 +213,8 @@ def _occurrences(
             _first_stage(it, stops.held_task(), t, x, dq), t, end, first if np.isfinite(first) else None
         ):
             if progress is not None:
-                progress(segment.end)
+                with stopping("progress"):
+                    progress(segment.end)
             met = stops.met(course, segment.begin, segment.end) if stops.limits else None
             _end_at_ranges(course, segment.begin, segment.end if met is None else met)
             if met is not None:

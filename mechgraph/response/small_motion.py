@@ -17,14 +17,13 @@ import numpy as np
 import scipy
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.arguments import option_faults
+from mechgraph.arguments import door
 from mechgraph.closure.assembly import assembled_at, named_columns
 from mechgraph.closure.rates import Velocities
-from mechgraph.closure.solver import ENGINES, EngineName, engine_for
+from mechgraph.closure.solver import EngineName, engine_for
 from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, MechgraphWarning, ResponseError, counted, listed
-from mechgraph.model.declaration import mapping_faults
-from mechgraph.model.mechanism import Mechanism, check_mechanism
+from mechgraph.model.mechanism import Mechanism
 from mechgraph.response.chart import Chart, Closed
 from mechgraph.response.charts import Task
 from mechgraph.response.motion_equations import MASSLESS, Columns, Loads, in_unit_inertias
@@ -58,10 +57,8 @@ NAMED = 8
 class _Place:
     """Forces about a chart at rest."""
 
-    def __init__(self, m: Mechanism, call: str, where: str, at: Mapping[str, float] | None, engine: EngineName) -> None:
-        check_mechanism(m, call)
-        faults = option_faults({"engine": (engine, ENGINES)}) + mapping_faults(**{where: at})
-        faults += [
+    def __init__(self, m: Mechanism, call: str, at: Mapping[str, float] | None, engine: EngineName) -> None:
+        faults = [
             f"{one.where}{', '.join(one.over_positions)}: {OVER_POSITIONS}" for one in m.loads if one.over_positions
         ]
         if faults:
@@ -172,6 +169,7 @@ class Equilibrium(Mechanism):
         return _balanced, (self._arguments(), self.stable, self.solution)
 
 
+@door
 def equilibrium(m: Mechanism, start: Mapping[str, float] | None = None, *, engine: EngineName = "auto") -> Equilibrium:
     """A position in which the declared loads balance, with the declared drives at their place: Newton from ``start``.
 
@@ -186,7 +184,7 @@ def equilibrium(m: Mechanism, start: Mapping[str, float] | None = None, *, engin
     ResponseError
         where none is found.
     """
-    place = _Place(m, "equilibrium of", "start", start, engine)
+    place = _Place(m, "equilibrium of", start, engine)
     largest = 0.0
     for _ in range(EQUILIBRIUM_STEPS):
         Q, M, _, K = place.derivatives()
@@ -302,6 +300,7 @@ class Linearized(Shown):
         )
 
 
+@door
 def linearize(m: Mechanism, at: Mapping[str, float] | None = None, *, engine: EngineName = "auto") -> Linearized:
     """Small motions about the declared ``start`` or the coordinates ``at``, the drives at rest; meant for an equilibrium.
 
@@ -309,7 +308,7 @@ def linearize(m: Mechanism, at: Mapping[str, float] | None = None, *, engine: En
     ------
     DeclarationError, AssemblyError
     """
-    place = _Place(m, "linearize", "at", at, engine)
+    place = _Place(m, "linearize", at, engine)
     Q, M, C, K = place.derivatives()
     if np.linalg.eigvalsh(in_unit_inertias(M)).min() <= MASSLESS:
         raise DeclarationError(
@@ -321,7 +320,7 @@ def linearize(m: Mechanism, at: Mapping[str, float] | None = None, *, engine: En
             f"mechanism {m.name!r}: is not in equilibrium there (generalized forces of {np.abs(Q).max() / largest:.2g} of "
             "the largest that a load exerts); mg.equilibrium(m) finds a position that is",
             MechgraphWarning,
-            stacklevel=2,
+            stacklevel=3,
         )
     s, free = place.task.system, place.chart.free
     L = s.par.L

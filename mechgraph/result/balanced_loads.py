@@ -10,6 +10,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.arguments import place_among
 from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError
 from mechgraph.model.link import Link
@@ -47,6 +48,13 @@ class PointLoad(Shown):
     unique: Mask
     about: str
     distributed: bool = False
+    known_sizes: Array | None = None
+
+    @property
+    def sizes(self) -> Array:
+        """Sizes ``(..., 2)`` of moment and force, of what is unique of them; NaN where nothing is."""
+        parts = np.stack([self.moment, self.force], axis=-2)
+        return np.asarray(np.linalg.norm(parts, axis=-1)) if self.known_sizes is None else self.known_sizes
 
     @property
     def force(self) -> Array:
@@ -82,7 +90,8 @@ class Case(NamedTuple):
 class Range(NamedTuple):
     """Least and greatest value of a component (``Fx`` ..., ``|F|``, ``|M|``) of what one thing does, and the positions where they occur.
 
-    NaN (and position -1) where the component is not unique at some position.
+    ``|F|`` and ``|M|`` are those of what is unique. NaN (and position -1) where the component, or all of them, is not unique at some
+    position.
     """
 
     name: str
@@ -178,19 +187,21 @@ class BalancedLoads:
     def _greatest(self) -> dict[int, list[str]]:
         """Positions at which something is greatest that is not the same everywhere, and what; the first where everything is."""
         out: dict[int, list[str]] = {}
-        for what in ("force", "moment"):
-            sizes = {one.name: self._sizes(getattr(one, what)) for one in self.acting}
-            most = max((np.nanmax(size, initial=0.0) for size in sizes.values()), default=0.0)
-            for name, size in sizes.items():
+        for what, scale in zip(("moment", "force"), self.scales, strict=True):
+            for one in self.acting:
+                name, size = one.name, np.where(self._solved, one.sizes[..., int(what == "force")], np.nan).ravel()
                 largest = np.nanmax(size, initial=0.0)
-                if largest > SMALL * most and largest - np.nanmin(size) > SMALL * largest:
+                if largest > SMALL * scale and largest - np.nanmin(size) > SMALL * largest:
                     out.setdefault(int(np.nanargmax(size)), []).append(f"greatest {what} of {name}")
         return out or {i: [] for i in np.flatnonzero(self._solved)[:1].tolist()}
 
-    def _sizes(self, vectors: Array) -> Array:
-        """Sizes of what is known of vectors, flat; NaN where not solved."""
-        sizes = np.linalg.norm(np.nan_to_num(vectors), axis=-1)
-        return np.where(self._solved, sizes, np.nan).ravel()
+    @cached_property
+    def scales(self) -> tuple[float, float]:
+        """The largest moment and force, or what either makes of the other at the largest arm: beside it what is small is rounding."""
+        sizes = [one.sizes[self._solved].reshape(-1, 2) for one in self.acting]
+        moment, force = np.nanmax(np.concatenate([np.zeros((1, 2)), *sizes]), axis=0).tolist()
+        arm = max((float(np.linalg.norm(one.point)) for one in self.acting), default=0.0)
+        return max(moment, arm * force), max(force, moment / arm if arm else 0.0)
 
     def envelope(self) -> tuple[Range, ...]:
         """Least and greatest of every component of all that acts, over the solved positions."""
@@ -198,7 +209,7 @@ class BalancedLoads:
         units = {letter: unit_of(self.mechanism.units, (2 if letter == "M" else 1, 1, -2)) for letter in "MF"}
         for one in self.acting:
             values = dict(zip(COMPONENTS, np.moveaxis(one.wrench, -1, 0), strict=True))
-            values |= {f"|{letter}|": np.linalg.norm(v, axis=-1) for letter, v in (("F", one.force), ("M", one.moment))}
+            values |= {"|F|": one.sizes[..., 1], "|M|": one.sizes[..., 0]}
             for component, value in values.items():
                 flat = np.ravel(value)
                 known = np.where(np.ravel(self._solved), flat, np.nan)
@@ -210,7 +221,8 @@ class BalancedLoads:
 
     def not_unique(self, position: int) -> dict[str, tuple[str, ...]]:
         """What acts -> its components that equilibrium alone does not give, at a position."""
-        found = {one.name: one.unique.reshape(-1, 6)[position] for one in self.acting}
+        at = place_among(position, self.solution.status.size, "position", f"free body of {self.link.name!r}")
+        found = {one.name: one.unique.reshape(-1, 6)[at] for one in self.acting}
         return {
             name: tuple(c for c, known in zip(COMPONENTS, unique, strict=True) if not known)
             for name, unique in found.items()

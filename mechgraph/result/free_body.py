@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.arguments import door
 from mechgraph.document import Bullets, Document, Heading, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError
 from mechgraph.model.coupling import BaseCoupling
@@ -18,7 +19,8 @@ from mechgraph.model.load import Gravity
 from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker
-from mechgraph.result.balanced_loads import At, BalancedLoads, PointLoad, about_origin
+from mechgraph.report.report import check
+from mechgraph.result.balanced_loads import SMALL, At, BalancedLoads, PointLoad, about_origin
 from mechgraph.result.load_files import FORMATS
 from mechgraph.result.numbers import bracket, number
 from mechgraph.result.solution import Solution
@@ -46,17 +48,17 @@ class FreeBody(BalancedLoads, Shown):
     def document(self, at: At = "worst") -> Document:
         """What acts with its greatest force and moment, and the load cases at positions."""
         ranges = {(r.name, r.component): r for r in self.envelope()}
-        most = {
-            size: np.nanmax([r.greatest for r in ranges.values() if r.component == size], initial=0.0)
-            for size in ("|F|", "|M|")
-        }
+        most = dict(zip(("|F|", "|M|"), reversed(self.scales), strict=True))
         rows = []
         for one in self.acting:
             row = [one.name, one.kind, ", ".join(f"{x + 0.0:.6g}" for x in one.point)]
             for size, largest in most.items():
                 r = ranges[one.name, size]
                 row += (
-                    [number(r.greatest, largest), self.solution.place(r.at_greatest)]
+                    [
+                        number(r.greatest, largest),
+                        self.solution.place(r.at_greatest) if r.greatest > SMALL * largest else "",
+                    ]
                     if r.at_greatest >= 0
                     else ["not unique", ""]
                 )
@@ -68,14 +70,29 @@ class FreeBody(BalancedLoads, Shown):
         found = "" if np.isnan(self.balance) else f"; the sum of all is zero to {self.balance:.0e} of the largest"
         return Document(
             f"Loads on link {self.link.name} of {self.mechanism.name}",
-            (Paragraph(f"{words}{found}."), Table(head, rows, "lllrlrl"), Heading("Positions", 2), Bullets(cases)),
+            (
+                Paragraph(f"{words}{found}.{self._part()}"),
+                Table(head, rows, "lllrlrl"),
+                Heading("Positions", 2),
+                Bullets(cases),
+            ),
         )
+
+    def _part(self) -> str:
+        """What stands for that which is not unique."""
+        if all(one.unique[self._solved].all() for one in self.acting):
+            return ""
+        report = check(self.mechanism)
+        if report.own_forces_unique:
+            return f" All that a {report.kind.name} model has is unique; what else the pairs carry is not, and is left out."
+        return " Of what is not unique the part that is, at right angles to what self-stresses may add."
 
     def __repr__(self) -> str:
         names = ", ".join(one.name for one in self.acting)
         return f"FreeBody({self.link.name!r}, {np.size(self.solution.status)} positions, {names})"
 
 
+@door
 def free_body(s: Solution, link: str) -> FreeBody:
     """All that acts on a link, at points of it and in its own frame: what its pairs transmit, loads, and its inertia.
 
@@ -99,7 +116,8 @@ def free_body(s: Solution, link: str) -> FreeBody:
             other, marker = (pair.a, pair.markers[1]) if pair.b == link else (pair.b, pair.markers[0])
             wrench, unique = s.on_link(pair.name, link)
             about = f"{pair.type.symbol}, from {other}"
-            acting.append(PointLoad(pair.name, "pair", _point(marker.point), wrench, unique, about))
+            sizes = s.sizes_on_link(pair.name, link)
+            acting.append(PointLoad(pair.name, "pair", _point(marker.point), wrench, unique, about, known_sizes=sizes))
 
     def add(name: str, kind: str, point: Any, wrench: Array, about: str, distributed: bool = False) -> None:
         """What is known at every position, (M, F) about the global origin."""

@@ -7,14 +7,15 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
+from mechgraph.arguments import Count, Positive, door
 from mechgraph.document.tree import plain
 from mechgraph.errors import DeclarationError
 from mechgraph.quantities import wrong
-from mechgraph.result.balanced_loads import BalancedLoads, Case, PointLoad
+from mechgraph.result.balanced_loads import At, BalancedLoads, Case, PointLoad
 from mechgraph.result.numbers import bracket
 from mechgraph.units import BASE_UNITS, FORCE, LENGTH, MOMENT, unit_of
 from mechgraph.writing import Format, cell, csv_of, write_whole
@@ -64,17 +65,18 @@ def _at(one: PointLoad, case: Case) -> Any:
 # --- a deck for finite elements ----------------------------------------------------------------------------------------
 
 
+@door
 def load_deck(
     body: BalancedLoads,
-    path: Path,
-    at: Any = "worst",
+    path: str | os.PathLike[str],
+    at: At = "worst",
     *,
     model: str = "",
     held: str = "",
-    inertia: str = "wrench",
+    inertia: Literal["wrench", "acceleration"] = "wrench",
     elements: str = "EALL",
-    couples: float | None = None,
-    first_node: int = FIRST_NODE,
+    couples: Positive | None = None,
+    first_node: Count = FIRST_NODE,
 ) -> None:
     """Write a load deck of CalculiX or Abaqus: a node at every point at which something acts, in the link's frame, and a step a position.
 
@@ -97,7 +99,8 @@ def load_deck(
     DeclarationError
         where something is not unique at a position (``redundant="minimum_norm"`` gives one set of many, and the deck says so); FileError.
     """
-    faults = _option_faults(body, held, inertia, couples, first_node)
+    names = [one.name for one in body.acting]
+    faults = [] if held in ("", *names) else [wrong(held, "held", f"one of {', '.join(names)}")]
     cases = body.cases(at)
     unknown: dict[str, str] = {}
     for case in cases:
@@ -115,17 +118,6 @@ def load_deck(
         raise DeclarationError(f"load deck of {body.link.name!r}", faults)
     deck = _Deck(body, cases, model, held, inertia == "acceleration", elements, couples, first_node)
     write_whole(path, (f"{line}\n" for line in deck.lines()))
-
-
-def _option_faults(body: BalancedLoads, held: str, inertia: str, couples: Any, first_node: Any) -> list[str]:
-    names = [one.name for one in body.acting]
-    checks = (
-        (held == "" or held in names, held, "held", f"one of {', '.join(names)}"),
-        (inertia in ("wrench", "acceleration"), inertia, "inertia", "'wrench' or 'acceleration'"),
-        (couples is None or (isinstance(couples, int | float) and couples > 0), couples, "couples", "a length above 0"),
-        (isinstance(first_node, int) and first_node > 0, first_node, "first_node", "a number above 0"),
-    )
-    return [wrong(value, what, wanted) for fine, value, what, wanted in checks if not fine]
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,10 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.arguments import door
 from mechgraph.data import plain
 from mechgraph.document import Block, Document, Heading, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError
@@ -153,7 +155,7 @@ class OverTime(Shown):
                 f"Over time: {m.name}", (Paragraph(f"{self.duration.size} cases; ask for the figures by name."),)
             )
         over = (
-            f"over a whole cycle of {self.revolutions:.6g} revolutions"
+            f"over a whole cycle of {self.revolutions:.6g} revolution{'s' * (abs(float(self.revolutions)) != 1)}"
             if self.closed
             else "from the first position to the last"
         )
@@ -197,7 +199,8 @@ def _with_error(one: Figures) -> str:
     return f"{number(value)} ± {error:.1g}" if error > DOUBTFUL * abs(value) else number(value)
 
 
-def over_time(s: Solution, about: Any = (0.0, 0.0, 0.0)) -> OverTime:
+@door
+def over_time(s: Solution, about: ArrayLike = (0.0, 0.0, 0.0)) -> OverTime:
     """Peak, mean and RMS of driver efforts and powers and of the shaking force and moment, and the work, over time or a whole cycle.
 
     Positions need not be evenly spaced. Times are those of the motion, or follow from the rate of a driver that runs one way,

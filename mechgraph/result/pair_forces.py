@@ -25,6 +25,21 @@ TOGETHER = 300_000
 """Wrenches that are looked at together where all pairs are."""
 
 
+def _sizes(states: Array) -> Array:
+    """Sizes ``(T,)`` of what is unique of vectors ``(3, T)``: of their part at right angles to all that self-stresses add to them.
+
+    ``states (3, 1 + s, T)`` are the vectors and what the self-stresses have in them. NaN where these take every direction.
+    """
+    vectors, stress = states[:, 0], np.moveaxis(states[:, 1:], -1, 0)
+    if not stress.shape[-1]:
+        return np.asarray(np.linalg.norm(vectors, axis=0))
+    ways, sizes, _ = np.linalg.svd(stress, full_matrices=False)
+    loose = sizes > UNIQUE
+    along = np.einsum("tij,it->tj", ways, vectors) * loose
+    left = vectors - np.einsum("tij,tj->it", ways, along)
+    return np.where(loose.sum(axis=-1) == len(vectors), np.nan, np.linalg.norm(left, axis=0))
+
+
 def _touched(stress: Array, scale: float = 1.0) -> Mask:
     """Where self-stresses have a part: ``stress (..., s, T)``."""
     return np.asarray(np.sqrt((stress * stress).sum(axis=-2)) > UNIQUE * scale)
@@ -62,8 +77,8 @@ class PairForces(Kept):
         coefficients = self._system.coupling_matrix[touching, columns, 0]
         return np.asarray(np.einsum("gf,g...->f...", coefficients, self._of(name)[touching]))
 
-    def on_link(self, pair: int, link: int) -> tuple[Array, Mask]:
-        """What a pair transmits to one of its links, in the link's frame about its marker there; and what of it is unique."""
+    def on_link(self, pair: int, link: int) -> tuple[Array, Mask, Array]:
+        """What a pair transmits to one of its links, in the link's frame about its marker there; what of it is unique; sizes of that."""
         s, states = self._system, self._transmitted(pair)
         sign, side = (1.0, 1) if s.b[pair] == link else (-1.0, 0)
         p = np.asarray(self.whole.pairs[pair].markers[side].point, dtype=float)
@@ -78,7 +93,10 @@ class PairForces(Kept):
         found = self._evaluated(seen)
         unit = np.repeat([self._L**2, self._L], 3)[:, None]
         unique = (~_touched(found[:, 1:]) & self._solved).astype(float)
-        return self._out(self._masked(sign * unit * found[:, 0], found[:, 1:])), self._out(unique).astype(bool)
+        known = found[:, :1] if self.least_norm else found
+        sizes = np.stack([self._L**2 * _sizes(known[:3]), self._L * _sizes(known[3:])])
+        wrench = self._out(self._masked(sign * unit * found[:, 0], found[:, 1:]))
+        return wrench, self._out(unique).astype(bool), self._out(sizes)
 
     def _about_origin(self, value: Array, stress: Array) -> Array:
         """Wrench ``(6, T)`` in the user's units about the global origin, NaN where ``stress (6, s, T)`` has a part."""
@@ -95,6 +113,11 @@ class PairForces(Kept):
         stress = shift_wrench(self._of("stress")[:, pair], point[:, None])
         scale = np.repeat([self._L**2, self._L], 3)[:, None]
         return self._out(self._masked(scale * shift_wrench(reactions, point), stress))
+
+    def magnitude(self, pair: int) -> Array:
+        """Size of what is unique of the force of the reaction."""
+        states = np.concatenate([self._force("reactions")[3:, pair][:, None], self._of("stress")[3:, pair]], axis=1)
+        return self._out(self._L * _sizes(states[:, :1] if self.least_norm else states)[None])[..., 0]
 
     def components(self, pair: int) -> dict[str, Array]:
         """Reaction components by name."""

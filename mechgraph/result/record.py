@@ -8,7 +8,8 @@ from typing import Annotated
 
 import numpy as np
 
-from mechgraph.result.contacts import LiftOff, lift_offs
+from mechgraph.result.contact_ranges import LiftOff, Overlap
+from mechgraph.result.contacts import lift_offs, overlaps
 from mechgraph.result.extremes import Greatest, Range, efforts, multipliers, reactions
 from mechgraph.result.places import OK, Places, coupling_unit
 from mechgraph.result.values import LoadBearing, Values
@@ -108,6 +109,7 @@ class SolutionData:
     reactions: tuple[ReactionData, ...]
     warnings: Annotated[tuple[LoadBearing, ...], "passive freedoms that carry load"]
     lift_off: Annotated[tuple[LiftOff, ...], "positions at which contacts that are only pushed would have to pull"]
+    overlap: Annotated[tuple[Overlap, ...], "positions at which the elements of contacts cut into each other"]
     passive: Annotated[tuple[str, ...], "names of all passive freedoms"]
     checks: ChecksData
     engine: str
@@ -145,6 +147,7 @@ def solution_data(values: Values) -> SolutionData:
         _reactions(places) if forces else (),
         values.load_bearing(),
         lift_offs(values),
+        overlaps(values),
         tuple(values.passive_efforts()) if forces else (),
         ChecksData(*worst),
         values.engine,

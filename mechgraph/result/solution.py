@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.arguments import place_among
 from mechgraph.data import json_text, plain
 from mechgraph.document import Document, Shown, to_text
 from mechgraph.equations.state import State
@@ -18,7 +20,8 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.newton import Work
 from mechgraph.quantities import wrong
 from mechgraph.result import export
-from mechgraph.result.contacts import ContactResult, LiftOff, contacts_of, lift_offs, place_of_contact
+from mechgraph.result.contact_ranges import LiftOff, Overlap
+from mechgraph.result.contacts import ContactResult, contacts_of, lift_offs, overlaps, place_of_contact
 from mechgraph.result.places import OK, Places
 from mechgraph.result.record import solution_data
 from mechgraph.result.summary import summary
@@ -27,8 +30,6 @@ from mechgraph.result.values import Checks, LoadBearing, LoadResult, Mask, Value
 from mechgraph.result.views import CouplingResult, LinkResult, PairResult
 
 if TYPE_CHECKING:
-    import os
-
     import pandas
     import xarray
 
@@ -38,6 +39,8 @@ class Solution(Shown):
 
     It can be pickled where its loads can: those that hold numbers, or a function of a module.
     """
+
+    _wanted = "a Solution; mg.solve(mechanism) makes one"
 
     def __init__(self, values: Values) -> None:
         self._values = values
@@ -96,7 +99,11 @@ class Solution(Shown):
                     )
                 ],
             )
-        return self._values.on_link(k, i)
+        return self._values.on_link(k, i)[:2]
+
+    def sizes_on_link(self, pair: str, link: str) -> Array:
+        """Sizes ``(..., 2)`` of what is unique of moment and force in ``on_link``, whichever directions that has."""
+        return self._values.on_link(self.whole.place_of_pair(pair), self.whole.place_of_link(link))[2]
 
     def coupling(self, name: str) -> CouplingResult:
         """Values of a coupling."""
@@ -114,19 +121,8 @@ class Solution(Shown):
 
     def load(self, index: int) -> LoadResult:
         """What the load of that number in ``mechanism.loads`` does: wrenches on links, power, and how a force law is read."""
-        count = len(self.mechanism.loads)
-        if type(index) is not int or not 0 <= index < count:
-            raise DeclarationError(
-                f"load of {self.mechanism.name!r}",
-                [
-                    wrong(
-                        index,
-                        "index",
-                        f"a number below {count}, counted from 0" if count else "none, as there are no loads",
-                    )
-                ],
-            )
-        return self._values.load(index)
+        of = f"load of {self.mechanism.name!r}"
+        return self._values.load(place_among(index, len(self.mechanism.loads), "index", of))
 
     @property
     def has_forces(self) -> bool:
@@ -183,9 +179,9 @@ class Solution(Shown):
         return self._values.passive_efforts()
 
     @property
-    def warnings(self) -> tuple[LoadBearing | LiftOff, ...]:
-        """What makes reactions doubtful: passive freedoms that carry load, and contacts that would have to pull."""
-        return (*self._values.load_bearing(), *lift_offs(self._values))
+    def warnings(self) -> tuple[LoadBearing | LiftOff | Overlap, ...]:
+        """What is doubtful: passive freedoms that carry load, contacts that would have to pull or whose elements cut into each other."""
+        return (*self._values.load_bearing(), *lift_offs(self._values), *overlaps(self._values))
 
     def document(self, asked: bool = False) -> Document:
         """What ``print`` shows; ``asked`` as in ``summary()``, also what takes long."""
@@ -219,9 +215,9 @@ class Solution(Shown):
 
     def place(self, index: int) -> str:
         """A position of the flat batch in words: the values of the drivers, or its time."""
-        return Places(self._values).full_name(index)
+        return Places(self._values).full_name(place_among(index, self.status.size, "index", "place of a position"))
 
-    def state(self, index: Any = ()) -> State:
+    def state(self, index: int | slice | tuple[int, ...] = ()) -> State:
         """Screws, loads and coordinates at one position, for ``Formulation.assemble``."""
         return self._values.state(index)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Table
 from mechgraph.errors import counted
-from mechgraph.result.contacts import contacts_of, lift_offs
+from mechgraph.result.contacts import contacts_of, lift_offs, overlaps
 from mechgraph.result.extremes import Greatest, Range, Reactions, efforts, multipliers, reactions
 from mechgraph.result.numbers import SHOWN_AS_ZERO, bracket, number, with_unit
 from mechgraph.result.places import OK, Places, coupling_unit
@@ -266,7 +266,7 @@ class _View(Places):
         yield Table(head[:width], tuple(row[:width] for row in rows), align="lrrrrrr"[:width])
         if len(found) > LISTED:
             yield Paragraph(f"And {len(found) - LISTED} more: s.contacts.")
-        items = [found.text for found in lift_offs(self.values)]
+        items = [found.text for found in (*lift_offs(self.values), *overlaps(self.values))]
         if items:
             yield Bullets(_shortened(items))
 

@@ -166,8 +166,13 @@ class Values(Protocol):
     def total(self, pair: int) -> Array:
         """Total wrench of a pair about the global origin, ``(..., 6)``."""
 
-    def on_link(self, pair: int, link: int) -> tuple[Array, Mask]:
-        """What a pair transmits to one of its links, (M, F) in its frame about the marker there, and whether unique, ``(..., 6)``."""
+    def on_link(self, pair: int, link: int) -> tuple[Array, Mask, Array]:
+        """What a pair transmits to one of its links, (M, F) in its frame about the marker there, and whether unique, ``(..., 6)``;
+        sizes of what is unique of M and F ``(..., 2)``.
+        """
+
+    def magnitude(self, pair: int) -> Array:
+        """Size of what is unique of the force of the reaction, ``(...)``."""
 
     def reaction_at_pair(self, pair: int) -> Array:
         """Reaction about the origin of marker B, global directions, ``(..., 6)``."""

@@ -69,6 +69,14 @@ class PairResult(Shown):
         return self._values.reaction_at_pair(self._index)[..., 3:]
 
     @property
+    def magnitude(self) -> Array:
+        """Size ``(...)`` of what is unique of the force: of its part at right angles to the forces that self-stresses may add.
+
+        In a planar mechanism that is the force in its plane. NaN where nothing of it is unique.
+        """
+        return self._values.magnitude(self._index)
+
+    @property
     def moment(self) -> Array:
         """Moment of the reaction ``(..., 3)`` about the origin of marker B, global directions."""
         return self._values.reaction_at_pair(self._index)[..., :3]
@@ -109,6 +117,7 @@ def pair_units(units: Mapping[str, str], row: PairType) -> dict[str, Any]:
         "effort": efforts,
         "applied_effort": efforts,
         "force": force,
+        "magnitude": force,
         "moment": moment,
         "reaction": (moment,) * 3 + (force,) * 3,
         "total": (moment,) * 3 + (force,) * 3,

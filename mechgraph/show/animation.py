@@ -8,15 +8,16 @@ import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.arguments import Positive, door
 from mechgraph.errors import DeclarationError
 from mechgraph.quantities import wrong
 from mechgraph.result.solution import Solution
-from mechgraph.show.canvas import colours, new_axes
+from mechgraph.show.canvas import DRAWN, Dpi, Size, colours, new_axes
 from mechgraph.show.scene import Scene, scene
 from mechgraph.show.skeleton import Drawing, painter_for
 from mechgraph.writing import Format, format_of, optional, whole_file, writable
@@ -29,18 +30,19 @@ SHOWN = 12
 Frames = Callable[[], Iterator[Any]]
 
 
+@door
 def animate(
     s: Solution,
     path: str | os.PathLike[str],
     *,
     frames: int | Sequence[int] | None = None,
-    fps: float = 20.0,
+    fps: Positive = 20.0,
     forces: bool = False,
     traces: bool | Sequence[str] = True,
     labels: bool = True,
     view: tuple[float, float] = (24.0, -58.0),
-    size: tuple[float, float] = (6.4, 4.8),
-    dpi: float = 100.0,
+    size: Size = (6.4, 4.8),
+    dpi: Dpi = 100.0,
     progress: Callable[[int, int], None] | None = None,
 ) -> None:
     """Write a film of the mechanism over its positions: ``.gif``, ``.mp4`` (needs ffmpeg, or the ``film`` extra) or ``.png``.
@@ -66,8 +68,6 @@ def animate(
     writable(path)
     found = scene(s, forces=forces)
     chosen = _chosen(found, frames)
-    if not isinstance(fps, int | float) or not fps > 0:
-        raise DeclarationError(f"film of {found.mechanism.name!r}", [wrong(fps, "fps", "a positive number")])
     film = _Film(found, chosen, traces, labels, view, size)
 
     def drawn() -> Iterator[Any]:
@@ -179,7 +179,8 @@ FORMATS = (
 """What a film can be written as."""
 
 
-def save_picture(ax: Any, path: str | os.PathLike[str], *, dpi: float = 150.0) -> None:
+@door
+def save_picture(ax: Annotated[Any, DRAWN], path: str | os.PathLike[str], *, dpi: Dpi = 150.0) -> None:
     """Write the figure of axes, whole or not at all, as the suffix says: ``.png``, ``.svg`` or ``.pdf``; the same bytes each time.
 
     Raises

@@ -2,12 +2,31 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
+import io
 from collections.abc import Sequence
-from typing import Any
+from typing import Annotated, Any
 
+from mechgraph.arguments import Wanted
 from mechgraph.errors import MissingExtraError, visible
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.quantities import is_numeric
+
+MOST_DPI, MOST_INCHES, PNG_DPI = 10_000, 400, 110
+
+
+def _sized(value: Any) -> bool:
+    return is_numeric(value, (2,)) and min(value) >= 0.1 and max(value) <= MOST_INCHES
+
+
+DRAWN = Wanted(lambda value: hasattr(value, "get_figure"), "axes of matplotlib")
+Axes = Annotated[Any, Wanted(lambda value: value is None or DRAWN.fits(value), DRAWN.words)]
+"""Axes to draw on, or None for new ones."""
+Dpi = Annotated[
+    float, Wanted(lambda value: is_numeric(value, ()) and 10 <= value <= MOST_DPI, f"a number from 10 to {MOST_DPI}")
+]
+Size = Annotated[tuple[float, float], Wanted(_sized, f"width and height, inches from 0.1 to {MOST_INCHES}")]
 
 INK = "#1f2933"
 MUTED = "#7b8794"
@@ -33,7 +52,18 @@ def new_axes(size: tuple[float, float] | None = None, **options: Any) -> Any:
         from matplotlib.figure import Figure
     except ImportError:
         raise MissingExtraError("matplotlib", "plot") from None
-    return Figure(figsize=size, layout="constrained").add_subplot(**options)
+    ax: Any = Figure(figsize=size, layout="constrained").add_subplot(**options)
+    ax._repr_png_ = functools.partial(
+        _png, ax.figure
+    )  # a notebook shows axes by their name, and only figures of pyplot
+    return ax
+
+
+def _png(figure: Any) -> bytes:
+    """The picture of a figure."""
+    file = io.BytesIO()
+    figure.savefig(file, format="png", dpi=PNG_DPI)
+    return file.getvalue()
 
 
 def toolkit(name: str) -> Any:

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.arguments import door
 from mechgraph.atlas.chain import Chain
 from mechgraph.closure.indexing import Index
 from mechgraph.errors import DeclarationError
-from mechgraph.show.canvas import INK, MUTED, PALETTE, bare, new_axes
+from mechgraph.show.canvas import INK, MUTED, PALETTE, Axes, bare, new_axes
 
 MOST_ON_A_PAGE = 240
 """Chains on one page."""
@@ -31,6 +32,7 @@ MARKERS, OTHER = {"R": "o", "P": "s"}, "D"
 MARKER_SIZE = {"o": 14, "s": 20, "D": 60}
 
 
+@door
 def draw_chains(chains: Iterable[Chain], *, columns: int = 6, titles: Iterable[str] | None = None) -> Any:
     """Draw chains on one page, numbered in their order; returns the figure.
 
@@ -52,7 +54,7 @@ def draw_chains(chains: Iterable[Chain], *, columns: int = 6, titles: Iterable[s
     return figure
 
 
-def _draw(chain: Chain, ax: Any) -> None:
+def _draw(chain: Chain, ax: Axes) -> None:
     from matplotlib.patches import Polygon
 
     joints_of = [[k for k, joint in enumerate(chain.joints) if link in joint] for link in range(chain.links)]

@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.arguments import door
 from mechgraph.errors import DeclarationError
 from mechgraph.quantities import shown
 from mechgraph.response.course import Response
 from mechgraph.result.solution import Solution
-from mechgraph.show.canvas import HATCH, INK, MUTED, PALETTE, new_axes, plain, said, with_unit
+from mechgraph.show.canvas import HATCH, INK, MUTED, PALETTE, Axes, new_axes, plain, said, with_unit
 from mechgraph.show.margins import margins
 from mechgraph.units import unit_of
 
@@ -121,12 +122,13 @@ def hatched_strips(ax: Any, x: Abscissa, lost: Sequence[tuple[str, Array, str]])
         ax.add_patch(strip)
 
 
+@door
 def effort_curve(
     s: Solution,
     freedom: str | Iterable[str] | None = None,
     *,
     over: str | None = None,
-    ax: Any = None,
+    ax: Axes = None,
     marked: int | None = None,
 ) -> Any:
     """Draw what drivers supply, and where loads act in their freedoms what these do. Returns the axes.
@@ -151,7 +153,7 @@ def effort_curve(
     x = abscissa(s, over)
     ax = new_axes() if ax is None else ax
     found = {name: _driver_effort(s, name) for name in names}
-    sides = dict.fromkeys((effort.couple for effort in found.values()), ax)
+    sides: dict[bool, Any] = dict.fromkeys((effort.couple for effort in found.values()), ax)
     if len(sides) == 2:
         sides[False] = ax.twinx()
     several, entries = len(names) > 1, 0
@@ -228,8 +230,9 @@ def _legend(ax: Any, others: Sequence[Any], entries: int) -> None:
     ax.legend([handle for handle, _ in found], [label for _, label in found], frameon=False)
 
 
+@door
 def reaction_curve(
-    s: Solution, pair: str, *, moment: bool = False, over: str | None = None, ax: Any = None, marked: int | None = None
+    s: Solution, pair: str, *, moment: bool = False, over: str | None = None, ax: Axes = None, marked: int | None = None
 ) -> Any:
     """Draw the components of a pair's reaction in its own frame, with their ranges in the legend. Returns the axes.
 
@@ -285,7 +288,8 @@ def reaction_curve(
     return ax
 
 
-def margin_curve(s: Solution, *, over: str | None = None, ax: Any = None) -> Any:
+@door
+def margin_curve(s: Solution, *, over: str | None = None, ax: Axes = None) -> Any:
     """Draw over the positions how far they are from singular ones. Returns the axes.
 
     The smallest singular value of the scaled closure equations that was kept, over the largest, with the drivers free (a change point

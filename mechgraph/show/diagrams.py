@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.arguments import door
 from mechgraph.equations.formulation import Formulation
-from mechgraph.model.mechanism import Mechanism, check_mechanism
-from mechgraph.show.canvas import FAINT, HATCH, INK, MUTED, PALETTE, bare, colours, new_axes, said
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.show.canvas import FAINT, HATCH, INK, MUTED, PALETTE, Axes, bare, colours, new_axes, said
 from mechgraph.show.painting import FlatPainter, inside
 from mechgraph.structure.decomposition import Decomposition
 from mechgraph.topology.linkgraph import link_graph
@@ -27,14 +28,14 @@ LABELLED = 64
 """Equations and unknowns up to which each is named beside the pattern; beyond, their owners are."""
 
 
-def draw_graph(m: Mechanism, *, ax: Any = None) -> Any:
+@door
+def draw_graph(m: Mechanism, *, ax: Axes = None) -> Any:
     """Draw the link-pair graph: links as dots, pairs as lines between them, coloured by the loops that they lie in. Returns the axes.
 
     A pair in several loops has a strand for each; one in no loop is grey. The frame is a square. Dotted lines are couplings.
     """
     from mechgraph.show.layout import places
 
-    check_mechanism(m, "draw_graph")
     loops = [tuple(m.pairs[k].name for k, _ in loop) for loop in m.once(link_graph).loops]
     at = places(m.link_names(), ((p.a, p.b) for p in m.pairs))
     canvas = _Canvas(ax, np.array(list(at.values())))
@@ -87,7 +88,8 @@ def _edges(m: Mechanism, at: dict[str, Array]) -> Iterator[tuple[str, Array]]:
         yield pair.name, (1 - u) * p + u * q + 4 * u * (1 - u) * BULGE * side * across
 
 
-def draw_structure(m: Mechanism, *, groups: Decomposition | None = None, ax: Any = None) -> Any:
+@door
+def draw_structure(m: Mechanism, *, groups: Decomposition | None = None, ax: Axes = None) -> Any:
     """Draw the structural diagram: links as lines between two pairs and as polygons between more, pairs as crossed circles.
 
     Returns the axes. The frame is hatched, a dotted line ties the pairs of a coupling. Nothing is to scale: it is the graph alone. With
@@ -95,7 +97,6 @@ def draw_structure(m: Mechanism, *, groups: Decomposition | None = None, ax: Any
     """
     from mechgraph.show.layout import places
 
-    check_mechanism(m, "draw_structure")
     of_link = {name: [p.name for p in m.pairs if name in (p.a, p.b)] for name in m.link_names()}
     at = places((p.name for p in m.pairs), chain.from_iterable(combinations(names, 2) for names in of_link.values()))
     canvas = _Canvas(ax, np.array(list(at.values())))
@@ -208,7 +209,8 @@ class _Canvas:
         painter.fit(free, arranged.room)
 
 
-def draw_sparsity(f: Formulation, *, ax: Any = None) -> Any:
+@door
+def draw_sparsity(f: Formulation, *, ax: Axes = None) -> Any:
     """Draw which unknown appears in which equation, with their names; equations of one owner have one colour. Returns the axes.
 
     Up to 64 equations each is named, beyond that their owners are. Lines separate the equations of links, pairs and couplings.

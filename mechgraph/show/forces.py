@@ -7,17 +7,19 @@ from typing import Any, Literal
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.arguments import door
 from mechgraph.errors import DeclarationError
 from mechgraph.result.solution import Solution
 from mechgraph.show.acting import known_force
-from mechgraph.show.canvas import HATCH, INK, MUTED, PALETTE, REACTION, new_axes, plain, said, with_unit
+from mechgraph.show.canvas import HATCH, INK, MUTED, PALETTE, REACTION, Axes, new_axes, plain, said, with_unit
 from mechgraph.show.curves import known_pair
 from mechgraph.show.scene import place_of
 from mechgraph.show.stage import Stage
 from mechgraph.units import unit_of
 
 
-def reaction_ranges(s: Solution, *, moment: bool = False, ax: Any = None) -> Any:
+@door
+def reaction_ranges(s: Solution, *, moment: bool = False, ax: Axes = None) -> Any:
     """Draw from what to what the reactions of all pairs range over the positions. Returns the axes.
 
     One bar a pair: the size of its force (of its couple about its own point with ``moment``), the dot where the mean is. Where parts are
@@ -87,7 +89,8 @@ def _sizes(s: Solution, pair: str, moment: bool) -> tuple[Array, list[str], bool
     return size, parts, True
 
 
-def polar_force(s: Solution, pair: str, *, on: Literal["a", "b"] = "a", ax: Any = None) -> Any:
+@door
+def polar_force(s: Solution, pair: str, *, on: Literal["a", "b"] = "a", ax: Axes = None) -> Any:
     """Draw how the force in a bearing turns: its part across the axis in polar coordinates, fixed on a link. Returns the axes.
 
     The force of link a on link b, the angle counted about the axis from x of the marker on the chosen link: where a housing (``on="a"``) or

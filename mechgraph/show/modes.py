@@ -17,27 +17,28 @@ MOST_SHOWN = 16
 
 
 def draw_assemblies(modes: Assemblies) -> Any:
-    """The skeletons of all assemblies side by side, numbered; the figure.
+    """The skeletons of all assemblies side by side, numbered, then a point of every continuum; the figure.
 
     Raises
     ------
     DeclarationError
         where there is none.
     """
-    if not len(modes):
+    drawn = [*zip(modes.modes, modes.kinds, strict=True), *((one.point, "continuum") for one in modes.continua)]
+    if not drawn:
         raise DeclarationError(f"picture of {modes.mechanism.name!r}", ["there is no real assembly to draw"])
-    shown = modes.modes[:MOST_SHOWN]
+    shown = drawn[:MOST_SHOWN]
     columns = int(np.ceil(np.sqrt(len(shown))))
     rows = -(-len(shown) // columns)
-    probe = draw_skeleton(shown[0])
+    probe = draw_skeleton(shown[0][0])
     projection = getattr(probe, "name", "rectilinear")
     first = new_axes((3.2 * columns, 3.0 * rows), projection=projection)
     figure = first.figure
     figure.clear()
-    for i, mode in enumerate(shown):
+    for i, (mode, kind) in enumerate(shown):
         ax = figure.add_subplot(rows, columns, i + 1, projection=projection)
         draw_skeleton(mode, ax=ax)
-        ax.set_title(f"{i} ({modes.kinds[i]})", fontsize=9)
+        ax.set_title(f"{i} ({kind})", fontsize=9)
     return figure
 
 

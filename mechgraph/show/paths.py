@@ -8,15 +8,19 @@ from typing import Any, Literal
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.arguments import door
 from mechgraph.errors import DeclarationError
 from mechgraph.quantities import shown
+from mechgraph.response.course import Response
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import MaterialPoint
-from mechgraph.show.canvas import INK, MUTED, PALETTE, new_axes, plain, said, with_unit
+from mechgraph.show.canvas import INK, MUTED, PALETTE, Axes, new_axes, plain, said, with_unit
 from mechgraph.show.scene import place_of
 from mechgraph.show.stage import Stage
 from mechgraph.units import unit_of
 
+FINE = 400
+"""Points that the path of a response has at least."""
 STILL = 1e-6
 """Path of a point over the longest below which it stands still."""
 RANK = {"position": 0, "velocity": 1, "acceleration": 2}
@@ -46,7 +50,8 @@ def motion_of(s: Solution, point: str) -> MaterialPoint:
     raise DeclarationError(f"path in {m.name!r}", [f"there is no point {shown(point)}; points: {', '.join(there)}"])
 
 
-def point_path(s: Solution, points: str | Iterable[str] | None = None, *, ax: Any = None) -> Any:
+@door
+def point_path(s: Solution, points: str | Iterable[str] | None = None, *, ax: Axes = None) -> Any:
     """Draw the paths of points: in the plane of a plane mechanism, else in space. Returns the axes.
 
     Parameters
@@ -60,16 +65,17 @@ def point_path(s: Solution, points: str | Iterable[str] | None = None, *, ax: An
     DeclarationError
         where there is no such point; MissingExtraError without matplotlib.
     """
-    names = _names(s, points)
+    s, names = _finely(s), _names(s, points)
     return _draw(s, {name: motion_of(s, name).position for name in names}, 0, ax)
 
 
+@door
 def hodograph(
     s: Solution,
     points: str | Iterable[str] | None = None,
     *,
     of: Literal["velocity", "acceleration"] = "velocity",
-    ax: Any = None,
+    ax: Axes = None,
 ) -> Any:
     """Draw the hodograph of points: the curve of the tips of their velocities (or accelerations), from one origin. Returns the axes.
 
@@ -79,7 +85,16 @@ def hodograph(
         raise DeclarationError(
             f"hodograph of {s.mechanism.name!r}", [f"of = {of!r}: expected 'velocity' or 'acceleration'"]
         )
+    s = _finely(s)
     return _draw(s, {name: getattr(motion_of(s, name), of) for name in _names(s, points)}, RANK[of], ax)
+
+
+def _finely(s: Solution) -> Solution:
+    """A response at times between its outputs too, so that its paths are curves."""
+    if not isinstance(s, Response) or len(s.t) < 2:
+        return s
+    between = np.linspace(0.0, 1.0, max(2, -(-FINE // (len(s.t) - 1)) + 1))[:-1]
+    return s.at(np.append((s.t[:-1, None] + np.diff(s.t)[:, None] * between).ravel(), s.t[-1]))
 
 
 def _names(s: Solution, points: str | Iterable[str] | None) -> list[str]:

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.arguments import door
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.result.solution import Solution
-from mechgraph.show.canvas import HATCH, INK, LOAD, MUTED, REACTION, bare, colours, new_axes
+from mechgraph.show.canvas import HATCH, INK, LOAD, MUTED, REACTION, Axes, bare, colours, new_axes
 from mechgraph.show.painting import FlatPainter, Painter, SpacePainter, edges_of, inside, shaded
 from mechgraph.show.scene import Part, Scene, scene
 from mechgraph.units import unit_of
@@ -39,11 +40,12 @@ ABOVE = {"plate": 2.0, "foot": 2.1, "guide": 3.0, "spring": 5.0, "load": 6.0, "d
 """Height of roles over others; links and symbols lie together at 4, sorted by depth."""
 
 
+@door
 def draw_skeleton(
     s: Solution | Mechanism,
     position: int = 0,
     *,
-    ax: Any = None,
+    ax: Axes = None,
     ghosts: int = 5,
     traces: bool | Sequence[str] = True,
     labels: bool = True,

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.arguments import Count, door
 from mechgraph.errors import DeclarationError
 from mechgraph.quantities import wrong
-from mechgraph.show.canvas import INK, PALETTE, new_axes, plain, said, with_unit
+from mechgraph.show.canvas import INK, PALETTE, Axes, new_axes, plain, said, with_unit
 from mechgraph.show.curves import Abscissa, lay_out
 from mechgraph.units import unit_of
 from mechgraph.variants.result import Study
@@ -18,15 +19,19 @@ BANDS = ((0.00135, 0.99865), (0.05, 0.95), (0.25, 0.75))
 """Quantiles between which bands are drawn: three standard deviations of a normal distribution to each side, nine tenths, half."""
 MOST_BARS = 20
 
+BinsName = Literal["auto", "fd", "doane", "scott", "stone", "rice", "sturges", "sqrt"]
+"""Rules of ``numpy.histogram_bin_edges``."""
 
+
+@door
 def study_histogram(
     study: Study,
     output: str,
     *,
     position: int | None = None,
     part: int | None = None,
-    bins: int | str = "auto",
-    ax: Any = None,
+    bins: Count | BinsName = "auto",
+    ax: Axes = None,
 ) -> Any:
     """Draw how an output is spread over the variants, with the mechanism itself, the mean and the quantiles. Returns the axes.
 
@@ -68,7 +73,8 @@ def study_histogram(
     return ax
 
 
-def study_bands(study: Study, output: str, *, over: str | None = None, part: int | None = None, ax: Any = None) -> Any:
+@door
+def study_bands(study: Study, output: str, *, over: str | None = None, part: int | None = None, ax: Axes = None) -> Any:
     """Draw the quantiles of an output over the positions, as bands about the median, with the mechanism itself. Returns the axes.
 
     Parameters
@@ -100,8 +106,9 @@ def study_bands(study: Study, output: str, *, over: str | None = None, part: int
     return ax
 
 
+@door
 def study_tornado(
-    study: Study, output: str, *, position: int | None = None, part: int | None = None, ax: Any = None
+    study: Study, output: str, *, position: int | None = None, part: int | None = None, ax: Axes = None
 ) -> Any:
     """Draw what every parameter alone changes of an output, to first order, at its ends, the largest on top. Returns the axes.
 

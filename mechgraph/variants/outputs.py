@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.arguments import items_of
 from mechgraph.errors import DeclarationError, did_you_mean, listed, near_names
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import shown, wrong
@@ -28,6 +29,7 @@ def _properties(kind: type) -> tuple[str, ...]:
     return tuple(n for n, v in vars(kind).items() if isinstance(v, property) and n not in ("units", "components"))
 
 
+RANKS = ("position", "velocity", "acceleration")
 OF_PAIR, OF_LINK = _properties(PairResult), _properties(LinkResult)
 
 
@@ -42,12 +44,14 @@ def named_outputs(m: Mechanism, outputs: Any, parameters: Iterable[str]) -> dict
     if isinstance(outputs, str):
         outputs = [outputs]
     if not isinstance(outputs, Mapping):
-        if not isinstance(outputs, Iterable) or not all(isinstance(name, str) for name in outputs):
+        unlisted: list[str] = []
+        names = items_of(outputs, "", unlisted)
+        if unlisted or not all(isinstance(name, str) for name in names):
             raise DeclarationError(
                 "study: outputs",
                 [wrong(outputs, "outputs", "names, or a mapping name -> name or function of a Solution")],
             )
-        outputs = {name: name for name in outputs}
+        outputs = {name: name for name in names}
     faults = [
         fault
         for name, what in outputs.items()
@@ -89,7 +93,9 @@ def _known(m: Mechanism, what: str) -> list[str]:
     """Names of the quantities of the pair or link that is named, or of all."""
     owner = what.rpartition(".")[0]
     of = [(pair.name, OF_PAIR) for pair in m.pairs] + [(link.name, OF_LINK) for link in m.links]
+    points = [f"{link.name}.{name}" for link in m.links for name in link.points if owner in (link.name, "")]
     return [f"{name}.{part}" for name, parts in of if owner in (name, "") for part in parts] + [
+        *points,
         *OF_SOLUTION,
         *OF_CHECKS,
     ]
@@ -114,7 +120,24 @@ def _found(m: Mechanism, text: str) -> Callable[[Solution], Any] | None:
         if part.startswith("center") and m.link(owner).center is None:
             return None
         return lambda s: getattr(s.link(owner), part)
+    if point := _point(m, text):
+        link, name, rank = point
+        return lambda s: getattr(s.link(link).at(name), RANKS[rank])
     return None
+
+
+def _point(m: Mechanism, text: str) -> tuple[str, str, int] | None:
+    """Link, name and derivative of ``bucket.tip``, ``bucket.tip.velocity`` or ``bucket.tip.acceleration``."""
+    return next(
+        (
+            (link.name, name, rank)
+            for link in m.links
+            for name in link.points
+            for rank, of in enumerate(RANKS)
+            if text == f"{link.name}.{name}{f'.{of}' if rank else ''}"
+        ),
+        None,
+    )
 
 
 def unit_of_output(m: Mechanism, what: Output) -> str | tuple[str, ...]:
@@ -130,8 +153,10 @@ def unit_of_output(m: Mechanism, what: Output) -> str | tuple[str, ...]:
     found: Any = ""
     if owner in m.pair_index and part in OF_PAIR:
         found = pair_units(m.units, m.pair(owner).type).get(part, "")
-    elif owner in m.link_index:
+    elif owner in m.link_index and part in OF_LINK:
         found = link_units(m.units).get(part, "")
+    elif point := _point(m, what):
+        found = unit_of(m.units, (1, 0, -point[2]))
     elif what == "shaking":
         found = pair_units(m.units, m.pairs[0].type)["reaction"]
     return found[0] if isinstance(found, tuple) and len(set(found)) == 1 else found

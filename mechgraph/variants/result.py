@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Shown, Table
@@ -166,14 +166,15 @@ class Study(Shown):
             return np.full((len(self._near.status), *self.outputs[name].shape[1:]), np.nan)
         return self._near.outputs[name]
 
-    def quantiles(self, name: str, q: Any = (0.00135, 0.5, 0.99865)) -> Array:
+    def quantiles(self, name: str, q: ArrayLike = (0.00135, 0.5, 0.99865)) -> Array:
         """Quantiles of an output over the variants that were solved, ``(*shape of q, ...)``; NaN where none was."""
         values = self._output(name)
         if not ((np.asarray(q) >= 0) & (np.asarray(q) <= 1)).all():
             raise DeclarationError("study", [f"quantiles q = {q!r}: expected numbers from 0 to 1"])
         some = np.isfinite(values).any(axis=0)
-        found = np.nanquantile(np.where(some, values, 0.0), q, axis=0)
-        return np.where(some, found, np.nan)
+        at = np.asarray(q, dtype=float)
+        found = np.nanquantile(np.where(some, values, 0.0), at.ravel(), axis=0)
+        return np.where(some, found, np.nan).reshape(at.shape + some.shape)
 
     def mean(self, name: str) -> Array:
         """Mean of an output over the variants that were solved."""

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.arguments import option_faults
+from mechgraph.arguments import Count, Index, door
 from mechgraph.closure.driver_motion import Motions, actuators, driven
-from mechgraph.closure.solver import MOTION_ENGINES, MotionEngineName
-from mechgraph.errors import DeclarationError, MechgraphWarning
-from mechgraph.force.dalembert import METHODS, MethodName
-from mechgraph.kinetostatics import REDUNDANT, RedundantName
+from mechgraph.closure.solver import MotionEngineName
+from mechgraph.errors import DeclarationError, MechgraphWarning, StudyError, counted
+from mechgraph.force.dalembert import MethodName
+from mechgraph.kinetostatics import RedundantName
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.quantities import wrong
@@ -26,7 +26,7 @@ from mechgraph.variants.fields import AnyField, clashes, field_values, find_fiel
 from mechgraph.variants.outputs import named_outputs
 from mechgraph.variants.result import Study
 from mechgraph.variants.sampling import SAMPLINGS, SamplingName, distributions, grid_size, spread
-from mechgraph.variants.work import Part, Source, Task, as_rows, motion_of_case, solved
+from mechgraph.variants.work import Part, Source, Task, as_rows, motion_of_case, solved, unsolved
 
 POSITIONS_TOGETHER = 60_000
 """Positions of all variants that are solved together: bounds the memory."""
@@ -45,12 +45,13 @@ SMALLEST = 1e-6
 Progress = Callable[[int, int], None]
 
 
+@door
 def study(
     m: Mechanism | Callable[..., Mechanism],
     parameters: Mapping[str, Any],
     outputs: Any,
-    n: int = 1000,
-    seed: int = 0,
+    n: Count = 1000,
+    seed: Index = 0,
     *,
     motions: Mapping[str, Any] | None = None,
     actuate: Iterable[str] | None = None,
@@ -92,17 +93,13 @@ def study(
     ------
     DeclarationError
         with all faults of parameters and outputs at once. Errors of the mechanism itself as in ``solve``.
+    StudyError
+        where processes ended before their variants were solved, again when these were tried alone, or ``progress`` raised; carries the
+        Study of all others.
     """
     ways = distributions(parameters)
-    named: dict[str, tuple[Any, Iterable[str]]] = {
-        "sampling": (sampling, SAMPLINGS),
-        "method": (method, METHODS),
-        "redundant": (redundant, REDUNDANT),
-        "engine": (engine, MOTION_ENGINES),
-    }
-    faults = _argument_faults(m, n, seed, executor, progress, named)
-    if not ways:
-        faults.append("parameters: none are named")
+    faults = [] if ways else ["parameters: none are named"]
+    faults += [wrong(n, "n", f"at most {MOST_VARIANTS} variants")] if n > MOST_VARIANTS else []
     if faults:
         raise DeclarationError("study", faults)
     source, given = _source(m, ways, motions, tol)
@@ -128,29 +125,14 @@ def study(
     size = min(size, FEW_ALONE) if source.one_by_one else size
     tasks = [task(near, slice(0, 1))]
     tasks += [task(values[:, i : i + size], slice(i, i + size)) for i in range(0, values.shape[1], size)]
-    parts = _all_solved(tasks, executor, progress)
+    done, why, cause = _all_solved(tasks, executor, progress)
+    parts = [done[i] if i in done else unsolved(task, why) for i, task in enumerate(tasks)]
     found = Study(source, ways, values, steps, kept, paths, parts[0], parts[1:])
+    if why:
+        raise StudyError(f"study of {source.mechanism.name!r}: {why}", found) from cause
     for warning in found.warnings:
-        warnings.warn(f"study of {source.mechanism.name!r}: {warning}", MechgraphWarning, stacklevel=2)
+        warnings.warn(f"study of {source.mechanism.name!r}: {warning}", MechgraphWarning, stacklevel=3)
     return found
-
-
-def _argument_faults(
-    m: Any, n: Any, seed: Any, executor: Any, progress: Any, named: Mapping[str, tuple[Any, Iterable[str]]]
-) -> list[str]:
-    faults = option_faults(named)
-    if not isinstance(m, Mechanism) and not callable(m):
-        faults.append(wrong(m, "mechanism", "a Mechanism, or a function that builds one"))
-    for what, value, least in (("n", n, 1), ("seed", seed, 0)):
-        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-            faults.append(wrong(value, what, f"a whole number, at least {least}"))
-        elif what == "n" and value > MOST_VARIANTS:
-            faults.append(wrong(value, what, f"at most {MOST_VARIANTS} variants"))
-    if executor is not None and not hasattr(executor, "submit"):
-        faults.append(wrong(executor, "executor", "an Executor of concurrent.futures"))
-    if progress is not None and not callable(progress):
-        faults.append(wrong(progress, "progress", "a function of the parts done and of all parts"))
-    return faults
 
 
 def _source(
@@ -201,35 +183,59 @@ def _rows_of(name: str, motion: Motion, count: int) -> Motion:
 
 def _all_solved(
     tasks: Sequence[Task], executor: concurrent.futures.Executor | None, progress: Progress | None
-) -> list[Part]:
+) -> tuple[dict[int, Part], str, Exception | None]:
+    """Parts by the numbers of their tasks; why some are missing, and the error that it came from."""
     done: dict[int, Part] = {}
     for i, part in _streamed(tasks, executor):
         done[i] = part
-        if progress is not None:
-            progress(len(done), len(tasks))
-    return [done[i] for i in range(len(tasks))]
+        try:
+            if progress is not None:
+                progress(len(done), len(tasks))
+        except Exception as error:
+            return done, f"progress raised {type(error).__name__}: {error}", error
+    missing = len(tasks) - len(done)
+    why = (
+        f"the process of {counted(missing, 'part')} of {len(tasks)} ended before it was done (out of memory, or killed)"
+    )
+    return done, why if missing else "", None
 
 
 def _streamed(tasks: Sequence[Task], executor: concurrent.futures.Executor | None) -> Iterator[tuple[int, Part]]:
-    """Parts as they come: from the executor, from processes of this machine where there is much to do, or from here."""
+    """Parts as they come: from the executor, from processes of this machine where there is much to do, or from here.
+
+    Those that a process took with it when it ended are tried again, as long as others come, then each in a process of its own; those that
+    end this one too are left out.
+    """
     workers = os.cpu_count() or 1
     if executor is not None:
-        yield from _submitted(tasks, executor)
+        yield from _submitted(dict(enumerate(tasks)), executor)
     elif len(tasks) > 2 and workers > 1 and _can_be_sent(tasks[0]):
-        with concurrent.futures.ProcessPoolExecutor(min(workers, len(tasks))) as pool:
-            yield from _submitted(tasks, pool)
+        left, before = dict(enumerate(tasks)), len(tasks) + 1
+        while 0 < len(left) < before:
+            before = len(left)
+            with concurrent.futures.ProcessPoolExecutor(min(workers, before)) as pool:
+                for i, part in _submitted(left, pool):
+                    del left[i]
+                    yield i, part
+        for i, task in left.items():
+            with concurrent.futures.ProcessPoolExecutor(1) as pool:
+                yield from _submitted({i: task}, pool)
     else:
         for i, task in enumerate(tasks):
             yield i, solved(task)
 
 
-def _submitted(tasks: Sequence[Task], executor: concurrent.futures.Executor) -> Iterator[tuple[int, Part]]:
-    futures: dict[concurrent.futures.Future[Part], int] = {
-        executor.submit(solved, task): i for i, task in enumerate(tasks)
-    }
+def _submitted(tasks: Mapping[int, Task], executor: concurrent.futures.Executor) -> Iterator[tuple[int, Part]]:
+    """Parts as they come, as far as the processes of the executor live."""
+    futures: dict[concurrent.futures.Future[Part], int] = {}
     try:
+        for i, task in tasks.items():
+            futures[executor.submit(solved, task)] = i
         for future in concurrent.futures.as_completed(futures):
-            yield futures[future], future.result()
+            if not isinstance(future.exception(), concurrent.futures.BrokenExecutor):
+                yield futures[future], future.result()
+    except concurrent.futures.BrokenExecutor:  # in the midst of being given tasks
+        return
     finally:
         for future in futures:
             future.cancel()

@@ -19,7 +19,7 @@ from mechgraph.force.dalembert import MethodName
 from mechgraph.kinetostatics import RedundantName, solve_quietly
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
-from mechgraph.result.contacts import LiftOff
+from mechgraph.result.contact_ranges import LiftOff, Overlap
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import LoadBearing
 from mechgraph.structure.snapping import SnappedMechanism, meant, started
@@ -28,8 +28,8 @@ from mechgraph.variants.fields import AnyField, Variants, stacked, topology_of, 
 from mechgraph.variants.number_names import ItemField
 from mechgraph.variants.outputs import Output, quantity
 
-Doubt = LoadBearing | LiftOff
-"""What makes reactions doubtful."""
+Doubt = LoadBearing | LiftOff | Overlap
+"""What makes a solution doubtful."""
 Build = Callable[..., Mechanism]
 NOT_SOLVED = "not solved"
 """Status of a variant that could not be built or assembled; its message says why."""
@@ -131,14 +131,25 @@ class Part:
     warnings: tuple[Doubt, ...] = ()
 
 
+def unsolved(task: Task, why: str) -> Part:
+    """A part of which nothing came."""
+    count, positions = task.values.shape[1], max(motion.shape[-1] for motion in task.motions.values())
+    status = np.full((count, positions), len(STATUSES) - 1, dtype=np.int8)
+    return Part(None, status, dict.fromkeys(range(count), why))
+
+
 def worst(found: Iterable[Doubt]) -> tuple[Doubt, ...]:
-    """Of every passive freedom the warning with the greatest effort, of every contact that with the greatest pull."""
-    out: dict[tuple[bool, str], tuple[float, Doubt]] = {}
+    """Of every passive freedom the warning with the greatest effort, of every contact that with the greatest pull, and the deepest cut."""
+    out: dict[tuple[type, str], tuple[float, Doubt]] = {}
     for warning in found:
-        if isinstance(warning, LoadBearing):
-            key, size = (True, warning.name), warning.effort
-        else:
-            key, size = (False, warning.pair), warning.force
+        match warning:
+            case LoadBearing():
+                name, size = warning.name, warning.effort
+            case LiftOff():
+                name, size = warning.pair, warning.force
+            case Overlap():
+                name, size = warning.pair, warning.curvature
+        key = type(warning), name
         if size >= out.get(key, (size, warning))[0]:
             out[key] = size, warning
     return tuple(warning for _, warning in out.values())

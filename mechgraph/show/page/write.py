@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from mechgraph.arguments import door
 from mechgraph.document import Bullets, Document, to_html
 from mechgraph.equations.build import formulate
 from mechgraph.errors import DeclarationError, MechgraphWarning, MissingExtraError
 from mechgraph.kinetostatics import solve
-from mechgraph.model.mechanism import Mechanism, check_mechanism
+from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import wrong
 from mechgraph.report.report import DeterminacyReport, check
 from mechgraph.result.solution import Solution
@@ -35,6 +36,7 @@ TOO_LARGE = "It has more links than are drawn in space."
 START = "mechgraphView.start();"
 
 
+@door
 def write_report(
     m: Mechanism,
     solution: Solution | None = None,
@@ -64,7 +66,6 @@ def write_report(
 
 def report_page(m: Mechanism, solution: Solution | None = None, study: Study | None = None) -> str:
     """The page as text; see ``write_report``."""
-    check_mechanism(m, "write_report")
     faults = _faults(m, solution, study)
     if faults:
         raise DeclarationError("write_report", faults)
@@ -135,9 +136,9 @@ def _judged(r: DeterminacyReport) -> tuple[str, str]:
         return "fair", "By its graph alone"
     if r.mobility is None or r.undriven or r.contradicting_drives:
         return "bad", "No answer as it stands"
-    if r.near or not r.determinate or any(p.load_bearing for p in r.passive):
+    if r.near or any(p.load_bearing for p in r.passive) or not (r.determinate or r.own_forces_unique):
         return "fair", "To be read with care"
-    return "good", "All is determined"
+    return "good", "All is determined" if r.determinate else f"All that a {r.kind.name} model has is unique"
 
 
 def _numbers(r: DeterminacyReport, s: Solution | None) -> Iterator[tuple[str, str]]:
