@@ -14,7 +14,7 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.call import Call, Starts
-from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.configuration import ROUNDINGS, Configuration
 from mechgraph.closure.driver_path import Mask, in_blocks
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.rates import Rates, Velocities
@@ -66,6 +66,7 @@ class Compiled(Outcome):
         work = Work(positions=count, nodes=len(whole) + steps, evaluations=evaluations, factorizations=factorizations)
         self.trajectory.engine, self.trajectory.work = COMPILED, work
         self.contradicting[:] = ~whole[variant]
+        self.trajectory.estimate(np.arange(count), ROUNDINGS * np.finfo(float).eps * records["condition"])
         if forces or line.options.method is None:
             self.trajectory.take(records, forces)
         else:

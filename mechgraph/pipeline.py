@@ -12,13 +12,13 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.by_kernel import compiled
 from mechgraph.call import Options, Starts
-from mechgraph.closure.assembly import closed_start, named_columns
+from mechgraph.closure.assembly import CLOSED, closed_start, named_columns
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.closure.driver_path import FARTHEST, DriverPath, Positions, far_faults, requests
 from mechgraph.closure.following import follow
 from mechgraph.closure.indexing import Index
-from mechgraph.closure.passive_motion import PassiveMotion, are_alone
+from mechgraph.closure.passive_motion import PassiveMotion, PassiveMotions, are_alone
 from mechgraph.closure.passive_rest import unspun
 from mechgraph.closure.ranges import end_at_ranges
 from mechgraph.closure.rates import distance_to_dead_point
@@ -26,12 +26,14 @@ from mechgraph.closure.reduced_path import follow_reduced
 from mechgraph.closure.reduction import Reduction, reduction_of
 from mechgraph.closure.solver import ClosureSolver, closure_solver, engine_for, solver_at_start
 from mechgraph.errors import DeclarationError, IndeterminateError
+from mechgraph.force.passive_hold import hold_names
 from mechgraph.numerics.linear import independent_rows
-from mechgraph.numerics.tolerances import PATH
+from mechgraph.numerics.tolerances import MOTIONS, PATH
 from mechgraph.outcome import Followed, Outcome
 from mechgraph.report.refused import (
     change_point_error,
     dead_point_error,
+    no_longer_passive_error,
     structure_error,
     undecided_error,
     undriven_error,
@@ -89,7 +91,7 @@ class Pipeline:
     @cached_property
     def freedoms(self) -> Freedoms:
         """What can move at the start, what the drivers leave free, passive freedoms."""
-        key = "free", self.engine, self.columns.tobytes(), bool(self.m.loads)
+        key = "free", self.engine, self.columns.tobytes(), tuple(load.in_freedom for load in self.m.loads)
         return self._with_start(key, lambda: free_motion(self.system, self.x, self.columns, self.engine))
 
     # --- drivers ---------------------------------------------------------------------------------------------------------
@@ -214,9 +216,29 @@ class Pipeline:
         if found is None:
             found = follow(path, requests(starts.x, values, batch), total)
             if self.passive:
+                self._check_still_passive(path, found)
                 found = unspun(path, found, self.passive)
                 found.interpolate()
         return found
+
+    def _check_still_passive(self, path: DriverPath, found: Positions) -> None:
+        """What is passive at the start moves no other link at any regular node of the path, as far as that closes."""
+        nodes = found.tracks.nodes
+        here = path.at(nodes.x, nodes.drive, nodes.track)
+        f = path.factored(here, nodes.which)
+        open_ = np.isin(nodes.track, nodes.track[here.closure > CLOSED])
+        closed = np.flatnonzero(~open_ & (f.condition <= PATH.singular))
+        if not closed.size:
+            return
+        some = here.part(closed)
+        strays = PassiveMotions(some, self.passive, f.part(closed, some).motions()).strays > MOTIONS.nearby
+        moves: list[bool] = np.any(strays, axis=1).tolist()
+        if any(moves):
+            first = closed[int(np.argmax(np.any(strays, axis=0)))]
+            names = [name for name, stray in zip(hold_names(self.m, self.passive), moves, strict=True) if stray]
+            values = nodes.drive[:, first] * self.unit[self.lead]
+            drives = dict(zip(np.array(self.drive.names)[self.lead].tolist(), values.tolist(), strict=True))
+            raise no_longer_passive_error(self.drive.m, names, drives)
 
     @cached_property
     def reduction(self) -> Reduction | None:

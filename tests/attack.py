@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 from mechanisms import Z
-from strategies import body, rotation
+from strategies import body, closed_mechanism, rotation
 
 import mechgraph as mg
 
@@ -141,6 +141,40 @@ def nearly_folded(rng, margin, offset=0.0, lean=0.0) -> Bars:
         c = (a + g) * (1 + margin) - b
         if abs(b - c) < 0.8 * abs(g - a):
             return Bars(a, b, c, g, float(rng.choice([-1, 1])), offset, lean)
+
+
+# --- integer and degenerate geometry ------------------------------------------------------------------------------------------
+
+ANY_PAIR = ("R", "P", "H", "C", "U", "S", "E", "Sc", "Sg", "Cp", "Sp")
+TURN_OR_SLIDE = ("R", "R", "P")
+
+
+def integer_mechanism(seed) -> mg.Mechanism:
+    """A mechanism of all pairs at points 0..3 along the axes x, y, z, with one to three loops, driven so that it moves.
+
+    Half of them have as many freedoms as random loops need; the others are any graph, mostly of pairs that turn or slide.
+    """
+    rng = np.random.default_rng((seed, 24))
+    if rng.random() < 0.5:
+        m = closed_mechanism(seed, loops=int(rng.choice([1, 1, 2, 3])), mobility=1, branches=0)
+        links, drawn = list(m.links), [(p.type.symbol, p.a, p.b) for p in m.pairs]
+    else:
+        loops = int(rng.choice([1, 1, 2, 3]))
+        count = int(rng.integers(2, 4)) + 2 * loops
+        links = [mg.Link("frame"), *(body(rng, f"b{k}", rng.uniform(-1, 1, 3)) for k in range(1, count))]
+        ends = [(int(rng.integers(max(k - 2, 0), k)), k) for k in range(1, count)]
+        ends += [tuple(rng.choice(count, 2, replace=False).tolist()) for _ in range(loops)]
+        symbols = rng.choice(ANY_PAIR if rng.random() < 0.5 else TURN_OR_SLIDE, len(ends))
+        drawn = [(str(symbol), links[a].name, links[b].name) for symbol, (a, b) in zip(symbols, ends, strict=True)]
+    pairs, row = [], mg.pair_types()
+    for k, (symbol, a, b) in enumerate(drawn, 1):
+        axis, second = np.eye(3)[rng.choice(3, 2, replace=False)]
+        more = {"axis": axis} if symbol != "S" else {}
+        more |= {"second": second} if row[symbol].square_second else {}
+        more |= {"pitch": 0.5} if row[symbol].takes_pitch else {}
+        pairs.append(mg.Pair(f"J{k}", symbol, a, b, point=rng.integers(0, 4, 3).astype(float), **more))
+    m = mg.Mechanism(f"integer {seed}", links, pairs, loads=[mg.Gravity((0, 0, -9.81))])
+    return m.replace(drives=mg.check(m).suggested_drives)
 
 
 def anywhere(rng):

@@ -9,8 +9,10 @@ or column, placed at the loop where it lies. What results,
         [   G     0 ]
 
 is square. Where its pivots are all well away from zero the rank of J is proved: the bordering cannot make up for a rank below that
-of the matching. Then q solves the rates, x gives the loop wrenches, a random ``c`` a random self-stress. Many positions are factored
-group by group where that is faster: the blocks of B in block triangular form are the structural groups with these drivers.
+of the matching. Where geometry makes the rank lower, or the borders do not meet what it leaves, they are bases of the self-stresses that
+connect loops and of the motions there, which an elimination finds. Then q solves the rates, x gives the loop wrenches, a random ``c`` a
+random self-stress. Many positions are factored group by group where that is faster: the blocks of B in block triangular form are the
+structural groups with these drivers.
 Sources: Duff, Erisman and Reid, Direct Methods for Sparse Matrices, 2017, chapters 5 and 6 (matching, structural rank); Govaerts, Numerical
 Methods for Bifurcations of Dynamical Equilibria, 2000, chapter 3 (bordered systems).
 """
@@ -25,6 +27,7 @@ from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.elimination import Elimination
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
 from mechgraph.numerics.block_triangular import BlockFactor, BlockTriangular
@@ -54,15 +57,17 @@ class LoopSystem(ReducedRows):
     ``regular`` whether its pivots prove the rank there; ``rank`` of J without the fixed columns; ``smallest`` pivot; ``redundant``
     number of self-stresses; ``held`` number of motions left; ``kept (loops,)`` rows of every loop that are
     independent there, ``dropped`` the largest singular value among the others; ``shared`` number of self-stresses that connect loops,
-    ``shared_in`` a loop of each.
+    ``shared_in`` a loop of each; ``borders`` self-stresses ``(height, shared)`` and motions ``(free columns, held)`` that were given as
+    such; None where borders are random.
     """
 
-    def __init__(self, rows: ClosureRows, fixed: Index) -> None:
+    def __init__(self, rows: ClosureRows, fixed: Index, borders: tuple[Array, Array] | None = None) -> None:
         super().__init__(rows, fixed)
+        self.borders = borders
         self._match()
         self.pattern, self._constant = self._border(beside=False)
         self.first = self.factor(rows)
-        if self.shared and not self.first.smallest_pivot > RETRY:
+        if borders is None and self.shared and not self.first.smallest_pivot > RETRY:
             own = self.first, self.pattern, self._constant
             self.pattern, self._constant = self._border(beside=True)
             self.first = self.factor(rows)
@@ -71,12 +76,33 @@ class LoopSystem(ReducedRows):
         self.smallest = self.first.smallest_pivot
         self.regular = self.smallest > PIVOT
         self.pivot_limit = max(PIVOT, WORSE * self.smallest)
-        self.rank = self._matched - self._motions
+        self.rank = self._n - self.held
 
     @classmethod
     def at(cls, here: Configuration, fixed: Index) -> LoopSystem:
         """The system chosen at the first position of a configuration."""
         return cls(ClosureRows.at(here), fixed)
+
+    @classmethod
+    def of_rank(cls, here: Configuration, fixed: Index) -> LoopSystem:
+        """The same with the rank that the position has, be it below that of the graph."""
+        out = cls.at(here, fixed)
+        return out if out.regular else cls(out.rows, fixed, out.null_spaces())
+
+    @classmethod
+    def like(cls, other: LoopSystem, here: Configuration) -> LoopSystem:
+        """The system of another position chosen at the first one of a configuration, of the same rank."""
+        out = cls(ClosureRows.at(here), other.fixed)
+        if other.borders is None:
+            return out
+        own = out.null_spaces()
+        as_there = own[1].shape == other.borders[1].shape or out.height != other.height
+        return cls(out.rows, other.fixed, own if as_there else other.borders)
+
+    def null_spaces(self) -> tuple[Array, Array]:
+        """Orthonormal self-stresses ``(height, s)`` that connect loops and motions ``(free columns, p)``, columns of unit size."""
+        found = Elimination(self.matrix, self.owners, RANKS.position)
+        return np.linalg.qr(found.stresses(np.eye(self.height - found.rank)))[0], np.linalg.qr(found.motions())[0]
 
     # --- the choice ------------------------------------------------------------------------------------------------------
 
@@ -128,7 +154,7 @@ class LoopSystem(ReducedRows):
         cols = [np.broadcast_to(place[e.column], (6, len(e.loop)))[self._live], more.col.astype(np.intp)]
         data = [np.zeros(0)]
         self._motions = 0
-        for null, columns in self._motions_of_single_loops():
+        for null, columns in self._motions_of_single_loops() if self.borders is None else ():
             keep = np.abs(null) > 0
             number = self._m + self._motions + np.repeat(np.arange(len(null))[:, None], null.shape[1], axis=1)
             rows.append(number[keep])
@@ -145,7 +171,9 @@ class LoopSystem(ReducedRows):
         self._left_cols = np.flatnonzero(left)
         self._matched = int((match >= 0).sum())
         self.shared, self.held = len(self._left_rows), self._motions + len(self._left_cols)
-        self.redundant = self.rows.count - (self._matched - self._motions)
+        if self.borders is not None:
+            self.shared, self.held = (part.shape[1] for part in self.borders)
+        self.redundant = self.rows.count - (self._n - self.held)
         owner = np.concatenate([self.owners, np.zeros(self._motions, dtype=np.intp)])
         self.shared_in = owner[self._left_rows]
 
@@ -161,21 +189,25 @@ class LoopSystem(ReducedRows):
         """The pattern of the square system and its constant values.
 
         A random column for every row left over, in the rows of its loop, or where it is ``beside`` them also in those of the
-        neighbours; a random row for every column left over.
+        neighbours; a random row for every column left over. Or the borders that are given.
         """
         rows, cols, data = self._inner
         rng = np.random.default_rng(BORDERS_SEED)
-        if beside:
+        if self.borders is not None:
+            (number, support), (held, columns) = (np.indices(part.T.shape).reshape(2, -1) for part in self.borders)
+            constant = np.concatenate([part.T.ravel() for part in self.borders])
+        elif beside:
             number, support = _shares(self._touch, self._touch.T.tocsr(), self._left_rows)
         else:
             height = np.concatenate([self.kept, np.ones(self.rows.further, dtype=np.intp)])
             count = height[self.shared_in]
-            number = np.repeat(np.arange(self.shared), count)
+            number = np.repeat(np.arange(len(count)), count)
             first = np.cumsum(height)[self.shared_in] - count
             support = first[number] + np.arange(len(number)) - (np.cumsum(count) - count)[number]
-        held, columns = _shares(self._touch.T.tocsr(), self._touch, self._left_cols.astype(np.intp))
+        if self.borders is None:
+            held, columns = _shares(self._touch.T.tocsr(), self._touch, self._left_cols.astype(np.intp))
+            constant = np.concatenate([data, _random_units(rng, number), _random_units(rng, held)])
         self._size = self._n + self.shared
-        constant = np.concatenate([data, _random_units(rng, number), _random_units(rng, held)])
         pattern = Pattern(
             np.concatenate([rows, support, self._m + self._motions + held]),
             np.concatenate([cols, self._n + number, columns]),

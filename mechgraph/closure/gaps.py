@@ -224,8 +224,16 @@ def _left(path: DriverPath, found: Positions, ways: list[_Way], careful: bool = 
 
 
 def _states(path: DriverPath, found: Positions, tracks: Index, at: Array, drive: Array) -> tuple[Array, Index]:
-    """Closed states at places of tracks."""
-    interpolation = Interpolation(path, found.tracks.nodes)
+    """Closed states at places of tracks; of one that nowhere goes on its start."""
+    nodes = found.tracks.nodes
+    interpolation = Interpolation(path, nodes)
+    if not np.isin(tracks, nodes.track[interpolation.left]).all():
+        start = np.searchsorted(nodes.track, tracks)
+        x, which = nodes.x[:, start], nodes.which[start]
+        goes = np.flatnonzero(np.isin(tracks, nodes.track[interpolation.left]))
+        if goes.size:
+            x[:, goes], which[goes] = _states(path, found, tracks[goes], at[goes], drive[:, goes])
+        return x, which
     step = interpolation.find(tracks, at)
     which = interpolation.nodes.which[interpolation.left[step]]
     closed = found.follower.newton.close(interpolation(step, at, drive), drive, tracks, which)

@@ -75,6 +75,18 @@ class PassiveMotions:
         """The place among ``links`` of the first that motion ``i`` moves."""
         return self.links.index(self.passive[i].links[0])
 
+    @property
+    def strays(self) -> Array:
+        """Parts ``(p, T)`` of the passive twists with which other links move, or their own links against each other."""
+        out = np.empty((len(self.passive), self.here.T))
+        for i, motion in enumerate(self.passive):
+            V = self.here.link_twists(self.rates[:, i])
+            of_links = V[:, motion.links[:1]]
+            size = np.abs(of_links).max(axis=(0, 1))
+            V[:, motion.links] -= of_links
+            out[i] = np.abs(V).max(axis=(0, 1)) / np.maximum(size, np.finfo(float).tiny)
+        return out
+
     def _twists(self, rates: Array) -> Array:
         """Twists ``(6, n, p, T)`` of the links for rates ``(F, p, T)``."""
         return np.stack([self.here.link_twists(rates[:, i])[:, self.links] for i in range(rates.shape[1])], axis=2)

@@ -43,7 +43,8 @@ def unspun(path: DriverPath, found: Positions, passive: tuple[PassiveMotion, ...
     nodes, so that it does not hang on which positions were asked for. Links with several passive motions: see ``passive_steps``.
     Source: Bishop, There is more than one way to frame a curve, Amer. Math. Monthly 82, 1975 (vectors carried along an axis).
     """
-    nodes, good = found.tracks.nodes, np.flatnonzero((found.status == Status.OK) & (found.near < 0))
+    nodes = found.tracks.nodes
+    good = np.flatnonzero((found.status == Status.OK) & (found.near < 0) & (found.place != 0.0))
     if not len(nodes.steps[0]) or not found.moved.any():
         return found
     carried = (

@@ -82,6 +82,10 @@ class PassiveSteps:
             closed = self._at(many, t, drive, which)
             x, here = closed.x, self.path.at(closed.x, drive, track)
             f = self.path.factored(here, closed.which)
+            if f.motions().shape[1] != len(self.passive):
+                # beyond what closes, as where a shaky mechanism does not go on
+                self._sure[steps] = False
+                return
             dq = (f.sensitivity() * self.interpolation.slope[:, many]).sum(axis=1)
             dq += PassiveMotions(here, self.passive, f.motions()).at_rest(here.link_twists(dq))
             rates = self.path.tangent(self.path.difference(x, self._begin[:, many]), dq)

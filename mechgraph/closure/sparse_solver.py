@@ -131,7 +131,7 @@ class SparseFactored:
         for t in np.flatnonzero(~out):
             one = np.array([t])
             here, beside = self.here.part(one), [side.part(one) for side in sides]
-            alone = SparseSolver(self.solver.fixed, self.solver.keep)
+            alone = SparseSolver(self.solver.fixed, self.solver.keep, self.solver.forms[0])
             out[t] = alone.factored(here, alone.chosen(here, np.full(1, -1)))._departures(*beside)[0] <= PATH.departure
         return np.asarray(out)
 
@@ -164,12 +164,16 @@ class SparseFactored:
 
 
 class SparseSolver:
-    """Borderings chosen where they are needed; a position whose pivots become small against those of its form gets a new one."""
+    """Borderings chosen where they are needed; a position whose pivots become small against those of its form gets a new one.
+
+    All are of the rank of the first one, or of one that they are to be ``like``.
+    """
 
     engine = "sparse"
 
-    def __init__(self, fixed: Index, keep: Index | None = None) -> None:
+    def __init__(self, fixed: Index, keep: Index | None = None, like: LoopSystem | None = None) -> None:
         self.fixed, self.keep = fixed, np.zeros(0, dtype=np.intp) if keep is None else keep
+        self.like = like
         self.forms: list[LoopSystem] = []
         self._last: tuple[weakref.ref[Configuration], dict[int, tuple[Index, Factored]]] | None = None
 
@@ -249,5 +253,6 @@ class SparseSolver:
     def _make(self, here: Configuration, t: int) -> None:
         """A form made at a position."""
         at = np.array([t])
-        self.forms.append(LoopSystem.at(here if here.T == 1 else here.part(at), self.fixed))
+        part, like = here if here.T == 1 else here.part(at), self.forms[0] if self.forms else self.like
+        self.forms.append(LoopSystem.like(like, part) if like else LoopSystem.of_rank(part, self.fixed))
         self._known(here)[len(self.forms) - 1] = at, SparseFactors([self.forms[-1].first])

@@ -131,7 +131,7 @@ static size_t lay_out(const Model *m, double *memory, Work *w) {
 int mgk_record(const int *I, int *places) {
   const int c = I[MGK_COLUMNS], n = I[MGK_LINKS], p = I[MGK_PAIRS], k = I[MGK_COUPLINGS];
   const int s = 6 * I[MGK_LOOPS] + k - I[MGK_UNKNOWNS];
-  const int lengths[MGK_PARTS] = {I[MGK_STATES], c, c, c, 1, 3 * p, 6 * p, c, c, 6 * n, 6 * p * s, c * s, c, k, k * s, c * s, 6, 1, 1};
+  const int lengths[MGK_PARTS] = {I[MGK_STATES], c, c, c, 1, 1, 3 * p, 6 * p, c, c, 6 * n, 6 * p * s, c * s, c, k, k * s, c * s, 6, 1, 1};
   places[0] = 0;
   FOR(i, MGK_PARTS) places[i + 1] = places[i] + lengths[i];
   return MGK_OK;
@@ -1011,7 +1011,7 @@ static int certified(const Model *m, Work *w, double *grown) {
 /* Rates, forces and the record of a closed state just factored. */
 static int put(const Model *m, Work *w, const double *x, const double *v, const double *a, int with_forces, const int *places, double *record,
                double *largest) {
-  record[places[MGK_CLOSURE]] = w->closure;
+  record[places[MGK_CLOSURE]] = w->closure, record[places[MGK_CONDITION]] = w->reach * fmax(w->a.condition, w->b.condition);
   const int status = rates(m, w, v, a);
   if (status) return status;
   PUT(MGK_X, x), PUT(MGK_DQ, w->dq), PUT(MGK_DDQ, w->ddq);
@@ -1113,7 +1113,7 @@ static int along(const Model *m, Work *w, Asked *asked) {
     if (length <= 1e-14 * fmax(1.0, size_of(w->drive, d))) {
       FOR(i, d) w->direction[i] = i == 0;
       if ((status = first_node(m, w, w->x))) return status;
-      *w->b.at = 0.0;
+      *w->b.at = 0.0, w->b.condition = w->a.condition;
       memcpy(w->b.x, w->a.x, m->states * sizeof(double));
       if ((status = read_off(m, w, asked, 0.0))) return status;
       asked->done++;

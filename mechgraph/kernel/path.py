@@ -52,7 +52,7 @@ class Kernel:
         """
         count, each = begin.shape[1], len(q) // begin.shape[1]
         state = np.empty(ctypes.c_size_t(self.library.mgk_state_size(pointer(self.I))).value // 8 + 1)
-        values, largest = np.full((len(q), self.layout.record(forces)), np.nan), np.zeros(2)
+        values, largest = np.empty((len(q), self.layout.record(forces))), np.zeros(2)
         done, work, whole = ctypes.c_int(), np.zeros(3, dtype=ctypes.c_long), np.ones(count, dtype=bool)
         I, memory, most, told = (pointer(array) for array in (self.I, state, largest, work))
         for i in range(count):
@@ -64,6 +64,7 @@ class Kernel:
                     pointer(values[mine]), most, ctypes.byref(done), told,
                 )  # fmt: skip
                 if not whole[i]:
+                    values[mine] = np.nan
                     break
         return Records(self.layout, values, largest, (int(work[0]), int(work[1]), int(work[2]))), whole
 

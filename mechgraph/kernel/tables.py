@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,15 +26,22 @@ from mechgraph.numerics.linear import complement
 Integers = NDArray[np.int32]
 
 FORMAT = 1
-TURN, SLIDE, ROTATION, POSE = 0, 3, 6, 7
-"""Kinds of factors, as in ``kernel.h``."""
 PARTS = (
-    "x", "coordinates", "dq", "ddq", "closure", "points", "reactions", "efforts", "given", "loads", "stress", "stress_efforts", "coupled",
+    "x", "coordinates", "dq", "ddq", "closure", "condition", "points", "reactions", "efforts", "given", "loads", "stress", "stress_efforts", "coupled",
     "multipliers", "multiplier_stress", "coupled_stress", "shaking", "balance", "power",
 )  # fmt: skip
 """Parts of a record, in order."""
-MOST_ROWS = 90
+ROWS_OF_KERNEL = 90
 """Closure rows up to which dense elimination, state by state, serves."""
+
+
+class Kind(IntEnum):
+    """Kinds of factors, as in ``kernel.h``; turns and slides about x, of which those about y and z follow."""
+
+    TURN = 0
+    SLIDE = 3
+    ROTATION = 6
+    POSE = 7
 
 
 @dataclass(frozen=True)
@@ -79,15 +87,15 @@ def why_not(system: System) -> str | None:
             name = m.pairs[int(np.flatnonzero(system.type_of == number)[0])].name
             return f"pair {name!r} ({row.symbol}) has a freedom whose axis moves with the pitch"
     rows = 6 * system.graph.n_loops + len(m.couplings)
-    if rows > MOST_ROWS:
-        return f"it has {rows} closure rows; expected at most {MOST_ROWS}"
+    if rows > ROWS_OF_KERNEL:
+        return f"it has {rows} closure rows; expected at most {ROWS_OF_KERNEL}"
     return None
 
 
 def _steps(factor: Factor, rank: int) -> list[_Step]:
     """A factor about axes of coordinates, between constant poses where it is about another line."""
     if isinstance(factor, Rotation):
-        return [_Step(ROTATION, rank)]
+        return [_Step(Kind.ROTATION, rank)]
     freedom: Freedom = factor.freedoms[0]
     base, per_pitch = np.array(freedom.twist), np.array(freedom.per_pitch)
     line = base[:3] if freedom.turns else base[3:]
@@ -95,21 +103,21 @@ def _steps(factor: Factor, rank: int) -> list[_Step]:
     if len(unit) == 1 and line[unit[0]] == 1.0:
         axis = int(unit[0])
         if not freedom.turns:
-            return [_Step(SLIDE + axis, rank, (0.0,))]
+            return [_Step(Kind.SLIDE + axis, rank, (0.0,))]
         along = np.eye(6)[3 + axis]
         if not np.delete(base[3:], axis).any() and not (per_pitch - along * per_pitch[3 + axis]).any():
-            return [_Step(TURN + axis, rank, (float(base[3 + axis]),), float(per_pitch[3 + axis]))]
+            return [_Step(Kind.TURN + axis, rank, (float(base[3 + axis]),), float(per_pitch[3 + axis]))]
     C = identity()
     x = np.cross(line, np.eye(3)[int(np.argmin(np.abs(line)))])
     C[:, 0] = x / np.sqrt(x @ x)
     C[:, 1], C[:, 2] = np.cross(line, C[:, 0]), line
     if not freedom.turns:
-        turn = _Step(SLIDE + 2, rank, (0.0,))
+        turn = _Step(Kind.SLIDE + 2, rank, (0.0,))
     else:
         C[:, 3] = np.cross(line, base[3:])
-        turn = _Step(TURN + 2, rank, (float(line @ base[3:]),), float(line @ per_pitch[3:]))
+        turn = _Step(Kind.TURN + 2, rank, (float(line @ base[3:]),), float(line @ per_pitch[3:]))
     there, back = (tuple(pose.ravel().tolist()) for pose in (C, inverse(C)))
-    return [_Step(POSE, rank, there), turn, _Step(POSE, rank, back)]
+    return [_Step(Kind.POSE, rank, there), turn, _Step(Kind.POSE, rank, back)]
 
 
 def _keeps_its_line(freedom: Freedom) -> bool:
@@ -122,10 +130,12 @@ def layout(system: System, drives: Index, held: Index) -> Layout:
     """The layout of a mechanism that the kernel can carry, the freedoms ``drives`` given and ``held`` at rest."""
     s, g = system, system.graph
     steps, first, effort_factor = _factors(s)
-    widths = [0 if step.kind == POSE else 3 if step.kind == ROTATION else 1 for _, step in steps]
+    widths = [0 if step.kind == Kind.POSE else 3 if step.kind == Kind.ROTATION else 1 for _, step in steps]
     numbers = np.cumsum([0, *(len(step.constant) for _, step in steps)])
     columns = np.cumsum([0, *widths])
-    states = np.cumsum([0, *(4 if step.kind == ROTATION else w for (_, step), w in zip(steps, widths, strict=True))])
+    states = np.cumsum(
+        [0, *(4 if step.kind == Kind.ROTATION else w for (_, step), w in zip(steps, widths, strict=True))]
+    )
     unknown = complement(np.union1d(drives, held), s.n_freedoms)
     place = np.full(s.n_freedoms, -1)
     place[unknown] = np.arange(len(unknown))
@@ -212,7 +222,7 @@ def _record(s: System, unknowns: int) -> tuple[dict[str, slice], dict[str, tuple
         "shaking": (6,),
     }
     shapes |= {"stress": (stresses, p, 6), "stress_efforts": (stresses, c), "coupled_stress": (stresses, c)}
-    shapes |= {"multiplier_stress": (stresses, k), "closure": (), "balance": (), "power": ()}
+    shapes |= {"multiplier_stress": (stresses, k), "closure": (), "condition": (), "balance": (), "power": ()}
     ends = np.cumsum([0, *(int(np.prod(shapes[name])) for name in PARTS)]).tolist()
     return {name: slice(i, j) for name, i, j in zip(PARTS, ends[:-1], ends[1:], strict=True)}, shapes
 

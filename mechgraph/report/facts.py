@@ -13,12 +13,14 @@ from mechgraph.closure.assembly import at_position
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.rank import EngineName
 from mechgraph.errors import DeclarationError
+from mechgraph.force.passive_hold import hold_names
 from mechgraph.numerics.tolerances import RANKS
 from mechgraph.quantities import wrong
 from mechgraph.report import driving, findings
 from mechgraph.report.advice import Advice, driving_advice, variants
 from mechgraph.report.findings import Finding, LoopFact, PassiveFinding
 from mechgraph.report.graph_facts import GraphFacts
+from mechgraph.report.rounding import LIMIT
 from mechgraph.structure.advice import advice
 from mechgraph.structure.decomposition import Decomposition, decomposition
 from mechgraph.structure.families import Families, families
@@ -63,6 +65,7 @@ class Facts(GraphFacts):
     note: str = ""
     geometry: Geometry | None = None
     asked: EngineName = "auto"
+    limit: float = LIMIT
 
     # --- what the topology decides ---------------------------------------------------------------------------------------
 
@@ -248,6 +251,12 @@ class Facts(GraphFacts):
     def undriven(self) -> tuple[Finding, ...]:
         """Freedoms that are neither driven nor passive."""
         return findings.left_free(self.geometry.freedoms) if self.geometry else ()
+
+    @property
+    def passive_here_only(self) -> tuple[str, ...]:
+        """Names of motions that are passive in this position only: they move other links in all others, and are free."""
+        g = self.geometry
+        return tuple(hold_names(self.mechanism, g.freedoms.passing)) if g else ()
 
     @cached_property
     def passive(self) -> tuple[PassiveFinding, ...]:

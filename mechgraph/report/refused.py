@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from mechgraph.errors import DeadPointError, IndeterminateError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.report.report import check
+from mechgraph.report.sentences import here_only
 from mechgraph.structure.branching import branches_text
 from mechgraph.structure.mobility import FreeMotion
 
@@ -22,12 +23,24 @@ def structure_error(m: Mechanism, drives: Sequence[str]) -> IndeterminateError:
 
 def undriven_error(m: Mechanism, free: Sequence[FreeMotion]) -> IndeterminateError:
     """Freedoms are left that are neither driven nor passive."""
+    report = check(m)
     own = m.freedom_names()
     names = ", ".join(dict.fromkeys(name for motion in free for name in motion.names if name in own))
     many = len(free) > 1
     count, more = (f"{len(free)} freedoms are", f"{len(free)} drivers") if many else ("1 freedom is", "one driver")
     return IndeterminateError(
-        f"mechanism {m.name!r}: {count} neither driven nor passive (moving: {names}); add {more}, or change a pair",
+        f"mechanism {m.name!r}: {count} neither driven nor passive (moving: {names}){here_only(report.passive_here_only)}; add {more}, "
+        "or change a pair",
+        report,
+    )
+
+
+def no_longer_passive_error(m: Mechanism, names: Sequence[str], drives: Mapping[str, float]) -> IndeterminateError:
+    """Motions ``names`` were passive where the mechanism was assembled, and move other links at values of the ``drives``."""
+    at = ", ".join(f"{name} = {value:.6g}" for name, value in drives.items())
+    return IndeterminateError(
+        f"mechanism {m.name!r}: {' or '.join(names)} is passive where it was assembled, but moves other links at {at}, so that the "
+        "drivers do not determine the motion there; add a driver, or change a pair",
         check(m),
     )
 

@@ -12,16 +12,26 @@ from mechgraph.closure.assembly import assembled, assembled_at, named_columns
 from mechgraph.closure.rank import EngineName
 from mechgraph.data import json_text, plain
 from mechgraph.document import Document, Paragraph, Shown, to_markdown, to_text
-from mechgraph.errors import AssemblyError, MechgraphError
+from mechgraph.errors import AssemblyError, DeclarationError, MechgraphError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.tolerances import RANKS
+from mechgraph.quantities import wrong
 from mechgraph.report import brief, data, sections, sentences
 from mechgraph.report.facts import Facts, Geometry
-from mechgraph.report.rounding import Rounding, rounding
+from mechgraph.report.rounding import LIMIT, Rounding, rounding
+from mechgraph.structure.least_change import SearchEnded
 from mechgraph.structure.mobility import free_motion
 from mechgraph.structure.placed_pairs import EXACT
 from mechgraph.structure.snapping import meant
 from mechgraph.topology.linkgraph import link_graph
+
+HINTED = 2.0
+"""Seconds that an error may wait for the same."""
+ENDED = (
+    "Whether rounded numbers hide a special geometry was looked for during {limit:g} s and not found out; pass limit= to look longer, or "
+    "tol= with the accuracy that is meant"
+)
+"""What is said of a search that took too long."""
 
 
 class DeterminacyReport(Facts, Shown):
@@ -35,11 +45,26 @@ class DeterminacyReport(Facts, Shown):
     @cached_property
     def rounding(self) -> Rounding | None:
         """The smallest tolerance up to 1e-2 with which directions and distances are meant to say something else, where there is one."""
-        return rounding(self.mechanism, _verdict_of)
+        return self._rounding[0]
+
+    @property
+    def rounding_not_sought(self) -> bool:
+        """Whether that was not looked for to the end: it took longer than ``limit``."""
+        return self._rounding[1]
+
+    @cached_property
+    def _rounding(self) -> tuple[Rounding | None, bool]:
+        try:
+            return rounding(self.mechanism, _verdict_of, self.limit), False
+        except SearchEnded:
+            return None, True
 
     def document(self, full: bool = False) -> Document:
         """The report as a document: verdict, what to do and what may be trusted, or all of it; first what rounding does to it."""
-        first = () if self.rounding is None else (Paragraph(self.rounding.text),)
+        told = (
+            self.rounding.text if self.rounding else ENDED.format(limit=self.limit) if self.rounding_not_sought else ""
+        )
+        first = (Paragraph(told),) if told else ()
         if not full:
             return brief.document(self, first)
         made = sections.document(self)
@@ -77,7 +102,10 @@ def _verdict_of(m: Mechanism, doubt: float = RANKS.doubt) -> tuple[Any, ...]:
 
 def hinted(m: Mechanism, error: MechgraphError) -> MechgraphError:
     """An error that also says what tolerance would change the verdict, or make exact what is so to rounding only, where one would."""
-    found = rounding(m, partial(_verdict_of, doubt=EXACT))
+    try:
+        found = rounding(m, partial(_verdict_of, doubt=EXACT), HINTED)
+    except SearchEnded:
+        return error
     if found is not None:
         error.args = (f"{error.args[0]}. {found.text}", *error.args[1:])
     return error
@@ -85,7 +113,12 @@ def hinted(m: Mechanism, error: MechgraphError) -> MechgraphError:
 
 @door
 def check(
-    m: Mechanism, at: Mapping[str, float] | None = None, *, engine: EngineName = "auto", tol: float | None = None
+    m: Mechanism,
+    at: Mapping[str, float] | None = None,
+    *,
+    engine: EngineName = "auto",
+    tol: float | None = None,
+    limit: float = LIMIT,
 ) -> DeterminacyReport:
     """The determinacy report of a mechanism: of its graph, and where it has geometry of its closed position at ``start``.
 
@@ -95,15 +128,18 @@ def check(
     engine : which engine decides ranks, ``"dense"`` or ``"sparse"``; ``"auto"`` takes the faster one. The report is the same.
     tol : accuracy to which directions (radians) and distances (over L) are meant; the report is that of ``m.snapped(tol)``. Left out:
         that of the mechanism, or exact.
+    limit : seconds that a search may take (for special geometry hidden by rounded numbers); what was not looked for to the end is said.
 
     Raises
     ------
     AssemblyError
         where ``at`` is given and cannot be reached. Without it, loops that cannot be closed are reported in ``note``.
     """
+    if not limit > 0:
+        raise DeclarationError(f"check {m.name!r}", [wrong(limit, "limit", "seconds above 0")])
     graph = m.once(link_graph)
     if not m.has_geometry:
-        return DeterminacyReport(m, graph, "Topology only: no geometry is declared.", asked=engine)
+        return DeterminacyReport(m, graph, "Topology only: no geometry is declared.", asked=engine, limit=limit)
     try:
         m = meant(m, tol, "check")
         graph = m.once(link_graph)
@@ -111,8 +147,8 @@ def check(
     except AssemblyError as error:
         if at:
             raise
-        return DeterminacyReport(m, graph, f"No facts that need geometry: {error}", asked=engine)
+        return DeterminacyReport(m, graph, f"No facts that need geometry: {error}", asked=engine, limit=limit)
     columns, _ = named_columns(m, system, {d.freedom: 0.0 for d in m.drives})
     return DeterminacyReport(
-        m, graph, "", Geometry(system, x, columns, free_motion(system, x, columns, engine)), engine
+        m, graph, "", Geometry(system, x, columns, free_motion(system, x, columns, engine)), engine, limit
     )

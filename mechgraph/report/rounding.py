@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from decimal import Decimal
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from mechgraph.closure.assembly import closed_start
 from mechgraph.errors import MechgraphError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.structure.kind import kind_of
+from mechgraph.structure.least_change import SearchEnded
 from mechgraph.structure.placed_pairs import EXACT
 from mechgraph.structure.snapping import SnappedMechanism, candidates, snapped
 
@@ -22,6 +24,8 @@ LARGEST_TOL = 1e-2
 """Largest tolerance that is tried."""
 CLOSE = 1e-3
 """Change of a pair up to which numbers of any number of digits are taken for rounded: of random mechanisms hardly one comes so near."""
+LIMIT = 20.0
+"""Seconds that the search for near-special geometry may take unless another limit is given."""
 MOST_PAIRS = 300
 """Pairs up to which rounding is looked for without being asked."""
 BY_CHANCE = (60, 1.5)
@@ -52,12 +56,18 @@ class Rounding:
         return self.text
 
 
-def rounding(m: Mechanism, verdict: Callable[[Mechanism], tuple[Any, ...]]) -> Rounding | None:
+def rounding(m: Mechanism, verdict: Callable[[Mechanism], tuple[Any, ...]], limit: float = LIMIT) -> Rounding | None:
     """The smallest tolerance (of decades up to 1e-2) that changes ``verdict(m)``, its mobility first; None where there is none.
 
     The verdict is a tuple that begins with the finite mobility; empty where there is none. Changes of pairs beyond what ``plausible``
     says are no rounding: a mechanism may come near a special one by chance.
+
+    Raises
+    ------
+    SearchEnded
+        after ``limit`` seconds.
     """
+    until = monotonic() + limit
     if isinstance(m, SnappedMechanism) or not m.has_geometry or len(m.pairs) > MOST_PAIRS:
         return None
     own: tuple[Any, ...] | None = None
@@ -70,7 +80,9 @@ def rounding(m: Mechanism, verdict: Callable[[Mechanism], tuple[Any, ...]]) -> R
         if (sizes <= tol).sum() > max(BY_CHANCE[0], BY_CHANCE[1] * len(m.pairs)):
             break
         try:
-            exact = snapped(m, tol)
+            exact = snapped(m, tol, until)
+        except SearchEnded:
+            raise
         except MechgraphError:
             continue
         if (not exact.changes.moved and exact.changes.closure <= EXACT) or exact.changes.largest > plausible(

@@ -238,7 +238,7 @@ SECTIONS = (
     Section("", ("kind", "loop_kinds", "own_forces_unique"), lambda r: [Paragraph(kind_line(r))]),
     Section("", ("inputs", "finite_mobility", "stroke", "excess", "change_point", "margin", "near"), _why),
     Section("Advice", ("effects", "advice", "sets_not_sought"), _advice),
-    Section("Neither driven nor passive", ("undriven",), _findings("undriven")),
+    Section("Neither driven nor passive", ("undriven", "passive_here_only"), _findings("undriven")),
     Section("Passive freedoms", ("passive",), _findings("passive")),
     Section("Locked freedoms", ("locked",), _findings("locked")),
     Section(

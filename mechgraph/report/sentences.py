@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +18,8 @@ from mechgraph.structure.uniqueness import Uniqueness
 
 DROPPED = 1e-9
 """Part of the margin above which a dropped singular value is reported rather than the margin."""
+LINE = 80
+"""Longest list of names in a sentence that is not counted instead."""
 SETS = 3
 """Most sets of components that the verdict names."""
 
@@ -114,9 +118,17 @@ def _left_free(r: Facts) -> str:
     free = f"{plural(len(r.undriven), 'freedom')} {verb} neither driven nor passive"
     if not r.change_point:
         shaky = " The mobility is infinitesimal only: a shaky structure." if _shaky(r) else ""
-        return f"Under-driven: mobility {r.mobility}, {drivers}; {free}.{shaky}"
+        return f"Under-driven: mobility {r.mobility}, {drivers}; {free}{here_only(r.passive_here_only)}.{shaky}"
     state = "under-driven at" if r.suggested_drives else "at"
     return f"Finite mobility {r.finite_mobility}, {drivers}, {state} a change point: mobility {r.mobility} here; {free} here."
+
+
+def here_only(names: Sequence[str]) -> str:
+    """What looks passive where the mechanism stands, behind the freedoms that are not; empty where nothing does."""
+    if not names:
+        return ""
+    shown = joined(names) if len(names) <= SETS and len(joined(names)) <= LINE else f"{len(names)} motions"
+    return f" ({shown}: passive in this position only)"
 
 
 def _driven_structure(r: Facts) -> str:

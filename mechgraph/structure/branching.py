@@ -14,6 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from mechgraph.algebra.screw import null_space
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index, System
@@ -38,17 +39,17 @@ SAME = 1e-3
 
 
 class _Curvature:
-    """``x_j . bias(q')`` and the rates of the drivers less one, at multiples ``a (n, T)`` of the motions."""
+    """``x_j . bias(q')`` at multiples ``a (n, T)`` of the motions ``N (F, n)``, and rates ``given (k, n)`` of these less one."""
 
-    def __init__(self, system: System, x: Array, N: Array, stress: Array, columns: Index) -> None:
-        self.system, self.x, self.N, self.stress, self.columns = system, x, N, stress, columns
+    def __init__(self, system: System, x: Array, N: Array, stress: Array, given: Array) -> None:
+        self.system, self.x, self.N, self.stress, self.given = system, x, N, stress, given
 
     def residual(self, a: Array) -> Array:
         """Residuals ``(self-stresses + drivers, T)``."""
         here = Configuration(self.system, np.repeat(self.x[:, None], a.shape[1], axis=1))
         dq = self.N @ a
         bias = here.closure_bias(here.bias(dq, here.link_twists(dq)))
-        return np.concatenate([self.stress.T @ bias, dq[self.columns] - 1.0])
+        return np.concatenate([self.stress.T @ bias, self.given @ a - 1.0])
 
     def at(self, a: Array) -> _Point:
         """The residual with its derivatives."""
@@ -74,6 +75,7 @@ def branches(
 ) -> tuple[dict[str, float], ...]:
     """The branches that meet at a closed state ``x (nx,)``: rates of all freedoms by name, for unit rates of the drivers ``columns``.
 
+    Of branches along which the drivers stand still the largest rate is one.
     Empty where there is one alone, or where more than ``MOST_BRANCHES`` directions do: then a freedom is left free. The rank is
     decided to the accuracy with which closing meets a singular position (``RANKS.nearby``). Passive motions are at rest.
     """
@@ -86,25 +88,40 @@ def branches(
     rng = np.random.default_rng(STARTS_SEED)
     # so many random combinations of the self-stresses say as much about N.shape[1] motions as all of them
     stress = found.random_stress(rng, min(found.count - found.rank, N.shape[1] + 1))
-    curvature = _Curvature(system, x, N, stress, columns)
-    first = rng.normal(size=(N.shape[1], STARTS))
-    a, error = closest_zeros(curvature.at, _Point.steps, np.add, first, tolerance=BRANCH_RESIDUAL)
-    ways: list[Array] = []
-    for one in (N @ a[:, error < 1e3 * BRANCH_RESIDUAL]).T:
-        if all(np.abs(one - other).max() > SAME for other in ways):
-            ways.append(np.where(np.abs(one) < SAME**2, 0.0, one))
+    ways = _ways(_Curvature(system, x, N, stress, N[columns]), rng)
+    resting = N @ null_space(N[columns], RANKS.nearby)
+    if ways and resting.shape[1]:
+        # a random rate of one gives every direction its size
+        beside = _ways(_Curvature(system, x, resting, stress, rng.normal(size=(1, resting.shape[1]))), rng)
+        ways += [way / way[np.argmax(np.abs(way))] + 0.0 for way in beside]
     if not 1 < len(ways) <= MOST_BRANCHES:
         return ()
     unit = np.where(system.is_length, system.par.L, 1.0)
     names = system.m.freedom_names()
-    rates = sorted((way * unit / unit[columns[0]]).tolist() for way in ways)
-    return tuple(dict(zip(names, one, strict=True)) for one in rates)
+    # in an order that rounding does not change
+    rates = sorted((way * unit / unit[columns[0]] for way in ways), key=lambda way: np.round(way / SAME).tolist())
+    return tuple(dict(zip(names, one.tolist(), strict=True)) for one in rates)
+
+
+def _ways(curvature: _Curvature, rng: np.random.Generator) -> list[Array]:
+    """The rates ``(F,)`` that have no residual, found from random starts."""
+    first = rng.normal(size=(curvature.N.shape[1], STARTS))
+    a, error = closest_zeros(curvature.at, _Point.steps, np.add, first, tolerance=BRANCH_RESIDUAL)
+    ways: list[Array] = []
+    for one in (curvature.N @ a[:, error < 1e3 * BRANCH_RESIDUAL]).T:
+        if all(np.abs(one - other).max() > SAME for other in ways):
+            ways.append(np.where(np.abs(one) < SAME**2, 0.0, one))
+    return ways
 
 
 def branches_text(ways: Sequence[dict[str, float]], driver: str) -> str:
     """Branches by the rates of the freedoms in which they differ, in words."""
     differ = [name for name in ways[0] if np.ptp([way[name] for way in ways]) > SAME][:FREEDOMS_LISTED]
-    texts = [", ".join(f"{name} {way[name]:.4g}" for name in differ) for way in ways]
+    texts = [
+        (f"{driver} at rest, " if not way[driver] else "")
+        + ", ".join(f"{n} {way[n]:.4g}" for n in differ if n != driver)
+        for way in ways
+    ]
     return f"{len(ways)} branches meet there, by their rates for a unit rate of {driver}: " + "; ".join(
         f"({i}) {text}" for i, text in enumerate(texts, 1)
     )

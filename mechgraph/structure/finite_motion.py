@@ -19,6 +19,7 @@ takes no step on a branch along which the rank is nowhere full (a shaky part car
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -53,6 +54,8 @@ FROZEN = 12
 """Corrections with the equations of the position left."""
 SLOW = 0.2
 """Part of the closure error that such a correction may leave."""
+MOST_GIVEN = 200
+"""Freedoms up to which a motion is followed with all of them given; of more a trial step says enough, and takes no gigabytes of rates."""
 STEPS_SEED = 7
 
 
@@ -72,7 +75,10 @@ class _Closed:
 
     @cached_property
     def N(self) -> Array:
-        return np.linalg.qr(self.closure.motions / self.closure.reduced.scale[:, None])[0]
+        """Ordered by how much they meet the rows, whatever the engine: what returns meets them a little (see ``RANKS.nearby``)."""
+        rows = self.closure.reduced
+        N = np.linalg.qr(self.closure.motions / rows.scale[:, None])[0]
+        return np.asarray(N @ np.linalg.svd(rows.matrix @ N[rows.free], full_matrices=True)[2].T)
 
     def increments(self, v: Array) -> Array:
         """The motion ``N v`` with its largest increment one."""
@@ -104,6 +110,13 @@ class _Closed:
         v = self.N.T @ rng.normal(size=self.N.shape[0])
         return np.asarray(v / np.linalg.norm(v))
 
+    def steps(self, rng: np.random.Generator) -> Iterator[tuple[Array, Array]]:
+        """States to which random steps lead, and the increments from here; those that do not close or come back left out."""
+        for _ in range(RANDOM_STEPS):
+            x = self.moved(self.random(rng), TRIAL_STEPS[0])
+            if x is not None and np.abs(self.change(x)).max() > MOVED * TRIAL_STEPS[0]:
+                yield x, self.change(x)
+
     def regular(self, v: Array) -> float:
         """Length of the first step after which the rows that are independent here close all loops; 0 where there is none.
 
@@ -134,6 +147,8 @@ class _Closed:
         """
         single = np.flatnonzero(self.system.single_rows >= 0)
         given = np.array(independent_rows(self.N, single.tolist(), self.N.shape[1]), dtype=np.intp)
+        if len(given) > MOST_GIVEN:
+            return 0.0
         ahead = STROKE * self.increments(v)[given]
         if not np.abs(ahead).max(initial=0.0) > MOVED * TRIAL_STEPS[0]:
             return 0.0
@@ -185,6 +200,11 @@ class FiniteMotion:
         return self.closure_nearby.motions if self.closure_nearby else None
 
 
+def states_nearby(system: System, x: Array, closure: ClosureRank) -> Iterator[tuple[Array, Array]]:
+    """Closed states random steps away from a closed state ``x (nx,)``, and the increments ``(F,)`` that lead there."""
+    return _Closed(system, x, closure, closure.engine).steps(np.random.default_rng(STEPS_SEED))
+
+
 def finite_motion(system: System, x: Array, closure: ClosureRank, engine: EngineName = "auto") -> FiniteMotion:
     """Follow the motions of a closed state ``x (nx,)`` where ``closure`` is the rank of its closure equations.
 
@@ -206,15 +226,8 @@ def _near_by(start: _Closed, rng: np.random.Generator) -> FiniteMotion:
     """The mobility about a position that is not regular: the largest of those at positions reached from it."""
     best = FiniteMotion(0, start.closure.rank)
     rank = best.rank_nearby
-    for _ in range(RANDOM_STEPS):
-        x = start.moved(start.random(rng), TRIAL_STEPS[0])
-        if x is None:
-            continue
-        change = start.change(x)
-        length = float(np.abs(change).max())
-        if not length > MOVED * TRIAL_STEPS[0]:
-            continue
-        there = start.reached(x)
+    for x, change in start.steps(rng):
+        length, there = float(np.abs(change).max()), start.reached(x)
         rank = max(rank, there.closure.rank)
         if not there.N.shape[1]:
             continue

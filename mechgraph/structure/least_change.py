@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from time import monotonic
 from typing import TypeAlias
 
 import numpy as np
@@ -24,6 +25,7 @@ import scipy
 from mechgraph.algebra.se3 import Array, cross
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import System
+from mechgraph.errors import MechgraphError
 from mechgraph.numerics.linear import singular_values
 from mechgraph.structure.near_relations import Relation, Relations
 from mechgraph.structure.placed_pairs import EXACT, Placed
@@ -52,6 +54,10 @@ DENSE = 1200
 """Numbers to be changed from which on relations are met by an iterative least-norm solution."""
 SEARCH_SEED = 11
 """Seed of these motions."""
+
+
+class SearchEnded(MechgraphError):
+    """A search took longer than it may."""
 
 
 def least_change(placed: Placed, tol: float) -> tuple[Array, tuple[Relation, ...], tuple[Relation, ...], bool]:
@@ -138,6 +144,8 @@ def _solved(
     change = np.zeros((6, placed.frames.shape[2])) if begin is None else begin
     best, least = change, np.full(1, np.inf)
     for _ in range(ROUNDS):
+        if monotonic() > placed.until:
+            raise SearchEnded(f"mechanism {placed.system.m.name!r}: the search for near-special geometry took too long")
         r, A = rows_at(change)
         if not r.size or np.abs(r).max() < np.abs(least).max():
             best, least = change, np.abs(r)

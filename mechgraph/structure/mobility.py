@@ -17,8 +17,9 @@ from mechgraph.closure.passive_motion import PassiveMotion
 from mechgraph.closure.rank import ClosureRank, EngineName, rank_of_rows
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.linear import independent_rows, rank_of, singular_values
-from mechgraph.numerics.tolerances import MOTIONS, PATH
-from mechgraph.structure.passive import passive_motions, small_combinations
+from mechgraph.numerics.tolerances import MOTIONS, PATH, RANKS
+from mechgraph.structure.finite_motion import MOVED, states_nearby
+from mechgraph.structure.passive import lasting, passive_motions, small_combinations
 from mechgraph.structure.position import Position
 
 
@@ -38,7 +39,7 @@ class Freedoms:
     ``null (F, M)`` orthonormal motions;
     ``dependent`` whether drivers cannot move independently, ``drive`` how strongly the weakest of them moves (against the freedom that
     moves most; small near a dead point); ``left (F, n)`` orthonormal motions with the drivers at rest, ``passive`` motions among them;
-    ``hold`` freedoms whose rest stops the passive motions.
+    ``hold`` freedoms whose rest stops the passive motions. ``passing`` motions are passive in this position only: they are free.
     """
 
     closure: ClosureRank
@@ -50,6 +51,7 @@ class Freedoms:
     left: Array
     hold: Index
     drive: float = 1.0
+    passing: tuple[PassiveMotion, ...] = ()
 
     @cached_property
     def undriven(self) -> tuple[FreeMotion, ...]:
@@ -59,10 +61,7 @@ class Freedoms:
     @cached_property
     def inputs(self) -> Array:
         """Motions ``(F, M)`` without their passive part."""
-        if not self.passive:
-            return self.null
-        P, _ = np.linalg.qr(np.stack([p.rates for p in self.passive], axis=1))
-        return np.asarray(self.null - P @ (P.T @ self.null))
+        return _beside(self.null, self.passive)
 
     def still(self, columns: Index) -> NDArray[np.bool_]:
         """Which of the drivers ``columns`` stand still in all motions, as at a dead point."""
@@ -121,20 +120,51 @@ def freedoms_at(position: Position, columns: Index, engine: EngineName = "auto")
     drive = _drive(null, columns)
     at_rest = rank_of_rows(position.rows, columns, engine) if len(columns) else closure
     left = _left_free(closure, at_rest, columns)
-    passive = passive_motions(position, left, columns)
+    here = passive_motions(position, left, columns)
+    passive = _lasting(here, position, closure, columns) if here else here
+    passing = tuple(p for p in here if all(p is not other for other in passive))
     if not len(columns) and passive and len(passive) == null.shape[1]:
-        # nothing else can move: what could be driven is an input, and what swings all links, with no load to be held against, is free
-        every = 0 if position.m.loads else position.graph.n_links - 1
-        passive = [
-            p
-            for p in passive
-            if len(p.links) != every and not (np.abs(p.rates[position.drivable]) > MOTIONS.still).any()
-        ]
+        # nothing else can move: what could be driven is an input, whatever pairs that hold nothing could drive
+        inputs = position.drivable & np.repeat(position.holding, np.diff(position.rows.first_column))
+        passive = [p for p in passive if not (np.abs(p.rates[inputs]) > MOTIONS.still).any()]
     hold = np.zeros(0, dtype=np.intp)
     if passive:
         _, pivots = scipy.linalg.qr(np.stack([p.rates for p in passive]), mode="r", pivoting=True)
         hold = np.sort(pivots[: len(passive)]).astype(np.intp)
-    return Freedoms(closure, at_rest, null, drive < MOTIONS.dependent, tuple(passive), position, left, hold, drive)
+    return Freedoms(
+        closure, at_rest, null, drive < MOTIONS.dependent, tuple(passive), position, left, hold, drive, passing
+    )
+
+
+def _beside(motions: Array, passive: Sequence[PassiveMotion]) -> Array:
+    """Motions without their passive part."""
+    if not passive:
+        return motions
+    P, _ = np.linalg.qr(np.stack([p.rates for p in passive], axis=1))
+    return np.asarray(motions - P @ (P.T @ motions))
+
+
+def _lasting(
+    here: list[PassiveMotion], position: Position, closure: ClosureRank, columns: Index
+) -> list[PassiveMotion]:
+    """Those of the passive motions that are passive at a position nearby as well, where the mechanism can move as declared.
+
+    A position with the others moved, as on the way of a driver; else any other one.
+    """
+    if position.altered:
+        return here
+    reached, most = None, 0.0
+    for x, change in states_nearby(position.declared.system, position.declared.x[:, 0], closure):
+        moved = float(np.abs(_beside(change[:, None], here)).max() / np.abs(change).max())
+        if reached is None or moved > most:
+            reached, most = x, moved
+        if moved > MOVED or closure.motions.shape[1] == len(here):
+            break
+    if reached is None:
+        return here
+    there = Position.at(Configuration(position.declared.system, reached[:, None]))
+    left = rank_of_rows(there.rows, columns, closure.engine, RANKS.nearby).motions
+    return lasting(here, passive_motions(there, left, columns, RANKS.nearby), position, columns)
 
 
 def _complement(m: Mechanism, left: Array, passive: Sequence[PassiveMotion]) -> list[FreeMotion]:
@@ -146,8 +176,7 @@ def _complement(m: Mechanism, left: Array, passive: Sequence[PassiveMotion]) -> 
         return []
     rest = left
     if passive:
-        P, _ = np.linalg.qr(np.stack([p.rates for p in passive], axis=1))
-        rest = left - P @ (P.T @ left)
+        rest = _beside(left, passive)
         U, s, _ = np.linalg.svd(rest, full_matrices=False)
         rest = U[:, : left.shape[1] - len(passive)]
     Q, _ = np.linalg.qr(rest)

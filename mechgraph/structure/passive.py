@@ -4,12 +4,17 @@ Candidates follow from the graph. A set of links that turns or slides as one has
 Either the set is one link (or links that no motion moves against each other), or its border are two pairs that lie in the same loops:
 cutting them parts the graph. So the twists common to the freedoms of a border are all there is to look at, and no null space of
 the mechanism is needed. Where a passive motion of several links is a sum of smaller ones, the smaller ones are named.
+
+Pairs that hold nothing close no loop: a set of links is passive between others, so its border has two pairs at least that hold something.
+A freedom in which a load acts moves by that load and is none. What is passive at a position alone is told by another one near it, which
+the mechanism reaches by moving (``lasting``).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations, pairwise
 
 import numpy as np
@@ -23,7 +28,7 @@ from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.numerics.tolerances import MOTIONS
 from mechgraph.structure.position import Position
 from mechgraph.topology.components import components_of_edges, cut_off, labels_of_bipartite, members
-from mechgraph.topology.linkgraph import LinkGraph
+from mechgraph.topology.linkgraph import LinkGraph, graph_of_ends
 
 DIFFERENCE_STEP = 1e-4
 """Step of the central differences that tell whether a pair element leaves its place."""
@@ -37,6 +42,53 @@ class _Search:
 
     position: Position
     driven: frozenset[int]
+    common: float = MOTIONS.common
+
+    @cached_property
+    def holding(self) -> tuple[bool, ...]:
+        """Which pairs hold something, or are driven."""
+        position = self.position
+        driven = [not self.driven.isdisjoint(position.columns(k)) for k in range(len(position.graph.ends))]
+        return tuple((position.holding | np.array(driven, dtype=bool)).tolist())
+
+    def border(self, links: tuple[int, ...]) -> tuple[int, ...]:
+        """The pairs between some links and others."""
+        inside = set(links)
+        return tuple(k for k, (a, b) in enumerate(self.position.graph.ends) if (a in inside) != (b in inside))
+
+    @cached_property
+    def joining(self) -> tuple[int, ...]:
+        """The pairs that hold something, and of the others as many as join what nothing else joins; these close no loop."""
+        graph = self.position.graph
+        kept = [k for k, holds in enumerate(self.holding) if holds]
+        label = components_of_edges(graph.n_links, [graph.ends[k] for k in kept])
+        for k, (a, b) in enumerate(graph.ends):
+            if label[a] != label[b]:
+                label[label == label[a]] = label[b]
+                kept.append(k)
+        return tuple(kept)
+
+    def series(self) -> list[list[int]]:
+        """See ``series``, for the pairs that hold something."""
+        graph, some = self.position.graph, self.joining
+        if len(some) == len(graph.ends):
+            return series(graph)
+        joined = graph_of_ends(graph.n_links, [graph.ends[k] for k in some], graph.frame)
+        return [[some[k] for k in pairs] for pairs in series(joined)]
+
+    def cut_off(self, one: int, two: int) -> tuple[int, ...]:
+        """The links that lose the frame when two pairs are cut."""
+        graph = self.position.graph
+        ends = [graph.ends[k] for k in self.joining if k not in (one, two)]
+        return cut_off(graph.n_links, ends, graph.frame, ())
+
+    def loaded(self) -> Index:
+        """The columns of the freedoms in which loads act."""
+        position, out = self.position, []
+        for k, j in (position.m.freedom(load.in_freedom) for load in position.m.loads if load.in_freedom is not None):
+            name, names = position.m.pairs[k].type.freedoms[j].name, [f.name for f in position.type_of(k).freedoms]
+            out += [position.columns(k)[names.index(name)]] if name in names else []
+        return np.array(out, dtype=np.intp)
 
     def columns(self, k: int) -> list[int]:
         """The columns of a pair that are not driven."""
@@ -48,20 +100,46 @@ class _Search:
         if not mine or not others:
             return False
         s = np.linalg.svd(self.position.rows.S[:, mine + others], compute_uv=False)
-        return len(mine) + len(others) > 6 or bool(s[-1] <= MOTIONS.common * s[0])
+        return len(mine) + len(others) > 6 or bool(s[-1] <= self.common * s[0])
 
 
-def passive_motions(position: Position, left: Array, driven: Index) -> list[PassiveMotion]:
-    """Independent passive motions with the freedoms ``driven`` at rest; ``left (F, p)`` are all motions that leave free."""
+def passive_motions(
+    position: Position, left: Array, driven: Index, common: float = MOTIONS.common
+) -> list[PassiveMotion]:
+    """Independent passive motions with the freedoms ``driven`` at rest; ``left (F, p)`` are all motions that leave free.
+
+    Twists with a singular value up to ``common`` are common to the pairs of a border.
+    """
     if not left.shape[1]:
         return []
     motions: list[PassiveMotion] = []
-    search = _Search(position, frozenset(driven.tolist()))
-    for links, border in sorted(_borders(search, left), key=lambda item: (len(item[0]), item[0])):
-        for motion in _of_border(search, links, border):
-            if _independent(motion, motions):
+    search = _Search(position, frozenset(driven.tolist()), common)
+    loaded = search.loaded()
+    for links in sorted(_sets(search, left), key=lambda links: (len(links), links)):
+        for motion in _of_border(search, links, search.border(links)):
+            if not (np.abs(motion.rates[loaded]) > MOTIONS.still).any() and _independent(motion, motions):
                 motions.append(motion)
     return sorted(motions, key=lambda p: p.links)
+
+
+def lasting(
+    here: Sequence[PassiveMotion], there: Sequence[PassiveMotion], position: Position, driven: Index
+) -> list[PassiveMotion]:
+    """The passive motions at a position that are so ``there`` as well, at one near it; ``here`` are all that are so at the position.
+
+    Links that move as one there do so here. Where they have more such motions here, the nearest to those there last.
+    """
+    search = _Search(position, frozenset(driven.tolist()))
+    of_links: dict[tuple[int, ...], list[Array]] = {}
+    for motion in there:
+        of_links.setdefault(motion.links, []).append(motion.rates)
+    out: list[PassiveMotion] = []
+    for links, rates in of_links.items():
+        mine = [motion for motion in here if motion.links == links] or _of_border(search, links, search.border(links))
+        Q = np.linalg.qr(np.stack(rates, axis=1))[0]
+        near = [float(np.linalg.norm(Q.T @ motion.rates) / np.linalg.norm(motion.rates)) for motion in mine]
+        out += [mine[i] for i in np.sort(np.argsort(near)[::-1][: len(rates)])]
+    return sorted(out, key=lambda p: p.links)
 
 
 def links_at_rest_together(position: Position, rates: Array) -> list[list[int]]:
@@ -87,31 +165,23 @@ def series(graph: LinkGraph) -> list[list[int]]:
     return [pairs for pairs in by_key.values() if len(pairs) > 1]
 
 
-def _borders(search: _Search, left: Array) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
-    """(links, border pairs) of all sets that a passive motion could move."""
+def _sets(search: _Search, left: Array) -> Iterator[tuple[int, ...]]:
+    """All sets of links that a passive motion could move."""
     graph = search.position.graph
-    set_of: dict[int, int] = {}
-    sets = links_at_rest_together(search.position, left)
-    for number, links in enumerate(sets):
-        set_of |= dict.fromkeys(links, number)
-    border: list[list[int]] = [[] for _ in sets]
-    for k, (a, b) in enumerate(graph.ends):
-        if set_of[a] != set_of[b]:
-            border[set_of[a]].append(k)
-            border[set_of[b]].append(k)
     seen = set()
-    for links, pairs in zip(sets, border, strict=True):
-        if graph.frame not in links and len(pairs) > 1 and all(search.common_twist(pairs[0], k) for k in pairs[1:]):
-            seen.add(tuple(links))
-            yield tuple(links), tuple(pairs)
-    for in_series in series(graph):
+    for links in map(tuple, links_at_rest_together(search.position, left)):
+        holding = [k for k in search.border(links) if search.holding[k]] if graph.frame not in links else []
+        if len(holding) > 1 and all(search.common_twist(holding[0], k) for k in holding[1:]):
+            seen.add(links)
+            yield links
+    for in_series in search.series():
         few = len(in_series) <= LONGEST_SERIES
         for one, two in combinations(in_series, 2) if few else pairwise(in_series):
             if search.common_twist(one, two):
-                cut = cut_off(graph.n_links, graph.ends, graph.frame, (one, two))
+                cut = search.cut_off(one, two)
                 if cut not in seen:
                     seen.add(cut)
-                    yield cut, (one, two)
+                    yield cut
 
 
 def _of_border(search: _Search, links: tuple[int, ...], border: tuple[int, ...]) -> list[PassiveMotion]:
@@ -128,13 +198,13 @@ def _of_border(search: _Search, links: tuple[int, ...], border: tuple[int, ...])
         rows[6 * i : 6 * i + 6, : len(columns[0])] = first
         rows[6 * i : 6 * i + 6, at : at + len(part)] = -side * S[:, part]
         at += len(part)
-    common = null_space(rows, MOTIONS.common)
+    common = null_space(rows, search.common)
     if not common.shape[1]:
         return []
     moves = np.zeros((position.n_freedoms, common.shape[1]))
     moves[every] = common
     twists = first @ common[: len(columns[0])]
-    leaving = [_leaving(position, k, links, moves, twists) for k in border]
+    leaving = [_leaving(position, k, links, moves, twists) for k in border if position.type_of(k).reactions]
     if position.rows.more is not None:  # couplings hold as well
         leaving.append(position.rows.more @ moves)
     out = []

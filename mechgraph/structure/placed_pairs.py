@@ -18,11 +18,12 @@ EXACT = 1e-13
 class Placed:
     """The pairs where they stand in a start that is closed to the tolerance, the misfit of loops shared by all pairs.
 
-    ``frames (3, 4, P)`` of the pairs (marker B), ``steps (3, 4, P)`` from marker A to them; ``misfit (6, P)`` of the two sides.
+    ``frames (3, 4, P)`` of the pairs (marker B), ``steps (3, 4, P)`` from marker A to them; ``misfit (6, P)`` of the two sides;
+    ``until`` the time (of ``time.monotonic``) at which what is sought of them is given up.
     """
 
-    def __init__(self, here: Configuration) -> None:
-        self.here, self.system = here, here.system
+    def __init__(self, here: Configuration, until: float = np.inf) -> None:
+        self.here, self.system, self.until = here, here.system, until
         self.x = here.x[:, 0]
         first, last = pair_frames(here)
         self.steps = compose(inverse(first), last)[..., 0]

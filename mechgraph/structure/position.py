@@ -94,6 +94,20 @@ class Position:
         frame = here.frames[number][0][:, :, i, :1]
         return PlacedPair(group.row, system.par.pitch[k : k + 1], frame, here.x[group.state_rows[:, i], :1])
 
+    @property
+    def altered(self) -> bool:
+        """Whether pairs or couplings are not those declared."""
+        return bool(self.changed) or self.rows.count != self.declared.system.n_rows
+
+    @cached_property
+    def holding(self) -> NDArray[np.bool_]:
+        """Which pairs ``(P,)`` hold something, by reactions or by a coupling."""
+        held = np.zeros(self.n_freedoms, dtype=bool)
+        if self.rows.more is not None:
+            held[self.rows.more.indices] = True
+        every = range(len(self.graph.ends))
+        return np.array([bool(self.type_of(k).reactions) or held[self.columns(k)].any() for k in every], dtype=bool)
+
     @cached_property
     def drivable(self) -> NDArray[np.bool_]:
         """Which freedoms ``(F,)`` take a drive."""

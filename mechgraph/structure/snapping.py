@@ -79,7 +79,7 @@ class SnappedMechanism(Mechanism):
     declared: Mechanism
 
 
-def snapped(m: Mechanism, tol: float) -> SnappedMechanism:
+def snapped(m: Mechanism, tol: float, until: float = np.inf) -> SnappedMechanism:
     """The mechanism with the smallest change, ``sum angle^2 + (shift / L)^2`` over the pairs, that makes near-special geometry exact.
 
     Raises
@@ -88,12 +88,14 @@ def snapped(m: Mechanism, tol: float) -> SnappedMechanism:
         where ``tol`` is no number above 0 and at most 0.1, or the mechanism has no geometry.
     AssemblyError
         where the loops do not even close to ``tol``.
+    SearchEnded
+        at the time ``until`` (of ``time.monotonic``).
     """
     fault = tolerance_fault(tol)
     if fault:
         raise DeclarationError(f"mechanism {m.name!r}", [fault])
     here = closed_start(m, tol=tol)
-    placed = Placed(here)
+    placed = Placed(here, until)
     change, met, dropped, mobile = least_change(placed, tol)
     pairs = placed.pairs(change)
     L, moved = here.system.par.L, placed.moved(change)

@@ -117,12 +117,15 @@ def test_torques_in_balance_leave_the_shaft_idle() -> None:
     assert "idle" in s.summary()
 
 
-def test_a_swing_that_nothing_loads_is_not_passive() -> None:
-    report = mg.check(shaft())
-    assert report.passive == ()
-    assert not report.determinate
+def test_no_load_makes_a_freedom_passive() -> None:
+    """The spin of a shaft is passive whatever loads it from outside; where a load acts in the freedom itself it is the mechanism's own."""
+    for loads in ([], [mg.Gravity((0, 0, -G))], [mg.Wrench("shaft", moment=(0, 0, 20.0))]):
+        (found,) = mg.check(shaft(*loads)).passive
+        assert found.load_bearing == any(isinstance(load, mg.Wrench) for load in loads)
+    driven_through = shaft(mg.Effort("A.Rz", 20.0))
+    assert not mg.check(driven_through).determinate
     with pytest.raises(mg.IndeterminateError, match="neither driven nor passive"):
-        mg.solve(shaft())
+        mg.solve(driven_through)
 
 
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
@@ -203,7 +206,7 @@ def test_rods_that_hang_on_balls_end_in_one_pose_however_many_positions_are_aske
 @pytest.mark.parametrize("size", [1e-12, 1.0, 1e12])
 def test_an_effort_of_any_size_is_held(size: float) -> None:
     """What counts as rounding is measured by the loads that act."""
-    light = shaft(mg.Effort("A.Rz", size))
+    light = shaft(mg.Wrench("shaft", moment=(0, 0, size)))
     s, said = solved(light)
     assert len(said) == 1
     assert np.abs(next(iter(s.passive_effort.values()))) == pytest.approx(size, rel=1e-9)

@@ -1,0 +1,106 @@
+"""Mechanisms of integer and degenerate geometry: both engines say the same, and a position alone what it says in company."""
+
+import numpy as np
+import pytest
+from attack import conditions, differences, integer_mechanism, solved, without_numbers
+
+import mechgraph as mg
+
+pytestmark = pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
+"""Weights move passive freedoms; ``test_passive_loads`` looks at what is said of it."""
+
+VALUES = np.array([0.0, 0.05, -0.1])
+SAME = 1e-9
+"""Difference over the condition, see ``test_engines``."""
+
+
+def facts(report: mg.DeterminacyReport) -> dict[str, object]:
+    return {
+        "determinate": report.determinate,
+        "mobility": report.mobility,
+        "finite": report.finite_mobility,
+        "redundancy": report.redundancy,
+        "passive": {p.name for p in report.passive},
+        "here only": set(report.passive_here_only),
+        "undriven": len(report.undriven),
+        "unique": report.unique,
+    }
+
+
+def assert_same(one: mg.Solution | Exception, other: mg.Solution | Exception, pick: np.ndarray | None = None) -> None:
+    if isinstance(one, Exception) or isinstance(other, Exception):
+        assert (type(one), without_numbers(one)) == (type(other), without_numbers(other))
+        return
+    worst, where, faults = differences(one, other, pick=pick)
+    assert not faults
+    assert worst <= SAME * conditions(one)[one.status == "ok"].max(initial=1.0), where
+
+
+@pytest.mark.seeds(5, without=(2, 4))
+def test_engines_and_company(seed: int) -> None:
+    m = integer_mechanism(seed)
+    assert facts(mg.check(m, engine="dense")) == facts(mg.check(m, engine="sparse"))
+    given = {d.freedom: VALUES if i == 0 else 0.6 * VALUES for i, d in enumerate(m.drives)}
+    dense, sparse = (solved(m, given, engine=engine) for engine in ("dense", "sparse"))
+    assert_same(dense, sparse)
+    for i in range(
+        len(VALUES) if len(m.drives) == 1 else 1
+    ):  # of several drivers the way leads from position to position
+        one = solved(m, {name: values[i : i + 1] for name, values in given.items()}, engine="dense")
+        assert_same(dense, one, pick=np.array([i]))
+
+
+# --- what thousands of them found, one by one -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", [339, 421])
+def test_a_rank_below_that_of_the_graph(seed: int) -> None:
+    """Borders that a matching places, where the rank is lower, or that miss what is free."""
+    test_engines_and_company(seed)
+
+
+def test_finite_mobility_does_not_hang_on_a_basis() -> None:
+    """Mobility 3 in a shaky position: of its directions one goes on, and the others return, as any mix of them does in part."""
+    m = integer_mechanism(223)
+    assert [mg.check(m, engine=engine).finite_mobility for engine in ("dense", "sparse")] == [1, 1]
+
+
+def test_what_leads_nowhere_is_told_by_its_branches() -> None:
+    """13 pairs: a passive motion that another one, free at the start alone, is tied to; the number of both changed along the path."""
+    X, Y, Z = np.eye(3)
+    drawn = [
+        ("R", "g", "L1", (1, 0, 1), Z), ("S", "L1", "L2", (0, 1, 0), None), ("C", "L2", "L3", (1, 2, 0), Y),
+        ("P", "L3", "g", (2, 2, 1), Z), ("P", "L3", "L4", (0, 0, 0), X), ("P", "L4", "L5", (0, 0, 0), Y),
+        ("P", "L5", "L6", (0, 0, 0), X), ("P", "L6", "L2", (0, 0, 0), Z), ("R", "L4", "L7", (1, 2, 1), Y),
+        ("R", "L7", "L8", (0, 1, 0), X), ("P", "L8", "L9", (0, 0, 0), Z), ("U", "L9", "L10", (0, 0, 0), X),
+        ("C", "L10", "L5", (2, 2, 0), Z),
+    ]  # fmt: skip
+    pairs = [
+        mg.Pair(
+            f"J{k}", t, a, b, point=at, **({"axis": z} if z is not None else {}), **({"second": Y} if t == "U" else {})
+        )
+        for k, (t, a, b, at, z) in enumerate(drawn, 1)
+    ]
+    m = mg.Mechanism("integer", None, pairs, ["J10"])
+    for engine in ("dense", "sparse"):
+        with pytest.raises(mg.DeadPointError, match=r"2 branches meet there.*J10\.Rz at rest"):
+            mg.solve(m, {"J10": [0.0, 0.05]}, engine=engine)
+
+
+def test_a_search_of_check_ends_at_its_limit() -> None:
+    """A ring of 60 turns and slides, each a little off an integer place: hundreds of relations are nearly met."""
+    rng = np.random.default_rng(0)
+    pairs = [
+        mg.Pair(
+            f"J{k}", str(rng.choice(["R", "P"])), f"L{k}", f"L{(k + 1) % 60}",
+            point=rng.integers(0, 4, 3) + 1e-5 * rng.normal(size=3), axis=np.eye(3)[rng.integers(3)] + 1e-5 * rng.normal(size=3),
+        )
+        for k in range(60)
+    ]  # fmt: skip
+    report = mg.check(mg.Mechanism("ring", None, pairs, ["J0"]), limit=1e-6)
+    assert report.rounding is None
+    assert report.rounding_not_sought
+    assert "looked for during 1e-06 s and not found out; pass limit=" in " ".join(str(report).split())
+    with pytest.raises(mg.DeclarationError, match="limit = 0: expected seconds above 0"):
+        mg.check(mg.load("four-bar"), limit=0)
+    assert not mg.check(mg.load("four-bar")).rounding_not_sought

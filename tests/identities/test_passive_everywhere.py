@@ -1,0 +1,159 @@
+"""Passive freedoms are passive at every position: what is so at one alone, or by a pair that holds nothing, is free."""
+
+import mechanisms as known
+import numpy as np
+import pytest
+from mechanisms import X, Y, Z
+
+import mechgraph as mg
+from mechgraph.structure import mobility
+
+ENGINES = ("dense", "sparse")
+
+
+def loop(*pairs: tuple[str, tuple[float, ...], object], drive: str) -> mg.Mechanism:
+    """A ring of (symbol, point, axis), the first pair at the frame."""
+    return known.ring([p[0] for p in pairs], [p[1] for p in pairs], [p[2] for p in pairs], drives=[drive])
+
+
+PARALLEL_HERE = {
+    # the axes of both cylindrical pairs are parallel where they are declared, and turn out of it
+    "C-S-C-R": loop(("C", (2, 0, 0), Y), ("S", (0, 2, 2), None), ("C", (0, 0, 1), Y), ("R", (1, 0, 2), X), drive="O4"),
+    "C-R-R-C-R-R": loop(
+        ("C", (0, 0, 0), Z), ("R", (1, 0, 0), Y), ("R", (2, 1, 0), X), ("C", (2, 2, 1), Z), ("R", (0, 2, 0), X),
+        ("R", (0, 1, 2), Y), drive="O5",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", PARALLEL_HERE)
+def test_what_is_passive_in_one_position_only_is_free(name: str) -> None:
+    m = PARALLEL_HERE[name]
+    report = mg.check(m)
+    assert not report.passive
+    assert not report.determinate
+    assert len(report.undriven) == len(report.passive_here_only) == 1
+    assert "passive in this position only" in report.verdict
+    assert "passive in this position only" in str(report)
+    for engine in ENGINES:
+        with pytest.raises(mg.IndeterminateError, match="passive in this position only"):
+            mg.kinematics(m, {m.drives[0].freedom: [0.0, -0.2]}, engine=engine)
+    # driven as well, it is determinate, and both engines agree
+    more = m.replace(drives=[*m.drives, *report.suggested_drives])
+    assert mg.check(more).determinate
+    given = {d.freedom: [0.05] for d in more.drives}
+    one, other = (mg.kinematics(more, given, engine=engine) for engine in ENGINES)
+    np.testing.assert_allclose(one.link("link1").pose, other.link("link1").pose, atol=1e-12)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_path_on_which_something_stops_being_passive_is_refused_there(monkeypatch, engine: str) -> None:
+    """Were it not seen beside the start, the path itself would show it: the held motion moves other links from the first node on."""
+    monkeypatch.setattr(mobility, "_lasting", lambda here, *_: here)
+    m = PARALLEL_HERE["C-S-C-R"]
+    with pytest.raises(
+        mg.IndeterminateError, match=r"link1 and link2 is passive where .* moves other links at O4.Rz = -?0\.\d+"
+    ):
+        mg.kinematics(m, {"O4": [0.0, -0.2]}, engine=engine)
+    assert mg.kinematics(m, {"O4": [0.0]}, engine=engine).status.tolist() == ["ok"]
+
+
+def test_what_is_passive_everywhere_stays_so() -> None:
+    """The coupler of a four-bar on two cylindrical pairs slides on them in every position, the rod between two balls spins."""
+    m = mg.load("four-bar")
+    planar = m.replace(pairs=[p.replace(type="C") if p.name in ("B", "C") else p for p in m.pairs])
+    assert [p.name for p in mg.check(planar).passive] == ["coupler"]
+    assert not mg.check(planar).passive_here_only
+    assert [p.name for p in mg.check(mg.load("rssr")).passive] == ["coupler"]
+
+
+# --- rows that hold nothing -------------------------------------------------------------------------------------------------
+
+BODIES = [
+    mg.Link("ground"), mg.Link("body", 330.0, (0, 0, 1), np.eye(3)), mg.Link("wheel", 20.0, (0, 0, 0), np.eye(3)),
+]  # fmt: skip
+SLIDES = [
+    mg.Pair("A", "P", "ground", "body", point=(0, 0, 1), axis=Z),
+    mg.Pair("B", "P", "body", "wheel", point=(0, 0, 0), axis=Z),
+]
+TYRE = mg.Pair("F", "Fr", "ground", "wheel", point=(0, 0, 0), axis=Z)
+
+
+@pytest.mark.parametrize("loads", [[], [mg.Gravity((0, 0, -9.81))], [mg.TorsionSpring("F.Tz", 2e5)]])
+def test_a_pair_that_holds_nothing_makes_no_freedom_passive(loads: list[object]) -> None:
+    """A quarter car driven in its strut: body and wheel fall together, with or without a place for the spring of the tyre."""
+    with_it = mg.Mechanism("quarter car", BODIES, [*SLIDES, TYRE], ["B"], loads)
+    bare = mg.Mechanism("quarter car", BODIES, SLIDES, ["B"])
+    for m in (bare, with_it):
+        report = mg.check(m)
+        assert (report.mobility, len(report.undriven), report.passive, report.passive_here_only) == (2, 1, (), ())
+        assert report.verdict.startswith("Under-driven: mobility 2, 1 driver; 1 freedom is neither driven nor passive")
+        with pytest.raises(mg.IndeterminateError, match="neither driven nor passive"):
+            mg.solve(m, {"B": [0.0, 0.1]})
+    both = mg.solve(with_it, {"A": 0.0, "B": [0.0, 0.1]})
+    np.testing.assert_allclose(both["F"].position[:, 2], [0.0, 0.1], atol=1e-15)
+
+
+def test_a_freedom_in_which_a_spring_acts_is_not_passive() -> None:
+    m = mg.load("four-bar")
+    m = m.replace(pairs=[p.replace(type="C") if p.name in ("B", "C") else p for p in m.pairs], loads=[])
+    assert len(mg.check(m).passive) == 1
+    for load in (mg.TorsionSpring("B.Tz", 100.0), mg.Damper("C.Tz", coefficient=1.0), mg.Effort("B.Tz", 1.0)):
+        report = mg.check(m.replace(loads=[load]))
+        assert (len(report.passive), len(report.undriven)) == (0, 1)
+        with pytest.raises(mg.IndeterminateError, match="neither driven nor passive"):
+            mg.solve(m.replace(loads=[load]), {"A": 0.0})
+    assert len(mg.check(m.replace(loads=[mg.TorsionSpring("B.Rz", 100.0)])).passive) == 1
+
+
+def facts(report: mg.DeterminacyReport, pairs: tuple[mg.Pair, ...]) -> dict[str, object]:
+    return {
+        "determinate": report.determinate,
+        "mobility": report.mobility,
+        "finite": report.finite_mobility,
+        "redundancy": report.redundancy,
+        "passive": [(p.name, p.links, p.load_bearing) for p in report.passive],
+        "here only": report.passive_here_only,
+        "undriven": len(report.undriven),
+        "unique": {p.name: report.unique.get(p.name) for p in pairs},
+        "change point": report.change_point,
+        "dead point": report.dead_point,
+    }
+
+
+@pytest.mark.parametrize("name", mg.library())
+def test_pairs_that_hold_nothing_change_no_fact(name: str) -> None:
+    m = mg.load(name)
+    rng = np.random.default_rng(sum(map(ord, name)))
+    more = []
+    for k in range(2):
+        a, b = rng.choice([link.name for link in m.links], 2, replace=False).tolist()
+        more.append(mg.Pair(f"free{k}", "Fr", a, b, point=rng.uniform(-1, 1, 3), axis=Z))
+    assert facts(mg.check(m.replace(pairs=[*m.pairs, *more])), m.pairs) == facts(mg.check(m), m.pairs)
+
+
+# --- folded bars ------------------------------------------------------------------------------------------------------------
+
+FOLDED = {
+    # (corners, rates of the second to fourth pair on the branch along which the crank moves); on the other it stands still
+    "kite": ([(0, 0), (2, 0), (2.5, 0), (2, 0)], (-2.5, 4.0, -2.5)),
+    "folded square": ([(0, 0), (1, 0), (0, 0), (1, 0)], (0.0, -1.0, 0.0)),
+    "stretched": ([(0, 0), (1, 0), (2, 0), (1, 0)], (-1.0, 1.0, -1.0)),
+}
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("name", FOLDED)
+def test_folded_bars_name_their_branches(name: str, engine: str) -> None:
+    """Two pins coincide: the bars between them turn about both. By hand: a kite keeps its line of symmetry."""
+    corners, rates = FOLDED[name]
+    m = loop(*(("R", (*corner, 0.0), Z) for corner in corners), drive="O1")
+    for values in ([0.0], [0.0, 0.1, 0.2]):
+        with pytest.raises(mg.DeadPointError, match=r"2 branches meet there.*O1\.Rz at rest") as error:
+            mg.kinematics(m, {"O1": values}, engine=engine, on_reach="flag")
+        ways = sorted(
+            ([way[f"O{k}.Rz"] for k in range(1, 5)] for way in error.value.branches), key=lambda way: abs(way[0])
+        )
+        assert ways[0][0] == 0.0
+        assert max(map(abs, ways[0])) == pytest.approx(1.0)
+        np.testing.assert_allclose(ways[1], [1.0, *rates], atol=1e-9)
