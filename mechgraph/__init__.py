@@ -57,8 +57,9 @@ from mechgraph.modes.result import Assemblies, AssembliesOver
 from mechgraph.report.report import DeterminacyReport, check
 from mechgraph.report.structure import Structure, groups, structure
 from mechgraph.response.course import Response
+from mechgraph.response.equilibrium import equilibrium
 from mechgraph.response.respond import respond
-from mechgraph.response.small_motion import equilibrium, linearize
+from mechgraph.response.small_motion import linearize
 from mechgraph.result.free_body import FreeBody, free_body
 from mechgraph.result.over_time import OverTime, over_time
 from mechgraph.result.solution import Solution

@@ -17,7 +17,7 @@ from mechgraph.call import Call, Starts
 from mechgraph.closure.configuration import ROUNDINGS, Configuration
 from mechgraph.closure.driver_path import Mask, in_blocks
 from mechgraph.closure.indexing import Index, System
-from mechgraph.closure.rates import Rates, Velocities
+from mechgraph.closure.rates import Rates, Velocities, expected_error
 from mechgraph.closure.solver import ClosureSolver
 from mechgraph.errors import DeclarationError
 from mechgraph.kernel import build
@@ -66,7 +66,8 @@ class Compiled(Outcome):
         work = Work(positions=count, nodes=len(whole) + steps, evaluations=evaluations, factorizations=factorizations)
         self.trajectory.engine, self.trajectory.work = COMPILED, work
         self.contradicting[:] = ~whole[variant]
-        self.trajectory.estimate(np.arange(count), ROUNDINGS * np.finfo(float).eps * records["condition"])
+        condition, reach = records["condition"]
+        self.trajectory.estimate(np.arange(count), expected_error(ROUNDINGS * np.finfo(float).eps * reach, condition))
         if forces or line.options.method is None:
             self.trajectory.take(records, forces)
         else:

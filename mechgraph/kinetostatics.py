@@ -158,7 +158,7 @@ def _solved(
     if outcome.found is None and not np.isin(solution.status, SOLVED).all():  # numpy says how far the path led
         line, outcome = _outcome(m, motions, replace(options, engine=line.engine), actuate)
         solution = Solution(outcome.trajectory)
-    for warning in () if quiet else solution.warnings:
+    for warning in () if quiet else solution.doubts:
         warnings.warn(f"mechanism {m.name!r}: {warning}", MechgraphWarning, stacklevel=5)
     error = _unreached(line, outcome, solution) if on_reach == "raise" else None
     if error is not None:

@@ -14,14 +14,18 @@ from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.coordinates import continued
 from mechgraph.closure.driver_path import BLOCK, DriverPath, Positions, Status, in_blocks
 from mechgraph.closure.indexing import Index, System
-from mechgraph.closure.rates import Rates, Velocities, at_dead_points, disagreement, rates
+from mechgraph.closure.rates import Rates, Velocities, accuracy, at_dead_points, disagreement, rates
 from mechgraph.closure.solver import ClosureSolver, FactoredClosure, closure_solver
 from mechgraph.errors import DeclarationError
 from mechgraph.force.block import BlockForces, ForceTask, forces_of_block
 from mechgraph.model.load_base import Load
+from mechgraph.numerics.continuation import Follower
+from mechgraph.numerics.crossings import passed
 from mechgraph.result.kept import BlockMotion
 from mechgraph.result.trajectory import Trajectory
+from mechgraph.result.values import PassedCrossing
 from mechgraph.structure.actuation import stand_still
+from mechgraph.structure.branching import branches
 
 SystemAt = Callable[[Index], System]
 
@@ -82,6 +86,7 @@ class Outcome:
         if line.acting is not line.columns or len(line.lead) < len(line.columns):  # all their efforts are unknowns
             solver = closure_solver(line.engine, line.acting, line.hold)
             f = solver.factored(motion.here, solver.chosen(motion.here, np.full(motion.here.T, -1)))
+            self.trajectory.estimate(motion.places, accuracy(motion.here, f.condition))
         assert line.options.method is not None
         task = ForceTask(
             line.options.method,
@@ -121,6 +126,31 @@ class Followed(Outcome):
         work.positions, work.nodes = len(variant), len(found.tracks.nodes)
         self.trajectory.engine, self.trajectory.work = line.engine, work
         self._fill()
+        self.trajectory.passed = tuple(self._passed()) if starts.x.shape[1] == 1 else ()
+
+    def _passed(self) -> Iterator[PassedCrossing]:
+        """The crossings over which the path led to positions."""
+        found, line = self.found, self.line
+        names = [line.drive.names[i] for i in line.lead]
+        unit = np.where(line.system.is_length[line.leading], line.system.par.L, 1.0)
+        for track, place in found.tracks.crossings:
+            if not (found.moved & (found.track == track) & (found.place > place) & (place > 0.0)).any():
+                continue
+            follower = Follower(self.path, leads=False)
+            follower.paths = found.follower.paths
+            crossing = passed(follower, found.tracks.nodes, track, place)
+            if crossing is None:
+                drive = follower.paths.drive(np.array([track]), np.array([place]))[:, 0]
+                yield PassedCrossing(dict(zip(names, (drive * unit).tolist(), strict=True)), np.nan, ())
+                continue
+            x = crossing.states(np.array([place]))[:, 0]
+            at = dict(zip(names, (crossing.drive * unit).tolist(), strict=True))
+            # the branch that was followed first, by its rates for unit rates of the drivers
+            own = crossing.sides.Z.sum(axis=1) @ crossing.weights(np.array([place]))[:, 0]
+            own *= np.where(line.system.is_length, line.system.par.L, 1.0) / unit[0]
+            ways = branches(line.system, x, line.leading, line.passive)
+            off = [np.abs(np.array([*way.values()]) - own).max() for way in ways]
+            yield PassedCrossing(at, crossing.miss, tuple(ways[i] for i in np.argsort(off)))
 
     def _fill(self) -> None:
         found = self.found
@@ -169,7 +199,9 @@ class Followed(Outcome):
         found.work.factorizations += here.T
         found.work.groups = max(found.work.groups, f.groups)
         open_ = here.closure > CLOSED
-        dead = at_dead_points(here, f, self.solver) & ~open_
+        dead, errors = at_dead_points(here, f, self.solver)
+        self.trajectory.estimate(places, errors)
+        dead &= ~open_
         if (open_ | dead).any():
             self.trajectory.mark(places[open_], Status.NOT_CLOSED.value)
             self.trajectory.mark(places[dead], Status.DEAD_POINT.value)
@@ -217,6 +249,8 @@ class Followed(Outcome):
             dq, ddq = (np.einsum("fnk,kn->fn", values.reshape(-1, n, k), weights) for values in (moved.dq, moved.ddq))
             open_ = Configuration(self._system_at(places), found.x[:, places]).closure > CLOSED
             self.trajectory.mark(places[open_], Status.NOT_CLOSED.value)
+            errors = at_dead_points(beside, f, self.solver)[1].reshape(n, k)
+            rates_error = crossing.error(found.place[places], moved.ddq.reshape(-1, n, k), errors)
             for regular in (True, False):
                 mine = np.flatnonzero(((found.status[places] == Status.OK) == regular) & ~open_)
                 if not mine.size:
@@ -225,6 +259,11 @@ class Followed(Outcome):
                 here = Configuration(self._system_at(at), found.x[:, at])
                 motion = Rates(Velocities(here, dq[:, mine]), ddq[:, mine], np.zeros(len(mine)))
                 factors = self.solver.factored(here, self.solver.chosen(here, found.which[at])) if regular else None
+                error = rates_error[mine]
+                if factors is not None:
+                    moved_by = here.rounding * f.condition.reshape(n, k)[mine].max(axis=1)
+                    error = np.maximum(error, factors.condition * moved_by)
+                self.trajectory.estimate(at, error)
                 yield self._agreed(motion, at), factors
 
 

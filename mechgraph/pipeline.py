@@ -20,7 +20,6 @@ from mechgraph.closure.following import follow
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.passive_motion import PassiveMotion, PassiveMotions, are_alone
 from mechgraph.closure.passive_rest import unspun
-from mechgraph.closure.ranges import end_at_ranges
 from mechgraph.closure.rates import distance_to_dead_point
 from mechgraph.closure.reduced_path import follow_reduced
 from mechgraph.closure.reduction import Reduction, reduction_of
@@ -205,7 +204,6 @@ class Pipeline:
         path = DriverPath(self.system, self.solver, starts.system_of, start)
         path.carries = are_alone(self.passive)
         found = self._followed(path, starts, followed)
-        end_at_ranges(path, found)
         return Followed(self, starts, batch, variant, found, path)
 
     def _followed(self, path: DriverPath, starts: Starts, batch: tuple[int, ...]) -> Positions:

@@ -507,6 +507,31 @@ def test_a_carriage_that_leaves_its_rail_between_positions_is_out_of_reach_from_
         assert (s.status == np.where(np.array(q) > -1.0, "ok", "out of reach")).all()
 
 
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.parametrize("driver", ["A", "X"])
+def test_two_drivers_come_back_from_beyond_an_end(driver, engine):
+    """An arc of .5 rad to either side, followed by the arm or along the arc, and a hand on the arm that turns meanwhile."""
+    arc = mg.Curve.circle(radius=2.0, angles=(0.0, 1.0))
+    pairs = [
+        mg.Pair("A", "R", "frame", "arm", point=(0, 0, 0), axis=(0, 0, 1)),
+        mg.Pair("X", "P", "frame", "arm", point=arc.at(np.array(0.5))[0], curve=arc),
+        mg.Pair("B", "R", "arm", "hand", point=(1, 0, 0), axis=(0, 0, 1)),
+    ]
+    m = mg.Mechanism("m", None, pairs, [driver, "B"])
+    for angle in ([0, 0.95, 0.1], [0, 0.95, 0.97, 0.1, 0.5, -0.4, -0.6, 0.3], [0.4, -0.9, 0.9, 0.2]):
+        q = np.array(angle)
+        for turned in (0 * q, 0.3 * np.arange(len(q))):
+            s = mg.kinematics(m, {driver: q if driver == "A" else 2 * q, "B": turned}, on_reach="flag", engine=engine)
+            ok = np.abs(q) <= 0.5
+            assert s.status.tolist() == np.where(ok, "ok", "out of reach").tolist()
+            assert_allclose(s["X"].position[ok, 0], 2 * q[ok], atol=1e-12)
+    with pytest.raises(mg.ReachError, match=r"X\.Ts comes to the end") as error:
+        mg.kinematics(m, {driver: [0.0, 1.9], "B": [0.0, 0.0]}, engine=engine)
+    assert error.value.value[f"{driver}.{'Rz' if driver == 'A' else 'Ts'}"] == pytest.approx(
+        1 if driver == "X" else 0.5
+    )
+
+
 def test_curves_and_surfaces_are_drawn_where_they_are():
     """The symbol of a pair shows its curve as a line through the marker, on link b that of its own; no straight guide beside it."""
     round_, open_ = mg.Curve.ellipse(a=2.0, b=1.0), mg.Curve.line(point=(2, 0, 0), direction=(0, 1, 0), ends_at=(-1, 1))

@@ -215,9 +215,12 @@ def test_no_energy_is_lost_where_branches_all_but_cross(off):
 
 
 @pytest.mark.parametrize("off", [1e-8, -1e-9])
-def test_a_load_in_time_passes_there_as_well(off):
+def test_a_block_that_slides_beside_it_passes_there_as_well(off):
     """In independent freedoms: closing took rounding for an open loop where the condition is poor."""
-    m = nearly_a_parallelogram(off, mg.Effort("A", lambda pose, twist, t: 0.0))
+    m = nearly_a_parallelogram(off)
+    block = mg.Link("block", 1.0, (0, 0, 0), np.eye(3))
+    slide = mg.Pair("P", "P", m.frame, "block", point=(0, 0, 0), axis=(0, 0, 1))
+    m = m.replace(links=[*m.links, block], pairs=[*m.pairs, slide])
     r = mg.respond(m, np.linspace(0.0, 0.2, 11), rates={"A": -9.0})
     assert "in independent freedoms" in str(r.work)
     assert np.abs(r.energy.balance).max() < 1e-4 * r.energy.greatest

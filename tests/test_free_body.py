@@ -69,6 +69,38 @@ def test_balance_with_every_kind_of_load_and_in_link_frames_that_turn() -> None:
     np.testing.assert_allclose(rod["loads[0] gravity"].force[0], [0, 0, -0.5 * 9.81], atol=1e-12)
 
 
+def test_the_frame_is_supported_against_all_that_acts_on_it_its_own_loads_too() -> None:
+    """Gas between piston and head cancels; what shakes the frame is weight and inertia of all links, by hand from their centres."""
+    m = crank_slider().mechanism
+    frame = m.link(m.frame).replace(mass=5.0, center=(0.3, 0.2, 0.1))
+    gas = [
+        mg.Wrench(link, force=(push, 0.0, 0.0), point=(0.2, 0.0, 0.0))
+        for link, push in (("slider", -9e3), (m.frame, 9e3))
+    ]
+    m = m.replace(links=[frame, *(link for link in m.links if link.name != m.frame)], loads=[*m.loads, *gas])
+    motion = {"A": mg.Motion(TURN, velocity=30.0, acceleration=5.0)}
+    s = mg.solve(m, motion)
+    weights = [(k.mass, s.link(k.name).center_acceleration) for k in m.links if k.mass > 0]
+    np.testing.assert_allclose(
+        s.shaking[:, 3:], sum(mass * (np.array([0, 0, -9.81]) - a) for mass, a in weights), atol=1e-9
+    )
+    body = mg.free_body(s, m.frame)
+    support = next(one for one in body.acting if one.name == "support")
+    np.testing.assert_allclose(support.wrench, -s.shaking, atol=1e-9)
+    assert body.balance < 1e-12
+    pushed = mg.solve(m, motion, loads=[*m.loads, mg.Wrench(m.frame, force=(0, 7.0, 0), point=(1.0, 0, 0))])
+    more = np.broadcast_to([0, 0, 7.0, 0, 7.0, 0], (len(TURN), 6))
+    np.testing.assert_allclose(pushed.shaking - s.shaking, more, atol=1e-9)
+
+
+def test_the_support_of_a_planar_frame_is_known_though_its_pairs_are_not() -> None:
+    m = mg.load("four-bar")
+    s = mg.solve(m.replace(loads=[mg.Wrench(m.frame, force=(0, 3.0, 0), point=(1.0, 0, 0))]), {"A": TURN})
+    support = next(one for one in mg.free_body(s, m.frame).acting if one.name == "support")
+    np.testing.assert_allclose(support.wrench, np.broadcast_to([0, 0, -3.0, 0, -3.0, 0], (len(TURN), 6)), atol=1e-12)
+    assert support.unique.all()
+
+
 def test_a_pendulum_by_hand() -> None:
     """Mass m on a rod of length l at 2 m/s: the pin carries ``m g cos + m l w^2`` along it, and ``m g sin`` less inertia across."""
     m = mg.Mechanism(

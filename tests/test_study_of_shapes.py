@@ -180,7 +180,7 @@ def test_variants_with_curves_of_their_own_are_shared_out(monkeypatch):
         for i in (1, 4):
             alone = mg.solve(study.variant(i), {"A": mg.Motion(0.5, 3.0)})["A"].effort
             assert_allclose(study.outputs["A.effort"][i], alone[None, 0] if alone.ndim > 1 else alone, rtol=1e-11)
-    assert parts == {"K.curve.radius": 4, "follower.mass": 2}
+    assert parts == {"K.curve.radius": 4, "follower.mass": 1}
 
 
 def test_points_of_a_slot():

@@ -37,6 +37,16 @@ class Numbers:
         self.n_factors, self.n_freedoms = n_factors, n_freedoms
         self.n_pairs = len(n_factors)
 
+    def taken(self, par: Parameters, which: Index) -> Numbers:
+        """Those of some variants, with their parameters."""
+        out = Numbers(par, self.walk, self.batches, self.n_factors, self.n_freedoms, self.for_one)
+        vars(out).update(constants=_of(self.constants, which), twists=_of(self.twists, which))
+        vars(out)["poses"] = [
+            (_of(C, which) if C.ndim == 4 else C, beside and (_of(beside[0], which), _of(beside[1], which)))
+            for C, beside in self.poses
+        ]
+        return out
+
     @cached_property
     def constants(self) -> Array:
         """Constant poses ``(3, 4, 1 + 2 P, B)``: the identity, markers A, markers B."""
@@ -153,3 +163,8 @@ class Numbers:
     def ends(self) -> Array:
         """Origins of the markers B in the frames of their links b, ``(3, 1, P, B)``."""
         return self.par.marker_b[:, None, 3]
+
+
+def _of(values: Array, which: Index) -> Array:
+    """Some variants of a batch; of a batch of one, itself."""
+    return values.take(which, axis=-1) if values.shape[-1] > 1 else values

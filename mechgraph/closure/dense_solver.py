@@ -14,10 +14,22 @@ from numpy.typing import NDArray
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
+from mechgraph.closure.loop_rows import lengths_of
 from mechgraph.numerics.kept import kept
-from mechgraph.numerics.linear import Choice, ChosenSystem, Lu, choose, parabola_is_regular, scaled_norm
+from mechgraph.numerics.linear import (
+    RANK_TOLERANCE,
+    Choice,
+    ChosenSystem,
+    Lu,
+    choose,
+    complement,
+    parabola_is_regular,
+    scaled_norm,
+)
 from mechgraph.numerics.tolerances import PATH
 
+SMALL_LOOP = 0.5
+"""Size of a loop over L below which its rows are taken over it."""
 TRIES = 8
 """Choices tried for a batch at most."""
 
@@ -32,29 +44,47 @@ def independent(here: Configuration, Z: Array) -> bool:
 class Form:
     """Rows turned by the orthogonal ``turn (m, m)`` so that the independent ones come first (None: all are), and a choice of those.
 
+    Before, rows are multiplied by ``scale (m,)`` (None: by one): displacements of a loop much smaller than the mechanism are taken over its
+    own size, so that the condition is that of the loop.
+
     The rows of a redundant loop are dependent in a way that changes as it moves; among turned rows the first ones stay independent until
     the column space has turned by a right angle, where rows picked out of them may not.
     """
 
     choice: Choice
     turn: Array | None
+    scale: Array | None = None
 
     def rows(self, b: Array) -> Array:
-        """``turn^T b`` for ``b (m, k, T)``."""
+        """``turn^T scale b`` for ``b (m, k, T)``."""
+        b = b if self.scale is None else self.scale[:, None, None] * b
         return b if self.turn is None else (self.turn.T @ b.reshape(len(b), -1)).reshape(b.shape)
 
     def back(self, y: Array) -> Array:
-        """``turn y``."""
-        return y if self.turn is None else (self.turn @ y.reshape(len(y), -1)).reshape(y.shape)
+        """``scale turn y``."""
+        y = y if self.turn is None else (self.turn @ y.reshape(len(y), -1)).reshape(y.shape)
+        return y if self.scale is None else self.scale[:, None, None] * y
 
 
-def form_at(J: Array, fixed: Index, keep: Index | None) -> Form:
+def form_at(J: Array, fixed: Index, keep: Index | None, scale: Array | None = None) -> Form:
     """The form chosen at one matrix ``(m, F)``: columns by pivoted QR, rows by the left singular vectors of these."""
+    J = J if scale is None else scale[:, None] * J
     choice = choose(J, fixed, keep=keep)
     if len(choice.rows) == len(J):
-        return Form(choice, None)
+        return Form(choice, None, scale)
     turn = np.linalg.svd(J[:, choice.cols], full_matrices=True)[0]
-    return Form(replace(choice, rows=np.arange(len(choice.cols))), turn)
+    return Form(replace(choice, rows=np.arange(len(choice.cols))), turn, scale)
+
+
+def row_scale(here: Configuration, t: int) -> Array | None:
+    """What takes displacements of loops over their own sizes ``(rows,)``: powers of two, one but for loops below half of the length L."""
+    size = lengths_of(here.system.graph, here.pair_points[:, :, t], here.middles[:, :, t])
+    if not (size < SMALL_LOOP).any():
+        return None
+    out = np.ones(len(here.residual))
+    own = np.repeat(2.0 ** np.floor(-np.log2(np.minimum(size, 1.0))), 3).reshape(-1, 3)
+    out[: 6 * len(size)].reshape(-1, 2, 3)[:, 1] = own
+    return out
 
 
 class DenseFactored:
@@ -105,6 +135,13 @@ class DenseFactored:
         """See the protocol in ``closure.solver``."""
         found = [form.back(system.solve_transposed(_at(b, at))) for form, at, system in self._parts]
         return self._joined(found, (self.rows, b.shape[1]))
+
+    def residual_size(self, r: Array) -> Array:
+        """See the protocol in ``closure.solver``."""
+        out = np.zeros(self.T)
+        for form, at, _ in self._parts:
+            out[at] = np.abs(form.rows(r[:, None, at])).max(axis=(0, 1), initial=0.0)
+        return out
 
     def sensitivity(self) -> Array:
         """See the protocol in ``closure.solver``."""
@@ -278,15 +315,20 @@ class DenseSolver:
         if known is not None and (which < 0).all():
             return known.which.copy()
         which = which.copy()
-        for t in np.flatnonzero(which < 0):
-            which[t] = self._fitting(here.J[:, :, t])
+        left = np.flatnonzero(which < 0)
+        while left.size:
+            number = self._fitting(here, int(left[0]))
+            which[left[0]], left = number, left[1:]
+            if left.size:
+                fits = self._serves(number, here.part(left))
+                which[left[fits]], left = number, left[~fits]
         for _ in range(TRIES):
             poorness = self._poorness(here, which)
             poor = np.flatnonzero(poorness > 1.0)
             if not poor.size:
                 break
             worst = int(poor[np.argmax(poorness[poor])])
-            self.forms.append(form_at(here.J[:, :, worst], self.fixed, None))
+            self.forms.append(form_at(here.J[:, :, worst], self.fixed, None, row_scale(here, worst)))
             new = len(self.forms) - 1
             same_rank = np.array(
                 [len(self.forms[i].choice.cols) == len(self.forms[new].choice.cols) for i in which[poor]]
@@ -300,15 +342,25 @@ class DenseSolver:
                 break
         return which
 
-    def _fitting(self, J: Array) -> int:
-        """The number of a form for one matrix: one of the last where that fits as well, or one made there."""
-        made = form_at(J, self.fixed, self.keep)
+    def _fitting(self, here: Configuration, t: int) -> int:
+        """The number of a form for one position: one of the last where that fits as well, or one made there."""
+        J = here.J[:, :, t]
+        made = form_at(J, self.fixed, self.keep, row_scale(here, t))
         for i in range(len(self.forms) - 1, max(-1, len(self.forms) - 1 - TRIES), -1):
             known = self.forms[i]
             if known.choice.same(made.choice) and (known.turn is None or _fits(known, J)):
                 return i
         self.forms.append(made)
         return len(self.forms) - 1
+
+    def _serves(self, number: int, here: Configuration) -> NDArray[np.bool_]:
+        """At which positions a form made at another one is fair, and of their rank."""
+        fair = self._poorness(here, np.full(here.T, number)) <= 1.0
+        rank, free = len(self.forms[number].choice.cols), complement(self.fixed, here.J.shape[1])
+        if fair.any() and rank < min(len(here.J), free.size):
+            sigma = np.linalg.svd(np.moveaxis(here.J[:, free], -1, 0), compute_uv=False)
+            fair &= (sigma > RANK_TOLERANCE * sigma[:, :1]).sum(axis=1) == rank
+        return np.asarray(fair)
 
     def _poorness(self, here: Configuration, which: Index) -> Array:
         """Condition number over what is fair, or where motions are held the largest rate over what is fair."""

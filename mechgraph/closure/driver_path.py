@@ -195,11 +195,12 @@ class Positions:
     turns: Index | None = None
     gained: Array | None = None
     spin: Array | None = None
-    left: NDArray[Any] = field(init=False)
+    left: NDArray[Any] = field(default_factory=lambda: np.zeros(0, dtype=object))
     """The freedom that leaves its range before a position, or an empty text."""
 
     def __post_init__(self) -> None:
-        self.left = np.full(len(self.status), "", dtype=object)
+        if not self.left.size:
+            self.left = np.full(len(self.status), "", dtype=object)
 
     @property
     def moved(self) -> Mask:
@@ -215,7 +216,7 @@ class Positions:
     def take_up(self, more: Positions, places: Index) -> None:
         """Take some places from positions that were followed afterwards, with the tracks on which they lie."""
         known = len(self.tracks.end)
-        for name in ("x", "status", "which", "reached", "place"):
+        for name in ("x", "status", "which", "reached", "place", "left"):
             getattr(self, name)[..., places] = getattr(more, name)[..., places]
         self.track[places] = known + more.track[places]
         self.near[places] = np.where(more.near[places] < 0, -1, len(self.crossings) + more.near[places])

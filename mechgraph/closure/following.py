@@ -17,6 +17,7 @@ from mechgraph.closure.driver_path import DriverPath, Positions, Request
 from mechgraph.closure.gaps import along_polygons_with_gaps
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.legs import Legs
+from mechgraph.closure.ranges import end_at_ranges
 from mechgraph.numerics.beyond import followed
 from mechgraph.numerics.continuation import Follower
 from mechgraph.numerics.tracks import Nodes, Paths
@@ -52,7 +53,11 @@ class _Way:
 
 def follow(path: DriverPath, requests: list[Request], total: int) -> Positions:
     """States at all positions asked for; ``total`` positions in all."""
-    return (_along_curves if path.size[1] == 1 else along_polygons_with_gaps)(path, requests, total)
+    if path.size[1] != 1:
+        return along_polygons_with_gaps(path, requests, total)
+    found = _along_curves(path, requests, total)
+    end_at_ranges(path, found)
+    return found
 
 
 def _along_curves(path: DriverPath, requests: list[Request], total: int) -> Positions:

@@ -17,6 +17,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.driver_path import DriverPath, Positions, Request
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.legs import along_polygons
+from mechgraph.closure.ranges import end_at_ranges, range_ends
 from mechgraph.numerics.continuation import End, Follower
 from mechgraph.numerics.hermite import STRAIGHT_ON, Interpolation
 from mechgraph.numerics.tolerances import PATH
@@ -88,7 +89,7 @@ class _Way:
 
 def along_polygons_with_gaps(path: DriverPath, requests: list[Request], total: int) -> Positions:
     """Several drivers: all positions; see the head of this file."""
-    found = along_polygons(path, requests, total)
+    found = _within_ranges(path, requests, total)
     polygons = []
     for i, request in enumerate(requests):
         if (ended := _ended(found, i)) is not None:
@@ -104,7 +105,7 @@ def along_polygons_with_gaps(path: DriverPath, requests: list[Request], total: i
             again.append(ahead)
             back += behind
         variants = path.variant_of
-        more = along_polygons(path, again + back, total)
+        more = _within_ranges(path, again + back, total)
         path.variant_of = np.concatenate([variants, path.variant_of])
         places = [request.places for request in again]
         places += [r.places[more.moved[r.places]] for r in back]
@@ -118,6 +119,13 @@ def along_polygons_with_gaps(path: DriverPath, requests: list[Request], total: i
         for i, request in enumerate(back):
             owner = next(p for p in polygons if np.isin(request.places[0], p.request.places))
             owner.tracks.append(known + len(again) + i)
+    return found
+
+
+def _within_ranges(path: DriverPath, requests: list[Request], total: int) -> Positions:
+    """All positions, each polygon up to where a coordinate leaves its range."""
+    found = along_polygons(path, requests, total)
+    end_at_ranges(path, found)
     return found
 
 
@@ -217,10 +225,11 @@ def _left(path: DriverPath, found: Positions, ways: list[_Way], careful: bool = 
     variants, path.variant_of = path.variant_of, path.variant_of[tracks]
     follower, paths = Follower(path), Paths(lines)
     nodes = follower.follow(x, paths, which=which, careful=careful).nodes
+    outside = range_ends(path, follower, nodes, np.full(len(ways), np.inf))[0]
     path.variant_of = variants
     end = np.where(follower.stuck, -np.inf, 0.0)
     np.maximum.at(end, nodes.track, np.where(follower.stuck[nodes.track], -np.inf, nodes.place))
-    return paths.end - end
+    return np.asarray(paths.end - np.minimum(end, outside))
 
 
 def _states(path: DriverPath, found: Positions, tracks: Index, at: Array, drive: Array) -> tuple[Array, Index]:

@@ -29,6 +29,8 @@ from mechgraph.topology.linkgraph import LinkGraph, link_graph
 class System(States):
     """A mechanism with geometry, indexed for the kernels, with the numbers ``par`` (the declared ones where left out)."""
 
+    _taken_from: tuple[System, Index] | None = None
+
     def __init__(self, m: Mechanism, graph: LinkGraph | None = None, par: Parameters | None = None) -> None:
         super().__init__(m, graph or m.once(link_graph), par or m.once(parameters))
 
@@ -101,7 +103,9 @@ class System(States):
 
     @cached_property
     def numbers(self) -> Numbers:
-        """What follows from the parameters."""
+        """What follows from the parameters; of variants taken from more what is known there."""
+        if self._taken_from is not None:
+            return self._taken_from[0].numbers.taken(self.par, self._taken_from[1])
         return Numbers(self.par, self.walk, self.batches, self.n_factors, self.n_freedoms)
 
     @cached_property
@@ -136,7 +140,12 @@ class System(States):
 
     def cases(self, which: Index) -> System:
         """The system with the numbers of some variants of its batch, in that order; of a batch of one, itself."""
-        return self if self.par.batch == 1 else self.with_parameters(self.par.taken(which))
+        if self.par.batch == 1:
+            return self
+        out = self.with_parameters(self.par.taken(which))
+        if len(which) > 1:  # of one the numbers have another form
+            out._taken_from = self, which
+        return out
 
     def with_parameters(self, par: Parameters) -> System:
         """The same mechanism with other numbers."""

@@ -5,17 +5,23 @@ A coordinate may leave its range and come back between two nodes: nodes are put 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.driver_path import DriverPath, Positions, Status
 from mechgraph.closure.indexing import System
+from mechgraph.numerics.continuation import End, Follower
 from mechgraph.numerics.hermite import Interpolation
 from mechgraph.numerics.tolerances import PATH
 from mechgraph.numerics.tracks import Nodes
 
 BEYOND_END = 1e-9
 """Lengths over L by which a coordinate may be beyond its range: rounding."""
+BISECTIONS = 52
+"""Times that a step is halved for the place where a coordinate leaves its range: to rounding."""
+NONE = np.zeros(0, dtype=np.intp)
 TURNS_FOUND = 4
 """Nodes put one after the other where a coordinate turns back; the third is there to 1e-5, and the value to its square."""
 
@@ -28,42 +34,69 @@ def beyond(system: System, x: Array) -> Array:
 
 
 def end_at_ranges(path: DriverPath, found: Positions) -> None:
-    """Take away the positions of every track from where a coordinate leaves its range on; ``found.left`` says which it is."""
+    """End every track where a coordinate leaves its range, and take away its positions behind; ``found.left`` says which it is."""
     system = path.system
-    columns = system.limits[0]
-    if not columns.size:
+    over = np.flatnonzero((beyond(system, found.x) > BEYOND_END).any(axis=0))
+    outside = np.full(len(found.tracks.end), np.inf)
+    np.minimum.at(outside, found.track[over], found.place[over])
+    ends, node = range_ends(path, found.follower, found.tracks.nodes, outside)
+    left = np.flatnonzero(np.isfinite(ends))
+    if not left.size:
         return
-    nodes = _with_turns(path, found)
-    outside, over = beyond(system, nodes.x), beyond(system, found.x)
-    names = system.m.freedom_names()
-    for track in np.unique(found.track).tolist():
-        mine, on_it = (
-            np.flatnonzero((nodes.track == track) & (nodes.place >= 0.0)),
-            np.flatnonzero(found.track == track),
-        )
-        late = mine[(outside[:, mine] > BEYOND_END).any(axis=0)]
-        places = [*nodes.place[late], *found.place[on_it[(over[:, on_it] > BEYOND_END).any(axis=0)]]]
-        if not places:
-            continue
-        end = min(places)
-        after = found.place[on_it] >= end
+    first = system.limits[0][np.argmax(beyond(system, node.x), axis=0)]
+    names = [system.m.freedom_names()[i] for i in first.tolist()]
+    for i, track in enumerate(left.tolist()):
+        after = found.place > ends[track]
         # a later period begins behind the whole first one
-        gone = on_it[after if found.turns is None else after | (found.turns[on_it] > 0)]
-        before = mine[nodes.place[mine] < end]
-        at_end = (
-            nodes.x[:, mine[nodes.place[mine] >= end][:1]] if (nodes.place[mine] >= end).any() else found.x[:, gone[:1]]
-        )
-        found.left[gone] = names[int(columns[np.argmax(beyond(system, at_end)[:, 0])])]
-        found.status[gone], found.near[gone] = Status.OUT_OF_REACH, -1
+        gone = (found.track == track) & (after if found.turns is None else after | (found.turns > 0))
+        found.status[gone], found.near[gone], found.left[gone] = Status.OUT_OF_REACH, -1, names[i]
         found.x[:, gone] = np.nan
-        if before.size:
-            found.reached[:, gone] = nodes.drive[:, before[-1:]]
-        found.here = None
-
-
-def _with_turns(path: DriverPath, found: Positions) -> Nodes:
-    """The nodes of all tracks, and further ones where a limited coordinate turns back near an end of its range between two of them."""
+        found.reached[:, gone] = node.drive[:, [i]]
     nodes = found.tracks.nodes
+    kept = nodes.take((nodes.place < ends[nodes.track]) | (nodes.place == 0.0))
+    how = [End.RANGE if there < np.inf else end for end, there in zip(found.tracks.end, ends, strict=True)]
+    found.tracks = replace(found.tracks, nodes=Nodes.join([kept, node.take(node.place > 0.0)]), end=how)
+    found.here = None
+
+
+def range_ends(path: DriverPath, follower: Follower, nodes: Nodes, outside: Array) -> tuple[Array, Nodes]:
+    """Where tracks ``(V,)`` leave a range of a coordinate, infinite where they do not, and the nodes there, one each that does.
+
+    ``outside (V,)``: places that are known to lie behind.
+    """
+    V, system = len(outside), path.system
+    if not system.limits[0].size:
+        return outside, nodes.take(NONE)
+    nodes = _with_turns(path, follower, nodes)
+    out, mine = (beyond(system, nodes.x) > BEYOND_END).any(axis=0), nodes.place >= 0.0
+    far, near = outside.copy(), np.zeros(V)
+    np.minimum.at(far, nodes.track[out & mine], nodes.place[out & mine])
+    before = mine & (nodes.place < far[nodes.track])
+    np.maximum.at(near, nodes.track[before], nodes.place[before])
+    left = np.flatnonzero(np.isfinite(far))
+    if not left.size:
+        return far, nodes.take(NONE)
+    low, high = near[left], far[left]
+    between = Interpolation(path, nodes)
+    for _ in range(BISECTIONS if (high > low).any() else 0):
+        middle = 0.5 * (low + high)
+        x = between(between.find(left, middle), middle, follower.paths.drive(left, middle))
+        over = (beyond(system, x) > BEYOND_END).any(axis=0)
+        low, high = np.where(over, low, middle), np.where(over, middle, high)
+    ends = np.full(V, np.inf)
+    ends[left] = low
+    drive = follower.paths.drive(left, low)
+    first = nodes.take(mine)
+    first = first.take(np.searchsorted(first.track, left))
+    x, on = first.x, low > 0.0
+    if on.any():
+        x[:, on] = between(between.find(left[on], low[on]), low[on], drive[:, on])
+    closed = follower.newton.nodes(x, drive, left, first.which, PATH.node)
+    return ends, Nodes.closed(closed, drive, left, low, sure=True)
+
+
+def _with_turns(path: DriverPath, follower: Follower, nodes: Nodes) -> Nodes:
+    """The nodes of all tracks, and further ones where a limited coordinate turns back near an end of its range between two of them."""
     columns, low, high = path.system.limits
     for _ in range(TURNS_FOUND):
         between = Interpolation(path, nodes)
@@ -84,7 +117,7 @@ def _with_turns(path: DriverPath, found: Positions) -> Nodes:
             break
         place = nodes.place[a[step]] + s[turns] * width[step]
         track, which = nodes.track[a[step]], nodes.which[a[step]]
-        drive = found.follower.paths.drive(track, place)
-        closed = found.follower.newton.nodes(between(step, place, drive), drive, track, which, PATH.node)
+        drive = follower.paths.drive(track, place)
+        closed = follower.newton.nodes(between(step, place, drive), drive, track, which, PATH.node)
         nodes = Nodes.join([nodes, Nodes.closed(closed, drive, track, place, sure=True).take(closed.done)])
     return nodes

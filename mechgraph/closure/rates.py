@@ -100,16 +100,40 @@ def distance_to_dead_point(here: Configuration, solver: FactoredClosure, columns
     return out
 
 
-def at_dead_points(here: Configuration, factored: FactoredClosure, solver: ClosureSolver) -> NDArray[np.bool_]:
-    """Which positions are so near to a singular one of the drivers that their rates would be noise, ``(T,)``."""
-    dead = np.asarray(factored.condition > PATH.singular)
-    doubtful = np.flatnonzero((factored.condition > PATH.doubtful) & ~dead)
-    if doubtful.size:
-        few = here.part(doubtful)
-        f = factored.part(doubtful, few)
-        near = distance_to_dead_point(few, f, solver.fixed)
-        dead[doubtful] = ~(near > PATH.dead_point) | (_scatter(few, f, solver) > PATH.scatter)
-    return dead
+def at_dead_points(
+    here: Configuration, factored: FactoredClosure, solver: ClosureSolver
+) -> tuple[NDArray[np.bool_], Array]:
+    """Which positions are so near to a singular one of the drivers that their rates would be noise, and the ``accuracy (T,)`` of all."""
+    condition = factored.condition
+    dead, out = np.asarray(condition > PATH.singular), accuracy(here, condition)
+    poor = np.flatnonzero((condition > PATH.poor) & ~dead)
+    if poor.size:
+        few = here.part(poor)
+        f = factored.part(poor, few)
+        scatter = _scatter(few, f, solver)
+        out[poor] = few.rounding * np.maximum(condition[poor], scatter / PATH.rounding)
+        near = np.full(poor.size, np.inf)
+        doubtful = np.flatnonzero(condition[poor] > PATH.doubtful)
+        if doubtful.size:
+            fewer = few.part(doubtful)
+            near[doubtful] = distance_to_dead_point(fewer, f.part(doubtful, fewer), solver.fixed)
+            dead[poor] = ~(near > PATH.dead_point) | ((scatter > PATH.scatter) & (condition[poor] > PATH.doubtful))
+    return dead, out
+
+
+def accuracy(here: Configuration, condition: Array) -> Array:
+    """See ``expected_error``, at the states of a configuration."""
+    return expected_error(here.rounding, condition)
+
+
+def expected_error(rounding: Array, condition: Array) -> Array:
+    """Estimated relative error ``(T,)`` of rates and forces at states of fair condition, whose residuals have a ``rounding (T,)``.
+
+    Rounding of the residual moves a state by condition times as much, which changes rates, solved with a matrix that is moved, by
+    condition times that again, and accelerations, solved from these rates, once more.
+    """
+    grown = np.maximum(condition / PATH.square, 1.0) * np.maximum(condition / PATH.cube, 1.0)
+    return np.asarray(rounding * condition * grown)
 
 
 def _scatter(here: Configuration, factored: FactoredClosure, solver: ClosureSolver) -> Array:

@@ -51,6 +51,9 @@ class FactoredClosure(Protocol):
     def solve_transposed(self, b: Array) -> Array:
         """``x (m, k, T)`` with ``J^T x = b (F, k, T)`` in the columns neither fixed nor held."""
 
+    def residual_size(self, r: Array) -> Array:
+        """Largest entry ``(T,)`` of residuals ``(m, T)``, displacements over the sizes of their loops."""
+
     def sensitivity(self) -> Array:
         """Rates ``Z (F, d, T)`` of all freedoms for unit rates of the fixed ones."""
 

@@ -65,6 +65,13 @@ class SparseFactored:
         found = [form.solve_transposed(factors, b[:, :, at]) for form, at, factors in self._parts]
         return self._joined(found, self.here.system.n_rows, b.shape[1])
 
+    def residual_size(self, r: Array) -> Array:
+        """See ``FactoredClosure``."""
+        out = np.zeros(self.here.T)
+        for form, at, _ in self._parts:
+            out[at] = np.abs(form.kept_part(r[:, at])).max(axis=0, initial=0.0)
+        return out
+
     def sensitivity(self) -> Array:
         """See ``FactoredClosure``."""
         fixed = self.solver.fixed

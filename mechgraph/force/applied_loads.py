@@ -34,16 +34,14 @@ def inertia_wrenches(here: Configuration, rates: Rates) -> Array:
     return np.concatenate([cross(c, force) - rotate(R, turning), force])
 
 
-def nothing(shape: tuple[int, ...]) -> Array:
-    """Zeros of a shape that take no memory; they cannot be written to."""
-    return np.broadcast_to(0.0, shape)
+NOT_FINITE = "gives a value that is not finite at some position; check its callable, or a spring of length 0"
 
 
 class Site:
     """Collects loads on links and efforts in freedoms; speaks the user's units, about the internal origin.
 
-    Implements ``model.load.LoadSite``. ``external`` holds what comes from outside, ``internal`` what links exert on each other;
-    ``largest`` is the largest single contribution (internal units), against which a sum that cancels is rounding.
+    Implements ``model.load.LoadSite``. ``wrenches (6, N, T)``, ``efforts (F, T)``; ``largest`` is the largest single contribution
+    (internal units), against which a sum that cancels is rounding.
     """
 
     def __init__(
@@ -54,35 +52,25 @@ class Site:
         system = here.system
         self.m, self.L = system.m, system.par.L
         self._link = self.m.link_index
-        self.external = np.zeros((6, len(self.m.links), here.T))
-        self.internal = nothing(self.external.shape)
+        self.wrenches = np.zeros((6, len(self.m.links), here.T))
         self.efforts = np.zeros((system.n_freedoms, here.T))
-        self._target = self.external
         self.largest = 0.0
 
     def collect(self, loads: tuple[Load, ...]) -> None:
         """Evaluate all loads."""
         for load in loads:
-            if load.between_links and not self.internal.flags.writeable:
-                self.internal = np.zeros_like(self.external)
-            self._target = self.internal if load.between_links else self.external
             load.act(self)
         if not self._finite():
             wrong = next((load for load in loads if not self._alone(load)), loads[-1])
-            raise DeclarationError(
-                f"load {wrong.where.removesuffix(': ')}",
-                ["gives a value that is not finite at some position; check its callable, or a spring of length 0"],
-            )
+            raise DeclarationError(f"load {wrong.where.removesuffix(': ')}", [NOT_FINITE])
 
     def _finite(self) -> bool:
-        return all(np.isfinite(part).all() for part in (self.external, self.internal, self.efforts))
+        return all(np.isfinite(part).all() for part in (self.wrenches, self.efforts))
 
     def _alone(self, load: Load) -> bool:
         """Whether a load alone gives finite values."""
         other = copy(self)
-        other.external, other.internal = np.zeros_like(self.external), nothing(self.internal.shape)
-        other.efforts = np.zeros_like(self.efforts)
-        other._target = other.external
+        other.wrenches, other.efforts = np.zeros_like(self.wrenches), np.zeros_like(self.efforts)
         load.act(other)
         return other._finite()
 
@@ -127,11 +115,8 @@ class Site:
         if isinstance(value, PerCase):
             return np.asarray(self.number(value)).reshape(width, self.here.T)
         if callable(value):
-            i = self._link[link]
-            pose = self._spread(user_poses(self.here)[i])
-            twist = self._spread(np.moveaxis(user_twists(self.here, self.rates.V)[:, i], 0, -1))
             try:
-                given = value(pose, twist, self.t)
+                given = value(*self.motion_of(link), self.t)
             except Exception as error:
                 raise DeclarationError(
                     f"load on {link!r}", [f"its callable (pose, twist, t) failed: {type(error).__name__}: {error}"]
@@ -155,6 +140,12 @@ class Site:
                 [f"value of shape {np.shape(value)} does not fit the positions {self.batch}; expected {wanted}"],
             ) from None
         return np.moveaxis(full.reshape(-1, width)[self.good], -1, 0)
+
+    def motion_of(self, link: str) -> tuple[Array, Array]:
+        """Pose ``(..., 4, 4)`` and twist ``(..., 6)`` of a link in the user's batch."""
+        i = self._link[link]
+        twists = user_twists(self.here, self.rates.V)[:, i]
+        return self._spread(user_poses(self.here)[i]), self._spread(np.moveaxis(twists, 0, -1))
 
     def _spread(self, rows: Array) -> Array:
         """Values of the solved positions in the user's batch shape, NaN elsewhere."""
@@ -196,8 +187,8 @@ class Site:
         self._add(self._link[link], moment, 0.0)
 
     def _add(self, links: Any, moment: Array, force: Any) -> None:
-        self._target[:3, links] += moment
-        self._target[3:, links] += force
+        self.wrenches[:3, links] += moment
+        self.wrenches[3:, links] += force
         self._note(np.abs(moment).max(initial=0.0) / self.L**2, np.abs(force).max(initial=0.0) / self.L)
 
     def _note(self, *sizes: float) -> None:
@@ -211,16 +202,12 @@ class Site:
 
     # --- in internal units -------------------------------------------------------------------------------------------
 
-    def scaled(self, wrench: Array) -> Array:
-        """Wrenches in the user's units as internal ones."""
-        out = np.empty(wrench.shape)
-        np.divide(wrench[:3], self.L**2, out=out[:3])
-        np.divide(wrench[3:], self.L, out=out[3:])
-        return out
-
     def applied(self) -> Array:
         """Wrenches of all loads on all links, ``(6, N, T)``, as internal ones."""
-        return self.scaled(self.external + self.internal if self.internal.flags.writeable else self.external)
+        out = np.empty(self.wrenches.shape)
+        np.divide(self.wrenches[:3], self.L**2, out=out[:3])
+        np.divide(self.wrenches[3:], self.L, out=out[3:])
+        return out
 
     def scaled_efforts(self) -> Array:
         """Given efforts ``(F, T)`` as internal ones."""

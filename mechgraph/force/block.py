@@ -104,8 +104,6 @@ def forces_of_block(
     parts = (own, given, found.coupled)
     balance, wrench = _balance(here, found.reactions, totals, loads, (applied, inertia, held, *parts))
     power, term = _power(rates, totals, applied if held is None else applied + held, parts, inertia)
-    frame = here.system.graph.frame
-    shaking = np.delete(loads, frame, axis=1).sum(axis=1) + site.scaled(site.internal)[:, frame]
     return BlockForces(
         found.reactions,
         found.efforts,
@@ -118,7 +116,7 @@ def forces_of_block(
         found.multipliers,
         found.stress.multipliers,
         row_efforts(here, found.stress.multipliers),
-        shaking,
+        loads.sum(axis=1),  # what links exert on each other cancels
         balance,
         power,
         (wrench, term),

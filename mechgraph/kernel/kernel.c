@@ -64,7 +64,6 @@ typedef struct {
   double *null, *stress, *stress_effort, *row_value, *column_value, *trial, *increment, *change, *bound, *record, *direction, *line_begin, *asked, *kept;
   size_t n_kept;
   Node a, b, before;
-  double frame_load[6];
   long steps, evaluations, factorizations;
 } Work;
 
@@ -131,7 +130,7 @@ static size_t lay_out(const Model *m, double *memory, Work *w) {
 int mgk_record(const int *I, int *places) {
   const int c = I[MGK_COLUMNS], n = I[MGK_LINKS], p = I[MGK_PAIRS], k = I[MGK_COUPLINGS];
   const int s = 6 * I[MGK_LOOPS] + k - I[MGK_UNKNOWNS];
-  const int lengths[MGK_PARTS] = {I[MGK_STATES], c, c, c, 1, 1, 3 * p, 6 * p, c, c, 6 * n, 6 * p * s, c * s, c, k, k * s, c * s, 6, 1, 1};
+  const int lengths[MGK_PARTS] = {I[MGK_STATES], c, c, c, 1, 2, 3 * p, 6 * p, c, c, 6 * n, 6 * p * s, c * s, c, k, k * s, c * s, 6, 1, 1};
   places[0] = 0;
   FOR(i, MGK_PARTS) places[i + 1] = places[i] + lengths[i];
   return MGK_OK;
@@ -644,7 +643,7 @@ static void pushed(Work *w, int link, const double *force, const double *at) {
 }
 
 /* A spring or damper between points of two links. */
-static void between_points(const Model *m, Work *w, int i, int j, const double *number) {
+static void between_points(Work *w, int i, int j, const double *number) {
   double p[3], q[3], d[3], back[3], speed = 0.0, length = 0.0;
   point_of(w->pose + 12 * i, number, p);
   point_of(w->pose + 12 * j, number + 3, q);
@@ -660,19 +659,12 @@ static void between_points(const Model *m, Work *w, int i, int j, const double *
   FOR(r, 3) d[r] *= force == 0.0 ? 0.0 : force / length, back[r] = -d[r];
   pushed(w, i, back, p);
   pushed(w, j, d, q);
-  FOR(side, 2) if ((side ? j : i) == m->frame_link) {
-    double f[6] = {0};
-    memcpy(f + 3, side ? d : back, 3 * sizeof(double));
-    wrench_moved(f, side ? q : p, 1.0);
-    FOR(r, 6) w->frame_load[r] += f[r];
-  }
 }
 
 /* All loads: wrenches on links, efforts in freedoms. */
 static void loads(const Model *m, Work *w, const double *x) {
   memset(w->applied, 0, (size_t)6 * m->links * sizeof(double));
   memset(w->given, 0, m->columns * sizeof(double));
-  memset(w->frame_load, 0, sizeof w->frame_load);
   FOR(l, m->loads) {
     const int *load = m->load + 4 * l, i = load[1], j = load[2];
     const double *number = m->load_number + load[3];
@@ -695,7 +687,7 @@ static void loads(const Model *m, Work *w, const double *x) {
     } else if (load[0] == MGK_LAW) {
       w->given[i] += -number[0] * (x[m->column_state[i]] - number[1]) - number[2] * w->dq[i];
     } else {
-      between_points(m, w, i, j, number);
+      between_points(w, i, j, number);
     }
   }
 }
@@ -867,10 +859,10 @@ static int forces(const Model *m, Work *w, const double *x, double *record, cons
   }
   checks(m, w, record + places[MGK_BALANCE], record + places[MGK_POWER], largest);
   double *shaking = record + places[MGK_SHAKING], *body = record + places[MGK_BODY_LOADS];
-  memcpy(shaking, w->frame_load, sizeof w->frame_load);
+  memset(shaking, 0, 6 * sizeof(double)); /* what links exert on each other cancels */
   FOR(b, m->links) FOR(r, 6) {
     body[6 * b + r] = w->applied[6 * b + r] + w->inertial[6 * b + r];
-    if (b != m->frame_link) shaking[r] += body[6 * b + r];
+    shaking[r] += body[6 * b + r];
   }
   FOR(k, m->pairs) FOR(r, 3) record[places[MGK_POINTS] + 3 * k + r] = w->end[12 * k + 4 * r + 3];
 #define PUT(part, values) memcpy(record + places[part], values, (size_t)(places[part + 1] - places[part]) * sizeof(double))
@@ -1011,7 +1003,8 @@ static int certified(const Model *m, Work *w, double *grown) {
 /* Rates, forces and the record of a closed state just factored. */
 static int put(const Model *m, Work *w, const double *x, const double *v, const double *a, int with_forces, const int *places, double *record,
                double *largest) {
-  record[places[MGK_CLOSURE]] = w->closure, record[places[MGK_CONDITION]] = w->reach * fmax(w->a.condition, w->b.condition);
+  double *condition = record + places[MGK_CONDITION];
+  record[places[MGK_CLOSURE]] = w->closure, condition[0] = fmax(w->a.condition, w->b.condition), condition[1] = w->reach;
   const int status = rates(m, w, v, a);
   if (status) return status;
   PUT(MGK_X, x), PUT(MGK_DQ, w->dq), PUT(MGK_DDQ, w->ddq);
@@ -1147,7 +1140,6 @@ static void begin(const Model *m, Work *w) {
 static void opened(const int *I, const double *P, void *state, Model *m, Work *w) {
   read_tables(I, P, m);
   lay_out(m, state, w);
-  memset(w->frame_load, 0, sizeof w->frame_load);
   w->steps = w->evaluations = w->factorizations = 0;
 }
 

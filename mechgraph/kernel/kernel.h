@@ -54,7 +54,7 @@ enum {
   MGK_FORMAT_ERROR = 8  /* tables of another version */
 };
 
-/* Parts of a record, in order, for one position (the condition times the reach, by which rounding counts); s = 6 loops + couplings - unknowns self-stresses. */
+/* Parts of a record, in order, for one position (condition: that number, and how far links reach, by which rounding counts); s = 6 loops + couplings - unknowns self-stresses. */
 enum {
   MGK_X, MGK_COORDINATES, MGK_DQ, MGK_DDQ, MGK_CLOSURE, MGK_CONDITION, MGK_POINTS, MGK_REACTIONS, MGK_EFFORTS, MGK_GIVEN, MGK_BODY_LOADS, MGK_STRESS,
   MGK_STRESS_EFFORTS, MGK_COUPLED, MGK_MULTIPLIERS, MGK_MULTIPLIER_STRESS, MGK_COUPLED_STRESS, MGK_SHAKING, MGK_BALANCE, MGK_POWER,

@@ -27,8 +27,8 @@ Integers = NDArray[np.int32]
 
 FORMAT = 1
 PARTS = (
-    "x", "coordinates", "dq", "ddq", "closure", "condition", "points", "reactions", "efforts", "given", "loads", "stress", "stress_efforts", "coupled",
-    "multipliers", "multiplier_stress", "coupled_stress", "shaking", "balance", "power",
+    "x", "coordinates", "dq", "ddq", "closure", "condition", "points", "reactions", "efforts", "given", "loads", "stress", "stress_efforts",
+    "coupled", "multipliers", "multiplier_stress", "coupled_stress", "shaking", "balance", "power",
 )  # fmt: skip
 """Parts of a record, in order."""
 ROWS_OF_KERNEL = 90
@@ -222,7 +222,7 @@ def _record(s: System, unknowns: int) -> tuple[dict[str, slice], dict[str, tuple
         "shaking": (6,),
     }
     shapes |= {"stress": (stresses, p, 6), "stress_efforts": (stresses, c), "coupled_stress": (stresses, c)}
-    shapes |= {"multiplier_stress": (stresses, k), "closure": (), "condition": (), "balance": (), "power": ()}
+    shapes |= {"multiplier_stress": (stresses, k), "closure": (), "condition": (2,), "balance": (), "power": ()}
     ends = np.cumsum([0, *(int(np.prod(shapes[name])) for name in PARTS)]).tolist()
     return {name: slice(i, j) for name, i, j in zip(PARTS, ends[:-1], ends[1:], strict=True)}, shapes
 

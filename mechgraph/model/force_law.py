@@ -16,7 +16,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
 from mechgraph.model.field_kinds import FREEDOM_NAME, LINK_NAME, NAMED_POINT, NUMBER, POSITION, TABLE
 from mechgraph.model.force_table import ForceTable
-from mechgraph.model.load_base import Load, LoadSite
+from mechgraph.model.load_base import Breaks, Load, LoadSite
 from mechgraph.model.nameable import Nameable
 from mechgraph.quantities import is_numeric, real_array, shown, wrong
 from mechgraph.units import FORCE_PER_LENGTH, FORCE_PER_VELOCITY, LENGTH, MOMENT, MOMENT_PER_RATE
@@ -224,7 +224,8 @@ class ForceLaw(_Placed):
     """A force ``F = scale law(x - free, x', t)``, in a freedom ``"D"`` or between points ``(link a, link b, p, q)``.
 
     ``law`` is a ``ForceTable`` or a function of arrays ``(T,)``: coordinate, rate and time (None where the motion has no times). ``F``
-    acts along the coordinate, its power is ``F x'``: + on link b and - on link a in a freedom; + pushes the points apart.
+    acts along the coordinate, its power is ``F x'``: + on link b and - on link a in a freedom; + pushes the points apart. ``breaks`` are
+    times at which a function jumps or bends: in ``respond`` steps end there.
     """
 
     kind: ClassVar[str] = "force_law"
@@ -234,6 +235,7 @@ class ForceLaw(_Placed):
         default=0.0, kw_only=True
     )
     scale: Annotated[float, NUMBER("factor of the force")] = field(default=1.0, kw_only=True)
+    breaks: Breaks = field(default=(), kw_only=True)
 
     def faults(self, names: Nameable) -> list[str]:
         """What is wrong with this load."""
@@ -248,6 +250,11 @@ class ForceLaw(_Placed):
     def by_position(self) -> bool:
         """See ``Load``; functions are given arrays of positions, any of them."""
         return True
+
+    @property
+    def of_time(self) -> bool:
+        """See ``Load``; a table does not."""
+        return not isinstance(self.law, ForceTable)
 
     @property
     def smooth(self) -> bool:

@@ -5,13 +5,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from mechgraph.algebra.se3 import rotate
 from mechgraph.model.field_kinds import FREEDOM_NAME, LINK_NAME, NAMED_POINT, SERIES, TEXT, VECTOR, VECTOR_SERIES
 from mechgraph.model.force_law import Damper, ForceLaw, Spring, TorsionSpring
-from mechgraph.model.load_base import Load, LoadSite, Value
+from mechgraph.model.load_base import Breaks, Load, LoadSite, Value
 from mechgraph.model.nameable import Nameable
 from mechgraph.units import ACCELERATION, FORCE, LENGTH, MOMENT
 
@@ -48,7 +48,7 @@ class Wrench(Load):
     ``point`` is in the coordinates of the declared configuration, in which link frames stand on the global one (for a link
     placed by markers: its own frame), or the name of a point of the link; the mass centre where it is left out (a force on
     a link without one needs it). ``frame`` says whether force and moment have global directions or turn with the link.
-    Values may be arrays over positions or a callable ``(pose, twist, t)`` of the link.
+    Values may be arrays over positions or a callable ``(pose, twist, t)`` of the link; ``breaks`` as of a ``ForceLaw``.
     """
 
     kind: ClassVar[str] = "wrench"
@@ -69,6 +69,7 @@ class Wrench(Load):
         Literal["global", "link"],
         TEXT('`"link"`: force and moment turn with the link; `"global"`: they do not', choices=("global", "link")),
     ] = "global"
+    breaks: Breaks = field(default=(), kw_only=True)
 
     def faults(self, names: Nameable) -> list[str]:
         """What is wrong with this load."""
@@ -96,13 +97,14 @@ class Wrench(Load):
 class Effort(Load):
     """A given effort in a freedom: couple about a turn, force along a slide; + on link b, - on link a.
 
-    ``value`` may be an array over positions or a callable ``(pose, twist, t)`` of link b.
+    ``value`` may be an array over positions or a callable ``(pose, twist, t)`` of link b; ``breaks`` as of a ``ForceLaw``.
     """
 
     kind: ClassVar[str] = "effort"
     subject: ClassVar[str] = "effort in {freedom}"
     freedom: Annotated[str, FREEDOM_NAME("the freedom, e.g. D or B.Rx", single=False)]
     value: Annotated[Value, SERIES("couple about a turn, force along a slide; + on link b, - on link a", FORCE, MOMENT)]
+    breaks: Breaks = field(default=(), kw_only=True)
 
     def act(self, site: LoadSite) -> None:
         """Add the effort."""

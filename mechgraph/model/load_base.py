@@ -5,19 +5,24 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol, Self
+from typing import Annotated, Any, ClassVar, Protocol, Self
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.model.field_format import Described
-from mechgraph.model.field_kinds import FREEDOM_NAME, LINK_NAME
+from mechgraph.model.field_kinds import FREEDOM_NAME, LINK_NAME, TIMES
 from mechgraph.model.nameable import Nameable
 from mechgraph.model.numeric import same_fields
 from mechgraph.quantities import shown
+from mechgraph.units import TIME
 
 Value = Any
 """A number or vector, an array over positions, or a callable ``(pose, twist, t)``."""
+
+
+Breaks = Annotated[Any, TIMES("of a function of time: when it jumps or bends, for `respond`", TIME, default="none")]
+"""Field of a load that may be a function of time; steps end there."""
 
 
 class LoadSite(Protocol):
@@ -107,6 +112,8 @@ class Load(Described, ABC):
             elif about.of and (link := getattr(self, about.of)) in names.link_index:
                 found.append(None if value in names.link(link).points else names.link(link).point_fault(value))
         found += self.value_faults("")
+        if self.break_times and not self.of_time:
+            found.append(f"breaks = {shown(self.break_times)}: beside no function of time; leave them out")
         return [self.where + fault for fault in found if fault]
 
     @property
@@ -128,6 +135,16 @@ class Load(Described, ABC):
             for name, value in given.items()
             if value is not None and not callable(value) and np.ndim(value) > len(self.formats[name].kind.shape or ())
         )
+
+    @property
+    def of_time(self) -> bool:
+        """Whether it may depend on time by itself."""
+        return not self.by_position
+
+    @property
+    def break_times(self) -> tuple[float, ...]:
+        """Times at which it is known not to be smooth."""
+        return tuple(np.ravel(getattr(self, "breaks", ())).tolist())
 
     @property
     def smooth(self) -> bool:

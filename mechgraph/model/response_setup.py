@@ -60,6 +60,7 @@ class ResponseSetup(Described):
     rtol: Annotated[float, NUMBER("relative tolerance of a step")] = 1e-8
     atol: Annotated[float, NUMBER("absolute tolerance: radians, lengths / L, and their rates")] = 1e-10
     method: Annotated[MethodName, TEXT("stepper of `scipy.integrate`", choices=METHODS)] = "auto"
+    max_step: Annotated[float | None, NUMBER("longest step", TIME, default="none")] = None
     passive: Annotated[
         PassiveName, TEXT("what passive freedoms do: move freely, or stay at rest", choices=get_args(PassiveName))
     ] = "free"
@@ -110,7 +111,7 @@ class ResponseSetup(Described):
             found.append(wrong(points, "points", f"a number from 2 to {MOST_POINTS}, beside time = (begin, end)"))
         for what in ("start", "rates"):
             found += _value_faults(m, what, getattr(self, what))
-        found += tolerance_faults(self.rtol, self.atol)
+        found += tolerance_faults(self.rtol, self.atol, self.max_step)
         found += option_faults({"method": (self.method, METHODS), "passive": (self.passive, get_args(PassiveName))})
         for what, kind in (("motions", Drive), ("events", Event), ("stops", Stop)):
             items = items_of(getattr(self, what), what, found)
@@ -164,6 +165,7 @@ class ResponseSetup(Described):
         return replace(
             self,
             time=plain(np.asarray(self.time) * base[2]),
+            max_step=None if self.max_step is None else self.max_step * base[2],
             start=scaled(self.start, 0),
             rates=scaled(self.rates, 1),
             motions=tuple(one.in_units(base, turns(one.freedom)) for one in self.motions),
@@ -182,9 +184,10 @@ def read_times(t: Any, faults: list[str]) -> Array:
     return times
 
 
-def tolerance_faults(rtol: Any, atol: Any) -> list[str]:
-    """What is wrong with the tolerances of a step."""
-    return [
+def tolerance_faults(rtol: Any, atol: Any, max_step: Any) -> list[str]:
+    """What is wrong with the tolerances of a step, and with the longest one."""
+    long = max_step is None or (is_numeric(max_step, ()) and max_step > 0.0)
+    return ([] if long else [wrong(max_step, "max_step", "a time above 0, or None")]) + [
         wrong(value, name, "a number from 1e-14 to 0.1")
         for name, value in (("rtol", rtol), ("atol", atol))
         if not is_numeric(value, ()) or not 1e-14 <= value <= 0.1

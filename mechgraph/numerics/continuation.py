@@ -37,6 +37,7 @@ class End(Enum):
     REACHED = "reached"
     FOLD = "fold"
     CROSSING = "crossing"
+    RANGE = "range"
     GIVEN_UP = "given up"
 
 

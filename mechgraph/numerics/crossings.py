@@ -7,14 +7,15 @@ the rates solved there. Nearer than ``WINDOW`` states are therefore interpolated
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.numerics.continuation import Follower
 from mechgraph.numerics.hermite import through
-from mechgraph.numerics.newton import Problem
+from mechgraph.numerics.newton import Problem, largest
 from mechgraph.numerics.tolerances import PATH
 from mechgraph.numerics.tracks import Nodes
 
@@ -34,7 +35,12 @@ SPANS = (0.08, 0.02, 0.005)
 """Spans tried. With the first, polynomials through the sides are exact to rounding where the branch is analytic within a distance of
 0.5; the others serve where another singular position is near."""
 SCATTER = 3.0
-"""Factor within which condition times distance is constant where there is no other singular position near."""
+"""Factor within which the answer to a residual times the distance is constant where there is no other singular position near."""
+PROBE_SEED = 3
+BETWEEN = np.linspace(-1.0, 1.0, 8)
+"""Places between the nearest sides at which interpolated states are asked how they close; not the crossing itself."""
+CLOSES = 1e-12
+"""Residual up to which they do: the roundings of a thousand loops add up in it."""
 
 PROBE = 10 * PATH.dead_zone
 """Distance at which the condition is looked at for another crossing."""
@@ -60,6 +66,30 @@ class Crossing:
         """Path values ``(d, n)`` at places beside the crossing."""
         return self.drive[:, None] + self.direction[:, None] * (places - self.place)
 
+    @cached_property
+    def _open(self) -> tuple[float, float]:
+        nearest = float(np.abs(self.sides.place - self.place).min())
+        at = self.place + nearest * BETWEEN
+        tracks, which = np.full(len(at), self.track), np.repeat(self.sides.which[:1], len(at))
+        point = self.problem.at(self.states(at), self.drives(at), tracks)
+        f = self.problem.factored(point, which)
+        sizes = (f.residual_size(r) for r in (point.residual, np.ones_like(point.residual) * point.rounding))
+        miss, rounding = (float(size.max()) for size in sizes)
+        return miss, max(CLOSES, rounding)
+
+    @property
+    def miss(self) -> float:
+        """By how much the states between the nearest sides do not close: angles, and lengths over the sizes of their loops.
+
+        Dimensions that differ by as much would open the crossing, so that the branches pass each other.
+        """
+        return self._open[0]
+
+    @property
+    def least_miss(self) -> float:
+        """What is not told from none."""
+        return self._open[1]
+
     def weights(self, places: Array) -> Array:
         """Lagrange's weights ``(sides, n)`` for values at places between the sides."""
         at = self.sides.place
@@ -67,6 +97,20 @@ class Crossing:
         distance = places - at[:, None]
         others = ~np.eye(len(at), dtype=bool)
         return np.stack([distance[mine].prod(axis=0) for mine in others]) / gaps.prod(axis=1)[:, None]
+
+    def error(self, places: Array, ddq: Array, errors: Array) -> Array:
+        """Relative error ``(n,)`` of accelerations interpolated from those at the sides ``ddq (F, n, sides)`` of ``errors (n, sides)``.
+
+        Theirs, and by how much the result changes where the outermost sides are left out.
+        """
+        weights, inner = (
+            self.weights(places),
+            replace(self, sides=self.sides.take(np.arange(1, len(self.sides) - 1))).weights(places),
+        )
+        inner = np.pad(inner, ((1, 1), (0, 0)))
+        off = np.abs(np.einsum("fnk,kn->fn", ddq, weights - inner)).max(axis=0, initial=0.0)
+        size = np.abs(ddq).max(axis=(0, 2), initial=1.0)
+        return np.asarray((np.abs(weights) * errors.T).sum(axis=0) + off / size)
 
     def states(self, places: Array) -> Array:
         """States ``(nx, n)`` at places, interpolated between the sides."""
@@ -110,13 +154,20 @@ def passed(follower: Follower, nodes: Nodes, track: int, place: float) -> Crossi
         drives = drive[:, None] + direction[:, None] * (at - place)
         x = through(problem, picked, base, direction, at)
         found = follower.newton.nodes(x, drives, base.track, base.which, PATH.node)
-        nearness = found.condition * np.abs(at - place)
+        nearness = _answer(problem, found.x, drives, base.track, found.which) * np.abs(at - place)
         regular = nearness.max() <= SCATTER * nearness.min()
         if found.done.all() and (found.correction <= 1e-2 * span).all() and regular:
             return Crossing(
                 problem, track, place, drive, direction, Nodes.closed(found, drives, base.track, at, sure=True)
             )
     return None
+
+
+def _answer(problem: Problem, x: Array, drive: Array, tracks: Index, which: Index) -> Array:
+    """How much states ``(nx, n)`` answer to a random residual: as the condition one over the distance, but no matter of pivots."""
+    point = problem.at(x, drive, tracks)
+    b = np.random.default_rng(PROBE_SEED).normal(size=len(point.residual))
+    return largest(problem.factored(point, which).solve(np.repeat(b[:, None, None], x.shape[1], axis=2))[:, 0])
 
 
 _DISTANCES = 4e-3 * 3.0 ** np.arange(4)

@@ -32,10 +32,6 @@ BEHIND = np.array([0.02, 0.05, 0.09])
 """Distances of the nodes behind a crossing."""
 OFF = 1e-2
 """Correction of a node behind, against its distance from the crossing, from which on it may be on another branch."""
-BETWEEN = np.linspace(-1.0, 1.0, 9)
-"""Places between the nearest sides at which interpolated states must close."""
-CLOSES = 1e-12
-"""Residual up to which they do: the roundings of a thousand loops add up in it."""
 
 
 def leapt(follower: Follower, nodes: Nodes) -> tuple[Crossing, Nodes] | None:
@@ -60,7 +56,7 @@ def leapt(follower: Follower, nodes: Nodes) -> tuple[Crossing, Nodes] | None:
         return None
     crossing = _singular_between(last.take(np.array([-1])), behind.take(np.array([0])))
     found = passed(follower, Nodes.join([nodes, behind]), int(last.track[0]), crossing)
-    if found is None or not _closes(found):
+    if found is None or not found.miss <= found.least_miss:
         return None
     middle = len(found.sides) // 2
     crossing = _singular_between(*(found.sides.take(np.array([i])) for i in (middle - 1, middle)))
@@ -84,13 +80,3 @@ def _behind(follower: Follower, last: Nodes, crossing: float) -> Nodes | None:
     if not found.done.all() or (found.correction > OFF * BEHIND).any():
         return None
     return Nodes.closed(found, drive, base.track, at, sure=True)
-
-
-def _closes(crossing: Crossing) -> bool:
-    """Whether the states between the nearest sides close."""
-    nearest = float(np.abs(crossing.sides.place - crossing.place).min())
-    at = crossing.place + nearest * BETWEEN
-    x, tracks = crossing.states(at), np.full(len(at), crossing.track)
-    point = crossing.problem.at(x, crossing.drives(at), tracks)
-    limit = np.maximum(CLOSES, point.rounding)
-    return bool((np.abs(point.residual).max(axis=0, initial=0.0) <= limit).all())

@@ -41,6 +41,9 @@ class Factored(Protocol):
     def solve(self, b: Array) -> Array:
         """Increments ``(F, k, n)`` for right sides ``(m, k, n)``."""
 
+    def residual_size(self, r: Array) -> Array:
+        """Largest entry ``(n,)`` of residuals ``(m, n)``, each in the measure of what it belongs to."""
+
     def motions(self) -> Array:
         """Increments ``(F, p, n)`` that the equations leave free with the path values at rest."""
 

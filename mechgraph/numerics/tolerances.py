@@ -149,6 +149,15 @@ class PathTolerances:
     """Part by which rounding may change accelerations before a position counts as one: beside a crossing of branches, not near a fold."""
     doubtful: float = 1e4
     """Condition number above which the distance to a dead point is computed."""
+    square: float = 5.0
+    """Condition number above which errors of rates are taken to grow with its square: so they do towards a fold."""
+    cube: float = 100.0
+    """The same for the cube, as beside a crossing. Estimates from both are within a factor of ten of the errors of four-bars beside change
+    points (against 50 digits), and up to a hundred times those of ordinary positions."""
+    poor: float = 300.0
+    """Condition number above which what rounding does to accelerations is tried, not estimated; few mechanisms come there."""
+    inaccurate: float = 1e-6
+    """Estimated relative error of rates and forces above which a solution warns: six digits are what dimensions are known to."""
     dead_zone: float = 1e-7
     """Distance from the end of a path up to which a requested position counts as the dead point itself."""
     crossing: float = 3e6

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.closure.driver_path import in_blocks
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.passive_motion import PassiveMotion
+from mechgraph.closure.rates import Velocities
 from mechgraph.force.applied_loads import kinetic_energy
+from mechgraph.model.load_base import Load
 from mechgraph.response.chart import Chart, Closed, Stopped
-from mechgraph.response.motion_equations import Loads, Moved, moved
+from mechgraph.response.motion_equations import Loads, Moved, accelerations, applied, moved, positions_together
 from mechgraph.response.prescribed import Prescribed
 from mechgraph.structure.mobility import free_motion
 
@@ -112,10 +117,22 @@ class ChartStage:
         # where it does not close the rates are NaN as well, and the step is taken back
         return np.nan_to_num(np.pad(J, ((0, 0), (0, 1))), copy=False)
 
+    def by_time(self, t: float, y: Array) -> tuple[Callable[[Array], Array], Array] | None:
+        """See ``Stage``."""
+        parts = self.task.loads.stored, self.task.loads.rest
+        loads = tuple(load for some in parts for load in some if load.of_time)
+        if not (loads or len(self.task.columns)) or not self._evaluated(t, y):
+            return None
+        rates = np.concatenate([y[self.n : -1], self.task.prescribed_at(np.array([t]))[1, :, 0]])
+        return partial(_by_time, self.task, self._moved, loads), rates
+
+    def _evaluated(self, t: float, y: Array) -> bool:
+        """Evaluate at an accepted place, where that was not the last evaluation; whether the loops close there."""
+        return (self._last.t == t and np.array_equal(self._y, y)) or self._found(t, y[:, None]) is not None
+
     def accepted(self, t: float, y: Array) -> bool:
         """See ``Stage``."""
-        if self._last.t != t or not np.array_equal(self._y, y):
-            self._found(t, y[:, None])
+        self._evaluated(t, y)
         self._path.append(self._last)
         return not self.chart.worn(self._f, y[: self.n])
 
@@ -143,5 +160,17 @@ class ChartStage:
         found = moved(closed, y[n:-1], p[1:], self.task.loads, at)
         rates = found.rates
         self._last = _Known(t, closed.here.x[:, 0], rates.dq[:, 0], rates.ddq[:, 0])
-        self._f, self._y = closed.f, y[:, 0]
+        self._f, self._y, self._moved = closed.f, y[:, 0], found
         return found
+
+
+def _by_time(task: Task, at: Moved, loads: tuple[Load, ...], t: Array) -> Array:
+    """Accelerations ``(n + p, T)`` of loads, and of the prescribed freedoms, at times, the state as it is ``at`` one."""
+    columns, here, force = at.columns, at.columns.here, np.zeros((at.columns.n, len(t)))
+    for some in in_blocks(np.arange(len(t)), positions_together(task.system, 1)) if loads else ():
+        many = here.part(np.zeros(len(some), dtype=np.intp))
+        velocities = Velocities(many, np.repeat(at.rates.dq[:, :1], len(some), axis=1))
+        wrenches, efforts = applied(many, loads, velocities, t[some])
+        force[:, some] = (columns.Z[..., :1] * (efforts + many.tree_efforts(wrenches))[:, None]).sum(axis=0)
+    own = accelerations(np.repeat(columns.mass[..., :1], len(t), axis=2), force)[0]
+    return np.concatenate([own, task.prescribed_at(t)[2]])

@@ -12,11 +12,14 @@ from numpy.typing import ArrayLike
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import CLOSED
+from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_path import in_blocks
 from mechgraph.closure.indexing import Index
+from mechgraph.closure.rates import Velocities
 from mechgraph.data import plain
 from mechgraph.document import Bullets, Document, Heading, Paragraph, Shown
 from mechgraph.errors import DeclarationError, ResponseError
+from mechgraph.force.applied_loads import Site
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import declared
 from mechgraph.quantities import real_array, wrong
@@ -186,6 +189,16 @@ class Course:
         kinetic, potential, work = (part.reshape(times.shape) for part in parts)
         return Response(trajectory, Energy(kinetic, potential, work, self._energy_at_start, times), self)
 
+    def moments(self, t: Array) -> list[Response]:
+        """The responses at each of several times ``(T,)``, evaluated together."""
+        (whole, *parts), out = self._read(t), []
+        for i, at in enumerate(t.tolist()):
+            values = whole.part(slice(i, i + 1))
+            values.batch, values.t = (), np.array(at)
+            kinetic, potential, work = (part[i] for part in parts)
+            out.append(Response(values, Energy(kinetic, potential, work, self._energy_at_start, values.t), self))
+        return out
+
     @cached_property
     def _energy_at_start(self) -> float:
         _, kinetic, potential, work = self._read(np.array(self.begin))
@@ -239,6 +252,12 @@ class Course:
             rates = moved(closed, v, task.prescribed_at(at)[1:], task.loads, at).rates
             out[0][:, places], out[1][:, places] = rates.dq, rates.ddq
         return out
+
+    def site(self, t: Array) -> Site:
+        """What loads see of the motion at times ``(T,)``."""
+        here = Configuration(self.task.system, self.positions(t))
+        velocities = Velocities(here, self.rates(t)[0])
+        return Site(here, velocities, self.task.system.coordinates_of(here.x), (len(t),), np.arange(len(t)), t)
 
     def freedom(self, name: str, t: Array) -> Array:
         """Position, velocity and acceleration ``(3, T)`` of a freedom at times ``(T,)``, user's units."""

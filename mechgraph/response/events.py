@@ -21,7 +21,15 @@ from mechgraph.result.solution import Solution
 ACCURACY = 1e-12
 """Part of a step to which the time of an event is found."""
 LOOKS = 8
-"""Parts of a step at whose ends freedoms are looked at, so that one which passes its value and comes back is seen."""
+"""Parts of a step at whose ends a height is looked at."""
+BESIDE_ENDS = 1e-5
+"""Part of a step beside its ends at which is looked too, so that a height that turns in the first or last part is seen to."""
+TURN_FOUND = 1e-9
+"""Part of a step to which the place of a turn is found; the height there is found to the square of it."""
+LOOKS_IN_STEP = np.unique(
+    np.concatenate([np.linspace(0.0, 1.0, LOOKS + 1), [BESIDE_ENDS, 1.0 - BESIDE_ENDS], 0.5 ** np.arange(4, 20)])
+)
+"""Parts of a step at which stops are looked at: closely behind its beginning, where a freedom may have just left its stop."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +50,8 @@ class Watched(Protocol):
     def freedom(self, name: str, t: Array) -> Array:
         """Position, velocity and acceleration ``(3, T)`` of a freedom at times ``(T,)``."""
 
-    def response(self, t: float) -> Solution:
-        """Everything at one time."""
+    def moments(self, t: Array) -> Sequence[Solution]:
+        """Everything at each of several times."""
 
 
 @dataclass
@@ -57,28 +65,25 @@ class Watch:
     def passed(self, begin: float, end: float) -> Iterator[Occurrence]:
         """What happens in a step, in the order of time."""
         found = []
+        looks = np.union1d(np.linspace(0.0, 1.0, LOOKS + 1), [BESIDE_ENDS, 1.0 - BESIDE_ENDS])
         for which, event in enumerate(self.events):
-            t = _looks(event, begin, end)
+            height = partial(_heights, event, self.motion)
+            t = begin + (end - begin) * looks
             known = [self._before[which]] if which in self._before else []
-            h = np.concatenate([known, _heights(event, self.motion, t[len(known) :])])
+            h = np.concatenate([known, height(t[len(known) :])])
             self._before[which] = float(h[-1])
+            t, h = with_turns(height, t, h)
             turns = (h[:-1] != 0.0) & (np.sign(h[:-1]) != np.sign(h[1:]))
             for i in np.flatnonzero(turns & ((event.direction == 0) | (np.sign(h[1:] - h[:-1]) == event.direction))):
-                root = first_root(partial(_heights, event, self.motion), t[i], t[i + 1])
-                found.append(Occurrence(event, root, bool(h[i + 1] > h[i])))
+                found.append(Occurrence(event, first_root(height, t[i], t[i + 1]), bool(h[i + 1] > h[i])))
         yield from sorted(found, key=lambda one: one.t)
-
-
-def _looks(event: Event, begin: float, end: float) -> Array:
-    """Times of a step at which to look: a function, which needs a whole Solution, is looked at where the step ends."""
-    return np.linspace(begin, end, LOOKS + 1) if isinstance(event.of, str) else np.array([begin, end])
 
 
 def _heights(event: Event, motion: Watched, t: Array) -> Array:
     """How far the quantity is above the value at times ``(T,)``."""
     if isinstance(event.of, str):
         return motion.freedom(event.of, t)[WHATS.index(event.what)] - event.value
-    return np.array([_height(event, motion.response(float(one))) for one in t])
+    return np.array([_height(event, one) for one in motion.moments(t)])
 
 
 def _height(event: Event, s: Solution) -> float:
@@ -87,6 +92,33 @@ def _height(event: Event, s: Solution) -> float:
     if height is None or height.size != 1 or not np.isfinite(height).all():
         raise Stopped(f"event {event.text}: gave {shown(height)}; expected one finite number")
     return float(height.reshape(())) - event.value
+
+
+def with_turns(height: Callable[[Array], Array], t: Array, h: Array) -> tuple[Array, Array]:
+    """Times and heights ``(T,)`` with those, where a height turns back between them, at which it has passed zero, if it has.
+
+    Between three looks of which the middle one is nearest to zero its rate is zero somewhere: there the height is nearest.
+    """
+    size = np.abs(h)
+    same = (np.sign(h[:-2]) == np.sign(h[1:-1])) & (np.sign(h[1:-1]) == np.sign(h[2:])) & (h[1:-1] != 0.0)
+    near = np.flatnonzero(same & (size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])) + 1
+    times, heights = [t], [h]
+    for i in near.tolist():
+        # a height that does not change with its looks beside it does not turn
+        if size[i] == size[i - 1] == size[i + 1]:
+            continue
+        side = float(np.sign(h[i]))
+        found = scipy.optimize.minimize_scalar(
+            lambda at, side=side: side * float(height(np.array([at]))[0]),
+            bounds=(t[i - 1], t[i + 1]),
+            method="bounded",
+            options={"xatol": TURN_FOUND * (t[i + 1] - t[i - 1])},
+        )
+        if found.fun < 0.0:
+            times.append(np.array([found.x]))
+            heights.append(np.array([side * found.fun]))
+    order = np.argsort(np.concatenate(times), kind="stable")
+    return np.concatenate(times)[order], np.concatenate(heights)[order]
 
 
 def first_root(height: Callable[[Array], Array], begin: float, end: float) -> float:

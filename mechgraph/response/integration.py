@@ -20,12 +20,15 @@ from mechgraph.closure.indexing import Index
 from mechgraph.errors import MechgraphWarning, counted
 from mechgraph.response.chart import Closed, Stopped
 from mechgraph.response.charts import Task
+from mechgraph.response.looks import SHORTER, overlooked
 
 EXPLICIT = ("RK23", "RK45", "DOP853")
 LOOK = 500
 """Steps after which the length of steps is looked at."""
 TOLD_FROM = 100_000
 """Steps to come from which on the user is told: minutes."""
+SHORTEST = 1e-13
+"""Part of the time below which a step is rounding."""
 GIVEN_UP_FROM = 1e8
 """Steps to come from which on the motion is given up: hours and days."""
 
@@ -47,6 +50,12 @@ class Stage(Protocol):
     @property
     def jacobian(self) -> Callable[[float, Array], Array] | None:
         """Derivatives ``(k, k)`` of ``y'`` by ``y`` for implicit steppers; None to have them found by single evaluations."""
+
+    def by_time(self, t: float, y: Array) -> tuple[Callable[[Array], Array], Array] | None:
+        """Accelerations ``(k, T)`` at times ``(T,)`` of all that depends on time by itself, the rest as it is at one time with ``y``.
+
+        Those of ``v``, then of the prescribed freedoms; and the rates ``(k,)`` that they change. None where nothing does.
+        """
 
     def accepted(self, t: float, y: Array) -> bool:
         """Keep what is known at the end of an accepted step; whether the stage serves on."""
@@ -92,11 +101,18 @@ class Count:
 
 @dataclass
 class Integration:
-    """A motion followed by a stepper; ``run`` adds ``segments``."""
+    """A motion followed by a stepper; ``run`` adds ``segments``.
+
+    ``max_step``: longest step; ``breaks``: times at which steps end and begin anew; ``apart``: greatest distance between looks at
+    what depends on time.
+    """
 
     method: str
     rtol: float
     atol: float
+    max_step: float = np.inf
+    breaks: tuple[float, ...] = ()
+    apart: float = np.inf
     segments: list[Segment] = field(default_factory=list)
     done: float = 0.0
     """Work done since the start."""
@@ -111,40 +127,66 @@ class Integration:
         Stopped
             where steps become shorter than rounding.
         """
-        make = getattr(scipy.integrate, self.method)
-        t, h = begin, first
+        t, h, y, work = begin, first, stage.begin(), self.done
+        self.work.stages += 1
         while t < end:
-            self.work.stages += 1
-            work, y = self.done, stage.begin()
-            atol = np.full(len(y), self.atol)
-            atol[-1] *= stage.energy
-            more: dict[str, Any] = {} if h is None else {"first_step": min(h, end - t)}
-            if self.method not in EXPLICIT:
-                more["jac"] = stage.jacobian
-            stepper = make(stage.rates, t, y, end, rtol=self.rtol, atol=atol, **more)
+            goal = min((one for one in self.breaks if one > t), default=end)
+            stepper = self._stepper(stage, t, y, min(goal, end), h)
             serves = True
             try:
                 while stepper.status == "running" and serves:
                     # trial steps may be far too long; what overflows there is taken back
                     with np.errstate(over="ignore", invalid="ignore"):
                         message = stepper.step()
-                    if stepper.status == "failed":
+                    rounding = stepper.t - t <= SHORTEST * max(abs(t), abs(stepper.t))
+                    known = bool(np.isfinite(stepper.y).all())
+                    if stepper.status == "failed" or (rounding and not known):
                         raise Stopped(
-                            f"{message} Steps collapse where loads are stiff or jump, and at positions where the mechanism locks or "
-                            "only links without inertia move; for stiff loads use method='Radau'"
+                            f"{message or ''} Steps collapse where loads are stiff or jump, and at positions where the mechanism locks or "
+                            "only links without inertia move; for stiff loads use method='Radau'".strip()
                         )
+                    if not known or (not rounding and self._missed(stage, t, stepper)):
+                        h = SHORTER * (stepper.t - t)
+                        break
                     self.work.steps += 1
                     self.segments.append(Segment(t, stepper.t, stage, stepper.dense_output(), work))
-                    # the step goes on with its length, which a multistep method finds anew
-                    h = None if self.method in ("BDF", "LSODA") else stepper.t - t
-                    t, self.done = stepper.t, work + float(stepper.y[-1])
+                    # the step goes on with its length, which a multistep method finds anew, and any behind a break
+                    h = None if self.method in ("BDF", "LSODA") or stepper.t == goal else stepper.t - t
+                    t, y, self.done = stepper.t, stepper.y, work + float(stepper.y[-1])
                     self._look(end)
-                    serves = stage.accepted(t, stepper.y)
+                    serves = stage.accepted(t, y)
                     yield self.segments[-1]
             finally:
                 self.work.evaluations += stepper.nfev
-            if t < end:
-                stage = stage.following(t, stepper.y)
+            if t < end and not serves:
+                stage = stage.following(t, y)
+                y, work = stage.begin(), self.done
+                self.work.stages += 1
+
+    def _stepper(self, stage: Stage, t: float, y: Array, end: float, first: float | None) -> Any:
+        """A stepper from a time on to another; what jumps at a break at either end is seen as it is between them."""
+        low, high = (np.nextafter(one, mid) if one in self.breaks else one for one, mid in ((t, end), (end, t)))
+
+        def between(function: Callable[[float, Array], Array]) -> Callable[[float, Array], Array]:
+            return lambda at, y: function(min(max(at, low), high), y)
+
+        atol = np.full(len(y), self.atol)
+        atol[-1] *= stage.energy
+        more: dict[str, Any] = {} if first is None else {"first_step": min(first, end - t)}
+        if self.method not in EXPLICIT:
+            more["jac"] = stage.jacobian and between(stage.jacobian)
+        make = getattr(scipy.integrate, self.method)
+        return make(between(stage.rates), t, y, end, rtol=self.rtol, atol=atol, max_step=self.max_step, **more)
+
+    def _missed(self, stage: Stage, begin: float, stepper: Any) -> bool:
+        """Whether a step that the stepper has just taken may have missed what depends on time by itself."""
+        end, y = stepper.t, stepper.y
+        by_time = stage.by_time(end, y)
+        if by_time is None:
+            return False
+        accelerations, rates = by_time
+        inside = np.nextafter(begin, end), np.nextafter(end, begin)
+        return overlooked(accelerations, *inside, self.apart, self.rtol * np.abs(rates) + self.atol)
 
     def _look(self, end: float) -> None:
         """Say where steps have become so short that loads are likely stiff, and a long wait certain; give up where there is no end."""

@@ -178,14 +178,14 @@ class Columns:
             ddq = ddq + self.rest.still_at_rest(self.f, dq, velocities.V, velocities.bias, A)
         return velocities, ddq, _inertia(here, velocities.V, here.accelerations_with(ddq, velocities.bias))
 
-    def applied(self, loads: tuple[Load, ...], velocities: Velocities, t: Array) -> tuple[Array, Array]:
-        """Wrenches ``(6, N, T)`` of loads on the links and efforts ``(F, T)`` in the freedoms."""
-        here = self.here
-        if not loads:
-            return np.zeros((6, len(here.system.m.links), here.T)), np.zeros((here.system.n_freedoms, here.T))
-        site = Site(here, velocities, here.system.coordinates_of(here.x), (here.T,), np.arange(here.T), t)
-        site.collect(loads)
-        return site.applied(), site.scaled_efforts()
+
+def applied(here: Configuration, loads: tuple[Load, ...], velocities: Velocities, t: Array) -> tuple[Array, Array]:
+    """Wrenches ``(6, N, T)`` of loads on the links and efforts ``(F, T)`` in the freedoms."""
+    if not loads:
+        return np.zeros((6, len(here.system.m.links), here.T)), np.zeros((here.system.n_freedoms, here.T))
+    site = Site(here, velocities, here.system.coordinates_of(here.x), (here.T,), np.arange(here.T), t)
+    site.collect(loads)
+    return site.applied(), site.scaled_efforts()
 
 
 def _at_rest(here: Configuration, rest: PassiveMotions, Z: Array) -> Array:
@@ -207,7 +207,7 @@ def moved(closed: Closed, v: Array, p: Array, loads: Loads, t: Array) -> Moved:
     dq = (Z * v).sum(axis=1) + (Zp * p[0]).sum(axis=1)
     velocities, ddq, inertia = columns.bound(dq, (Zp * p[1]).sum(axis=1))
     V = velocities.V
-    (stored, by_stored), (rest, by_rest) = (columns.applied(some, velocities, t) for some in (loads.stored, loads.rest))
+    (stored, by_stored), (rest, by_rest) = (applied(here, some, velocities, t) for some in (loads.stored, loads.rest))
     wrenches, efforts = stored + rest + inertia, by_stored + by_rest
     a, unopposed = columns.accelerations(wrenches, efforts)
     left = np.abs(unopposed).max(initial=0.0)
@@ -232,7 +232,7 @@ def along_one(here: Configuration, f: FactoredClosure, loads: Loads) -> Array:
         raise Stopped(NO_INERTIA)
     still, ahead, back = (Velocities(here, factor * columns.Z[:, 0]) for factor in (0.0, 1.0, -1.0))
     stored, forth, behind = (
-        columns.force(*columns.applied(some, way, t))[0]
+        columns.force(*applied(here, some, way, t))[0]
         for some, way in ((loads.stored, still), (loads.rest, ahead), (loads.rest, back))
     )
     return np.stack([columns.mass[0, 0], stored, 0.5 * (forth + behind), 0.5 * (forth - behind)])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,10 +12,10 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
+from mechgraph.response.differentiated import Law, differentiated, samples_fault
 
 OVER_POSITIONS = "is an array over positions, which a motion in time does not have; give a number or a function"
 """What is wrong with a load that holds such an array."""
-Law = Callable[[float], tuple[float, float, float]]
 
 
 class Sampled:
@@ -76,17 +76,21 @@ def law_of(name: str, motion: Any) -> Law | str:
             )
         if not (np.diff(motion.t) > 0).all():
             return f"motion of {name!r}: its times do not rise"
-        return Sampled(name, motion)
+        fault = samples_fault(motion.t, np.stack([motion.position, motion.velocity, motion.acceleration], axis=1))
+        return f"motion of {name!r}: {fault}" if fault else Sampled(name, motion)
     if callable(motion):
         return Called(name, motion)
     return f"motion of {name!r} = {type(motion).__name__}: expected a Motion with t, or a callable t -> (position, velocity, acceleration)"
 
 
 class Prescribed:
-    """The prescribed freedoms of a mechanism: names, and their values ``(3, p)`` in the user's units at a time."""
+    """The prescribed freedoms of a mechanism: names, and their values ``(3, p)`` in the user's units at a time.
 
-    def __init__(self, laws: Mapping[str, Law]) -> None:
-        self.laws = dict(laws)
+    ``breaks``: times at which their accelerations jump.
+    """
+
+    def __init__(self, laws: Mapping[str, Law], breaks: Sequence[float] = ()) -> None:
+        self.laws, self.breaks = dict(laws), tuple(breaks)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -98,8 +102,8 @@ class Prescribed:
         return np.array([law(t) for law in self.laws.values()], dtype=float).reshape(-1, 3).T
 
 
-def read_motions(m: Mechanism, motions: Mapping[str, Any], faults: list[str]) -> Prescribed:
-    """The motions of a call, and those that drives carry; adds what is wrong with them to ``faults``."""
+def read_motions(m: Mechanism, motions: Mapping[str, Any], times: Array, faults: list[str]) -> Prescribed:
+    """The motions of a call over its times, and those that drives carry; adds what is wrong with them to ``faults``."""
     named: dict[str, Any] = {m.full_name(d.freedom): d.motion for d in m.drives if d.motion is not None}
     for name, motion in motions.items():
         fault = m.freedom_fault(name, single=True)
@@ -108,5 +112,12 @@ def read_motions(m: Mechanism, motions: Mapping[str, Any], faults: list[str]) ->
         else:
             named[m.full_name(name)] = motion
     laws = {name: law_of(name, motion) for name, motion in named.items()}
+    breaks: list[float] = []
+    for name, law in laws.items():
+        found = differentiated(law, float(times[0]), float(times[-1])) if isinstance(law, Called) else ()
+        if isinstance(found, str):
+            faults.append(f"motion of {name!r}: {found}")
+        else:
+            breaks += found
     faults += [law for law in laws.values() if isinstance(law, str)]
-    return Prescribed({name: law for name, law in laws.items() if not isinstance(law, str)})
+    return Prescribed({name: law for name, law in laws.items() if not isinstance(law, str)}, breaks)

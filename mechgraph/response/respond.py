@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 from typing import Any, Literal, get_args
 
@@ -34,13 +35,15 @@ from mechgraph.report.report import hinted
 from mechgraph.response.along_path import Arc, PathStage
 from mechgraph.response.chart import Stopped, stopping
 from mechgraph.response.charts import ChartStage, Task
+from mechgraph.response.chatter import Chatter
 from mechgraph.response.course import Course, Response
-from mechgraph.response.events import Occurrence, Watch, first_root, read_events
+from mechgraph.response.events import LOOKS_IN_STEP, Occurrence, Watch, first_root, read_events, with_turns
 from mechgraph.response.initial import read_rates, read_start, start_rates, started
 from mechgraph.response.integration import Integration, Stage
+from mechgraph.response.looks import OF_ALL
 from mechgraph.response.motion_equations import Loads
 from mechgraph.response.prescribed import OVER_POSITIONS, read_motions
-from mechgraph.response.stops import LOOKS_IN_STEP, Stops, read_stops
+from mechgraph.response.stops import Stops, read_stops
 from mechgraph.structure.mobility import free_motion
 from mechgraph.structure.snapping import meant
 
@@ -63,6 +66,7 @@ def respond(
     rtol: float | None = None,
     atol: float | None = None,
     method: MethodName | None = None,
+    max_step: float | None = None,
     engine: EngineName = "auto",
     events: Iterable[Event] | Event | None = None,
     stops: Iterable[Stop] | Stop | None = None,
@@ -89,6 +93,8 @@ def respond(
     rtol, atol : tolerances of a step, relative and absolute (radians and lengths / L, and their rates); left out, 1e-8 and 1e-10.
     method : a stepper of ``scipy.integrate``: explicit ``"RK23"``, ``"RK45"``, ``"DOP853"``, for stiff laws ``"Radau"``, ``"BDF"``,
         ``"LSODA"``; ``"auto"`` is DOP853.
+    max_step : the longest step. Steps end at the ``breaks`` of loads, and are refused where a look at 2,000 times between begin and end
+        sees a load or a prescribed motion do what they missed; a pulse that is shorter needs its ``breaks``, or ``max_step``.
     engine : as in ``solve``.
     events : ``Event``s to be watched; a terminal one ends the motion, at its time.
     stops : ``Stop``s, limits of freedoms that they strike, rest on and leave; what a stop exerts is an ``applied_effort``.
@@ -106,7 +112,7 @@ def respond(
         where the motion cannot be followed to its end, or is interrupted; carries the Response so far.
     """
     given = {"t": t, "start": start, "rates": rates, "motions": motions, "rtol": rtol, "atol": atol, "method": method}
-    how = _how(m, given | {"events": events, "stops": stops, "passive": passive})
+    how = _how(m, given | {"max_step": max_step, "events": events, "stops": stops, "passive": passive})
     faults = option_faults(
         {
             "method": (how.method, METHODS),
@@ -116,7 +122,7 @@ def respond(
         }
     )
     faults += mapping_faults(start=how.start, rates=how.rates, motions=how.motions)
-    faults += tolerance_faults(how.rtol, how.atol)
+    faults += tolerance_faults(how.rtol, how.atol, how.max_step)
     times, watched, limits = (
         read_times(how.t, faults),
         read_events(m, how.events, faults),
@@ -128,7 +134,7 @@ def respond(
     declared = m if replaced is None else m.replace(loads=replaced)
     m = meant(declared, tol, "respond")
     begin = float(times[0])
-    prescribed = read_motions(m, how.motions, faults)
+    prescribed = read_motions(m, how.motions, times, faults)
     wanted = read_start(m, how.start, prescribed, begin, faults) if not faults else {}
     wanted_rates = read_rates(m, how.rates, faults)
     faults += [f"{one.where}{', '.join(one.over_positions)}: {OVER_POSITIONS}" for one in m.loads if one.over_positions]
@@ -152,7 +158,14 @@ def respond(
     faults = standing.faults(x)
     if faults:
         raise DeclarationError(f"respond {m.name!r}", faults)
-    it = Integration("DOP853" if how.method == "auto" else how.method, float(how.rtol), float(how.atol))
+    it = Integration(
+        "DOP853" if how.method == "auto" else how.method,
+        float(how.rtol),
+        float(how.atol),
+        np.inf if how.max_step is None else float(how.max_step),
+        tuple(sorted({time for load in m.loads for time in load.break_times} | set(prescribed.breaks))),
+        float(times[-1] - begin) / OF_ALL,
+    )
     return _followed(Course(it, task, m, times), standing, watched, x, dq, on_stop, progress)
 
 
@@ -205,6 +218,7 @@ def _occurrences(
 ) -> Iterable[Occurrence]:
     """Follow the motion to its end; yields what happens, in the order of time."""
     it, end, t, crowd = course.integration, float(course.times[-1]), course.begin, 0
+    chatter = Chatter(course, course.mechanism.loads, end - t)
     dq, _, first, found = stops.after(t, x, dq)
     yield from found
     while t < end:
@@ -215,6 +229,7 @@ def _occurrences(
             if progress is not None:
                 with stopping("progress"):
                     progress(segment.end)
+            chatter.look(segment.begin, segment.end)
             met = stops.met(course, segment.begin, segment.end) if stops.limits else None
             _end_at_ranges(course, segment.begin, segment.end if met is None else met)
             if met is not None:
@@ -242,30 +257,35 @@ def _end_at_ranges(course: Course, begin: float, end: float) -> None:
         return
     looks = begin + (end - begin) * LOOKS_IN_STEP
     over = beyond(system, course.positions(looks)) - BEYOND_END
-    outside = np.flatnonzero((over > 0.0).any(axis=0))
-    if outside.size:
-        k, first = int(np.argmax(over[:, outside[0]])), int(outside[0])
-        before = looks[first - 1] if first else begin
-        root = first_root(lambda t: beyond(system, course.positions(t))[k] - BEYOND_END, before, looks[first])
-        course.integration.cut(root)
+    met = {}
+    for k in range(len(columns)):
+        height = partial(_over, course, k)
+        t, h = with_turns(height, looks, over[k])
+        first = int(np.argmax(h > 0.0))
+        if h[first] > 0.0:
+            met[k] = first_root(height, t[first - 1], t[first]) if first else begin
+    if met:
+        k = min(met, key=lambda k: met[k])
+        course.integration.cut(met[k])
         name = system.m.freedom_names()[int(columns[k])]
         raise Stopped(f"{name} is at the end of its curve or surface; give a Stop there, or a longer one")
 
 
+def _over(course: Course, k: int, t: Array) -> Array:
+    """How far a pair is beyond the end of its curve or surface at times ``(T,)``."""
+    return np.asarray(beyond(course.task.system, course.positions(t))[k] - BEYOND_END)
+
+
 def _first_stage(it: Integration, task: Task, begin: float, x: Array, dq: Array) -> Stage:
-    """Along the path where there is one path and loads that depend on the place on it, and linearly on the rate; charts otherwise."""
+    """Along the path where there is one path; charts otherwise."""
     last = it.segments[-1] if it.segments else None
     if last is not None and isinstance(last.stage, PathStage) and last.stage.task is task:
         arc = last.stage.arc
-        return PathStage(arc, float(last.dense(begin)[0]), float(dq[arc.column]))
+        return PathStage(arc, begin, float(last.dense(begin)[0]), float(dq[arc.column]))
     motions = closure_rank(Configuration(task.system, x[:, None]), engine=task.engine).motions
-    if (
-        motions.shape[1] == 1
-        and not len(task.columns)
-        and all(load.smooth for load in (*task.loads.stored, *task.loads.rest))
-    ):
+    if motions.shape[1] == 1 and not len(task.columns):
         arc = Arc(task, x, dq)
         it.work.coordinates = "along the path"
-        return PathStage(arc, arc.begin, arc.rate)
+        return PathStage(arc, begin, arc.begin, arc.rate)
     it.work.coordinates = "in independent freedoms"
     return ChartStage(task, begin, x, dq)

@@ -29,7 +29,7 @@ from mechgraph.model.stop import Stop
 from mechgraph.quantities import wrong
 from mechgraph.response.chart import Closed, Stopped
 from mechgraph.response.charts import Task
-from mechgraph.response.events import Occurrence, first_root
+from mechgraph.response.events import LOOKS_IN_STEP, Occurrence, first_root, with_turns
 from mechgraph.response.motion_equations import NO_INERTIA, UNOPPOSED, accelerations, moved
 from mechgraph.response.prescribed import Prescribed
 
@@ -37,9 +37,6 @@ IMMOVABLE = 1e-12
 """Rate of a freedom for unit rates of the independent ones below which these do not move it."""
 TOUCHING = 1e-9
 """Gap (radians, lengths / L) up to which a stop counts as closed."""
-LOOKS_IN_STEP = np.unique(np.append(np.linspace(0.125, 1.0, 8), 0.5 ** np.arange(3, 20)))
-"""Parts of a step at which gaps are looked at: closely behind its beginning, where a freedom may have just left its stop. The beginning
-itself is that of the step before, whose rates an impact may have changed."""
 LOWEST = 1e-9
 """Height (radians, lengths / L) of a rebound below which the freedom rests on its stop; what it loses is of that order."""
 
@@ -154,17 +151,19 @@ class Stops:
     def met(self, motion: Moving, begin: float, end: float) -> float | None:
         """The first time in a step at which a free limit is passed, or a held one no longer presses."""
         times: list[float] = []
-        looks = begin + (end - begin) * LOOKS_IN_STEP
+        looks = (
+            begin + (end - begin) * LOOKS_IN_STEP[1:]
+        )  # rates at the beginning are those before an impact, if there was one
         free = [limit for limit in self.limits if limit not in self.held]
         if free:
             x = motion.positions(looks)
             for limit in free:
-                gap = limit.sign * (x[limit.row] - limit.value)
+                height = partial(_gap, motion, limit)
+                t, gap = with_turns(height, looks, limit.sign * (x[limit.row] - limit.value))
                 deep = np.flatnonzero(gap < -TOUCHING)
                 if deep.size:
                     before = np.flatnonzero(gap[: deep[0]] > 0.0)
-                    height = partial(_gap, motion, limit)
-                    times.append(first_root(height, looks[before[-1]], looks[deep[0]]) if before.size else looks[0])
+                    times.append(first_root(height, t[before[-1]], t[deep[0]]) if before.size else looks[0])
         if self.held:
             push = partial(self._pressing, motion)
             if push(looks[-1:])[0] < 0.0:

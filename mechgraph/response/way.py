@@ -22,7 +22,7 @@ from mechgraph.numerics.hermite import Interpolation
 from mechgraph.numerics.leap import leapt
 from mechgraph.numerics.tolerances import PATH
 from mechgraph.numerics.tracks import Nodes, Paths
-from mechgraph.response.motion_equations import Loads, along_one
+from mechgraph.response.along_terms import OF_LOADS, AlongTerms
 
 FIRST_PART = 0.8
 """Length of path that is tabulated first (radians, or lengths / L); every further part is twice as long as the one before."""
@@ -53,7 +53,7 @@ NOISE = 1e-9
 
 @dataclass(frozen=True)
 class Piece:
-    """The path between two values of its coordinate: Chebyshev series ``(POINTS, 4)`` of ``M, Q_0, P_1, P_2``.
+    """The path between two values of its coordinate: Chebyshev series ``(POINTS, 4 + m)`` of the terms (see ``along_terms``).
 
     ``steepness``: the largest rate of another freedom for a unit rate of the coordinate.
     """
@@ -67,8 +67,8 @@ class Piece:
 class Way:
     """The path from a closed state ``x (nx,)`` on; tabulated up to ``length``, and no further where it is ``closed``."""
 
-    def __init__(self, path: DriverPath, loads: Loads, x: Array, sense: float) -> None:
-        self.path, self.loads, self.sense = path, loads, sense
+    def __init__(self, path: DriverPath, terms: AlongTerms, x: Array, sense: float) -> None:
+        self.path, self.terms, self.sense = path, terms, sense
         self.begin = float(x[path.rows[0]])
         path.variant_of = np.zeros(1, dtype=np.intp)
         self.follower = Follower(path)
@@ -210,13 +210,13 @@ class Way:
         return out
 
     def _series(self, spans: list[tuple[float, float]]) -> tuple[Array, Array, Array]:
-        """Series ``(spans, POINTS, 5)`` over spans of places, how steep the path is in each, and the noise of the series."""
+        """Series ``(spans, POINTS, 4 + m)`` over spans of places, how steep the path is in each, and the noise of the series."""
         nodes = np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS)
         at = np.concatenate([0.5 * (a + b) + 0.5 * (b - a) * nodes for a, b in spans])
         x, which = self.states(at)
         here = Configuration(self.path.system, x)
         f = self.path.solver.factored(here, which)
-        values = along_one(here, f, self.loads).T.reshape(len(spans), POINTS, 4)
+        values = self.terms.tabulated(here, f).T.reshape(len(spans), POINTS, -1)
         T = np.polynomial.chebyshev.chebvander(nodes, POINTS - 1) * (2.0 / POINTS)
         T[:, 0] *= 0.5
         singles = self.path.system.single_rows >= 0
@@ -227,11 +227,12 @@ class Way:
 
 
 def _coarse(c: Array, noise: float) -> bool:
-    """Whether series ``(POINTS, 4)`` leave more out than rounding, which stays however short the piece is."""
+    """Whether series ``(POINTS, 4 + m)`` leave more out than rounding, which stays however short the piece is."""
     late, last = np.abs(c[-8:-4]).max(axis=0), np.abs(c[-4:]).max(axis=0)
     tail, size = np.abs(c[-2:]).max(axis=0), np.abs(c).max(axis=0)
-    # the mass beside itself, forces beside what gives the mass an acceleration of one as well
-    largest = np.append(size[0], np.full(3, size[:2].max()))
+    # the mass beside itself, forces beside what gives the mass an acceleration of one as well, places beside one (radian, length / L)
+    of_forces, others = np.full(OF_LOADS - 1, size[:2].max()), np.maximum(size[OF_LOADS:], 1.0)
+    largest = np.concatenate([size[:1], of_forces, others])
     rounding = (last > NOT_FALLING * late) & (last < max(NOISE, noise) * largest)
     small = tail <= SERIES_TAIL * np.maximum(size, 1e-3 * largest)
     return bool(not (small | rounding).all())

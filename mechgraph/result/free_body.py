@@ -20,7 +20,7 @@ from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker
 from mechgraph.report.report import check
-from mechgraph.result.balanced_loads import SMALL, At, BalancedLoads, PointLoad, about_origin
+from mechgraph.result.balanced_loads import SMALL, At, BalancedLoads, PointLoad
 from mechgraph.result.load_files import FORMATS
 from mechgraph.result.numbers import bracket, number
 from mechgraph.result.solution import Solution
@@ -145,9 +145,7 @@ def free_body(s: Solution, link: str) -> FreeBody:
         about = "minus mass times acceleration, of all of it"
         acting.append(PointLoad("inertia", "inertia", _point(one.center), wrench, _every(wrench), about, True))
     if link == m.frame:
-        left = -np.sum([about_origin(other) for other in acting], axis=0)
-        about = "what holds the frame, at the origin of its frame"
-        acting.append(PointLoad("support", "support", (0.0, 0.0, 0.0), left, np.isfinite(left), about))
+        add("support", "support", None, -s.shaking, "what holds the frame, at the origin of its frame")
     return FreeBody(s, one, tuple(acting), acceleration)
 
 

@@ -25,6 +25,7 @@ from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.newton import Work
 from mechgraph.numerics.tolerances import PATH
+from mechgraph.result.values import PassedCrossing
 
 
 @dataclass(frozen=True)
@@ -109,6 +110,7 @@ class Kept:
         self._largest = np.zeros(2)
         self._solved = np.zeros(self._count, dtype=bool)
         self._motions: list[BlockMotion] = []
+        self.passed: tuple[PassedCrossing, ...] = ()
         self.has_forces = False
         self.engine: Literal["dense", "sparse", "compiled"] = "dense"
         self.method: str | None = None
@@ -136,6 +138,11 @@ class Kept:
             if values is not None:
                 self._keep(name, places, values)
         self._largest = np.maximum(self._largest, forces.largest)
+
+    def estimate(self, places: Index, error: Array) -> None:
+        """Note an estimated relative error of rates and forces ``(n,)``; the greatest stays."""
+        known = self._kept.setdefault("accuracy", np.zeros(self._count))
+        known[places] = np.maximum(known[places], error)
 
     def take(self, records: Records, forces: bool) -> None:
         """Keep all positions from the records of a compiled solution."""
@@ -254,8 +261,8 @@ class Kept:
         s = self._system
         P, N, F, n = len(s.m.pairs), len(s.m.links), s.n_freedoms, len(s.m.couplings)
         shapes: dict[str, tuple[int, ...]] = {
-            "x": (s.n_state,), "dq": (F,), "ddq": (F,), "closure": (), "points": (3, P), "reactions": (6, P), "efforts": (F,),
-            "given": (F,), "loads": (6, N), "hold": (6, N), "stress": (6, P, 0), "stress_efforts": (F, 0), "coupled": (F,),
+            "x": (s.n_state,), "dq": (F,), "ddq": (F,), "closure": (), "accuracy": (), "points": (3, P), "reactions": (6, P),
+            "efforts": (F,), "given": (F,), "loads": (6, N), "hold": (6, N), "stress": (6, P, 0), "stress_efforts": (F, 0), "coupled": (F,),
             "multipliers": (n,), "multiplier_stress": (n, 0), "coupled_stress": (F, 0), "shaking": (6,), "balance": (), "power": (),
             "holds": (len(self._passive),), "hold_terms": (len(self._passive),),
         }  # fmt: skip

@@ -12,7 +12,7 @@ from mechgraph.result.contact_ranges import LiftOff, Overlap
 from mechgraph.result.contacts import lift_offs, overlaps
 from mechgraph.result.extremes import Greatest, Range, efforts, multipliers, reactions
 from mechgraph.result.places import OK, Places, coupling_unit
-from mechgraph.result.values import LoadBearing, Values
+from mechgraph.result.values import LoadBearing, PassedCrossing, Values
 from mechgraph.units import unit_of
 
 Index = Annotated[int, "number of the position, counted from 0 over all of them in order"]
@@ -88,6 +88,7 @@ class ChecksData:
     closure: float | None
     equilibrium: float | None
     power: float | None
+    accuracy: Annotated[float | None, "estimated relative error of rates and forces"]
 
 
 @dataclass(frozen=True)
@@ -110,6 +111,7 @@ class SolutionData:
     warnings: Annotated[tuple[LoadBearing, ...], "passive freedoms that carry load"]
     lift_off: Annotated[tuple[LiftOff, ...], "positions at which contacts that are only pushed would have to pull"]
     overlap: Annotated[tuple[Overlap, ...], "positions at which the elements of contacts cut into each other"]
+    crossings: Annotated[tuple[PassedCrossing, ...], "crossings of branches that the path was led over"]
     passive: Annotated[tuple[str, ...], "names of all passive freedoms"]
     checks: ChecksData
     engine: str
@@ -124,7 +126,7 @@ def solution_data(values: Values) -> SolutionData:
     own, applied = efforts(values) if forces else (None, None)
     worst = [
         float(np.nanmax(np.abs(of))) if np.isfinite(of).any() else None
-        for of in (checks.closure, checks.equilibrium, checks.power)
+        for of in (checks.closure, checks.equilibrium, checks.power, checks.accuracy)
     ]
     names = values.whole.freedom_names()
     driven = [names.index(name) for name in values.actuated]
@@ -148,6 +150,7 @@ def solution_data(values: Values) -> SolutionData:
         values.load_bearing(),
         lift_offs(values),
         overlaps(values),
+        values.crossings(),
         tuple(values.passive_efforts()) if forces else (),
         ChecksData(*worst),
         values.engine,

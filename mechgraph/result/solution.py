@@ -18,6 +18,7 @@ from mechgraph.equations.state import State
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.newton import Work
+from mechgraph.numerics.tolerances import PATH
 from mechgraph.quantities import wrong
 from mechgraph.result import export
 from mechgraph.result.contact_ranges import LiftOff, Overlap
@@ -26,7 +27,7 @@ from mechgraph.result.places import OK, Places
 from mechgraph.result.record import solution_data
 from mechgraph.result.summary import summary
 from mechgraph.result.table import Include, table_of
-from mechgraph.result.values import Checks, LoadBearing, LoadResult, Mask, Values
+from mechgraph.result.values import Checks, Inaccurate, LoadBearing, LoadResult, Mask, PassedCrossing, Values
 from mechgraph.result.views import CouplingResult, LinkResult, PairResult
 
 if TYPE_CHECKING:
@@ -156,7 +157,7 @@ class Solution(Shown):
 
     @property
     def checks(self) -> Checks:
-        """Closure error, equilibrium residual and power balance at every position."""
+        """Closure error, equilibrium residual, power balance and estimated accuracy at every position."""
         return self._values.checks()
 
     @property
@@ -166,7 +167,10 @@ class Solution(Shown):
 
     @property
     def shaking(self) -> Array:
-        """Wrench ``(..., 6)`` about the global origin that pairs and springs transmit to the frame."""
+        """Wrench ``(..., 6)`` about the global origin of all that acts on the frame: pairs, springs, loads on it, its own weight.
+
+        What supports the frame bears it: it is the sum of the loads on all links and of their inertia.
+        """
         return self._values.shaking()
 
     @property
@@ -179,9 +183,19 @@ class Solution(Shown):
         return self._values.passive_efforts()
 
     @property
-    def warnings(self) -> tuple[LoadBearing | LiftOff | Overlap, ...]:
-        """What is doubtful: passive freedoms that carry load, contacts that would have to pull or whose elements cut into each other."""
+    def doubts(self) -> tuple[LoadBearing | LiftOff | Overlap, ...]:
+        """What makes reactions doubtful: passive freedoms that carry load, contacts that would have to pull, or cut into each other."""
         return (*self._values.load_bearing(), *lift_offs(self._values), *overlaps(self._values))
+
+    @property
+    def warnings(self) -> tuple[LoadBearing | LiftOff | Overlap | PassedCrossing | Inaccurate, ...]:
+        """What makes reactions doubtful (``doubts``); crossings of branches that were passed, with place, miss and the other branches;
+        rates and forces that rounding spoils (see ``checks.accuracy``).
+        """
+        error = self.checks.accuracy.reshape(-1)
+        poor = np.flatnonzero(error > PATH.inaccurate)
+        worst = [Inaccurate(float(error[i]), int(i), len(poor)) for i in poor[np.argsort(-error[poor])][:1]]
+        return (*self.doubts, *self._values.crossings(), *worst)
 
     def document(self, asked: bool = False) -> Document:
         """What ``print`` shows; ``asked`` as in ``summary()``, also what takes long."""

@@ -53,6 +53,7 @@ def summary(values: Values, asked: bool = True, more_checks: tuple[tuple[str, An
         size = len(view.m.pairs) * view.status.size
         blocks += view.forces() if asked or size <= UNASKED else [Paragraph(view.left_out(size))]
         blocks += view.passive()
+    blocks += view.crossings()
     if view.solved.any():
         blocks += view.checks(more_checks)
     hint = force_hint(view.m.units)
@@ -308,6 +309,12 @@ class _View(Places):
             yield Heading("Passive freedoms", 2)
             yield Bullets(_shortened(items))
 
+    def crossings(self) -> Iterator[Block]:
+        """The crossings of branches that the path was led over."""
+        if found := self.values.crossings():
+            yield Heading("Crossings passed", 2)
+            yield Bullets(_shortened([*map(str, found)]))
+
     # --- checks and work -----------------------------------------------------------------------------------------------
 
     def checks(self, more: tuple[tuple[str, Any], ...]) -> Iterator[Block]:
@@ -316,6 +323,8 @@ class _View(Places):
         rows = [("closure error (angle, length / L)", checks.closure)]
         if self.values.has_forces:
             rows += [("equilibrium, relative", checks.equilibrium), ("power balance, relative", checks.power)]
+        if np.isfinite(checks.accuracy).any():  # of a motion in time it is not estimated
+            rows.append(("accuracy of rates and forces, estimated", checks.accuracy))
         worst = tuple((name, f"{np.nanmax(np.abs(value)):.0e}") for name, value in (*rows, *more))
         yield Heading("Checks", 2)
         yield Table(("check", "worst"), worst, align="lr")

@@ -72,7 +72,7 @@ def table_of(s: Values, include: Sequence[Include] = ()) -> list[Column]:
     for name in asked:
         for column, more, dimension in MORE[name](s):
             put(column, more, *dimension)
-    for name in ("closure", "equilibrium", "power"):
+    for name in ("closure", "equilibrium", "power", "accuracy"):
         put(name, getattr(s.checks(), name))
     put("status", s.status())
     return out

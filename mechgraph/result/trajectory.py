@@ -17,7 +17,7 @@ from mechgraph.numerics.tolerances import MOTIONS
 from mechgraph.result.kept import BlockMotion
 from mechgraph.result.pair_forces import PairForces
 from mechgraph.result.states import flat_place, user_state, user_wrench
-from mechgraph.result.values import Checks, LoadBearing, LoadResult, MaterialPoint
+from mechgraph.result.values import Checks, LoadBearing, LoadResult, MaterialPoint, PassedCrossing
 from mechgraph.units import unit_of
 
 
@@ -155,13 +155,19 @@ class Trajectory(PairForces):
     # --- checks and states -----------------------------------------------------------------------------------------------
 
     def checks(self) -> Checks:
-        """Closure error, equilibrium and power; the last two relative to the largest term in the whole batch."""
+        """Closure error, equilibrium and power, the last two relative to the largest term in the whole batch, and accuracy."""
         closure = self._out(self._of("closure"))
+        accuracy = self._out(np.where(self._solved, self._of("accuracy"), np.nan))
         if not self.has_forces:
             nothing = np.full(self.batch, np.nan)
-            return Checks(closure, nothing, nothing)
+            return Checks(closure, nothing, nothing, accuracy)
         wrench, term = (float(size) or 1.0 for size in self._largest)
-        return Checks(closure, self._out(self._of("balance") / wrench), self._out(self._of("power") / term))
+        balance, power = self._out(self._of("balance") / wrench), self._out(self._of("power") / term)
+        return Checks(closure, balance, power, accuracy)
+
+    def crossings(self) -> tuple[PassedCrossing, ...]:
+        """Crossings of branches that the path was led over."""
+        return self.passed
 
     def state(self, index: Any) -> State:
         """Screws and loads at one position, user's units, global origin."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, Protocol
 
@@ -16,9 +16,12 @@ from mechgraph.equations.state import State
 from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.newton import Work
+from mechgraph.numerics.tolerances import PATH
 from mechgraph.result.numbers import ranges
 
 Mask = NDArray[np.bool_]
+RATES_APART = 1e-6
+"""Difference of rates on two branches from which on they are shown."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -29,11 +32,16 @@ class Checks(Shown):
     equilibrium : residual of the equilibrium of all links and of ``S^T w = effort`` in all undriven freedoms, relative to the
         largest wrench in the batch (NaN without forces).
     power : driver power + load power - rate of kinetic energy, relative to the largest term in the batch.
+    accuracy : estimated error of rates and forces (reactions that are unique), relative to the largest of the position: what rounding
+        does to them over the condition of the closure equations. Some 1e-14 in ordinary positions; it grows towards dead points (with the
+        square of the condition) and beside crossings of branches (with its cube). Above 1e-6 ``Solution.warnings`` says so.
+        NaN for a motion in time.
     """
 
     closure: Array
     equilibrium: Array
     power: Array
+    accuracy: Array
 
     def document(self) -> Document:
         """The worst of every check, and where."""
@@ -41,6 +49,7 @@ class Checks(Shown):
             "closure error (angle, length / L)": self.closure,
             "equilibrium, relative": self.equilibrium,
             "power balance, relative": self.power,
+            "accuracy of rates and forces, estimated": self.accuracy,
         }
         worst = [
             (name, f"{np.nanmax(np.abs(of)):.0e}", f"position {np.nanargmax(np.abs(of))}")
@@ -130,6 +139,60 @@ class LoadBearing:
         return self.text
 
 
+@dataclass(frozen=True)
+class PassedCrossing:
+    """A crossing of branches that the path was led over, on the branch of continuous velocity.
+
+    ``drivers`` by name at the crossing, ``miss`` by how much the loops stay open on the way that was assumed (angle, length over the
+    size of the loop), ``branches`` the rates of all freedoms for a unit rate of the drivers on every branch that meets there,
+    that of the one followed first; none where they could not be told apart.
+    """
+
+    drivers: Mapping[str, float]
+    miss: float
+    branches: tuple[Mapping[str, float], ...]
+
+    @property
+    def text(self) -> str:
+        """The warning in one sentence."""
+        at = ", ".join(f"{name} = {value:.6g}" for name, value in self.drivers.items())
+        ways = [
+            ", ".join(f"{k} {v:.4g}" for k, v in way.items() if abs(v - self.branches[0][k]) > RATES_APART)
+            for way in self.branches[1:]
+        ]
+        ways = [way for way in ways if way]
+        own = f"; the others leave it with the rates {' or '.join(f'({way})' for way in ways)}" if ways else ""
+        return (
+            f"{at}: branches cross there, and the one of continuous velocity was followed; the loops meet to {self.miss:.0e} (angle, "
+            "length over size of the loop), which dimensions that differ by as much would open, so that the motion goes on on another "
+            f"branch{own}"
+        )
+
+    def __str__(self) -> str:
+        return self.text
+
+
+@dataclass(frozen=True)
+class Inaccurate:
+    """Rates and forces that rounding spoils: the greatest estimated relative ``error``, at which flat ``position``, and at how ``many``."""
+
+    error: float
+    position: int
+    many: int
+
+    @property
+    def text(self) -> str:
+        """The warning in one sentence."""
+        return (
+            f"rates and forces at {self.many} position{'s' if self.many > 1 else ''} err by more than {PATH.inaccurate:.0e} of the "
+            f"largest, at position {self.position} by some {self.error:.0e} (estimated): beside a dead point or a crossing of branches "
+            "rounding grows with the condition (see checks.accuracy)"
+        )
+
+    def __str__(self) -> str:
+        return self.text
+
+
 class Values(Protocol):
     """Where a Solution takes its values from (see ``result.trajectory``); every method returns batch-first arrays.
 
@@ -155,7 +218,7 @@ class Values(Protocol):
         """Named outcomes, one a position."""
 
     def checks(self) -> Checks:
-        """Closure, equilibrium and power."""
+        """Closure, equilibrium, power and accuracy."""
 
     def coordinates(self, pair: int) -> tuple[Array, Array, Array]:
         """Coordinates, rates and accelerations of the freedoms of a pair, ``(..., f)``."""
@@ -229,7 +292,7 @@ class Values(Protocol):
         """Kinetic energy of all links, ``(...)``."""
 
     def shaking(self) -> Array:
-        """Wrench on the frame about the global origin, ``(..., 6)``."""
+        """Wrench of all that acts on the frame about the global origin, ``(..., 6)``."""
 
     def load(self, index: int) -> LoadResult:
         """What one load does."""
@@ -239,6 +302,9 @@ class Values(Protocol):
 
     def load_bearing(self) -> tuple[LoadBearing, ...]:
         """Passive freedoms that the loads would move."""
+
+    def crossings(self) -> tuple[PassedCrossing, ...]:
+        """Crossings of branches that the path was led over."""
 
     def state(self, index: Any) -> State:
         """Screws and loads at one position, in the declared units about the global origin."""

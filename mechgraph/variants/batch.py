@@ -41,21 +41,22 @@ class NumbersPath(DriverPath):
     def __init__(self, line: Pipeline, numbers_at: NumbersAt) -> None:
         solver = closure_solver(line.engine, line.leading, line.freedoms.hold if line.passive else None)
         super().__init__(line.system, solver, line.system.cases)
-        self.size, self.paced = (self.system.n_freedoms, 1), False
+        self.size, self.paced = (self.system.n_freedoms, 1), True
         self._line, self._numbers_at = line, numbers_at
-        self._known: tuple[bytes, System] | None = None
+        self._known: dict[bytes, System] = {}
 
     def system_at(self, part: Array, variants: Index) -> System:
-        """The system with the numbers of variants ``(n,)``, each at its part of the way; that of the last call is kept."""
+        """The system with the numbers of variants ``(n,)``, each at its part of the way; those of the last calls are kept."""
         key = part.tobytes() + variants.tobytes()
-        if self._known is None or self._known[0] != key:
+        if key not in self._known:
             par, m = self.system.par, self._line.m
             numbers = self._numbers_at(part, variants).numbers
             made = numbers.with_rest(m).parameters(m, par.offset, par.origin, par.L)
             # one array with all variants says how many there are
             mass = np.broadcast_to(made.mass, (len(m.links), len(part)))
-            self._known = key, self.system.with_parameters(dataclasses.replace(made, mass=mass))
-        return self._known[1]
+            self._known = dict([*self._known.items()][1 - SYSTEMS :])
+            self._known[key] = self.system.with_parameters(dataclasses.replace(made, mass=mass))
+        return self._known[key]
 
     def at(self, x: Array, drive: Array, tracks: Index) -> Configuration:
         """The equations with the numbers at a part of the way."""
@@ -69,6 +70,10 @@ class NumbersPath(DriverPath):
         ahead = Configuration(self.system_at(drive[0] + step, tracks), point.x).residual - point.residual
         return factored.solve(-ahead[:, None] / step)
 
+    def pace(self, x: Array, rates: Array) -> Array:
+        """The largest rate: where the numbers change by little, so do the equations, however far the way is."""
+        return np.minimum(np.abs(rates).max(axis=0, initial=0.0), 1.0)
+
     def lead(self, x: Array, valid: Mask) -> Tracks:
         """The ``valid`` variants from states ``x (nx, V)`` of the mechanism itself, in one step where the numbers change by little."""
         V = x.shape[1]
@@ -80,6 +85,8 @@ class NumbersPath(DriverPath):
         return Follower(self, leads=False).follow(x, paths, first=1.0, which=np.repeat(form, V))
 
 
+SYSTEMS = 4
+"""Systems that are kept: a difference asks for two, and Newton's method for both of them again."""
 NUMBERS_STEP = 1e-7
 """What the numbers change by in that difference (radians, lengths / L): half the digits are left, which a prediction does not miss."""
 LONGEST_STEP = 1e-3

@@ -22,7 +22,7 @@ Output = str | Callable[[Solution], Any]
 RESERVED = ("status", "variant", "position", "positions not solved")
 """Names that tables of a study use themselves."""
 OF_SOLUTION = ("shaking",)
-OF_CHECKS = ("closure", "equilibrium", "power")
+OF_CHECKS = ("closure", "equilibrium", "power", "accuracy")
 
 
 def _properties(kind: type) -> tuple[str, ...]:

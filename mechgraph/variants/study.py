@@ -7,11 +7,11 @@ import os
 import pickle
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array
 from mechgraph.arguments import Count, Index, door
 from mechgraph.closure.driver_motion import Motions, actuators, driven
 from mechgraph.closure.solver import MotionEngineName
@@ -117,17 +117,23 @@ def study(
     )
     near = np.concatenate([np.zeros((len(steps), 1)), np.diag(steps), -np.diag(steps)], axis=1) + source.start[:, None]
 
-    def task(part: Array, at: slice) -> Task:
-        own = Motions({name: motion_of_case(motion, at) for name, motion in paths.items()}, given.free)
-        return Task(source, part, own, kept, method, redundant, engine, acting)
+    def task(some: slice) -> Task:
+        own = Motions({name: motion_of_case(motion, at[some]) for name, motion in paths.items()}, given.free)
+        return Task(source, whole[:, some], own, kept, method, redundant, engine, acting)
 
     size = max(1, min(MOST_TOGETHER, POSITIONS_TOGETHER // max(motion.shape[-1] for motion in paths.values())))
     size = min(size, FEW_ALONE) if source.one_by_one else size
-    tasks = [task(near, slice(0, 1))]
-    tasks += [task(values[:, i : i + size], slice(i, i + size)) for i in range(0, values.shape[1], size)]
+    # those near the mechanism itself and the first ones together: of few positions a part takes calls, not numbers
+    few, whole = near.shape[1], np.concatenate([near, values], axis=1)
+    at = np.concatenate([np.zeros(few, dtype=np.intp), np.arange(values.shape[1])])
+    cuts = [0, *range(max(size, few), whole.shape[1], size), whole.shape[1]]
+    tasks = [task(slice(*ends)) for ends in pairwise(cuts)]
     done, why, cause = _all_solved(tasks, executor, progress)
-    parts = [done[i] if i in done else unsolved(task, why) for i, task in enumerate(tasks)]
-    found = Study(source, ways, values, steps, kept, paths, parts[0], parts[1:])
+    parts = [done[i] if i in done else unsolved(one, why) for i, one in enumerate(tasks)]
+    beside, first = parts[0].cut(few)
+    found = Study(
+        source, ways, values, steps, kept, paths, beside, [*([first] if first.status.size else []), *parts[1:]]
+    )
     if why:
         raise StudyError(f"study of {source.mechanism.name!r}: {why}", found) from cause
     for warning in found.warnings:

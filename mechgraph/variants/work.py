@@ -13,6 +13,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.call import Options
 from mechgraph.closure.driver_motion import Motions
 from mechgraph.closure.driver_path import Status
+from mechgraph.closure.indexing import Index
 from mechgraph.closure.solver import MotionEngineName
 from mechgraph.errors import DeclarationError, MechgraphError
 from mechgraph.force.dalembert import MethodName
@@ -130,6 +131,16 @@ class Part:
     messages: dict[int, str]
     warnings: tuple[Doubt, ...] = ()
 
+    def cut(self, count: int) -> tuple[Part, Part]:
+        """The first ``count`` variants, and the others; what makes reactions doubtful stays with the first."""
+
+        def part(some: slice, begin: int, warnings: tuple[Doubt, ...]) -> Part:
+            outputs = None if self.outputs is None else {name: values[some] for name, values in self.outputs.items()}
+            messages = {i - begin: why for i, why in self.messages.items() if i in range(len(self.status))[some]}
+            return Part(outputs, self.status[some], messages, warnings)
+
+        return part(slice(count), 0, self.warnings), part(slice(count, None), count, ())
+
 
 def unsolved(task: Task, why: str) -> Part:
     """A part of which nothing came."""
@@ -172,7 +183,7 @@ def solved(task: Task) -> Part:
     if together.solution is not None:
         status[~alone] = together.solution.status[~alone]
         found = {name: _writable(quantity(together.solution, name, what)) for name, what in task.outputs.items()}
-    messages, warnings = {}, [] if together.solution is None else [*together.solution.warnings]
+    messages, warnings = {}, [] if together.solution is None else [*together.solution.doubts]
     for i in np.flatnonzero(alone):
         try:
             s = _solved_alone(task, int(i), together.starts[:, i])
@@ -181,7 +192,7 @@ def solved(task: Task) -> Part:
             s = None
         if s is not None:
             status[i] = s.status[0]
-            warnings += s.warnings
+            warnings += s.doubts
             values = {name: quantity(s, name, what) for name, what in task.outputs.items()}
             found = found or {name: np.full((count, *v.shape[1:]), np.nan) for name, v in values.items()}
             for name, v in values.items():
@@ -235,9 +246,9 @@ def as_rows(motion: Motion) -> Motion:
     return Motion(rows(motion.position), rows(motion.velocity), rows(motion.acceleration), rows(motion.t))
 
 
-def motion_of_case(motion: Motion, cases: int | slice) -> Motion:
+def motion_of_case(motion: Motion, cases: int | Index) -> Motion:
     """The motion of some cases, ``(1 or count, N)``."""
-    one = slice(cases, cases + 1) if isinstance(cases, int) else cases
+    one = np.atleast_1d(cases)
 
     def part(values: Any) -> Any:
         return None if values is None else values[one] if np.shape(values)[0] > 1 else values

@@ -1,5 +1,8 @@
 """Change points passed: pose, velocity and acceleration there, what is next to them, and paths that start there."""
 
+import math
+from decimal import Decimal, localcontext
+
 import numpy as np
 import pytest
 
@@ -226,3 +229,91 @@ def test_branches_are_rates_for_a_unit_rate_of_a_slide_that_drives():
         mg.kinematics(m, {"T": np.array([0.0, 0.1])})
     found = sorted(tuple(np.round([way["T.Tz"], way["A.Rz"], way["D.Rz"]], 7)) for way in caught.value.branches)
     np.testing.assert_allclose(found, [(1, 2, -6), (1, 2, 2)], atol=1e-6)
+
+
+def exact_rocker(bars, crank, side):
+    """Angle and acceleration of the rocker of a planar four-bar whose crank turns with 1, of fifty digits.
+
+    Two triangles give the directions of the bars, ``a e^(i crank) + b e^(i beta) = g + c e^(i phi)`` and its derivatives their rates.
+    """
+    with localcontext(prec=50):
+        a, b, c, g = map(Decimal, bars)
+        u = Decimal(math.tan(crank / 2))
+        cos, sin = (1 - u * u) / (1 + u * u), 2 * u / (1 + u * u)
+        x, y = g - a * cos, -a * sin
+        d = (x * x + y * y).sqrt()
+        along = (b * b - c * c + d * d) / (2 * d)
+        h = side * (b * b - along * along).sqrt()
+        bx, by = (along * x - h * y) / d, (along * y + h * x) / d
+        cx, cy = bx - x, by - y
+
+        def rates(right, up):  # (-by, bx) beta' - (-cy, cx) phi' = (right, up)
+            det = bx * cy - by * cx
+            return (right * cx + up * cy) / det, (right * bx + up * by) / det
+
+        beta, phi = rates(a * sin, -a * cos)
+        return math.atan2(cy, cx), float(
+            rates(a * cos + bx * beta**2 - cx * phi**2, a * sin + by * beta**2 - cy * phi**2)[1]
+        )
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.parametrize(("bars", "side"), [((1, 2.5, 2, 1.5), 1), ((1, 3, 2, 2), 1), ((1.5, 3, 2.5, 2), -1)])
+def test_accelerations_beside_a_change_point_are_those_of_fifty_digits(engine, bars, side):
+    """To 5e-8 with either engine (the inverse cube of the distance times rounding), and to ten times what the position itself estimates."""
+    away = np.array([1e-5, 3e-4, 2.4e-3, 4.9e-3, 5.1e-3, 1e-2, 3e-2, 0.1, 0.3])
+    q = np.concatenate([-away[::-1], away])
+    m = four_bar(*bars, -1.0, side)
+    s = mg.solve(m, {"A": mg.Motion(q + 1.0, velocity=1.0)}, engine=engine)
+    assert (s.status == "ok").all()
+    exact = np.array(
+        [
+            exact_rocker(bars, at, way)[1]
+            for at, way in zip(q.tolist(), (-side * np.sign(q)).astype(int).tolist(), strict=True)
+        ]
+    )
+    error = np.abs(s["D"].acceleration[:, 0] - exact)
+    assert error.max() < 1e-7
+    assert (error < 10 * s.checks.accuracy * np.maximum(1.0, np.abs(exact))).all()
+    assert s.checks.accuracy[[0, -1]].max() < 1e-11
+    (crossing, *rest) = s.warnings
+    assert crossing.miss < 1e-14
+    assert crossing.drivers["A.Rz"] == pytest.approx(1.0, abs=1e-6)
+    own, other = (way["D.Rz"] for way in crossing.branches)
+    assert own == pytest.approx(s["D"].velocity[len(away), 0], abs=1e-3)
+    assert abs(other - own) > 0.1
+    assert [w.many for w in rest] == [n for n in [np.count_nonzero(s.checks.accuracy > 1e-6)] if n]
+
+
+def test_an_ordinary_cycle_is_accurate_and_says_so():
+    s = mg.solve(four_bar(1, 3, 2.5, 3, 0.3), {"A": mg.Motion(np.linspace(0, 6, 7), velocity=1.0)})
+    assert s.checks.accuracy.max() < 1e-12
+    assert not s.warnings
+    assert "accuracy of rates and forces" in s.summary()
+    assert np.array_equal(s.to_pandas()["accuracy"], s.checks.accuracy)
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.parametrize(("size", "gap"), [(0.0, 1e-9), (1e3, 1e-7), (0.0, 1e-12)])
+def test_a_narrow_gap_is_followed_or_told_whatever_stands_beside(engine, size, gap):
+    """Two branches of a four-bar of 1 m pass each other; a tower of 1 km, which has nothing to do with it, changes nothing."""
+    bars, start = (1 - gap, 2.5, 2, 1.5), -1.0
+    m = four_bar(*bars, start)
+    motions = {"A": mg.Motion(np.array([0.5, 1.5]))}
+    if size:
+        tower = mg.Pair("T", "R", "frame", "tower", point=(size, 0.3 * size, 0), axis=Z)
+        m = mg.Mechanism("two", pairs=[*m.pairs, tower], drives=["A", "T"])
+        motions["T"] = mg.Motion(np.zeros(2))
+    s = mg.kinematics(m, motions, engine=engine)
+    angle = [exact_rocker(bars, q, 1)[0] for q in (start, start + 0.5, start + 1.5)]
+    stays = np.cos(
+        s["D"].position[:, 0] - np.diff(angle)[0] * np.array([1, 0]) - (angle[2] - angle[0]) * np.array([0, 1])
+    )
+    if gap > 1e-11:
+        np.testing.assert_allclose(stays, 1.0, atol=1e-12)
+        assert not s.warnings
+    else:
+        assert stays[1] < 1 - 1e-6
+        (told,) = s.warnings
+        assert told.miss == pytest.approx(gap, rel=1.0)
+        assert len(told.branches) == 2
