@@ -70,8 +70,7 @@ from mechgraph.variants.result import Study
 from mechgraph.variants.study import study
 
 if TYPE_CHECKING:
-    from mechgraph.compiled.compiled import Compiled
-    from mechgraph.compiled.compiled import compile_mechanism as compile
+    from mechgraph.compiled.compiled import Compiled, compile
     from mechgraph.show.page.write import write_report
 
 __all__ = [
@@ -174,7 +173,7 @@ __all__ = [
 
 LATER = {
     "Compiled": ("mechgraph.compiled.compiled", "Compiled"),
-    "compile": ("mechgraph.compiled.compiled", "compile_mechanism"),
+    "compile": ("mechgraph.compiled.compiled", "compile"),
     "write_report": ("mechgraph.show.page.write", "write_report"),
 }
 

@@ -72,6 +72,12 @@ def start_sets(tmp_path_factory: pytest.TempPathFactory) -> None:
     os.environ["MECHGRAPH_CACHE"] = str(tmp_path_factory.mktemp("start_sets"))
 
 
+@pytest.fixture(scope="session", autouse=True)
+def spoken_warnings() -> None:
+    """What numpy says of values that are none, users never see; here it is a warning, and so an error."""
+    importlib.import_module("mechgraph.arguments").FLOATING |= {"all": "warn", "under": "ignore"}
+
+
 @pytest.fixture(scope="session")
 def kernel_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Where tests of the kernel build it: not where programs that other tests start would find it."""
@@ -92,12 +98,6 @@ def compiled() -> None:
     """What a test of the compiled kernel asks for: where no C compiler is, it is skipped, and where CI is set it fails."""
     if build.installed() is None and not compiler.compilers():
         (pytest.fail if CI else pytest.skip)("no C compiler here: pip install 'mechgraph[fast]' brings one")
-
-
-@pytest.fixture(scope="session", autouse=True)
-def spoken_warnings() -> None:
-    """What numpy says of values that are none, users never see; here it is a warning, and so an error."""
-    importlib.import_module("mechgraph.arguments").FLOATING |= {"all": "warn", "under": "ignore"}
 
 
 @pytest.fixture

@@ -22,6 +22,7 @@ from mechgraph.closure.sparse_solver import SparseSolver
 EngineName = Literal["auto", "dense", "sparse"]
 ENGINES: tuple[EngineName, ...] = ("auto", "dense", "sparse")
 MotionEngineName = Literal["auto", "compiled", "dense", "sparse"]
+"""Engines of calls that follow a motion; what is at hand where ``compiled`` serves is the numpy engine that ``auto`` takes."""
 SPARSE_ROWS = {1.0: 120, 20.0: 84, 50.0: 60, 400.0: 42, np.inf: 36}
 """Closure rows from which on ``auto`` takes the sparse engine, for up to so many positions.
 

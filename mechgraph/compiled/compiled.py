@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, turn_tangent
+from mechgraph.arguments import door, with_doors
 from mechgraph.compiled.tabled import STATUSES, Tabled, tabled
 from mechgraph.compiled.write import write_tables
 from mechgraph.errors import DeclarationError, listed
@@ -26,7 +27,8 @@ PARTINGS = 12
 """Halvings of a change of parameters, until the loops are closed by small corrections."""
 
 
-def compile_mechanism(m: Mechanism) -> Compiled:
+@door
+def compile(m: Mechanism) -> Compiled:
     """Keep a mechanism ready in the compiled kernel, for one position after the other: control loops, optimisers, real time.
 
     ::
@@ -353,3 +355,6 @@ class Compiled:
         room.motion[0] = q
         room.run()
         return int(room.status[0])
+
+
+with_doors(Compiled)

@@ -16,7 +16,7 @@ from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.closure.indexing import System
 from mechgraph.errors import DeclarationError, listed
 from mechgraph.kernel.tables import Integers, Layout, layout, tables
-from mechgraph.model.mechanism import Mechanism, check_mechanism
+from mechgraph.model.mechanism import Mechanism
 from mechgraph.pipeline import Pipeline
 from mechgraph.quantities import shown
 from mechgraph.structure.snapping import meant
@@ -163,7 +163,6 @@ def tabled(m: Mechanism, asked: str = "compile") -> Tabled:
     DeclarationError
         which names what the kernel cannot carry; errors of the start as in ``solve``.
     """
-    check_mechanism(m, asked)
     subject = f"{asked} {m.name!r}"
     own = meant(m, None, asked)
     drives = tuple(own.full_name(drive.freedom) for drive in own.drives)
