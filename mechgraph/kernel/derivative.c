@@ -36,7 +36,6 @@ int mgk_derivative(const int *I, const double *P, const double *dP, int count, v
   FOR(i, count) p[i] = P[i] + _Complex_I * (STEP * dP[i]);
   read_tables(I, p, &m);
   lay_out(&m, x + m.states, &w);
-  memset(w.frame_load, 0, sizeof w.frame_load);
   w.evaluations = w.factorizations = 0;
   mgk_record(I, places);
   const int d = m.drives;
