@@ -34,7 +34,7 @@ from mechgraph.quantities import is_numeric, real_array, shown, wrong
 from mechgraph.reading import text_of, toml_of
 from mechgraph.writing import write_whole
 
-LINE = 120
+LINE_OF_FILE = 120
 """Characters of a line of a written list."""
 LIST = re.compile(r"""\[\n((?:\ +[^\[\]{}"'\n]+,\n)+)\ *\]""")
 LIST_OF_LISTS = re.compile(r"""\[\n((?:\ +\[[^\[\]{}"'\n]*\],\n)+)\ *\]""")
@@ -381,9 +381,9 @@ def _in_few_lines(text: str) -> str:
     def filled(found: re.Match[str]) -> str:
         items = [line.strip().removesuffix(",") for line in found[1].splitlines()]
         one = f"[{', '.join(items)}]"
-        if len(one) <= LINE:
+        if len(one) <= LINE_OF_FILE:
             return one
-        lines = textwrap.wrap(", ".join(items), LINE, break_long_words=False, break_on_hyphens=False)
+        lines = textwrap.wrap(", ".join(items), LINE_OF_FILE, break_long_words=False, break_on_hyphens=False)
         return "[\n" + "".join(f"    {line.removesuffix(',')},\n" for line in lines) + "]"
 
     return LIST_OF_LISTS.sub(filled, LIST.sub(filled, text))
