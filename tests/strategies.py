@@ -155,6 +155,12 @@ def with_loads(m, seed, constant=False):
     return m.replace(loads=loads)
 
 
+def with_loads_on_links(m, seed):
+    """The same without those in freedoms: such a load makes a freedom, passive otherwise, the mechanism's own."""
+    m = with_loads(m, seed)
+    return m.replace(loads=[load for load in m.loads if load.in_freedom is None])
+
+
 def motions(m, seed, t, size=0.08):
     """Smooth motions of all drives from their start, ``q = start + a (cos(w t + p) - cos p)``, with exact rates."""
     rng = np.random.default_rng((seed, 3))

@@ -106,9 +106,11 @@ def test_a_position_is_on_the_branch_that_leads_there() -> None:
 
 
 def test_bad_arguments_of_a_map_are_all_named() -> None:
-    with pytest.raises(mg.DeclarationError) as caught:
-        mg.branches(mg.load("four-bar"), "Q", samples=1, points=0, over=(1.0, 0.0))
-    assert len(caught.value.faults) == 4
+    """Those of a wrong kind at once, then wrong values at once."""
+    for bad, count in (({"samples": 1, "points": 0}, 2), ({"over": (1.0, 0.0)}, 2)):
+        with pytest.raises(mg.DeclarationError) as caught:
+            mg.branches(mg.load("four-bar"), "Q", **bad)
+        assert len(caught.value.faults) == count
 
 
 def test_turns_are_those_next_to_the_start() -> None:

@@ -44,7 +44,9 @@ def unspun(path: DriverPath, found: Positions, passive: tuple[PassiveMotion, ...
     Source: Bishop, There is more than one way to frame a curve, Amer. Math. Monthly 82, 1975 (vectors carried along an axis).
     """
     nodes = found.tracks.nodes
-    good = np.flatnonzero((found.status == Status.OK) & (found.near < 0) & (found.place != 0.0))
+    turns = np.zeros(found.x.shape[1], dtype=np.intp) if found.turns is None else found.turns
+    # at the start all is where it is, unless that is met again after some turns
+    good = np.flatnonzero((found.status == Status.OK) & (found.near < 0) & ((found.place != 0.0) | (turns != 0)))
     if not len(nodes.steps[0]) or not found.moved.any():
         return found
     carried = (
@@ -53,7 +55,6 @@ def unspun(path: DriverPath, found: Positions, passive: tuple[PassiveMotion, ...
         else PassiveSteps(path, Interpolation(path, nodes), found.follower, passive)
     )
     x, status = found.x.copy(), found.status.copy()
-    turns = np.zeros(found.x.shape[1], dtype=np.intp) if found.turns is None else found.turns
     for at in in_blocks(good) if good.size else ():
         x[:, at], sure = carried.turned(found.x[:, at], found.which[at], found.track[at], found.place[at], turns[at])
         status[at[~sure]] = Status.NOT_CLOSED

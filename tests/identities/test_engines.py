@@ -6,7 +6,7 @@ import pytest
 from attack import anywhere, conditions, differences, solved, warned, without_numbers
 from lattices import LATTICES
 from mechanisms import Z
-from strategies import closed_mechanism, motions, open_chain, with_drives, with_loads
+from strategies import closed_mechanism, motions, open_chain, with_drives, with_loads, with_loads_on_links
 
 import mechgraph as mg
 from mechgraph.closure.assembly import assembled, named_columns
@@ -96,7 +96,7 @@ def test_chains_open_at_the_start(seed):
 @pytest.mark.parametrize("seed", [40, 139, 213])
 def test_the_sign_of_what_holds_a_passive_body(seed):
     """A turn in E-S, a slide in E-E, a turn in Sp-S: the couple or force that holds the body has one sign."""
-    m = with_loads(with_drives(closed_mechanism(seed), seed), seed)
+    m = with_loads_on_links(with_drives(closed_mechanism(seed), seed), seed)
     given = {d.freedom: 0.01 for d in m.drives}
     one, other = (solved(m, given, engine=e).passive_effort for e in ("dense", "sparse"))
     assert one.keys() == other.keys()
@@ -107,7 +107,7 @@ def test_the_sign_of_what_holds_a_passive_body(seed):
 @pytest.mark.parametrize("seed", [40, 204, 218])
 def test_where_a_passive_body_stands_does_not_hang_on_the_engine(seed):
     """A body between a sphere and a plane: the turn that takes its spin out is not linear in the coordinates of the plane."""
-    m = with_loads(with_drives(closed_mechanism(seed), seed), seed)
+    m = with_loads_on_links(with_drives(closed_mechanism(seed), seed), seed)
     given = {d.freedom: mg.Motion(np.linspace(0.0, 0.3, 4), 1.0) for d in m.drives}
     one, other = (solved(m, given, engine=e, forces=False) for e in ("dense", "sparse"))
     assert differences(one, other, forces=False)[0] < 1e-9

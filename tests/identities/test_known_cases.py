@@ -49,7 +49,7 @@ CASES = {
     "6-sps": Case(lambda: known.hexapod("SPS"), 12, 12, 0, passive=6),
     "6-sps undriven": Case(lambda: known.hexapod("SPS", driven=False), 12, 12, 0, passive=6),
     "door": Case(known.door, 1, 1, 5, (4, 1, 0)),
-    "door, ball and groove": Case(lambda: known.door("S", "Sg"), 1, 1, 0),
+    "door, ball and groove": Case(lambda: known.door("S", "Sg"), 1, 1, 0, passive=1),
     "pphchp, three parallel": Case(lambda: known.pphchp(Z, Z, Z), 3, 3, 2, (0, 2, 0)),
     "pphchp, 3 and 4 parallel": Case(lambda: known.pphchp(Z, Z, (1, 0.3, 0.2)), 2, 2, 1, (0, 1, 0)),
     "pphchp, 3 and 5 parallel": Case(lambda: known.pphchp(Z, (0.3, 0.2, 1), Z), 2, 2, 1, (0, 1, 0)),
@@ -59,7 +59,7 @@ CASES = {
     "prprrh, parallel": Case(known.prprrh_special, 1, 1, 1, (0, 1, 0)),
 }
 DETERMINATE = {
-    "rssr", "rsur", "rssr-sc", "rccc", "3-upu", "6-ups", "6-sps",
+    "rssr", "rsur", "rssr-sc", "rccc", "3-upu", "6-ups", "6-sps", "door, ball and groove",
 }  # fmt: skip
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from attack import Bars, anywhere, carried, conditions, differences, everything, solved, wrapped
 from mechanisms import Z
-from strategies import chebyshev_rate, chebyshev_times, closed_mechanism, with_drives, with_loads
+from strategies import chebyshev_rate, chebyshev_times, closed_mechanism, with_drives, with_loads, with_loads_on_links
 
 import mechgraph as mg
 from mechgraph.call import Options
@@ -81,7 +81,7 @@ def test_random_mechanisms(seed):
 
 def test_names_of_a_result_do_not_hang_on_what_was_reached():
     """Where no position is reached, what holds a passive body is NaN; its name is there as otherwise."""
-    m = with_loads(with_drives(closed_mechanism(40), 40), 40)
+    m = with_loads_on_links(with_drives(closed_mechanism(40), 40), 40)
     freedom = m.drives[0].freedom
     near, far = (solved(m, {freedom: q}) for q in ([0.0, 50.0], [50.0]))
     assert far.status[0] == near.status[1] != "ok"
