@@ -336,7 +336,7 @@ def test_near_relations_by_chance_do_not_hold_up_the_report_of_a_long_ring(monke
     """Of 200 axes that stand anyhow hundreds of pairs come near something special; taking them so is minutes of work for no hint."""
     rng, tried = np.random.default_rng(0), []
     ring = known.ring("R" * 200, rng.normal(size=(200, 3)), rng.normal(size=(200, 3)))
-    monkeypatch.setattr(rounding, "snapped", lambda m, tol: tried.append(tol) or snapping.snapped(m, tol))
+    monkeypatch.setattr(rounding, "snapped", lambda m, tol, *more: tried.append(tol) or snapping.snapped(m, tol, *more))
     report = mg.check(ring)
     assert report.rounding is None
     assert "mobility 194" in str(report)
