@@ -1,4 +1,4 @@
-"""Hypothesis profiles: ``dev`` at the desk, ``ci`` (more examples, always the same ones) where CI is set. Golden files."""
+"""Hypothesis profiles: ``dev`` at the desk, ``ci`` (always the same examples) where CI is set. Golden files."""
 
 import importlib
 import itertools
@@ -13,13 +13,15 @@ from mechgraph import by_kernel
 from mechgraph.kernel import build, compiler
 
 settings.register_profile("dev", max_examples=25, deadline=None)
-settings.register_profile("ci", max_examples=60, deadline=None, derandomize=True, database=None)
+settings.register_profile("ci", max_examples=20, deadline=None, derandomize=True, database=None)
 CI = os.environ.get("CI", "").lower() not in {"", "0", "false"}
 settings.load_profile("ci" if CI else "dev")
 
 GOLDEN = Path(__file__).parent / "golden"
 FURTHER = 10_000
 """First seed of ``--attack``."""
+DAILY = 5
+"""Seeds of a test that are run every day; its others are slow."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -43,13 +45,14 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Seeds of tests that are marked so: always the same ones, then the further ones of ``--attack``."""
+    """Seeds of tests that are marked so: always the same ones, most of them slow, then the further ones of ``--attack``."""
     marker = metafunc.definition.get_closest_marker("seeds")
     if marker is not None:
         without = marker.kwargs.get("without", ())
-        always = itertools.islice((seed for seed in itertools.count() if seed not in without), marker.args[0])
+        always = list(itertools.islice((seed for seed in itertools.count() if seed not in without), marker.args[0]))
         more = metafunc.config.getoption("--attack")
-        metafunc.parametrize("seed", [*always, *range(FURTHER, FURTHER + more)])
+        late = (pytest.param(seed, marks=pytest.mark.slow) for seed in itertools.islice(always, DAILY, None))
+        metafunc.parametrize("seed", [*always[:DAILY], *late, *range(FURTHER, FURTHER + more)])
 
 
 @pytest.hookimpl(wrapper=True)

@@ -282,7 +282,7 @@ def assert_parallel(s, bars, q, start):
 ONE = [Bars(1.0, 2.0, 1.0, 2.0)]
 
 
-@pytest.mark.parametrize("step", [1, 2, 6, 7, 10, -7, 0.74])
+@pytest.mark.parametrize("step", [2, 7, -7, *(pytest.param(step, marks=pytest.mark.slow) for step in (1, 6, 10, 0.74))])
 def test_parallelogram_over_a_turn(step):
     q = np.radians(np.arange(0, 360 + 1e-9, abs(step))) * np.sign(step)
     for start in (np.pi / 2, np.radians(137.3)):
@@ -290,7 +290,12 @@ def test_parallelogram_over_a_turn(step):
 
 
 @pytest.mark.parametrize(
-    ("off", "engine"), [(1e-5, "dense"), (1e-5, "sparse"), (1e-3, "dense"), (3e-3, "sparse"), (5e-3, "dense")]
+    ("off", "engine"),
+    [
+        (1e-5, "dense"),
+        (3e-3, "sparse"),
+        *(pytest.param(*one, marks=pytest.mark.slow) for one in ((1e-5, "sparse"), (1e-3, "dense"), (5e-3, "dense"))),
+    ],
 )
 def test_beside_a_change_point_wherever_the_path_ends(engine, off):
     """Behind a change point a position is solved alone, with one before it, and with others behind it."""
@@ -349,9 +354,9 @@ RHOMBUS = [Bars(1.0, 1.0, 1.0, 1.0)]
     [
         (ONE, -0.5, "dense"),
         (RHOMBUS, -0.5, "sparse"),
-        (ONE, -3e-3, "dense"),
-        (ONE, -1e-4, "dense"),
         (RHOMBUS, 1e-5, "dense"),
+        pytest.param(ONE, -3e-3, "dense", marks=pytest.mark.slow),
+        pytest.param(ONE, -1e-4, "dense", marks=pytest.mark.slow),
     ],
 )
 def test_paths_may_begin_and_end_beside_a_change_point(bars, begin, engine):
