@@ -1,4 +1,4 @@
-"""Start sets serve a mechanism however it is declared: pairs in any order, links of any names, pairs the other way round."""
+"""Start sets serve a mechanism however it is declared: pairs in any order, links of any names, pairs the other way round; their work."""
 
 from __future__ import annotations
 
@@ -15,9 +15,13 @@ from test_modes import FOUR, STEPHENSON, WATT, planar, platform
 import mechgraph as mg
 from mechgraph.atlas.canonical import least_order, least_orders
 from mechgraph.modes import finding
+from mechgraph.modes.family import Family
 from mechgraph.modes.groups import groups_of
+from mechgraph.modes.homotopy import Care, Equations, Leg, Linear, follow
 from mechgraph.modes.labelling import Labelling
+from mechgraph.modes.monodromy import MISSED, _Group
 from mechgraph.modes.question import Question
+from mechgraph.modes.store import kept
 
 BOTH_WAYS = frozenset("RPCS")
 """Pairs that are the same with their links exchanged."""
@@ -137,6 +141,43 @@ def same(first: mg.Assemblies, second: mg.Assemblies, sign: Mapping[str, float])
     gaps = np.abs(np.exp(1j * table)[:, None] - np.exp(1j * other)).max(axis=2, initial=0.0)
     assert gaps.min(axis=1).max() < 1e-8
     assert gaps.min(axis=0).max() < 1e-8
+
+
+def test_members_are_worked_out_once_a_step_and_only_what_moves_of_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A step solves the equations twice, for the same markers; what no member moves stays where it is, to the last digit."""
+    family = groups_of(Question(planar("Watt", "A", **WATT), {"A": 0.1}).form.family)[0].family
+    rng = np.random.default_rng(0)
+    member, x = family.random_closed(rng)
+    equations, goal = Equations(family, family.mixing(rng)), family.random_member(rng)
+    goal.markers[:, :, 1:] = member.markers[:, :, 1:]
+    made: list[np.ndarray] = []
+    solved: list[int] = []
+    system_with, newton = Family.system_with, Linear.newton
+    monkeypatch.setattr(Family, "system_with", lambda f, m, d: (made.append(m), system_with(f, m, d))[1])
+    monkeypatch.setattr(Linear, "newton", lambda here, idle: (solved.append(1), newton(here, idle))[1])
+    tracked = follow(Leg(equations, member, goal), x[:, None], Care())
+    assert tracked.arrived.all()
+    assert len(solved) >= 2 * len(made) - 4
+    assert all((markers[:, :, 1:] == member.markers[:, :, 1:]).all() for markers in made)
+    assert np.abs(made[-1] - goal.markers).max() < 1e-12
+
+
+def test_loops_are_followed_in_one_go_where_many_assemblies_need_many(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With sixteen known, four loops without a further one are enough for a chance below one in ten thousand."""
+    family = groups_of(Question(mg.load("7r"), {"O1": 0.2}).form.family)[0].family
+    start = kept(family)
+    assert start is not None
+    rounds: list[int] = []
+
+    def back(group: _Group, _: Family, loops: int, __: np.random.Generator) -> np.ndarray:
+        rounds.append(loops)
+        return np.tile(group.x, loops)
+
+    monkeypatch.setattr(_Group, "_round", back)
+    group = _Group(Equations(family, start.mixing), start.member, start.x, 100)
+    group.grow(MISSED, np.random.default_rng(0), None)
+    assert rounds == [4]
+    assert group.chance == pytest.approx(17.0**-4)
 
 
 def test_the_least_order_of_a_graph_is_the_same_however_its_nodes_are_numbered() -> None:

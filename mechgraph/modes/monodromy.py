@@ -28,6 +28,8 @@ LOOP_ROUNDS, MOST_TRACKED = 60, 60_000
 """Rounds of loops at a member, and tracks in all, after which they are not either."""
 BATCH = 48
 """Tracks followed together, of as many loops as it takes."""
+MOST_TOGETHER = 600
+"""Tracks followed together, at most, where so many are needed for none to have been missed."""
 CANDIDATES = 6
 """Members of which the best one is kept."""
 ATTEMPTS = 8
@@ -168,7 +170,9 @@ class _Group:
                 break
             if progress is not None:
                 progress(f"{N} assemblies of a random member, {self.quiet} loops without a further one")
-            loops = max(1, BATCH // N)
+            # so many that where none brings a further one they are enough, and no fewer than are followed at the cost of one
+            enough = int(np.ceil(np.log(missed / self.chance) / -np.log(N + 1.0)))
+            loops = max(min(enough, MOST_TOGETHER // N), BATCH // N, 1)
             there = self._round(family, loops, rng)
             poses = fingerprints(family, self.base, there)
             new = distinct(poses, self.known)
