@@ -55,6 +55,9 @@ CALMING, CALMEST, CALM = 8, 1.0, 1e-4
 MOST_STEPS = 2000
 """Steps after which a track is given up."""
 
+TRACKS_TOGETHER = 600
+"""Tracks followed together, at most, of several positions or loops."""
+
 
 class Equations:
     """Closure equations of a class: the closure rows, mixed ``(rank, rows)`` where they depend on each other."""
