@@ -358,8 +358,11 @@ def test_an_assembly_beyond_the_end_of_a_slot_is_none(ends_at, offsets) -> None:
     if offsets:
         assert mg.assemble(m, {"A": 0.3}).start["S.Ts"] == pytest.approx(-0.03, abs=0.01)
     else:
-        with pytest.raises(mg.AssemblyError, match=r"at A = 0.3; there S.Ts is beyond the end of its curve"):
+        assert np.arccos((2.98**2 - 5) / 4) == pytest.approx(0.245154, abs=1e-6)
+        with pytest.raises(mg.AssemblyError, match=r"came to A = 0.245\d*; there S.Ts comes to the end of its"):
             mg.assemble(m, {"A": 0.3})
+        with pytest.raises(mg.AssemblyError, match=r"came to A = 0\.3; there S.Ts is beyond the end of its"):
+            mg.assemble(m, {"A": 0.3}, guess={"C": 0.1})
 
 
 def test_bad_arguments_are_all_named() -> None:

@@ -9,7 +9,7 @@ are contracted to few nodes first).
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Sequence
 from typing import Any
 
 Order = tuple[int, ...]
@@ -36,11 +36,8 @@ def least_orders(matrix: Matrix) -> tuple[Order, list[Order]]:
     waiting = [_refined(matrix, [matrix[v][v] for v in range(n)])]
     while waiting:
         colours = waiting.pop()
-        shared = [c for c in set(colours) if colours.count(c) > 1]
-        if shared:
-            first = min(shared)
-            for v in (v for v in range(n) if colours[v] == first):
-                waiting.append(_refined(matrix, [2 * c + (u != v) for u, c in enumerate(colours)]))
+        if choices := _singled_out(matrix, colours):
+            waiting += choices
             continue
         order = tuple(sorted(range(n), key=colours.__getitem__))
         code = tuple(matrix[u][v] for u in order for v in order)
@@ -49,6 +46,42 @@ def least_orders(matrix: Matrix) -> tuple[Order, list[Order]]:
         if code == best:
             orders.append(order)
     return best or (), orders
+
+
+def least_order(matrix: Matrix) -> Order:
+    """An order of nodes that gives the least matrix, row by row, of those that the refinement leaves.
+
+    Of nodes that look alike one is left out where a symmetry takes another one to it, as two orders that give the same matrix tell.
+    """
+    n = len(matrix)
+
+    def code(order: Order) -> list[int]:
+        return [matrix[u][v] for u in order for v in order]
+
+    def any_order(colours: list[int]) -> Order:
+        while choices := _singled_out(matrix, colours):
+            colours = next(choices)
+        return tuple(sorted(range(n), key=colours.__getitem__))
+
+    def least(colours: list[int]) -> Order:
+        known: list[list[int]] = []
+        found: list[Order] = []
+        for finer in _singled_out(matrix, colours) or ():
+            if (seen := code(any_order(finer))) not in known:
+                known.append(seen)
+                found.append(least(finer))
+        return min(found, key=code, default=any_order(colours))
+
+    return least(_refined(matrix, [matrix[v][v] for v in range(n)]))
+
+
+def _singled_out(matrix: Matrix, colours: list[int]) -> Iterator[list[int]] | None:
+    """The colours when one of the first nodes that look alike is told from the others, each in turn; None where all are told apart."""
+    shared = [c for c in set(colours) if colours.count(c) > 1]
+    if not shared:
+        return None
+    alike = [v for v, c in enumerate(colours) if c == min(shared)]
+    return (_refined(matrix, [2 * c + (u != v) for u, c in enumerate(colours)]) for v in alike)
 
 
 def _refined(matrix: Matrix, colours: Iterable[int]) -> list[int]:

@@ -350,7 +350,8 @@ def assembled_at(
     )
     x, done = led(system, x, columns, goal)
     if not done:
-        raise _not_reached(m, system, x, float(np.abs(x[system.single_rows[columns]] - goal).max()), values)
+        short = float(np.abs(x[system.single_rows[columns]] - goal).max())
+        raise _not_reached(m, system, x, short, values, _outside(m, system, x, -BEYOND_END, "comes to"))
     _refuse_beyond_ends(m, system, x, values)
     return _state(scaled(Configuration(system, x[:, None])))
 
@@ -365,11 +366,16 @@ def _refuse_far(m: Mechanism, names: Iterable[str], way: Array, unit: Array) -> 
 
 def _refuse_beyond_ends(m: Mechanism, system: System, x: Array, values: Mapping[str, float]) -> None:
     """Refuse a closed state in which a pair is beyond an end of its curve or surface."""
+    if why := _outside(m, system, x, BEYOND_END, "is beyond"):
+        raise _not_reached(m, system, x, float(beyond(system, x[:, None]).max()), values, why)
+
+
+def _outside(m: Mechanism, system: System, x: Array, least: float, how: str) -> str:
+    """Which coordinate is beyond its range by more than ``least``, most of all, in words."""
     over = beyond(system, x[:, None])[:, 0]
-    if (over > BEYOND_END).any():
-        name = m.freedom_names()[int(system.limits[0][over.argmax()])]
-        why = f"there {name} is beyond the end of its curve or surface"
-        raise _not_reached(m, system, x, float(over.max()), values, why)
+    if not (over > least).any():
+        return ""
+    return f"there {m.freedom_names()[int(system.limits[0][over.argmax()])]} {how} the end of its curve or surface"
 
 
 def _not_reached(
@@ -380,7 +386,7 @@ def _not_reached(
     reached = ", ".join(f"{name} = {best[m.full_name(name)]:.6g}" for name in values)
     return AssemblyError(
         f"mechanism {m.name!r}: cannot be assembled at {asked}; "
-        f"{why or f'came to {reached}, {error:.3g} short (radians, or lengths / L)'}. "
+        f"came to {reached}{f'; {why}' if why else f', {error:.3g} short (radians, or lengths / L)'}. "
         "Take a value in reach, or another start or guess",
         error,
         best,

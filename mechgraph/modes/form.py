@@ -10,8 +10,6 @@ go that of their two ways that is nearest to the start: ways of rods are no asse
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable
 from dataclasses import replace
 from itertools import count
 from operator import itemgetter
@@ -164,7 +162,6 @@ class WithoutRods:
         self.start, self.full, self._rows = whole.here, whole.system, whole.rows
         self._drive = drive
         s = self.full
-        # the frame comes first, so that a start set serves whatever the order of declaration
         inner = [s.graph.frame, *(link for rod in rods for link in rod.links)]
         self.links = np.array([s.graph.frame, *np.setdiff1d(np.arange(len(s.m.links)), inner)], dtype=np.intp)
         self.place = np.full(len(s.m.links), -1, dtype=np.intp)
@@ -173,7 +170,7 @@ class WithoutRods:
         part = components_of_edges(len(s.m.links), [s.graph.ends[k] for k in self.pairs])[self.links]
         first = np.unique(part, return_index=True)[1]
         self.afloat = self.links[np.sort(first[first > 0])]
-        self.rods, self._all, self.spare = _sorted(rows, self._points), rods, len(rods) - len(rows)
+        self.rods, self._all, self.spare = rows, rods, len(rods) - len(rows)
         self.state_rows, self.kept = (
             np.array([i for k in self.pairs for i in range(to[k], to[k + 1])], dtype=np.intp)
             for to in (s.first_row, s.first_column)
@@ -381,19 +378,3 @@ def _angle(a: Array, b: Array, axis: Array) -> Array:
     # exp(i angle) and exp(-i angle): the smaller one has lost its digits
     ahead, back = cosine + 1j * sine, cosine - 1j * sine
     return np.where(np.abs(ahead) >= np.abs(back), -1j * np.log(ahead), 1j * np.log(back))
-
-
-def _sorted(rods: list[Rod], points: Callable[[Rod], list[tuple[int, Array]]]) -> list[Rod]:
-    """Rods in an order that follows from the bodies and the points that they share, not from their names."""
-    number: dict[tuple[float, ...], int] = {}
-
-    def joint(body: int, at: Array) -> tuple[int, int]:
-        return body, number.setdefault((body, *np.round(at, 6).tolist()), len(number))
-
-    joined = [[joint(*end) for end in sorted(points(rod), key=itemgetter(0))] for rod in rods]
-    shared = Counter(end for ends in joined for end in ends)
-    order = sorted(
-        range(len(rods)),
-        key=lambda i: ([body for body, _ in joined[i]], [-shared[end] for end in joined[i]], joined[i]),
-    )
-    return [rods[i] for i in order]

@@ -81,7 +81,7 @@ class Group:
             a, b = s.graph.ends[k]
             at[a].append((b, Step(k, 1)))
             at[b].append((a, Step(k, -1)))
-        # the frame leads its body, so that a start set serves whatever the order of declaration
+        # the frame leads its body and stands before all others
         first: dict[int, int] = {}
         for link in sorted(self._bearers.tolist(), key=lambda link: link != s.graph.frame):
             first.setdefault(int(body[link]), link)

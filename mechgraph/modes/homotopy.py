@@ -55,6 +55,9 @@ CALMING, CALMEST, CALM = 8, 1.0, 1e-4
 MOST_STEPS = 2000
 """Steps after which a track is given up."""
 
+TRACKS_TOGETHER = 600
+"""Tracks followed together, at most, of several positions or loops."""
+
 
 class Equations:
     """Closure equations of a class: the closure rows, mixed ``(rank, rows)`` where they depend on each other."""
@@ -113,15 +116,20 @@ class Leg:
 
     def __init__(self, equations: Equations, begin: Member, end: Member, which: Index | None = None) -> None:
         self.equations, self.family = equations, equations.family
-        R = multiplied(end.markers[:, :3], begin.markers[:, :3].swapaxes(0, 1))
-        eta = finite_twist(R, end.markers[:, 3], begin.markers[:, 3])
+        moves = (end.markers != begin.markers).any(axis=(0, 1, 3))
+        self._moving, self._still = np.flatnonzero(moves), np.flatnonzero(~moves)
+        self._rest = begin.markers[:, :, self._still]
+        first, last = (markers[:, :, self._moving] for markers in (begin.markers, end.markers))
+        R = multiplied(last[:, :3], first[:, :3].swapaxes(0, 1))
+        eta = finite_twist(R, last[:, 3], first[:, 3])
         turn = np.sqrt((eta[:3] * eta[:3]).sum(axis=0))
         slides = np.abs(turn) < SLIDE
         self._turn = np.where(slides, 1.0, turn)
         unit = eta / self._turn
         unit[:3] = np.where(slides, 0.0, unit[:3])
-        self._eta = np.where(slides, self._turn * unit, eta)
-        self._paths = np.einsum("ijknt,jlnt->ilknt", screw_terms(unit)[:3], homogeneous(begin.markers))
+        self._eta = np.zeros((6, len(moves), eta.shape[2]), dtype=complex)
+        self._eta[:, self._moving] = np.where(slides, self._turn * unit, eta)
+        self._paths = np.einsum("ijknt,jlnt->ilknt", screw_terms(unit)[:3], homogeneous(first))
         self._begin, self._change = begin.drive, end.drive - begin.drive
         self._which = which
 
@@ -140,8 +148,10 @@ class Leg:
         drive = self._of(self._begin, tracks) + t * change
         x[self.family.rows] = drive[: len(self.family.rows)]
         paths, values = self._of(self._paths, tracks), screw_values(self._of(self._turn, tracks) * t)
+        markers = np.empty((3, 4, self._eta.shape[1], len(t)), dtype=complex)
+        markers[:, :, self._still] = self._of(self._rest, tracks)
         one = paths.shape[-1] == 1
-        markers = (
+        markers[:, :, self._moving] = (
             np.einsum("ijkn,knt->ijnt", paths[..., 0], values) if one else np.einsum("ijknt,knt->ijnt", paths, values)
         )
         here = Configuration(self.family.system_with(markers, drive), x)
@@ -153,7 +163,12 @@ class Linear:
 
     def __init__(self, leg: Leg, here: Configuration, change: Array, eta: Array) -> None:
         self.equations, self.family, self.here, self.change, self._eta = leg.equations, leg.family, here, change, eta
+        self._leg = leg
         self.J = self._mixed(here.J[:, self.family.free])
+
+    def again(self, x: Array) -> Linear:
+        """The equations of the same members at other states ``x (nx, T)`` with the same values of drivers."""
+        return Linear(self._leg, Configuration(self.here.system, x), self.change, self._eta)
 
     def _mixed(self, rows: Array) -> Array:
         M = self.equations.mixing
@@ -304,7 +319,7 @@ class _March:
             here = leg.at(x, t, tracks)
             one = here.newton(self.idle)
             x = eq.family.system.advance(here.here.x, one)
-            here = leg.at(x, t, tracks)
+            here = here.again(x)
             two = here.newton(self.idle)
             sizes = [eq.size(x, d) for d in (one, two)]
             noise = here.noise
@@ -361,18 +376,16 @@ def polished(leg: Leg, x: Array, t: complex, tracks: Index, most: float = MOST_N
     eq = leg.equations
     places = np.full(x.shape[1], t)
     with np.errstate(all="ignore"):
+        here = leg.at(x, places, tracks)
         for _ in range(CALMING if eq.idle else 0):
-            here = leg.at(x, places, tracks)
             step = _calming(eq, here)
-            if eq.size(x, step).max(initial=0.0) < CALM:
+            if eq.size(here.here.x, step).max(initial=0.0) < CALM:
                 break
-            x = eq.family.system.advance(here.here.x, step)
-            here = leg.at(x, places, tracks)
-            x = eq.family.system.advance(here.here.x, here.newton(here.idle()))
-        last, idle = np.full(x.shape[1], np.inf), None
-        for _ in range(POLISHING):
-            here = leg.at(x, places, tracks)
-            idle = here.idle() if idle is None else idle
+            here = here.again(eq.family.system.advance(here.here.x, step))
+            here = here.again(eq.family.system.advance(here.here.x, here.newton(here.idle())))
+        last, idle = np.full(x.shape[1], np.inf), here.idle()
+        for i in range(POLISHING):
+            here = here.again(x) if i else here
             dq = here.newton(idle)
             size = eq.size(here.here.x, dq)
             x = np.where(size < last, eq.family.system.advance(here.here.x, dq), here.here.x)

@@ -15,7 +15,7 @@ import numpy as np
 from mechgraph.closure.configuration import Configuration
 from mechgraph.modes.bounds import bound
 from mechgraph.modes.family import GENERIC, MEMBER_CLOSED, SPAN, Array, Family, Member
-from mechgraph.modes.homotopy import Care, Equations, Leg, Linear, follow
+from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, Equations, Leg, Linear, follow
 from mechgraph.modes.trace import NOT_PASSED, Trace, trace_test
 from mechgraph.numerics.linear import rank_of, singular_values
 
@@ -27,7 +27,7 @@ MOST_FOUND = 1200
 LOOP_ROUNDS, MOST_TRACKED = 60, 60_000
 """Rounds of loops at a member, and tracks in all, after which they are not either."""
 BATCH = 48
-"""Tracks followed together, of as many loops as it takes."""
+"""Tracks followed together at least, of as many loops as it takes."""
 CANDIDATES = 6
 """Members of which the best one is kept."""
 ATTEMPTS = 8
@@ -168,7 +168,9 @@ class _Group:
                 break
             if progress is not None:
                 progress(f"{N} assemblies of a random member, {self.quiet} loops without a further one")
-            loops = max(1, BATCH // N)
+            # so many that where none brings a further one they are enough, and no fewer than are followed at the cost of one
+            enough = int(np.ceil(np.log(missed / self.chance) / -np.log(N + 1.0)))
+            loops = max(min(enough, TRACKS_TOGETHER // N), BATCH // N, 1)
             there = self._round(family, loops, rng)
             poses = fingerprints(family, self.base, there)
             new = distinct(poses, self.known)

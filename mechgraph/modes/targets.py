@@ -16,15 +16,13 @@ import numpy as np
 from mechgraph.closure.assembly import CLOSED, close_all
 from mechgraph.closure.configuration import Configuration
 from mechgraph.modes.family import Array, Family, Member
-from mechgraph.modes.homotopy import Care, Equations, Leg, follow, rounding
+from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, Equations, Leg, follow, rounding
 from mechgraph.modes.monodromy import ONE_ASSEMBLY, StartSet, distinct
 from mechgraph.modes.nearby import Nearby, irregular, least_value
 from mechgraph.numerics.linear import Index
 
 RUNS = 4
 """Runs of all tracks, at most."""
-TRACKS_TOGETHER = 600
-"""Tracks followed together."""
 RADIUS = 0.04
 """Distance from its end at which a track is led round."""
 ARCS = 12

@@ -18,8 +18,8 @@ from mechgraph.model.chain import chain_symbols
 from mechgraph.model.library import library_path
 from mechgraph.modes import store
 from mechgraph.modes.bounds import bound
-from mechgraph.modes.family import Family
 from mechgraph.modes.groups import groups_of
+from mechgraph.modes.labelling import Labelling
 from mechgraph.modes.monodromy import Irregular, start_set
 from mechgraph.modes.question import Question
 
@@ -63,7 +63,7 @@ def wanted() -> Iterator[tuple[mg.Mechanism, dict[str, Any]]]:
     yield arm, {"L6": mg.kinematics(arm, {f"A{i}": 0.3 * i for i in range(6)}).link("L6").pose}
 
 
-def families() -> Iterator[tuple[str, Family]]:
+def families() -> Iterator[tuple[str, Labelling]]:
     """Classes of the groups of these mechanisms, where they are known, each once, with the names of their mechanisms."""
     keys = set()
     for m, at in wanted():
@@ -73,18 +73,19 @@ def families() -> Iterator[tuple[str, Family]]:
             print(f"{m.name}: {type(error).__name__}", flush=True)
             continue
         for group in [] if whole.fault else groups_of(whole):
-            if (key := store.key(group.family)) not in keys:
-                keys.add(key)
-                yield m.name, group.family
+            labelling = Labelling(group.family)
+            if labelling.key not in keys:
+                keys.add(labelling.key)
+                yield m.name, labelling
 
 
 def main() -> None:
     """Work them out and write them."""
     found: dict[str, Any] = {}
-    for name, family in families():
-        begin = time.process_time()
+    for name, labelling in families():
+        family, begin = labelling.family, time.process_time()
         try:
-            start = store.packed(family) or start_set(family, np.random.default_rng(0))
+            start = store.packed(labelling) or start_set(family, np.random.default_rng(0))
         except Irregular:
             print(f"{name}: irregular", flush=True)
             continue
@@ -92,7 +93,7 @@ def main() -> None:
         sure = start.trace.passed or (known is not None and known.count == N)
         print(f"{name}: {N}, {'sure' if sure else 'not sure'}, {time.process_time() - begin:.1f} s", flush=True)
         if sure and N <= MOST:
-            found |= {f"{store.key(family)}/{part}": value for part, value in store.arrays(start).items()}
+            found |= {f"{store.key(labelling)}/{part}": value for part, value in store.arrays(labelling, start).items()}
     np.savez_compressed(store.PACKED, **found)
 
 

@@ -22,13 +22,14 @@ def test_start_sets_of_the_library_and_of_common_topologies_come_with_the_packag
     with np.load(store.PACKED) as packed:
         names = {name.split("/")[0] for name in packed.files}
     served = set()
-    for name, family in families():
-        if store.key(family) not in names:
+    for name, labelling in families():
+        family = labelling.family
+        if store.key(labelling) not in names:
             continue
         found, known = store.kept(family), bound(family)
         assert found is not None, name
         assert found.trace.passed or (known is not None and known.count == found.x.shape[1])
-        served.add(store.key(family))
+        served.add(store.key(labelling))
     assert served == names
     assert len(names) >= 20
     assert store.PACKED.stat().st_size < 400_000
