@@ -202,20 +202,15 @@ class Solution(Shown):
         checks = self.checks
         names: tuple[Literal["equilibrium", "power"], ...] = ("equilibrium", "power")
         for check in names:
-            error = np.abs(getattr(checks, check)).reshape(-1)
-            off = np.flatnonzero((error > CHECKS.balanced) & (self.status.reshape(-1) == OK))
-            if off.size:
-                worst = int(off[np.argmax(error[off])])
-                yield Unbalanced(check, float(error[worst]), worst, len(off))
+            error = np.where(self.status == OK, np.abs(getattr(checks, check)), np.nan)
+            yield from (Unbalanced(*one, check) for one in _worst(error, CHECKS.balanced))
 
     @property
     def warnings(self) -> tuple[LoadBearing | LiftOff | Overlap | Unbalanced | PassedCrossing | Inaccurate, ...]:
         """What makes reactions doubtful (``doubts``); crossings of branches that were passed, with place, miss and the other branches;
         rates and forces that rounding spoils (see ``checks.accuracy``).
         """
-        error = self.checks.accuracy.reshape(-1)
-        poor = np.flatnonzero(error > PATH.inaccurate)
-        worst = [Inaccurate(float(error[i]), int(i), len(poor)) for i in poor[np.argsort(-error[poor])][:1]]
+        worst = [Inaccurate(*one) for one in _worst(self.checks.accuracy, PATH.inaccurate)]
         return (*self.doubts, *self._values.crossings(), *worst)
 
     def document(self, asked: bool = False) -> Document:
@@ -303,3 +298,10 @@ class Solution(Shown):
         status = self.status
         solved = f"{int((status == OK).sum())} of {status.size} solved"
         return f"{type(self).__name__}({self.mechanism.name!r}, batch {self.batch}, {solved}; print it for its summary)"
+
+
+def _worst(errors: Array, limit: float) -> list[tuple[float, int, int]]:
+    """The greatest of errors above a limit, its flat position, and how many there are; empty where there are none."""
+    flat = errors.reshape(-1)
+    off = np.flatnonzero(flat > limit)
+    return [(float(flat[i]), int(i), off.size) for i in off[np.argsort(-flat[off])][:1]]

@@ -174,18 +174,28 @@ class PassedCrossing:
 
 
 @dataclass(frozen=True)
-class Inaccurate:
-    """Rates and forces that rounding spoils: the greatest estimated relative ``error``, at which flat ``position``, and at how ``many``."""
+class _Worst:
+    """The greatest relative ``error``, at which flat ``position``, and at how ``many`` it is too great."""
 
     error: float
     position: int
     many: int
 
     @property
+    def places(self) -> str:
+        """``3 positions``."""
+        return f"{self.many} position{'s' if self.many > 1 else ''}"
+
+
+@dataclass(frozen=True)
+class Inaccurate(_Worst):
+    """Rates and forces that rounding spoils: the greatest estimated relative ``error``, at which flat ``position``, and at how ``many``."""
+
+    @property
     def text(self) -> str:
         """The warning in one sentence."""
         return (
-            f"rates and forces at {self.many} position{'s' if self.many > 1 else ''} err by more than {PATH.inaccurate:.0e} of the "
+            f"rates and forces at {self.places} err by more than {PATH.inaccurate:.0e} of the "
             f"largest, at position {self.position} by some {self.error:.0e} (estimated): beside a dead point or a crossing of branches "
             "rounding grows with the condition (see checks.accuracy)"
         )
@@ -195,21 +205,18 @@ class Inaccurate:
 
 
 @dataclass(frozen=True)
-class Unbalanced:
-    """Forces that fail a check: the greatest relative ``error`` of that ``check``, at which flat ``position``, and at how ``many``."""
+class Unbalanced(_Worst):
+    """Forces that fail a ``check``: the greatest relative ``error``, at which flat ``position``, and at how ``many``."""
 
     check: Literal["equilibrium", "power"]
-    error: float
-    position: int
-    many: int
 
     @property
     def text(self) -> str:
         """The warning in one sentence."""
         return (
-            f"forces at {self.many} position{'s' if self.many > 1 else ''} fail the check of {self.check} by more than "
-            f"{CHECKS.balanced:.0e} of the largest term, at position {self.position} by {self.error:.0e} (see checks.{self.check}): do "
-            "not use them; compare with the other engine and the other methods"
+            f"forces at {self.places} fail the check of {self.check} by more than {CHECKS.balanced:.0e} of the largest term, at position "
+            f"{self.position} by {self.error:.0e} (see checks.{self.check}): do not use them; compare with the other engine and the other "
+            "methods"
         )
 
     def __str__(self) -> str:
