@@ -1,5 +1,6 @@
 """Motion in time of mechanisms that nobody chose, and of published ones: energy, momentum, the way back, the drives it needs."""
 
+import importlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -271,3 +272,22 @@ def test_derivatives_for_implicit_steppers_come_in_one_batch(seed):
     for i, nudge in enumerate(h * np.eye(len(y))):
         column = (stage.rates(t, y + nudge) - stage.rates(t, y - nudge)) / (2 * h)
         np.testing.assert_allclose(J[:, i], column, atol=1e-4 * np.abs(J).max())
+
+
+@pytest.mark.parametrize(
+    ("attribute", "check"),
+    [("mechgraph.force.dalembert.tree_wrenches", "equilibrium"), ("mechgraph.force.block.kinetic_power", "power")],
+)
+def test_forces_that_fail_a_check_are_warned_of(monkeypatch, attribute, check):
+    """A part of the equations that is twice what it should be: a warning says which check fails, where and by how much."""
+    m = strategies.solvable(3)
+    motions = strategies.motions(m, 3, np.linspace(0.0, 0.5, 3))
+    assert mg.solve(strategies.solvable(3), motions).warnings == ()
+    module, name = attribute.rsplit(".", 1)
+    right = getattr(importlib.import_module(module), name)
+    monkeypatch.setattr(attribute, lambda *given: 2.0 * right(*given))
+    with pytest.warns(mg.MechgraphWarning, match="fail the check of"):
+        s = mg.solve(m, motions)
+    found = {w.check: w for w in s.warnings}[check]
+    errors = np.abs(getattr(s.checks, check))
+    assert (found.error, found.position, found.many) == (errors.max(), errors.argmax(), (errors > 1e-6).sum())

@@ -154,6 +154,40 @@ def test_belt_by_hand(crossed, torque):
     assert np.cross(point - [0.6, 0, 0], force)[2] == pytest.approx(-torque, rel=1e-12)
 
 
+# --- several meshes between the same shafts ------------------------------------------------------------------------------------
+
+
+def meshes(*gears):
+    """Gears between the same two shafts, a torque on the second: the shares are not unique."""
+    m = two(spur(), b=(3, 0, 0), torque=5.0)
+    return m.replace(
+        couplings=[mg.SpurGears(f"g{i}", "A", "B", teeth=(20, 40), **more) for i, more in enumerate(gears)]
+    )
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.parametrize("angles", [(20, 25), (25, 20), (25, 20, 22)])
+def test_the_gear_of_the_smaller_pressure_angle_bears_all(angles, engine):
+    """Shares m with sum M / r and sum |m| tan(angle) least: on either flank of the others the bearings would bear more."""
+    s = solved(meshes(*({"pressure_angle": np.deg2rad(a)} for a in angles)), engine=engine, redundant="minimum_norm")
+    shares = np.array([s.coupling(f"g{i}").effort[0] for i in range(len(angles))])
+    np.testing.assert_allclose(shares, np.where(np.array(angles) == 20, -2.5, 0.0), atol=1e-6)
+    np.testing.assert_allclose(s["A"].force, np.broadcast_to([2.5 * TAN, 2.5, 0.0], (3, 3)), rtol=1e-9, atol=1e-12)
+    assert s.checks.equilibrium.max() < 1e-12
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.parametrize("second", [-0.3, -0.1])
+def test_helices_of_opposite_hands_bear_each_other_s_axial_force(second, engine):
+    """Shafts bear what both meshes exert; of equal angles half each, so that no axial force is left."""
+    gears = ({"helix_angle": beta, "module": 0.1 * np.cos(beta)} for beta in (0.3, second))
+    s = solved(meshes(*gears), engine=engine, redundant="minimum_norm")
+    forces = [s.coupling(name).force for name in ("g0", "g1")]
+    np.testing.assert_allclose(s["A"].force, forces[0] + forces[1], atol=1e-12)
+    assert s.checks.equilibrium.max() < 1e-12
+    assert np.abs(s["A"].force[:, 2]).max() < (1e-7 if second == -0.3 else 0.02)  # 0.25 and more of one mesh alone
+
+
 # --- trains ------------------------------------------------------------------------------------------------------------------
 
 

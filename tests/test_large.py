@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lattices import BAR, LATTICES, ladder, parallelograms, scissors
 from numpy.testing import assert_allclose
-from strategies import body
+from strategies import body, motions, solvable
 
 import mechgraph as mg
 from mechgraph.closure import tree
@@ -387,3 +387,11 @@ def test_drivers_that_contradict_each_other() -> None:
     with pytest.raises(mg.IndeterminateError, match="contradict"):
         mg.solve(m, {"J0": 0.1, "J1": 0.3}, engine="sparse")
     assert mg.solve(m, {"J0": 0.0, "J1": 0.0}, engine="sparse").status == "ok"
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+def test_a_start_between_two_folds(engine):
+    """1.6e-5 before one fold and 3.7e-4 behind another: the way back that ends at the other one tells nothing of a dead point."""
+    m = solvable(78)
+    s = mg.solve(m, motions(m, 78, np.linspace(0, 1, 3)), engine=engine, on_reach="flag")
+    assert s.status.tolist() == ["ok", "out of reach", "out of reach"]

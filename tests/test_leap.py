@@ -29,7 +29,7 @@ def way(lower, engine="dense", bars=1):
     system, x = assembled_at(m, {})
     task = Task(system, Loads((), ()), Prescribed({}), np.zeros(0, dtype=np.intp), engine)
     arc = Arc(task, x, np.zeros(system.n_freedoms))
-    out = Way(arc.path, task.loads, x, -1.0)
+    out = Way(arc.path, arc.terms, x, -1.0)
     out.extend(2.0)
     out.extend(2.5)
     return out

@@ -508,3 +508,15 @@ def test_held_passive_freedoms_and_stops():
     lost = np.diff(r.energy.kinetic + r.energy.potential)
     assert lost.max() < 1e-8
     np.testing.assert_allclose((r.link("coupler").twist[:, :3] * between(r, "B", "C")).sum(axis=1), 0.0, atol=1e-12)
+
+
+def test_the_rate_of_a_slide_is_in_the_declared_unit_of_length():
+    """A cart with an arm: the mean radius of the mechanism, in which slides are solved, is not one."""
+    arm = mg.Link("arm", mass=1.0, center=(0.1, 0, 0), inertia=0.01 * np.eye(3))
+    pairs = [
+        mg.Pair("P", "P", "frame", "cart", point=(0, 0, 0), axis=(1, 0, 0)),
+        mg.Pair("R", "R", "cart", "arm", point=(0.3, 0, 0), axis=(0, 0, 1)),
+    ]
+    m = mg.Mechanism("cart", [mg.Link("frame"), mg.Link("cart", mass=1.0, center=(0, 0, 0)), arm], pairs)
+    r = mg.respond(m, [0.0, 0.1], rates={"P": 0.5, "R": 0.2})
+    assert [r[name].velocity[0, 0] for name in "PR"] == pytest.approx([0.5, 0.2], rel=1e-12)

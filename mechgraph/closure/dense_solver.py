@@ -160,7 +160,7 @@ class DenseFactored:
             self._motions = self._joined(found, (self.freedoms, 0))
         return self._motions
 
-    def self_stresses(self) -> Array:
+    def self_stresses(self, every: bool = False) -> Array:
         """See the protocol in ``closure.solver``."""
         found = [form.back(system.null_of_transpose()) for form, _, system in self._parts]
         return self._joined(found, (self.rows, 0))

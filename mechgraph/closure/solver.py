@@ -60,8 +60,8 @@ class FactoredClosure(Protocol):
     def motions(self) -> Array:
         """Motions ``(F, p, T)`` with the fixed columns at rest: one a held motion."""
 
-    def self_stresses(self) -> Array:
-        """Multipliers ``(m, s, T)`` with ``J^T x = 0`` in the columns not fixed: all of them (dense), or random ones (sparse)."""
+    def self_stresses(self, every: bool = False) -> Array:
+        """Multipliers ``(m, s, T)`` with ``J^T x = 0`` in the columns not fixed: a basis if ``complete`` or ``every``, or random."""
 
     def regular_between(self, ends: Configuration, a: Index, b: Index) -> NDArray[np.bool_]:
         """Whether no matrix on the parabola through those at ``ends`` ``a (T,)``, here and at ``b`` is singular or nearly so, ``(T,)``."""

@@ -89,11 +89,11 @@ class SparseFactored:
         found = [form.motions(factors, len(at)) for form, at, factors in self._parts]
         return self._joined(found, self.here.system.n_freedoms)
 
-    def self_stresses(self) -> Array:
-        """Random ones, of size one in the measure of every loop; none where there is no redundancy."""
+    def self_stresses(self, every: bool = False) -> Array:
+        """Random ones, of size one in the measure of every loop, as many as there are if ``every``; none where there is no redundancy."""
         rows, found = self.here.system.n_rows, []
         for form, at, factors in self._parts:
-            count = PROBES if form.redundant else 0
+            count = form.redundant if every else PROBES if form.redundant else 0
             some = ClosureRows.of(self.here, at)
             found.append(
                 form.random_stress(factors, some, np.random.default_rng(SEED), count)

@@ -16,6 +16,7 @@ from mechgraph.closure.rates import Rates
 from mechgraph.closure.solver import FactoredClosure
 from mechgraph.force.applied_loads import Site, inertia_wrenches, kinetic_power
 from mechgraph.force.dalembert import METHODS, ForceProblem, Wrenches, row_efforts
+from mechgraph.force.flanks import STRAIN, least_under_signs
 from mechgraph.force.passive_hold import hold
 from mechgraph.force.reaction_map import effort_map, reaction_map
 from mechgraph.model.load_base import Load
@@ -141,19 +142,47 @@ def _least_on_flanks(
 ) -> tuple[_Found, Array]:
     """See ``_least``; with the signs of the multipliers ``(n, T)`` that tell on which flanks gears touch each other.
 
-    Where multipliers are not unique those of least norm may touch on other flanks than the first ones found: then once more on these.
+    Where multipliers are not unique those of least norm may touch on other flanks than the first ones found: then once more on these, and
+    where that does not settle under the condition that they keep the signs of their flanks (see ``force.flanks``).
     """
     flank = wrenches.multipliers
     if not lines:
         return _least(here, wrenches, f, task, lines, flank), flank
     for _ in range(FLANKS):
-        relief = [lines.relief(part, flank) for part in (wrenches.multipliers, wrenches.multiplier_stress)]
-        relieved = replace(wrenches, totals=wrenches.totals - relief[0], stress=wrenches.stress - relief[1])
-        found = _least(here, relieved, f, task, lines, flank)
-        if ((found.multipliers < 0.0) == (flank < 0.0)).all():
-            break
-        flank = found.multipliers
-    return found, flank
+        found = _least(here, _relieved(wrenches, lines, flank), f, task, lines, flank)
+        moved = ((found.multipliers < 0.0) != (flank < 0.0)).any(axis=0)
+        if not moved.any():
+            return found, flank
+        flank = np.where(moved, found.multipliers, flank)
+    whole, flank = _kept_on_flanks(here, wrenches, f, task, flank, np.flatnonzero(moved))
+    relieved = _relieved(whole, lines, flank)
+    kept = _found(here, relieved.totals, relieved.multipliers, _stress(here, relieved, f, task))
+    for name in ("reactions", "efforts", "multipliers", "coupled"):
+        getattr(found, name)[..., moved] = getattr(kept, name)[..., moved]
+    return replace(found, stress=kept.stress), flank
+
+
+def _kept_on_flanks(
+    here: Configuration, wrenches: Wrenches, f: FactoredClosure, task: ForceTask, flank: Array, at: Index
+) -> tuple[Wrenches, Array]:
+    """Total wrenches and multipliers of least norm at the positions ``at``, on their flanks; the other positions as they are."""
+    totals, multipliers, flank = wrenches.totals.copy(), wrenches.multipliers.copy(), flank.copy()
+    for t in at:
+        one = np.array([t])
+        alone = here.part(one)
+        x = f.part(one, alone).self_stresses(every=True)
+        change = -x[6 * here.system.graph.n_loops :]
+        own = Wrenches(totals[..., one], alone.pair_wrenches(x), multipliers[:, one], change)
+        y, flank[:, t] = least_under_signs(alone, own, ContactLines(alone), _acting(here, task))
+        totals[..., t] += own.stress[..., 0] @ y
+        multipliers[:, t] += change[..., 0] @ y
+    return replace(wrenches, totals=totals, multipliers=multipliers), flank
+
+
+def _relieved(wrenches: Wrenches, lines: ContactLines, flank: Array) -> Wrenches:
+    """Total wrenches and self-stresses without what contacts on their flanks take off."""
+    relief = [lines.relief(part, flank) for part in (wrenches.multipliers, wrenches.multiplier_stress)]
+    return replace(wrenches, totals=wrenches.totals - relief[0], stress=wrenches.stress - relief[1])
 
 
 def _least(
@@ -161,31 +190,48 @@ def _least(
 ) -> _Found:
     """Reactions and efforts of least norm; where self-stresses are random ones only if that is asked for."""
     totals, multipliers = wrenches.totals, wrenches.multipliers
-    acting = np.union1d(task.driven, here.system.coupled_freedoms)
-    stress = (orthonormal_stress if f.complete else split_stress)(
-        here, wrenches.stress, wrenches.multiplier_stress, acting
-    )
+    stress = _stress(here, wrenches, f, task)
     s = stress.wrenches.shape[2]
     if s and not f.complete and task.redundant == "minimum_norm":
-        x = _least_multipliers(here, totals, multipliers, f, acting, lines, flank)
+        x = _least_multipliers(here, totals, multipliers, f, _acting(here, task), lines, flank)
         others = x[6 * here.system.graph.n_loops :]
         totals = totals + here.pair_wrenches(x[:, None])[:, :, 0]
         totals = totals + lines.relief(others, flank) if lines else totals
         multipliers = multipliers - others
+    found = _found(here, totals, multipliers, stress)
+    if not (s and f.complete):
+        return found
+    y = least_multiples(here, found.reactions, found.efforts, multipliers, stress)
+    multipliers = multipliers + np.einsum("nit,it->nt", stress.multipliers, y)
+    return _Found(
+        found.reactions + np.einsum("cpit,it->cpt", stress.wrenches, y),
+        found.efforts + np.einsum("fit,it->ft", stress.efforts, y),
+        stress,
+        multipliers,
+        row_efforts(here, multipliers[:, None])[:, 0],
+    )
+
+
+def _found(here: Configuration, totals: Array, multipliers: Array, stress: Stress) -> _Found:
+    """What total wrenches are made of."""
     efforts = pair_power(here, totals)
-    reactions = reaction_part(here, totals, efforts)
-    if s and f.complete:
-        y = least_multiples(here, reactions, efforts, multipliers, stress)
-        reactions = reactions + np.einsum("cpit,it->cpt", stress.wrenches, y)
-        efforts = efforts + np.einsum("fit,it->ft", stress.efforts, y)
-        multipliers = multipliers + np.einsum("nit,it->nt", stress.multipliers, y)
-    return _Found(reactions, efforts, stress, multipliers, row_efforts(here, multipliers[:, None])[:, 0])
+    coupled = row_efforts(here, multipliers[:, None])[:, 0]
+    return _Found(reaction_part(here, totals, efforts), efforts, stress, multipliers, coupled)
+
+
+def _acting(here: Configuration, task: ForceTask) -> Index:
+    """The freedoms with efforts: driven, coupled."""
+    return np.union1d(task.driven, here.system.coupled_freedoms)
+
+
+def _stress(here: Configuration, wrenches: Wrenches, f: FactoredClosure, task: ForceTask) -> Stress:
+    """The self-stresses of total wrenches, orthonormal where they are all there are."""
+    split = orthonormal_stress if f.complete else split_stress
+    return split(here, wrenches.stress, wrenches.multiplier_stress, _acting(here, task))
 
 
 FLANKS = 3
 """How often flanks are changed in search of multipliers of least norm."""
-STRAIN = 1e-4
-"""Weight of efforts beside reactions: where drivers or couplings strain each other without any reaction, their efforts decide alone."""
 
 
 def _least_multipliers(

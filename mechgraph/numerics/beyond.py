@@ -55,7 +55,7 @@ def _begun_before(follower: Follower, tracks: Tracks) -> Tracks:
     heading = _heading(back, start, -1)
     if not heading.size:
         return tracks
-    begin = back.nodes.take(_outermost(back.nodes.track, every, 1))
+    begin = _most_regular(back.nodes)
     points, stops = list(begin.drive.T[:, :, None]), [np.zeros(1, dtype=bool)] * len(every)
     for v in heading:
         points[v] = np.concatenate([points[v], paths.points[v]], axis=1)
@@ -97,7 +97,7 @@ def _followed_on(follower: Follower, tracks: Tracks, side: int, alone: Index) ->
     back, ahead = (follower.paths.drive(every, base.place + way * side * LEAD) for way in (-1.0, 1.0))
     # from well before the crossing, where the branches are apart
     found = _straight_on(follower, nodes, base, back, heading).nodes
-    begin = found.take(_outermost(found.track, every, 1))
+    begin = _most_regular(found)
     over = _straight_on(follower, nodes, begin, ahead, heading, leads=True)
     for v in heading[begin.place[heading] > 0.0].tolist():
         mine = over.nodes.take(over.nodes.track == v)
@@ -155,6 +155,12 @@ def _straight_on(
 def _outermost(track: Index, tracks: Index, side: int) -> Index:
     """Places of the last (``side`` 1) or the first (-1) of some ``tracks`` in a sorted array."""
     return np.searchsorted(track, tracks, side="right") - 1 if side > 0 else np.searchsorted(track, tracks)
+
+
+def _most_regular(nodes: Nodes) -> Nodes:
+    """The node of least condition of every track: the way back from one singular point may end at another, as between two folds."""
+    order = np.lexsort((nodes.condition, nodes.track))
+    return nodes.take(order[np.unique(nodes.track[order], return_index=True)[1]])
 
 
 def _near(nodes: Nodes, here: Index, there: Index) -> Mask:

@@ -70,13 +70,24 @@ class StressTolerances:
     """Part (of a largest part of one) below which a component is not shown."""
     drivers_alone: float = 1e-9
     """Part below which reactions count as none: drivers that strain each other alone."""
+    rounding: float = 1e-12
+    """Part of the largest multiplier by which one may miss the sign of its flank, so that rounding leaves a solution."""
     relieved: float = 1e-6
     """Power of a unit twist on a self-stress above which the twist relieves it."""
+
+
+@dataclass(frozen=True)
+class CheckTolerances:
+    """When a solution fails its own checks."""
+
+    balanced: float = 1e-6
+    """Residual of equilibrium or power, over the largest term, above which a solution warns: as for ``PathTolerances.inaccurate``."""
 
 
 RANKS = RankTolerances()
 MOTIONS = MotionTolerances()
 STRESSES = StressTolerances()
+CHECKS = CheckTolerances()
 
 
 @dataclass(frozen=True)

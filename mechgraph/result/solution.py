@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import importlib
 import os
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from mechgraph.equations.state import State
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.newton import Work
-from mechgraph.numerics.tolerances import PATH
+from mechgraph.numerics.tolerances import CHECKS, PATH
 from mechgraph.quantities import wrong
 from mechgraph.result import export
 from mechgraph.result.contact_ranges import LiftOff, Overlap
@@ -27,7 +27,16 @@ from mechgraph.result.places import OK, Places
 from mechgraph.result.record import solution_data
 from mechgraph.result.summary import summary
 from mechgraph.result.table import Include, table_of
-from mechgraph.result.values import Checks, Inaccurate, LoadBearing, LoadResult, Mask, PassedCrossing, Values
+from mechgraph.result.values import (
+    Checks,
+    Inaccurate,
+    LoadBearing,
+    LoadResult,
+    Mask,
+    PassedCrossing,
+    Unbalanced,
+    Values,
+)
 from mechgraph.result.views import CouplingResult, LinkResult, PairResult
 
 if TYPE_CHECKING:
@@ -183,18 +192,25 @@ class Solution(Shown):
         return self._values.passive_efforts()
 
     @property
-    def doubts(self) -> tuple[LoadBearing | LiftOff | Overlap, ...]:
-        """What makes reactions doubtful: passive freedoms that carry load, contacts that would have to pull, or cut into each other."""
-        return (*self._values.load_bearing(), *lift_offs(self._values), *overlaps(self._values))
+    def doubts(self) -> tuple[LoadBearing | LiftOff | Overlap | Unbalanced, ...]:
+        """What makes reactions doubtful: passive freedoms that carry load, contacts that would have to pull, or cut into each other; forces
+        that fail the check of equilibrium or power.
+        """
+        return (*self._values.load_bearing(), *lift_offs(self._values), *overlaps(self._values), *self._unbalanced())
+
+    def _unbalanced(self) -> Iterator[Unbalanced]:
+        checks = self.checks
+        names: tuple[Literal["equilibrium", "power"], ...] = ("equilibrium", "power")
+        for check in names:
+            error = np.where(self.status == OK, np.abs(getattr(checks, check)), np.nan)
+            yield from (Unbalanced(*one, check) for one in _worst(error, CHECKS.balanced))
 
     @property
-    def warnings(self) -> tuple[LoadBearing | LiftOff | Overlap | PassedCrossing | Inaccurate, ...]:
+    def warnings(self) -> tuple[LoadBearing | LiftOff | Overlap | Unbalanced | PassedCrossing | Inaccurate, ...]:
         """What makes reactions doubtful (``doubts``); crossings of branches that were passed, with place, miss and the other branches;
         rates and forces that rounding spoils (see ``checks.accuracy``).
         """
-        error = self.checks.accuracy.reshape(-1)
-        poor = np.flatnonzero(error > PATH.inaccurate)
-        worst = [Inaccurate(float(error[i]), int(i), len(poor)) for i in poor[np.argsort(-error[poor])][:1]]
+        worst = [Inaccurate(*one) for one in _worst(self.checks.accuracy, PATH.inaccurate)]
         return (*self.doubts, *self._values.crossings(), *worst)
 
     def document(self, asked: bool = False) -> Document:
@@ -282,3 +298,10 @@ class Solution(Shown):
         status = self.status
         solved = f"{int((status == OK).sum())} of {status.size} solved"
         return f"{type(self).__name__}({self.mechanism.name!r}, batch {self.batch}, {solved}; print it for its summary)"
+
+
+def _worst(errors: Array, limit: float) -> list[tuple[float, int, int]]:
+    """The greatest of errors above a limit, its flat position, and how many there are; empty where there are none."""
+    flat = errors.reshape(-1)
+    off = np.flatnonzero(flat > limit)
+    return [(float(flat[i]), int(i), off.size) for i in off[np.argsort(-flat[off])][:1]]

@@ -16,7 +16,7 @@ from mechgraph.equations.state import State
 from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.newton import Work
-from mechgraph.numerics.tolerances import PATH
+from mechgraph.numerics.tolerances import CHECKS, PATH
 from mechgraph.result.numbers import ranges
 
 Mask = NDArray[np.bool_]
@@ -31,7 +31,8 @@ class Checks(Shown):
     closure : closure error, the largest of angle [rad] and length / L over the loops.
     equilibrium : residual of the equilibrium of all links and of ``S^T w = effort`` in all undriven freedoms, relative to the
         largest wrench in the batch (NaN without forces).
-    power : driver power + load power - rate of kinetic energy, relative to the largest term in the batch.
+    power : driver power + load power - rate of kinetic energy, relative to the largest term in the batch. Above 1e-6 of either
+        ``Solution.warnings`` says so.
     accuracy : estimated error of rates and forces (reactions that are unique), relative to the largest of the position: what rounding
         does to them over the condition of the closure equations. Some 1e-14 in ordinary positions; it grows towards dead points (with the
         square of the condition) and beside crossings of branches (with its cube). Above 1e-6 ``Solution.warnings`` says so.
@@ -173,20 +174,49 @@ class PassedCrossing:
 
 
 @dataclass(frozen=True)
-class Inaccurate:
-    """Rates and forces that rounding spoils: the greatest estimated relative ``error``, at which flat ``position``, and at how ``many``."""
+class _Worst:
+    """The greatest relative ``error``, at which flat ``position``, and at how ``many`` it is too great."""
 
     error: float
     position: int
     many: int
 
     @property
+    def places(self) -> str:
+        """``3 positions``."""
+        return f"{self.many} position{'s' if self.many > 1 else ''}"
+
+
+@dataclass(frozen=True)
+class Inaccurate(_Worst):
+    """Rates and forces that rounding spoils: the greatest estimated relative ``error``, at which flat ``position``, and at how ``many``."""
+
+    @property
     def text(self) -> str:
         """The warning in one sentence."""
         return (
-            f"rates and forces at {self.many} position{'s' if self.many > 1 else ''} err by more than {PATH.inaccurate:.0e} of the "
+            f"rates and forces at {self.places} err by more than {PATH.inaccurate:.0e} of the "
             f"largest, at position {self.position} by some {self.error:.0e} (estimated): beside a dead point or a crossing of branches "
             "rounding grows with the condition (see checks.accuracy)"
+        )
+
+    def __str__(self) -> str:
+        return self.text
+
+
+@dataclass(frozen=True)
+class Unbalanced(_Worst):
+    """Forces that fail a ``check``: the greatest relative ``error``, at which flat ``position``, and at how ``many``."""
+
+    check: Literal["equilibrium", "power"]
+
+    @property
+    def text(self) -> str:
+        """The warning in one sentence."""
+        return (
+            f"forces at {self.places} fail the check of {self.check} by more than {CHECKS.balanced:.0e} of the largest term, at position "
+            f"{self.position} by {self.error:.0e} (see checks.{self.check}): do not use them; compare with the other engine and the other "
+            "methods"
         )
 
     def __str__(self) -> str:

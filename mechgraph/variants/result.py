@@ -38,7 +38,7 @@ class Study(Shown):
     nominal : name -> array ``(...)`` of the mechanism itself (with the motion of the first variant, where each has its own).
     units : name -> unit of an output, one for every entry of its last axis where they differ; empty where it is not known.
     messages : variant -> why it could not be solved.
-    warnings : what makes reactions doubtful, as in ``Solution.warnings``, with the greatest effort or pull in all variants.
+    warnings : what makes reactions doubtful, as in ``Solution.warnings``, with the greatest effort, pull or error in all variants.
     """
 
     def __init__(
@@ -101,7 +101,7 @@ class Study(Shown):
             ),
         ]
         if self.warnings:
-            blocks += [Heading("Reactions that rest on what nothing supplies", 2), Bullets([*map(str, self.warnings)])]
+            blocks += [Heading("Doubtful reactions", 2), Bullets([*map(str, self.warnings)])]
         if self.messages:
             told = [f"variant {i}: {text}" for i, text in list(self.messages.items())[:VARIANTS_LISTED]]
             more = (

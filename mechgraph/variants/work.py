@@ -22,14 +22,14 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.result.contact_ranges import LiftOff, Overlap
 from mechgraph.result.solution import Solution
-from mechgraph.result.values import LoadBearing
+from mechgraph.result.values import LoadBearing, Unbalanced
 from mechgraph.structure.snapping import SnappedMechanism, meant, started
 from mechgraph.variants.batch import solve_together
 from mechgraph.variants.fields import AnyField, Variants, stacked, topology_of, varied
 from mechgraph.variants.number_names import ItemField
 from mechgraph.variants.outputs import Output, quantity
 
-Doubt = LoadBearing | LiftOff | Overlap
+Doubt = LoadBearing | LiftOff | Overlap | Unbalanced
 """What makes a solution doubtful."""
 Build = Callable[..., Mechanism]
 NOT_SOLVED = "not solved"
@@ -150,7 +150,9 @@ def unsolved(task: Task, why: str) -> Part:
 
 
 def worst(found: Iterable[Doubt]) -> tuple[Doubt, ...]:
-    """Of every passive freedom the warning with the greatest effort, of every contact that with the greatest pull, and the deepest cut."""
+    """Of every passive freedom the warning with the greatest effort, of every contact that with the greatest pull, and the deepest cut;
+    of every check the greatest error.
+    """
     out: dict[tuple[type, str], tuple[float, Doubt]] = {}
     for warning in found:
         match warning:
@@ -160,6 +162,8 @@ def worst(found: Iterable[Doubt]) -> tuple[Doubt, ...]:
                 name, size = warning.pair, warning.force
             case Overlap():
                 name, size = warning.pair, warning.curvature
+            case Unbalanced():
+                name, size = warning.check, warning.error
         key = type(warning), name
         if size >= out.get(key, (size, warning))[0]:
             out[key] = size, warning
