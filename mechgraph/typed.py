@@ -80,15 +80,15 @@ def named_value(text: str, what: str) -> tuple[str, str]:
     return name.strip(), rest.strip()
 
 
-def duration(text: str, m: Mechanism) -> float:
-    """A time span: ``10`` or ``10s`` (``ms`` too), in the unit of time that the mechanism declares (seconds where it declares none)."""
-    value, unit = _number(text, f"--for {text!r}", "10 or 10s")
-    declared, known = m.units.get("time", "s"), KNOWN["time"]
+def duration(text: str, option: str, declared: str = "s") -> float:
+    """A time span: ``10`` or ``10s`` (``ms`` too), in the unit of time ``declared``."""
+    value, unit = _number(text, f"{option} {text!r}", "10 or 10s")
+    known = KNOWN["time"]
     scales = {"": 1.0, declared: 1.0}
     if declared in known:
         scales |= {name: known[name] / known[declared] for name in ("s", "ms")}
     if unit not in scales or value <= 0:
-        refuse(f"--for {text!r}", f"expected a time above 0 in {', '.join(filter(None, scales))}, e.g. 10{declared}")
+        refuse(f"{option} {text!r}", f"expected a time above 0 in {', '.join(filter(None, scales))}, e.g. 10{declared}")
     return value * scales[unit]
 
 

@@ -119,6 +119,14 @@ def test_check_says_that_loops_cannot_be_closed(unclosable: Path) -> None:
     assert "cannot be closed" in result.stdout
 
 
+def test_check_takes_no_longer_than_it_may() -> None:
+    text = " ".join(run("check", "windows-2", "--limit", "1e-3ms").stdout.split())
+    assert "looked for during 1e-06 s and not to the end" in text
+    assert json.loads(run("check", "windows-2", "--limit", "1e-6", "--json").stdout)["not_sought"]
+    assert json.loads(run("check", "four-bar", "--limit", "20s", "--json").stdout)["not_sought"] == []
+    assert "--limit '5kg': expected a time above 0 in s, ms" in bad("check", "four-bar", "--limit", "5kg")
+
+
 def test_equations() -> None:
     assert "R_41 + R_21" in run("equations", "rcsr").stdout
     assert "24 unknowns" in run("equations", "rcsr", "--blocks").stdout
@@ -696,12 +704,24 @@ def test_respond_prints_a_summary_and_writes_the_motion(tmp_path):
     assert len(out.read_text().splitlines()) == 7
 
 
+def test_respond_takes_steps_no_longer_than_it_may(tmp_path):
+    out = tmp_path / "motion.csv"
+    free = run("respond", "windows-2", "--for", "100ms", "--out", str(out)), out.read_text().splitlines()
+    bounded = (
+        run("respond", "windows-2", "--for", "100ms", "--max-step", "2ms", "--out", str(out)),
+        out.read_text().splitlines(),
+    )
+    assert free[0].exit_code == bounded[0].exit_code == 0, bounded[0].output
+    assert len(bounded[1]) >= 51 > len(free[1])
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
         (("--for", "-1s"), "above 0"),
         (("--for", "1min"), "above 0 in s, ms"),
         (("--for", "3min"), "expected a time"),
+        (("--for", "1s", "--max-step", "0"), "--max-step '0': expected a time above 0"),
         (("--for", "1s", "--rate", "A0=1", "--rate", "A1=2"), "contradict the closure"),
         (("--for", "1s", "--start", "A0=3kg"), "--start"),
     ],

@@ -342,3 +342,36 @@ def test_near_relations_by_chance_do_not_hold_up_the_report_of_a_long_ring(monke
     assert "mobility 194" in str(report)
     near = snapping.candidates(ring, rounding.LARGEST_TOL)
     assert len(near) > 2 * max(int((near <= tol).sum()) for tol in tried)
+
+
+def turns_and_slides(n: int) -> mg.Mechanism:
+    """Turns about z and slides across it in turn, in one loop: mobility n - 3 and redundancy 3."""
+    turn, odd = 2 * np.pi * np.arange(n) / n, np.arange(n) % 2
+    points = n * np.array([np.cos(turn), np.sin(turn), 0 * turn]).T
+    axes = np.array([odd * np.cos(np.arange(n)), odd * np.sin(np.arange(n)), 1 - odd]).T
+    return known.ring("RP" * (n // 2), points, axes)
+
+
+def test_what_a_report_leaves_out_of_a_large_ring_is_said() -> None:
+    """Above 300 pairs rounding was not looked for without a word."""
+    report = mg.check(turns_and_slides(302), limit=1e-6)
+    assert (report.mobility, report.redundancy) == (299, 3)
+    text = " ".join(str(report).split())
+    assert "special geometry is not known: of 302 pairs it is not looked for (of up to 300 it is); pass tol=" in text
+    assert "What changes of pairs would help was looked for during 1e-06 s and not to the end; pass limit=" in text
+    assert report.to_dict()["not_sought"] == list(report.not_sought)
+    with pytest.raises(
+        mg.MechgraphError, match=r"exact to tol=0.0001 was not found in 1e-06 s; pass limit= to look longer"
+    ):
+        mg.check(turns_and_slides(302), tol=1e-4, limit=1e-6)
+
+
+def test_a_start_with_many_motions_is_refused_without_large_arrays() -> None:
+    """The search for branches took 128 positions a motion at once, 15 GiB for a ring of 1,000 links."""
+    tracemalloc.start()
+    try:
+        with pytest.raises(mg.IndeterminateError, match="298 freedoms are neither driven nor passive"):
+            mg.solve(turns_and_slides(302), {"O1": [0.0, 0.1]})
+        assert tracemalloc.get_traced_memory()[1] < 1e8
+    finally:
+        tracemalloc.stop()

@@ -423,3 +423,21 @@ def test_a_saved_file_says_what_a_reader_would(tmp_path):
     mg.save(long, tmp_path / "m.toml")
     assert mg.load(tmp_path / "m.toml") == long
     assert max(map(len, (tmp_path / "m.toml").read_text().splitlines())) <= 125
+
+
+def test_evenly_spaced_positions_are_saved_as_a_sweep() -> None:
+    """The motion of 7r took 64 lines; what is read again is the same to the last bit."""
+    assert "sweep_deg = [0.0, 360.0, 1.0]" in toml.written(mg.load("7r"))
+    m = mg.load("four-bar")
+
+    def again(positions: Any) -> str:
+        made = m.replace(drives=[mg.Drive("A", motion=mg.Motion(positions, velocity=2.0))])
+        text = toml.written(made)
+        assert toml.parse(tomllib.loads(text), "again") == made
+        return text
+
+    even = np.arange(0, 1, 0.01), 0.1 * np.arange(4), 0.3 - np.radians(2.0) * np.arange(50)
+    assert all("sweep" in again(positions) for positions in even)
+    again(np.linspace(0.3, -2, 77)), again(np.radians(np.arange(20.0, -40, -3)))  # to the last bit, as a sweep or not
+    odd = [0, 0, 0, 0], [0, 0.1, 0.2, 0.3 + 1e-9], [0.0, 1.0], [0.5]
+    assert not any("sweep" in again(positions) for positions in odd)

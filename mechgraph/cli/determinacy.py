@@ -12,7 +12,7 @@ from mechgraph.cli.outcome import NO_ANSWER
 from mechgraph.cli.output import show, working, write
 from mechgraph.cli.reading import loaded, show_compared
 from mechgraph.cli.records import check_data, write_json
-from mechgraph.typed import parse_at, refuse
+from mechgraph.typed import duration, parse_at, refuse
 
 
 def check(
@@ -26,6 +26,12 @@ def check(
     engine: Engine = "auto",
     compared: Compare = False,
     tol: Tolerance = None,
+    limit: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TIME", help="How long each search of the report may take, 20s by itself; it says what was left."
+        ),
+    ] = None,
 ) -> None:
     """Print the determinacy report: the verdict, what to do, and what may be trusted; with --full all of it.
 
@@ -39,8 +45,9 @@ def check(
         refuse("check", "--json, --markdown and --compare exclude each other")
     m = loaded(mechanism)
     values = dict(parse_at(m, text) for text in at or ())
+    bounded = {} if limit is None else {"limit": duration(limit, "--limit")}
     with working(f"checking {m.name}: what can move"):
-        report = mg.check(m, at=values or None, engine=engine, tol=tol)
+        report = mg.check(m, at=values or None, engine=engine, tol=tol, **bounded)
     with working(f"checking {m.name}: what is unique, what to do"):
         data = check_data(m, report) if json else {}
         text = report.to_markdown(full) if markdown else ""

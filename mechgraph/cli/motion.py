@@ -140,6 +140,10 @@ def respond(
         float | None,
         typer.Option(help="Absolute tolerance (radians, lengths / L, and their rates), 1e-10 by itself."),
     ] = None,
+    max_step: Annotated[
+        str | None,
+        typer.Option("--max-step", metavar="TIME", help="Longest step: 5ms. By itself as the tolerances allow."),
+    ] = None,
     passive: Annotated[
         Literal["free", "held"] | None, typer.Option(help="Whether passive freedoms move freely, or are held at rest.")
     ] = None,
@@ -160,18 +164,20 @@ def respond(
     m = loaded(mechanism)
     begin = dict(parse_at(m, text, "--start") for text in start or ())
     rates = dict(parse_at(m, text, "--rate") for text in rate or ())
+    declared = m.units.get("time", "s")
     if span is not None:
-        times = np.array([0.0, duration(span, m)])
+        times = np.array([0.0, duration(span, "--for", declared)])
     elif m.response is not None:
         times = m.response.times
     else:
         refuse("respond", "how long? Give --for TIME; the mechanism has no [response] that says it")
+    longest = None if max_step is None else duration(max_step, "--max-step", declared)
     t = np.linspace(times[0], times[-1], points) if points else times
     with progress(f"moving {m.name}", float(times[-1])) as moved, warnings.catch_warnings():
         warnings.simplefilter("ignore", mg.MechgraphWarning)  # the summary has them
         r = mg.respond(
             m, t, start=begin or None, rates=rates or None, rtol=rtol, atol=atol, method=method, passive=passive, engine=engine,
-            on_stop="return", progress=moved,
+            max_step=longest, on_stop="return", progress=moved,
         )  # fmt: skip
     with working(f"summary of {m.name}"):
         told = _told(r, out, tuple(include or ()), json, over_time)

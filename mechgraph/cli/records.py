@@ -223,7 +223,7 @@ def check_data(m: mg.Mechanism, report: mg.DeterminacyReport) -> Json:
     for advice, data in zip(report.advice, facts["advice"], strict=True):
         steps = patch(declared, to_data(advice.apply()))
         data["patch"] = [{"op": step["op"], "path": step["path"], "value": step.get("value")} for step in steps]
-    return {"rounding": None, **facts, "declaration": declared}
+    return {"rounding": None, "not_sought": [], **facts, "declaration": declared}
 
 
 def equations_data(f: mg.Formulation, s: mg.Solution | None) -> EquationsData:
@@ -303,6 +303,8 @@ def _record(kind: type, **more: Any) -> Callable[[Json], Json]:
 
 def _check(defs: Json) -> Json:
     properties = {"rounding": schema_of(Annotated[Rounding | None, "a tolerance that would change the verdict"], defs)}
+    words = "what was not looked for to the end, in sentences"
+    properties["not_sought"] = schema_of(Annotated[tuple[str, ...], words], defs)
     properties |= schemas(KEYS, defs)
     properties["advice"] = schema_of(Annotated[tuple[Applicable, ...], "what would help, the best first"], defs)
     words = "the mechanism as its file holds it (see mechanism.schema.json), which the patches of the advice change"

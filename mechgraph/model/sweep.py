@@ -12,6 +12,24 @@ LATE_END = 1e-9
 """Part of a step by which the end may come late through rounding and still be excluded."""
 
 
+DIGITS = 12
+"""Digits in which a sweep is sought first: those that people write."""
+
+
+def sweep_of(positions: Array) -> list[float] | None:
+    """``[first, end, step]`` of which ``swept`` makes exactly these positions ``(n,)``, in the fewest digits; None where none does."""
+    n = len(positions)
+    if n < 4:  # three numbers are as short
+        return None
+    first, step = float(positions[0]), float(positions[-1] - positions[0]) / (n - 1)
+    steps = float(f"{step:.{DIGITS}g}"), step, float(positions[1]) - first
+    for found in ([first, float(f"{first + n * step:.{DIGITS}g}"), step] for step in steps):
+        made = swept(*found)
+        if not isinstance(made, str) and np.array_equal(made, positions):
+            return found
+    return None
+
+
 def swept(first: float, end: float, step: float) -> Array | str:
     """Positions ``first + k step`` before ``end``, or why there are none."""
     if step == 0 or first == end:

@@ -24,12 +24,13 @@ from mechgraph.model.field_kinds import BY_FREEDOM, COEFFICIENTS, SIX, TABLE, TA
 from mechgraph.model.file_format import DEGREES, KINDS, SCHEMA, TABLES_OF_FILE, USUAL
 from mechgraph.model.library import library_names, library_path
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.motion import Motion
 from mechgraph.model.numeric import filled_second, sound_tol
 from mechgraph.model.pair_table import TABLE as PAIR_TABLE
 from mechgraph.model.pair_type import PairType
 from mechgraph.model.placed_rows import travels
 from mechgraph.model.surfaces import Surface
-from mechgraph.model.sweep import swept
+from mechgraph.model.sweep import DIGITS, sweep_of, swept
 from mechgraph.quantities import is_numeric, real_array, shown, wrong
 from mechgraph.reading import text_of, toml_of
 from mechgraph.writing import write_whole
@@ -315,7 +316,21 @@ def _data(item: Described, path: str, where: str) -> dict[str, Any]:
             and not (isinstance(value, tuple) and not value)
         ):
             out[about.key or key] = dict(value) if about.kind is COEFFICIENTS else _plain(value, f"{where}.{key}", path)
-    return out
+    return _as_sweep(out, item) if isinstance(item, Motion) else out
+
+
+def _as_sweep(out: dict[str, Any], motion: Motion) -> dict[str, Any]:
+    """The table of a motion with a sweep, of degrees where that is shorter, in place of positions that it makes exactly."""
+    found = {}
+    if motion.position.ndim == 1 and (plain := sweep_of(motion.position)):
+        found["sweep"] = plain
+        degrees = [float(f"{value:.{DIGITS}g}") for value in np.degrees(plain)]
+        if np.array_equal(swept(*np.radians(degrees).tolist()), motion.position):
+            found[f"sweep{DEGREES}"] = degrees
+    if not found:
+        return out
+    key = min(found, key=lambda key: len(repr(found[key])))
+    return {key: found[key]} | {name: value for name, value in out.items() if name != "position"}
 
 
 def to_data(m: Mechanism, path: str = "") -> dict[str, Any]:

@@ -50,21 +50,22 @@ def independent_rows(rows: Array, candidates: list[int], count: int) -> list[int
     Depends on the column space of ``rows`` only where its columns are orthonormal.
     """
     chosen: list[int] = []
-    basis = np.zeros((0, rows.shape[1]))
+    basis, taken = np.empty((min(rows.shape), rows.shape[1])), set[int]()
     size = np.sqrt((rows**2).sum(axis=1))
     for limit in WEAK:
         for i in candidates:
             if len(chosen) == count:
                 return chosen
-            if i in chosen or not size[i] > VANISHING:
+            if i in taken or not size[i] > VANISHING:
                 continue
             rest = rows[i] / size[i]
             for _ in range(2):
-                rest = rest - basis.T @ (basis @ rest)
+                rest = rest - basis[: len(chosen)].T @ (basis[: len(chosen)] @ rest)
             part = np.linalg.norm(rest)
             if part > limit:
+                basis[len(chosen)] = rest / part
                 chosen.append(i)
-                basis = np.vstack([basis, rest / part])
+                taken.add(i)
     return chosen
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from time import monotonic
 
 import numpy as np
 
@@ -368,8 +369,19 @@ class Facts(GraphFacts):
     @cached_property
     def effects(self) -> tuple[Effect, ...]:
         """Changes with their computed effect: they remove redundancy, or free a structure."""
-        g = self.geometry
-        return advice(g.freedoms, g.driven, self.finite_mobility or 0, self.asked) if g else ()
+        return self._sought[0]
+
+    @property
+    def effects_not_sought(self) -> bool:
+        """Whether those were not looked for to the end: it took longer than ``limit``."""
+        return self._sought[1]
+
+    @cached_property
+    def _sought(self) -> tuple[tuple[Effect, ...], bool]:
+        if not (g := self.geometry):
+            return (), False
+        until = monotonic() + self.limit
+        return advice(g.freedoms, g.driven, self.finite_mobility or 0, self.asked, until), monotonic() > until
 
     @property
     def sets_not_sought(self) -> bool:

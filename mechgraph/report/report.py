@@ -19,7 +19,7 @@ from mechgraph.quantities import wrong
 from mechgraph.report import brief, data, sections, sentences
 from mechgraph.report.facts import Facts, Geometry
 from mechgraph.report.rounding import LIMIT, Rounding, rounding
-from mechgraph.structure.least_change import SearchEnded
+from mechgraph.structure.least_change import TOOK_TOO_LONG, SearchEnded
 from mechgraph.structure.mobility import free_motion
 from mechgraph.structure.placed_pairs import EXACT
 from mechgraph.structure.snapping import meant
@@ -29,9 +29,17 @@ HINTED = 2.0
 """Seconds that an error may wait for the same."""
 ENDED = (
     "Whether rounded numbers hide a special geometry was looked for during {limit:g} s and not found out; pass limit= to look longer, or "
-    "tol= with the accuracy that is meant"
+    "tol= with the accuracy that is meant."
 )
 """What is said of a search that took too long."""
+UNSOUGHT = (
+    "Whether rounded numbers hide a special geometry is not known: {}; pass tol= with the accuracy that is meant."
+)
+"""What is said of one that was not begun."""
+CHANGES_ENDED = (
+    "What changes of pairs would help was looked for during {limit:g} s and not to the end; pass limit= to look longer."
+)
+"""What is said of the advice."""
 
 
 class DeterminacyReport(Facts, Shown):
@@ -49,22 +57,27 @@ class DeterminacyReport(Facts, Shown):
 
     @property
     def rounding_not_sought(self) -> bool:
-        """Whether that was not looked for to the end: it took longer than ``limit``."""
-        return self._rounding[1]
+        """Whether that was not looked for to the end: it took longer than ``limit``, or there are too many pairs."""
+        return bool(self._rounding[1])
 
     @cached_property
-    def _rounding(self) -> tuple[Rounding | None, bool]:
+    def _rounding(self) -> tuple[Rounding | None, str]:
         try:
-            return rounding(self.mechanism, _verdict_of, self.limit), False
-        except SearchEnded:
-            return None, True
+            return rounding(self.mechanism, _verdict_of, self.limit), ""
+        except SearchEnded as error:
+            late = str(error) == TOOK_TOO_LONG
+            return None, ENDED.format(limit=self.limit) if late else UNSOUGHT.format(error)
+
+    @property
+    def not_sought(self) -> tuple[str, ...]:
+        """What was not looked for to the end, in sentences."""
+        changes = CHANGES_ENDED.format(limit=self.limit) if self.effects_not_sought else ""
+        return tuple(filter(None, (self._rounding[1], changes)))
 
     def document(self, full: bool = False) -> Document:
         """The report as a document: verdict, what to do and what may be trusted, or all of it; first what rounding does to it."""
-        told = (
-            self.rounding.text if self.rounding else ENDED.format(limit=self.limit) if self.rounding_not_sought else ""
-        )
-        first = (Paragraph(told),) if told else ()
+        found = (self.rounding.text,) if self.rounding else ()
+        first = tuple(map(Paragraph, (*found, *self.not_sought)))
         if not full:
             return brief.document(self, first)
         made = sections.document(self)
@@ -81,7 +94,8 @@ class DeterminacyReport(Facts, Shown):
     def to_dict(self) -> dict[str, Any]:
         """All facts as plain data."""
         facts = data.to_dict(self, sections.KEYS)
-        return facts if self.rounding is None else {"rounding": plain(self.rounding), **facts}
+        found = {} if self.rounding is None else {"rounding": plain(self.rounding)}
+        return found | ({"not_sought": list(self.not_sought)} if self.not_sought else {}) | facts
 
     def to_json(self) -> str:
         """All facts as JSON."""
@@ -128,12 +142,15 @@ def check(
     engine : which engine decides ranks, ``"dense"`` or ``"sparse"``; ``"auto"`` takes the faster one. The report is the same.
     tol : accuracy to which directions (radians) and distances (over L) are meant; the report is that of ``m.snapped(tol)``. Left out:
         that of the mechanism, or exact.
-    limit : seconds that a search may take (for special geometry hidden by rounded numbers); what was not looked for to the end is said.
+    limit : seconds that each search may take (for special geometry hidden by rounded numbers, for changes that help, for what ``tol``
+        makes exact); what was not looked for to the end is said.
 
     Raises
     ------
     AssemblyError
         where ``at`` is given and cannot be reached. Without it, loops that cannot be closed are reported in ``note``.
+    MechgraphError
+        where the geometry is not made exact to ``tol`` within ``limit``.
     """
     if not limit > 0:
         raise DeclarationError(f"check {m.name!r}", [wrong(limit, "limit", "seconds above 0")])
@@ -141,7 +158,7 @@ def check(
     if not m.has_geometry:
         return DeterminacyReport(m, graph, "Topology only: no geometry is declared.", asked=engine, limit=limit)
     try:
-        m = meant(m, tol, "check")
+        m = meant(m, tol, "check", limit)
         graph = m.once(link_graph)
         system, x = assembled_at(m, at) if at else assembled(m)
     except AssemblyError as error:

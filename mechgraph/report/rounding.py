@@ -16,7 +16,7 @@ from mechgraph.closure.assembly import closed_start
 from mechgraph.errors import MechgraphError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.structure.kind import kind_of
-from mechgraph.structure.least_change import SearchEnded
+from mechgraph.structure.least_change import TOOK_TOO_LONG, SearchEnded
 from mechgraph.structure.placed_pairs import EXACT
 from mechgraph.structure.snapping import SnappedMechanism, candidates, snapped
 
@@ -28,6 +28,8 @@ LIMIT = 20.0
 """Seconds that the search for near-special geometry may take unless another limit is given."""
 MOST_PAIRS = 300
 """Pairs up to which rounding is looked for without being asked."""
+TOO_MANY = "of {} pairs it is not looked for (of up to {} it is)"
+"""What is said of more."""
 BY_CHANCE = (60, 1.5)
 """Relations within a tolerance, in all and a pair, above which they are no rounding: of many pairs some come near any relation."""
 SAFE = 4.0
@@ -65,11 +67,13 @@ def rounding(m: Mechanism, verdict: Callable[[Mechanism], tuple[Any, ...]], limi
     Raises
     ------
     SearchEnded
-        after ``limit`` seconds.
+        after ``limit`` seconds, and of more than ``MOST_PAIRS`` pairs.
     """
     until = monotonic() + limit
-    if isinstance(m, SnappedMechanism) or not m.has_geometry or len(m.pairs) > MOST_PAIRS:
+    if isinstance(m, SnappedMechanism) or not m.has_geometry:
         return None
+    if len(m.pairs) > MOST_PAIRS:
+        raise SearchEnded(TOO_MANY.format(len(m.pairs), MOST_PAIRS))
     own: tuple[Any, ...] | None = None
     other: tuple[SnappedMechanism, float, tuple[Any, ...]] | None = None
     try:
@@ -90,6 +94,8 @@ def rounding(m: Mechanism, verdict: Callable[[Mechanism], tuple[Any, ...]], limi
         ):
             continue
         own = verdict(m) if own is None else own
+        if monotonic() > until:
+            raise SearchEnded(TOOK_TOO_LONG)
         then = verdict(exact)
         if then and (not own or then[0] != own[0]):
             return _worded(exact, tol, then)

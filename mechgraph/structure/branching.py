@@ -34,6 +34,8 @@ FREEDOMS_LISTED = 8
 """Most freedoms listed of a branch."""
 MOST_BRANCHES = 16
 """Most branches that are told apart."""
+BRANCHING_MOTIONS = 24
+"""Motions up to which branches are sought: of more, far more branches than are told apart meet, or all of a continuum."""
 SAME = 1e-3
 """Difference of rates up to which two branches are one: rates of branches that touch are found to the square root of rounding."""
 
@@ -76,8 +78,9 @@ def branches(
     """The branches that meet at a closed state ``x (nx,)``: rates of all freedoms by name, for unit rates of the drivers ``columns``.
 
     Of branches along which the drivers stand still the largest rate is one.
-    Empty where there is one alone, or where more than ``MOST_BRANCHES`` directions do: then a freedom is left free. The rank is
-    decided to the accuracy with which closing meets a singular position (``RANKS.nearby``). Passive motions are at rest.
+    Empty where there is one alone (without self-stresses there is no other), where more than ``BRANCHING_MOTIONS`` motions are possible,
+    or where more than ``MOST_BRANCHES`` directions are: then a freedom is left free. The rank is decided
+    to the accuracy with which closing meets a singular position (``RANKS.nearby``). Passive motions are at rest.
     """
     found = rank_of_rows(ClosureRows.at(Configuration(system, x[:, None])), tolerance=RANKS.nearby)
     N = found.motions
@@ -85,6 +88,8 @@ def branches(
         idle, _ = np.linalg.qr(np.stack([p.rates for p in passive], axis=1))
         U, s, _ = np.linalg.svd(N - idle @ (idle.T @ N), full_matrices=False)
         N = U[:, s > 0.5]
+    if found.rank == found.count or N.shape[1] > BRANCHING_MOTIONS:
+        return ()
     rng = np.random.default_rng(STARTS_SEED)
     # so many random combinations of the self-stresses say as much about N.shape[1] motions as all of them
     stress = found.random_stress(rng, min(found.count - found.rank, N.shape[1] + 1))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
+from time import monotonic
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,12 +28,12 @@ BEAM = 12
 
 
 def relieving(
-    position: Position, changes: list[Change], redundancy: int
+    position: Position, changes: list[Change], redundancy: int, until: float
 ) -> tuple[list[tuple[Change, ...]], list[tuple[Change, ...]]]:
     """Single changes that lower the redundancy, and smallest sets that remove it, without more freedoms than self-stresses removed.
 
     Ranked by how little they change: freedoms added beyond need, then number of changes, then the order of declaration. Where there are
-    too many self-stresses for that the set is one change in every loop.
+    too many self-stresses for that the set is one change in every loop. Sets are sought up to the time ``until``.
     """
     every = sorted((c for c in changes if c.relief), key=lambda c: (c.added - c.relief, -c.relief, c.effort, c.item))
     built = [c for c in every if c.effort < PLANE]
@@ -42,7 +43,7 @@ def relieving(
     largest: list[tuple[Change, ...]] = []
     for some in (built, every):
         exact = [c for c in some if c.added == c.relief]
-        complete, most = _complete_sets(exact, redundancy) if exact else ([], [])
+        complete, most = _complete_sets(exact, redundancy, until) if exact else ([], [])
         if complete:
             return singles, complete
         largest = largest or most
@@ -94,7 +95,9 @@ def _independent(directions: Array, added: Index) -> NDArray[np.bool_]:
     return np.asarray((np.linalg.eigvalsh(gram) > STRESSES.relieved**2).sum(axis=1) == added)
 
 
-def _complete_sets(exact: list[Change], redundancy: int) -> tuple[list[tuple[Change, ...]], list[tuple[Change, ...]]]:
+def _complete_sets(
+    exact: list[Change], redundancy: int, until: float
+) -> tuple[list[tuple[Change, ...]], list[tuple[Change, ...]]]:
     """Sets of changes that together remove all self-stresses, each as many as it adds freedoms; else those that remove most.
 
     A set grows by changes of later pairs, a beam of sets at a time, those first that remove most.
@@ -109,7 +112,7 @@ def _complete_sets(exact: list[Change], redundancy: int) -> tuple[list[tuple[Cha
     complete: list[tuple[int, ...]] = []
     largest: list[tuple[int, ...]] = []
     most = 0
-    while beam:
+    while beam and monotonic() <= until:
         grown = [
             (mine.removed + int(added[i]), mine, i)
             for mine in beam

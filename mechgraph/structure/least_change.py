@@ -56,8 +56,12 @@ SEARCH_SEED = 11
 """Seed of these motions."""
 
 
+TOOK_TOO_LONG = "the search took longer than it may"
+"""What a search says that is given up for its time."""
+
+
 class SearchEnded(MechgraphError):
-    """A search took longer than it may."""
+    """A search for near-special geometry was given up."""
 
 
 def least_change(placed: Placed, tol: float) -> tuple[Array, tuple[Relation, ...], tuple[Relation, ...], bool]:
@@ -145,7 +149,7 @@ def _solved(
     best, least = change, np.full(1, np.inf)
     for _ in range(ROUNDS):
         if monotonic() > placed.until:
-            raise SearchEnded(f"mechanism {placed.system.m.name!r}: the search for near-special geometry took too long")
+            raise SearchEnded(TOOK_TOO_LONG)
         r, A = rows_at(change)
         if not r.size or np.abs(r).max() < np.abs(least).max():
             best, least = change, np.abs(r)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -18,9 +19,12 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.numeric import tolerance_fault
 from mechgraph.model.parameters import Declared
 from mechgraph.numerics.linear import singular_values
-from mechgraph.structure.least_change import MOST_ROWS, least_change, weakness
+from mechgraph.structure.least_change import MOST_ROWS, SearchEnded, least_change, weakness
 from mechgraph.structure.near_relations import Relation, Relations
 from mechgraph.structure.placed_pairs import EXACT, Placed
+
+GIVEN_UP = "{} {!r}: what makes its geometry exact to tol={:g} was not found in {:g} s; pass limit= to look longer, or leave tol out"
+"""What is said of a mechanism that is not made exact in time."""
 
 
 @dataclass(frozen=True)
@@ -126,15 +130,26 @@ def started(m: Mechanism, start: Mapping[str, float]) -> Mechanism:
     return m.replace(start=start)
 
 
-def meant(m: Mechanism, tol: float | None, call: str) -> Mechanism:
-    """The mechanism as it is meant with the tolerance of a call, or its own; itself where there is none, or nothing to move."""
+def meant(m: Mechanism, tol: float | None, call: str, limit: float = np.inf) -> Mechanism:
+    """The mechanism as it is meant with the tolerance of a call, or its own; itself where there is none, or nothing to move.
+
+    Raises
+    ------
+    SearchEnded
+        after ``limit`` seconds.
+    """
     tol = m.tol if tol is None else tol
     if tol is None or isinstance(m, SnappedMechanism):
         return m
     fault = tolerance_fault(tol)
     if fault:
         raise DeclarationError(f"{call} {m.name!r}", [fault])
-    return snapped(m, tol) if m.has_geometry else m
+    if not m.has_geometry:
+        return m
+    try:
+        return snapped(m, tol, monotonic() + limit)
+    except SearchEnded as error:
+        raise SearchEnded(GIVEN_UP.format(call, m.name, tol, limit)) from error
 
 
 def candidates(m: Mechanism, tol: float) -> Array:
