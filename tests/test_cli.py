@@ -146,7 +146,7 @@ def test_files_as_the_suffix_says(tmp_path: Path) -> None:
 
     for name, read in (("x.csv", pandas.read_csv), ("x.parquet", pandas.read_parquet)):
         assert (
-            f"Wrote {tmp_path / name}: 72 rows, 74 columns."
+            f"Wrote {tmp_path / name}: 72 rows, 75 columns."
             in run("solve", "7r", "--drive", "O1=0:360:5deg@10", "--out", tmp_path / name).stdout
         )
         assert read(tmp_path / name).shape == (72, 74)

@@ -1,6 +1,7 @@
 """A mechanism that stays hot: what a call gives beside ``solve``, its state, parameters, derivatives and refusals."""
 
 import threading
+from dataclasses import replace
 
 import mpmath
 import numpy as np
@@ -258,3 +259,35 @@ def test_without_a_compiler(monkeypatch, tmp_path):
     finally:
         build.installed.cache_clear()
         module._functions.cache_clear()
+
+
+@pytest.mark.parametrize("name", ["crank.mass", "coupler.inertia.zz", "coupler.center.x"])
+def test_derivatives_by_numbers_beside_which_there_is_no_mechanism(name: str) -> None:
+    """A small mass less a step would be below zero, and a rod's inertia has no body beside it; against differences of calls."""
+    m = mg.load("four-bar")
+    links = [link if link.name == "frame" else replace(link, unphysical=True) for link in m.links]
+    c, free = mg.compile(m), mg.compile(m.replace(links=links))
+    free(0.3, 5.0, 2.0)
+    c(0.3, 5.0, 2.0)
+    value, efforts = c.parameters[name], []
+    step = 1e-4 * abs(value)
+    for sense in (1.0, -1.0):
+        free.parameters[name] = value + sense * step
+        efforts.append(free(0.3, 5.0, 2.0)[0])
+    slope = (efforts[0] - efforts[1]) / (2 * step)
+    assert c.gradient("A.effort", [name])[0] == pytest.approx(slope, rel=1e-6)
+    assert abs(slope) > 1e-3
+
+
+def test_parameters_are_a_mapping_of_what_was_set() -> None:
+    c = mg.compile(mg.load("four-bar"))
+    declared = c(0.1)[0]
+    assert c.parameters["crank.mass"] > 0
+    assert not c.parameters
+    c.parameters.update({"crank.mass": 0.05})
+    assert list(c.parameters) == ["crank.mass"]
+    assert abs(c(0.1)[0] - declared) > 1e-4
+    del c.parameters["crank.mass"]
+    assert c(0.1)[0] == pytest.approx(declared, rel=1e-13)
+    with pytest.raises(AttributeError):
+        c.parameters = {"crank.mass": 2.0}

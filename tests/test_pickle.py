@@ -56,7 +56,7 @@ def things() -> dict[str, Any]:
         "DeadPointError": mg.DeadPointError("dead", {"A": 1.0}), "ReachError": mg.ReachError("far", {"A": 1.0}, s),
         "ShapeError": mg.ShapeError("raised", "A"),
         "response": mg.respond(mg.load("windows-2"), (0, 0.2)), "response in charts": mg.respond(pushed, (0, 0.2)),
-        "ResponseError": mg.ResponseError("stopped", s), "event": mg.Event("A0", 0.1),
+        "ResponseError": mg.ResponseError("stopped", s), "StudyError": mg.StudyError("ended", s), "event": mg.Event("A0", 0.1),
         "surface": mg.Surface.sphere(radius=0.1), "curve": mg.Curve.circle(radius=0.1),
         "on a curve": mg.Pair("X", "Sg", "a", "b", curve=mg.Curve.ellipse(a=0.2, b=0.1)),
         "spur": mg.SpurGears("g", "A", "B", teeth=(20, 40)), "bevel": mg.BevelGears("g", "A", "B", teeth=(20, 40), module=0.1),

@@ -28,6 +28,12 @@ Engine = Annotated[
     Literal["auto", "dense", "sparse"],
     typer.Option(help="Dense or sparse matrices, or the faster ones for the size; the results are the same."),
 ]
+MotionEngine = Annotated[
+    Literal["auto", "dense", "sparse", "compiled"],
+    typer.Option(
+        help="Dense or sparse matrices, the compiled kernel, or the fastest for the size; the results are the same."
+    ),
+]
 Tolerance = Annotated[
     float | None,
     typer.Option(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, MutableMapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from typing import Any, NoReturn
@@ -61,10 +61,10 @@ def _functions() -> ctypes.CDLL:
     return library
 
 
-class Parameters(Mapping[str, float]):
-    """Declared numbers by the names that studies use (``crank.mass``, ``length[2]``), to be set in place; those that were named are listed.
+class Parameters(MutableMapping[str, float]):
+    """Declared numbers by the names that studies use (``crank.mass``, ``length[2]``), to be set in place; those that were set are listed.
 
-    What is set counts from the next call on.
+    What is set counts from the next call on; what is deleted is as declared again.
     """
 
     def __init__(self, tables: Tabled, wanted: Mapping[str, float] | None = None) -> None:
@@ -82,11 +82,18 @@ class Parameters(Mapping[str, float]):
             raise DeclarationError(f"parameters of {self._tables.m.name!r}", [wrong(value, name, "a finite number")])
         self.wanted[name] = float(number)
 
+    def __delitem__(self, name: str) -> None:
+        self._tables.known(name)
+        self.wanted.pop(name, None)
+
     def __iter__(self) -> Iterator[str]:
-        return iter(self._tables.fields)
+        return iter(self.wanted)
 
     def __len__(self) -> int:
-        return len(self._tables.fields)
+        return len(self.wanted)
+
+    def __repr__(self) -> str:
+        return f"Parameters({self.wanted})"
 
 
 class _Room:
@@ -137,7 +144,7 @@ class Compiled:
         size = _functions().mgk_state_size(self.I.ctypes.data) // 8 + 1
         self.P, self.home, self.state = tables.P.copy(), np.zeros(size), np.zeros(size)
         self._values: dict[str, float] = {}
-        self.parameters = Parameters(tables)
+        self._parameters = Parameters(tables)
         self._one, self._single = _Room(self, 1, self.state), True
         self._last = self._one
         if like is None:
@@ -146,7 +153,7 @@ class Compiled:
             return
         for mine, theirs in ((self.P, like.P), (self.home, like.home), (self.state, like.state)):
             mine[:] = theirs
-        self._values, self.parameters = dict(like._values), Parameters(tables, like.parameters.wanted)
+        self._values, self._parameters = dict(like._values), Parameters(tables, like.parameters.wanted)
         self._single, self._last = like._single, like._last.copied(self)
         if self._single:
             self._one = self._last
@@ -154,6 +161,14 @@ class Compiled:
     def copy(self) -> Compiled:
         """The same with a state, parameters and results of its own."""
         return Compiled(self.tables.copy(), self)
+
+    @property
+    def parameters(self) -> Parameters:
+        """Declared numbers by name, to be set in place: ``c.parameters["crank.mass"] = 2.0``."""
+        return self._parameters
+
+    def __repr__(self) -> str:
+        return f"Compiled({self.tables.m.name!r}, drives {listed(self.drives)}, {self.status})"
 
     # --- calls -------------------------------------------------------------------------------------------------------------
 
@@ -322,8 +337,8 @@ class Compiled:
 
     def _led(self) -> int:
         """Lead the declared position and the last good one to the numbers wanted; a status, and nothing changed, where that fails."""
-        goal = dict(self.parameters.wanted)
-        begin = {name: self._values.get(name, self.tables.known(name)) for name in goal}
+        wanted, names = dict(self.parameters.wanted), {**self._values, **self.parameters.wanted}
+        begin, goal = ({name: of.get(name, self.tables.known(name)) for name in names} for of in (self._values, wanted))
         arrays = (self.P, self.home, self.state)
         before, done, step = [array.copy() for array in arrays], 0.0, 1.0
         while done < 1.0:
@@ -340,7 +355,7 @@ class Compiled:
                 array[:] = old
             if failed:
                 return status
-        self._values = goal
+        self._values = wanted
         return 0
 
     def _drives(self) -> Array:
