@@ -149,7 +149,7 @@ def test_files_as_the_suffix_says(tmp_path: Path) -> None:
             f"Wrote {tmp_path / name}: 72 rows, 75 columns."
             in run("solve", "7r", "--drive", "O1=0:360:5deg@10", "--out", tmp_path / name).stdout
         )
-        assert read(tmp_path / name).shape == (72, 74)
+        assert read(tmp_path / name).shape == (72, 75)
     assert run("respond", "windows-2", "--for", "1s", "--points", "5", "--out", tmp_path / "r.nc").exit_code == 0
     with xarray.open_dataset(tmp_path / "r.nc", engine="h5netcdf") as data:
         assert data["A0.Rz"].dims == ("t",)
@@ -170,7 +170,7 @@ def test_files_as_the_suffix_says(tmp_path: Path) -> None:
 
 def test_figures_over_time() -> None:
     shown = run("solve", "7r", "--drive", "O1=0:360:5deg@10", "--over-time").stdout
-    assert "over a whole cycle of 1 revolutions" in shown
+    assert "over a whole cycle of 1 revolution" in shown
     assert "Work per revolution" in shown
     assert "no times" in bad("solve", "7r", "--drive", "O1=0:360:5deg", "--over-time")
     assert (
