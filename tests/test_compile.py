@@ -291,3 +291,22 @@ def test_parameters_are_a_mapping_of_what_was_set() -> None:
     assert c(0.1)[0] == pytest.approx(declared, rel=1e-13)
     with pytest.raises(AttributeError):
         c.parameters = {"crank.mass": 2.0}
+
+
+def test_a_number_that_opens_redundant_loops_has_no_derivatives() -> None:
+    """An axis of a planar four-bar turned out of the plane's normal leaves nothing that moves; lengths keep it planar."""
+    pairs = [
+        mg.Pair(name, "R", *links, point=point, axis=(0, 0, 1))
+        for name, links, point in (
+            ("A", ("frame", "crank"), (0, 0, 0)),
+            ("B", ("crank", "rod"), (0.2, 1, 0)),
+            ("C", ("rod", "rocker"), (2.2, 1.6, 0)),
+            ("D", ("frame", "rocker"), (2, 0, 0)),
+        )
+    ]
+    c = mg.compile(mg.Mechanism("four-bar", None, pairs, ["A"], [mg.Effort("D", 3.0)]))
+    c(0.1)
+    found = c.gradient("A.effort", ["C.axis.x", "C.point.x"])
+    assert np.isnan(found[0])
+    assert np.isfinite(found[1])
+    assert c.status == "ok"

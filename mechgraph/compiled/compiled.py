@@ -23,6 +23,8 @@ from mechgraph.quantities import has_quantity, real_array, without_units, wrong
 WORDS = np.array([word for _, word, _ in STATUSES])
 START = 4
 """Place of the start in the table of numbers, see ``kernel.h``."""
+BESIDE = 1e-6
+"""Change of a number, relative, with which redundant loops have to close still; far above their rounding."""
 PARTINGS = 12
 """Halvings of a change of parameters, until the loops are closed by small corrections."""
 
@@ -272,7 +274,8 @@ class Compiled:
         Returns
         -------
         array
-            ``(names,)``; of a pair with ``f`` freedoms ``(f, names)``, of a reaction ``(6, names)``. NaN where the last call was refused.
+            ``(names,)``; of a pair with ``f`` freedoms ``(f, names)``, of a reaction ``(6, names)``. NaN where the last call was
+            refused, and by a number that opens redundant loops, as an axis turned out of those that are parallel.
 
         Raises
         ------
@@ -303,7 +306,7 @@ class Compiled:
         t, room = self.tables, self._last
         values = {name: t.known(name), **self._values}
         out = [np.full(part.shape[1:], np.nan) for part in (room.effort, room.reaction, room.position)]
-        if room.status[-1]:
+        if room.status[-1] or not self._closes_beside(name, values[name]):
             return out
         dP, motion = t.derivative(values, name), np.ascontiguousarray(room.motion[:, -1])
         memory = np.empty(_functions().mgk_derivative_size(self.I.ctypes.data, len(dP)) // 16 + 1, dtype=complex)
@@ -314,6 +317,18 @@ class Compiled:
         for g in t.rotations:
             out[2][g] = turn_tangent(room.position[-1, g], out[2][g])
         return out
+
+    def _closes_beside(self, name: str, value: float) -> bool:
+        """Whether redundant loops close with a number a little off; where they do not nothing has a derivative by it."""
+        if not self.tables.layout.shapes["stress"][0]:
+            return True
+        other = self.copy()
+        other.parameters[name] = value + BESIDE * (abs(value) or 1.0)
+        try:
+            other(self._last.motion[0, -1])
+        except DeclarationError:  # a mass or an inertia that no body has: no loop knows of it
+            return True
+        return bool(other.status == "ok")
 
     def write(self, path: str | os.PathLike[str], name: str | None = None) -> None:
         """Write the mechanism with its parameters as they are: C99 (``press.c``, ``press.h``), or a unit for co-simulation (``.fmu``).
