@@ -23,7 +23,7 @@ from mechgraph.quantities import has_quantity, real_array, without_units, wrong
 WORDS = np.array([word for _, word, _ in STATUSES])
 START = 4
 """Place of the start in the table of numbers, see ``kernel.h``."""
-BESIDE = 1e-6
+OPENING = 1e-6
 """Change of a number, relative, with which redundant loops have to close still; far above their rounding."""
 PARTINGS = 12
 """Halvings of a change of parameters, until the loops are closed by small corrections."""
@@ -323,7 +323,7 @@ class Compiled:
         if not self.tables.layout.shapes["stress"][0]:
             return True
         other = self.copy()
-        other.parameters[name] = value + BESIDE * (abs(value) or 1.0)
+        other.parameters[name] = value + OPENING * (abs(value) or 1.0)
         try:
             other(self._last.motion[0, -1])
         except DeclarationError:  # a mass or an inertia that no body has: no loop knows of it
