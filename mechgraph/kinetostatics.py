@@ -133,7 +133,7 @@ def _solve(
     motions: Mapping[str, Any] | None,
     on_reach: str,
     options: Options,
-    actuate: Iterable[str] | None = None,
+    actuate: str | Iterable[str] | None = None,
     tol: float | None = None,
     quiet: bool = False,
 ) -> Solution:
@@ -150,7 +150,7 @@ def _solved(
     motions: Mapping[str, Any] | None,
     on_reach: str,
     options: Options,
-    actuate: Iterable[str] | None,
+    actuate: str | Iterable[str] | None,
     quiet: bool,
 ) -> Solution:
     line, outcome = _outcome(m, motions, options, actuate)
@@ -219,7 +219,7 @@ def solve(
     m: Mechanism,
     motions: Mapping[str, Any] | None = None,
     *,
-    actuate: Iterable[str] | None = None,
+    actuate: str | Iterable[str] | None = None,
     method: MethodName = "loop_wrench",
     loads: Iterable[Load] | None = None,
     redundant: RedundantName = "nan",

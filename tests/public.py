@@ -17,7 +17,7 @@ from mechgraph import show
 from mechgraph.document import Shown
 
 Door = tuple[str, Callable, tuple, dict]
-BUILT = frozenset({"Chain", "Families", "Formulation", "Group", "Identity", "SystemGroup"})
+BUILT = frozenset({"Chain", "Compiled", "Families", "Formulation", "Group", "Identity", "SystemGroup"})
 """Classes whose objects functions make; a reader of a program finds them in ``__all__`` for their names alone."""
 INSIDE = {
     "Mechanism": "freedom freedom_fault full_name has_graph_of in_own_units once period place_of_link place_of_pair "
@@ -286,6 +286,7 @@ def declared_doors() -> list[tuple[str, Callable, tuple, dict]]:
         ("load", mg.load, ("four-bar",), {}),
         ("check", mg.check, (m, {"A": 0.1}), {"engine": "dense"}),
         ("assemble", mg.assemble, (m, {"A": 0.1}, {"B": 0.1}), {}),
+        ("compile", mg.compile, (m,), {}),
         ("formulate", mg.formulate, (m, "lee", ["A"]), {"unknowns": "kinetostatics"}),
         (
             "solve",

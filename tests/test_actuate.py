@@ -170,7 +170,7 @@ def test_names_of_actuators_are_checked() -> None:
     assert len(error.value.faults) == 3
     with pytest.raises(mg.DeclarationError, match=r"A\.Rz is given twice"):
         mg.solve(slider_crank(), {"A": 0.1}, actuate=["A", "A.Rz"])
-    with pytest.raises(mg.DeclarationError, match="expected a list"):
+    with pytest.raises(mg.DeclarationError, match="actuate = 3: expected"):
         mg.solve(slider_crank(), {"A": 0.1}, actuate=3)  # type: ignore[arg-type]
     assert mg.solve(slider_crank(), {"A": 0.1}, actuate="B").actuated == ("B.Rz",)
 

@@ -123,7 +123,7 @@ def test_names_that_files_cannot_hold(name: str, tmp_path: Path) -> None:
 def test_a_suffix_that_says_nothing(tmp_path: Path) -> None:
     with pytest.raises(mg.FileError, match=r"known: .csv \(CSV\), .nc \(NetCDF\), .parquet \(Parquet\)"):
         crank().write(tmp_path / "x.xlsx")
-    with pytest.raises(mg.DeclarationError, match="expected a path"):
+    with pytest.raises(mg.DeclarationError, match="expected a text or a path"):
         crank().write(3)  # type: ignore[arg-type]
     assert not list(tmp_path.iterdir())
 

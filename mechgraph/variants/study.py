@@ -54,7 +54,7 @@ def study(
     seed: Index = 0,
     *,
     motions: Mapping[str, Any] | None = None,
-    actuate: Iterable[str] | None = None,
+    actuate: str | Iterable[str] | None = None,
     sampling: SamplingName = "random",
     executor: concurrent.futures.Executor | None = None,
     method: MethodName = "loop_wrench",
