@@ -134,7 +134,7 @@ def test_all_tables_take_it_and_know_the_units(tmp_path: Path) -> None:
     rows = list(csv.DictReader((tmp_path / "table.csv").read_text(encoding="utf-8").splitlines()))
     found = [float(row["loads[3] effort force [N mm]"]) for row in rows]
     assert found == Q.ravel().tolist()
-    with pytest.raises(mg.DeclarationError, match="'points' or 'links' or 'centers' or 'loads'"):
+    with pytest.raises(mg.DeclarationError, match="'points', 'links', 'centers', 'loads'"):
         s.columns(["everything"])  # type: ignore[list-item]
     with pytest.raises(mg.DeclarationError, match="a list"):
         s.columns("loads")  # type: ignore[arg-type]

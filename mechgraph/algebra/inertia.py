@@ -8,6 +8,8 @@ plain arrays.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -255,7 +257,7 @@ def shifted(inertia: ArrayLike, mass: ArrayLike, offset: ArrayLike) -> Array:
 
 
 @door
-def physical_faults(inertia: ArrayLike, tol: float = 1e-9) -> list[str]:
+def physical_faults(inertia: Any, tol: float = 1e-9) -> list[str]:
     """Return what keeps a tensor from being the inertia of a body; an empty list where nothing does.
 
     A tensor is that of some distribution of mass exactly if it is symmetric and its principal moments satisfy
