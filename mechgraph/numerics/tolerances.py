@@ -82,6 +82,8 @@ class CheckTolerances:
 
     balanced: float = 1e-6
     """Residual of equilibrium or power, over the largest term, above which a solution warns: as for ``PathTolerances.inaccurate``."""
+    rounding: float = 1e-12
+    """Forces, over mass times speed times angular speed, that are rounding of the motion: nothing is said of their equilibrium."""
 
 
 RANKS = RankTolerances()

@@ -203,7 +203,23 @@ class Solution(Shown):
         names: tuple[Literal["equilibrium", "power"], ...] = ("equilibrium", "power")
         for check in names:
             error = np.where(self.status == OK, np.abs(getattr(checks, check)), np.nan)
-            yield from (Unbalanced(*one, check) for one in _worst(error, CHECKS.balanced))
+            found = _worst(error, CHECKS.balanced)
+            if found and not self._forces_are_rounding:
+                yield from (Unbalanced(*one, check) for one in found)
+
+    @property
+    def _forces_are_rounding(self) -> bool:
+        """Whether all pairs transmit next to nothing beside mass times speed times angular speed, as of links that nothing accelerates."""
+        m = self.mechanism
+        force = max(float(np.nan_to_num(np.abs(self[p.name].total)).max(initial=0.0)) for p in m.pairs)
+        moving = [(link.mass, self.link(link.name)) for link in m.links if link.mass]
+        speed = max(
+            (mass * float(np.nan_to_num(np.abs(r.center_velocity)).max(initial=0.0)) for mass, r in moving), default=0.0
+        )
+        turn = max(
+            float(np.nan_to_num(np.abs(self.link(link.name).angular_velocity)).max(initial=0.0)) for link in m.links
+        )
+        return force <= CHECKS.rounding * speed * turn
 
     @property
     def warnings(self) -> tuple[LoadBearing | LiftOff | Overlap | Unbalanced | PassedCrossing | Inaccurate, ...]:
