@@ -275,7 +275,7 @@ def test_a_track_led_round_to_no_assembly_is_at_infinity_only_if_a_second_run_sa
     none, off = np.zeros(len(stray), dtype=bool), every.copy()
     off[:, 0] = 1e3 * (1 + 1j)
     astray, whole = _Run(off, ~stray, stray, none), _Run(every, ~none, none, none)
-    known = Ends(every[:, :0], np.zeros((0, 0)), none[:0])
+    known = Ends.none(*every.shape)
     _account(family, at, known, astray, 0)
     assert (known.infinite, known.x.shape[1], known.clean) == (1, 39, False)
     again = deepcopy(known)

@@ -129,8 +129,8 @@ def test_two_stops_at_once_share_the_blow():
 @pytest.mark.parametrize(
     ("stops", "words"),
     [
-        (3, "stops = 3: expected a list"),
-        ([3], "expected an mg.Stop"),
+        (3, "stops = 3: expected a Stop or a list"),
+        ([3], r"stops = \[3\]: expected a Stop or a list"),
         (mg.Stop("Q", lower=0.0), "unknown freedom"),
         (mg.Stop("A"), "neither lower nor upper"),
         (mg.Stop("A", lower=1.0, upper=0.0), "lower < upper"),

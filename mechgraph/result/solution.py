@@ -209,17 +209,20 @@ class Solution(Shown):
 
     @property
     def _forces_are_rounding(self) -> bool:
-        """Whether all pairs transmit next to nothing beside mass times speed times angular speed, as of links that nothing accelerates."""
+        """Whether all pairs transmit next to nothing beside what inertia would, had it to be turned: of links that nothing accelerates."""
+
+        def largest(values: Array) -> float:
+            return float(np.nan_to_num(np.abs(values)).max(initial=0.0))
+
         m = self.mechanism
-        force = max(float(np.nan_to_num(np.abs(self[p.name].total)).max(initial=0.0)) for p in m.pairs)
-        moving = [(link.mass, self.link(link.name)) for link in m.links if link.mass]
-        speed = max(
-            (mass * float(np.nan_to_num(np.abs(r.center_velocity)).max(initial=0.0)) for mass, r in moving), default=0.0
+        moving = [(link, self.link(link.name)) for link in m.links if link.mass]
+        turn = max(largest(self.link(link.name).angular_velocity) for link in m.links)
+        momentum = sum(
+            link.mass * largest(r.center_velocity) * (1.0 + largest(r.center))
+            + turn * largest(np.zeros(1) if link.inertia is None else np.asarray(link.inertia))
+            for link, r in moving
         )
-        turn = max(
-            float(np.nan_to_num(np.abs(self.link(link.name).angular_velocity)).max(initial=0.0)) for link in m.links
-        )
-        return force <= CHECKS.rounding * speed * turn
+        return max(largest(self[p.name].total) for p in m.pairs) <= CHECKS.rounding * turn * momentum
 
     @property
     def warnings(self) -> tuple[LoadBearing | LiftOff | Overlap | Unbalanced | PassedCrossing | Inaccurate, ...]:
