@@ -7,15 +7,14 @@ from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any
 
-from mechgraph.arguments import door
+from mechgraph.arguments import Positive, door
 from mechgraph.closure.assembly import assembled, assembled_at, named_columns
 from mechgraph.closure.rank import EngineName
 from mechgraph.data import json_text, plain
 from mechgraph.document import Document, Paragraph, Shown, to_markdown, to_text
-from mechgraph.errors import AssemblyError, DeclarationError, MechgraphError
+from mechgraph.errors import AssemblyError, MechgraphError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.tolerances import RANKS
-from mechgraph.quantities import wrong
 from mechgraph.report import brief, data, sections, sentences
 from mechgraph.report.facts import Facts, Geometry
 from mechgraph.report.rounding import LIMIT, Rounding, rounding
@@ -132,7 +131,7 @@ def check(
     *,
     engine: EngineName = "auto",
     tol: float | None = None,
-    limit: float = LIMIT,
+    limit: Positive = LIMIT,
 ) -> DeterminacyReport:
     """The determinacy report of a mechanism: of its graph, and where it has geometry of its closed position at ``start``.
 
@@ -152,8 +151,6 @@ def check(
     MechgraphError
         where the geometry is not made exact to ``tol`` within ``limit``.
     """
-    if not limit > 0:
-        raise DeclarationError(f"check {m.name!r}", [wrong(limit, "limit", "seconds above 0")])
     graph = m.once(link_graph)
     if not m.has_geometry:
         return DeterminacyReport(m, graph, "Topology only: no geometry is declared.", asked=engine, limit=limit)

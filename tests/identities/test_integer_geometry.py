@@ -101,6 +101,6 @@ def test_a_search_of_check_ends_at_its_limit() -> None:
     assert report.rounding is None
     assert report.rounding_not_sought
     assert "looked for during 1e-06 s and not found out; pass limit=" in " ".join(str(report).split())
-    with pytest.raises(mg.DeclarationError, match="limit = 0: expected seconds above 0"):
+    with pytest.raises(mg.DeclarationError, match="limit = 0: expected a number above 0"):
         mg.check(mg.load("four-bar"), limit=0)
     assert not mg.check(mg.load("four-bar")).rounding_not_sought
