@@ -13,14 +13,14 @@ from mechgraph import by_kernel
 from mechgraph.kernel import build, compiler
 
 settings.register_profile("dev", max_examples=25, deadline=None)
-settings.register_profile("ci", max_examples=20, deadline=None, derandomize=True, database=None)
+settings.register_profile("ci", max_examples=10, deadline=None, derandomize=True, database=None)
 CI = os.environ.get("CI", "").lower() not in {"", "0", "false"}
 settings.load_profile("ci" if CI else "dev")
 
 GOLDEN = Path(__file__).parent / "golden"
 FURTHER = 10_000
 """First seed of ``--attack``."""
-DAILY = 5
+DAILY = 3
 """Seeds of a test that are run every day; its others are slow."""
 
 
@@ -42,6 +42,9 @@ def pytest_configure(config: pytest.Config) -> None:
         "seeds(n, without=()): a test for each of n seeds, the first but those named, and for as many more as --attack says; "
         "only these further ones may be skipped",
     )
+    config.addinivalue_line(
+        "markers", "daily(n): n of the cases of this test, evenly spread, are run every day; the others are slow"
+    )
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
@@ -53,6 +56,20 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         more = metafunc.config.getoption("--attack")
         late = (pytest.param(seed, marks=pytest.mark.slow) for seed in itertools.islice(always, DAILY, None))
         metafunc.parametrize("seed", [*always[:DAILY], *late, *range(FURTHER, FURTHER + more)])
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Cases that stand for many others: of a test marked ``daily(n)`` all but n are slow; before they are chosen by markers."""
+    cases: dict[str, list[pytest.Item]] = {}
+    for item in items:
+        if item.get_closest_marker("daily") and not item.get_closest_marker("slow"):
+            cases.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    for found in cases.values():
+        n = min(found[0].get_closest_marker("daily").args[0], len(found))
+        kept = {i * len(found) // n for i in range(n)}
+        for i in set(range(len(found))) - kept:
+            found[i].add_marker(pytest.mark.slow)
 
 
 @pytest.hookimpl(wrapper=True)

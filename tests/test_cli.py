@@ -626,6 +626,7 @@ def shell(command: str, **environment: str) -> "subprocess.CompletedProcess[str]
     )  # fmt: skip
 
 
+@pytest.mark.daily(3)
 @pytest.mark.skipif(os.name == "nt", reason="a shell of another kind")
 @pytest.mark.parametrize(
     ("command", "status", "message"),

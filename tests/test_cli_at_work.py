@@ -64,6 +64,7 @@ def completed(words: str) -> list[str]:
     return done.stdout.split()
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize(
     ("words", "expected"),
     [

@@ -183,6 +183,7 @@ KNOWN = ("goldberg", "myard", "bricard_cube", "sarrus", "spherical", "three_cran
          "rccc", "door", "prprrh_special", "hexapod", "three_upu", "folded_bars", "two_four_bars")  # fmt: skip
 
 
+@pytest.mark.daily(18)
 @pytest.mark.parametrize("name", LOOPS)
 def test_library_reports_do_not_depend_on_the_engine(name: str) -> None:
     assert_same_report(mg.load(name))
@@ -193,13 +194,14 @@ def test_known_reports_do_not_depend_on_the_engine(name: str) -> None:
     assert_same_report(getattr(known, name)())
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("kind", LATTICES)
 @pytest.mark.parametrize("links", [6, 12, 20])
 def test_lattice_reports_do_not_depend_on_the_engine(kind: str, links: int) -> None:
     assert_same_report(LATTICES[kind](links))
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=4, deadline=None)
 @given(st.integers(0, 10**6))
 @example(64911)  # near a dead point
 def test_random_reports_do_not_depend_on_the_engine(seed: int) -> None:

@@ -38,6 +38,7 @@ def motion_of(r, freedom):
     return tuple(getattr(r[name], what)[:, column] for what in ("position", "velocity", "acceleration"))
 
 
+@pytest.mark.daily(6)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.seeds(5, without=(1, 4))
 def test_energy_is_kept_and_accuracy_is_that_of_the_tolerance(seed, engine):

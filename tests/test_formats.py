@@ -42,6 +42,7 @@ def solution(request: pytest.FixtureRequest) -> mg.Solution:
     return SOLUTIONS[request.param]()
 
 
+@pytest.mark.daily(4)
 def test_netcdf_comes_back(solution: mg.Solution, tmp_path: Path) -> None:
     xr = pytest.importorskip("xarray")
     pytest.importorskip("h5netcdf")
@@ -102,6 +103,7 @@ def test_all_formats_hold_the_same_numbers(solution: mg.Solution, tmp_path: Path
                 np.testing.assert_array_equal(np.asarray(found).reshape(values.shape), values, err_msg=label)
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("name", NAMES)
 def test_names_that_files_cannot_hold(name: str, tmp_path: Path) -> None:
     pd, xr = pytest.importorskip("pandas"), pytest.importorskip("xarray")

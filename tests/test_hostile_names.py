@@ -56,6 +56,7 @@ class Tags(HTMLParser):
         }
 
 
+@pytest.mark.daily(14)
 @pytest.mark.parametrize("name", NAMES)
 def test_documents(name: str) -> None:
     m = named(name)

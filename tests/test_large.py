@@ -29,6 +29,8 @@ from mechgraph.numerics.sparse import SparseFactors
 from mechgraph.topology.linkgraph import link_graph
 
 AGREE = 1e-9
+LONG = [pytest.param(name, marks=pytest.mark.slow) if name == "tree" else name for name in LATTICES]
+"""A tree of thousands of links takes its time."""
 VALUES = ("position", "velocity", "acceleration", "reaction", "total", "effort", "applied_effort", "force", "moment")
 
 
@@ -101,7 +103,8 @@ def test_sparse_and_dense_agree(name: str, seed: int, many: bool, least: bool) -
     assert np.max(np.abs(sparse.checks.power)) < 1e-11
 
 
-@pytest.mark.parametrize("name", LATTICES)
+@pytest.mark.daily(2)
+@pytest.mark.parametrize("name", LONG)
 def test_three_hundred_links(name: str) -> None:
     """Above the crossover by themselves, against the dense path."""
     m = LATTICES[name](300 if name in ("ladder", "scissors") else 130)
@@ -183,8 +186,8 @@ def test_the_end_of_the_reach_is_found() -> None:
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 def test_parallelograms_pass_their_change_point_as_parallelograms(engine: str) -> None:
     """Folded flat, every cell could go on as an antiparallelogram; the branch of continuous velocity is the one that stays parallel."""
-    m = ladder(120, equal=True)
-    turns = np.linspace(0.0, 3.0, 61)
+    m = ladder(60, equal=True)
+    turns = np.linspace(0.0, 3.0, 31)
     s = mg.solve(m, {"J0": turns}, on_reach="flag", engine=engine)
     assert (s.status == "ok").all()
     cranks = [p.name for p in m.pairs if p.a == m.frame]
@@ -288,7 +291,8 @@ def test_deep_trees_by_pointer_doubling(monkeypatch: pytest.MonkeyPatch) -> None
     assert_allclose(deep.carried(loads), shallow.carried(loads), atol=1e-11)
 
 
-@pytest.mark.parametrize("name", LATTICES)
+@pytest.mark.daily(2)
+@pytest.mark.parametrize("name", LONG)
 def test_five_thousand_links(name: str) -> None:
     m = LATTICES[name](5000)
     s = mg.solve(m, {"J0": mg.Motion(0.0, velocity=1.0)})
@@ -370,6 +374,7 @@ PATHS = {
 }
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("path", PATHS.values(), ids=PATHS)
 @pytest.mark.parametrize("name", ["ladder", "spatial"])
 def test_what_cannot_be_reached_is_told_as_in_a_small_mechanism(name: str, path: object) -> None:

@@ -116,6 +116,7 @@ def test_every_public_class_is_among_them() -> None:
     assert public - set(here) <= parts | bases
 
 
+@pytest.mark.daily(161)
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("name", things())
 def test_comes_back_equal(name: str, way: str) -> None:

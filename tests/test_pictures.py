@@ -187,6 +187,7 @@ def test_margins_are_those_of_the_report() -> None:
     assert "nearly singular below" in labels(ax)
 
 
+@pytest.mark.daily(9)
 @pytest.mark.parametrize("name", mg.library())
 def test_graphs_and_structures_of_the_library(name: str) -> None:
     m = mg.load(name)
@@ -213,6 +214,7 @@ def test_couplings_tie_pairs() -> None:
         check_texts(ax)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("name", ["$x$", "_hidden", "$\\frac{", "a\nb", "50 %", "<b>&amp;"])
 def test_names_are_shown_as_they_are(name: str) -> None:
     """No formula is made of them, no legend leaves them out, nothing fails."""

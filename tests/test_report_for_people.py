@@ -37,6 +37,7 @@ BUILDERS = (
 )
 
 
+@pytest.mark.daily(13)
 @pytest.mark.parametrize("name", BUILDERS)
 def test_the_page_has_25_lines_and_begins_with_the_verdict(name: str) -> None:
     report = mg.check(BUILDERS[name]())
@@ -204,6 +205,7 @@ def test_the_command_line_prints_the_page_and_the_whole() -> None:
 # --- advice -----------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.daily(16)
 @pytest.mark.parametrize("name", [*BUILDERS])
 def test_every_advice_does_what_it_says(name: str) -> None:
     report = mg.check(BUILDERS[name]())

@@ -207,13 +207,13 @@ def test_in_a_notebook() -> None:
     nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
     pytest.importorskip("ipykernel")
     cells = [
-        "import mechgraph as mg\nm = mg.load('four-bar')\ns = mg.solve(m)\nm",
+        "import mechgraph as mg\nm = mg.load('four-bar')\ns = mg.solve(m, engine='dense')\nm",
         "s", "s['B']", "s.link('coupler')", "mg.check(m)", "mg.formulate(m)", "print(s)", "mg.check(m).advice[:1]",
     ]  # fmt: skip
     notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(cell) for cell in cells])
     nbclient.NotebookClient(notebook, timeout=120, kernel_name="python3").execute()
     nbformat.validate(notebook)
-    s = mg.solve(mg.load("four-bar"))
+    s = mg.solve(mg.load("four-bar"), engine="dense")
     expected = [s.mechanism, s, s["B"], s.link("coupler"), mg.check(s.mechanism), mg.formulate(s.mechanism)]
     for cell, value in zip(notebook.cells, expected, strict=False):
         (output,) = cell.outputs

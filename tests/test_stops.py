@@ -155,6 +155,7 @@ def chain(n):
     return mg.Mechanism("chain", links, pairs, loads=[mg.Gravity((0, -G, 0))])
 
 
+@pytest.mark.daily(1)
 @pytest.mark.seeds(2)
 def test_random_pendulums_between_stops(seed):
     """No stop is passed, none pulls, and energy is lost at impacts alone."""

@@ -481,12 +481,21 @@ def test_dask_cluster() -> None:
     """A real local cluster through its executor."""
     distributed = pytest.importorskip("distributed")
     ways = {"length[2]": scipy.stats.norm(0.4, 0.004)}
-    here = mg.study(mg.load("rcsr"), ways, "O1.effort", n=6, seed=7, motions=RCSR)
+    here = mg.study(mg.load("rcsr"), ways, "O1.effort", n=6, seed=7, motions=RCSR, engine="dense")
     with (
         distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as cluster,
         distributed.Client(cluster) as client,
     ):
-        there = mg.study(mg.load("rcsr"), ways, "O1.effort", n=6, seed=7, motions=RCSR, executor=client.get_executor())
+        there = mg.study(
+            mg.load("rcsr"),
+            ways,
+            "O1.effort",
+            n=6,
+            seed=7,
+            motions=RCSR,
+            engine="dense",
+            executor=client.get_executor(),
+        )
     assert np.array_equal(here.outputs["O1.effort"], there.outputs["O1.effort"])
 
 

@@ -244,6 +244,7 @@ def agree(a, b):
     assert_allclose(a.contact("K").normal, b.contact("K").normal, atol=1e-10)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize(
     ("tilt", "engine"),
     [

@@ -49,6 +49,7 @@ def kite_rates(crank, side, h=1e-4):
 BESIDE = np.array([0.0, 1e-7, 3e-7, 1e-6, 1e-5, 1e-4, 5e-4, 1e-3, 5e-3])
 
 
+@pytest.mark.daily(5)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize("method", ["loop_wrench", "newton_euler", "printed"])
 @pytest.mark.parametrize("moved", TURNS)
@@ -119,6 +120,7 @@ def rocker(dims, crank, side):
     return d * ((b * b - c * c + square + 1j * side * far * near) / (2 * square) - 1)
 
 
+@pytest.mark.daily(7)
 @pytest.mark.parametrize("dims", [(1, 1, 2, 2), (1, 1, 1, 1), (1, 2, 2, 1), (1, 2, 1, 2), (2, 1, 2, 1), (2, 2, 1, 1)])
 @pytest.mark.parametrize("side", [1, -1])
 def test_velocity_is_continuous_over_whole_turns(dims, side):
@@ -132,6 +134,7 @@ def test_velocity_is_continuous_over_whole_turns(dims, side):
     np.testing.assert_allclose(s["D"].velocity[:, 0], (f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * h), atol=1e-9)
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize(
     ("engine", "off"),
     [(engine, off) for off in (9e-4, 5e-4, 1e-4, 1e-5) for engine in ("dense", "sparse")] + [("dense", 1e-6)],

@@ -35,6 +35,7 @@ def near_its_dead_point(before):
     return mg.assemble(m, {"A": crank}).replace(drives=["D"])
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize("before", [1e-3, 1e-5, 1e-7])
 def test_from_beside_a_dead_point_and_to_it(engine, before):

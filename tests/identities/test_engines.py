@@ -60,18 +60,21 @@ def drawn(seed):
     return m, motions(m, seed, t, size=float(rng.choice([0.08, 0.5]))), how
 
 
+@pytest.mark.daily(3)
 @pytest.mark.seeds(24)
 def test_random_mechanisms(seed):
     m, given, how = drawn(seed)
     assert_engines_agree(m, given, **how)
 
 
+@pytest.mark.daily(22)
 @pytest.mark.parametrize("name", mg.library())
 def test_library(name):
     m = mg.load(name)
     assert_engines_agree(m, {d.freedom: d.motion.position[:5] for d in m.drives if d.motion is not None})
 
 
+@pytest.mark.daily(8)
 @pytest.mark.parametrize("method", ["loop_wrench", "newton_euler", "printed"])
 @pytest.mark.parametrize("kind", LATTICES)
 def test_lattices_around_the_crossover(kind, method):
@@ -137,6 +140,7 @@ COUPLED = {
 }
 
 
+@pytest.mark.daily(11)
 @pytest.mark.parametrize("name", COUPLED)
 @pytest.mark.parametrize("method", ["loop_wrench", "newton_euler", "printed"])
 def test_couplings(name, method):

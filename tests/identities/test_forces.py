@@ -144,6 +144,7 @@ def given_effort(m, s, k, j):
     return total
 
 
+@pytest.mark.daily(8)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_every_link_is_in_equilibrium(seed):
     """Sum of total pair wrenches, applied and inertia wrenches is zero on every moving link; all from public results."""
@@ -184,6 +185,7 @@ def test_undriven_freedoms_transmit_the_efforts_that_are_given_and_reactions_do_
                 assert not r.effort[..., j].any()
 
 
+@pytest.mark.daily(7)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_both_methods_agree(seed):
     m, given, _ = problem(seed)

@@ -139,6 +139,7 @@ def test_slider_crank_with_rod_about_as_long_as_the_crank(exponent, longer):
         assert (error * np.maximum(root[ok], 1e-9)).max() < 1e-11
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("size", [3e-4, 1e-3])
 def test_a_small_bend_of_a_slot_that_leads_back_is_not_leapt_over(size, turned):
@@ -291,6 +292,7 @@ def five_bar(rng):
     return mg.Mechanism("five-bar", None, pairs, ["A", "E"]), head
 
 
+@pytest.mark.daily(3)
 @pytest.mark.seeds(6)
 def test_a_polygon_misses_nothing_that_is_reached_alone(seed):
     """Behind gaps of random polygons: on the branch of the closed form, nothing flagged that is reached by itself, the same for any

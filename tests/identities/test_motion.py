@@ -84,6 +84,7 @@ def assert_all_rates(m, t, s):
             assert_rate(t, k.center_velocity, k.center_acceleration, f"{name} center acceleration")
 
 
+@pytest.mark.daily(6)
 @pytest.mark.parametrize("seed", range(16))
 def test_rates_are_the_derivatives_of_positions(seed):
     m, t, _, s = moving(seed)
@@ -101,6 +102,7 @@ def test_rates_are_the_derivatives_of_positions_for_every_pair_type(symbol):
         assert_all_rates(m, t, s)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize(
     "letters", ["RCSR", "RRRRRRR", "RHCHC", "RSgC", "RScCR", "RSpR", "RESR", "PUUU", "RCpCR", "RUSR"]
 )
@@ -142,6 +144,7 @@ def test_markers_link_by_link_meet_at_every_position():
             np.testing.assert_allclose(za, zb, atol=1e-10)
 
 
+@pytest.mark.daily(8)
 @pytest.mark.parametrize("seed", range(40))
 def test_what_is_not_reached_has_a_turning_point_before_it(seed):
     """Positions that are refused: an arc-length continuation of its own finds that the drivers turn back before."""
@@ -173,6 +176,7 @@ def test_loops_stay_closed_where_a_passive_freedom_is_held(seed):
     assert s.checks.closure[good].max() < 1e-10
 
 
+@pytest.mark.daily(5)
 @pytest.mark.parametrize("seed", range(8))
 def test_going_back_meets_the_positions_of_going_there(seed):
     m, t, given, _ = moving(seed)
@@ -184,6 +188,7 @@ def test_going_back_meets_the_positions_of_going_there(seed):
         np.testing.assert_allclose(X[:NODES], X[NODES:][::-1], atol=1e-9)
 
 
+@pytest.mark.daily(5)
 @pytest.mark.parametrize("seed", range(8))
 def test_positions_do_not_depend_on_how_finely_they_are_asked(seed):
     m, _, given, s = moving(seed)

@@ -28,6 +28,7 @@ def size_of(r):
     return max(np.ptp(r.energy.kinetic), np.abs(r.energy.kinetic).max(), np.ptp(r.energy.potential), 1e-6)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.seeds(8)
 def test_energy_is_what_the_loads_bring(seed):
     """Kinetic and potential energy less the work done is constant; loops are closed at every output; both engines move alike."""
@@ -42,6 +43,7 @@ def test_energy_is_what_the_loads_bring(seed):
         np.testing.assert_allclose(other[p.name].velocity, r[p.name].velocity, atol=1e-6 * size)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.seeds(8, without=(0, 2, 3, 6, 7, 9, 10, 12, 13, 15, 16, 18, 19, 20, 21, 22))
 def test_back_to_the_start(seed):
     """Without loads that take energy, with the rates turned round, it goes back to where it came from."""
@@ -58,6 +60,7 @@ def test_back_to_the_start(seed):
         assert back[k].position[-1, j] == pytest.approx(r[k].position[0, j], abs=1e-6)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.seeds(8)
 def test_doubling_the_accuracy(seed):
     """Results move by no more than the coarser tolerance allows."""

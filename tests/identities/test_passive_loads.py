@@ -194,11 +194,9 @@ def test_a_ring_that_turns_and_slides_has_a_hold_for_each() -> None:
 
 @pytest.mark.parametrize("link", ["rod1", pytest.param("rod2", marks=pytest.mark.slow)])
 def test_rods_that_hang_on_balls_end_in_one_pose_however_many_positions_are_asked_for(link: str) -> None:
-    """Over a turn of the crank, seven numbers of positions: the rest of the passive rods is a matter of the path."""
+    """Over a turn of the crank, four numbers of positions: the rest of the passive rods is a matter of the path."""
     m = rsss().replace(loads=[])
-    ends = [
-        mg.kinematics(m, {"A": np.linspace(0, 2 * np.pi, n)}).link(link).pose[-1] for n in (2, 3, 5, 9, 17, 40, 361)
-    ]
+    ends = [mg.kinematics(m, {"A": np.linspace(0, 2 * np.pi, n)}).link(link).pose[-1] for n in (2, 3, 9, 40)]
     for end in ends:
         np.testing.assert_allclose(end, ends[-1], atol=1e-10)
 

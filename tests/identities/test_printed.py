@@ -376,6 +376,7 @@ def check_all(m: mg.Mechanism, s: mg.Solution, bookkeeping: str, positions: tupl
                 assert_holds(text, numbers)
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("bookkeeping", BOOKKEEPINGS)
 @pytest.mark.parametrize("name", MOVING)
 def test_printed_equations_of_the_library_hold(name: str, bookkeeping: str) -> None:
@@ -445,14 +446,14 @@ def test_printed_equations_hold_beyond_the_library(m: mg.Mechanism, motion: dict
     check_all(m, mg.solve(m, motion, redundant="minimum_norm"), bookkeeping, (0, 1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("bookkeeping", "sought"),
     [
         ("minimal", "kinetostatics"),
-        *(
-            pytest.param(*which, marks=pytest.mark.slow)
-            for which in (("minimal", "response"), ("lee", "kinetostatics"), ("lee", "response"))
-        ),
+        ("minimal", "response"),
+        ("lee", "kinetostatics"),
+        ("lee", "response"),
     ],
 )
 def test_a_wrong_sign_would_be_seen(bookkeeping: str, sought: str) -> None:

@@ -46,6 +46,7 @@ def assert_methods_agree(m, given, **how):
         assert worst <= SAME * max(1.0, worse), f"{where}: {worst:.1e} at condition {worse:.1e}"
 
 
+@pytest.mark.daily(32)
 @pytest.mark.parametrize("redundant", ["nan", "minimum_norm"])
 @pytest.mark.parametrize("name", MOVING)
 def test_library(name, redundant):
@@ -53,6 +54,7 @@ def test_library(name, redundant):
     assert_methods_agree(m, library_motion(m), redundant=redundant)
 
 
+@pytest.mark.daily(25)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize("redundant", ["nan", "minimum_norm"])
 @pytest.mark.parametrize("make", REDUNDANT.values(), ids=REDUNDANT)
@@ -70,6 +72,7 @@ def test_redundant_mechanisms(make, redundant, engine):
     assert_methods_agree(m, given, redundant=redundant, engine=engine)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.seeds(16)
 def test_random_mechanisms(seed):
     m, given, how = drawn(seed)
@@ -111,6 +114,7 @@ def moves_as_held(s: mg.Solution, m: mg.Mechanism, unknown: mg.equations.terms.U
     return not s.passive_effort or unknown.freedom == m.full_name(m.drives[0].freedom)
 
 
+@pytest.mark.daily(44)
 @pytest.mark.parametrize("bookkeeping", ["lee", "minimal"])
 @pytest.mark.parametrize("name", MOVING)
 def test_given_the_efforts_of_a_solution_the_response_is_its_motion(name, bookkeeping):

@@ -56,6 +56,7 @@ def first_drive(m):
     return freedom, begin, 1.0 if m.pairs[k].type.freedoms[j].turns else 0.02
 
 
+@pytest.mark.daily(6)
 @pytest.mark.parametrize("name", mg.library())
 def test_library(name):
     m = mg.load(name)
@@ -64,6 +65,7 @@ def test_library(name):
     assert_subsets_agree(m, freedom, begin + size * np.linspace(0, 2 * np.pi, 19), rng)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.seeds(14, without=(2, 3, 4, 5, 8, 10, 13, 16, 18, 20, 22))
 def test_random_mechanisms(seed):
     rng = np.random.default_rng((seed, 41))
@@ -106,6 +108,7 @@ def on_polygon(seed, rng, size=None):
     return with_loads(m, seed), np.array(points), np.array(corner)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.seeds(10, without=(1,))
 def test_several_drivers(seed):
     rng = np.random.default_rng(seed)
@@ -186,6 +189,7 @@ def assert_rates_are_derivatives(s):
         np.testing.assert_allclose(s.link(k).acceleration, rate, atol=1e-8 + 10 * tail)
 
 
+@pytest.mark.daily(5)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize("case", CARRIED)
 def test_passive_links_that_move_against_each_other_or_slide(case, engine):
@@ -319,6 +323,7 @@ def drawn_parallelograms(rng):
             return bars, start
 
 
+@pytest.mark.daily(3)
 @pytest.mark.seeds(6)
 def test_several_parallelograms_on_one_crank(seed):
     """Change points of their own, or all at one crank angle; and any subset of the positions."""
@@ -429,6 +434,7 @@ def test_several_drivers_beside_a_change_point():
         assert worst < 1e-7, where
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("form", ["full", "reduced"])
 @pytest.mark.parametrize("begin", [-1e-3, 1e-3])
 def test_passive_bodies_beside_a_change_point(begin, form):
