@@ -17,7 +17,7 @@ import numpy as np
 
 from mechgraph.algebra.screw import cross_twist
 from mechgraph.algebra.se3 import compose, inverse
-from mechgraph.atlas.canonical import least_order, ranked
+from mechgraph.graph.chains import least_order, ranked
 from mechgraph.model.pair_type import PairType
 from mechgraph.modes.family import SPAN, Array, Family, Member
 from mechgraph.numerics.linear import Index
