@@ -15,8 +15,7 @@ from functools import cached_property
 import numpy as np
 import scipy
 
-from mechgraph.algebra.screw import cross_twist
-from mechgraph.algebra.se3 import Array, cross
+from mechgraph.algebra.se3 import Array, cross, cross_twist
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.solver import FactoredClosure
 from mechgraph.graph.linkgraph import labels_of_bipartite, members

@@ -36,6 +36,7 @@ from mechgraph.document.tree import (
 WIDTH = 80
 """Default width of a text rendering, in columns."""
 
+
 def to_text(document: Document, width: int = WIDTH) -> str:
     """Return the document as plain text of at most `width` columns.
 

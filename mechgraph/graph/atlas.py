@@ -99,7 +99,7 @@ class Identity:
     def number(self) -> tuple[int, int] | None:
         """Place in the atlas of its links and mobility, from 1, and the number of chains there; None for what is not in it."""
         mobility = self.bare.mobility
-        # 12: links up to which the number of a chain in the atlas is looked up (a second at most)
+        # links up to which the number of a chain in the atlas is looked up (a second at most)
         if mobility < 0 or self.bare.loops < 1 or self.bare.links > 12:
             return None
         code = self.bare.code
@@ -300,7 +300,7 @@ def atlas(
     if faults or not symbols:
         raise DeclarationError("atlas", faults or ["types: is empty; allow at least one pair type, e.g. 'R'"])
     rows = tuple(TABLE[t] for t in dict.fromkeys(symbols))
-    # 60: pairs beyond which no chain is looked for: of more, no one could read the list
+    # pairs beyond which no chain is looked for: of more, no one could read the list
     counts = (joints,) if joints is not None else range(links, 60)
     kinds = (ChainKind(links, count, mobility, family, rows, multiple) for count in counts)
     fitting = (w for w in kinds if _fits(w))

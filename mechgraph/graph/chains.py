@@ -560,7 +560,7 @@ def _weights(
     sets, loops, touched = graph.rings
     bound = (6 - kind.family) * loops + touched[:, sorted(joint_nodes)].sum(axis=1) + 1
     bound -= (sets.all(axis=1)) & (kind.mobility == 0)
-    # 4_000_000: numbers in the table of mobilities of parts that is made at a time
+    # numbers in the table of mobilities of parts that is made at a time
     step = max(1, 4_000_000 // max(1, len(sets)))
     parts = [rows[i : i + step] for i in range(0, len(rows), step)]
     mobile = [part[(part.astype(float) @ sets.T >= bound).all(axis=1)] for part in parts]

@@ -20,8 +20,7 @@ from itertools import combinations, pairwise
 import numpy as np
 import scipy
 
-from mechgraph.algebra.screw import null_space
-from mechgraph.algebra.se3 import Array, compose, pose_exp
+from mechgraph.algebra.se3 import Array, compose, null_space, pose_exp
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.passive_motion import PassiveMotion
 from mechgraph.graph.linkgraph import (

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from mechgraph.algebra.screw import null_space
-from mechgraph.algebra.se3 import Array
+from mechgraph.algebra.se3 import Array, null_space
 from mechgraph.closure.indexing import Index
 from mechgraph.graph.linkgraph import labels_of_bipartite
 from mechgraph.numerics.tolerances import STRESSES
