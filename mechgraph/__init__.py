@@ -5,11 +5,6 @@ from typing import TYPE_CHECKING, Any
 
 from mechgraph import starting  # noqa: F401  # isort: skip  # before all that takes time to load
 from mechgraph.algebra import inertia
-from mechgraph.atlas.atlas import atlas, load_chains, save_chains
-from mechgraph.atlas.chain import Chain
-from mechgraph.atlas.identify import Identity, identify
-from mechgraph.atlas.multiple import MultipleJoint
-from mechgraph.atlas.system_groups import SystemGroup, system_groups
 from mechgraph.equations.build import formulate
 from mechgraph.equations.formulation import Formulation
 from mechgraph.equivalent import multiple_joints, split_joint
@@ -29,6 +24,17 @@ from mechgraph.errors import (
     StudyError,
 )
 from mechgraph.exchange.files import load, save
+from mechgraph.graph.atlas import (
+    Identity,
+    MultipleJoint,
+    SystemGroup,
+    atlas,
+    identify,
+    load_chains,
+    save_chains,
+    system_groups,
+)
+from mechgraph.graph.chains import Chain
 from mechgraph.kinetostatics import assemble, kinematics, solve
 from mechgraph.model.chain import chain
 from mechgraph.model.coupling import Coupling

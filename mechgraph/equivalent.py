@@ -22,12 +22,12 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.arguments import door
-from mechgraph.atlas.multiple import MultipleJoint
 from mechgraph.closure.assembly import assembled, assembled_at, at_position
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.contact_lines import ContactLines
 from mechgraph.errors import DeclarationError
 from mechgraph.force.applied_loads import user_poses
+from mechgraph.graph.atlas import MultipleJoint
 from mechgraph.model.contact import Contact
 from mechgraph.model.link import Link
 from mechgraph.model.mechanism import Mechanism

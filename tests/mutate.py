@@ -28,7 +28,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
-CORE = ("algebra", "model", "equations", "force", "structure", "topology", "variants")
+CORE = ("algebra", "model", "equations", "force", "structure", "graph", "variants")
 LEFT_OUT = ("test_house.py", "test_layers.py", "test_readme.py", "benchmarks")
 """Tests that say nothing about numbers, or that run other tests."""
 

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
-from mechgraph.atlas.canonical import least_orders, symmetries
-from mechgraph.atlas.contracted import contracted_graphs
+from mechgraph.graph.chains import contracted_graphs, least_orders, symmetries
 from mechgraph.show import draw_chains, draw_structure
 
 

@@ -23,6 +23,7 @@ from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.elimination import Elimination
 from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
 from mechgraph.closure.rank import ClosureRank, closure_rank, rank_of_rows
+from mechgraph.graph.linkgraph import link_graph
 from mechgraph.numerics.tolerances import RANKS
 from mechgraph.report import rounding
 from mechgraph.report.graph_facts import counted_ledger
@@ -31,7 +32,6 @@ from mechgraph.structure.generic import random_rows
 from mechgraph.structure.kind import kind_of
 from mechgraph.structure.mobility import free_motion
 from mechgraph.structure.uniqueness import uniqueness
-from mechgraph.topology.linkgraph import link_graph
 
 ENGINES = ("dense", "sparse")
 

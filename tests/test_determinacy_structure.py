@@ -11,9 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mechgraph as mg
+from mechgraph.graph.linkgraph import link_graph, parts_of
 from mechgraph.structure.generic import generic
-from mechgraph.topology.linkgraph import link_graph
-from mechgraph.topology.matching import parts_of
 
 TYPES = ("R", "P", "C", "S", "E", "U", "W", "Sp", "Sg")
 

@@ -24,9 +24,9 @@ from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import System
 from mechgraph.closure.loop_rows import ClosureRows
 from mechgraph.closure.tree import Tree
+from mechgraph.graph.linkgraph import link_graph
 from mechgraph.model.parameters import parameters
 from mechgraph.numerics.sparse import SparseFactors
-from mechgraph.topology.linkgraph import link_graph
 
 AGREE = 1e-9
 LONG = [pytest.param(name, marks=pytest.mark.slow) if name == "tree" else name for name in LATTICES]

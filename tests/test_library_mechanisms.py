@@ -11,7 +11,7 @@ from mechgraph.closure.driver_path import DriverPath, Request, Status
 from mechgraph.closure.following import follow
 from mechgraph.closure.indexing import System
 from mechgraph.closure.solver import closure_solver
-from mechgraph.topology.linkgraph import link_graph
+from mechgraph.graph.linkgraph import link_graph
 
 MOVING = tuple(name for name in mg.library() if mg.load(name).drives[0].motion is not None)
 RANK = 1e-9

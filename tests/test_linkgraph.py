@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import mechgraph as mg
 from mechgraph.closure.indexing import indexed
-from mechgraph.topology.linkgraph import graph_of_ends, link_graph, network
+from mechgraph.graph.linkgraph import graph_of_ends, link_graph, network
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -13,7 +13,7 @@ from test_assembly_groups import spatial
 from test_modes import FOUR, STEPHENSON, WATT, planar, platform
 
 import mechgraph as mg
-from mechgraph.atlas.canonical import least_order, least_orders
+from mechgraph.graph.chains import least_order, least_orders
 from mechgraph.modes import finding
 from mechgraph.modes.family import Family
 from mechgraph.modes.groups import groups_of

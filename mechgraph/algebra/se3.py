@@ -1,18 +1,70 @@
-"""Rotations and poses: compose, invert, exponential and logarithm.
+"""Rotations, poses, twists and wrenches: composed, inverted, exponential and logarithm, moved by a pose, their spans.
 
-A pose is the upper three rows of the homogeneous matrix, ``(3, 4, ...)``: rotation ``X[:, :3]`` and position ``X[:, 3]``.
+A pose is the upper three rows of the homogeneous matrix, ``(3, 4, ...)``: rotation ``X[:, :3]`` and position ``X[:, 3]``. Twist ``(w, v)``
+angular first, ``v`` the velocity of the body point at the origin; wrench ``(M, F)`` moment first, about the origin. Power is the plain
+product ``w . M + v . F``: no swap matrix.
 Source: Murray, Li and Sastry, A Mathematical Introduction to Robotic Manipulation, 1994, chapter 2.
+
+A call of numpy for a single vector takes as long as twenty operations of Python's own numbers: a path is followed from one position to
+the next, and what it costs is such calls. So a formula of vector components is written once, with the functions of a library that is
+handed to it, and evaluated with arrays, or with plain numbers where there are few of them.
 """
 
 from __future__ import annotations
 
+import cmath
 import math
+from collections.abc import Callable
+from itertools import chain
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from mechgraph.algebra.components import Array as Array
-from mechgraph.algebra.components import Library, by_components
+Array = NDArray[np.float64]
+Library = Any
+"""Where a formula finds ``sqrt``, ``sin``, ``cos``, ``arctan``, ``where`` and ``all``: numpy, or the same of plain numbers."""
+
+
+REAL_NUMBERS, COMPLEX_NUMBERS = (
+    SimpleNamespace(
+        sqrt=module.sqrt,
+        sin=module.sin,
+        cos=module.cos,
+        arctan=module.atan,
+        where=lambda condition, value, other: value if condition else other,
+        all=bool,
+    )
+    for module in (math, cmath)
+)
+
+
+class by_components:
+    """A ``formula(library, *components)`` that gives components, as a function of vectors ``(m, ...)``."""
+
+    def __init__(self, formula: Callable[..., tuple[Any, ...]]) -> None:
+        self.formula, self.__doc__ = formula, formula.__doc__
+
+    def __call__(self, *vectors: Array) -> Array:
+        """Vectors ``(k, ...)``; the batch axes of arguments may be broadcast."""
+        batch = vectors[0].shape[1:]
+        count = math.prod(batch)
+        # vectors up to which plain numbers are faster (measured)
+        if 0 < count <= 12:
+            try:
+                joined = np.concatenate(vectors).reshape(-1, count)
+                library = COMPLEX_NUMBERS if joined.dtype.kind == "c" else REAL_NUMBERS
+                found = np.array([self.formula(library, *column) for column in joined.T.tolist()])
+                return found.T.reshape(-1, *batch)
+            except (ArithmeticError, ValueError):
+                pass  # where plain numbers have no value arrays have NaN or infinity
+        rows = self.formula(np, *chain(*vectors))
+        out = np.empty((len(rows), *np.broadcast_shapes(*map(np.shape, rows))), dtype=np.result_type(*rows))
+        for i, row in enumerate(rows):
+            out[i] = row
+        return out
+
 
 Components = tuple[Any, ...]
 
@@ -218,8 +270,6 @@ HALF_TANGENT[(0, 1, 2, 3, 3, 3), (7, 2, 3, 0, 4, 8)] = 1.0
 HALF_TANGENT[(0, 1, 2), (5, 6, 1)] = -1.0
 NEAR = 1e-4
 """``tan(angle/2)^2`` up to which the series of ``_arctan_parts`` are exact to rounding (0.02 radians)."""
-WIDE = 3.0
-"""``3 - trace = 2 - 2 cos(angle)`` at 120 degrees: beyond, a rotation vector is found through quaternions."""
 
 
 class WideTurn(ArithmeticError):
@@ -244,7 +294,8 @@ def _finite_twist(
     lib: Library, a: Any, b: Any, c: Any, trace: Any, x1: Any, y1: Any, z1: Any, x0: Any, y0: Any, z0: Any
 ) -> Components:
     """``finite_twist`` from ``2 sin(angle) axis``, ``trace``, ``to`` and ``start``."""
-    if not lib.all(abs(trace - 3.0) < WIDE):
+    # ``3 - trace = 2 - 2 cos(angle)`` at 120 degrees: beyond, a rotation vector is found through quaternions
+    if not lib.all(abs(trace - 3.0) < 3.0):
         raise WideTurn
     more = trace + 1.0
     a, b, c = a / more, b / more, c / more
@@ -304,3 +355,55 @@ def _wide_finite_twist(R: Array, p: Array) -> Array:
     c = np.where(small, 1 / 12 + angle2 / 720, (1 - half / np.tan(half)) / (4 * half**2))
     wp = cross(w, p)
     return np.concatenate([w, p - 0.5 * wp + c * cross(w, wp)])
+
+
+def move_twist(X: Array, s: Array) -> Array:
+    """Twist given in the frame of pose ``X``, expressed in the outer frame: ``(R w, R v + p x R w)``."""
+    w = rotate(X[:, :3], s[:3])
+    return np.concatenate([w, rotate(X[:, :3], s[3:]) + cross(X[:, 3], w)])
+
+
+def move_wrench(X: Array, f: Array) -> Array:
+    """Wrench given in the frame of pose ``X``, expressed in the outer frame: ``(R M + p x R F, R F)``."""
+    force = rotate(X[:, :3], f[3:])
+    return np.concatenate([rotate(X[:, :3], f[:3]) + cross(X[:, 3], force), force])
+
+
+def move_constant(X: Array, free: Array, line: Array, at: Array | None = None) -> tuple[Array, Array]:
+    """Direction and moment of a constant screw ``(3,)`` turned by a pose ``X (3, 4, ...)``, its line through ``at (3, ...)``.
+
+    A screw has a bound part ``line`` (a rotation or a force) and a free part (a translation or a couple). Returns
+    ``(R line, R free + at x R line)``, the bound and the free part in the outer frame; ``at`` is the origin of ``X`` unless given.
+    """
+    bound, loose = (np.einsum("ij...,j->i...", X[:, :3], part) for part in (line, free))
+    return bound, loose + cross(X[:, 3] if at is None else at, bound)
+
+
+def cross_twist(V: Array, S: Array) -> Array:
+    """Rate of a twist ``S`` that moves with a body of twist ``V``: ``ad(V) S = (w x s_w, w x s_v + v x s_w)``."""
+    out = np.empty(np.broadcast_shapes(V.shape, S.shape), dtype=np.result_type(V, S))
+    cross(V[:3], S[:3], out[:3])
+    cross(V[:3], S[3:], out[3:])
+    out[3:] += cross(V[3:], S[:3])
+    return out
+
+
+def shift_wrench(f: Array, point: Array) -> Array:
+    """Wrench about the origin, taken about ``point``: ``(M - point x F, F)``."""
+    out = np.array(f)
+    out[:3] -= cross(point, f[3:])
+    return out
+
+
+def power(V: Array, f: Array) -> Array:
+    """Power ``w . M + v . F`` of a wrench on a twist, along the first axis."""
+    return np.asarray((V * f).sum(axis=0))
+
+
+def null_space(A: Array, tolerance: float) -> Array:
+    """Orthonormal columns ``N`` with ``A N = 0``, by singular values below ``tolerance`` times the largest."""
+    if A.shape[0] == 0 or A.size == 0:
+        return np.eye(A.shape[1])
+    _, sigma, Vt = np.linalg.svd(A, full_matrices=True)
+    rank = int((sigma > tolerance * max(sigma[0], np.finfo(float).tiny)).sum())
+    return np.asarray(Vt[rank:].T)

@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mechgraph.algebra.screw import cross_twist, move_twist
-from mechgraph.algebra.se3 import Array, compose, cross, finite_twist, multiplied
+from mechgraph.algebra.se3 import Array, compose, cross, cross_twist, finite_twist, move_twist, multiplied
 from mechgraph.closure.batches import Index, ScrewTable
 from mechgraph.closure.indexing import System
 from mechgraph.closure.one_state import OneState

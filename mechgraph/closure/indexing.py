@@ -20,10 +20,10 @@ from mechgraph.closure.coefficients import FACTORS_AT_ONCE, Numbers
 from mechgraph.closure.one_state import FEW_NODES, OneStateMatrices
 from mechgraph.closure.rows import CouplingRows, LoopRows, PositionRows, Rows
 from mechgraph.closure.states import States
+from mechgraph.graph.linkgraph import LinkGraph, link_graph
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import Parameters, coupling_places, parameters
 from mechgraph.numerics.linear import add_at
-from mechgraph.topology.linkgraph import LinkGraph, link_graph
 
 
 class System(States):

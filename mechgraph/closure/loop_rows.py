@@ -21,9 +21,9 @@ from mechgraph.algebra.se3 import Array, cross
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.places import entries_of
+from mechgraph.graph.linkgraph import LinkGraph
 from mechgraph.numerics.least_norm import LeastNorm
 from mechgraph.numerics.tolerances import RANKS
-from mechgraph.topology.linkgraph import LinkGraph
 
 Mask = NDArray[np.bool_]
 

@@ -15,11 +15,10 @@ from functools import cached_property
 import numpy as np
 import scipy
 
-from mechgraph.algebra.screw import cross_twist
-from mechgraph.algebra.se3 import Array, cross
+from mechgraph.algebra.se3 import Array, cross, cross_twist
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.solver import FactoredClosure
-from mechgraph.topology.components import labels_of_bipartite, members
+from mechgraph.graph.linkgraph import labels_of_bipartite, members
 
 TURNING = 1e-6
 """Part of a unit motion from which on it turns the links that it moves."""

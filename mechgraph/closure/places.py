@@ -19,6 +19,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.batches import FactorBatch, Group, Index, ScrewTable, factor_batches
 from mechgraph.closure.coefficients import MARKER_A, MARKER_B
 from mechgraph.closure.tree import Ranks, Tree, Walk, ranked
+from mechgraph.graph.linkgraph import LinkGraph
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.once import of_graph
 from mechgraph.model.pair_type import PairType
@@ -26,7 +27,6 @@ from mechgraph.model.parameters import Parameters
 from mechgraph.model.row_parts import Component
 from mechgraph.model.travelling import Travelling
 from mechgraph.numerics.linear import Place, compact
-from mechgraph.topology.linkgraph import LinkGraph
 
 MANY_LOOPS = 16
 """Loops above which the loop matrix is applied as a sparse one (measured: from here on it is the faster one)."""

@@ -22,11 +22,11 @@ from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.elimination import Elimination
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
+from mechgraph.graph.linkgraph import labels_of_bipartite, members
 from mechgraph.numerics.least_norm import singular_ratio
 from mechgraph.numerics.linear import rank_of
 from mechgraph.numerics.sparse import SparseFactors
 from mechgraph.numerics.tolerances import RANKS
-from mechgraph.topology.components import labels_of_bipartite, members
 
 EngineName = Literal["auto", "dense", "sparse"]
 CROSSOVER = 144

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import SMALL_BATCH, Array, compose, multiplied
+from mechgraph.graph.linkgraph import LinkGraph
 from mechgraph.numerics.linear import Place, add_at, compact, scattered_sum
-from mechgraph.topology.linkgraph import LinkGraph
 
 Index = NDArray[np.intp]
 Level = tuple[Index, NDArray[np.bool_], Index, Index]

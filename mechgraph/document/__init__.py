@@ -9,12 +9,7 @@ White space in running text (headings, paragraphs, bullets, cells, captions) cou
 only `Code` and the text form of an `Equation` keep theirs.
 """
 
-from mechgraph.document.html import to_html
-from mechgraph.document.latex import latex_words, to_latex
-from mechgraph.document.latex_file import to_latex_file
-from mechgraph.document.markdown import to_markdown
-from mechgraph.document.shown import Shown
-from mechgraph.document.text import to_text
+from mechgraph.document.render import Shown, latex_words, to_html, to_latex, to_latex_file, to_markdown, to_text
 from mechgraph.document.tree import Block, Bullets, Code, Document, Equation, Heading, Legend, Paragraph, Table
 
 __all__ = [

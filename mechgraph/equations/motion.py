@@ -14,11 +14,11 @@ from mechgraph.equations.symbols import LeeNames, Symbol, Words, direction, fact
 from mechgraph.equations.system import LinearSystem
 from mechgraph.equations.terms import AXES, Block, Known, ScalarEquation, Screw, Term, Unknown
 from mechgraph.errors import counted
+from mechgraph.graph.linkgraph import LinkGraph, link_graph
 from mechgraph.model.factors import ConstantScrew
 from mechgraph.model.link import Link
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
-from mechgraph.topology.linkgraph import LinkGraph, link_graph
 
 POSITION, RATE, ACCELERATION = range(3)
 LETTERS = {True: ("theta", "omega", "alpha"), False: ("S", "dS", "ddS")}

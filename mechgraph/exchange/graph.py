@@ -11,9 +11,9 @@ import os
 from typing import TYPE_CHECKING, Any
 
 from mechgraph.errors import visible
+from mechgraph.graph.linkgraph import link_graph
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
-from mechgraph.topology.linkgraph import link_graph
 from mechgraph.writing import write_whole
 
 if TYPE_CHECKING:

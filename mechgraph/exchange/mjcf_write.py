@@ -18,8 +18,7 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.inertia import physical_faults
-from mechgraph.algebra.screw import move_twist
-from mechgraph.algebra.se3 import Array, compose, inverse, matrix_quaternion
+from mechgraph.algebra.se3 import Array, compose, inverse, matrix_quaternion, move_twist
 from mechgraph.errors import HIDDEN, FileError
 from mechgraph.kinetostatics import assemble
 from mechgraph.model import pair_kinematics as evaluation

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
-from mechgraph.algebra.screw import shift_wrench
-from mechgraph.algebra.se3 import cross
+from mechgraph.algebra.se3 import cross, shift_wrench
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
 

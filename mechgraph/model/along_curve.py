@@ -8,8 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mechgraph.algebra.components import Library, by_components
-from mechgraph.algebra.se3 import Array, cross
+from mechgraph.algebra.se3 import Array, Library, by_components, cross
 from mechgraph.model.curves import ORDERS, Curve
 from mechgraph.model.factors import Factor
 from mechgraph.model.row_parts import UNIT_TWISTS, Freedom

@@ -50,7 +50,7 @@ DEGREES = "_deg"
 
 
 @dataclass(frozen=True)
-class Table:
+class FileTable:
     """One table of the format: ``make`` builds its object, ``fields`` by their names in files, ``needed`` must be there.
 
     ``attributes`` are the names of the fields in the object, ``defaults`` what a field left out counts as, ``rules`` more of its schema.
@@ -78,7 +78,7 @@ def _table(
     needed: Sequence[str] | None = None,
     rules: Schema | None = None,
     **more: FieldFormat,
-) -> Table:
+) -> FileTable:
     """The table of a class (or function): fields that only the file has, those that the class describes, and ``more``."""
     own = make.formats if inspect.isclass(make) and issubclass(make, Formatted) else {}
     attributes = {about.key or name: name for name, about in own.items()}
@@ -88,7 +88,7 @@ def _table(
     if needed is None:
         needed = [key for key, value in defaults.items() if value is inspect.Parameter.empty]
     summary = words or (make.__doc__ or "").partition("\n")[0].replace("``", "")
-    return Table(make, summary, fields, tuple(needed), attributes, defaults, rules or {})
+    return FileTable(make, summary, fields, tuple(needed), attributes, defaults, rules or {})
 
 
 def _one_of(how: str, *names: str) -> Schema:
@@ -117,7 +117,7 @@ _FILE = {
 }
 _PER_PITCH = SIX("part multiplied by the pitch of the pair", default="0")
 
-TABLES_OF_FILE: dict[str, Table] = {
+TABLES_OF_FILE: dict[str, FileTable] = {
     "file": _table(
         Mechanism,
         _FILE,

@@ -12,13 +12,14 @@ from typing import Protocol
 
 import numpy as np
 
-from mechgraph.algebra.screw import move_constant, move_twist
 from mechgraph.algebra.se3 import (
     Array,
     batch_last,
     compose,
     cross,
     identity,
+    move_constant,
+    move_twist,
     quaternion_exp,
     quaternion_log,
     turn_between,

@@ -10,7 +10,7 @@ from urllib.parse import quote
 
 from mechgraph.model.field_format import FieldFormat
 from mechgraph.model.field_kinds import TABLE, TABLES
-from mechgraph.model.file_format import KINDS, TABLES_OF_FILE, USUAL, Table
+from mechgraph.model.file_format import KINDS, TABLES_OF_FILE, USUAL, FileTable
 
 
 def _array(count: int) -> dict[str, Any]:
@@ -63,7 +63,7 @@ def laid_out(value: Any, depth: int = 0) -> str:
     return f"{{{inner}{f',{inner}'.join(entries)}{outer}}}"
 
 
-def _table_schema(name: str, table: Table) -> dict[str, Any]:
+def _table_schema(name: str, table: FileTable) -> dict[str, Any]:
     what, _, kind = name.partition(" ")
     properties: dict[str, Any] = {"kind": {"const": kind}} if kind else {}
     for key, about in table.fields.items():
@@ -125,7 +125,7 @@ def _rows(names: str) -> Iterator[tuple[str, ...]]:
             yield *first, *_row(key, about, table)
 
 
-def _row(key: str, about: FieldFormat, table: Table) -> tuple[str, ...]:
+def _row(key: str, about: FieldFormat, table: FileTable) -> tuple[str, ...]:
     kind = about.kind.words + (" ≥ 0" if about.minimum == 0 else "")
     if about.rules.get("type") == "array":
         kind = "list"

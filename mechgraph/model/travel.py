@@ -18,8 +18,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from mechgraph.algebra.components import Library, by_components
-from mechgraph.algebra.se3 import Array, cross
+from mechgraph.algebra.se3 import Array, Library, by_components, cross
 from mechgraph.model.curves import CLOSED_GAP, ORDERS, Curve
 from mechgraph.model.numeric import second_direction
 from mechgraph.model.pieces import Pieces, hermite

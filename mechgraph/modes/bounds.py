@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechgraph.graph.linkgraph import components_of_edges
 from mechgraph.modes.family import Family, span
 from mechgraph.modes.rods import RodFamily
-from mechgraph.topology.components import components_of_edges
 
 SIX_TURNS = (
     "Lee, Woernle and Hiller, A complete solution for the inverse kinematic problem of the general 6R robot manipulator, "

@@ -123,7 +123,7 @@ def told_apart(family: Family, x: Array, sure: Sequence[Certificate | None]) -> 
             2.0 * np.minimum(*(np.sqrt(((Q + sign * R) ** 2).sum(axis=0)) for sign in (1.0, -1.0))),
         ]
         least = np.delete(np.concatenate(gaps).max(axis=0, initial=0.0) / UP - error - error[n] - APART_ROUNDING, n)
-        out[i] = replace(cast(Certificate, sure[i]), apart=float(least.min()) if least.size else None)
+        out[i] = replace(cast("Certificate", sure[i]), apart=float(least.min()) if least.size else None)
     return out
 
 

@@ -20,8 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.algebra.screw import cross_twist, move_twist
-from mechgraph.algebra.se3 import compose, finite_twist, inverse, multiplied, pose_exp
+from mechgraph.algebra.se3 import compose, cross_twist, finite_twist, inverse, move_twist, multiplied, pose_exp
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.rank import closure_rank

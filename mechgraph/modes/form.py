@@ -32,6 +32,7 @@ from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.point_rows import PointNumbers
 from mechgraph.closure.reduction import floating_type
 from mechgraph.errors import counted
+from mechgraph.graph.linkgraph import components_of_edges
 from mechgraph.model import pair_kinematics
 from mechgraph.model.link import Link
 from mechgraph.model.mechanism import Mechanism
@@ -41,7 +42,6 @@ from mechgraph.modes.family import SPAN, Array, Family
 from mechgraph.modes.rods import RodFamily, RodSystem
 from mechgraph.numerics.linear import rank_of, singular_values
 from mechgraph.numerics.tolerances import RANKS
-from mechgraph.topology.components import components_of_edges
 
 WAYS = "A leg that two turns carry can stand in two ways in the same assembly: nearest to the start, the other does not count"
 """What is said of rods with two turns at an end."""

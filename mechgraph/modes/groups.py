@@ -19,6 +19,7 @@ from mechgraph.algebra.se3 import compose, identity
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.point_rows import PointNumbers
+from mechgraph.graph.linkgraph import components_of_edges
 from mechgraph.model.link import Link
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
@@ -29,7 +30,6 @@ from mechgraph.numerics.linear import complement
 from mechgraph.numerics.tolerances import RANKS
 from mechgraph.structure.groups import MOST_SPLIT, smallest
 from mechgraph.structure.link_rows import Constraint, Constraints, rows_of_pair
-from mechgraph.topology.components import components_of_edges
 
 KNOWN_MOVED = 0.3
 """Change of what is known (radians, lengths over L) at which a group must still be a member of its class."""

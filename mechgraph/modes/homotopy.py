@@ -17,8 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.algebra.screw import move_twist
-from mechgraph.algebra.se3 import finite_twist, homogeneous, multiplied, quaternion_product
+from mechgraph.algebra.se3 import finite_twist, homogeneous, move_twist, multiplied, quaternion_product
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
 from mechgraph.model.factors import screw_terms, screw_values

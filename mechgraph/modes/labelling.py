@@ -15,9 +15,8 @@ from functools import cached_property
 
 import numpy as np
 
-from mechgraph.algebra.screw import cross_twist
-from mechgraph.algebra.se3 import compose, inverse
-from mechgraph.atlas.canonical import least_order, ranked
+from mechgraph.algebra.se3 import compose, cross_twist, inverse
+from mechgraph.graph.chains import least_order, ranked
 from mechgraph.model.pair_type import PairType
 from mechgraph.modes.family import SPAN, Array, Family, Member
 from mechgraph.numerics.linear import Index

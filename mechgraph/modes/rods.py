@@ -20,12 +20,12 @@ from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.point_rows import PointNumbers, PointRows
 from mechgraph.closure.rows import Evaluated, PositionRows
+from mechgraph.graph.linkgraph import LinkGraph
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import Parameters
 from mechgraph.modes.family import SPAN, Array, Family
 from mechgraph.numerics.linear import rank_of, singular_values
 from mechgraph.numerics.tolerances import RANKS
-from mechgraph.topology.linkgraph import LinkGraph
 
 
 class RodRows(PointRows):
@@ -166,7 +166,7 @@ class RodFamily(Family):
         if self.still:
             return s.with_points(points)
         moved = super().system_with(markers[:, :, : -2 * n], drive)
-        return cast(RodSystem, moved).with_points(points)
+        return cast("RodSystem", moved).with_points(points)
 
     @cached_property
     def still(self) -> bool:

@@ -27,9 +27,9 @@ import numpy as np
 
 from mechgraph.algebra.se3 import compose, pose_exp
 from mechgraph.closure.configuration import Configuration
+from mechgraph.graph.linkgraph import components_of_edges
 from mechgraph.modes.family import SPAN, Array, Family, Member
 from mechgraph.modes.homotopy import Care, Equations, Leg, follow
-from mechgraph.topology.components import components_of_edges
 
 SAMPLES = 48
 """Members of a pencil that are sampled first; then as many again, until they tell."""

@@ -16,11 +16,11 @@ from mechgraph.closure.driver_path import DriverPath, Positions, Request, Status
 from mechgraph.closure.following import follow
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.solver import closure_solver, engine_for
+from mechgraph.graph.linkgraph import components_of_edges, members
 from mechgraph.modes.family import Array, Family
 from mechgraph.modes.question import Question
 from mechgraph.numerics.continuation import End
 from mechgraph.numerics.crossings import passed
-from mechgraph.topology.components import components_of_edges, members
 
 Node = tuple[int, int]
 """An assembly: the number of its sample, and its own there."""

@@ -7,9 +7,8 @@ from functools import cached_property
 
 from mechgraph.equations.build import BOOKKEEPINGS, BookkeepingName, formulate
 from mechgraph.equations.terms import Ledger, LedgerRow
+from mechgraph.graph.linkgraph import LinkGraph, MatchingParts, parts_of
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.topology.linkgraph import LinkGraph
-from mechgraph.topology.matching import Parts, parts_of
 
 
 @dataclass(frozen=True, repr=False)
@@ -57,7 +56,7 @@ class GraphFacts:
         return formulate(self.mechanism, bookkeeping).ledger()
 
     @cached_property
-    def parts(self) -> Parts:
+    def parts(self) -> MatchingParts:
         """Dulmage-Mendelsohn parts: which links and pairs are over-, which underdetermined by count."""
         return parts_of(self.mechanism, self.graph)
 

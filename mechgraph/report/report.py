@@ -13,6 +13,7 @@ from mechgraph.closure.rank import EngineName
 from mechgraph.data import json_text, plain
 from mechgraph.document import Document, Paragraph, Shown, to_markdown, to_text
 from mechgraph.errors import AssemblyError, MechgraphError
+from mechgraph.graph.linkgraph import link_graph
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.tolerances import RANKS
 from mechgraph.report import brief, data, sections, sentences
@@ -22,7 +23,6 @@ from mechgraph.structure.least_change import TOOK_TOO_LONG, SearchEnded
 from mechgraph.structure.mobility import free_motion
 from mechgraph.structure.placed_pairs import EXACT
 from mechgraph.structure.snapping import meant
-from mechgraph.topology.linkgraph import link_graph
 
 HINTED = 2.0
 """Seconds that an error may wait for the same."""

@@ -6,10 +6,9 @@ from collections.abc import Iterable, Iterator
 from typing import Any
 
 from mechgraph.arguments import door
-from mechgraph.atlas.identify import Identity, identify
-from mechgraph.atlas.multiple import MultipleJoint
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, MechgraphError, listed
+from mechgraph.graph.atlas import Identity, MultipleJoint, identify
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import wrong
 from mechgraph.report.report import DeterminacyReport, check

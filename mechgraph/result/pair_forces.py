@@ -6,8 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mechgraph.algebra.screw import shift_wrench
-from mechgraph.algebra.se3 import Array, cross, rotate, rotate_back
+from mechgraph.algebra.se3 import Array, cross, rotate, rotate_back, shift_wrench
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.contact_lines import ContactLines
 from mechgraph.closure.driver_path import in_blocks

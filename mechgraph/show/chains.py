@@ -10,9 +10,9 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.arguments import door
-from mechgraph.atlas.chain import Chain
 from mechgraph.closure.indexing import Index
 from mechgraph.errors import DeclarationError
+from mechgraph.graph.chains import Chain
 from mechgraph.show.canvas import INK, MUTED, PALETTE, Axes, bare, new_axes
 
 MOST_ON_A_PAGE = 240

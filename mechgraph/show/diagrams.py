@@ -12,11 +12,11 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.arguments import door
 from mechgraph.equations.formulation import Formulation
+from mechgraph.graph.linkgraph import link_graph
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.show.canvas import FAINT, HATCH, INK, MUTED, PALETTE, Axes, bare, colours, new_axes, said
 from mechgraph.show.painting import FlatPainter, inside
 from mechgraph.structure.decomposition import Decomposition
-from mechgraph.topology.linkgraph import link_graph
 
 STRAND = 0.035
 """Distance of the strands of an edge that lies in several loops, and"""

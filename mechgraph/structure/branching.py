@@ -14,8 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mechgraph.algebra.screw import null_space
-from mechgraph.algebra.se3 import Array
+from mechgraph.algebra.se3 import Array, null_space
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.loop_rows import ClosureRows

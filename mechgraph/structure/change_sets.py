@@ -13,8 +13,7 @@ from time import monotonic
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.algebra.screw import null_space
-from mechgraph.algebra.se3 import Array
+from mechgraph.algebra.se3 import Array, null_space
 from mechgraph.closure.indexing import Index
 from mechgraph.numerics.tolerances import STRESSES
 from mechgraph.structure.pair_changes import CHANGES_SHOWN, LARGEST_FOR_SETS, PLANE, Change

@@ -19,12 +19,12 @@ from functools import cached_property
 import numpy as np
 
 from mechgraph.document import Block, Document, Paragraph, Shown, Table
+from mechgraph.graph.linkgraph import Index
 from mechgraph.numerics.tolerances import MOTIONS
 from mechgraph.structure.groups import LinkSet, link_sets
 from mechgraph.structure.kind import Kind
 from mechgraph.structure.link_rows import LinkRows
 from mechgraph.structure.mobility import Freedoms
-from mechgraph.topology.components import Index
 
 BASES = ("RRR", "RRT", "RTR", "TRT", "RTT")
 """Dyads by type 1 to 5, in the order in which version 0 has its pairs; the last one is called TTR."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.atlas.multiple import MultipleJoint
+from mechgraph.graph.atlas import MultipleJoint
 from mechgraph.numerics.tolerances import RANKS
 from mechgraph.structure.position import Position
 

@@ -20,15 +20,20 @@ from itertools import combinations, pairwise
 import numpy as np
 import scipy
 
-from mechgraph.algebra.screw import null_space
-from mechgraph.algebra.se3 import Array, compose, pose_exp
+from mechgraph.algebra.se3 import Array, compose, null_space, pose_exp
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.passive_motion import PassiveMotion
+from mechgraph.graph.linkgraph import (
+    LinkGraph,
+    components_of_edges,
+    cut_off,
+    graph_of_ends,
+    labels_of_bipartite,
+    members,
+)
 from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.numerics.tolerances import MOTIONS
 from mechgraph.structure.position import Position
-from mechgraph.topology.components import components_of_edges, cut_off, labels_of_bipartite, members
-from mechgraph.topology.linkgraph import LinkGraph, graph_of_ends
 
 DIFFERENCE_STEP = 1e-4
 """Step of the central differences that tell whether a pair element leaves its place."""

@@ -7,8 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from mechgraph.algebra.screw import shift_wrench
-from mechgraph.algebra.se3 import Array, batch_last, cross
+from mechgraph.algebra.se3 import Array, batch_last, cross, shift_wrench
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
 from mechgraph.numerics.tolerances import STRESSES

@@ -12,12 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from mechgraph.algebra.screw import null_space
-from mechgraph.algebra.se3 import Array
+from mechgraph.algebra.se3 import Array, null_space
 from mechgraph.closure.indexing import Index
+from mechgraph.graph.linkgraph import labels_of_bipartite
 from mechgraph.numerics.tolerances import STRESSES
 from mechgraph.structure.components import Label
-from mechgraph.topology.components import labels_of_bipartite
 
 COMBINED = 300
 """Number of components of a group up to which combinations across pairs are computed."""

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechgraph.algebra.screw import null_space
-from mechgraph.algebra.se3 import Array
+from mechgraph.algebra.se3 import Array, null_space
 from mechgraph.closure.indexing import Index
 from mechgraph.model.row_parts import Component
 from mechgraph.structure.components import Components

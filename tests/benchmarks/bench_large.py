@@ -29,8 +29,8 @@ from mechgraph.closure.assembly import assembled
 from mechgraph.closure.bordering import LoopSystem
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import indexed
+from mechgraph.graph.linkgraph import link_graph
 from mechgraph.numerics.sparse import SparseFactors
-from mechgraph.topology.linkgraph import link_graph
 
 SIZES = [10, 100, 1_000, 10_000, 100_000]
 

@@ -19,7 +19,7 @@ from strategies import (
 )
 
 import mechgraph as mg
-from mechgraph.algebra import screw
+from mechgraph.algebra import se3
 
 pytestmark = pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
 """Random loads move passive freedoms; ``test_passive_loads`` looks at what is said of it."""
@@ -256,7 +256,7 @@ def test_a_moved_mechanism_has_the_moved_forces(seed):
     for p in m.pairs:
         x, y = s[p.name], moved[p.name]
         expected = np.moveaxis(
-            screw.move_wrench(X[:3, :, None] * np.ones(NODES), batched(np.nan_to_num(x.reaction))), 0, -1
+            se3.move_wrench(X[:3, :, None] * np.ones(NODES), batched(np.nan_to_num(x.reaction))), 0, -1
         )
         loose = np.isnan(x.reaction).any()
         if not loose:
@@ -267,7 +267,7 @@ def test_a_moved_mechanism_has_the_moved_forces(seed):
             np.testing.assert_allclose(y.components[name], value, atol=1e-7 * big)
     np.testing.assert_allclose(
         moved.shaking,
-        np.moveaxis(screw.move_wrench(X[:3, :, None] * np.ones(NODES), batched(s.shaking)), 0, -1),
+        np.moveaxis(se3.move_wrench(X[:3, :, None] * np.ones(NODES), batched(s.shaking)), 0, -1),
         atol=1e-8 * big,
     )
 

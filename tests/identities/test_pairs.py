@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mechgraph as mg
-from mechgraph.algebra import screw, se3
+from mechgraph.algebra import se3
 from mechgraph.model import pair_kinematics as evaluation
 
 PITCH = 0.37
@@ -268,7 +268,7 @@ def test_screws_move_with_the_marker(row):
     base = se3.pose_exp(rng.normal(size=(6, 2, 3)))
     here, there = (evaluation.frames_of(row, pitch, x, base=b) for b in (None, base))
     for j in range(row.f):
-        for kind, move in ((evaluation.twists_of, screw.move_twist), (evaluation.efforts_of, screw.move_wrench)):
+        for kind, move in ((evaluation.twists_of, se3.move_twist), (evaluation.efforts_of, se3.move_wrench)):
             moved = move(base, kind(row, pitch, here)[:, j])
             np.testing.assert_allclose(kind(row, pitch, there)[:, j], moved, atol=1e-13)
 

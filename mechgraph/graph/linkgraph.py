@@ -1,8 +1,8 @@
-"""The link graph: incidence matrix, spanning tree and a short cycle basis, in an order fixed by the declaration."""
+"""The link graph in an order fixed by the declaration, its parts, and the matching of unknowns to equations; no geometry."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain, pairwise
@@ -20,6 +20,60 @@ if TYPE_CHECKING:
     import networkx as nx
 
 Index = NDArray[np.intp]
+
+
+def components_of_edges(count: int, ends: Sequence[tuple[int, int]] | NDArray[np.intp]) -> Index:
+    """For each of ``count`` nodes the number of its component, counted from the first node on."""
+    a, b = np.asarray(ends, dtype=np.intp).reshape(-1, 2).T
+    graph = scipy.sparse.csr_array((np.ones(len(a)), (a, b)), shape=(count, count))
+    return component_numbers(scipy.sparse.csgraph.connected_components(graph, directed=False)[1])
+
+
+def labels_of_bipartite(touch: scipy.sparse.csr_array | scipy.sparse.coo_array) -> Index:
+    """For every row of ``touch`` the number of its component: rows that share a column belong together."""
+    coo = touch.tocoo()
+    rows, columns = (int(n) for n in touch.shape)
+    ends = np.stack([coo.row, rows + coo.col], axis=1).astype(np.intp)
+    return component_numbers(components_of_edges(rows + columns, ends)[:rows])
+
+
+def component_numbers(labels: NDArray[np.signedinteger]) -> Index:
+    """Labels renumbered in the order in which they appear."""
+    _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
+    number = np.empty(len(first), dtype=np.intp)
+    number[np.argsort(first)] = np.arange(len(first))
+    return number[inverse]
+
+
+def members(numbers: Index) -> list[list[int]]:
+    """The nodes of every component."""
+    if not len(numbers):
+        return []
+    order = np.argsort(numbers, kind="stable")
+    return [part.tolist() for part in np.split(order, np.flatnonzero(np.diff(numbers[order])) + 1)]
+
+
+def cut_off(count: int, ends: Sequence[tuple[int, int]], frame: int, cut: Iterable[int]) -> tuple[int, ...]:
+    """Nodes that lose the ``frame`` when the edges ``cut`` are taken away."""
+    gone = set(cut)
+    label = components_of_edges(count, [e for k, e in enumerate(ends) if k not in gone])
+    return tuple(np.flatnonzero(label != label[frame]).tolist())
+
+
+def reached(follows: scipy.sparse.csr_array, starts: Index) -> Index:
+    """Nodes that can be reached from any of ``starts`` along the entries (from row to column) of ``follows``."""
+    n = follows.shape[0]
+    extra = scipy.sparse.coo_array((np.ones(len(starts)), (np.full(len(starts), n), starts)), shape=(n + 1, n + 1))
+    whole = scipy.sparse.csr_array(extra + _padded(follows))
+    order = scipy.sparse.csgraph.breadth_first_order(whole, n, return_predecessors=False)
+    return np.sort(order[order < n]).astype(np.intp)
+
+
+def _padded(matrix: scipy.sparse.csr_array) -> scipy.sparse.coo_array:
+    coo = scipy.sparse.coo_array(matrix)
+    n = coo.shape[0] + 1
+    return scipy.sparse.coo_array((np.ones(coo.nnz), (coo.row, coo.col)), shape=(n, n))
+
 
 Loop = tuple[tuple[int, int], ...]
 """A loop as (pair index, sign) in the order in which it is run through."""
@@ -233,3 +287,64 @@ def _oriented(loop: list[int]) -> tuple[int, ...]:
     if first & 1:
         return (*loop[at:], *loop[:at])
     return tuple([step ^ 1 for step in (loop[at::-1] + loop[:at:-1])])
+
+
+@dataclass(frozen=True)
+class MatchingParts:
+    """Dulmage-Mendelsohn parts of the force equations.
+
+    Attributes
+    ----------
+    structural_rank : size of the largest matching of unknowns to equations.
+    redundant_links, redundant_pairs : the part with more reaction unknowns than equations (reactions not unique).
+    free_links, free_pairs : the part with more equations than unknowns (something can move undriven).
+    spare_unknowns, spare_equations : how many are left over in these parts.
+    """
+
+    structural_rank: int
+    redundant_links: tuple[str, ...]
+    redundant_pairs: tuple[str, ...]
+    free_links: tuple[str, ...]
+    free_pairs: tuple[str, ...]
+    spare_unknowns: int
+    spare_equations: int
+
+
+def parts_of(m: Mechanism, graph: LinkGraph) -> MatchingParts:
+    """Matching and parts from the graph and the freedoms of the pairs, by maximum flow from unknowns to equations."""
+    P, N = len(m.pairs), graph.n_links
+    supply = np.array([6 - p.type.f for p in m.pairs], dtype=np.intp)
+    np.add.at(supply, [m.freedom(drive.freedom)[0] for drive in m.drives], 1)
+    pair = np.repeat(np.arange(P), 2)
+    link = np.stack([graph.a, graph.b], axis=1).ravel()
+    moving = link != graph.frame
+    pair, link = pair[moving], link[moving]
+    links = np.delete(np.arange(N), graph.frame)
+    source, sink = P + N, P + N + 1
+    rows = np.concatenate([np.full(P, source), pair, P + links])
+    columns = np.concatenate([np.arange(P), P + link, np.full(len(links), sink)])
+    capacity = np.concatenate([supply, np.full(len(pair), 12), np.full(len(links), 6)]).astype(np.int32)
+    network = scipy.sparse.csr_array((capacity, (rows, columns)), shape=(P + N + 2, P + N + 2))
+    result = scipy.sparse.csgraph.maximum_flow(network, source, sink)
+    flow = scipy.sparse.csr_array(result.flow)
+    used, filled = flow[[source]].toarray()[0, :P], flow[:, [sink]].toarray()[P : P + N, 0]
+    serves = np.asarray(flow[pair, P + link]).ravel() > 0
+    everywhere, back = (pair, P + link), (P + link[serves], pair[serves])
+    over = _alternating(P + N, everywhere, back, np.flatnonzero(used < supply))
+    under = _alternating(P + N, everywhere[::-1], back[::-1], P + links[filled[links] < 6])
+    names, pair_names = m.link_names(), [p.name for p in m.pairs]
+    return MatchingParts(
+        structural_rank=int(result.flow_value),
+        redundant_links=tuple(names[i - P] for i in over if i >= P),
+        redundant_pairs=tuple(pair_names[k] for k in over if k < P),
+        free_links=tuple(names[i - P] for i in under if i >= P),
+        free_pairs=tuple(pair_names[k] for k in under if k < P),
+        spare_unknowns=int((supply - used).sum()),
+        spare_equations=int(6 * len(links) - filled.sum()),
+    )
+
+
+def _alternating(count: int, out: tuple[Index, Index], back: tuple[Index, Index], starts: Index) -> list[int]:
+    """Nodes on alternating paths from ``starts``: outwards along every edge, back along those that the matching uses."""
+    rows, columns = (np.concatenate([a, b]) for a, b in zip(out, back, strict=True))
+    return reached(scipy.sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(count, count)), starts).tolist()

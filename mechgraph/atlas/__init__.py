@@ -1,1 +1,0 @@
-"""Kinematic chains up to isomorphism: generated, named, their inversions and drivers; system groups."""

@@ -1,1 +1,0 @@
-"""The graph without geometry: incidence, loops, tree, counts."""
