@@ -16,6 +16,7 @@ from mechgraph.closure.assembly import assembled_at, last_closed
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.closure.driver_path import Status
+from mechgraph.closure.indexing import System
 from mechgraph.closure.poles import away_from_poles, ends_at_pole
 from mechgraph.closure.solver import MotionEngineName
 from mechgraph.errors import (
@@ -29,6 +30,7 @@ from mechgraph.force.dalembert import MethodName
 from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import declared
+from mechgraph.numerics.tracks import Nodes
 from mechgraph.outcome import Outcome
 from mechgraph.pipeline import Pipeline
 from mechgraph.report.report import check, hinted
@@ -46,10 +48,12 @@ SOLVED = (Status.OK.value, Status.CHANGE_POINT.value, Status.ACTUATORS_REST.valu
 """Outcomes that are no reason to raise."""
 DEAD = "At a dead point the drivers do not determine the motion; drive another freedom, leave the position out, or use on_reach='flag'"
 FLAG = "Use on_reach='flag' for the positions that can be reached"
+WITHOUT_BOUND, SHORTLY = 1e3, 0.01
+"""Slides of so many lengths L that have doubled within so much of the path before its end grow without bound."""
 REFUSED = {
     Status.DEAD_POINT: f"is a dead point{{meet}}. {DEAD}",
     Status.BEYOND_DEAD_POINT: f"is beyond a dead point; reached {{at}}{{meet}}. {DEAD}",
-    Status.OUT_OF_REACH: f"is out of reach; reached {{at}}. {FLAG}",
+    Status.OUT_OF_REACH: f"is out of reach; reached {{at}}{{far}}. {FLAG}",
     Status.NOT_CLOSED: f"is within reach, but its loops could not be closed to rounding; the path was followed to {{at}}. {FLAG}",
     Status.NOT_FOLLOWED: "was not reached: the path to it takes more steps than are made; it was followed to {at}. Start nearer to it, "
     "or use on_reach='flag'",
@@ -81,6 +85,7 @@ def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exceptio
     misses = solution.checks.closure.reshape(-1)
     why = REFUSED[status].format(
         at=_listed(reached.items()),
+        far=_without_bound(line.system, way),
         meet=f" ({branches_text(ways, line.drive.names[line.lead[0]])})" if ways else "",
         miss=misses[first],
         most=np.max(misses, where=np.isfinite(misses), initial=0.0),
@@ -101,6 +106,19 @@ def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exceptio
     error = DeadPointError(text, reached, solution)
     error.branches = ways
     return error
+
+
+def _without_bound(system: System, way: Nodes) -> str:
+    """What is said of slides that grow without bound towards the end of a way; towards a fold they keep to a limit."""
+    if not len(way):
+        return ""
+    slides = np.flatnonzero(system.is_length)
+    q = system.coordinates_of(way.x)[slides]
+    before = np.abs(q[:, way.place <= way.place[-1] - SHORTLY]).max(axis=1, initial=0.0)
+    far = np.abs(q[:, -1]) > np.maximum(WITHOUT_BOUND, 2.0 * before)
+    names = system.freedom_names_of(slides[far])
+    said = _listed(zip(names, (q[far, -1] * system.par.L).tolist(), strict=True))
+    return f", where {said}, growing without bound" if said else ""
 
 
 def _listed(values: Iterable[tuple[str, float]]) -> str:

@@ -187,7 +187,8 @@ def open_chain(seed, letters=None, masses=True):
     """A single loop declared by markers (twist, length, offset), open at q = 0, with a start found by assembling."""
     rng = np.random.default_rng((seed, 4))
     letters = letters or "".join(symbols_with(rng, 7))
-    n = len(mg.chain(letters).pairs)
+    pairs = mg.chain(letters, drive=None).pairs
+    n = len(pairs)
     names = [f"link{k}" for k in range(1, n)]
     links = [body(rng, k, rng.uniform(-0.5, 0.5, 3)) for k in names] if masses else None
     m = mg.chain(
@@ -195,7 +196,7 @@ def open_chain(seed, letters=None, masses=True):
         twist=rng.uniform(0.5, 2.6, n) * rng.choice([-1, 1], n),
         length=rng.uniform(0.3, 1.0, n),
         offset=rng.uniform(-0.4, 0.4, n),
-        pitch=dict.fromkeys((f"O{k + 1}" for k, p in enumerate(mg.chain(letters).pairs) if p.type.takes_pitch), 0.1),
+        pitch=dict.fromkeys((f"O{k + 1}" for k, p in enumerate(pairs) if p.type.takes_pitch), 0.1),
         links=links,
         drive=None,
         name=f"chain {letters} {seed}",

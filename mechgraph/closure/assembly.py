@@ -15,6 +15,7 @@ from mechgraph.closure.driver_path import FARTHEST, DriverPath, Request, Status,
 from mechgraph.closure.following import follow
 from mechgraph.closure.indexing import Index, System, indexed
 from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
+from mechgraph.closure.mixed_lengths import refuse_mixed_lengths
 from mechgraph.closure.ranges import BEYOND_END, beyond
 from mechgraph.closure.solver import closure_solver, engine_for
 from mechgraph.errors import AssemblyError, DeclarationError
@@ -214,7 +215,16 @@ def closed_start(m: Mechanism, preferred: Mapping[str, float] | None = None, tol
     ------
     AssemblyError
         with the smallest closure error found.
+    DeclarationError
+        where lengths are too far apart, unless the geometry is meant to ``tol``.
     """
+    here = _closed_start(m, preferred or {}, tol)
+    if not tol:
+        refuse_mixed_lengths(here)
+    return here
+
+
+def _closed_start(m: Mechanism, preferred: Mapping[str, float], tol: float) -> Configuration:
     if not m.has_geometry:
         bare = [p.name for p in m.pairs if not p.has_geometry]
         raise DeclarationError(
@@ -227,9 +237,9 @@ def closed_start(m: Mechanism, preferred: Mapping[str, float] | None = None, tol
         return here
     if error <= CLOSED:
         return scaled(Configuration(system, close_all(system, here.x, np.arange(0))[0]))
-    x, error = _search(m, system, x, preferred or {}, tol)
+    x, error = _search(m, system, x, preferred, tol)
     if error > max(CLOSED, tol):
-        turned = _opposite_axis(m, preferred or {}, error)
+        turned = _opposite_axis(m, preferred, error)
         best = dict(zip(m.freedom_names(), system.coordinates_of(x[:, None])[:, 0].tolist(), strict=True))
         raise AssemblyError(
             f"mechanism {m.name!r}: the loops cannot be closed near start; the smallest closure error found is {error:.3g} "
@@ -342,7 +352,9 @@ def assembled_at(
         if error > CLOSED:
             raise _not_reached(m, raw, x, error, values)
         _refuse_beyond_ends(m, raw, x, values)
-        return _state(scaled(Configuration(raw, x[:, None])))
+        here = scaled(Configuration(raw, x[:, None]))
+        refuse_mixed_lengths(here)
+        return _state(here)
     system, x = assembled(m, values)
     columns, goal = named_columns(m, system, values)
     _refuse_far(

@@ -28,8 +28,8 @@ from mechgraph.numerics.linear import (
 )
 from mechgraph.numerics.tolerances import PATH
 
-SMALL_LOOP = 0.5
-"""Size of a loop over L below which its rows are taken over it."""
+OWN_SIZE = 2.0
+"""Factor by which a loop is smaller or larger than L from which on its rows are taken over its own size."""
 TRIES = 8
 """Choices tried for a batch at most."""
 
@@ -44,8 +44,8 @@ def independent(here: Configuration, Z: Array) -> bool:
 class Form:
     """Rows turned by the orthogonal ``turn (m, m)`` so that the independent ones come first (None: all are), and a choice of those.
 
-    Before, rows are multiplied by ``scale (m,)`` (None: by one): displacements of a loop much smaller than the mechanism are taken over its
-    own size, so that the condition is that of the loop.
+    Before, rows and columns are multiplied by ``scale (m,), (F,)`` (None: by one): displacements of a loop much smaller or larger than the
+    mechanism are taken over its own size, and slides in it, so that the condition is that of the loop.
 
     The rows of a redundant loop are dependent in a way that changes as it moves; among turned rows the first ones stay independent until
     the column space has turned by a right angle, where rows picked out of them may not.
@@ -53,22 +53,36 @@ class Form:
 
     choice: Choice
     turn: Array | None
-    scale: Array | None = None
+    scale: tuple[Array, Array] | None = None
 
     def rows(self, b: Array) -> Array:
         """``turn^T scale b`` for ``b (m, k, T)``."""
-        b = b if self.scale is None else self.scale[:, None, None] * b
+        b = b if self.scale is None else self.scale[0][:, None, None] * b
         return b if self.turn is None else (self.turn.T @ b.reshape(len(b), -1)).reshape(b.shape)
 
     def back(self, y: Array) -> Array:
         """``scale turn y``."""
         y = y if self.turn is None else (self.turn @ y.reshape(len(y), -1)).reshape(y.shape)
-        return y if self.scale is None else self.scale[:, None, None] * y
+        return y if self.scale is None else self.scale[0][:, None, None] * y
+
+    def columns(self, b: Array) -> Array:
+        """Values ``b (F, k, T)`` of scaled columns: loads on them; or freedoms out of solutions for them."""
+        return b if self.scale is None else self.scale[1][:, None, None] * b
+
+    def matrix(self, J: Array) -> Array:
+        """Turned rows and scaled columns of matrices ``(m, F, T)``."""
+        J = self.rows(J)
+        return J if self.scale is None else J * self.scale[1][:, None]
+
+    def motions(self, system: ChosenSystem) -> Array:
+        """Motions ``(F, held, T)``, each with a one in the column that is held."""
+        found = self.columns(system.null_of_columns())
+        return found if self.scale is None else found / self.scale[1][self.choice.held][:, None]
 
 
-def form_at(J: Array, fixed: Index, keep: Index | None, scale: Array | None = None) -> Form:
+def form_at(J: Array, fixed: Index, keep: Index | None, scale: tuple[Array, Array] | None = None) -> Form:
     """The form chosen at one matrix ``(m, F)``: columns by pivoted QR, rows by the left singular vectors of these."""
-    J = J if scale is None else scale[:, None] * J
+    J = J if scale is None else scale[0][:, None] * J * scale[1]
     choice = choose(J, fixed, keep=keep)
     if len(choice.rows) == len(J):
         return Form(choice, None, scale)
@@ -76,15 +90,20 @@ def form_at(J: Array, fixed: Index, keep: Index | None, scale: Array | None = No
     return Form(replace(choice, rows=np.arange(len(choice.cols))), turn, scale)
 
 
-def row_scale(here: Configuration, t: int) -> Array | None:
-    """What takes displacements of loops over their own sizes ``(rows,)``: powers of two, one but for loops below half of the length L."""
-    size = lengths_of(here.system.graph, here.pair_points[:, :, t], here.middles[:, :, t])
-    if not (size < SMALL_LOOP).any():
+def own_scale(here: Configuration, t: int) -> tuple[Array, Array] | None:
+    """What takes displacements of loops over their own sizes, ``(rows,)`` and ``(F,)``, see ``Form``: powers of two.
+
+    None where all loops are of about the length L: a position may take a loop far beyond that.
+    """
+    s = here.system
+    size = lengths_of(s.graph, here.pair_points[:, :, t], here.middles[:, :, t])
+    if not ((size * OWN_SIZE < 1.0) | (size > OWN_SIZE)).any():
         return None
-    out = np.ones(len(here.residual))
-    own = np.repeat(2.0 ** np.floor(-np.log2(np.minimum(size, 1.0))), 3).reshape(-1, 3)
-    out[: 6 * len(size)].reshape(-1, 2, 3)[:, 1] = own
-    return out
+    rows, columns = np.ones(s.n_rows), np.ones(s.n_freedoms)
+    rows[: 6 * len(size)].reshape(-1, 2, 3)[:, 1] = 2.0 ** np.round(-np.log2(size))[:, None]
+    unit = np.abs(rows[:, None] * here.J[:, s.is_length, t]).max(axis=0, initial=0.0)
+    columns[s.is_length] = 2.0 ** np.round(-np.log2(np.where(unit > 0.0, unit, 1.0)))
+    return rows, columns
 
 
 class DenseFactored:
@@ -107,7 +126,7 @@ class DenseFactored:
         used = list(dict.fromkeys(which.tolist()))
         places = [np.arange(self.T)] if len(used) == 1 else [np.flatnonzero(which == i) for i in used]
         return [
-            (forms[i], at, _chosen(forms[i].rows(_at(J, at)), forms[i].choice))
+            (forms[i], at, _chosen(forms[i].matrix(_at(J, at)), forms[i].choice))
             for i, at in zip(used, places, strict=True)
         ]
 
@@ -128,12 +147,12 @@ class DenseFactored:
 
     def solve(self, b: Array) -> Array:
         """See the protocol in ``closure.solver``."""
-        found = [system.solve(form.rows(_at(b, at))) for form, at, system in self._parts]
+        found = [form.columns(system.solve(form.rows(_at(b, at)))) for form, at, system in self._parts]
         return self._joined(found, (self.freedoms, b.shape[1]))
 
     def solve_transposed(self, b: Array) -> Array:
         """See the protocol in ``closure.solver``."""
-        found = [form.back(system.solve_transposed(_at(b, at))) for form, at, system in self._parts]
+        found = [form.back(system.solve_transposed(form.columns(_at(b, at)))) for form, at, system in self._parts]
         return self._joined(found, (self.rows, b.shape[1]))
 
     def residual_size(self, r: Array) -> Array:
@@ -156,7 +175,7 @@ class DenseFactored:
     def motions(self) -> Array:
         """See the protocol in ``closure.solver``."""
         if self._motions is None:
-            found = [system.null_of_columns() for _, _, system in self._parts]
+            found = [form.motions(system) for form, _, system in self._parts]
             self._motions = self._joined(found, (self.freedoms, 0))
         return self._motions
 
@@ -169,7 +188,7 @@ class DenseFactored:
         """See the protocol in ``closure.solver``."""
         out = np.ones(self.T, dtype=bool)
         for form, at, system in self._parts:
-            matrices = [form.rows(_at(J, at)) for J in (self.J, ends.J.take(a, -1), ends.J.take(b, -1))]
+            matrices = [form.matrix(_at(J, at)) for J in (self.J, ends.J.take(a, -1), ends.J.take(b, -1))]
             if form.turn is not None:
                 # turned rows may be singular where the loop is not: the rows independent at these very positions are asked
                 matrices = _independent_rows(matrices, form.choice)
@@ -213,7 +232,7 @@ class OneFactored(DenseFactored):
         super().__init__(forms, fixed, J, which)
         self._form = form = forms[int(which[0])]
         rows, cols = form.choice.places
-        self._lu = Lu(form.rows(J)[rows][:, cols, 0])
+        self._lu = Lu(form.matrix(J)[rows][:, cols, 0])
 
     @kept
     def condition(self) -> Array:
@@ -225,13 +244,13 @@ class OneFactored(DenseFactored):
         rows, cols = self._form.choice.places
         out = np.zeros((self.freedoms, *b.shape[1:]))
         out[cols, :, 0] = self._lu.solve(self._form.rows(b)[rows, :, 0])
-        return out
+        return self._form.columns(out)
 
     def solve_transposed(self, b: Array) -> Array:
         """See the protocol in ``closure.solver``."""
         rows, cols = self._form.choice.places
         out = np.zeros((self.rows, *b.shape[1:]))
-        out[rows, :, 0] = self._lu.solve(b[cols, :, 0], transposed=True)
+        out[rows, :, 0] = self._lu.solve(self._form.columns(b)[cols, :, 0], transposed=True)
         return self._form.back(out)
 
 
@@ -244,7 +263,7 @@ def _independent_rows(matrices: list[Array], choice: Choice) -> list[Array]:
 
 def _fits(form: Form, J: Array) -> bool:
     """Whether the turned rows of a form are as independent at a matrix ``(m, F)`` as they should be."""
-    return bool(_chosen(form.rows(J[:, :, None]), form.choice).condition[0] <= PATH.fair)
+    return bool(_chosen(form.matrix(J[:, :, None]), form.choice).condition[0] <= PATH.fair)
 
 
 def _chosen(A: Array, choice: Choice) -> ChosenSystem:
@@ -328,7 +347,7 @@ class DenseSolver:
             if not poor.size:
                 break
             worst = int(poor[np.argmax(poorness[poor])])
-            self.forms.append(form_at(here.J[:, :, worst], self.fixed, None, row_scale(here, worst)))
+            self.forms.append(form_at(here.J[:, :, worst], self.fixed, None, own_scale(here, worst)))
             new = len(self.forms) - 1
             same_rank = np.array(
                 [len(self.forms[i].choice.cols) == len(self.forms[new].choice.cols) for i in which[poor]]
@@ -345,7 +364,7 @@ class DenseSolver:
     def _fitting(self, here: Configuration, t: int) -> int:
         """The number of a form for one position: one of the last where that fits as well, or one made there."""
         J = here.J[:, :, t]
-        made = form_at(J, self.fixed, self.keep, row_scale(here, t))
+        made = form_at(J, self.fixed, self.keep, own_scale(here, t))
         for i in range(len(self.forms) - 1, max(-1, len(self.forms) - 1 - TRIES), -1):
             known = self.forms[i]
             if known.choice.same(made.choice) and (known.turn is None or _fits(known, J)):

@@ -140,7 +140,7 @@ def _worded(exact: SnappedMechanism, tol: float, verdict: tuple[Any, ...]) -> Ro
     if angle > EXACT:
         meant.append(f"directions taken as meant to {np.degrees(angle):.2g} deg")
     if distance > EXACT * exact.changes.L:
-        meant.append(f"{'' if meant else 'taken as meant, '}distances to {distance:.2g} {unit}".rstrip())
+        meant.append(f"distances {'' if meant else 'taken as meant '}to {distance:.2g} {unit}".rstrip())
     kind = kind_of(closed_start(exact).S[:, :, 0]).name
     moves = f"moves (mobility {mobility})" if mobility else "is a structure (mobility 0)"
     off = {"planar": "off the normal", "spherical": "off the line through the centre"}.get(kind, "off")

@@ -130,9 +130,8 @@ class Place:
     def solution(self) -> Solution:
         """Everything at rest where the chart was laid out."""
         closed = self.closed(np.zeros((self.n, 1)))
-        trajectory, _, _ = trajectory_of(
-            self.task, self.m, np.zeros(()), [(np.zeros(1, dtype=np.intp), self.task, closed, np.zeros((self.n, 1)))]
-        )
+        block = np.zeros(1, dtype=np.intp), self.task, closed, np.zeros((self.n, 1))
+        trajectory, _, _ = trajectory_of(self.task, self.m, np.zeros(()), [block], at_rest=True)
         return Solution(trajectory)
 
     def start(self) -> dict[str, float]:

@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index, System
+from mechgraph.closure.rates import Rates, Velocities
 from mechgraph.force.applied_loads import Site, kinetic_energy
 from mechgraph.force.block import ForceTask, forces_of_block
 from mechgraph.model.mechanism import Mechanism
@@ -24,10 +26,13 @@ Block = tuple[Index, Task, Closed, Array]
 """Places, the task by which they were followed, closed states, and the rates ``v (n, T)`` of the independent columns of their factors."""
 
 
-def trajectory_of(task: Task, m: Mechanism, times: Array, blocks: Iterable[Block]) -> tuple[Trajectory, Array, Array]:
+def trajectory_of(
+    task: Task, m: Mechanism, times: Array, blocks: Iterable[Block], at_rest: bool = False
+) -> tuple[Trajectory, Array, Array]:
     """The trajectory at times (a number or ``(T,)``) from blocks of states, with kinetic and potential energy ``(T,)``.
 
     The efforts of the prescribed freedoms of ``task`` are those of drives; what else holds the tasks of the blocks acts as a load.
+    ``at_rest``: nothing moves nor is about to, also where no inertia resists.
     """
     s, t, blocks = task.system, times.reshape(-1), list(blocks)
     x = np.full((s.n_state, t.size), np.nan)
@@ -40,7 +45,7 @@ def trajectory_of(task: Task, m: Mechanism, times: Array, blocks: Iterable[Block
     for places, own, closed, v in blocks:
         # the batch of a block is its own: loads are functions of time here, not arrays over positions
         at, count, q = t[places], len(places), coordinates[:, places]
-        rates = moved(closed, v, own.prescribed_at(at)[1:], own.loads, at).rates
+        rates = _still(closed.here) if at_rest else moved(closed, v, own.prescribed_at(at)[1:], own.loads, at).rates
         idle = None if closed.held is None else closed.held.places
         force_task = ForceTask(out.method, m.loads, own.columns, own.held, (count,), at, "nan", idle)
         forces = forces_of_block(force_task, rates, closed.f, q, np.arange(count))
@@ -53,6 +58,11 @@ def trajectory_of(task: Task, m: Mechanism, times: Array, blocks: Iterable[Block
         for load in task.loads.stored:
             potential[places] += load.energy(site)
     return out, kinetic, potential
+
+
+def _still(here: Configuration) -> Rates:
+    nothing = np.zeros((here.system.n_freedoms, here.T))
+    return Rates(Velocities(here, nothing), nothing, np.zeros(here.T))
 
 
 def _same(system: System, places: Any) -> System:

@@ -93,6 +93,29 @@ def test_chains_open_at_the_start(seed):
     assert_engines_agree(m.replace(drives=[able[0]]), {able[0]: np.linspace(0.0, 0.2, 2)})
 
 
+def tangent_mechanism():
+    """An arm about the origin, a block that slides along it, pinned to a slider on the line x = 1."""
+    pairs = [
+        mg.Pair("A", "R", "frame", "arm", point=(0, 0, 0), axis=Z),
+        mg.Pair("B", "P", "arm", "block", point=(1, 0, 0), axis=(1, 0, 0)),
+        mg.Pair("C", "R", "block", "slider", point=(1, 0, 0), axis=Z),
+        mg.Pair("D", "P", "frame", "slider", point=(1, 0, 0), axis=(0, 1, 0)),
+    ]
+    return mg.Mechanism("tangent", None, pairs, ["A"])
+
+
+@pytest.mark.parametrize("engine", ["dense", pytest.param("sparse", marks=pytest.mark.slow)])
+def test_slides_that_grow_without_bound(engine):
+    """``D = tan A``: no dead point lies before a right angle, and behind it nothing is reached."""
+    a = np.array([1.5, 1.57, 1.5707, 2.0])
+    with pytest.raises(mg.ReachError, match=r"B\.Tz = [\d.]+, D\.Tz = [\d.]+, growing without bound") as error:
+        mg.kinematics(tangent_mechanism(), {"A": mg.Motion(a, 1.0)}, engine=engine)
+    s = error.value.solution
+    assert s.status.tolist() == ["ok"] * 3 + ["out of reach"]
+    np.testing.assert_allclose(s["D"].position[:3, 0], np.tan(a[:3]), rtol=1e-11)
+    np.testing.assert_allclose(s["D"].velocity[:3, 0], 1 / np.cos(a[:3]) ** 2, rtol=1e-9)
+
+
 # --- what random mechanisms found, one by one -------------------------------------------------------------------------------
 
 
