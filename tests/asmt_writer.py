@@ -66,6 +66,7 @@ class Writer:
         self.name, self.at = name, np.eye(4) if at is None else at
         self.parts, self.markers, self.poses = {}, {name: []}, {name: self.at}
         self.joints, self.motions, self.limits, self.forces = [], [], [], []
+        self.variables, self.assemblies, self.general = [], [], []
         self.gravity, self.simulation, self.results = np.zeros(3), (0.0, 1.0, 0.1), []
 
     def part(self, name, X, mass=0.0, center=(0, 0, 0), axes=None, moments=(0, 0, 0)):
@@ -92,17 +93,23 @@ class Writer:
         pairs = [[text] if k % 2 else text for k, text in enumerate(formulas)]
         self.motions += [kind, ["Name", [name], "MotionJoint", [f"/{self.name}/{joint}"], *pairs]]
 
-    def text(self):
+    def body(self, name, X):
+        """The lines of the assembly of that name, standing at X."""
         parts = []
-        for name, mass in self.parts.items():
-            refs = [line for m in self.markers[name] for line in m]
-            parts += ["Part", ["Name", [name], *placed(self.poses[name]), "Velocity3D", np.zeros(3), "FeatureOrder",
+        for part, mass in self.parts.items():
+            refs = [line for m in self.markers[part] for line in m]
+            parts += ["Part", ["Name", [part], *placed(self.poses[part]), "Velocity3D", np.zeros(3), "FeatureOrder",
                       *mass, "RefPoints", refs, "RefCurves", "RefSurfaces"]]  # fmt: skip
+        return ["Notes", ["(Text string: '')"], "Name", [name], *placed(X), "RefPoints",
+            [line for m in self.markers[self.name] for line in m], "RefCurves", "RefSurfaces", "Parts", [*parts, *self.assemblies],
+            "Variables", self.variables, "KinematicIJs",
+            "ConstraintSets", ["Joints", self.joints, "Motions", self.motions, "Limits", self.limits,
+             "GeneralConstraintSets", self.general],
+            "ForceTorques", self.forces]  # fmt: skip
+
+    def text(self):
         start, end, step = self.simulation
-        body = lines_of(1, "Notes", ["(Text string: '')"], "Name", [self.name], *placed(self.at), "RefPoints",
-            [line for m in self.markers[self.name] for line in m], "RefCurves", "RefSurfaces", "Parts", parts, "KinematicIJs",
-            "ConstraintSets", ["Joints", self.joints, "Motions", self.motions, "Limits", self.limits, "GeneralConstraintSets"],
-            "ForceTorques", self.forces, "ConstantGravity", self.gravity, "SimulationParameters",
+        body = lines_of(1, *self.body(self.name, self.at), "ConstantGravity", self.gravity, "SimulationParameters",
             ["tstart", np.array([start]), "tend", np.array([end]), "hout", np.array([step])])  # fmt: skip
         return "\n".join(["OndselSolver", "Assembly", *body, *self.results]) + "\n"
 

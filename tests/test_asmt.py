@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy
 from asmt_writer import KINDS, Writer, lines_of, random_pose, written
 from typer.testing import CliRunner
 
@@ -805,3 +806,187 @@ def test_a_force_along_a_line_of_a_file_pulls_its_markers_together(tmp_path, ten
 )
 def test_a_force_along_a_line_that_is_none_is_named(tmp_path, tension, twist, words):
     assert re.search(words, refused(tmp_path, sprung(tension, twist).text()))
+
+
+# --- joints of constant velocity, motions in several freedoms, variables, assemblies within assemblies ------------------
+
+
+def shafts(bend, quarter=False):
+    """Two shafts along z of their markers, which leave the joint at the origin, the second bent about x; the first is driven."""
+    w = Writer()
+    out = at(0, 0, rx=np.pi + bend)
+    X, Y = at(0, 0, angle=0.4), out @ at(0, 0, angle=-0.4)  # Y turned half round about its x is X, bent
+    w.part("one", X, 1.0, (0, 0, -0.1), moments=(1, 2, 2.5))
+    w.part("two", Y, 1.0, (0, 0, 0.1), moments=(1, 2, 2.5))
+    w.joint("RevoluteJoint", "A", w.name, at(0, 0), "one", X)
+    w.joint("CylindricalJoint", "B", w.name, out, "two", Y)
+    w.joint("ConstantVelocityJoint", "J", "one", X, "two", Y @ at(0, 0, angle=np.pi * quarter))
+    w.motion("RotationalMotion", "drive", "A", "RotationZ", "0.4+2*time")
+    return w
+
+
+@pytest.mark.parametrize(("bend", "quarter"), [(0.0, False), (0.5, False), (0.5, True), (-1.2, False)])
+def test_a_joint_of_constant_velocity_hands_on_a_constant_speed(tmp_path, bend, quarter):
+    """The condition of the solver, ``x_I . y_J + y_I . x_J = 0``, at every position, and equal speeds about axes that leave the joint."""
+    made, _ = loaded(tmp_path, shafts(bend, quarter).text())
+    s = mg.solve(made, redundant="minimum_norm")
+    X, Y = s.link("one").pose[:, :3, :3], s.link("two").pose[:, :3, :3]
+    condition = (X[:, :, 0] * Y[:, :, 1]).sum(1) + (X[:, :, 1] * Y[:, :, 0]).sum(1)
+    assert np.abs(condition).max() < 1e-12
+    assert (s.link("one").angular_velocity * X[:, :, 2]).sum(1) == pytest.approx(2.0)
+    assert (s.link("two").angular_velocity * Y[:, :, 2]).sum(1) == pytest.approx(-2.0)
+    assert (s.link("two").angular_acceleration * Y[:, :, 2]).sum(1) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_joint_of_constant_velocity_has_two_freedoms_and_takes_a_moment(tmp_path):
+    w = shafts(0.5)
+    w.joints, w.motions = w.joints[4:], []
+    w.joint("FixedJoint", "A", w.name, at(0, 0), "one", at(0, 0))
+    made, _ = loaded(tmp_path, w.text())
+    assert mg.check(made).mobility == 2
+
+
+def test_markers_of_a_joint_of_constant_velocity_that_look_the_same_way_are_named(tmp_path):
+    w = four_bar()
+    w.joint("ConstantVelocityJoint", "J", "frame", at(1, 2), "crank", at(1, 2, angle=0.3))
+    assert "z of both markers points the same way" in refused(tmp_path, w.text())
+
+
+def general(w, name, i, j, order, *formulas):
+    keys = ["rIJI1", "rIJI2", "rIJI3", "angIJJ1", "angIJJ2", "angIJJ3"]
+    lines = [part for key, text in zip(keys, formulas, strict=True) for part in (key, [text])]
+    w.motions += ["GeneralMotion", ["Name", [name], "MarkerI", [i], "MarkerJ", [j], *lines, "RotationOrder", [order]]]
+
+
+TURNS = {"1 2 3": "XYZ", "3 1 3": "ZXZ", "2 1 3": "YXZ"}
+
+
+@pytest.mark.parametrize("order", TURNS)
+@pytest.mark.parametrize("held", ["ball", "nothing", "ball the other way round", "ball in a groove"])
+def test_a_general_motion_prescribes_turns_in_their_order(tmp_path, held, order):
+    """The rotation of J in I is the product of three turns, here multiplied by another library."""
+    w = Writer()
+    turn = scipy.spatial.transform.Rotation.from_euler(TURNS[order], [0.2, 0.7, -0.3]).as_matrix()
+    J = at(0.1, 0.2, 0.3)
+    J[:3, :3] = turn
+    w.part("body", at(0, 0), 1.0, (0, 0, 0.1), moments=(1, 2, 2.5))
+    ends = (w.name, at(0.1, 0.2, 0.3), "body", J)
+    back, groove = held == "ball the other way round", held == "ball in a groove"
+    if held == "nothing":
+        i, j = w.marker(w.name, "mi", at(0.1, 0.2, 0.3)), w.marker("body", "mj", J)
+    elif back:
+        j, i = w.joint("SphericalJoint", "S", *ends[2:], *ends[:2])
+    else:
+        i, j = w.joint("PointInLineJoint" if groove else "SphericalJoint", "S", *ends)
+    general(w, "M", i, j, order, "0", "0", "0.1*time" if groove else "0", "0.2+time", "0.7", "time^2-0.3")
+    made, _ = loaded(tmp_path, w.text(), silent=held != "nothing")
+    s = mg.kinematics(made)
+    t = made.drives[0].motion.t
+    angles = np.stack([0.2 + t, 0.7 + 0 * t, t**2 - 0.3], axis=1)
+    expected = scipy.spatial.transform.Rotation.from_euler(TURNS[order], angles).as_matrix() @ turn.T
+    assert s.link("body").pose[:, :3, :3] == pytest.approx(expected, abs=1e-9)
+    assert s.link("body").point((0.1, 0.2, 0.3))[0][:, 2] == pytest.approx(0.3 + 0.1 * t * groove)
+
+
+def test_what_a_general_motion_cannot_say_is_named(tmp_path):
+    w = Writer()
+    w.part("body", at(0, 0))
+    i, j = w.joint("PlanarJoint", "E", w.name, at(0, 0), "body", at(0, 0))
+    general(w, "M", j, i, "1 2 3", "time", "0", "0", "0", "0", "time")
+    general(w, "N", i, j, "1 2", "time", "0", "0", "0", "0", "time")
+    message = refused(tmp_path, w.text())
+    assert "GeneralMotion 'M': names the markers of 'E' the other way round" in message
+    assert "GeneralMotion 'N': RotationOrder '1 2': expected three" in message
+
+
+@pytest.mark.parametrize("block", [False, True], ids=["lines", "blocks"])
+def test_formulas_may_use_the_variables_of_the_file(tmp_path, block):
+    """Variables in any order, by each other and by time; a block has its name and its formula in lines of their own."""
+    w = sprung("K1*(rIJ(self) - L0) + w")
+    entries = [("K1", "10.0d*L0*100"), ("W", "2*time^2"), ("L0", "0.1d")]
+    w.variables = [
+        part
+        for name, text in entries
+        for part in (["Variable", ["Name", [name], "Expression", [text]]] if block else [name, [text]])
+    ]
+    w.motions[-1][-1] = ["0.1*w/L0"]
+    made, _ = loaded(tmp_path, w.text())
+    s = mg.solve(made)
+    t = made.drives[0].motion.t
+    r = 0.3 + 2 * t**2
+    assert s.link("one").pose[:, 0, 3] == pytest.approx(r)
+    assert s["Pone"].effort[:, 0] == pytest.approx(
+        100 * (r - 0.1) + 2 * t**2 + 4.0, rel=1e-12
+    )  # the mass of 1, 4 m/s^2
+
+
+@pytest.mark.parametrize(
+    ("variables", "words"),
+    [
+        (["K", ["L"], "L", ["K"]], "variable 'k' is defined by itself"),
+        (["K", ["1"], "k", ["2"]], r"line \d+: variable 'k': is defined twice"),
+        (["time", ["1"]], "variable 'time': is no name for a variable"),
+        (["2K", ["1"]], "variable '2K': is no name"),
+        (["K"], "variable 'K': expected one formula"),
+        (["Variable", ["Name", ["K"], "Value", ["1"], "Unit", ["m"]]], "variable 'K': expected one formula"),
+        (["L", ["1"]], r"'k' is not known in a formula \(known: time, pi, .*\bl\b"),
+    ],
+)
+def test_variables_at_fault_are_named(tmp_path, variables, words):
+    w = sprung("K*rIJ(self)")
+    w.variables = variables
+    assert re.search(words, refused(tmp_path, w.text()))
+
+
+def within(place):
+    """A slide that carries an assembly within the assembly, standing at ``place`` on it: an arm on a pivot, driven both."""
+    w, inner = Writer(), Writer("Assembly1/Inner")
+    x = np.array([[0.0, 0, 1, 0], [0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1]])
+    w.part("slide", at(0.3, 0.4), 1.0, (0, 0, 0.1), moments=(1, 2, 2.5))
+    w.joint("TranslationalJoint", "P", w.name, x, "slide", x)
+    w.motion("TranslationalMotion", "push", "P", "TranslationZ", "0.5*time^2")
+    inner.part("arm", at(0.5, 0.0), 2.0, (0.1, 0, 0), moments=(0.1, 0.2, 0.3))
+    inner.joint("RevoluteJoint", "J", inner.name, at(0, 0), "arm", at(0, 0))
+    inner.motion("RotationalMotion", "M", "J", "RotationZ", "2*time")
+    w.joint("FixedJoint", "hold", "slide", place, "slide", place)
+    w.joints[-1][-1] = [inner.marker(inner.name, "foot", at(0, 0))]
+    w.assemblies = ["Assembly", inner.body("Inner", place)]
+    return w
+
+
+def test_an_assembly_within_an_assembly_brings_its_parts_joints_and_motions(tmp_path):
+    """The arm turns with 2 rad/s about a pivot that is pushed with 1 m/s^2: its mass centre and the moment about the pivot by hand."""
+    place = at(0.3, 0.4, 0.1, 0.7)
+    made, notes = loaded(tmp_path, within(place).text(), silent=False)
+    assert any("assembly 'Inner' on line" in note and "its own parts stand in its frame" in note for note in notes)
+    assert {link.name for link in made.links} == {"Assembly1", "slide", "Inner", "Inner/arm"}
+    s = mg.solve(made)
+    t = made.drives[0].motion.t
+    arm = 0.6 * np.exp(1j * (0.7 + 2 * t))
+    center = s.link("Inner/arm").center
+    assert center == pytest.approx(np.stack([0.3 + 0.5 * t**2 + arm.real, 0.4 + arm.imag, 0.1 + 0 * t], axis=1))
+    assert s["Inner/J"].effort[:, 0] == pytest.approx(2.0 * -arm.imag)  # m a, by its lever
+
+
+def test_what_is_mass_marker_to_a_part_is_a_marker(tmp_path):
+    w = Writer()
+    w.part("ball", at(0.3, 0.4), 1.0, (0, 0.2, 0.1), moments=(1, 2, 2.5))
+    w.joint("SphericalJoint", "S", w.name, at(0.3, 0.6, 0.1), "ball", at(0, 0))
+    w.joints[-1][-1] = ["/Assembly1/ball/MassMarker"]
+    made, notes = loaded(tmp_path, w.text())
+    assert marker_of(made, "S") == pytest.approx((0, 0.2, 0.1))
+
+
+def marker_of(made, pair):
+    """Where the marker of a pair stands on its second link."""
+    return next(p for p in made.pairs if p.name == pair).markers[1].point
+
+
+def test_blocks_and_constraints_that_are_not_known_are_named(tmp_path):
+    w = four_bar()
+    w.general += ["CurveCurveContact", ["Name", ["cam"]]]
+    assert re.search(r"line \d+: CurveCurveContact 'cam': its curves .* 'Kc'", refused(tmp_path, w.text()))
+    w.general = []
+    text = w.text().replace("\tKinematicIJs\n", "\tSensors\n\t\tSensor\n\tKinematicIJs\n")
+    _, notes = loaded(tmp_path, text, silent=False)
+    assert re.search(r"block Sensors on line \d+ was not read", notes[0])

@@ -105,3 +105,55 @@ def test_named_points_are_drawn() -> None:
     texts = [text.get_text() for text in draw_skeleton(arm()).texts]
     assert "arm.hook" in texts
     assert "frame.wall" in texts
+    s = mg.kinematics(arm(), {"A": np.linspace(0, 2, 9)})
+    for traces in (True, ["arm.hook"]):
+        drawn = {line.get_gid(): line for line in draw_skeleton(s, traces=traces).collections}
+        (path,) = drawn["trace of arm.hook"].get_segments()
+        np.testing.assert_allclose(path, s.link("arm").at("hook").position[:, :2], atol=1e-12)
+        assert "trace of frame.wall" not in drawn  # it stands still
+    with pytest.raises(
+        mg.DeclarationError, match=r"no pair or named point 'arm\.tip'; there are: frame\.wall, arm\.hook, A"
+    ):
+        draw_skeleton(s, traces=["arm.tip"])
+
+
+def test_coordinates_of_named_points_are_parameters_and_motions_outputs() -> None:
+    """The force at the hook has the moment 7 x at q = 0; where the hook is, and how fast, is told by its name."""
+    m = arm(loads=[mg.Wrench("arm", force=(0, -7, 1), point="hook")])
+    outputs = ["A.effort", "arm.hook", "arm.hook.velocity"]
+    motions = {"A": mg.Motion(np.zeros(1), velocity=2.0)}
+    study = mg.study(m, {"arm.hook.x": [2.0, 3.0, 5.0]}, outputs, n=3, motions=motions, sampling="grid")
+    np.testing.assert_allclose(study.outputs["A.effort"].ravel(), [14.0, 21.0, 35.0])
+    np.testing.assert_allclose(study.outputs["arm.hook"][:, 0], [(2, 4, 0), (3, 4, 0), (5, 4, 0)])
+    np.testing.assert_allclose(study.outputs["arm.hook.velocity"][:, 0], [(-8, 4, 0), (-8, 6, 0), (-8, 10, 0)])
+    with pytest.raises(mg.DeclarationError, match=r"'arm\.hok\.x'.*did you mean arm\.hook\.x"):
+        mg.study(m, {"arm.hok.x": [2.0]}, outputs, n=1, motions=motions)
+
+
+def two(tip: float = 2.0) -> mg.Mechanism:
+    """Two bars of length 1 and, with its tip, ``tip - 1``."""
+    return mg.Mechanism(
+        "two", links=[mg.Link("g"), mg.Link("one"), mg.Link("two", points={"tip": (tip, 0, 0)})],
+        pairs=[mg.Pair("A", "R", "g", "one", point=(0, 0, 0), axis=Z), mg.Pair("B", "R", "one", "two", point=(1, 0, 0), axis=Z)],
+        start={"A": 0.5, "B": -1.0},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["tip", "two.tip.x"])
+def test_prescribed_motion_of_a_point_that_differs_between_variants(name: str) -> None:
+    """The tip goes where it is asked to be, at a distance of 1.2: the angle between the bars by the cosine."""
+    of, tips = two if name == "tip" else two(), [1.8, 2.0, 2.3]
+    motions = {"two.tip": np.array([[1.2, 0.0, 0.0]])}
+    study = mg.study(of, {name: tips}, ["B.position", "two.tip"], n=3, motions=motions, sampling="grid")
+    r = np.array(tips) - 1
+    np.testing.assert_allclose(np.cos(study.outputs["B.position"].ravel()), (1.44 - 1 - r**2) / (2 * r), atol=1e-9)
+    np.testing.assert_allclose(study.outputs["two.tip"][:, 0], np.tile((1.2, 0, 0), (3, 1)), atol=1e-9)
+
+
+def test_coordinates_of_named_points_are_parameters_of_a_compiled_mechanism(compiled: None) -> None:
+    m = arm(loads=[mg.Wrench("arm", force=(0, -7, 1), point="hook")])
+    c = mg.compile(m)
+    assert c(0.0) == pytest.approx([21.0])
+    assert c.gradient("A.effort", ["arm.hook.x"]) == pytest.approx(7.0)
+    c.parameters["arm.hook.x"] = 5.0
+    assert c(0.0) == pytest.approx([35.0])

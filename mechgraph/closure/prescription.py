@@ -132,6 +132,14 @@ def coordinates(pair: Pair, poses: Array) -> Array:
     return np.concatenate([np.moveaxis(D[..., :3, 3], -1, 0), turned])
 
 
+def _placed(pair: Pair, m: Mechanism) -> Pair:
+    """A free pair at the point for which it was made, where that is in a mechanism: variants may have it elsewhere."""
+    own, start = m.link(pair.b).points, f"{pair.b}."
+    name = pair.name.removeprefix(start).rstrip("'") if pair.name.startswith(start) else ""
+    at = own.get(name)
+    return pair if at is None else pair.replace(on_b=Marker(at, pair.markers[1].axis, pair.markers[1].second))
+
+
 def _axes(pair: Pair) -> Array:
     """The axes of the three turns of a free pair as columns."""
     return np.array([freedom.twist[:3] for freedom in pair.type.freedoms[3:]]).T
@@ -152,7 +160,7 @@ class Prescription:
     known: tuple[Pair, ...] = ()
 
     def __post_init__(self) -> None:
-        self.free: dict[str, Pair] = {pair.name: pair for pair in self.known}
+        self.free: dict[str, Pair] = {pair.name: _placed(pair, self.m) for pair in self.known}
         self.motions: dict[str, Motion] = {}
 
     def add(self, name: str, value: Any) -> None:

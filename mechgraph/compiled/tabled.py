@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -16,7 +16,9 @@ from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.closure.indexing import System
 from mechgraph.errors import DeclarationError, listed
 from mechgraph.kernel.tables import Integers, Layout, layout, tables
+from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.parameters import Declared, declared
 from mechgraph.pipeline import Pipeline
 from mechgraph.quantities import shown
 from mechgraph.structure.snapping import meant
@@ -123,14 +125,22 @@ class Tabled:
             return self.P[None]
         rows = np.array(np.broadcast_arrays(*np.atleast_1d(*values.values(), 0.0)), dtype=float)[:-1]
         variants = varied(self.m, {name: self.fields[name] for name in values}, rows)
-        for i in np.flatnonzero(~variants.valid()) if checked else ():
+        alone = any(field.one_by_one for field, _ in variants.own)
+        for i in np.flatnonzero(~variants.valid()) if checked and not alone else ():
             variants.one(int(i))  # says why
             raise DeclarationError(
                 f"parameters of {self.m.name!r}", [f"no mechanism has these numbers: {listed(values)}"]
             )
+        if alone:
+            made = [variants.one(i) for i in range(variants.count)]
+            return np.concatenate([self._table(m, declared(m), m.loads, 1) for m in made])
+        return self._table(self.m, variants.numbers, variants.loads, variants.count)
+
+    def _table(self, m: Mechanism, numbers: Declared, loads: Sequence[Load], count: int) -> Array:
+        """``P (count, numbers)`` of variants of a mechanism."""
         par = self.system.par
-        system = System(self.m, self.system.graph, variants.numbers.parameters(self.m, par.offset, par.origin, par.L))
-        found = tables(self.layout, system, np.tile(self.x[:, None], rows.shape[1]), variants.loads)
+        system = System(m, self.system.graph, numbers.parameters(m, par.offset, par.origin, par.L))
+        found = tables(self.layout, system, np.tile(self.x[:, None], count), tuple(loads))
         assert found is not None
         return found[1]
 

@@ -2,8 +2,10 @@
 
 The format is that of FreeCAD's Assembly workbench and its solver (OndselSolver 2023 to 2026, class names ASMT...): an indented text whose
 first line names the program; `Position3D` and `RotationMatrix` place a part in the assembly, a `RefPoint` in its part and a `Marker` in
-its RefPoint, the rows of a matrix one below the other; a `PrincipalMassMarker` has the mass centre, the principal directions as columns
-and the principal moments; joints and motions name markers by path, `/Assembly/Part/Marker`. Joints hold marker J to marker I.
+its RefPoint, the rows of a matrix one below the other; a `PrincipalMassMarker`, which is a marker too, has the mass centre, the principal
+directions as columns and the principal moments; joints and motions name markers by path, `/Assembly/Part/Marker`. Joints hold marker J to
+marker I. `Variables` have names and formulas. An `Assembly` among the parts is a part of its own and brings its parts, placed in its frame,
+its joints, motions, limits and forces; what is of it has its name before its own, `Inner/Part`.
 """
 
 from __future__ import annotations
@@ -17,6 +19,8 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array, compose
 from mechgraph.errors import DeclarationError, FileError
+from mechgraph.exchange.asmt_joints import REFUSED
+from mechgraph.exchange.formula import is_name
 from mechgraph.exchange.indented import Node, numbers_of, tree_of
 from mechgraph.model.sweep import LONGEST_SWEEP
 from mechgraph.quantities import shown
@@ -26,6 +30,14 @@ NOT_A_ROTATION = 1e-3
 """Largest entry of ``R^T R - 1`` of a rotation matrix of few digits; it is made orthogonal."""
 IN_LINE = "InLineForceTorque"
 """The force that is read."""
+CONNECTIONS = ("Joints", "Motions", "Limits", "ForceTorques")
+"""Blocks of what stands between two markers; the last one stands beside the others' block."""
+SECTIONS = (
+    "Notes", "Name", "Position3D", "RotationMatrix", "Velocity3D", "Omega3D", "RefPoints", "RefCurves", "RefSurfaces", "Parts",
+    "Assemblies", "Variables", "KinematicIJs", "ConstraintSets", "ForceTorques", "ConstantGravity", "SimulationParameters",
+    "AnimationParameters", "PrincipalMassMarker",
+)  # fmt: skip
+"""Blocks of an assembly that are read, or say nothing of how it moves."""
 RESULTS = "TimeSeries"
 """The line from which on results stand."""
 
@@ -83,6 +95,7 @@ class Assembly:
     limits: Sequence[Connection]
     forces: Sequence[Connection]
     gravity: Array
+    variables: Mapping[str, str]
     times: Array
     results: Sequence[str]
     results_line: int
@@ -105,6 +118,9 @@ class Reader:
         self.faults: list[str] = []
         self.notes: list[str] = []
         self.markers: dict[str, Marker] = {}
+        self.parts: dict[str, Part] = {}
+        self.variables: dict[str, str] = {}
+        self.connected: dict[str, list[Connection]] = {key: [] for key in CONNECTIONS}
         self.stem = path.stem
 
     def pose(self, node: Node, where: str) -> Array:
@@ -122,22 +138,21 @@ class Reader:
         u, _, vt = np.linalg.svd(R)
         return np.column_stack([u @ vt if error > 1e-15 else R, position])
 
-    def container(self, node: Node, name: str, path: str) -> Part:
-        """A part with its mass data; its markers are noted."""
+    def container(self, node: Node, name: str, path: str, within: Array) -> Part:
+        """A part with its mass data, placed ``within`` a frame; its markers are noted."""
         where = f"part {shown(name)}"
         for point in node.under("RefPoints"):
             at = self.pose(point, f"{where}: RefPoint")
             for entry in point.under("Markers"):
-                marker = entry.word("Name")
-                full = f"{path}/{marker}"
-                if full in self.markers:
-                    self.faults.append(f"line {entry.line}: two markers are named {full}")
-                self.markers[full] = Marker(full, name, compose(at, self.pose(entry, f"marker {full}")))
+                marker = f"{path}/{entry.word('Name')}"
+                self.marker(entry, marker, name, compose(at, self.pose(entry, f"marker {marker}")))
         mass = node.child("PrincipalMassMarker")
-        pose = self.pose(node, where)
+        pose = compose(within, self.pose(node, where))
         if mass is None:
             return Part(name, path, pose, line=node.line)
         axes = self.pose(mass, f"{where}: PrincipalMassMarker")
+        if mass.word("Name"):
+            self.marker(mass, f"{path}/{mass.word('Name')}", name, axes)
         weight = float(mass.numbers("Mass", (1,), where, self.faults)[0])
         moments = mass.numbers("MomentOfInertias", (3,), where, self.faults)
         if weight < 0:
@@ -146,8 +161,14 @@ class Reader:
         placeholder = weight == 1.0 and bool((moments == 1.0).all())
         return Part(name, path, pose, weight, axes[:, 3], (inertia + inertia.T) / 2, placeholder, node.line)
 
-    def connections(self, entries: Sequence[Node]) -> list[Connection]:
-        """Joints, motions or limits; those without a name of their own get one."""
+    def marker(self, node: Node, path: str, part: str, pose: Array) -> None:
+        """Notes a marker."""
+        if path in self.markers:
+            self.faults.append(f"line {node.line}: two markers are named {path}")
+        self.markers[path] = Marker(path, part, pose)
+
+    def connections(self, entries: Sequence[Node], within: str) -> list[Connection]:
+        """Joints, motions, limits or forces of an assembly; those without a name of their own get one."""
         found: dict[str, Connection] = {}
         taken = {entry.word("Name") for entry in entries}
         for k, entry in enumerate(entries, 1):
@@ -159,8 +180,58 @@ class Reader:
                 self.notes.append(f"{entry.text} on line {entry.line} {why} and is called {name!r}")
                 taken.add(name)
             i, j, joint = (entry.word(key) for key in ("MarkerI", "MarkerJ", "MotionJoint"))
-            found[name] = Connection(entry.text, name, i, j, joint, entry)
+            found[name] = Connection(entry.text, within + name, i, j, joint, entry)
         return list(found.values())
+
+    def assembly(self, node: Node, ground: Part) -> None:
+        """Parts, variables, joints, motions, limits and forces of an assembly, and of the assemblies within it."""
+        within = "" if node is self.top else f"{ground.name}/"
+        for entry in (*node.under("Parts"), *node.under("Assemblies")):
+            label = entry.word("Name")
+            name = within + label
+            if not label or name in self.parts or name == ground.name:
+                why = "has no name" if not label else f"has the name {name!r}, which is taken"
+                self.faults.append(f"line {entry.line}: a part {why}")
+            frame = ground.pose if within else np.eye(3, 4)
+            part = self.parts[name] = self.container(entry, name, f"{ground.path}/{label}", frame)
+            if entry.text == "Assembly":
+                self.notes.append(f"assembly {name!r} on line {entry.line} is a part; its own parts stand in its frame")
+                self.assembly(entry, part)
+        for entry in node.under("Variables"):
+            self.variable(entry)
+        self.between(node, within)
+        for other in (child for child in node.children if child.children and child.text not in SECTIONS):
+            self.notes.append(f"block {other.text} on line {other.line} was not read")
+
+    def between(self, node: Node, within: str) -> None:
+        """Joints, motions, limits and forces of an assembly; constraints and forces of other kinds are faults."""
+        sets = node.child("ConstraintSets") or Node("", 0)
+        for other in (entry for key in sets.children if key.text not in CONNECTIONS for entry in key.children):
+            why = REFUSED.get(other.text, "not known here")
+            self.faults.append(f"line {other.line}: {other.text} {shown(other.word('Name'))}: {why}")
+        forces = node.under(CONNECTIONS[-1])
+        for force in (other for other in forces if other.text != IN_LINE):
+            self.faults.append(
+                f"line {force.line}: {force.text} {shown(force.word('Name'))}: forces are not read from FreeCAD files; delete it there "
+                "and give the load in Python (mg.Spring, mg.Wrench, mg.Effort)"
+            )
+        lists = [*(sets.under(key) for key in CONNECTIONS[:-1]), [force for force in forces if force.text == IN_LINE]]
+        for key, entries in zip(CONNECTIONS, lists, strict=True):
+            self.connected[key] += self.connections(entries, within)
+
+    def variable(self, node: Node) -> None:
+        """A variable: its name with the formula below it, or a block of ``Name`` and one other line with the formula below."""
+        others = [child for child in node.children if child.text != "Name"]
+        named = node.word("Name") if len(others) < len(node.children) else ""
+        name, formulas = (named, others[0].children if others else []) if named else (node.text, node.children)
+        key = name.lower()
+        if len(formulas) != 1 or (named and len(others) != 1):
+            self.faults.append(f"line {node.line}: variable {shown(name)}: expected one formula")
+        elif key in self.variables or not is_name(name):
+            why = "is defined twice" if key in self.variables else "is no name for a variable"
+            self.faults.append(f"line {node.line}: variable {shown(name)}: {why}")
+        else:
+            self.variables[key] = formulas[0].text
 
     def times(self) -> Array:
         """Times from tstart to tend in steps of hout."""
@@ -182,29 +253,15 @@ class Reader:
             with all faults of the file.
         """
         name = self.top.word("Name") or self.stem
-        ground = self.container(self.top, name, f"/{name}")
-        parts: dict[str, Part] = {}
-        for entry in self.top.under("Parts"):
-            label = entry.word("Name")
-            if not label or label in parts or label == name:
-                why = "has no name" if not label else f"has the name {label!r}, which is taken"
-                self.faults.append(f"line {entry.line}: a part {why}")
-            parts[label] = self.container(entry, label, f"/{name}/{label}")
-        sets = self.top.child("ConstraintSets") or Node("", 0)
-        forces = self.top.under("ForceTorques")
-        for force in (other for other in forces if other.text != IN_LINE):
-            self.faults.append(
-                f"line {force.line}: {force.text} {shown(force.word('Name'))}: forces are not read from FreeCAD files; delete it there "
-                "and give the load in Python (mg.Spring, mg.Wrench, mg.Effort)"
-            )
+        ground = self.container(self.top, name, f"/{name}", np.eye(3, 4))
+        self.assembly(self.top, ground)
         gravity = np.zeros(3)
         if self.top.child("ConstantGravity") is not None:
             gravity = self.top.numbers("ConstantGravity", (3,), "assembly", self.faults)
-        joints, motions, limits = (self.connections(sets.under(key)) for key in ("Joints", "Motions", "Limits"))
-        in_line = self.connections([force for force in forces if force.text == IN_LINE])
+        joints, motions, limits, forces = self.connected.values()
         made = Assembly(
-            name, ground, parts, self.markers, joints, motions, limits, in_line,
-            gravity, self.times(), self.results, self.results_line, self.notes,
+            name, ground, self.parts, self.markers, joints, motions, limits, forces,
+            gravity, self.variables, self.times(), self.results, self.results_line, self.notes,
         )  # fmt: skip
         if self.faults:
             raise DeclarationError(f"assembly {shown(name)}", self.faults)

@@ -26,8 +26,8 @@ def force(builder: Standing, found: Connection) -> Spring | ForceLaw | None:
     if ends is None:
         return None
     try:
-        tension = law(found.node.word("tension"))
-        if law(found.node.word("twist") or "0")(*LOOKED_AT).any():
+        tension = law(found.node.word("tension"), builder.assembly.variables)
+        if law(found.node.word("twist") or "0", builder.assembly.variables)(*LOOKED_AT).any():
             builder.faults.append(
                 f"{found.title}: twist: a couple about the line of two points is no load here; delete it there"
             )

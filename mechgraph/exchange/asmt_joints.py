@@ -117,12 +117,27 @@ def at_angle(angle: float) -> PairType:
     return PairType("Angle", "z axes at a constant angle", freedoms=[*SLIDES, "Rz", axis])
 
 
-def motion_type(turns: str) -> str | PairType:
+def turns_in(order: str) -> list[Freedom]:
+    """Turns about axes in some order, ``zxz``; an axis that comes again has the freedom ``Rz2``."""
+    found: list[Freedom] = []
+    for k, axis in enumerate(order):
+        twist = [0.0] * 6
+        twist["xyz".index(axis)] = 1.0
+        found.append(Freedom(f"R{axis}{order[: k + 1].count(axis)}".removesuffix("1"), tuple(twist)))  # type: ignore[arg-type]
+    return found
+
+
+def motion_type(order: str) -> str | PairType:
     """A pair without any reaction, for a motion between markers that no joint connects: slides along the axes of I, then turns in order."""
-    if turns == "xyz":
+    if order == "xyz":
         return "Fr"
-    names = [*SLIDES, *(f"R{axis}" for axis in turns)]
-    return PairType(f"Motion{turns}", HELD_BY_MOTION, freedoms=names, reactions=[])
+    return PairType(f"Motion{order}", HELD_BY_MOTION, freedoms=[*SLIDES, *turns_in(order)], reactions=[])
+
+
+def ball_type(row: Row, order: str) -> PairType:
+    """The pair of a ball in its seat, groove or on its plane whose rotation is turns in order, so that a motion can drive them."""
+    slides = [name for name, is_free in zip(SLIDES, row.slides, strict=True) if is_free]
+    return PairType(f"{row.type}{order}", "ball that turns in order", freedoms=[*slides, *turns_in(order)])
 
 
 JOINTS: dict[str, Row] = {
@@ -145,6 +160,7 @@ JOINTS: dict[str, Row] = {
 """Joints that have a pair."""
 
 REFUSED = {
-    "ConstantVelocityJoint": "there is no such pair; two UniversalJoints with a shaft between them do the same",
+    "CurveCurveContact": "its curves stand in sketches of the parts and may part and bounce (coeffRestitution), which no pair here does; "
+    "declare curves that stay in touch in Python: mg.Pair(..., 'Kc', curve=, curve_b=)",
 }
 """Joints that have none, and what to do."""

@@ -18,9 +18,20 @@ from mechgraph.algebra.inertia import physical_faults
 from mechgraph.algebra.se3 import Array, compose, inverse
 from mechgraph.errors import DeclarationError, listed
 from mechgraph.exchange.asmt import Assembly, Connection, Part
+from mechgraph.exchange.asmt_bends import CONSTANT_VELOCITY, bent
 from mechgraph.exchange.asmt_forces import force
 from mechgraph.exchange.asmt_gears import GEARED, geared
-from mechgraph.exchange.asmt_joints import JOINTS, REFUSED, SLIDES, Directions, Row, free, motion_type
+from mechgraph.exchange.asmt_joints import (
+    JOINTS,
+    REFUSED,
+    SLIDES,
+    Directions,
+    Row,
+    ball_type,
+    free,
+    motion_type,
+    turns_in,
+)
 from mechgraph.exchange.asmt_rods import RODS, rod
 from mechgraph.exchange.asmt_standing import UNMENTIONED, Standing
 from mechgraph.exchange.exact import FITS, Snapping
@@ -47,9 +58,18 @@ class Seat:
     directions: Directions
 
     @property
+    def is_ball(self) -> bool:
+        """Whether J turns in any way about a point that the joint holds."""
+        return self.row.turns is free and not self.row.anywhere
+
+    @property
     def misfit(self) -> tuple[float, float]:
         """Distance and angle by which J misses its place."""
         return float(np.linalg.norm(self.given[:, 3] - self.on_b[:, 3])), self.directions.error
+
+
+GENERAL = "GeneralMotion"
+"""The motion that prescribes place and turns."""
 
 
 class Builder(Standing):
@@ -62,7 +82,7 @@ class Builder(Standing):
         for joint in self.assembly.joints:
             ends = self.ends(joint)
             row = JOINTS.get(joint.kind)
-            if joint.kind in (*GEARED, *RODS):
+            if joint.kind in (*GEARED, *RODS, CONSTANT_VELOCITY):
                 continue
             if row is None:
                 why = REFUSED.get(joint.kind, f"not known here (known: {', '.join(JOINTS)})")
@@ -152,7 +172,7 @@ class Builder(Standing):
         links = [self.assembly.markers[path].part for path in (of.i, of.j)]
         markers = []
         for link, X in zip(links, (A, B), strict=True):
-            own = X if link == self.assembly.name else compose(inverse(self.part(link).pose), X)
+            own = self.own(link, X)
             markers.append(Marker(tuple(own[:, 3]), tuple(own[:, 2]), tuple(own[:, 0])))
         return Pair(name, kind, *links, on_a=markers[0], on_b=markers[1], pitch=pitch)  # type: ignore[arg-type]
 
@@ -177,20 +197,19 @@ class Builder(Standing):
             if found is None:
                 continue
             seat, sign = found
-            if seat is None:
-                if self.ends(motion) is None:
-                    continue
-                pair, at = self.motion_pair(motion)
-                pairs[motion.name], name = pair, motion.name
+            name = motion.name if seat is None else seat.joint.name
+            if seat is None and self.ends(motion) is None:
+                continue
+            if seat is None or (motion.kind == GENERAL and seat.is_ball and any(key[0] == "R" for key in formulas)):
+                pairs[name], at = self.motion_pair(motion, seat, sign, list(formulas))
                 start |= {f"{name}.{key}": value for key, value in at.items()}
-            else:
-                name = seat.joint.name
+                sign = 1.0
             self.drive(motion, pairs[name], formulas, sign, start, drives)
         return list(pairs.values()), list(drives.values()), start
 
     def moved_by(self, motion: Connection, seats: Sequence[Seat]) -> tuple[Seat | None, float] | None:
         """The joint that a motion moves, and -1 where it names the markers the other way round; no joint where it names markers alone."""
-        if motion.kind not in ("RotationalMotion", "TranslationalMotion", "GeneralMotion"):
+        if motion.kind not in ("RotationalMotion", "TranslationalMotion", GENERAL):
             self.faults.append(f"{motion.title}: not known here")
             return None
         for seat in seats:
@@ -201,6 +220,12 @@ class Builder(Standing):
             ):
                 return seat, 1.0
             if (motion.i, motion.j) == (joint.j, joint.i):
+                if (motion.kind == GENERAL and any(seat.row.slides[:2])) or (seat.is_ball and any(seat.row.slides)):
+                    self.faults.append(
+                        f"{motion.title}: names the markers of {joint.name!r} the other way round, "
+                        "where slides of J in I are not those of I in J; exchange MarkerI and MarkerJ of the joint"
+                    )
+                    return None
                 return seat, -1.0
         if motion.joint and not motion.i:
             joints = listed(f"/{self.assembly.name}/{seat.joint.name}" for seat in seats)
@@ -212,13 +237,15 @@ class Builder(Standing):
         """The formulas of a motion by freedom."""
         node = motion.node
         order = node.word("rotationOrder") or node.word("RotationOrder") or "1 2 3"
-        axes = ["xyz"[int(c) - 1] for c in order.split() if c in "123"] if motion.kind == "GeneralMotion" else []
+        axes = "".join("xyz"[int(c) - 1] for c in order.split() if c in ("1", "2", "3"))
+        if motion.kind == GENERAL and len(axes) != 3:
+            self.faults.append(f"{motion.title}: RotationOrder {shown(order)}: expected three of 1, 2, 3")
         keys = {
             "RotationalMotion": {"Rz": "RotationZ"},
             "TranslationalMotion": {"Tz": "TranslationZ"},
-            "GeneralMotion": {
+            GENERAL: {
                 **{name: f"rIJI{k}" for k, name in enumerate(SLIDES, 1)},
-                **{f"R{axis}": f"angIJJ{k}" for k, axis in enumerate(axes, 1)},
+                **{turn.name: f"angIJJ{k}" for k, turn in enumerate(turns_in(axes), 1)},
             },
         }.get(motion.kind, {})
         found = {freedom: " ".join(line.text for line in node.under(key)) for freedom, key in keys.items()}
@@ -226,19 +253,28 @@ class Builder(Standing):
             self.faults.append(f"{motion.title}: has no formula ({', '.join(keys.values())})")
         return {freedom: text for freedom, text in found.items() if text}
 
-    def motion_pair(self, motion: Connection) -> tuple[Pair, dict[str, float]]:
-        """The pair of a motion between markers that no joint connects, and its coordinates where the parts stand."""
-        self.notes.append(
-            f"{motion.kind} {motion.name!r} moves marker {motion.j} against {motion.i}, which no joint connects"
-        )
-        turns = "".join(name[1] for name in self.formulas(motion) if name.startswith("R")) or "z"
-        turns = turns if len(set(turns)) == 3 else turns[0] + {"x": "yz", "y": "zx", "z": "xy"}[turns[0]]
-        I, J = self.pose(motion.i), self.pose(motion.j)
-        relative = compose(inverse(I), J)
-        turn = scipy.spatial.transform.Rotation.from_matrix(relative[:, :3])
-        angles = turn.as_euler(turns.upper())  # type: ignore[call-overload]
-        at = dict(zip([*SLIDES, *(f"R{c}" for c in turns)], [*relative[:, 3].tolist(), *angles.tolist()], strict=True))
-        return self.by_markers(motion.name, motion_type(turns), motion, I, J), at
+    def motion_pair(
+        self, motion: Connection, seat: Seat | None, sign: float, freedoms: Sequence[str]
+    ) -> tuple[Pair, dict[str, float]]:
+        """The pair of a motion between markers that no joint connects, or of a ball whose turns it prescribes, and its coordinates now."""
+        order = "".join(name[1] for name in freedoms if name.startswith("R")) or "z"
+        order = order if len(order) == 3 else order[0] + {"x": "yz", "y": "zx", "z": "xy"}[order[0]]
+        if seat is None:
+            self.notes.append(
+                f"{motion.kind} {motion.name!r} moves marker {motion.j} against {motion.i}, which no joint connects"
+            )
+            name, of, kind, A, B = motion.name, motion, motion_type(order), self.pose(motion.i), self.pose(motion.j)
+        else:
+            name, of, kind, A = seat.joint.name, seat.joint, ball_type(seat.row, order), seat.on_a
+            B = np.column_stack([self.pose(seat.joint.j)[:, :3], seat.on_b[:, 3]])
+            if sign < 0:
+                of, A, B = motion, B, A
+        relative = compose(inverse(A), B)
+        angles = scipy.spatial.transform.Rotation.from_matrix(relative[:, :3]).as_euler(order.upper())  # type: ignore[call-overload]
+        turns = [turn.name for turn in turns_in(order)]
+        at = dict(zip([*SLIDES, *turns], [*relative[:, 3].tolist(), *angles.tolist()], strict=True))
+        pair = self.by_markers(name, kind, of, A, B)
+        return pair, {freedom.name: at[freedom.name] for freedom in pair.type.freedoms}
 
     def drive(
         self,
@@ -253,13 +289,13 @@ class Builder(Standing):
         able = [f.name for f, single in zip(pair.type.freedoms, pair.type.drivable, strict=True) if single]
         for freedom, text in formulas.items():
             try:
-                s, v, a = (sign * part for part in evaluated(text, self.assembly.times))
+                s, v, a = (sign * part for part in evaluated(text, self.assembly.times, self.assembly.variables))
             except FormulaFault as fault:
                 self.faults.append(f"{motion.title}: {fault}")
                 continue
             name = f"{pair.name}.{freedom}"
             if freedom not in able:
-                if motion.kind == "GeneralMotion" and not (s.any() or v.any()):
+                if motion.kind == GENERAL and not (s.any() or v.any()):
                     continue
                 where = f"{motion.title}: drives {freedom} of {pair.name!r} ({pair.type.name})"
                 self.faults.append(f"{where}, which takes a drive in {', '.join(able) or 'no freedom'}")
@@ -326,9 +362,13 @@ class Builder(Standing):
         a = self.assembly
         pairs, drives, start = self.driven(self.seats())
         rods = [found for joint in a.joints if joint.kind in RODS and (found := rod(self, joint)) is not None]
-        pairs += [pair for _, ends in rods for pair in ends]
-        links = [*self.links(pairs), *(link for link, _ in rods)]
+        balls = [joint for joint in a.joints if joint.kind == CONSTANT_VELOCITY]
+        bends = [bend for joint in balls if (bend := bent(self, joint)) is not None]
+        pairs += [pair for _, ends in rods for pair in ends] + [pair for bend in bends for pair in bend.pairs]
+        start |= {freedom: value for bend in bends for freedom, value in bend.start.items()}
+        links = [*self.links(pairs), *(link for link, _ in rods), *(bend.link for bend in bends)]
         couplings = [geared(self, joint, pairs) for joint in a.joints if joint.kind in GEARED]
+        couplings += [coupling for bend in bends for coupling in bend.couplings]
         loads = [load for found in a.forces if (load := force(self, found)) is not None]
         if self.moved:
             far = max(self.moved, key=lambda path: max(self.moved[path][0] / self.size, self.moved[path][1]))

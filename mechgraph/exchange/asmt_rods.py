@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array, compose, inverse
+from mechgraph.algebra.se3 import Array
 from mechgraph.exchange.asmt import Connection
 from mechgraph.exchange.asmt_standing import Standing
 from mechgraph.exchange.exact import FITS
@@ -53,9 +53,9 @@ def rod(builder: Standing, joint: Connection) -> tuple[Link, list[Pair]] | None:
     for side, (kind, _), path, foot, end, z in zip("IJ", kinds, (joint.i, joint.j), feet, ends, axes, strict=True):
         part = builder.assembly.markers[path].part
         X = np.column_stack([_axes(z), foot])
-        own = X if part == builder.assembly.name else compose(inverse(builder.part(part).pose), X)
         markers = [
-            Marker(tuple(Y[:, 3]), tuple(Y[:, 2]), tuple(Y[:, 0])) for Y in (own, np.column_stack([X[:, :3], end]))
+            Marker(tuple(Y[:, 3]), tuple(Y[:, 2]), tuple(Y[:, 0]))
+            for Y in (builder.own(part, X), np.column_stack([X[:, :3], end]))
         ]
         pairs.append(Pair(f"{joint.name} {side}", kind, part, joint.name, on_a=markers[0], on_b=markers[1]))
     return Link(joint.name), pairs

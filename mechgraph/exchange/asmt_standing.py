@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array, compose
+from mechgraph.algebra.se3 import Array, compose, inverse
 from mechgraph.errors import listed
 from mechgraph.exchange.asmt import Assembly, Connection, Part
 from mechgraph.quantities import shown
@@ -45,6 +45,10 @@ class Standing:
         """A marker in the assembly, where the parts stand."""
         found = self.assembly.markers[marker]
         return compose(self.part(found.part).pose, found.pose)
+
+    def own(self, part: str, X: Array) -> Array:
+        """A pose of the assembly in the frame of a part; that of the ground is global."""
+        return X if part == self.assembly.name else compose(inverse(self.part(part).pose), X)
 
     @functools.cached_property
     def size(self) -> float:

@@ -1,7 +1,8 @@
 """Formulas of time, as FreeCAD's motions hold them: value, rate and acceleration, differentiated exactly.
 
-A formula is a sum of products of numbers, ``time``, ``pi``, the four operations, powers (``^``) and the functions of ``FUNCTIONS``. It is
-read into a syntax tree of which only these parts are known; nothing of it is ever executed.
+A formula is a sum of products of numbers, ``time``, ``pi``, variables that the file defines by formulas, the four operations, powers
+(``^``) and the functions of ``FUNCTIONS``. It is read into a syntax tree of which only these parts are known; nothing of it is ever
+executed.
 """
 
 from __future__ import annotations
@@ -96,22 +97,47 @@ OPERATIONS: dict[type[ast.operator], Callable[[Jet, Jet], Jet]] = {
 }
 
 
-def evaluated(formula: str, t: Array) -> tuple[Array, Array, Array]:
-    """Value, rate and acceleration ``(T,)`` of a formula at times ``t (T,)``.
+NONE: Mapping[str, str] = {}
+
+
+class Known(dict[str, Jet]):
+    """Jets by name; a variable's is found from its formula when it is first asked for."""
+
+    def __init__(self, jets: Mapping[str, Jet], variables: Mapping[str, str]) -> None:
+        super().__init__({"pi": Jet(np.pi), **jets})
+        self.names = dict.fromkeys([*self, *variables])
+        self.waiting = dict(variables)
+
+    def __missing__(self, name: str) -> Jet:
+        formula = self.waiting.pop(name, None)
+        if formula is None:
+            raise FormulaFault(f"variable {shown(name)} is defined by itself")
+        self[name] = found = _jet(_tree(formula), self)
+        return found
+
+
+def is_name(name: str) -> bool:
+    """Whether a variable may have that name."""
+    key = name.lower()
+    return re.fullmatch(r"[a-z]\w*", key, re.ASCII) is not None and key not in ("time", "pi", "self", *FUNCTIONS)
+
+
+def evaluated(formula: str, t: Array, variables: Mapping[str, str] = NONE) -> tuple[Array, Array, Array]:
+    """Value, rate and acceleration ``(T,)`` of a formula at times ``t (T,)``; ``variables`` are formulas by their names in lower case.
 
     Raises
     ------
     FormulaFault
         where it is none, holds what is not known here, or has no finite value.
     """
-    jet = _found(formula, _tree(formula), {"time": Jet(t, np.ones_like(t), np.zeros_like(t))})
+    jet = _found(formula, _tree(formula), Known({"time": Jet(t, np.ones_like(t), np.zeros_like(t))}, variables))
     value, rate, acceleration = (np.array(np.broadcast_to(part, t.shape), float) for part in (jet.s, jet.v, jet.a))
     if not all(np.isfinite(part).all() for part in (value, rate, acceleration)):
         raise FormulaFault(f"{shown(formula)} has no finite value, rate or acceleration at some of the times")
     return value, rate, acceleration
 
 
-def law(formula: str) -> Callable[[Array, Array, Array], Array]:
+def law(formula: str, variables: Mapping[str, str] = NONE) -> Callable[[Array, Array, Array], Array]:
     """A force by the formula of it: a function of distance ``rIJ(self)``, its rate ``vrIJ(self)`` and time, ``(T,)`` each.
 
     Raises
@@ -122,7 +148,8 @@ def law(formula: str) -> Callable[[Array, Array, Array], Array]:
     tree = _tree(formula)
 
     def value(x: Array, v: Array, t: Array) -> Array:
-        found = _found(formula, tree, {"rij(self)": Jet(x), "vrij(self)": Jet(v), "time": Jet(t)})
+        known = Known({"rij(self)": Jet(x), "vrij(self)": Jet(v), "time": Jet(t)}, variables)
+        found = _found(formula, tree, known)
         return np.array(np.broadcast_to(found.s, np.shape(x)), float)
 
     value(*np.ones((3, 1)))
@@ -146,23 +173,25 @@ def _none(formula: str) -> str:
     return f"{shown(formula)} is no formula of time, such as 2*pi*time"
 
 
-def _found(formula: str, tree: ast.expr, known: Mapping[str, Jet]) -> Jet:
+def _found(formula: str, tree: ast.expr, known: Known) -> Jet:
     """The jet of a formula where what is ``known`` has these."""
     try:
         with np.errstate(all="ignore"):
-            return _jet(tree, {"pi": Jet(np.pi), **known})
+            return _jet(tree, known)
     except (ValueError, OverflowError, MemoryError, RecursionError, ZeroDivisionError):
         raise FormulaFault(_none(formula)) from None
 
 
-def _jet(node: ast.expr, known: Mapping[str, Jet]) -> Jet:
+def _jet(node: ast.expr, known: Known) -> Jet:
     """The jet of a part of a formula."""
     match node:
         case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
             return Jet(np.float64(number))  # a root of a negative number is none; that of a Python float is complex
-        case ast.Name(id=name) if name in known:
+        case ast.Name(id=name) if name in known.names:
             return known[name]
-        case ast.Call(func=ast.Name(id=name), args=[ast.Name(id="self")], keywords=[]) if f"{name}(self)" in known:
+        case ast.Call(func=ast.Name(id=name), args=[ast.Name(id="self")], keywords=[]) if (
+            f"{name}(self)" in known.names
+        ):
             return known[f"{name}(self)"]
         case ast.UnaryOp(op=ast.USub(), operand=inner):
             return -_jet(inner, known)
@@ -172,5 +201,5 @@ def _jet(node: ast.expr, known: Mapping[str, Jet]) -> Jet:
             return OPERATIONS[type(op)](_jet(left, known), _jet(right, known))
         case ast.Call(func=ast.Name(id=name), args=[inner], keywords=[]) if name in FUNCTIONS:
             return _jet(inner, known).through(*FUNCTIONS[name])
-    names = ", ".join(["time", "pi", *(name for name in known if name not in ("time", "pi")), *FUNCTIONS])
+    names = ", ".join(["time", "pi", *(name for name in known.names if name not in ("time", "pi")), *FUNCTIONS])
     raise FormulaFault(f"{shown(ast.unparse(node))} is not known in a formula (known: {names}, + - * / ^)")

@@ -270,7 +270,7 @@ class Follower(Marching):
             new = new.take(kept)
             np.minimum.at(least, new.track, new.condition)
             # where the condition grows as towards a fold, as |s* - s|^-1/2: no further than half of what is left
-            grown = (new.condition / middle.condition) ** 2 - 1.0
+            grown = (new.condition / np.maximum(middle.condition, 1.0)) ** 2 - 1.0  # that of no equations is zero
             left_over = 0.5 * (new.place - middle.place) / np.where(grown > 0, grown, 1.0)
             h = np.where(grown > 0, np.maximum(np.minimum(march.h[kept], left_over), PATH.shortest), march.h[kept])
             march.h[kept] = h

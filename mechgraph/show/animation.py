@@ -19,7 +19,7 @@ from mechgraph.quantities import wrong
 from mechgraph.result.solution import Solution
 from mechgraph.show.canvas import DRAWN, Dpi, Size, colours, new_axes
 from mechgraph.show.scene import Scene, scene
-from mechgraph.show.skeleton import Drawing, painter_for
+from mechgraph.show.skeleton import Drawing, painter_for, trace_faults
 from mechgraph.writing import Format, format_of, optional, whole_file, writable
 
 MOST_FRAMES = 72
@@ -68,6 +68,8 @@ def animate(
     writable(path)
     found = scene(s, forces=forces)
     chosen = _chosen(found, frames)
+    if faults := trace_faults(found, traces):
+        raise DeclarationError(f"animation of {found.mechanism.name!r}", faults)
     film = _Film(found, chosen, traces, labels, view, size)
 
     def drawn() -> Iterator[Any]:
@@ -102,7 +104,7 @@ class _Film:
     ) -> None:
         self.scene, self.labels, self.view = found, labels, view
         m = found.mechanism
-        self.traces = [p.name for p in m.pairs] if traces is True else [] if traces is False else list(traces)
+        self.traces = traces
         self.colour = colours(m)
         self.ax = new_axes(size) if found.normal is not None else new_axes(size, projection="3d")
         # every frame alike, and drawn once: without a layout that measures it first

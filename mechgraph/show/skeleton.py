@@ -11,6 +11,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.arguments import door
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.quantities import shown
 from mechgraph.result.solution import Solution
 from mechgraph.show.canvas import HATCH, INK, LOAD, MUTED, REACTION, Axes, bare, colours, new_axes
 from mechgraph.show.painting import FlatPainter, Painter, SpacePainter, edges_of, inside, shaded
@@ -67,7 +68,7 @@ def draw_skeleton(
     position : flat index of the position drawn in full.
     ax : axes of matplotlib, of two or three dimensions; new ones where left out, in a figure of their own: ``ax.figure.savefig(...)``.
     ghosts : number of further positions, drawn faintly.
-    traces : whether to draw the paths of pair points; or the names of the pairs whose paths are drawn.
+    traces : whether to draw the paths of pair points and named points; or the names of those whose paths are drawn: ``["B", "arm.tip"]``.
     labels : names of pairs (with their type) and links.
     forces : arrows of the reaction forces (what link a exerts on link b); hatched where the force is not unique.
     highlight : names of pairs, or a loop of the report (``report.loops[0]``): all other links are drawn in grey.
@@ -81,11 +82,12 @@ def draw_skeleton(
     """
     found = scene(s, forces=forces)
     m, size = found.mechanism, 1 if isinstance(s, Mechanism) else int(np.asarray(s.status).size)
-    names = {p.name for p in m.pairs}
     chosen = [item if isinstance(item, str) else item[0] for item in highlight]
-    traced = [] if isinstance(traces, bool) else list(traces)
-    faults = [f"{what}: there is no pair {name!r}; pairs: {', '.join(p.name for p in m.pairs)}"
-              for what, given in (("highlight", chosen), ("traces", traced)) for name in given if name not in names]  # fmt: skip
+    names = [p.name for p in m.pairs]
+    faults = [
+        f"highlight: there is no pair {name!r}; pairs: {', '.join(names)}" for name in chosen if name not in names
+    ]
+    faults += trace_faults(found, traces)
     if not -size <= position < size or position % size not in found.positions:
         faults.append(f"position {position} was not solved, or is none of {size}")
     if faults:
@@ -95,10 +97,32 @@ def draw_skeleton(
     drawing = Drawing(found, painter, colours(m, chosen))
     others = np.unique(np.linspace(0, len(found.positions) - 1, ghosts + 1).astype(int)) if ghosts else ()
     drawing.ghosts([int(i) for i in others if i != t])
-    drawing.traces([p.name for p in m.pairs] if traces is True else traced)
+    drawing.traces(traces)
     drawing.position(t)
     drawing.furniture(t, labels)
     return painter.ax
+
+
+def traceable(found: Scene) -> dict[str, tuple[str, Array]]:
+    """What has a path, by its name: the link that moves and the path ``(T, 3)``. Pairs have that of their point, named points their own."""
+    m = found.mechanism
+    out = {
+        part.owner: (part.link, X[:, :, :3] @ part.shape.vertices[0] + X[:, :, 3])
+        for part in found.parts
+        if part.role == "point"
+        for X in [found.frames[part.frame]]
+    }
+    return out | {p.name: (p.b if p.b != m.frame else p.a, found.points[p.name, p.b]) for p in m.pairs}
+
+
+def trace_faults(found: Scene, traces: bool | Sequence[str]) -> list[str]:
+    """What is wrong with names of paths."""
+    names, known = [] if isinstance(traces, bool) else list(traces), traceable(found)
+    return [
+        f"traces: there is no pair or named point {shown(name)}; there are: {', '.join(known)}"
+        for name in names
+        if name not in known
+    ]
 
 
 def painter_for(found: Scene, ax: Any, view: tuple[float, float]) -> Painter:
@@ -149,14 +173,12 @@ class Drawing:
                     runs, colors=self.colour[part.link], linewidths=1.2, alpha=GHOST, zorder=1.0, gid="ghosts"
                 )
 
-    def traces(self, names: Sequence[str]) -> None:
-        """Paths of pair points on link b, or on link a where b is the frame."""
-        m = self.scene.mechanism
-        for name in names:
-            pair = m.pair(name)
-            path = self.scene.points[name, pair.b]
+    def traces(self, traces: bool | Sequence[str]) -> None:
+        """Paths of pair points on link b, or on link a where b is the frame, and of named points: of all, of none, or of some by name."""
+        known = traceable(self.scene)
+        for name in known if traces is True else traces or ():
+            mover, path = known[name]
             if np.ptp(path, axis=0).max() > 1e-3 * self.scene.size:
-                mover = pair.b if pair.b != m.frame else pair.a
                 pieces = self._pieces(path)
                 style = {"linewidths": 0.9, "linestyles": [(0, (1, 1.6))], "alpha": 0.8, "zorder": 1.5}
                 self.painter.lines(pieces, colors=self.colour[mover], gid=f"trace of {name}", **style)

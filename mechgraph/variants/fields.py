@@ -99,8 +99,9 @@ class Variants:
             for c, own in zip(m.couplings, coupling_places(m), strict=True)
         ]
         loads = [_load_of(load, i) for load in self.loads]
+        lists: dict[str, list[Any]] = {"links": links, "pairs": pairs, "couplings": couplings}
         for field, values in self.own:
-            items: list[Any] = pairs if field.what == "pairs" else couplings
+            items = lists[field.what]
             items[field.index] = field.changed(items[field.index], float(values[i]))
         return m.replace(links=links, pairs=pairs, couplings=couplings, loads=loads)
 
@@ -179,7 +180,7 @@ def varied(m: Mechanism, fields: Mapping[str, AnyField], values: Array) -> Varia
     )
     if not own:
         return made
-    if placed or any(field.what == "pairs" for field, _ in own):
+    if placed or any(field.one_by_one for field, _ in own):
         return replace(made, missing=tuple(range(count)))
     return _with_gears(made)
 

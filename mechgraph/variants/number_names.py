@@ -1,7 +1,7 @@
 """Declared numbers by name.
 
-A number is named as it is declared: ``crank.mass``, ``crank.center.x``, ``crank.inertia.xy``, ``B.point.x``, ``B.axis.z``,
-``B.on_a.point.y``, ``B.pitch``, ``loads[0].stiffness``, ``loads[1].force.x``; of a coupling ``g.A`` and ``g.constant``, or
+A number is named as it is declared: ``crank.mass``, ``crank.center.x``, ``crank.inertia.xy``, ``crank.tip.x`` of a named point ``tip``,
+``B.point.x``, ``B.axis.z``, ``B.on_a.point.y``, ``B.pitch``, ``loads[0].stiffness``, ``loads[1].force.x``; of a coupling ``g.A`` and ``g.constant``, or
 ``couplings[0].A``; of gears, curves, surfaces and contacts ``g.module``, ``g.teeth.a``, ``K.curve.radius``, ``K.curve.points[3].x``,
 ``K.curve.lift[12]``, ``K.surface.center.z``, ``K.roller``, ``K.hertz.moduli.b``; of a chain ``length[2]``, ``twist[0]``,
 ``offset[1]`` (as in ``mg.chain``, counted from 0). Which fields of a link, pair, coupling or load are numbers, and of which components,
@@ -11,7 +11,7 @@ their annotations say (``model.field_format``).
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +21,7 @@ from mechgraph.errors import did_you_mean, near_names
 from mechgraph.model.chain import NUMBERS_OF_CHAIN, chain_numbers
 from mechgraph.model.coupling import BaseCoupling
 from mechgraph.model.field_format import Described, FieldFormat
+from mechgraph.model.field_kinds import POINT
 from mechgraph.model.link import Link
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker, Pair
@@ -79,11 +80,16 @@ class ItemField:
     path: tuple[str, ...]
     place: Place
 
+    @property
+    def one_by_one(self) -> bool:
+        """Whether mechanisms that differ in it do so in more than arrays: in their curves, surfaces, contacts, or named points."""
+        return self.what != "couplings"
+
     def read(self, m: Mechanism) -> float:
         """The declared value."""
         item = getattr(m, self.what)[self.index]
         for name in self.path:
-            item = getattr(item, name)
+            item = _part(item, name)
         return float(np.asarray(item, dtype=float)[self.place])
 
     def changed(self, item: Any, value: float) -> Any:
@@ -91,15 +97,22 @@ class ItemField:
         return _changed(item, self.path, self.place, value)
 
 
+def _part(item: Any, name: str) -> Any:
+    """What an item holds under a name; a named point."""
+    return item[name] if isinstance(item, Mapping) else getattr(item, name)
+
+
 def _changed(item: Any, path: tuple[str, ...], place: Place, value: float) -> Any:
     name, *rest = path
-    old = getattr(item, name)
+    old = _part(item, name)
     if rest:
         new = _changed(old, tuple(rest), place, value)
     else:
         new = np.array(old, dtype=float)
         new[place] = value
         new = new.tolist()
+    if isinstance(item, Mapping):
+        return {**item, name: new}
     return item.reshaped(**{name: new}) if isinstance(item, Pair) else item.replace(**{name: new})
 
 
@@ -168,11 +181,15 @@ def _component(item: Described, rest: str) -> tuple[tuple[str, ...], FieldFormat
     return (what,), about, about.kind.components()[at]
 
 
-def _link_field(m: Mechanism, i: int, rest: str) -> Field | str | None:
+def _link_field(m: Mechanism, i: int, rest: str) -> Field | ItemField | str | None:
     link = m.links[i]
     found = _component(link, rest)
     if found is None:
-        return None
+        point, _, at = rest.rpartition(".")
+        places = POINT.components()
+        return (
+            ItemField("links", i, ("points", point), places[at][0]) if point in link.points and at in places else None
+        )
     (what,), _, places = found
     if what == "mass" and link.center is None:
         return f"'{link.name}.mass': link {link.name!r} has no mass centre; declare center=(x, y, z)"
@@ -239,7 +256,8 @@ def _numbers_of(item: Described) -> list[str]:
             out += [f"{name}.{rest}" for rest in _numbers_of(held)]
         parts = (f"{name}.{part}".rstrip(".") for part in about.kind.components())
         out += [text for text in parts if _component(item, text) is not None]
-    return out
+    points = item.points if isinstance(item, Link) else ()
+    return out + [f"{name}.{at}" for name in points for at in POINT.components()]
 
 
 INDEXED: dict[str, Callable[[Mechanism, int, str], AnyField | str]] = {

@@ -58,8 +58,8 @@ class Source:
 
     @property
     def one_by_one(self) -> bool:
-        """Whether curves, surfaces or contacts vary, so that every variant is solved alone."""
-        return any(isinstance(field, ItemField) and field.what == "pairs" for field in (self.fields or {}).values())
+        """Whether curves, surfaces, contacts or named points vary, so that every variant is solved alone."""
+        return any(isinstance(field, ItemField) and field.one_by_one for field in (self.fields or {}).values())
 
     def one(self, values: Array) -> Mechanism:
         """The mechanism for ``values (parameters,)``, as it is meant with the tolerance."""
