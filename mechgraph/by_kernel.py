@@ -17,6 +17,7 @@ from mechgraph.call import Call, Starts
 from mechgraph.closure.configuration import ROUNDINGS, Configuration
 from mechgraph.closure.driver_path import Mask, in_blocks
 from mechgraph.closure.indexing import Index, System
+from mechgraph.closure.passive_motion import are_alone
 from mechgraph.closure.rates import Rates, Velocities, expected_error
 from mechgraph.closure.solver import ClosureSolver
 from mechgraph.errors import DeclarationError
@@ -122,7 +123,7 @@ def _kernel(line: Started, library: Any) -> tuple[Kernel, bool]:
 
     The start may be shared with mechanisms under other loads.
     """
-    key, kept = (line.columns.tobytes(), gives_forces(line)), line.start.solvers
+    key, kept = (line.columns.tobytes(), gives_forces(line), _passive(line)), line.start.solvers
     known = kept.get(COMPILED)
     loads = line.m.loads
     if known is None or known[0] != key or len(known[1]) != len(loads) or any(map(is_not, known[1], loads)):
@@ -145,18 +146,23 @@ def _filled(line: Started, library: Any, system: System, x: Array, loads: tuple[
 def _layout(line: Started) -> Layout | str:
     """The layout of a mechanism, or what of it cannot be carried; kept with all mechanisms of its graph."""
     sized = line.system.sized_once
-    key = COMPILED, line.columns.tobytes()
+    key = COMPILED, line.columns.tobytes(), _passive(line)
     if key not in sized:
         why = why_not(line.system)
-        sized[key] = layout(line.system, line.columns, np.zeros(0, dtype=np.intp)) if why is None else why
+        sized[key] = layout(line.system, line.columns, line.passive) if why is None else why
     found: Layout | str = sized[key]
     return found
 
 
+def _passive(line: Started) -> tuple[object, ...]:
+    """What of passive motions stands in the tables: loads in freedoms make some of them free."""
+    return tuple((motion.links, motion.turns, motion.rates.tobytes()) for motion in line.passive)
+
+
 def cannot(line: Started) -> str | None:
     """Why the kernel does not serve a call; None where it does."""
-    if line.passive:
-        return "it has passive freedoms"
+    if not are_alone(line.passive):
+        return "a link has several passive motions"
     if len(line.lead) < len(line.columns):
         return "its drives depend on each other"
     found = _layout(line)

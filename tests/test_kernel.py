@@ -175,7 +175,7 @@ def test_loads_that_are_numbers(name):
     m = m.replace(loads=loads_of(m))
     assert agreed(m, swing(m)) == "compiled"
     line = Pipeline(DriverMotion(m, swing(m)), Options())
-    known = tables.layout(line.system, line.columns, np.zeros(0, dtype=np.intp))
+    known = tables.layout(line.system, line.columns, line.passive)
     assert tables.tables(known, line.system, line.x[:, None], m.loads) is not None
 
 
@@ -220,7 +220,7 @@ def test_a_freedom_about_any_line_of_its_marker():
 
 
 @pytest.mark.parametrize(
-    ("name", "why"), [("geneva", r"pair 'C' \(Ps\) travels along a curve"), ("rssr", "it has passive freedoms")]
+    ("name", "why"), [("geneva", r"pair 'C' \(Ps\) travels along a curve"), ("ring on a bar", "a link has several passive motions")]
 )
 def test_what_it_cannot_carry_is_named(name, why):
     m = mg.load(name)
@@ -255,9 +255,9 @@ def test_beyond_the_tolerance_numpy_says_how_far_the_path_led():
 
 def test_record_and_tables_have_the_layout_of_the_library():
     """The places of all parts of a record as the library counts them; ``I`` and ``P`` end where its sections end."""
-    m = mg.load("rcsr-csr")
+    m = mg.load("rssr")
     line = Pipeline(DriverMotion(m, swing(m)), Options())
-    known = tables.layout(line.system, line.columns, np.zeros(0, dtype=np.intp))
+    known = tables.layout(line.system, line.columns, line.passive)
     I, (P,) = tables.tables(known, line.system, line.x[:, None], m.loads)
     places = (ctypes.c_int * (len(tables.PARTS) + 1))()
     build.built().mgk_record(ctypes.c_void_p(I.ctypes.data), places)
@@ -269,7 +269,7 @@ def test_a_state_that_stays_hot():
     """``mgk_solve`` led on from state to state, in the units of the declaration; a refused call leaves the state where it was."""
     m = mg.load("rcsr-csr")
     line = Pipeline(DriverMotion(m, swing(m)), Options())
-    known = tables.layout(line.system, line.columns, np.zeros(0, dtype=np.intp))
+    known = tables.layout(line.system, line.columns, line.passive)
     I, (P,) = tables.tables(known, line.system, line.x[:, None], m.loads)
     library = build.built()
     state = np.empty(ctypes.c_size_t(library.mgk_state_size(pointer(I))).value // 8 + 1)

@@ -42,6 +42,7 @@ STATUSES = (
     ("STRAIN", "strained", "drives or couplings strain each other without any reaction"),
     ("TOO_FAR", "not followed", "the position is further than steps are made"),
     ("FORMAT_ERROR", "other tables", "tables of another version"),
+    ("NOT_PASSIVE", "no longer passive", "a passive freedom moves other links here"),
 )
 """What the kernel returns, by its number: identifier, word, meaning."""
 TABLE_CHANGE = 0.02
@@ -192,7 +193,7 @@ def tabled(m: Mechanism, asked: str = "compile") -> Tabled:
         None if gives_forces(line) else "it does not find the forces at contacts of gears, racks and belts"
     ):
         raise DeclarationError(subject, [f"the compiled kernel does not carry it: {fault}"])
-    places = layout(system, line.columns, np.zeros(0, dtype=np.intp))
+    places = layout(system, line.columns, line.passive)
     found = tables(places, system, x[:, None], own.loads)
     if found is None:
         known = listed(sorted({load.kind for load in own.loads}))

@@ -43,6 +43,7 @@ int mgk_derivative(const int *I, const double *P, const double *dP, int count, v
   FOR(pass, 3) {
     evaluate(&m, &w, x);
     fill(&m, w.S, w.middle, NULL, NULL, w.lu);
+    add_border(&m, &w, w.lu);
     if (!eliminate(&m, &w)) return MGK_SINGULAR;
     if (pass == 2) break;
     FOR(r, m.rows) w.row_value[r] = -w.residual[r];

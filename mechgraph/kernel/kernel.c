@@ -30,29 +30,32 @@ static const magnitude SHORTEST = 2e-3;     /* step below which the careful foll
 static const magnitude INDEPENDENT = 1e-9;  /* part of the closure rates that drives may leave open */
 static const magnitude DRIVERS_ALONE = 1e-9;/* part below which the reactions of a self-stress count as none */
 static const magnitude UNIQUE = 1e-7;       /* part of a self-stress in a component above which it is not unique */
+static const magnitude NEARBY = 1e-5;       /* part of a passive motion above which it moves other links */
+static const magnitude UNTURNED = 1e-13;    /* angle that is rounding */
+static const magnitude MISSING = 1e-9;      /* angle, or length / L, that may be missing to rest */
 static const magnitude STRAIGHT_ON = 1e-12; /* change of direction up to which a polygon goes straight on */
-enum { ITERATIONS = 8, MOST_STEPS = 20000 };
+enum { ITERATIONS = 8, MOST_STEPS = 20000, MOST_TURNS = 8, POINTS = 8 };
 
 #define FOR(i, n) for (int i = 0; i < (n); i++)
 
 /* --- tables and memory ------------------------------------------------------------------------------------------------------------- */
 
 typedef struct {
-  int links, pairs, factors, columns, states, loops, steps, couplings, terms, drives, unknowns, loads, frame_link, rows, stresses;
+  int links, pairs, factors, columns, states, loops, steps, couplings, terms, drives, unknowns, loads, frame_link, rows, stresses, passives, held;
   const int *first, *kind, *column, *state, *number, *ends, *walk, *chord, *loop_first, *loop_pair, *loop_sign, *owner, *column_state,
-      *is_length, *place, *effort_factor, *effort_at_b, *dual, *drive, *unknown, *term_first, *term_column, *load;
+      *is_length, *place, *effort_factor, *effort_at_b, *dual, *drive, *unknown, *term_first, *term_column, *passive_first, *passive_link, *turns, *load;
   const double *unit, *origin, *start, *start_coordinates, *frame, *marker_a, *marker_b, *factor_number, *effort, *mass, *center,
-      *inertia, *base, *coefficient, *constant, *load_number;
+      *inertia, *base, *border, *coefficient, *constant, *load_number;
 } Model;
 
 /* A place on the path: state, rates along the way, the closure matrix and its rate along the way. */
 typedef struct {
-  double *x, *rate, *matrix, *matrix_rate, *at, condition;
+  double *x, *rate, *matrix, *matrix_rate, *at, *passive, *twist, *pose, condition;
 } Node;
 
 typedef struct {
   /* kept between calls: state, drives, and where rotation vectors of the user stand */
-  double *x, *drive, *axis, *angle, *begun;
+  double *x, *drive, *axis, *angle, *begun, *border;
   /* evaluation of one state */
   double *pose, *frame, *end, *S, *residual, *middle;
   magnitude reach, closure;
@@ -62,6 +65,9 @@ typedef struct {
   /* rates and forces */
   double *dq, *ddq, *V, *A, *bias, *G, *chord_V, *pair_twist, *E, *applied, *inertial, *total, *reaction, *carried, *given, *tau, *coupled, *multiplier;
   double *null, *stress, *stress_effort, *row_value, *column_value, *trial, *increment, *change, *bound, *record, *direction, *line_begin, *asked, *kept;
+  /* passive motions: unit rates, twists with their rates, velocity parts, links at rest in them; along a step, what is missing to rest */
+  double *passive, *twist, *twist_rate, *own_bias, *moving_bias, *moving, *raw, *apart, *trial_rate, *trial_acceleration, *still, *missing, *series;
+  magnitude single;
   size_t n_kept;
   Node a, b, before;
   long steps, evaluations, factorizations;
@@ -72,7 +78,8 @@ static void read_tables(const int *I, const double *P, Model *m) {
   m->links = I[MGK_LINKS], m->pairs = I[MGK_PAIRS], m->factors = I[MGK_FACTORS], m->columns = I[MGK_COLUMNS];
   m->states = I[MGK_STATES], m->loops = I[MGK_LOOPS], m->steps = I[MGK_STEPS], m->couplings = I[MGK_COUPLINGS];
   m->terms = I[MGK_TERMS], m->drives = I[MGK_DRIVES], m->unknowns = I[MGK_UNKNOWNS], m->loads = I[MGK_LOADS];
-  m->frame_link = I[MGK_FRAME], m->rows = 6 * m->loops + m->couplings, m->stresses = m->rows - m->unknowns;
+  m->frame_link = I[MGK_FRAME], m->passives = I[MGK_PASSIVES], m->held = 6 * m->loops + m->couplings;
+  m->rows = m->held + m->passives, m->stresses = m->rows - m->unknowns;
   const int p = m->pairs, f = m->factors, c = m->columns, n = m->links, *i = I + MGK_HEAD;
   m->first = i, i += p + 1, m->kind = i, i += f, m->column = i, i += f, m->state = i, i += f, m->number = i, i += f;
   m->ends = i, i += 2 * p, m->walk = i, i += 4 * (p - m->loops), m->chord = i, i += m->loops;
@@ -80,12 +87,14 @@ static void read_tables(const int *I, const double *P, Model *m) {
   m->owner = i, i += c, m->column_state = i, i += c, m->is_length = i, i += c, m->place = i, i += c;
   m->effort_factor = i, i += c, m->effort_at_b = i, i += c, m->dual = i, i += p;
   m->drive = i, i += m->drives, m->unknown = i, i += m->unknowns;
-  m->term_first = i, i += m->couplings + 1, m->term_column = i, i += m->terms, m->load = i;
+  m->term_first = i, i += m->couplings + 1, m->term_column = i, i += m->terms;
+  m->passive_first = i, i += m->passives + 1, m->passive_link = i, i += I[MGK_PASSIVE_LINKS], m->turns = i, i += m->passives, m->load = i;
   if (!P) return;
   const double *d = P;
   m->unit = d, d += 1, m->origin = d, d += 3, m->start = d, d += m->states, m->start_coordinates = d, d += c, m->frame = d, d += 12;
   m->marker_a = d, d += 12 * p, m->marker_b = d, d += 12 * p, m->factor_number = d, d += I[MGK_FACTOR_NUMBERS];
   m->effort = d, d += 6 * c, m->mass = d, d += n, m->center = d, d += 3 * n, m->inertia = d, d += 6 * n, m->base = d, d += 12 * n;
+  m->border = d, d += c * m->passives;
   m->coefficient = d, d += m->terms, m->constant = d, d += m->couplings, m->load_number = d;
 }
 
@@ -98,10 +107,10 @@ static double *taken(double **memory, size_t *size, size_t count) {
 
 /* The memory of a state laid out; its size in bytes. */
 static size_t lay_out(const Model *m, double *memory, Work *w) {
-  size_t size = 0, c = m->columns, n = m->links, p = m->pairs, r = m->rows, u = m->unknowns, s = m->stresses > 0 ? m->stresses : 0;
+  size_t size = 0, c = m->columns, n = m->links, p = m->pairs, r = m->rows, u = m->unknowns, s = m->stresses > 0 ? m->stresses : 0, q = m->passives;
   int places[MGK_PARTS + 1];
 #define TAKE(name, count) w->name = taken(&memory, &size, (count))
-  TAKE(x, m->states), TAKE(drive, m->drives), TAKE(axis, 3 * m->factors), TAKE(angle, m->factors), TAKE(begun, m->factors);
+  TAKE(x, m->states), TAKE(drive, m->drives), TAKE(axis, 3 * m->factors), TAKE(angle, m->factors), TAKE(begun, m->factors), TAKE(border, q * c);
   w->n_kept = size;
   TAKE(kept, w->n_kept);
   TAKE(pose, 12 * n), TAKE(frame, 12 * m->factors), TAKE(end, 12 * p), TAKE(S, 6 * c), TAKE(residual, r), TAKE(middle, 3 * m->loops);
@@ -111,16 +120,19 @@ static size_t lay_out(const Model *m, double *memory, Work *w) {
   TAKE(applied, 6 * n), TAKE(inertial, 6 * n), TAKE(total, 6 * p), TAKE(reaction, 6 * p), TAKE(carried, 6 * n), TAKE(given, c);
   TAKE(tau, c), TAKE(coupled, c), TAKE(multiplier, m->couplings), TAKE(null, s * r), TAKE(stress, 6 * p * s), TAKE(stress_effort, c * s);
   TAKE(row_value, r), TAKE(column_value, c), TAKE(trial, m->states), TAKE(increment, c), TAKE(change, u * u), TAKE(bound, 4 * u);
+  TAKE(passive, q * c), TAKE(twist, 6 * q), TAKE(twist_rate, 6 * q), TAKE(own_bias, 6 * p * q), TAKE(moving_bias, q ? 6 * p : 0), TAKE(moving, 6 * q);
+  TAKE(raw, 6 * q * q + q), TAKE(apart, 2 * q * q), TAKE(trial_rate, q ? c : 0), TAKE(trial_acceleration, q ? c : 0), TAKE(still, m->drives), TAKE(missing, q), TAKE(series, POINTS * q);
   Node *nodes[3] = {&w->a, &w->b, &w->before};
   FOR(i, 3) {
     nodes[i]->x = taken(&memory, &size, m->states), nodes[i]->rate = taken(&memory, &size, c);
     nodes[i]->matrix = taken(&memory, &size, r * u), nodes[i]->matrix_rate = taken(&memory, &size, r * u);
     nodes[i]->at = taken(&memory, &size, 1);
+    nodes[i]->passive = taken(&memory, &size, q * c), nodes[i]->twist = taken(&memory, &size, 6 * q), nodes[i]->pose = taken(&memory, &size, 12 * q);
   }
   TAKE(direction, m->drives), TAKE(line_begin, m->drives), TAKE(asked, 3 * m->drives);
   int head[MGK_HEAD] = {0};
   head[MGK_LINKS] = m->links, head[MGK_PAIRS] = m->pairs, head[MGK_COLUMNS] = m->columns, head[MGK_STATES] = m->states;
-  head[MGK_LOOPS] = m->loops, head[MGK_COUPLINGS] = m->couplings, head[MGK_UNKNOWNS] = m->unknowns;
+  head[MGK_LOOPS] = m->loops, head[MGK_COUPLINGS] = m->couplings, head[MGK_UNKNOWNS] = m->unknowns, head[MGK_PASSIVES] = m->passives;
   mgk_record(head, places);
   TAKE(record, places[MGK_PARTS]);
 #undef TAKE
@@ -128,9 +140,9 @@ static size_t lay_out(const Model *m, double *memory, Work *w) {
 }
 
 int mgk_record(const int *I, int *places) {
-  const int c = I[MGK_COLUMNS], n = I[MGK_LINKS], p = I[MGK_PAIRS], k = I[MGK_COUPLINGS];
-  const int s = 6 * I[MGK_LOOPS] + k - I[MGK_UNKNOWNS];
-  const int lengths[MGK_PARTS] = {I[MGK_STATES], c, c, c, 1, 2, 3 * p, 6 * p, c, c, 6 * n, 6 * p * s, c * s, c, k, k * s, c * s, 6, 1, 1};
+  const int c = I[MGK_COLUMNS], n = I[MGK_LINKS], p = I[MGK_PAIRS], k = I[MGK_COUPLINGS], q = I[MGK_PASSIVES];
+  const int s = 6 * I[MGK_LOOPS] + k + q - I[MGK_UNKNOWNS];
+  const int lengths[MGK_PARTS] = {I[MGK_STATES], c, c, c, 1, 2, 3 * p, 6 * p, c, c, 6 * n, 6 * p * s, c * s, c, k, k * s, c * s, 6, 1, 1, q ? 6 * n : 0, q, q};
   places[0] = 0;
   FOR(i, MGK_PARTS) places[i + 1] = places[i] + lengths[i];
   return MGK_OK;
@@ -392,6 +404,7 @@ static magnitude evaluate(const Model *m, Work *w, const double *x) {
     for (int i = m->term_first[k]; i < m->term_first[k + 1]; i++) *e += m->coefficient[i] * x[m->column_state[m->term_column[i]]];
     worst = fmax(worst, fabs(*e)), w->closure = fmax(w->closure, fabs(*e));
   }
+  memset(w->residual + m->held, 0, m->passives * sizeof(double));
   return worst;
 }
 
@@ -420,6 +433,11 @@ static void fill(const Model *m, const double *S, const double *middle, const do
     const int j = m->place[m->term_column[i]];
     if (j >= 0) out[(6 * m->loops + k) * u + j] = m->coefficient[i];
   }
+}
+
+/* The rows behind those of the closure, which keep increments across the passive motions. */
+static void add_border(const Model *m, const Work *w, double *out) {
+  FOR(i, m->passives) FOR(j, m->unknowns) out[(m->held + i) * m->unknowns + j] = w->border[i * m->columns + m->unknown[j]];
 }
 
 /* Elimination in place, with rows chosen by pivots: the independent rows of a redundant loop come first. Whether all columns are independent. */
@@ -499,6 +517,7 @@ static void row_sums(const Model *m, Work *w, const double *dq, const double *pa
     *sum = 0.0;
     if (dq) for (int i = m->term_first[k]; i < m->term_first[k + 1]; i++) *sum += m->coefficient[i] * dq[m->term_column[i]];
   }
+  memset(out + m->held, 0, m->passives * sizeof(double));
 }
 
 /* Rates of all freedoms with J q' + known = 0 for given ones of the drives; what is left of that, relative. */
@@ -528,6 +547,7 @@ static int closed(const Model *m, Work *w, double *x, double *matrix) {
     const int done = left <= CLOSED * w->reach || (left >= 0.5 * before && left <= ACCEPTED * w->reach);
     if (done || !(step < REUSED)) {
       fill(m, w->S, w->middle, NULL, NULL, w->lu);
+      add_border(m, w, w->lu);
       if (matrix) memcpy(matrix, w->lu, (size_t)m->rows * m->unknowns * sizeof(double));
       if (!eliminate(m, w)) return MGK_SINGULAR;
     }
@@ -570,52 +590,221 @@ static void move(const Model *m, Work *w, const double *dq, double *G) {
   }
 }
 
-/* Rates and accelerations of all freedoms, twists of all links and their rates. */
-static int rates(const Model *m, Work *w, const double *v, const double *a) {
-  magnitude turning = 0.0, gap = completed(m, w, v, NULL, 0.0, w->dq);
-  move(m, w, w->dq, NULL);
-  FOR(c, m->columns) turning = fmax(turning, fabs(w->dq[c]) * fabs(w->dq[c]));
-  double *known = w->residual; /* closed: no longer asked for */
-  row_sums(m, w, NULL, w->bias, known);
-  gap = fmax(gap, completed(m, w, a, known, turning, w->ddq));
-  if (gap > INDEPENDENT) return MGK_CONTRADICTION;
+/* Twists dV/dt of all links for accelerations of the freedoms, with the velocity parts of `move`. */
+static void accelerate(const Model *m, Work *w, const double *ddq) {
   memset(w->A + 6 * m->frame_link, 0, 6 * sizeof(double));
   FOR(t, m->pairs - m->loops) {
     const int *step = m->walk + 4 * t, k = step[0];
     FOR(i, 6) {
       double sum = w->bias[6 * k + i];
-      for (int f = m->first[k]; f < m->first[k + 1]; f++) FOR(j, width(m->kind[f])) sum += w->S[6 * (m->column[f] + j) + i] * w->ddq[m->column[f] + j];
+      for (int f = m->first[k]; f < m->first[k + 1]; f++) FOR(j, width(m->kind[f])) sum += w->S[6 * (m->column[f] + j) + i] * ddq[m->column[f] + j];
       w->A[6 * step[3] + i] = w->A[6 * step[2] + i] + (step[1] ? sum : -sum);
     }
+  }
+}
+
+/* The inverse of n columns beside them, in place: Gauss and Jordan. Whether there is one. */
+static int inverted(double *U, int n) {
+  FOR(i, n) FOR(j, n) U[2 * n * i + n + j] = i == j;
+  FOR(i, n) {
+    int best = i;
+    for (int r = i + 1; r < n; r++) if (fabs(U[2 * n * r + i]) > fabs(U[2 * n * best + i])) best = r;
+    if (!(fabs(U[2 * n * best + i]) > 1e-12)) return 0;
+    FOR(j, 2 * n) { const double t = U[2 * n * i + j]; U[2 * n * i + j] = U[2 * n * best + j], U[2 * n * best + j] = t; }
+    const double d = 1.0 / U[2 * n * i + i];
+    FOR(j, 2 * n) U[2 * n * i + j] *= d;
+    FOR(r, n) if (r != i) { const double g = U[2 * n * r + i]; FOR(j, 2 * n) U[2 * n * r + j] -= g * U[2 * n * i + j]; }
+  }
+  return 1;
+}
+
+/* --- passive motions: what they are and which rates are at rest in them, see closure/passive_motion.py ------------------------------ */
+
+/* The first link of a passive motion. */
+static int first_of(const Model *m, int i) { return m->passive_link[m->passive_first[i]]; }
+
+/* The axis of a turn, the direction of a slide, in a twist. */
+static double *along_axis(const Model *m, double *twists, int i) { return twists + 6 * i + (m->turns[i] ? 0 : 3); }
+
+/* Passive motions at a state just factored, of unit rates along their axes and in the sense of the border; each moves links of its own,
+ * by the twists of which they are told apart. */
+static int passive_motions(const Model *m, Work *w) {
+  const int n = m->passives, c = m->columns;
+  double *mixed = w->raw + 6 * n * n;
+  FOR(j, n) {
+    double *rate = w->passive + j * c;
+    memset(w->row_value, 0, m->rows * sizeof(double));
+    w->row_value[m->held + j] = 1.0;
+    solve(m, w, w->row_value, w->column_value);
+    memset(rate, 0, c * sizeof(double));
+    FOR(u, m->unknowns) rate[m->unknown[u]] = w->column_value[u];
+    move(m, w, rate, NULL);
+    FOR(i, n) memcpy(w->raw + 6 * (i * n + j), w->V + 6 * first_of(m, i), 6 * sizeof(double));
+  }
+  FOR(i, n) {
+    const double *of_link = w->raw + 6 * i * n;
+    int largest = 0;
+    FOR(j, n) if (size_of(of_link + 6 * j, 6) > size_of(of_link + 6 * largest, 6)) largest = j;
+    FOR(j, n) w->apart[2 * n * i + j] = dot(of_link + 6 * j, of_link + 6 * largest, 6);
+  }
+  if (!inverted(w->apart, n)) return MGK_NOT_PASSIVE;
+  FOR(a, c) {
+    FOR(i, n) {
+      mixed[i] = 0.0;
+      FOR(j, n) mixed[i] += w->passive[j * c + a] * w->apart[2 * n * j + n + i];
+    }
+    FOR(i, n) w->passive[i * c + a] = mixed[i];
+  }
+  FOR(i, n) {
+    double *rate = w->passive + i * c, *twist = w->twist + 6 * i;
+    move(m, w, rate, NULL);
+    memcpy(twist, w->V + 6 * first_of(m, i), 6 * sizeof(double));
+    for (int l = m->passive_first[i]; l < m->passive_first[i + 1]; l++) FOR(r, 6) w->V[6 * m->passive_link[l] + r] -= twist[r];
+    if (!(size_of(w->V, 6 * m->links) <= NEARBY * size_of(twist, 6))) return MGK_NOT_PASSIVE;
+    const double *axis = along_axis(m, w->twist, i), length = sqrt(dot(axis, axis, 3));
+    const double scale = REAL_PART(dot(rate, w->border + i * c, c)) < 0.0 ? -1.0 / length : 1.0 / length;
+    FOR(a, c) rate[a] *= scale;
+    FOR(r, 6) twist[r] *= scale;
+    FOR(r, 6 * m->pairs) w->own_bias[6 * m->pairs * i + r] = scale * scale * w->bias[r];
+  }
+  return MGK_OK;
+}
+
+/* The point of a link whose velocity counts: for a turn the foot on its axis from the origin of the link, for a slide that origin. */
+static void rest_point(const Model *m, const Work *w, int i, int link, double *origin, double *foot) {
+  const double *base = m->base + 12 * link, own[3] = {base[3], base[7], base[11]}, *U = w->twist + 6 * i;
+  double at[6];
+  point_of(w->pose + 12 * link, own, origin);
+  twist_about(U, origin, at);
+  FOR(r, 3) foot[r] = 0.0;
+  if (m->turns[i]) cross(U, at + 3, foot);
+}
+
+/* Rates without their parts along the passive motions, for which all links move as V. */
+static void put_at_rest(const Model *m, const Work *w, double *dq) {
+  FOR(i, m->passives) {
+    double power = 0.0, square = 0.0;
+    for (int l = m->passive_first[i]; l < m->passive_first[i + 1]; l++) {
+      const int link = m->passive_link[l];
+      double point[3], foot[3], own[6], moving[6];
+      rest_point(m, w, i, link, point, foot);
+      FOR(r, 3) point[r] += foot[r];
+      twist_about(w->twist + 6 * i, point, own);
+      twist_about(w->V + 6 * link, point, moving);
+      power += dot(own, moving, 6), square += dot(own, own, 6);
+    }
+    FOR(c, m->columns) dq[c] -= power / square * w->passive[i * m->columns + c];
+  }
+}
+
+/* Rates of the passive twists where the mechanism moves with dq and the velocity parts of `move`, which are used up; `moving`: the
+ * twists of their first links. The accelerations of both motions together, without those of each alone, are dU/ds + dV/dt, where
+ * dU/ds - dV/dt = ad(V) U. */
+static void twist_rates(const Model *m, Work *w, const double *dq) {
+  const int c = m->columns, p = 6 * m->pairs;
+  memcpy(w->moving_bias, w->bias, p * sizeof(double));
+  FOR(i, m->passives) {
+    const double *U = w->twist + 6 * i;
+    double *V = w->moving + 6 * i, *out = w->twist_rate + 6 * i;
+    FOR(a, c) w->trial_rate[a] = dq[a] + w->passive[i * c + a];
+    move(m, w, w->trial_rate, NULL);
+    FOR(r, 6) V[r] = w->V[6 * first_of(m, i) + r] - U[r];
+    FOR(r, p) w->bias[r] -= w->moving_bias[r] + w->own_bias[p * i + r];
+    memset(w->still, 0, m->drives * sizeof(double));
+    row_sums(m, w, NULL, w->bias, w->residual);
+    completed(m, w, w->still, w->residual, 0.0, w->trial_acceleration);
+    accelerate(m, w, w->trial_acceleration);
+    moved_twist(V, U, out);
+    FOR(r, 6) out[r] = 0.5 * (out[r] + w->A[6 * first_of(m, i) + r]);
+  }
+}
+
+/* Accelerations so that links stay at rest: the rate of the condition in `put_at_rest` vanishes. */
+static void keep_at_rest(const Model *m, const Work *w, double *ddq) {
+  FOR(i, m->passives) {
+    const double *U = w->twist + 6 * i, *dU = w->twist_rate + 6 * i;
+    double power = 0.0, square = 0.0;
+    for (int l = m->passive_first[i]; l < m->passive_first[i + 1]; l++) {
+      const double *V = w->V + 6 * m->passive_link[l], *A = w->A + 6 * m->passive_link[l];
+      double point[3], foot[3], own[6], moving[6], change[6], now[6], velocity[3], part[3];
+      rest_point(m, w, i, m->passive_link[l], point, foot);
+      twist_about(V, point, moving);
+      memcpy(velocity, moving + 3, sizeof velocity);
+      if (m->turns[i]) { /* of the foot w x v / w^2, v being the passive velocity of the origin */
+        double at[6], from[6], turn[3];
+        twist_about(U, point, at);
+        twist_about(dU, point, from);
+        cross(U, moving + 3, part);
+        FOR(r, 3) from[3 + r] += part[r];
+        cross(dU, at + 3, part);
+        cross(U, from + 3, turn);
+        const double grown = 2.0 * dot(U, dU, 3), size = dot(U, U, 3);
+        FOR(r, 3) velocity[r] += (part[r] + turn[r] - grown * foot[r]) / size;
+      }
+      FOR(r, 3) point[r] += foot[r];
+      twist_about(U, point, own);
+      twist_about(V, point, moving);
+      twist_about(dU, point, change);
+      twist_about(A, point, now);
+      cross(U, velocity, part);
+      FOR(r, 3) change[3 + r] += part[r];
+      cross(V, velocity, part);
+      FOR(r, 3) now[3 + r] += part[r];
+      power += dot(change, moving, 6) + dot(own, now, 6), square += dot(own, own, 6);
+    }
+    FOR(c, m->columns) ddq[c] -= power / square * w->passive[i * m->columns + c];
+  }
+}
+
+/* Rates of all freedoms, passive motions at rest, and what is left of the closure rates; V and the velocity parts of `move` too. */
+static int velocities(const Model *m, Work *w, const double *v, double *dq, magnitude *gap) {
+  *gap = completed(m, w, v, NULL, 0.0, dq);
+  if (m->passives) {
+    const int status = passive_motions(m, w);
+    if (status) return status;
+    move(m, w, dq, NULL);
+    put_at_rest(m, w, dq);
+  }
+  move(m, w, dq, NULL);
+  return MGK_OK;
+}
+
+/* Rates and accelerations of all freedoms, twists of all links and their rates. */
+static int rates(const Model *m, Work *w, const double *v, const double *a) {
+  magnitude turning = 0.0, gap;
+  const int status = velocities(m, w, v, w->dq, &gap);
+  if (status) return status;
+  if (m->passives) {
+    twist_rates(m, w, w->dq);
+    move(m, w, w->dq, NULL);
+  }
+  FOR(c, m->columns) turning = fmax(turning, fabs(w->dq[c]) * fabs(w->dq[c]));
+  double *known = w->residual; /* closed: no longer asked for */
+  row_sums(m, w, NULL, w->bias, known);
+  gap = fmax(gap, completed(m, w, a, known, turning, w->ddq));
+  if (gap > INDEPENDENT) return MGK_CONTRADICTION;
+  accelerate(m, w, w->ddq);
+  if (m->passives) {
+    keep_at_rest(m, w, w->ddq);
+    accelerate(m, w, w->ddq);
   }
   return isfinite(size_of(w->A, 6 * m->links) + turning) ? MGK_OK : MGK_NOT_FINITE;
 }
 
 /* --- forces ------------------------------------------------------------------------------------------------------------------------ */
 
-/* Effort wrenches of a pair combined to be dual to its freedoms, E (S^T E)^-1, by Gauss and Jordan. */
+/* Effort wrenches of a pair combined to be dual to its freedoms, E (S^T E)^-1. */
 static int made_dual(const Model *m, Work *w, int k) {
   const int c = m->column[m->first[k]];
   int n = 0;
-  double U[6][12] = {{0}}, E[36];
+  double U[72], E[36];
   for (int f = m->first[k]; f < m->first[k + 1]; f++) n += width(m->kind[f]);
   memcpy(E, w->E + 6 * c, 6 * n * sizeof(double));
-  FOR(i, n) {
-    FOR(j, n) U[i][j] = dot(w->S + 6 * (c + i), E + 6 * j, 6);
-    U[i][n + i] = 1.0;
-  }
-  FOR(i, n) {
-    int best = i;
-    for (int r = i + 1; r < n; r++) if (fabs(U[r][i]) > fabs(U[best][i])) best = r;
-    if (!(fabs(U[best][i]) > 1e-12)) return MGK_SINGULAR;
-    FOR(j, 2 * n) { const double t = U[i][j]; U[i][j] = U[best][j], U[best][j] = t; }
-    const double d = 1.0 / U[i][i];
-    FOR(j, 2 * n) U[i][j] *= d;
-    FOR(r, n) if (r != i) { const double g = U[r][i]; FOR(j, 2 * n) U[r][j] -= g * U[i][j]; }
-  }
+  FOR(i, n) FOR(j, n) U[2 * n * i + j] = dot(w->S + 6 * (c + i), E + 6 * j, 6);
+  if (!inverted(U, n)) return MGK_SINGULAR;
   FOR(j, n) FOR(i, 6) {
     double sum = 0.0;
-    FOR(g, n) sum += E[6 * g + i] * U[g][n + j];
+    FOR(g, n) sum += E[6 * g + i] * U[2 * n * g + n + j];
     w->E[6 * (c + j) + i] = sum;
   }
   return MGK_OK;
@@ -639,6 +828,7 @@ static int efforts(const Model *m, Work *w) {
 static void pushed(Work *w, int link, const double *force, const double *at) {
   double f[6] = {0, 0, 0, force[0], force[1], force[2]};
   wrench_moved(f, at, 1.0);
+  w->single = fmax(w->single, size_of(f, 6));
   FOR(i, 6) w->applied[6 * link + i] += f[i];
 }
 
@@ -665,6 +855,7 @@ static void between_points(Work *w, int i, int j, const double *number) {
 static void loads(const Model *m, Work *w, const double *x) {
   memset(w->applied, 0, (size_t)6 * m->links * sizeof(double));
   memset(w->given, 0, m->columns * sizeof(double));
+  w->single = 0.0;
   FOR(l, m->loads) {
     const int *load = m->load + 4 * l, i = load[1], j = load[2];
     const double *number = m->load_number + load[3];
@@ -682,6 +873,7 @@ static void loads(const Model *m, Work *w, const double *x) {
       point_of(X, number + 6, at);
       pushed(w, i, force, at);
       FOR(r, 3) w->applied[6 * i + r] += force[3 + r];
+      w->single = fmax(w->single, size_of(force + 3, 3));
     } else if (load[0] == MGK_EFFORT) {
       w->given[i] += number[0];
     } else if (load[0] == MGK_LAW) {
@@ -713,6 +905,44 @@ static void inertia(const Model *m, Work *w) {
     turned(X, M, out);
     FOR(i, 3) f[i] -= out[i];
   }
+}
+
+/* What keeps passive links at rest against loads and inertia, added to the loads: a couple about the axis of a turn, a force along a slide,
+ * which loads no pair of the links and comes from outside (force/passive_hold.py). `terms`: sizes of what adds up to the efforts. */
+static void hold(const Model *m, Work *w, double *wrenches, double *efforts, double *terms) {
+  memset(wrenches, 0, (size_t)6 * m->links * sizeof(double));
+  FOR(i, m->passives) {
+    const double *U = w->twist + 6 * i, *rate = w->passive + i * m->columns;
+    double power = dot(w->given, rate, m->columns), square = 0.0, axis[3];
+    magnitude sum = fmax(w->single, size_of(w->given, m->columns));
+    FOR(c, m->columns) sum += fabs(w->given[c] * rate[c]);
+    for (int pass = 0; pass < 2; pass++) for (int l = m->passive_first[i]; l < m->passive_first[i + 1]; l++) {
+      const int link = m->passive_link[l];
+      double point[3], foot[3], own[6], *out = wrenches + 6 * link;
+      rest_point(m, w, i, link, point, foot);
+      FOR(r, 3) point[r] += foot[r];
+      twist_about(U, point, own);
+      if (pass == 0) {
+        square += dot(own, own, 6);
+        FOR(r, 6) {
+          const double part = (w->applied[6 * link + r] + w->inertial[6 * link + r]) * U[r];
+          power += part, sum += fabs(part);
+        }
+      } else {
+        FOR(r, 6) out[r] = -power / square * own[r];
+        wrench_moved(out, point, 1.0);
+      }
+    }
+    /* in the sense in which the first component of note of the axis in its link is positive */
+    const int link = first_of(m, i);
+    double in_frame[3];
+    turned_back(w->pose + 12 * link, along_axis(m, w->twist, i), in_frame);
+    turned_back(m->base + 12 * link, in_frame, axis);
+    int first = 0;
+    while (first < 2 && !(fabs(axis[first]) > 0.1 * size_of(axis, 3))) first++;
+    efforts[i] = REAL_PART(axis[first]) < 0.0 ? power : -power, terms[i] = sum;
+  }
+  FOR(r, 6 * m->links) w->applied[r] += wrenches[r];
 }
 
 /* Pair wrenches of multipliers of the loops: w = C^T x, added. */
@@ -826,6 +1056,7 @@ static int forces(const Model *m, Work *w, const double *x, double *record, cons
   if (efforts(m, w)) return MGK_SINGULAR;
   loads(m, w, x);
   inertia(m, w);
+  if (m->passives) hold(m, w, record + places[MGK_HOLD], record + places[MGK_HOLDS], record + places[MGK_HOLD_TERMS]);
   FOR(i, 6 * m->links) w->carried[i] = w->applied[i] + w->inertial[i];
   memset(w->total, 0, (size_t)6 * m->pairs * sizeof(double));
   for (int t = m->pairs - m->loops - 1; t >= 0; t--) {
@@ -933,8 +1164,13 @@ static void set_drives(const Model *m, double *x, const double *q) {
 /* What a node is beside its closed state, at which it has just been factored: rates along the path, those of the matrix, the condition. */
 static int made_node(const Model *m, Work *w, Node *node) {
   const int n = m->unknowns;
-  double largest = 1.0, inverse = 0.0;
-  if (completed(m, w, w->direction, NULL, 0.0, node->rate) > INDEPENDENT) return MGK_CONTRADICTION;
+  double largest = 1.0, inverse = 0.0, gap;
+  const int status = velocities(m, w, w->direction, node->rate, &gap);
+  if (status) return status;
+  if (gap > INDEPENDENT) return MGK_CONTRADICTION;
+  memcpy(node->passive, w->passive, (size_t)m->passives * m->columns * sizeof(double));
+  memcpy(node->twist, w->twist, (size_t)6 * m->passives * sizeof(double));
+  FOR(i, m->passives) memcpy(node->pose + 12 * i, w->pose + 12 * first_of(m, i), 12 * sizeof(double));
   move(m, w, node->rate, w->G);
   FOR(l, m->loops) {
     double *V = w->chord_V + 6 * l, turn[3];
@@ -1012,6 +1248,137 @@ static int put(const Model *m, Work *w, const double *x, const double *v, const 
   return with_forces ? forces(m, w, x, record, places, largest) : MGK_OK;
 }
 
+/* --- passive links at rest, see closure/passive_rest.py ---------------------------------------------------------------------------- */
+
+/* The border across the passive motions of a node, in its matrix too, so that the next step begins and ends with the same rows. */
+static void set_border(const Model *m, Work *w, Node *node) {
+  const int c = m->columns;
+  FOR(i, m->passives) {
+    const double size = size_of(node->passive + i * c, c);
+    FOR(a, c) w->border[i * c + a] = node->passive[i * c + a] / size;
+  }
+  add_border(m, w, node->matrix);
+}
+
+/* The part of e across a unit vector u, of unit length; its length. */
+static double across(const double *e, const double *u, double *out) {
+  const double part = dot(e, u, 3);
+  FOR(i, 3) out[i] = e[i] - part * u[i];
+  const double length = sqrt(dot(out, out, 3));
+  FOR(i, 3) out[i] /= length;
+  return length;
+}
+
+/* Rate at which the part of e across u turns about it where u changes by du: n' . (u x n). */
+static double turning(const double *e, const double *u, const double *du) {
+  double n[3], turn[3];
+  const double length = across(e, u, n);
+  cross(u, n, turn);
+  return -dot(e, u, 3) * dot(du, turn, 3) / length;
+}
+
+/* What the amount of a turn is counted from over a step: a reference in space and one in the link, both across the axis at node a. */
+static void references(const Model *m, const Work *w, int i, double *in_space, double *in_link) {
+  const double *u = along_axis(m, w->a.twist, i);
+  double e[3] = {0};
+  int least = 0;
+  FOR(r, 3) if (fabs(u[r]) < fabs(u[least])) least = r;
+  e[least] = 1.0;
+  across(e, u, in_space);
+  turned_back(w->a.pose + 12 * i, in_space, in_link);
+}
+
+/* Angle about the axis from the reference in space to that in the link; of a slide the place of the link along it. */
+static double amount(const Model *m, const Work *w, int i, double *twists, const double *X) {
+  const double *u = along_axis(m, twists, i), origin[3] = {X[3], X[7], X[11]};
+  double e[3], c[3], from[3], to[3], turn[3];
+  if (!m->turns[i]) return dot(origin, u, 3);
+  references(m, w, i, e, c);
+  turned(X, c, turn);
+  across(e, u, from);
+  across(turn, u, to);
+  cross(from, to, turn);
+  return atan2(dot(turn, u, 3), dot(from, to, 3));
+}
+
+/* Its rate at rest, at a state with `twist_rates`. */
+static double amount_rate(const Model *m, Work *w, int i) {
+  const double *u = along_axis(m, w->twist, i), *change = along_axis(m, w->twist_rate, i), *V = w->moving + 6 * i;
+  const double *X = w->pose + 12 * first_of(m, i), origin[3] = {X[3], X[7], X[11]}, part = dot(change, u, 3);
+  double du[3], e[3], c[3], at[6], turn[3];
+  FOR(r, 3) du[r] = change[r] - part * u[r];
+  if (!m->turns[i]) {
+    twist_about(V, origin, at);
+    return dot(at + 3, u, 3) + dot(origin, du, 3);
+  }
+  references(m, w, i, e, c);
+  const double in_space = turning(e, u, du);
+  turned(X, c, e);
+  cross(V, u, turn);
+  FOR(r, 3) turn[r] = du[r] - turn[r];
+  return dot(V, u, 3) + turning(e, u, turn) - in_space;
+}
+
+/* Legendre's polynomials P_0 ... P_POINTS at t. */
+static void legendre(double t, double *P) {
+  P[0] = 1.0, P[1] = t;
+  for (int k = 2; k <= POINTS; k++) P[k] = ((2 * k - 1) * t * P[k - 1] - (k - 1) * P[k - 2]) / k;
+}
+
+/* Amounts at rest along the step from node a to b, as Legendre's series of their rates at Gauss's points. */
+static int rest_along(const Model *m, Work *w) {
+  static const double point[POINTS / 2] = {0.18343464249564980, 0.52553240991632899, 0.79666647741362674, 0.96028985649753623};
+  static const double weight[POINTS / 2] = {0.36268378337836198, 0.31370664587788729, 0.22238103445337447, 0.10122853629037626};
+  const double h = *w->b.at - *w->a.at;
+  memset(w->series, 0, (size_t)POINTS * m->passives * sizeof(double));
+  FOR(g, POINTS) {
+    const double t = g % 2 ? point[g / 2] : -point[g / 2];
+    double P[POINTS + 1], gap;
+    between(m, w, &w->a, &w->b, *w->a.at + 0.5 * (1.0 + t) * h, w->trial);
+    int status = closed(m, w, w->trial, NULL);
+    if (!status) status = velocities(m, w, w->direction, w->dq, &gap);
+    if (status) return status;
+    twist_rates(m, w, w->dq);
+    legendre(t, P);
+    FOR(i, m->passives) {
+      const double rate = h * weight[g / 2] * amount_rate(m, w, i);
+      FOR(k, POINTS) w->series[POINTS * i + k] += (k + 0.5) * P[k] * rate;
+    }
+  }
+  return MGK_OK;
+}
+
+/* What is missing to rest at a place of the step, where the motions have these twists and the first link of this one stands at X. */
+static double missing(const Model *m, const Work *w, int i, double at, double *twists, const double *X) {
+  const double t = 2.0 * (at - *w->a.at) / (*w->b.at - *w->a.at) - 1.0, whole = 8.0 * atan(1.0), *series = w->series + POINTS * i;
+  double P[POINTS + 1], out = w->missing[i] + amount(m, w, i, w->a.twist, w->a.pose + 12 * i) - amount(m, w, i, twists, X);
+  legendre(t, P);
+  out += 0.5 * (t + 1.0) * series[0];
+  for (int k = 1; k < POINTS; k++) out += 0.5 * (P[k + 1] - P[k - 1]) / (2 * k + 1) * series[k];
+  return m->turns[i] ? out - whole * floor(out / whole + 0.5) : out;
+}
+
+/* A closed state of the step, just factored, with its passive links moved to where they are at rest. */
+static int brought_to_rest(const Model *m, Work *w, double *x, double at) {
+  double before = INFINITY;
+  FOR(turn, m->passives ? MOST_TURNS : 0) {
+    double most = 0.0;
+    int status = passive_motions(m, w);
+    if (status) return status;
+    memset(w->increment, 0, m->columns * sizeof(double));
+    FOR(i, m->passives) {
+      const double part = missing(m, w, i, at, w->twist, w->pose + 12 * first_of(m, i));
+      FOR(c, m->columns) w->increment[c] += part * w->passive[i * m->columns + c];
+      most = fmax(most, fabs(part));
+    }
+    if (most <= UNTURNED || (most <= MISSING && most >= 0.5 * before)) return MGK_OK;
+    advance(m, x, w->increment, x);
+    if ((status = closed(m, w, x, NULL))) return status;
+    before = most;
+  }
+  return m->passives ? MGK_STEP : MGK_OK;
+}
+
 /* What is asked of a path: positions and what becomes of them. */
 typedef struct {
   int count, with_forces, done;
@@ -1029,7 +1396,8 @@ static int read_off(const Model *m, Work *w, Asked *asked, double at) {
   if (at >= *w->b.at) memcpy(w->x, w->b.x, m->states * sizeof(double));
   else between(m, w, &w->a, &w->b, at, w->x);
   set_drives(m, w->x, asked->q + i * d);
-  const int status = closed(m, w, w->x, NULL);
+  int status = closed(m, w, w->x, NULL);
+  if (!status && *w->b.at > *w->a.at) status = brought_to_rest(m, w, w->x, at);
   if (status) return status;
   return put(m, w, w->x, asked->v + i * d, asked->a + i * d, asked->with_forces, asked->places, asked->out + i * asked->length, asked->largest);
 }
@@ -1059,6 +1427,7 @@ static int follow(const Model *m, Work *w, Asked *asked, const double *begin, co
     status = closed(m, w, w->b.x, w->b.matrix);
     if (!status) status = made_node(m, w, &w->b);
     if (!status && !certified(m, w, &grown)) status = MGK_STEP;
+    if (!status && m->passives) status = rest_along(m, w);
     if (status) {
       h = fmin(0.5, grown) * step;
       if (h < SHORTEST) return status;
@@ -1072,8 +1441,10 @@ static int follow(const Model *m, Work *w, Asked *asked, const double *begin, co
       if ((status = read_off(m, w, asked, at))) return status;
     }
     coordinates(m, w, w->b.x, w->column_value); /* rotation vectors are continued from node to node */
+    FOR(i, m->passives) w->missing[i] = missing(m, w, i, *w->b.at, w->b.twist, w->b.pose + 12 * i);
     swapped(&w->before, &w->a);
     swapped(&w->a, &w->b);
+    set_border(m, w, &w->a);
     known = 1, h = fmin(LONGEST, grown * step);
   }
   return MGK_OK;
@@ -1083,8 +1454,11 @@ static int follow(const Model *m, Work *w, Asked *asked, const double *begin, co
 static int first_node(const Model *m, Work *w, const double *x) {
   memcpy(w->a.x, x, m->states * sizeof(double));
   *w->a.at = 0.0;
-  const int status = closed(m, w, w->a.x, w->a.matrix);
-  return status ? status : made_node(m, w, &w->a);
+  int status = closed(m, w, w->a.x, w->a.matrix);
+  if (!status) status = made_node(m, w, &w->a);
+  if (!status) set_border(m, w, &w->a);
+  memset(w->missing, 0, m->passives * sizeof(double));
+  return status;
 }
 
 /* The direction from p to q; its length. */
@@ -1123,8 +1497,7 @@ static int along(const Model *m, Work *w, Asked *asked) {
     length = towards(d, w->drive, end, w->direction);
     if ((status = first_node(m, w, w->x))) return status;
     if ((status = follow(m, w, asked, w->line_begin, end, length, until))) return status;
-    memcpy(w->drive, end, d * sizeof(double));
-    memcpy(w->x, w->a.x, m->states * sizeof(double));
+    memcpy(w->drive, end, d * sizeof(double)); /* the last position on it stands in w->x */
   }
   return MGK_OK;
 }
@@ -1135,6 +1508,7 @@ static void begin(const Model *m, Work *w) {
   memcpy(w->x, m->start, m->states * sizeof(double));
   FOR(i, m->drives) w->drive[i] = w->x[m->column_state[m->drive[i]]];
   FOR(f, m->factors) w->begun[f] = w->angle[f] = 0.0;
+  memcpy(w->border, m->border, (size_t)m->passives * m->columns * sizeof(double));
 }
 
 static void opened(const int *I, const double *P, void *state, Model *m, Work *w) {

@@ -16,21 +16,24 @@
  *       dual[pairs]                             whether the efforts are combined to be dual to the freedoms
  *       drive[drives], unknown[unknowns]        columns
  *       term_first[couplings + 1], term_column[terms]
+ *       passive_first[passives + 1], passive_link[links of all], turns[passives]   links that a passive motion moves as one; a turn?
  *       load[4 loads]                           kind (MGK_WEIGHT ...), two numbers, place among the load numbers
  * P   L, origin[3], start[states], start_coordinates[columns], frame[12], marker_a, marker_b[12 pairs], factor numbers, effort[6 columns],
- *     mass[links], center[3 links], inertia[6 links] (xx yy zz xy xz yz), base[12 links], coefficients[terms], constants[couplings],
+ *     mass[links], center[3 links], inertia[6 links] (xx yy zz xy xz yz), base[12 links], border[passives columns], coefficients[terms], constants[couplings],
  *     load numbers. Poses are three rows of four. Every link has the frame of its pair in the tree; its own is that times its base.
+ *     The border holds rates of the passive motions at the start.
  */
 #ifndef MECHGRAPH_KERNEL_H
 #define MECHGRAPH_KERNEL_H
 #include <stddef.h>
 
-#define MGK_FORMAT 1
+#define MGK_FORMAT 2
 
 /* The counts at the head of I. */
 enum {
   MGK_IS_FORMAT, MGK_LINKS, MGK_PAIRS, MGK_FACTORS, MGK_COLUMNS, MGK_STATES, MGK_LOOPS, MGK_STEPS, MGK_COUPLINGS, MGK_TERMS,
-  MGK_DRIVES, MGK_UNKNOWNS, MGK_LOADS, MGK_FRAME, MGK_FACTOR_NUMBERS, MGK_LOAD_NUMBERS, MGK_HEAD
+  MGK_DRIVES, MGK_UNKNOWNS, MGK_LOADS, MGK_FRAME, MGK_FACTOR_NUMBERS, MGK_LOAD_NUMBERS,
+  MGK_PASSIVES, MGK_PASSIVE_LINKS, MGK_HEAD
 };
 
 /* Kinds of factors: a turn about x, y or z (number: its pitch), a slide along x, y or z, a rotation (four state numbers), a constant pose. */
@@ -51,14 +54,15 @@ enum {
   MGK_NOT_FINITE = 5,   /* a load or a rate gives no finite number */
   MGK_STRAIN = 6,       /* drives or couplings strain each other without any reaction */
   MGK_TOO_FAR = 7,      /* more steps than are made */
-  MGK_FORMAT_ERROR = 8  /* tables of another version */
+  MGK_FORMAT_ERROR = 8, /* tables of another version */
+  MGK_NOT_PASSIVE = 9   /* a passive motion moves other links here, or is not told from another one */
 };
 
-/* Parts of a record, in order, for one position (condition: that number, and how far links reach, by which rounding counts); s = 6 loops + couplings - unknowns self-stresses. */
+/* Parts of a record, in order, for one position (condition: that number, and how far links reach, by which rounding counts); s = 6 loops + couplings + passives - unknowns self-stresses. */
 enum {
   MGK_X, MGK_COORDINATES, MGK_DQ, MGK_DDQ, MGK_CLOSURE, MGK_CONDITION, MGK_POINTS, MGK_REACTIONS, MGK_EFFORTS, MGK_GIVEN, MGK_BODY_LOADS, MGK_STRESS,
   MGK_STRESS_EFFORTS, MGK_COUPLED, MGK_MULTIPLIERS, MGK_MULTIPLIER_STRESS, MGK_COUPLED_STRESS, MGK_SHAKING, MGK_BALANCE, MGK_POWER,
-  MGK_PARTS
+  MGK_HOLD, MGK_HOLDS, MGK_HOLD_TERMS, MGK_PARTS
 };
 
 /* Where the parts of a record begin, and behind the last one its length: places[MGK_PARTS + 1]. */

@@ -76,7 +76,7 @@ def pointer(array: Array | Integers) -> ctypes.c_void_p:
 
 def _orders(begin: Array, q: Array, batch: tuple[int, ...]) -> Iterator[Integers]:
     """In which order positions are taken from the start: of one drive up and down its curve, of several case by case."""
-    if len(begin) > 1:
+    if len(begin) != 1:
         n = batch[-1] if batch else 1
         yield from np.arange(len(q), dtype=np.int32).reshape(-1, n)
         return

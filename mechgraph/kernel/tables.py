@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array, compose, identity, inverse, rotate
 from mechgraph.closure.indexing import Index, System
+from mechgraph.closure.passive_motion import PassiveMotion
 from mechgraph.closure.rows import CouplingRows
 from mechgraph.kernel.loads import Acting, acting
 from mechgraph.model.factors import ConstantScrew, Factor, Rotation
@@ -25,10 +26,11 @@ from mechgraph.numerics.linear import complement
 
 Integers = NDArray[np.int32]
 
-FORMAT = 1
+FORMAT = 2
 PARTS = (
     "x", "coordinates", "dq", "ddq", "closure", "condition", "points", "reactions", "efforts", "given", "loads", "stress", "stress_efforts",
     "coupled", "multipliers", "multiplier_stress", "coupled_stress", "shaking", "balance", "power",
+    "hold", "holds", "hold_terms",
 )  # fmt: skip
 """Parts of a record, in order."""
 ROWS_OF_KERNEL = 90
@@ -59,7 +61,8 @@ class Layout:
     """What a mechanism is made of: ``I``, with what its numbers are filled from.
 
     ``places`` and ``shapes`` of the parts of a record; ``side (N,)``: the pose among identity, markers A and markers B in which every link
-    stands; ``constant``, ``per_pitch``, ``pair``: of every factor number; ``ends``: links a and b of all pairs.
+    stands; ``constant``, ``per_pitch``, ``pair``: of every factor number; ``ends``: links a and b of all pairs;
+    ``border (p, F)``: rates of the passive motions at the start.
     """
 
     I: Integers
@@ -70,6 +73,7 @@ class Layout:
     per_pitch: Array
     pair: Index
     ends: tuple[Index, Index]
+    border: Array
 
     def record(self, forces: bool) -> int:
         """Numbers of a record, with forces or of the motion alone."""
@@ -126,8 +130,8 @@ def _keeps_its_line(freedom: Freedom) -> bool:
     return not per_pitch[:3].any() and not (per_pitch[3:] - line * (line @ per_pitch[3:])).any()
 
 
-def layout(system: System, drives: Index, held: Index) -> Layout:
-    """The layout of a mechanism that the kernel can carry, the freedoms ``drives`` given and ``held`` at rest."""
+def layout(system: System, drives: Index, passive: Sequence[PassiveMotion]) -> Layout:
+    """The layout of a mechanism that the kernel can carry, the freedoms ``drives`` given and ``passive`` motions at rest."""
     s, g = system, system.graph
     steps, first, effort_factor = _factors(s)
     widths = [0 if step.kind == Kind.POSE else 3 if step.kind == Kind.ROTATION else 1 for _, step in steps]
@@ -136,7 +140,7 @@ def layout(system: System, drives: Index, held: Index) -> Layout:
     states = np.cumsum(
         [0, *(4 if step.kind == Kind.ROTATION else w for (_, step), w in zip(steps, widths, strict=True))]
     )
-    unknown = complement(np.union1d(drives, held), s.n_freedoms)
+    unknown = complement(drives, s.n_freedoms)
     place = np.full(s.n_freedoms, -1)
     place[unknown] = np.arange(len(unknown))
     tree = g.steps.copy()
@@ -147,24 +151,26 @@ def layout(system: System, drives: Index, held: Index) -> Layout:
     K = len(s.m.couplings)
     ends = np.stack([s.a, s.b], axis=1)
     head = [FORMAT, len(s.m.links), len(s.m.pairs), len(steps), s.n_freedoms, s.n_state, g.n_loops, len(pair), K, len(term_columns),
-            len(drives), len(unknown), 0, g.frame, int(numbers[-1]), 0]  # fmt: skip
+            len(drives), len(unknown), 0, g.frame, int(numbers[-1]), 0, len(passive), sum(len(motion.links) for motion in passive)]  # fmt: skip
     parts = [
         head, first, [step.kind for _, step in steps], columns[:-1], states[:-1], numbers[:-1], ends.ravel(), tree.ravel(), g.chords,
         np.searchsorted(loop, np.arange(g.n_loops + 1)), pair, sign, s.pair_of_freedom, s.single_rows, s.is_length, place, *effort_factor,
         [row.computed_efforts for row in map(s.types.__getitem__, s.type_of.tolist())], drives, unknown,
-        np.searchsorted(term_rows, np.arange(K + 1)), term_columns,
+        np.searchsorted(term_rows, np.arange(K + 1)), term_columns, np.cumsum([0, *(len(motion.links) for motion in passive)]),
+        [link for motion in passive for link in motion.links], [motion.turns for motion in passive],
     ]  # fmt: skip
     P = len(s.m.pairs)
     side = np.zeros(len(s.m.links), dtype=np.intp)
     side[g.steps[:, 3]] = 1 + g.steps[:, 0] + np.where(g.steps[:, 1] > 0, P, 0)
     return Layout(
         np.concatenate([np.asarray(part, dtype=np.int32) for part in parts]),
-        *_record(s, len(unknown)),
+        *_record(s, len(unknown), len(passive)),
         side,
         np.array([value for _, step in steps for value in step.constant]),
         np.array([step.per_pitch for _, step in steps for _ in step.constant]),
         np.array([k for k, step in steps for _ in step.constant], dtype=np.intp),
         (s.a, s.b),
+        np.array([motion.rates for motion in passive]).reshape(len(passive), s.n_freedoms),
     )
 
 
@@ -208,10 +214,10 @@ def _coupling_rows(s: System) -> list[CouplingRows]:
     return [row for row in s.rows if isinstance(row, CouplingRows)]
 
 
-def _record(s: System, unknowns: int) -> tuple[dict[str, slice], dict[str, tuple[int, ...]]]:
+def _record(s: System, unknowns: int, passives: int) -> tuple[dict[str, slice], dict[str, tuple[int, ...]]]:
     """The places and shapes of the parts of a record."""
     c, n, p, k = s.n_freedoms, len(s.m.links), len(s.m.pairs), len(s.m.couplings)
-    stresses = 6 * s.graph.n_loops + k - unknowns
+    stresses = 6 * s.graph.n_loops + k + passives - unknowns
     shapes: dict[str, tuple[int, ...]] = dict.fromkeys(PARTS, (c,))
     shapes |= {
         "x": (s.n_state,),
@@ -223,8 +229,12 @@ def _record(s: System, unknowns: int) -> tuple[dict[str, slice], dict[str, tuple
     }
     shapes |= {"stress": (stresses, p, 6), "stress_efforts": (stresses, c), "coupled_stress": (stresses, c)}
     shapes |= {"multiplier_stress": (stresses, k), "closure": (), "condition": (2,), "balance": (), "power": ()}
+    shapes |= {"hold": (n if passives else 0, 6), "holds": (passives,), "hold_terms": (passives,)}
     ends = np.cumsum([0, *(int(np.prod(shapes[name])) for name in PARTS)]).tolist()
-    return {name: slice(i, j) for name, i, j in zip(PARTS, ends[:-1], ends[1:], strict=True)}, shapes
+    places = {name: slice(i, j) for name, i, j in zip(PARTS, ends[:-1], ends[1:], strict=True)}
+    if not passives:
+        del places["hold"]
+    return places, shapes
 
 
 def tables(known: Layout, system: System, x: Array, loads: Sequence[Load] | None) -> tuple[Integers, Array] | None:
@@ -253,7 +263,7 @@ def tables(known: Layout, system: System, x: Array, loads: Sequence[Load] | None
     parts = [
         np.full((1, 1), par.L), par.origin[:, None], x, s.start_coordinates(s.m.start)[:, None], par.frame.reshape(12, 1),
         _flat(A), _flat(B), known.constant[:, None] + known.per_pitch[:, None] * par.pitch[known.pair],
-        _by_item(np.concatenate([moment, force])), par.mass, _by_item(center), _by_item(inertia), _flat(own),
+        _by_item(np.concatenate([moment, force])), par.mass, _by_item(center), _by_item(inertia), _flat(own), known.border.reshape(-1, 1),
         *(row.coefficients for row in rows), *(row.constant for row in rows), *acts.numbers,
     ]  # fmt: skip
     I = np.concatenate([known.I, np.array(acts.entries, dtype=np.int32).ravel()])
