@@ -74,7 +74,7 @@ def solved(library: ctypes.CDLL, name: str, m: mg.Mechanism, q: list[float]) -> 
 
 
 @pytest.mark.usefixtures("compiled")
-@pytest.mark.parametrize("name", ["rcsr-csr", "bricard-cube"])
+@pytest.mark.parametrize("name", ["rcsr-csr", "bricard-cube", "rssr"])
 def test_c_gives_what_solve_gives(name, tmp_path):
     m = mg.load(name)
     t = tabled(m)

@@ -16,8 +16,9 @@ from attack import (
     without_numbers,
     wrapped,
 )
+from machines import five_rods
 from mechanisms import Z, hexapod
-from strategies import closed_mechanism, motions, with_drives, with_loads
+from strategies import closed_mechanism, motions, with_drives, with_loads, with_loads_on_links
 
 import mechgraph as mg
 from mechgraph import by_kernel
@@ -70,6 +71,7 @@ SERVED = {
     "r-sg-c",
     "rcsr",
     "rcsr-csr",
+    "rssr",
     "slider-crank",
     "windows-2",
 }
@@ -153,6 +155,69 @@ def test_rotation_vectors_go_on_beyond_half_a_turn():
         assert agreed(m, {drive.freedom: q}) == "compiled"
 
 
+def uneven_rod():
+    """RSSR with a coupler whose mass centre is off its line, under gravity and a couple about it; its drive makes more than a turn."""
+    m = mg.load("rssr")
+    links = [link.replace(center=(0.1, 0.2, 0.3), mass=2.0) if link.name == "coupler" else link for link in m.links]
+    loads = [mg.Gravity((1.0, 2.0, -9.81)), mg.Wrench("coupler", moment=(1.0, 0.5, 2.0))]
+    return m.replace(links=links, loads=loads)
+
+
+def bars_on_a_plane():
+    """Two bars that a driver moves against each other, and that turn idly as one."""
+    pairs = [
+        mg.Pair("A", "R", "frame", "b1", point=(-0.13, -0.45, 0), axis=Z),
+        mg.Pair("B", "R", "b1", "b2", point=(0.4, 0.3, 0.1), axis=Z),
+        mg.Pair("C", "Cp", "b2", "frame", point=(0.9, -0.2, 0.6), axis=Z, second=(0.6, 0.8, 0)),
+    ]
+    return mg.Mechanism("bars", None, pairs, ["B"], loads=[mg.Wrench("b2", force=(1.0, 2.0, 0.5), point=(0.1, 0, 0))])
+
+
+def washer():
+    """A washer that slides idly between two pistons."""
+    pairs = [
+        mg.Pair("A", "R", "frame", "arm", point=(0, 0, 0), axis=Z),
+        mg.Pair("B", "P", "arm", "washer", point=(0.3, 0.1, 0.2), axis=(1, 0.5, 0.2)),
+        mg.Pair("C", "P", "washer", "arm", point=(0.5, 0.3, 0.1), axis=(1, 0.5, 0.2)),
+    ]
+    links = [mg.Link("frame"), mg.Link("arm"), mg.Link("washer", 1.5, (0.2, 0.1, 0.3))]
+    return mg.Mechanism("washer", links, pairs, ["A"], loads=[mg.Gravity((1.0, -9.81, 0.5))])
+
+
+@pytest.mark.parametrize(
+    ("make", "size"),
+    [(uneven_rod, 4.0), (bars_on_a_plane, 1.5), (washer, 4.0), (lambda: hexapod("SPS"), 0.8), (five_rods, 0.8)],
+    ids=["rod", "bars", "washer", "hexapod", "suspension"],
+)
+def test_passive_links_are_at_rest_and_held_as_by_numpy(make, size):
+    """One or several links in a motion, turns and slides, load-bearing ones; far from the start, and wherever else positions are."""
+    m = make()
+    given = swing(m, 7, size)
+    assert agreed(m, given) == "compiled"
+    whole = mg.kinematics(m, given, engine="compiled")
+    if len(m.drives) > 1:  # they are led along the polygon of their positions
+        return
+    ((name, motion),) = given.items()
+    for some in ([6], [0, 4]):
+        part = mg.kinematics(m, {name: np.asarray(motion.position)[some]}, engine="compiled")
+        assert part.engine == "compiled"
+        for link in m.links:
+            np.testing.assert_allclose(part.link(link.name).pose, whole.link(link.name).pose[some], atol=1e-11)
+
+
+@pytest.mark.parametrize("seed", [40, 64, 94, 213])
+def test_random_mechanisms_with_passive_freedoms(seed):
+    """Spins between spheres, turns over planes, slides; several at once."""
+    m = with_loads_on_links(with_drives(closed_mechanism(seed), seed), seed)
+    assert mg.solve(m, motions(m, seed, np.linspace(0, 0.1, 2), size=0.08), engine="dense").passive_effort
+    assert agreed(m, motions(m, seed, np.linspace(0, 1.0, 5), size=0.08)) == "compiled"
+
+
+def test_check_follows_no_motion():
+    with pytest.raises(mg.DeclarationError, match="the kernel follows motions and decides no rank"):
+        mg.check(mg.load("four-bar"), engine="compiled")
+
+
 def loads_of(m):
     """Loads of every kind that is numbers."""
     a, b = m.links[1].name, m.links[2].name
@@ -219,11 +284,26 @@ def test_a_freedom_about_any_line_of_its_marker():
     assert agreed(chain, swing(chain, size=1.5)) == "compiled"
 
 
+def ring_on_a_slider():
+    """A ring that both slides and turns idly between two coaxial cylinders."""
+    pairs = [
+        mg.Pair("A", "P", "frame", "slider", point=(0, 0, 0), axis=(1, 0, 0)),
+        mg.Pair("B", "C", "slider", "ring", point=(0.2, 0, 0), axis=(1, 0, 0)),
+        mg.Pair("C", "C", "ring", "slider", point=(0.4, 0, 0), axis=(1, 0, 0)),
+    ]
+    return mg.Mechanism("ring", None, pairs, ["A"])
+
+
 @pytest.mark.parametrize(
-    ("name", "why"), [("geneva", r"pair 'C' \(Ps\) travels along a curve"), ("ring on a bar", "a link has several passive motions")]
+    ("make", "why"),
+    [
+        (lambda: mg.load("geneva"), r"pair 'C' \(Ps\) travels along a curve"),
+        (ring_on_a_slider, "a link has several passive motions"),
+    ],
+    ids=["geneva", "ring"],
 )
-def test_what_it_cannot_carry_is_named(name, why):
-    m = mg.load(name)
+def test_what_it_cannot_carry_is_named(make, why):
+    m = make()
     with pytest.raises(mg.DeclarationError, match=why):
         mg.solve(m, swing(m), engine="compiled")
     assert mg.solve(m, swing(m)).engine == "dense"

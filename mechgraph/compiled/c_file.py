@@ -173,8 +173,9 @@ def _whole_numbers(tables: Tabled) -> Iterator[str]:
     """The table of what the mechanism is made of, part by part as the comment of the kernel says."""
     known = tables.I.tolist()
     pairs, factors, columns, _, loops, steps, couplings, terms, drives, unknowns, loads = known[2:13]
+    passives, moved = known[len(COUNTS) - 2 : len(COUNTS)]
     parts = [
-        ("counts", 16), ("first factor of every pair", pairs + 1), ("kinds of factors", factors), ("their first columns", factors),
+        ("counts", len(COUNTS)), ("first factor of every pair", pairs + 1), ("kinds of factors", factors), ("their first columns", factors),
         ("their first state numbers", factors), ("their places among the factor numbers", factors),
         ("links a and b of pairs", 2 * pairs),        ("tree: pair, from a to b, parent, child", 4 * (pairs - loops)),
         ("chords", loops), ("loops: first steps", loops + 1),
@@ -182,7 +183,8 @@ def _whole_numbers(tables: Tabled) -> Iterator[str]:
         ("slides", columns),        ("places among the unknowns", columns), ("factors before their efforts", columns),
         ("efforts at marker B", columns),
         ("pairs with efforts made dual", pairs), ("drives", drives), ("unknown freedoms", unknowns),
-        ("couplings: first terms", couplings + 1),        ("freedoms of the terms", terms), ("loads", 4 * loads),
+        ("couplings: first terms", couplings + 1),        ("freedoms of the terms", terms),
+        ("passive motions: first links", passives + 1), ("links that they move as one", moved), ("turns", passives), ("loads", 4 * loads),
     ]  # fmt: skip
     assert sum(count for _, count in parts) == len(known)
     at = 0
@@ -193,7 +195,7 @@ def _whole_numbers(tables: Tabled) -> Iterator[str]:
 
 def _numbers(tables: Tabled) -> Iterator[str]:
     """The numbers of the mechanism, with the names of what they belong to."""
-    m, P, known = tables.m, tables.P.tolist(), dict(zip(COUNTS, tables.I[:16].tolist(), strict=True))
+    m, P, known = tables.m, tables.P.tolist(), dict(zip(COUNTS, tables.I[: len(COUNTS)].tolist(), strict=True))
     pairs, links, freedoms = (
         [in_comment(name) for name in names] for names in (m.pair_index, m.link_names(), m.freedom_names())
     )
@@ -204,6 +206,7 @@ def _numbers(tables: Tabled) -> Iterator[str]:
         ("pitches (over L) and poses of factors", (), known["factor numbers"]),
         ("unit effort", freedoms, 6), (f"mass{_unit(unit_of(m.units, (0, 1, 0)))}", links, 1), ("mass centre, over L", links, 3),
         ("inertia about it, over L^2: xx yy zz xy xz yz", links, 6), ("frame of the link, over L", links, 12),
+        ("rates of the passive motions at the start", (), known["passive motions"] * len(freedoms)),
         ("coefficients of couplings", (), known["terms"]), ("their constants", (), known["couplings"]),
         ("loads", (), known["load numbers"]),
     ]  # fmt: skip
@@ -217,7 +220,7 @@ def _numbers(tables: Tabled) -> Iterator[str]:
 
 COUNTS = (
     "format", "links", "pairs", "factors", "columns", "states", "loops", "steps", "couplings", "terms", "drives", "unknowns", "loads",
-    "frame", "factor numbers", "load numbers",
+    "frame", "factor numbers", "load numbers", "passive motions", "links in them",
 )  # fmt: skip
 """What stands at the head of the table."""
 

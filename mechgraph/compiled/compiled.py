@@ -280,9 +280,14 @@ class Compiled:
         Raises
         ------
         DeclarationError
-            for names that are none.
+            for names that are none, and where there are passive freedoms: where their links stand hangs on the whole way there.
         """
         of, place = self._output(output)
+        if self.tables.layout.shapes["holds"][0]:
+            self._refuse(
+                "gradient: there are passive freedoms, and where their links stand hangs on the whole way there; solve mechanisms with "
+                "other numbers from their starts, and take differences"
+            )
         names = [names] if isinstance(names, str) else list(names)
         columns = [self._derivatives(name)[of].reshape(-1)[place] for name in names]
         return np.stack(columns, axis=-1) if columns else np.zeros((*np.shape(place), 0))

@@ -34,7 +34,7 @@ static const magnitude NEARBY = 1e-5;       /* part of a passive motion above wh
 static const magnitude UNTURNED = 1e-13;    /* angle that is rounding */
 static const magnitude MISSING = 1e-9;      /* angle, or length / L, that may be missing to rest */
 static const magnitude STRAIGHT_ON = 1e-12; /* change of direction up to which a polygon goes straight on */
-enum { ITERATIONS = 8, MOST_STEPS = 20000, MOST_TURNS = 8, POINTS = 8 };
+enum { ITERATIONS = 8, MOST_STEPS = 20000, MOST_TURNS = 8, POINTS = 8, TOLD = 8 };
 
 #define FOR(i, n) for (int i = 0; i < (n); i++)
 
@@ -66,8 +66,8 @@ typedef struct {
   double *dq, *ddq, *V, *A, *bias, *G, *chord_V, *pair_twist, *E, *applied, *inertial, *total, *reaction, *carried, *given, *tau, *coupled, *multiplier;
   double *null, *stress, *stress_effort, *row_value, *column_value, *trial, *increment, *change, *bound, *record, *direction, *line_begin, *asked, *kept;
   /* passive motions: unit rates, twists with their rates, velocity parts, links at rest in them; along a step, what is missing to rest */
-  double *passive, *twist, *twist_rate, *own_bias, *moving_bias, *moving, *raw, *apart, *trial_rate, *trial_acceleration, *still, *missing, *series;
-  magnitude single;
+  double *passive, *twist, *twist_rate, *own_bias, *moving_bias, *moving, *raw, *apart, *trial_rate, *trial_acceleration, *still, *series;
+  magnitude single, told;
   size_t n_kept;
   Node a, b, before;
   long steps, evaluations, factorizations;
@@ -121,7 +121,7 @@ static size_t lay_out(const Model *m, double *memory, Work *w) {
   TAKE(tau, c), TAKE(coupled, c), TAKE(multiplier, m->couplings), TAKE(null, s * r), TAKE(stress, 6 * p * s), TAKE(stress_effort, c * s);
   TAKE(row_value, r), TAKE(column_value, c), TAKE(trial, m->states), TAKE(increment, c), TAKE(change, u * u), TAKE(bound, 4 * u);
   TAKE(passive, q * c), TAKE(twist, 6 * q), TAKE(twist_rate, 6 * q), TAKE(own_bias, 6 * p * q), TAKE(moving_bias, q ? 6 * p : 0), TAKE(moving, 6 * q);
-  TAKE(raw, 6 * q * q + q), TAKE(apart, 2 * q * q), TAKE(trial_rate, q ? c : 0), TAKE(trial_acceleration, q ? c : 0), TAKE(still, m->drives), TAKE(missing, q), TAKE(series, POINTS * q);
+  TAKE(raw, 6 * q * q + q), TAKE(apart, 2 * q * q), TAKE(trial_rate, q ? c : 0), TAKE(trial_acceleration, q ? c : 0), TAKE(still, m->drives), TAKE(series, POINTS * q);
   Node *nodes[3] = {&w->a, &w->b, &w->before};
   FOR(i, 3) {
     nodes[i]->x = taken(&memory, &size, m->states), nodes[i]->rate = taken(&memory, &size, c);
@@ -1157,6 +1157,20 @@ static void coordinates(const Model *m, Work *w, const double *x, double *out) {
   }
 }
 
+/* Rotation vectors continued up to a place of the step: near whole turns axes swing round within a part of a step. */
+static void continued(const Model *m, Work *w, double at) {
+  const double from = w->told, h = *w->b.at - *w->a.at;
+  int turns = 0;
+  FOR(f, m->factors) turns |= m->kind[f] == MGK_ROTATION;
+  w->told = at;
+  if (!turns || !(at > from)) return;
+  const int n = (int)ceil(TOLD * (at - from) / h);
+  for (int i = 1; i < n; i++) {
+    between(m, w, &w->a, &w->b, from + (at - from) * i / n, w->trial);
+    coordinates(m, w, w->trial, w->dq);
+  }
+}
+
 static void set_drives(const Model *m, double *x, const double *q) {
   FOR(i, m->drives) x[m->column_state[m->drive[i]]] = q[i];
 }
@@ -1348,35 +1362,37 @@ static int rest_along(const Model *m, Work *w) {
   return MGK_OK;
 }
 
-/* What is missing to rest at a place of the step, where the motions have these twists and the first link of this one stands at X. */
-static double missing(const Model *m, const Work *w, int i, double at, double *twists, const double *X) {
+/* What is missing to rest at a state of the step, node a being at rest. */
+static double missing(const Model *m, const Work *w, int i, double at) {
   const double t = 2.0 * (at - *w->a.at) / (*w->b.at - *w->a.at) - 1.0, whole = 8.0 * atan(1.0), *series = w->series + POINTS * i;
-  double P[POINTS + 1], out = w->missing[i] + amount(m, w, i, w->a.twist, w->a.pose + 12 * i) - amount(m, w, i, twists, X);
+  double P[POINTS + 1], out = amount(m, w, i, w->a.twist, w->a.pose + 12 * i) - amount(m, w, i, w->twist, w->pose + 12 * first_of(m, i));
   legendre(t, P);
   out += 0.5 * (t + 1.0) * series[0];
   for (int k = 1; k < POINTS; k++) out += 0.5 * (P[k + 1] - P[k - 1]) / (2 * k + 1) * series[k];
   return m->turns[i] ? out - whole * floor(out / whole + 0.5) : out;
 }
 
-/* A closed state of the step, just factored, with its passive links moved to where they are at rest. */
-static int brought_to_rest(const Model *m, Work *w, double *x, double at) {
+/* Closed by Newton from x, in place, as `closed` does, its passive links moved to where they are at rest at this place of the step. */
+static int closed_at_rest(const Model *m, Work *w, double *x, double at, double *matrix) {
   double before = INFINITY;
-  FOR(turn, m->passives ? MOST_TURNS : 0) {
+  FOR(turn, MOST_TURNS) {
     double most = 0.0;
-    int status = passive_motions(m, w);
+    int status = closed(m, w, x, matrix);
+    if (!m->passives || *w->b.at <= *w->a.at) return status;
+    if (!status) status = passive_motions(m, w);
     if (status) return status;
     memset(w->increment, 0, m->columns * sizeof(double));
     FOR(i, m->passives) {
-      const double part = missing(m, w, i, at, w->twist, w->pose + 12 * first_of(m, i));
+      const double part = missing(m, w, i, at);
       FOR(c, m->columns) w->increment[c] += part * w->passive[i * m->columns + c];
       most = fmax(most, fabs(part));
     }
     if (most <= UNTURNED || (most <= MISSING && most >= 0.5 * before)) return MGK_OK;
+    if (!(most <= CORRECTION)) return MGK_STEP;
     advance(m, x, w->increment, x);
-    if ((status = closed(m, w, x, NULL))) return status;
     before = most;
   }
-  return m->passives ? MGK_STEP : MGK_OK;
+  return MGK_STEP;
 }
 
 /* What is asked of a path: positions and what becomes of them. */
@@ -1396,8 +1412,8 @@ static int read_off(const Model *m, Work *w, Asked *asked, double at) {
   if (at >= *w->b.at) memcpy(w->x, w->b.x, m->states * sizeof(double));
   else between(m, w, &w->a, &w->b, at, w->x);
   set_drives(m, w->x, asked->q + i * d);
-  int status = closed(m, w, w->x, NULL);
-  if (!status && *w->b.at > *w->a.at) status = brought_to_rest(m, w, w->x, at);
+  continued(m, w, fmin(at, *w->b.at));
+  const int status = closed_at_rest(m, w, w->x, at, NULL);
   if (status) return status;
   return put(m, w, w->x, asked->v + i * d, asked->a + i * d, asked->with_forces, asked->places, asked->out + i * asked->length, asked->largest);
 }
@@ -1428,6 +1444,8 @@ static int follow(const Model *m, Work *w, Asked *asked, const double *begin, co
     if (!status) status = made_node(m, w, &w->b);
     if (!status && !certified(m, w, &grown)) status = MGK_STEP;
     if (!status && m->passives) status = rest_along(m, w);
+    if (!status && m->passives) status = closed_at_rest(m, w, w->b.x, *w->b.at, w->b.matrix);
+    if (!status && m->passives) status = made_node(m, w, &w->b);
     if (status) {
       h = fmin(0.5, grown) * step;
       if (h < SHORTEST) return status;
@@ -1440,8 +1458,8 @@ static int follow(const Model *m, Work *w, Asked *asked, const double *begin, co
       if (at > *w->b.at && step != left) break;
       if ((status = read_off(m, w, asked, at))) return status;
     }
-    coordinates(m, w, w->b.x, w->column_value); /* rotation vectors are continued from node to node */
-    FOR(i, m->passives) w->missing[i] = missing(m, w, i, *w->b.at, w->b.twist, w->b.pose + 12 * i);
+    continued(m, w, *w->b.at);
+    coordinates(m, w, w->b.x, w->dq);
     swapped(&w->before, &w->a);
     swapped(&w->a, &w->b);
     set_border(m, w, &w->a);
@@ -1453,11 +1471,10 @@ static int follow(const Model *m, Work *w, Asked *asked, const double *begin, co
 /* The first node of a line from the state x. */
 static int first_node(const Model *m, Work *w, const double *x) {
   memcpy(w->a.x, x, m->states * sizeof(double));
-  *w->a.at = 0.0;
+  *w->a.at = w->told = 0.0;
   int status = closed(m, w, w->a.x, w->a.matrix);
   if (!status) status = made_node(m, w, &w->a);
   if (!status) set_border(m, w, &w->a);
-  memset(w->missing, 0, m->passives * sizeof(double));
   return status;
 }
 

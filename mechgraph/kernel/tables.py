@@ -150,14 +150,15 @@ def layout(system: System, drives: Index, passive: Sequence[PassiveMotion]) -> L
     term_rows, term_columns = (rows[0].term_rows, rows[0].term_columns) if rows else np.zeros((2, 0), dtype=np.intp)
     K = len(s.m.couplings)
     ends = np.stack([s.a, s.b], axis=1)
+    moved = [link for motion in passive for link in motion.links]
     head = [FORMAT, len(s.m.links), len(s.m.pairs), len(steps), s.n_freedoms, s.n_state, g.n_loops, len(pair), K, len(term_columns),
-            len(drives), len(unknown), 0, g.frame, int(numbers[-1]), 0, len(passive), sum(len(motion.links) for motion in passive)]  # fmt: skip
+            len(drives), len(unknown), 0, g.frame, int(numbers[-1]), 0, len(passive), len(moved)]  # fmt: skip
     parts = [
         head, first, [step.kind for _, step in steps], columns[:-1], states[:-1], numbers[:-1], ends.ravel(), tree.ravel(), g.chords,
         np.searchsorted(loop, np.arange(g.n_loops + 1)), pair, sign, s.pair_of_freedom, s.single_rows, s.is_length, place, *effort_factor,
         [row.computed_efforts for row in map(s.types.__getitem__, s.type_of.tolist())], drives, unknown,
-        np.searchsorted(term_rows, np.arange(K + 1)), term_columns, np.cumsum([0, *(len(motion.links) for motion in passive)]),
-        [link for motion in passive for link in motion.links], [motion.turns for motion in passive],
+        np.searchsorted(term_rows, np.arange(K + 1)), term_columns,
+        np.cumsum([0, *(len(motion.links) for motion in passive)]), moved, [motion.turns for motion in passive],
     ]  # fmt: skip
     P = len(s.m.pairs)
     side = np.zeros(len(s.m.links), dtype=np.intp)

@@ -9,10 +9,10 @@ from typing import Any
 
 from mechgraph.arguments import Positive, door
 from mechgraph.closure.assembly import assembled, assembled_at, named_columns
-from mechgraph.closure.rank import EngineName
+from mechgraph.closure.solver import MotionEngineName
 from mechgraph.data import json_text, plain
 from mechgraph.document import Document, Paragraph, Shown, to_markdown, to_text
-from mechgraph.errors import AssemblyError, MechgraphError
+from mechgraph.errors import AssemblyError, DeclarationError, MechgraphError
 from mechgraph.graph.linkgraph import link_graph
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.tolerances import RANKS
@@ -129,7 +129,7 @@ def check(
     m: Mechanism,
     at: Mapping[str, float] | None = None,
     *,
-    engine: EngineName = "auto",
+    engine: MotionEngineName = "auto",
     tol: float | None = None,
     limit: Positive = LIMIT,
 ) -> DeterminacyReport:
@@ -139,6 +139,7 @@ def check(
     ----------
     at : values of freedoms at which to assemble first, e.g. ``{"A": 0.3}``.
     engine : which engine decides ranks, ``"dense"`` or ``"sparse"``; ``"auto"`` takes the faster one. The report is the same.
+        The compiled kernel follows motions; it decides no rank, and ``"compiled"`` is refused.
     tol : accuracy to which directions (radians) and distances (over L) are meant; the report is that of ``m.snapped(tol)``. Left out:
         that of the mechanism, or exact.
     limit : seconds that each search may take (for special geometry hidden by rounded numbers, for changes that help, for what ``tol``
@@ -146,11 +147,16 @@ def check(
 
     Raises
     ------
+    DeclarationError
+        where ``engine`` is ``"compiled"``.
     AssemblyError
         where ``at`` is given and cannot be reached. Without it, loops that cannot be closed are reported in ``note``.
     MechgraphError
         where the geometry is not made exact to ``tol`` within ``limit``.
     """
+    if engine == "compiled":
+        text = "engine 'compiled' does not serve: the kernel follows motions and decides no rank. Use engine='auto'"
+        raise DeclarationError(f"check {m.name!r}", [text])
     graph = m.once(link_graph)
     if not m.has_geometry:
         return DeterminacyReport(m, graph, "Topology only: no geometry is declared.", asked=engine, limit=limit)
