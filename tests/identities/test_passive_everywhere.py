@@ -58,6 +58,17 @@ def test_a_path_on_which_something_stops_being_passive_is_refused_there(monkeypa
     assert mg.kinematics(m, {"O4": [0.0]}, engine=engine).status.tolist() == ["ok"]
 
 
+def test_the_compiled_kernel_hands_it_over(monkeypatch, compiled: None) -> None:
+    monkeypatch.setattr(mobility, "_lasting", lambda here, *_: here)
+    m = PARALLEL_HERE["C-S-C-R"]
+    with pytest.raises(mg.IndeterminateError, match="moves other links at O4.Rz"):
+        mg.kinematics(m, {"O4": [0.0, -0.2]}, engine="compiled")
+    assert mg.kinematics(m, {"O4": [0.0]}, engine="compiled").engine == "compiled"
+    c = mg.compile(m)
+    assert np.isnan(c(-0.2))
+    assert c.status == "no longer passive"
+
+
 def test_what_is_passive_everywhere_stays_so() -> None:
     """The coupler of a four-bar on two cylindrical pairs slides on them in every position, the rod between two balls spins."""
     m = mg.load("four-bar")
