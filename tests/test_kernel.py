@@ -213,6 +213,12 @@ def test_random_mechanisms_with_passive_freedoms(seed):
     assert agreed(m, motions(m, seed, np.linspace(0, 1.0, 5), size=0.08)) == "compiled"
 
 
+def test_nothing_is_driven():
+    pairs = [mg.Pair("A", "W", "frame", "post", point=(0, 0, 0))]
+    post = mg.Mechanism("post", [mg.Link("frame"), mg.Link("post", 2.0, (0.3, 0, 1))], pairs)
+    assert agreed(post.replace(loads=[mg.Gravity((1.0, 0, -9.81))]), {}) == "compiled"
+
+
 def test_check_follows_no_motion():
     with pytest.raises(mg.DeclarationError, match="the kernel follows motions and decides no rank"):
         mg.check(mg.load("four-bar"), engine="compiled")

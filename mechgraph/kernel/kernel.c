@@ -3,6 +3,7 @@
  * A state is evaluated along the spanning tree: poses of links, twists of all freedoms, and what every chord leaves open of its loop. One
  * elimination of the closure matrix, rows chosen by pivots, serves Newton, rates, accelerations and, transposed, the loop wrenches of the
  * forces (reciprocity: J^T x = tau - S^T w_tree). A path is a chain of certified steps, see `certified`; positions are read off them.
+ * Passive freedoms: rows of a border keep increments across their motions, along a step links are brought to where they are at rest.
  * Sources: Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 5 and 8; Allgower and Georg, Introduction to Numerical Continuation
  * Methods, 2003, chapters 2 and 6.
  */
