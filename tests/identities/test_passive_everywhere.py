@@ -61,7 +61,7 @@ def test_a_path_on_which_something_stops_being_passive_is_refused_there(monkeypa
 def test_the_compiled_kernel_hands_it_over(monkeypatch, compiled: None) -> None:
     monkeypatch.setattr(mobility, "_lasting", lambda here, *_: here)
     m = PARALLEL_HERE["C-S-C-R"]
-    with pytest.raises(mg.IndeterminateError, match="moves other links at O4.Rz"):
+    with pytest.raises(mg.IndeterminateError, match=r"moves other links at O4\.Rz"):
         mg.kinematics(m, {"O4": [0.0, -0.2]}, engine="compiled")
     assert mg.kinematics(m, {"O4": [0.0]}, engine="compiled").engine == "compiled"
     c = mg.compile(m)
