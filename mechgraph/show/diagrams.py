@@ -22,7 +22,7 @@ STRAND = 0.035
 """Distance of the strands of an edge that lies in several loops, and"""
 BULGE = 0.22
 """of edges between the same two links, over the distance of neighbours."""
-LETTER, ENOUGH = (0.045, 0.11), 1.3
+LETTER, CLEARED = (0.045, 0.11), 1.3
 """Width and height of a letter of the text on a line, over the length of a line; clearance over its size that is enough."""
 LEGEND_LETTERS = 34
 """Letters of a line of the legend."""
@@ -102,7 +102,7 @@ def on_lines(curves: Mapping[str, Array], texts: Mapping[str, str], dots: Array)
         for at, size in placed.values():
             room = np.minimum(room, (np.abs(curve[first:last] - at) / (half + size)).max(axis=1))
         off = np.abs(np.linspace(-1.0, 1.0, last - first))
-        placed[name] = curve[first + int(np.argmax(np.minimum(room, ENOUGH) - 0.2 * off))], half
+        placed[name] = curve[first + int(np.argmax(np.minimum(room, CLEARED) - 0.2 * off))], half
     return {name: at for name, (at, _) in placed.items()}
 
 
