@@ -622,6 +622,14 @@ def test_the_command_line_compares_assemblies_only(tmp_path):
     assert run("check", tmp_path / "none.urdf").exit_code == 2
 
 
+def test_the_solver_writes_its_name_in_the_first_line(tmp_path):
+    text = four_bar().text()
+    same = [loaded(tmp_path, text.replace("OndselSolver", name, 1))[0].pairs for name in ("OndselSolver", "FreeCADMbD")]
+    assert same[0] == same[1]
+    with pytest.raises(mg.FileError, match="line 1 is 'SomeSolver'"):
+        loaded(tmp_path, text.replace("OndselSolver", "SomeSolver", 1))
+
+
 def test_lines_are_written_by_their_depth():
     assert lines_of(0, "a", ["b", np.array([1.0, 2.0])]) == ["a", "\tb", "\t\t1\t2\t"]
 

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from itertools import combinations
 from typing import Any
 
 import matplotlib
@@ -242,6 +243,35 @@ def test_the_frame_of_a_structure_is_hatched_and_parallel_pairs_bulge_apart() ->
     twin = mg.Mechanism("twin", pairs=[mg.Pair(n, "S", "frame", "body") for n in "AB"])
     lines = [line for line in show.draw_graph(twin).lines if str(line.get_gid()).startswith("pair ")]
     assert np.abs(np.array(lines[0].get_data()) - np.array(lines[1].get_data())).max() > 0.1
+
+
+@pytest.mark.parametrize("count", [2, 4])
+@pytest.mark.parametrize("others", [False, True])
+def test_names_of_parallel_pairs_lie_on_their_own_lines(count: int, others: bool) -> None:
+    """The middle of a name is on its line, no other line runs through its box, and no two boxes overlap."""
+    pairs = [mg.Pair(f"Hinge{n}", "S", "frame", "body") for n in range(count)]
+    if others:
+        pairs += [
+            mg.Pair("B", "S", "body", "wing"),
+            mg.Pair("second", "S", "body", "wing"),
+            mg.Pair("D", "U", "wing", "frame"),
+        ]
+    ax = show.draw_graph(mg.Mechanism("parallel", pairs=pairs))
+    ax.figure.draw_without_rendering()
+    boxes = {
+        text.get_text().partition(" (")[0]: text.get_window_extent()
+        for text in ax.texts
+        if text.get_text().endswith(")")
+    }
+    through: dict[str, set[str]] = {name: set() for name in boxes}
+    for line in ax.lines:
+        points = ax.transData.transform(np.array(line.get_data()).T)
+        for name, box in boxes.items():
+            if np.any((points > box.min).all(axis=1) & (points < box.max).all(axis=1)):
+                through[name].add(str(line.get_gid()))
+    assert through == {name: {f"pair {name}"} for name in boxes}
+    assert len(boxes) == len(pairs)
+    assert not any(a.overlaps(b) for a, b in combinations(boxes.values(), 2))
 
 
 def test_graphs_are_laid_out_the_same_each_time() -> None:

@@ -157,3 +157,12 @@ def test_coordinates_of_named_points_are_parameters_of_a_compiled_mechanism(comp
     assert c.gradient("A.effort", ["arm.hook.x"]) == pytest.approx(7.0)
     c.parameters["arm.hook.x"] = 5.0
     assert c(0.0) == pytest.approx([35.0])
+
+
+def test_the_path_of_a_response_is_drawn_through_what_lies_between_its_outputs() -> None:
+    """On the circle of its hook's radius everywhere, though six positions were asked for."""
+    r = mg.respond(arm(drives=[], loads=[mg.Gravity((0, -9.81, 0))]), np.linspace(0, 2, 6), start={"A": 0.0})
+    drawn = {line.get_gid(): line for line in draw_skeleton(r, traces=["arm.hook"]).collections}
+    (path,) = drawn["trace of arm.hook"].get_segments()
+    np.testing.assert_allclose(np.linalg.norm(path, axis=1), 5.0, atol=1e-9)
+    assert len(path) > 400

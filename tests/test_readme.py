@@ -20,6 +20,7 @@ from typer.testing import CliRunner
 import mechgraph as mg
 from mechgraph.cli import app
 from mechgraph.closure.driver_path import Status
+from mechgraph.compiled.tabled import STATUSES
 
 ROOT = Path(__file__).resolve().parents[1]
 README = ROOT / "README.md"
@@ -104,6 +105,12 @@ def test_every_outcome_and_every_error_stands_in_its_table() -> None:
     names = [name.strip("`") for row in first for name in row if name not in ("status", "error")]
     errors = {name for name in mg.__all__ if name.endswith("Error")} - {"MechgraphError"}
     assert sorted(names) == sorted([*(status.value for status in Status), *errors])
+
+
+def test_every_status_of_a_compiled_mechanism_stands_in_its_table() -> None:
+    table = README.read_text(encoding="utf-8").partition("| `c.status` |")[2].partition("\n\n")[0]
+    words = [word for row in table.splitlines()[2:] for word in row.split("|")[1].strip().split(", ")]
+    assert sorted(words) == sorted(word for _, word, _ in STATUSES)
 
 
 def equations() -> str:

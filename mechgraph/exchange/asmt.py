@@ -25,7 +25,7 @@ from mechgraph.exchange.indented import Node, numbers_of, tree_of
 from mechgraph.model.sweep import LONGEST_SWEEP
 from mechgraph.quantities import shown
 
-FIRST_LINES = ("OndselSolver", "freeCAD: 3D CAD with Motion Simulation  by  askoh.com")
+FIRST_LINES = ("OndselSolver", "FreeCADMbD", "freeCAD: 3D CAD with Motion Simulation  by  askoh.com")
 NOT_A_ROTATION = 1e-3
 """Largest entry of ``R^T R - 1`` of a rotation matrix of few digits; it is made orthogonal."""
 IN_LINE = "InLineForceTorque"

@@ -19,7 +19,7 @@ from mechgraph.quantities import wrong
 from mechgraph.result.solution import Solution
 from mechgraph.show.canvas import DRAWN, Dpi, Size, colours, new_axes
 from mechgraph.show.scene import Scene, scene
-from mechgraph.show.skeleton import Drawing, painter_for, trace_faults
+from mechgraph.show.skeleton import Drawing, course_of, painter_for, trace_faults
 from mechgraph.writing import Format, format_of, optional, whole_file, writable
 
 MOST_FRAMES = 72
@@ -70,7 +70,7 @@ def animate(
     chosen = _chosen(found, frames)
     if faults := trace_faults(found, traces):
         raise DeclarationError(f"animation of {found.mechanism.name!r}", faults)
-    film = _Film(found, chosen, traces, labels, view, size)
+    film = _Film(found, course_of(s, found, traces), chosen, traces, labels, view, size)
 
     def drawn() -> Iterator[Any]:
         for done, t in enumerate(chosen, 1):
@@ -100,11 +100,18 @@ class _Film:
     """Draws one frame after the other on the same axes, at the same scale."""
 
     def __init__(
-        self, found: Scene, chosen: Sequence[int], traces: bool | Sequence[str], labels: bool, view: Any, size: Any
+        self,
+        found: Scene,
+        course: Scene,
+        chosen: Sequence[int],
+        traces: bool | Sequence[str],
+        labels: bool,
+        view: Any,
+        size: Any,
     ) -> None:
         self.scene, self.labels, self.view = found, labels, view
         m = found.mechanism
-        self.traces = traces
+        self.course, self.traces = course, traces
         self.colour = colours(m)
         self.ax = new_axes(size) if found.normal is not None else new_axes(size, projection="3d")
         # every frame alike, and drawn once: without a layout that measures it first
@@ -119,7 +126,7 @@ class _Film:
         self.ax.clear()
         painter = painter_for(self.scene, self.ax, self.view)
         drawing = Drawing(self.scene, painter, self.colour)
-        drawing.traces(self.traces)
+        drawing.traces(self.traces, self.course)
         drawing.position(t)
         drawing.furniture(t, self.labels, self.extent, self.places)
         return self.ax.figure

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain, combinations, pairwise
 from textwrap import wrap
 from typing import Any
@@ -22,6 +22,8 @@ STRAND = 0.035
 """Distance of the strands of an edge that lies in several loops, and"""
 BULGE = 0.22
 """of edges between the same two links, over the distance of neighbours."""
+LETTER, CLEARED = (0.045, 0.11), 1.3
+"""Width and height of a letter of the text on a line, over the length of a line; clearance over its size that is enough."""
 LEGEND_LETTERS = 34
 """Letters of a line of the legend."""
 LABELLED = 64
@@ -39,8 +41,10 @@ def draw_graph(m: Mechanism, *, ax: Axes = None) -> Any:
     loops = [tuple(m.pairs[k].name for k, _ in loop) for loop in m.once(link_graph).loops]
     at = places(m.link_names(), ((p.a, p.b) for p in m.pairs))
     canvas = _Canvas(ax, np.array(list(at.values())))
-    middles = {}
-    for pair, curve in _edges(m, at):
+    curves = dict(_edges(m, at))
+    texts = {pair: f"{pair} ({m.pair(pair).type.symbol})" for pair in curves}
+    on = on_lines(curves, texts, np.array(list(at.values())))
+    for pair, curve in curves.items():
         within = [i for i, loop in enumerate(loops) if pair in loop]
         tangents = np.gradient(curve, axis=0)
         across = np.stack([-tangents[:, 1], tangents[:, 0]], axis=1) / np.linalg.norm(tangents, axis=1, keepdims=True)
@@ -48,10 +52,10 @@ def draw_graph(m: Mechanism, *, ax: Axes = None) -> Any:
             shift = STRAND * (place - 0.5 * (max(len(within), 1) - 1))
             colour = PALETTE[i % len(PALETTE)] if i >= 0 else FAINT
             canvas.line(curve + shift * across, colour, f"pair {pair}")
-        middles[pair] = curve[len(curve) // 2]
         canvas.keep_free(curve)
+        canvas.on_line(texts[pair], on[pair])
     for c in m.couplings:
-        canvas.coupling(c.name, [middles[m.pairs[m.freedom(q)[0]].name] for q in c.freedoms])
+        canvas.coupling(c.name, [on[m.pairs[m.freedom(q)[0]].name] for q in c.freedoms])
     for name, (x, y) in at.items():
         frame = name == m.frame
         canvas.ax.scatter(
@@ -65,8 +69,6 @@ def draw_graph(m: Mechanism, *, ax: Axes = None) -> Any:
             zorder=4,
         )
         canvas.name(name, at[name], INK, weight="bold")
-    for pair, middle in middles.items():
-        canvas.name(f"{pair} ({m.pair(pair).type.symbol})", middle, INK)
     words = ((f"loop {i + 1}: {', '.join(loop)}", PALETTE[i % len(PALETTE)]) for i, loop in enumerate(loops))
     canvas.finish(
         [(line, colour) for text, colour in words for line in wrap(text, LEGEND_LETTERS, subsequent_indent="    ")]
@@ -86,6 +88,22 @@ def _edges(m: Mechanism, at: dict[str, Array]) -> Iterator[tuple[str, Array]]:
         side = same.index(pair.name) - 0.5 * (len(same) - 1)
         across = np.array([p[1] - q[1], q[0] - p[0]])
         yield pair.name, (1 - u) * p + u * q + 4 * u * (1 - u) * BULGE * side * across
+
+
+def on_lines(curves: Mapping[str, Array], texts: Mapping[str, str], dots: Array) -> dict[str, Array]:
+    """Where a text lies on its own line: near its middle, as clear of other lines, of the dots and of other texts as it can."""
+    placed: dict[str, tuple[Array, Array]] = {}
+    for name, curve in curves.items():
+        half = np.array([0.5 * LETTER[0] * (len(texts[name]) + 1), 0.5 * LETTER[1]])
+        others = np.concatenate([dots, *(other[::4] for key, other in curves.items() if key != name)])
+        first, last = len(curve) // 4, len(curve) - len(curve) // 4
+        clear = np.abs(curve[first:last, None] - others) / half
+        room = clear.max(axis=2).min(axis=1)
+        for at, size in placed.values():
+            room = np.minimum(room, (np.abs(curve[first:last] - at) / (half + size)).max(axis=1))
+        off = np.abs(np.linspace(-1.0, 1.0, last - first))
+        placed[name] = curve[first + int(np.argmax(np.minimum(room, CLEARED) - 0.2 * off))], half
+    return {name: at for name, (at, _) in placed.items()}
 
 
 @door
@@ -181,6 +199,13 @@ class _Canvas:
         for u in np.linspace(0.12, 0.88, 9):
             begin = p + u * (q - p)
             self.line(np.stack([begin, begin + 0.07 * (across + along)]), MUTED, "frame", lw=1.0)
+
+    def on_line(self, text: str, at: Array) -> None:
+        """A text that lies on a line, which it interrupts."""
+        ground = {"boxstyle": "square,pad=0.12", "facecolor": "white", "edgecolor": "none"}
+        self.ax.text(*at, said(text), color=INK, fontsize=9.0, ha="center", va="center", zorder=3, bbox=ground)
+        half = np.array([0.5 * LETTER[0] * (len(text) + 1), 0.5 * LETTER[1]])
+        self._taken.append(at + half * np.array([(x, y) for x in np.linspace(-1, 1, 5) for y in (-1, 0, 1)]))
 
     def keep_free(self, points: Array) -> None:
         self._taken.append(points)

@@ -65,7 +65,7 @@ def point_path(s: Solution, points: str | Iterable[str] | None = None, *, ax: Ax
     DeclarationError
         where there is no such point; MissingExtraError without matplotlib.
     """
-    s, names = _finely(s), _names(s, points)
+    s, names = finely(s), _names(s, points)
     return _draw(s, {name: motion_of(s, name).position for name in names}, 0, ax)
 
 
@@ -85,11 +85,11 @@ def hodograph(
         raise DeclarationError(
             f"hodograph of {s.mechanism.name!r}", [f"of = {of!r}: expected 'velocity' or 'acceleration'"]
         )
-    s = _finely(s)
+    s = finely(s)
     return _draw(s, {name: getattr(motion_of(s, name), of) for name in _names(s, points)}, RANK[of], ax)
 
 
-def _finely(s: Solution) -> Solution:
+def finely(s: Solution) -> Solution:
     """A response at times between its outputs too, so that its paths are curves."""
     if not isinstance(s, Response) or len(s.t) < 2:
         return s

@@ -12,9 +12,11 @@ from mechgraph.arguments import door
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import shown
+from mechgraph.response.course import Response
 from mechgraph.result.solution import Solution
 from mechgraph.show.canvas import HATCH, INK, LOAD, MUTED, REACTION, Axes, bare, colours, new_axes
 from mechgraph.show.painting import FlatPainter, Painter, SpacePainter, edges_of, inside, shaded
+from mechgraph.show.paths import finely
 from mechgraph.show.scene import Part, Scene, scene
 from mechgraph.units import unit_of
 
@@ -97,7 +99,7 @@ def draw_skeleton(
     drawing = Drawing(found, painter, colours(m, chosen))
     others = np.unique(np.linspace(0, len(found.positions) - 1, ghosts + 1).astype(int)) if ghosts else ()
     drawing.ghosts([int(i) for i in others if i != t])
-    drawing.traces(traces)
+    drawing.traces(traces, course_of(s, found, traces))
     drawing.position(t)
     drawing.furniture(t, labels)
     return painter.ax
@@ -113,6 +115,17 @@ def traceable(found: Scene) -> dict[str, tuple[str, Array]]:
         for X in [found.frames[part.frame]]
     }
     return out | {p.name: (p.b if p.b != m.frame else p.a, found.points[p.name, p.b]) for p in m.pairs}
+
+
+def course_of(s: Solution | Mechanism, found: Scene, traces: bool | Sequence[str]) -> Scene:
+    """The scene whose positions paths run through: of a response that at times between its outputs too."""
+    return scene(finely(s)) if isinstance(s, Response) and traces else found
+
+
+def _pieces(course: Scene, path: Array) -> list[Array]:
+    """A path cut where positions between were not solved, and between cases."""
+    gaps = (np.diff(course.positions) > 1) | (np.diff(course.cases) > 0)
+    return [piece for piece in np.split(path, np.flatnonzero(gaps) + 1) if len(piece) > 1]
 
 
 def trace_faults(found: Scene, traces: bool | Sequence[str]) -> list[str]:
@@ -173,21 +186,15 @@ class Drawing:
                     runs, colors=self.colour[part.link], linewidths=1.2, alpha=GHOST, zorder=1.0, gid="ghosts"
                 )
 
-    def traces(self, traces: bool | Sequence[str]) -> None:
+    def traces(self, traces: bool | Sequence[str], course: Scene) -> None:
         """Paths of pair points on link b, or on link a where b is the frame, and of named points: of all, of none, or of some by name."""
-        known = traceable(self.scene)
+        known = traceable(course)
         for name in known if traces is True else traces or ():
             mover, path = known[name]
             if np.ptp(path, axis=0).max() > 1e-3 * self.scene.size:
-                pieces = self._pieces(path)
+                pieces = _pieces(course, path)
                 style = {"linewidths": 0.9, "linestyles": [(0, (1, 1.6))], "alpha": 0.8, "zorder": 1.5}
                 self.painter.lines(pieces, colors=self.colour[mover], gid=f"trace of {name}", **style)
-
-    def _pieces(self, path: Array) -> list[Array]:
-        """A path cut where positions between were not solved, and between cases."""
-        gaps = (np.diff(self.scene.positions) > 1) | (np.diff(self.scene.cases) > 0)
-        cuts = np.flatnonzero(gaps) + 1
-        return [piece for piece in np.split(path, cuts) if len(piece) > 1]
 
     def position(self, t: int) -> None:
         """Everything at one position."""

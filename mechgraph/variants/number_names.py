@@ -1,11 +1,11 @@
 """Declared numbers by name.
 
 A number is named as it is declared: ``crank.mass``, ``crank.center.x``, ``crank.inertia.xy``, ``crank.tip.x`` of a named point ``tip``,
-``B.point.x``, ``B.axis.z``, ``B.on_a.point.y``, ``B.pitch``, ``loads[0].stiffness``, ``loads[1].force.x``; of a coupling ``g.A`` and ``g.constant``, or
-``couplings[0].A``; of gears, curves, surfaces and contacts ``g.module``, ``g.teeth.a``, ``K.curve.radius``, ``K.curve.points[3].x``,
-``K.curve.lift[12]``, ``K.surface.center.z``, ``K.roller``, ``K.hertz.moduli.b``; of a chain ``length[2]``, ``twist[0]``,
-``offset[1]`` (as in ``mg.chain``, counted from 0). Which fields of a link, pair, coupling or load are numbers, and of which components,
-their annotations say (``model.field_format``).
+``B.point.x``, ``B.axis.z``, ``B.on_a.point.y``, ``B.pitch``, ``loads[0].stiffness``, ``loads[1].force.x``; of a coupling ``g.A`` and
+``g.constant``, or ``couplings[0].A``; of gears, curves, surfaces and contacts ``g.module``, ``g.teeth.a``, ``K.curve.radius``,
+``K.curve.points[3].x``, ``K.curve.lift[12]``, ``K.surface.center.z``, ``K.roller``, ``K.hertz.moduli.b``; of a chain ``length[2]``,
+``twist[0]``, ``offset[1]`` (as in ``mg.chain``, counted from 0). Which fields of a link, pair, coupling or load are numbers, and of which
+components, their annotations say (``model.field_format``).
 """
 
 from __future__ import annotations
@@ -186,10 +186,8 @@ def _link_field(m: Mechanism, i: int, rest: str) -> Field | ItemField | str | No
     found = _component(link, rest)
     if found is None:
         point, _, at = rest.rpartition(".")
-        places = POINT.components()
-        return (
-            ItemField("links", i, ("points", point), places[at][0]) if point in link.points and at in places else None
-        )
+        at_of = POINT.components()
+        return ItemField("links", i, ("points", point), at_of[at][0]) if point in link.points and at in at_of else None
     (what,), _, places = found
     if what == "mass" and link.center is None:
         return f"'{link.name}.mass': link {link.name!r} has no mass centre; declare center=(x, y, z)"
