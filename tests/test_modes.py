@@ -579,8 +579,7 @@ def test_in_a_plane_a_sum_along_an_isotropic_direction_has_a_low_degree(monkeypa
     whole = trace_test(equations, start.member, start.x, rng)
     assert (whole.degree, whole.samples) == (1, 16)
     monkeypatch.setattr("mechgraph.modes.trace.MOST_TRACKS", 16 * 5)
-    for i in (0, 5):
-        assert not trace_test(equations, start.member, np.delete(start.x, i, axis=1), rng).passed
+    assert not trace_test(equations, start.member, start.x[:, :5], rng).passed
 
 
 TRUSSES = {14: "01 05 06 12 23 26 34 45 46", 16: "01 03 06 12 14 23 35 45 46", 18: "01 02 05 06 14 23 34 36 45"}

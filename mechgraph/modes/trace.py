@@ -37,8 +37,9 @@ from mechgraph.graph.linkgraph import components_of_edges
 from mechgraph.modes.family import SPAN, Array, Family, Member, common
 from mechgraph.modes.homotopy import Care, Equations, Leg, follow
 
-SAMPLES = 16
-"""Members of a pencil that are sampled first; then as many again, until they tell."""
+SAMPLES, SAMPLES_ALONG = 48, 16
+"""Members of a pencil that are sampled first, of one with turns and of one along an isotropic direction; then as many again, until they
+tell."""
 ENOUGH, PENCILS = 5, 4
 """Members for every pole at which a pencil that does not tell is left for another one; pencils of which one has to tell."""
 MOST_TRACKS = 24_000
@@ -94,7 +95,7 @@ def trace_test(
     N, tracks = x.shape[1], 0
     for _ in range(PENCILS):
         pencil = _Pencil(equations, base, rng)
-        phi = pencil.anywhere(SAMPLES, rng)
+        phi = pencil.anywhere(pencil.first, rng)
         z, f, weights = np.zeros(0, dtype=complex), np.zeros(0, dtype=complex), np.zeros(0)
         while (tracks := tracks + len(phi) * N) <= MOST_TRACKS:
             if progress is not None:
@@ -108,7 +109,7 @@ def trace_test(
             if len(z) > ENOUGH * len(poles):
                 break
             phi = _beside(poles, rng)
-            phi = np.concatenate([phi, pencil.anywhere(max(SAMPLES, len(z)) - len(phi), rng)])
+            phi = np.concatenate([phi, pencil.anywhere(max(pencil.first, len(z)) - len(phi), rng)])
     return NOT_PASSED
 
 
@@ -165,6 +166,7 @@ class _Pencil:
         P = len(s.m.pairs)
         self.lines = np.zeros((6, len(self.family.bearers), 1), dtype=complex)
         self.along = _isotropic(self.family)
+        self.first = SAMPLES if self.along is None else SAMPLES_ALONG
         for chord, algebra in zip(s.chords.tolist(), self.family.loop_algebras, strict=True):
             self.lines[:, P + chord, 0] = _line(
                 algebra if self.along is None else np.append(np.zeros(3), self.along)[:, None], rng
