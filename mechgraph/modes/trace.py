@@ -7,6 +7,12 @@ permuted as ``z`` goes round the places where they meet. With ``g`` a number tha
 of ``1 / (g - c)`` over all assemblies is the same whichever way ``z`` came: a rational function, its degree the number of ``z`` with
 ``g = c``. A sum over some of them only is not.
 
+Where all loops move in one plane, markers slide along an isotropic direction ``v`` of it instead (``v . v = 0``). With ``w`` the complex
+numbers by which links have turned, the loops are linear in ``w`` along ``v``, which stands still, and in ``1 / w`` along its conjugate,
+which moves: parallel planes cut the assemblies out of the inverses of a linear space, an irreducible curve. The sum is that of ``g``
+itself, of points along ``v``, linear in ``w``: its degree is the number of ``z`` where an assembly goes to infinity, less than a tenth.
+(Of groups that do not depend on each other a linear sum does not tell every part from the whole; they are solved one after the other.)
+
 Whether a function is rational its Loewner matrix ``(f(a_i) - f(b_j)) / (a_i - b_j)`` tells: the rank is the degree (Antoulas and
 Anderson, On the scalar rational interpolation problem, IMA J. Math. Control Inform. 3, 1986). The singular values of a rational function
 end at once, in rounding; those of another one fade, each a few times less than the one before. Samples beside the poles that the matrix
@@ -28,11 +34,12 @@ import numpy as np
 from mechgraph.algebra.se3 import compose, pose_exp
 from mechgraph.closure.configuration import Configuration
 from mechgraph.graph.linkgraph import components_of_edges
-from mechgraph.modes.family import SPAN, Array, Family, Member
+from mechgraph.modes.family import SPAN, Array, Family, Member, common
 from mechgraph.modes.homotopy import Care, Equations, Leg, follow
 
-SAMPLES = 48
-"""Members of a pencil that are sampled first; then as many again, until they tell."""
+SAMPLES, SAMPLES_ALONG = 48, 16
+"""Members of a pencil that are sampled first, of one with turns and of one along an isotropic direction; then as many again, until they
+tell."""
 ENOUGH, PENCILS = 5, 4
 """Members for every pole at which a pencil that does not tell is left for another one; pencils of which one has to tell."""
 MOST_TRACKS = 24_000
@@ -88,7 +95,7 @@ def trace_test(
     N, tracks = x.shape[1], 0
     for _ in range(PENCILS):
         pencil = _Pencil(equations, base, rng)
-        phi = pencil.anywhere(SAMPLES, rng)
+        phi = pencil.anywhere(pencil.first, rng)
         z, f, weights = np.zeros(0, dtype=complex), np.zeros(0, dtype=complex), np.zeros(0)
         while (tracks := tracks + len(phi) * N) <= MOST_TRACKS:
             if progress is not None:
@@ -102,7 +109,7 @@ def trace_test(
             if len(z) > ENOUGH * len(poles):
                 break
             phi = _beside(poles, rng)
-            phi = np.concatenate([phi, pencil.anywhere(max(SAMPLES, len(z)) - len(phi), rng)])
+            phi = np.concatenate([phi, pencil.anywhere(max(pencil.first, len(z)) - len(phi), rng)])
     return NOT_PASSED
 
 
@@ -158,11 +165,15 @@ class _Pencil:
         s = self.family.system
         P = len(s.m.pairs)
         self.lines = np.zeros((6, len(self.family.bearers), 1), dtype=complex)
+        self.along = _isotropic(self.family)
+        self.first = SAMPLES if self.along is None else SAMPLES_ALONG
         for chord, algebra in zip(s.chords.tolist(), self.family.loop_algebras, strict=True):
-            self.lines[:, P + chord, 0] = _line(algebra, rng)
+            self.lines[:, P + chord, 0] = _line(
+                algebra if self.along is None else np.append(np.zeros(3), self.along)[:, None], rng
+            )
         self.drive = self.family.lengths_of(_random(rng, len(base.drive)))[:, None]
         self.c = _random(rng, 1)[0]
-        self.weights = _random(rng, len(_told(self.family, self.family.here)))
+        self.weights = _random(rng, len(self._told(self.family.here)))
 
     def members(self, phi: Array) -> Member:
         """Members at ``phi (n,)``; a line without a turn is a direction, along which it goes by ``z - 1``, as squares of rods do."""
@@ -177,23 +188,41 @@ class _Pencil:
         return np.asarray(rng.uniform(-np.pi, np.pi, n) + 1j * PENCIL_SPREAD * rng.normal(size=n))
 
     def sums(self, x: Array, phi: Array) -> tuple[Array, Array, Array]:
-        """``z``, the sum of ``1 / (g - c)`` and weights at pairs of members ``phi (n,)`` to both of which all tracks from ``x`` come."""
+        """``z``, the sum and weights at pairs of members ``phi (n,)`` to both of which all tracks from ``x`` come."""
         (n, N), members = (len(phi), x.shape[1]), self.members(phi)
         leg = Leg(self.equations, self.base, members, np.repeat(np.arange(n), N))
         tracked = follow(leg, np.tile(x, n), Care())
         good = tracked.arrived.reshape(n, N).all(axis=1)
         with np.errstate(all="ignore"):
             here = leg.at(tracked.x, np.ones(n * N), np.arange(n * N)).here
-            f = (1.0 / (self.weights @ _told(self.family, here) - self.c)).reshape(n, N).sum(axis=1)
+            g = (self.weights @ self._told(here)).reshape(n, N)
+            f = (1.0 / (g - self.c) if self.along is None else g).sum(axis=1)
             size = np.abs(here.poses).max(axis=(0, 1, 2)).reshape(n, N).max(axis=1)
         good &= np.isfinite(f)
         good = np.repeat(good.reshape(-1, 2).all(axis=1), 2)
         z = np.exp(1j * phi)
         return z[good], f[good], (np.maximum(1.0, np.abs(z)) / size)[good]
 
+    def _told(self, here: Configuration) -> Array:
+        """Numbers ``(n, T)`` of which ``g`` is made."""
+        if self.along is None:
+            return _told(self.family, here)
+        poses = here.poses[:, :, self.family.settled_links]
+        return np.tensordot(self.along, poses, 1).reshape(-1, here.T)
+
 
 def _random(rng: np.random.Generator, n: int) -> Array:
     return np.asarray(rng.normal(size=(n, 2)) @ [1.0, 1.0j])
+
+
+def _isotropic(family: Family) -> Array | None:
+    """An isotropic direction ``(3,)`` of the plane in which all loops move, and nothing else; None where they have none in common."""
+    algebras = family.loop_algebras
+    shared, plane = common(algebras), {h.shape[1] for h in algebras} == {3}
+    if family.points or family.idle.shape[1] or not plane or shared.shape[1] != 3:
+        return None
+    _, turns, Vt = np.linalg.svd(shared[:3])
+    return (shared @ Vt[1:].T)[3:] @ [1.0, 1.0j] if (turns > SPAN).sum() == 1 else None
 
 
 def _line(algebra: Array, rng: np.random.Generator) -> Array:
