@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mechgraph.errors import DeclarationError
-from mechgraph.quantities import has_quantity, is_numeric, is_quantity, real_array, wrong
+from mechgraph.quantities import has_quantity, is_numeric, is_quantity, no_limit, real_array, wrong
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -168,6 +168,10 @@ def at_least(number: int) -> Wanted:
 Count = Annotated[int, at_least(1)]
 Index = Annotated[int, at_least(0)]
 Positive = Annotated[float, Wanted(lambda value: is_numeric(value, ()) and value > 0, "a number above 0")]
+Limit = Annotated[
+    float,
+    Wanted(lambda value: no_limit(value) or (is_numeric(value, ()) and value > 0), "a number above 0, or infinity"),
+]
 
 
 PLAIN: dict[Any, Wanted] = {

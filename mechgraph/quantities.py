@@ -73,6 +73,11 @@ def is_numeric(value: Any, shape: tuple[int, ...]) -> bool:
     return array is not None and array.shape == shape and bool((np.abs(array) < LARGEST).all())
 
 
+def no_limit(value: Any) -> bool:
+    """Whether a limit is infinity, which means none."""
+    return isinstance(value, float | np.floating) and value == np.inf
+
+
 def column(values: Sequence[Any], shape: tuple[int, ...]) -> NDArray[np.float64] | None:
     """Floats and nested tuples of floats as an array ``(len(values), *shape)``; None where one is no such or not finite."""
     flat = values

@@ -92,6 +92,11 @@ def duration(text: str, option: str, declared: str = "s") -> float:
     return value * scales[unit]
 
 
+def longest(text: str, option: str, declared: str = "s") -> float:
+    """A time span, or ``inf`` for no limit."""
+    return np.inf if text.strip() == "inf" else duration(text, option, declared)
+
+
 def _turns(m: Mechanism, name: str, where: str) -> bool:
     fault = m.freedom_fault(name, single=True)
     if fault:

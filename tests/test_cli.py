@@ -227,6 +227,11 @@ def test_what_makes_forces_doubtful_is_said_beside_loads_and_pictures(tmp_path: 
 def test_messages_name_the_option_and_the_text_that_was_typed(tmp_path: Path) -> None:
     assert "unit 'grad' in '10grad'" in bad("solve", "four-bar", "--drive", "A=0:360:10grad")
     assert "write e.g. 10 or 10s" in bad("respond", "four-bar", "--for", "one")
+    m = mg.load("four-bar")
+    mg.save(m.replace(drives=[mg.Drive("A", mg.Motion([0.0, 0.5, 1.0]))]), tmp_path / "still.toml")
+    said = bad("respond", tmp_path / "still.toml", "--for", "1s")
+    assert "stored motion of A has no times; add t = [...]" in said
+    assert "Motion(" not in said
     assert "--at 'A=30grad'" in bad("equations", "four-bar", "--at", "A=30grad")
 
 

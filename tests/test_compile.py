@@ -136,9 +136,19 @@ def test_unknown_names():
     ):  # fmt: skip
         with pytest.raises(mg.DeclarationError):
             wrong()
-    c.parameters["coupler.mass"] = -1.0
-    with pytest.raises(mg.DeclarationError, match="mass"):
-        c(0.3)
+    with pytest.raises(mg.DeclarationError, match=r"mass = -1\.0: expected a number not below 0"):
+        c.parameters["coupler.mass"] = -1.0
+
+
+def test_numbers_that_are_possible_only_together():
+    """No inertia has one of its moments larger than the other two together; all of them may be a hundred times as large."""
+    c = mg.compile(mg.load("four-bar"))
+    names = [f"rocker.inertia.{entry}" for entry in ("xx", "yy", "zz")]
+    with pytest.raises(mg.DeclarationError, match=r"rocker.*inertia"):
+        c.parameters[names[2]] = 0.07
+    assert not c.parameters.wanted
+    c.parameters.update({name: 100.0 * c.parameters[name] for name in names})
+    np.testing.assert_allclose(c(0.3, 10.0), mg.compile(c.tables.changed(c.parameters.wanted))(0.3, 10.0), rtol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -688,7 +688,7 @@ def test_a_wrong_derivative_is_found_where_it_is(order, place):
         mg.Mechanism("m", None, [mg.Pair("K", "Ps", "a", "b", curve=curve)])
 
 
-@pytest.mark.parametrize("breaks", [(0.0,), (2.0, 1.0), (7.0,), "no", (np.nan,)])
+@pytest.mark.parametrize("breaks", [(0.0,), (2.0, 1.0), (7.0,), "no", (np.nan,), [[1.0], [2.0]], [[1.0, 2.0], 3.0]])
 def test_breaks_that_are_none_are_refused(breaks):
     curve = mg.Curve.function(position=dwelling, ends_at=(0, 2 * np.pi), closed=True, breaks=breaks)
     with pytest.raises(mg.DeclarationError, match="breaks"):

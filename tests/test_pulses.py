@@ -57,7 +57,7 @@ def test_steps_end_at_breaks_so_that_the_shortest_pulse_is_exact(load):
 
     made = {
         mg.Effort: lambda: mg.Effort("P", lambda pose, twist, t: short(t), breaks=(begin, end)),
-        mg.ForceLaw: lambda: mg.ForceLaw("P", law=lambda x, v, t: short(t), breaks=(end, begin)),
+        mg.ForceLaw: lambda: mg.ForceLaw("P", law=lambda x, v, t: short(t), breaks=(begin, end)),
         mg.Wrench: lambda: mg.Wrench("body", force=lambda p, w, t: short(t)[..., None] * X, breaks=[begin, end]),
     }[load]()
     r = mg.respond(block(made), (0, 10))
@@ -72,7 +72,10 @@ def test_the_longest_step_is_kept_and_stored_with_a_mechanism():
     r = mg.respond(m.replace(loads=[mg.Effort("P", 1.0)], response=mg.ResponseSetup((0, 10), max_step=0.5)))
     assert np.diff(r.t).max() <= 0.5 + 1e-12
     assert setup.converted((1.0, 1.0, 1e3), lambda name: False).max_step == pytest.approx(0.5)
-    for bad in (0.0, -1.0, "long", np.nan):
+    free = [mg.respond(m.replace(loads=[]), (0, 1), rates={"P": 1.0}, max_step=most).t for most in (None, np.inf)]
+    np.testing.assert_array_equal(*free)
+    assert mg.ResponseSetup((0, 10), max_step=np.inf) == mg.ResponseSetup((0, 10))
+    for bad in (0.0, -1.0, "long", np.nan, -np.inf):
         with pytest.raises(mg.DeclarationError, match="max_step"):
             mg.respond(m, (0, 1), max_step=bad)
 
@@ -269,5 +272,16 @@ def test_breaks_belong_to_functions():
     ):
         with pytest.raises(mg.DeclarationError, match=r"breaks = .* beside no function of time"):
             block(load)
-    with pytest.raises(mg.DeclarationError, match=r"breaks = 'soon': expected finite numbers"):
+    with pytest.raises(mg.DeclarationError, match=r"breaks = 'soon': expected finite numbers that rise"):
         block(mg.ForceLaw("P", law=lambda x, v, t: -x, breaks="soon"))
+
+
+@pytest.mark.parametrize("breaks", [(2.0, 1.0), (1.0, 1.0), [[1.0], [2.0]], [[1.0, 2.0], 3.0], (0.0, np.inf)])
+def test_breaks_rise(breaks):
+    for load in (
+        mg.Effort("P", lambda pose, twist, t: t, breaks=breaks),
+        mg.ForceLaw("P", law=lambda x, v, t: -x, breaks=breaks),
+        mg.Wrench("body", force=lambda p, w, t: X, breaks=breaks),
+    ):
+        with pytest.raises(mg.DeclarationError, match=r"1 fault\n.*breaks = .*: expected finite numbers that rise"):
+            block(load)

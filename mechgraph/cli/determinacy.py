@@ -12,7 +12,7 @@ from mechgraph.cli.outcome import NO_ANSWER
 from mechgraph.cli.output import show, working, write
 from mechgraph.cli.reading import loaded, show_compared
 from mechgraph.cli.records import check_data, write_json
-from mechgraph.typed import duration, parse_at, refuse
+from mechgraph.typed import longest, parse_at, refuse
 
 
 def check(
@@ -45,7 +45,7 @@ def check(
         refuse("check", "--json, --markdown and --compare exclude each other")
     m = loaded(mechanism)
     values = dict(parse_at(m, text) for text in at or ())
-    bounded = {} if limit is None else {"limit": duration(limit, "--limit")}
+    bounded = {} if limit is None else {"limit": longest(limit, "--limit")}
     with working(f"checking {m.name}: what can move"):
         report = mg.check(m, at=values or None, engine=engine, tol=tol, **bounded)
     with working(f"checking {m.name}: what is unique, what to do"):

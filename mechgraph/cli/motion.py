@@ -33,7 +33,7 @@ from mechgraph.cli.reading import check_out, loaded, show_compared
 from mechgraph.cli.records import Written, write_json
 from mechgraph.document import Document
 from mechgraph.result.export import FORMATS
-from mechgraph.typed import duration, motions_of, parse_at, refuse
+from mechgraph.typed import duration, longest, motions_of, parse_at, refuse
 
 Told = list[Document] | dict[str, Any]
 """Documents to be shown, or a record."""
@@ -172,13 +172,21 @@ def respond(
         times = m.response.times
     else:
         refuse("respond", "how long? Give --for TIME; the mechanism has no [response] that says it")
-    longest = None if max_step is None else duration(max_step, "--max-step", declared)
+    given = {m.full_name(d.freedom) for d in (m.response.motions if m.response else ())}
+    still = [d.freedom for d in m.drives if isinstance(d.motion, mg.Motion) and d.motion.t is None]
+    if still := [name for name in still if m.full_name(name) not in given]:
+        refuse(
+            "respond",
+            f"the stored motion of {', '.join(still)} has no times; add t = [...], a time for each position, to its [drive.motion] in "
+            "the file, or leave that out: the freedom then moves as the loads drive it",
+        )
+    longest_step = None if max_step is None else longest(max_step, "--max-step", declared)
     t = np.linspace(times[0], times[-1], points) if points else times
     with progress(f"moving {m.name}", float(times[-1])) as moved, warnings.catch_warnings():
         warnings.simplefilter("ignore", mg.MechgraphWarning)  # the summary has them
         r = mg.respond(
             m, t, start=begin or None, rates=rates or None, rtol=rtol, atol=atol, method=method, passive=passive, engine=engine,
-            max_step=longest, on_stop="return", progress=moved,
+            max_step=longest_step, on_stop="return", progress=moved,
         )  # fmt: skip
     with working(f"summary of {m.name}"):
         told = _told(r, out, tuple(include or ()), json, over_time)

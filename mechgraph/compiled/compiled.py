@@ -18,7 +18,7 @@ from mechgraph.compiled.write import write_tables
 from mechgraph.errors import DeclarationError, listed
 from mechgraph.kernel import build
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.quantities import has_quantity, real_array, without_units, wrong
+from mechgraph.quantities import has_quantity, is_numeric, real_array, without_units, wrong
 
 WORDS = np.array([word for _, word, _ in STATUSES])
 START = 4
@@ -66,7 +66,8 @@ def _functions() -> ctypes.CDLL:
 class Parameters(MutableMapping[str, float]):
     """Declared numbers by the names that studies use (``crank.mass``, ``length[2]``), to be set in place; those that were set are listed.
 
-    What is set counts from the next call on; what is deleted is as declared again.
+    What is set counts from the next call on; what is deleted is as declared again. What no declaration could have, beside what was set
+    before, is refused at once; numbers that are possible only together, as those of an inertia, are set by ``update``.
     """
 
     def __init__(self, tables: Tabled, wanted: Mapping[str, float] | None = None) -> None:
@@ -78,11 +79,20 @@ class Parameters(MutableMapping[str, float]):
         return self.wanted.get(name, declared)
 
     def __setitem__(self, name: str, value: float) -> None:
-        self._tables.known(name)
-        number = real_array(value)
-        if number is None or number.shape or not np.isfinite(number):
-            raise DeclarationError(f"parameters of {self._tables.m.name!r}", [wrong(value, name, "a finite number")])
-        self.wanted[name] = float(number)
+        self.update({name: value})
+
+    def update(self, *given: Any, **named: Any) -> None:
+        """Set several at once, as those of a dict; all of them or none."""
+        values = dict(*given, **named)
+        for name, value in values.items():
+            self._tables.known(name)
+            if not is_numeric(value, ()):
+                raise DeclarationError(
+                    f"parameters of {self._tables.m.name!r}", [wrong(value, name, "a finite number")]
+                )
+        together = self.wanted | {name: float(value) for name, value in values.items()}
+        self._tables.possible(together)
+        self.wanted = together
 
     def __delitem__(self, name: str) -> None:
         self._tables.known(name)

@@ -22,7 +22,7 @@ from mechgraph.model.parameters import Declared, declared
 from mechgraph.pipeline import Pipeline
 from mechgraph.quantities import shown
 from mechgraph.structure.snapping import meant
-from mechgraph.variants.fields import AnyField, clashes, field_values, find_field, varied
+from mechgraph.variants.fields import AnyField, Variants, clashes, field_values, find_field, varied
 
 STATUSES = (
     ("OK", "ok", "solved"),
@@ -124,18 +124,24 @@ class Tabled:
         """
         if not values:
             return self.P[None]
-        rows = np.array(np.broadcast_arrays(*np.atleast_1d(*values.values(), 0.0)), dtype=float)[:-1]
-        variants = varied(self.m, {name: self.fields[name] for name in values}, rows)
-        alone = any(field.one_by_one for field, _ in variants.own)
-        for i in np.flatnonzero(~variants.valid()) if checked and not alone else ():
-            variants.one(int(i))  # says why
-            raise DeclarationError(
-                f"parameters of {self.m.name!r}", [f"no mechanism has these numbers: {listed(values)}"]
-            )
-        if alone:
+        variants = self.possible(values, checked)
+        if _one_by_one(variants):
             made = [variants.one(i) for i in range(variants.count)]
             return np.concatenate([self._table(m, declared(m), m.loads, 1) for m in made])
         return self._table(self.m, variants.numbers, variants.loads, variants.count)
+
+    def possible(self, values: Mapping[str, Any], checked: bool = True) -> Variants:
+        """The variants with other numbers, see ``numbers``; refused where one of them can be no mechanism."""
+        rows = np.array(np.broadcast_arrays(*np.atleast_1d(*values.values(), 0.0)), dtype=float)[:-1]
+        variants = varied(self.m, {name: self.fields[name] for name in values}, rows)
+        if checked and _one_by_one(variants):
+            variants.one(0)  # says what is wrong, as below
+        for i in np.flatnonzero(~variants.valid()) if checked and not _one_by_one(variants) else ():
+            variants.one(int(i))
+            raise DeclarationError(
+                f"parameters of {self.m.name!r}", [f"no mechanism has these numbers: {listed(values)}"]
+            )
+        return variants
 
     def _table(self, m: Mechanism, numbers: Declared, loads: Sequence[Load], count: int) -> Array:
         """``P (count, numbers)`` of variants of a mechanism."""
@@ -201,3 +207,8 @@ def tabled(m: Mechanism, asked: str = "compile") -> Tabled:
         raise DeclarationError(subject, [f"the compiled kernel does not carry it: {fault}"])
     I, P = found
     return Tabled(own, system, x, places, I, P[0], drives, home)
+
+
+def _one_by_one(variants: Variants) -> bool:
+    """Whether each variant has to be declared by itself."""
+    return any(field.one_by_one for field, _ in variants.own)

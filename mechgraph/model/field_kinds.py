@@ -70,6 +70,14 @@ def _samples_fault(value: Any, what: str, minimum: float | None) -> str | None:
     return None if good else wrong(value, what, "finite numbers")
 
 
+def _rising_fault(value: Any, what: str, minimum: float | None) -> str | None:
+    array = real_array(value)
+    good = array is not None and array.ndim <= 1 and is_numeric(array, array.shape)
+    return (
+        None if good and (np.diff(np.atleast_1d(array)) > 0).all() else wrong(value, what, "finite numbers that rise")
+    )
+
+
 def _tensor_fault(value: Any, what: str, minimum: float | None) -> str | None:
     return None if is_numeric(value, (3, 3)) else wrong(value, what, "a 3 x 3 tensor of finite numbers")
 
@@ -227,8 +235,8 @@ POINT_LIST = Kind(
     "n × 3", {"type": "array", "items": _VECTOR}, None, None, True, _point_list_fault, _moved_points, entry=POINT
 )
 FUNCTION = Kind("function", {"not": {}}, None, None, False, _function_fault, lambda f, pose: MovedShape(f, plain(pose)))
-TIMES = Kind("times", {"not": {}}, None, None, True, _samples_fault)
-"""Times at which a function is not smooth; files hold no functions."""
+BREAKS = Kind("rising numbers", {"not": {}}, None, None, True, _rising_fault)
+"""Where a function is not smooth; files hold no functions."""
 NUMBERS = Kind("n numbers", {"type": "array", "items": {"type": "number"}})
 FACTS = Kind("table", {"type": "object"}, dict)
 COEFFICIENTS = Kind("table", {"type": "object", "additionalProperties": {"type": "number"}, "minProperties": 1}, dict)

@@ -14,7 +14,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.model.asked import BESIDE, asked, between, inner, slope_faults
 from mechgraph.model.cam import ArmCam, Cam
 from mechgraph.model.curves import CLOSED_GAP, INTERVALS, ORDERS, Circle, Curve, Ellipse, Helix, Involute, Line
-from mechgraph.model.field_kinds import FLAG, FUNCTION, INTERVAL, POINT_LIST, SAMPLES
+from mechgraph.model.field_kinds import BREAKS, FLAG, FUNCTION, INTERVAL, POINT_LIST
 from mechgraph.model.pieces import Pieces, parted
 from mechgraph.quantities import wrong
 from mechgraph.units import LENGTH
@@ -87,13 +87,13 @@ class Function(Curve):
     position: Annotated[Any, FUNCTION("u -> (x, x', x'', x'''), each (3, n)")]
     ends_at: Annotated[Any, INTERVAL("least and greatest u")]
     closed: Annotated[bool, FLAG("whether it returns to where it begins")] = False
-    breaks: Annotated[Any, SAMPLES("parameters between its pieces, in order", default="none")] = ()
+    breaks: Annotated[Any, BREAKS("parameters between its pieces", default="none")] = ()
 
     @property
     def nodes(self) -> Array:
         """Parts of its pieces."""
         begin, end = self.ends
-        pieces = np.array([begin, *self.breaks, end])
+        pieces = np.array([begin, *np.atleast_1d(self.breaks), end])
         parts = np.ceil(INTERVALS * np.diff(pieces) / (end - begin)).astype(int) + 1
         return np.unique(np.concatenate([*map(np.linspace, pieces[:-1], pieces[1:], parts)]))
 
@@ -130,11 +130,9 @@ class Function(Curve):
         found = super().faults(where)
         if found:
             return found
-        within = [self.ends[0], *self.breaks, self.ends[1]]
+        within = [self.ends[0], *np.atleast_1d(self.breaks), self.ends[1]]
         if not (np.diff(within) > 0).all():
-            return [
-                wrong(self.breaks, f"{where}breaks", f"increasing numbers between {within[0]:g} and {within[-1]:g}")
-            ]
+            return [wrong(self.breaks, f"{where}breaks", f"rising numbers between {within[0]:g} and {within[-1]:g}")]
         self.at(inner(self.ends))
         steps = [(order + 1, order, 0) for order in range(ORDERS - 1)]
         words = ("position", "derivative 1", "derivative 2", "derivative 3")

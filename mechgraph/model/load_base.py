@@ -11,7 +11,7 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.model.field_format import Described
-from mechgraph.model.field_kinds import FREEDOM_NAME, LINK_NAME, TIMES
+from mechgraph.model.field_kinds import BREAKS, FREEDOM_NAME, LINK_NAME
 from mechgraph.model.nameable import Nameable
 from mechgraph.model.numeric import same_fields
 from mechgraph.quantities import shown
@@ -21,7 +21,7 @@ Value = Any
 """A number or vector, an array over positions, or a callable ``(pose, twist, t)``."""
 
 
-Breaks = Annotated[Any, TIMES("of a function of time: when it jumps or bends, for `respond`", TIME, default="none")]
+Breaks = Annotated[Any, BREAKS("of a function of time: when it jumps or bends, for `respond`", TIME, default="none")]
 """Field of a load that may be a function of time; steps end there."""
 
 
@@ -111,8 +111,9 @@ class Load(Described, ABC):
                 found.append(names.freedom_fault(value, single=about.single))
             elif about.of and (link := getattr(self, about.of)) in names.link_index:
                 found.append(None if value in names.link(link).points else names.link(link).point_fault(value))
-        found += self.value_faults("")
-        if self.break_times and not self.of_time:
+        values = self.value_faults("")
+        found += values
+        if not values and self.break_times and not self.of_time:
             found.append(f"breaks = {shown(self.break_times)}: beside no function of time; leave them out")
         return [self.where + fault for fault in found if fault]
 

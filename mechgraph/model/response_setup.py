@@ -19,7 +19,7 @@ from mechgraph.model.motion import Motion
 from mechgraph.model.nameable import Nameable
 from mechgraph.model.numeric import plain, same_fields
 from mechgraph.model.stop import Stop
-from mechgraph.quantities import is_numeric, real_array, wrong
+from mechgraph.quantities import is_numeric, no_limit, real_array, wrong
 from mechgraph.units import LENGTH, PURE, TIME, factor_of
 
 MOST_POINTS = 10_000_000
@@ -69,6 +69,8 @@ class ResponseSetup(Described):
 
     def __post_init__(self) -> None:
         self.read_numbers()
+        if no_limit(self.max_step):
+            object.__setattr__(self, "max_step", None)
         for name in ("start", "rates"):
             value = getattr(self, name)
             kept = {} if value is None else value
@@ -186,8 +188,8 @@ def read_times(t: Any, faults: list[str]) -> Array:
 
 def tolerance_faults(rtol: Any, atol: Any, max_step: Any) -> list[str]:
     """What is wrong with the tolerances of a step, and with the longest one."""
-    long = max_step is None or (is_numeric(max_step, ()) and max_step > 0.0)
-    return ([] if long else [wrong(max_step, "max_step", "a time above 0, or None")]) + [
+    long = max_step is None or no_limit(max_step) or (is_numeric(max_step, ()) and max_step > 0.0)
+    return ([] if long else [wrong(max_step, "max_step", "a time above 0, or infinity or None")]) + [
         wrong(value, name, "a number from 1e-14 to 0.1")
         for name, value in (("rtol", rtol), ("atol", atol))
         if not is_numeric(value, ()) or not 1e-14 <= value <= 0.1

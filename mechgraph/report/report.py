@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any
 
-from mechgraph.arguments import Positive, door
+from mechgraph.arguments import Limit, door
 from mechgraph.closure.assembly import assembled, assembled_at, named_columns
 from mechgraph.closure.solver import MotionEngineName
 from mechgraph.data import json_text, plain
@@ -131,7 +131,7 @@ def check(
     *,
     engine: MotionEngineName = "auto",
     tol: float | None = None,
-    limit: Positive = LIMIT,
+    limit: Limit = LIMIT,
 ) -> DeterminacyReport:
     """The determinacy report of a mechanism: of its graph, and where it has geometry of its closed position at ``start``.
 

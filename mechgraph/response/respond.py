@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.arguments import door, items_of, option_faults
+from mechgraph.arguments import Limit, door, items_of, option_faults
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.ranges import BEYOND_END, beyond
 from mechgraph.closure.rank import closure_rank
@@ -66,7 +66,7 @@ def respond(
     rtol: float | None = None,
     atol: float | None = None,
     method: MethodName | None = None,
-    max_step: float | None = None,
+    max_step: Limit | None = None,
     engine: EngineName = "auto",
     events: Iterable[Event] | Event | None = None,
     stops: Iterable[Stop] | Stop | None = None,
