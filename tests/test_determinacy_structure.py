@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 import mechgraph as mg
 from mechgraph.graph.linkgraph import link_graph, parts_of
 from mechgraph.structure.generic import generic
+from mechgraph.structure.self_stress import canonical
 
 TYPES = ("R", "P", "C", "S", "E", "U", "W", "Sp", "Sg")
 
@@ -141,3 +142,12 @@ def test_a_driven_dyad_is_free_and_a_closed_frame_is_over() -> None:
     assert parts.spare_unknowns == 6
     assert parts.free_links == ("3",)
     assert parts.spare_equations == 1
+
+
+def test_of_two_echelon_forms_of_as_many_terms_the_first_rows_decide() -> None:
+    """A general plane of four components: the form taken from its first row on has its zeros there, in any basis."""
+    columns = np.random.default_rng(5).normal(size=(1, 4, 2))
+    found = canonical(columns)
+    np.testing.assert_array_equal(found[0, :2] == 0.0, [[False, True], [True, False]])
+    assert (found[0, 2:] != 0.0).all()
+    np.testing.assert_allclose(canonical(columns @ [[1.0, 2.0], [3.0, -1.0]]), found, atol=1e-12)

@@ -42,3 +42,20 @@ def test_the_rods_of_a_suspension_rest_in_their_spins() -> None:
         turning = np.cross(V[:, :3], u)
         assert np.abs((V[:, :3] * u).sum(axis=1)).max() < 1e-13
         assert np.abs((A[:, :3] * u).sum(axis=1) + (V[:, :3] * turning).sum(axis=1)).max() < 1e-12
+
+
+def test_a_washer_rests_whatever_two_drivers_do() -> None:
+    """Between a table on a turning arm and the ground: three passive motions, of which none is begun."""
+    Z, at = (0, 0, 1), (1, 0, 0)
+    pairs = [
+        mg.Pair("A", "R", "frame", "arm", point=(0, 0, 0), axis=Z),
+        mg.Pair("B", "P", "arm", "table", point=at, axis=at),
+    ]
+    pairs += [
+        mg.Pair("E", "E", "table", "washer", point=at, axis=Z),
+        mg.Pair("F", "E", "washer", "frame", point=at, axis=Z),
+    ]
+    m = mg.Mechanism("washer", None, pairs, ["A", "B"], frame="frame")
+    s = mg.kinematics(m, {"A": mg.Motion([0.0, 0.6], 1.0), "B": mg.Motion([0.0, 0.5], 0.5)})
+    np.testing.assert_allclose(s.link("washer").pose[-1], np.eye(4), atol=1e-14)
+    np.testing.assert_allclose(s["F"].position[-1], 0.0, atol=1e-14)
