@@ -55,7 +55,7 @@ class Variants:
             ok &= np.isfinite(values).all(axis=tuple(range(values.ndim - 1)))
         ok &= (n.mass >= 0).all(axis=0)
         ok &= ((n.axis**2).sum(axis=1) > 1e-24).all(axis=(0, 1))
-        if n.inertia.shape[-1] > 1:
+        if n.inertia.shape[-1] == self.count:
             free = np.array([link.unphysical for link in self.mechanism.links])
             ok &= (physical(np.nan_to_num(n.inertia)) | free[:, None]).all(axis=0)
         for own in coupling_places(self.mechanism):
