@@ -930,10 +930,25 @@ static void set_drives(const Model *m, double *x, const double *q) {
   FOR(i, m->drives) x[m->column_state[m->drive[i]]] = q[i];
 }
 
-/* What a node is beside its closed state, at which it has just been factored: rates along the path, those of the matrix, the condition. */
-static int made_node(const Model *m, Work *w, Node *node) {
+/* Condition number of the independent rows of a closure matrix just factored, whose inverse is made. */
+static double condition_of(const Model *m, Work *w, const double *matrix) {
   const int n = m->unknowns;
   double largest = 1.0, inverse = 0.0;
+  FOR(i, n) {
+    memset(w->row_value, 0, m->rows * sizeof(double));
+    w->row_value[w->row[i]] = 1.0;
+    solve(m, w, w->row_value, w->inverse + i * n); /* column i */
+  }
+  FOR(i, n) {
+    double of_matrix = 0.0, of_inverse = 0.0;
+    FOR(j, n) of_matrix += fabs(matrix[w->row[i] * n + j]), of_inverse += fabs(w->inverse[j * n + i]);
+    largest = fmax(largest, of_matrix), inverse = fmax(inverse, of_inverse);
+  }
+  return largest * inverse;
+}
+
+/* What a node is beside its closed state, at which it has just been factored: rates along the path, those of the matrix, the condition. */
+static int made_node(const Model *m, Work *w, Node *node) {
   if (completed(m, w, w->direction, NULL, 0.0, node->rate) > INDEPENDENT) return MGK_CONTRADICTION;
   move(m, w, node->rate, w->G);
   FOR(l, m->loops) {
@@ -943,17 +958,7 @@ static int made_node(const Model *m, Work *w, Node *node) {
     memmove(w->chord_V + 3 * l, V, 3 * sizeof(double));
   }
   fill(m, w->G, w->middle, w->S, w->chord_V, node->matrix_rate);
-  FOR(i, n) {
-    memset(w->row_value, 0, m->rows * sizeof(double));
-    w->row_value[w->row[i]] = 1.0;
-    solve(m, w, w->row_value, w->inverse + i * n); /* column i */
-  }
-  FOR(i, n) {
-    double of_matrix = 0.0, of_inverse = 0.0;
-    FOR(j, n) of_matrix += fabs(node->matrix[w->row[i] * n + j]), of_inverse += fabs(w->inverse[j * n + i]);
-    largest = fmax(largest, of_matrix), inverse = fmax(inverse, of_inverse);
-  }
-  node->condition = largest * inverse;
+  node->condition = condition_of(m, w, node->matrix);
   return node->condition <= FAIR ? MGK_OK : MGK_SINGULAR;
 }
 

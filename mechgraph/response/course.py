@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.by_kernel import COMPILED
 from mechgraph.closure.assembly import CLOSED
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_path import in_blocks
@@ -221,6 +222,8 @@ class Course:
         m, system = self.mechanism, self.task.system
         trajectory, kinetic, potential = trajectory_of(self.task, m, times, blocks)
         trajectory.work = self.integration.work
+        if COMPILED in {segment.stage.engine for segment in self.integration.segments}:
+            trajectory.engine = COMPILED
         if isinstance(m, SnappedMechanism):
             trajectory.as_declared(partial(declared_closure, system, declared(m.declared)), m.changes.tol)
         return trajectory, kinetic, potential, works * system.par.L**2

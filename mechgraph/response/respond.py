@@ -16,7 +16,7 @@ from mechgraph.arguments import door, items_of, option_faults
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.ranges import BEYOND_END, beyond
 from mechgraph.closure.rank import closure_rank
-from mechgraph.closure.solver import ENGINES, EngineName, engine_for
+from mechgraph.closure.solver import MotionEngineName, engine_for
 from mechgraph.errors import AssemblyError, DeclarationError, MechgraphWarning, ResponseError
 from mechgraph.model.declaration import mapping_faults
 from mechgraph.model.event import Event
@@ -40,6 +40,7 @@ from mechgraph.response.course import Course, Response
 from mechgraph.response.events import LOOKS_IN_STEP, Occurrence, Watch, first_root, read_events, with_turns
 from mechgraph.response.initial import read_rates, read_start, start_rates, started
 from mechgraph.response.integration import Integration, Stage
+from mechgraph.response.kernel_rates import library_for
 from mechgraph.response.looks import OF_ALL
 from mechgraph.response.motion_equations import Loads
 from mechgraph.response.prescribed import OVER_POSITIONS, read_motions
@@ -67,7 +68,7 @@ def respond(
     atol: float | None = None,
     method: MethodName | None = None,
     max_step: float | None = None,
-    engine: EngineName = "auto",
+    engine: MotionEngineName = "auto",
     events: Iterable[Event] | Event | None = None,
     stops: Iterable[Stop] | Stop | None = None,
     on_stop: OnStopName = "raise",
@@ -117,7 +118,7 @@ def respond(
         {
             "method": (how.method, METHODS),
             "passive": (how.passive, get_args(PassiveName)),
-            "engine": (engine, ENGINES),
+            "engine": (engine, get_args(MotionEngineName)),
             "on_stop": (on_stop, get_args(OnStopName)),
         }
     )
@@ -150,6 +151,7 @@ def respond(
     task = Task(system, Loads.of(m.loads), prescribed, columns, engine_for(system.n_rows, 1, engine))
     if how.passive == "held":
         task = replace(task, held=free_motion(system, x, columns, task.engine).passive)
+    task = replace(task, library=library_for(task, engine))
     try:
         dq = start_rates(m, task, x, wanted_rates, begin)
     except Stopped as stop:

@@ -1,0 +1,109 @@
+"""The right-hand side of the equations of motion by the compiled kernel, where it carries what moves (``kernel/motion.c``)."""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.by_kernel import COMPILED, at_hand
+from mechgraph.closure.indexing import System
+from mechgraph.closure.passive_motion import PassiveMotion
+from mechgraph.errors import DeclarationError
+from mechgraph.kernel import build
+from mechgraph.kernel.loads import in_tables
+from mechgraph.kernel.path import pointer
+from mechgraph.kernel.tables import layout, tables, why_not
+from mechgraph.response.chart import Chart
+from mechgraph.response.motion_equations import SPARSE_FROM, Loads
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """Of one state: ``u'``, ``v'``, the power, how steep the chart is there and its condition; and the state itself."""
+
+    du: Array
+    dv: Array
+    power: float
+    steepness: float
+    condition: float
+    state: Array
+
+
+class Task(Protocol):
+    """What moves, see ``charts.Task``."""
+
+    @property
+    def system(self) -> System:
+        """The scaled system."""
+
+    @property
+    def loads(self) -> Loads:
+        """Its loads."""
+
+    @property
+    def held(self) -> tuple[PassiveMotion, ...]:
+        """Passive motions held at rest."""
+
+
+def cannot(task: Task) -> str | None:
+    """Why the kernel does not serve a motion; None where it does."""
+    system, loads = task.system, task.loads
+    if task.held:
+        return "passive freedoms are held at rest"
+    if system.n_freedoms * len(system.m.links) >= SPARSE_FROM:
+        return f"it has {system.n_freedoms} freedoms and {len(system.m.links)} links; expected fewer than {SPARSE_FROM} of the product"
+    other = next((load for load in (*loads.stored, *loads.rest) if not in_tables(load)), None)
+    if other is not None:
+        return f"load {other.where.removesuffix(': ')} is a function or a table"
+    return why_not(system)
+
+
+def library_for(task: Task, engine: str) -> Any:
+    """The library for a task as ``engine`` asks; None where numpy is to serve.
+
+    Raises
+    ------
+    DeclarationError
+        where the kernel was asked for by name and cannot carry it; MissingExtraError without a compiler.
+    """
+    library = build.built() if engine == COMPILED else at_hand() if engine == "auto" else None
+    why = None if library is None else cannot(task)
+    if why is not None and engine == COMPILED:
+        text = f"engine 'compiled' does not serve: {why}. Use engine='auto'"
+        raise DeclarationError(f"respond {task.system.m.name!r}", [text])
+    return library if why is None else None
+
+
+class KernelRates:
+    """The tables of a chart with the library that evaluates them."""
+
+    def __init__(self, library: Any, chart: Chart, loads: Loads) -> None:
+        s, columns = chart.system, np.concatenate([chart.free, chart.prescribed])
+        places = layout(s, columns, np.zeros(0, dtype=np.intp))
+        found = tables(places, s, chart.x0[:, None], (*loads.stored, *loads.rest))
+        assert found is not None
+        self.n, self._x0 = len(chart.free), np.ascontiguousarray(chart.x0)
+        self._tables = found
+        size = library.mgk_motion_size
+        size.restype = ctypes.c_size_t
+        self._memory = np.empty(size(pointer(found[0])) // 8 + 1)
+        self._out = np.empty(2 * self.n + 3)
+        self._known = [pointer(array) for array in (*found, self._memory)], len(loads.stored)
+        self._call = library.mgk_motion
+
+    def __call__(self, known: Array, h: float, y: Array, p: Array) -> Evaluated | None:
+        """At ``y = (u, v)`` a time ``h`` behind a ``known`` state (x, q', q''), prescribed freedoms ``p (3, p)``; None where it does not
+        serve.
+        """
+        (I, P, memory), stored = self._known
+        found, y, p = np.empty(len(known)), np.ascontiguousarray(y), np.ascontiguousarray(p)
+        numbers = [pointer(array) for array in (self._x0, y, p, known)]
+        n, out = self.n, self._out
+        if self._call(I, P, memory, n, stored, *numbers, ctypes.c_double(h), pointer(found), pointer(out)):
+            return None
+        du, dv, (power, steepness, condition) = out[:n].copy(), out[n : 2 * n].copy(), out[2 * n :].tolist()
+        return Evaluated(du, dv, power, steepness, condition, found)
