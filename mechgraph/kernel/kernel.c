@@ -323,14 +323,15 @@ static void difference(const Model *m, const double *x1, const double *x0, doubl
   }
 }
 
-/* Rates of increments dq (below a radian) at the state that they lead to: dexp^-1(v) w for rotations. */
+/* Rates of increments dq (below a turn) at the state that they lead to: dexp^-1(v) w for rotations. */
 static void tangent(const Model *m, const double *dq, const double *rate, double *out) {
   memcpy(out, rate, m->columns * sizeof(double));
   FOR(f, m->factors) {
     if (m->kind[f] != MGK_ROTATION) continue;
     const double *v = dq + m->column[f], square = dot(v, v, 3);
     double *r = out + m->column[f], once[3], twice[3];
-    const double part = 1.0 / 12 + square * (1.0 / 720 + square * (1.0 / 30240 + square / 1209600));
+    const double half = 0.5 * sqrt(square);
+    const double part = half < 0.05 ? 1.0 / 12 + square * (1.0 / 720 + square * (1.0 / 30240 + square / 1209600)) : (1.0 - half / tan(half)) / square;
     cross(v, r, once);
     cross(v, once, twice);
     FOR(i, 3) r[i] += part * twice[i] - 0.5 * once[i];

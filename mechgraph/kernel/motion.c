@@ -342,7 +342,7 @@ size_t mgk_motion_size(const int *I) {
   return mgk_state_size(I) + lay_out_motion(&m, I[MGK_LOAD_NUMBERS], NULL, &at);
 }
 
-/* Begin at the start of P with rates v of the drives. */
+/* Begin at the start of P with rates v of the drives, at rest where it is NULL. */
 int mgk_motion_start(const int *I, const double *P, void *state, const double *v) {
   Model m;
   Work w;
@@ -355,7 +355,7 @@ int mgk_motion_start(const int *I, const double *P, void *state, const double *v
   memcpy(at.begin, w.x, m.states * sizeof(double));
   *at.step = 0.0;
   memset(at.y, 0, m.drives * sizeof(double));
-  FOR(i, m.drives) at.y[m.drives + i] = v[i] / (m.is_length[m.drive[i]] ? *m.unit : 1.0);
+  FOR(i, m.drives) at.y[m.drives + i] = v ? v[i] / (m.is_length[m.drive[i]] ? *m.unit : 1.0) : 0.0;
   status = closed_at(&m, &w, &at, m.drives, at.begin, at.y, NULL, w.x);
   if (!status && completed(&m, &w, at.y + m.drives, NULL, 0.0, at.rate) > INDEPENDENT) status = MGK_CONTRADICTION;
   return status;

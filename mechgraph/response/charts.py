@@ -58,24 +58,35 @@ class Task:
 
     def prescribed_at(self, t: Array) -> Array:
         """Prescribed positions, velocities, accelerations ``(3, p, T)``, internal units."""
+        if not len(self.columns):
+            return np.zeros((3, 0, len(t)))
         unit = np.where(self.system.is_length[self.columns], self.system.par.L, 1.0)
         return np.stack([self.prescribed.at(float(one)) / unit for one in t], axis=-1)
 
 
 @dataclass(frozen=True)
 class _Known:
-    """A state that was evaluated, ``(x, q', q'')``, from which others are predicted."""
+    """A state that was evaluated, ``(x, q', q'')`` of so many numbers, from which others are predicted."""
 
     t: float
     state: Array
-    x: Array
-    dq: Array
-    ddq: Array
+    of_x: int
+    of_dq: int
 
-    @classmethod
-    def of(cls, system: System, t: float, state: Array) -> _Known:
-        """The parts of a state."""
-        return cls(t, state, *np.split(state, [system.n_state, system.n_state + system.n_freedoms]))
+    @property
+    def x(self) -> Array:
+        """The position."""
+        return self.state[: self.of_x]
+
+    @property
+    def dq(self) -> Array:
+        """Rates."""
+        return self.state[self.of_x : self.of_x + self.of_dq]
+
+    @property
+    def ddq(self) -> Array:
+        """Accelerations."""
+        return self.state[self.of_x + self.of_dq :]
 
     def ahead(self, system: System, t: Array) -> Array:
         """States at other times, to second order, ``(nx, T)``."""
@@ -91,8 +102,10 @@ class ChartStage:
         self.chart = task.chart(x)
         self.n = len(self.chart.free)
         self._first = np.concatenate([np.zeros(self.n), dq[self.chart.moving], [0.0]])
-        self._last = _Known.of(task.system, t, np.concatenate([x, dq, np.zeros_like(dq)]))
+        self._sizes = len(x), len(dq)
+        self._last = _Known(t, np.concatenate([x, dq, np.zeros_like(dq)]), *self._sizes)
         self._path = [self._last]
+        self._of_time = tuple(load for some in (task.loads.stored, task.loads.rest) for load in some if load.of_time)
         self._kernel: KernelRates | None = None
         found = self._found(t, self._first[:, None])
         if found is None:
@@ -120,17 +133,16 @@ class ChartStage:
         here = self._by_kernel(t, y)
         if here is None:
             return self._rates(t, y[:, None])[:, 0]
-        return np.concatenate([here.du, here.dv, [here.power]])
+        return here.rates
 
     def _by_kernel(self, t: float, y: Array) -> Evaluated | None:
         """The same by the kernel; None where there is none, or it does not serve: numpy says what is there."""
         if self._kernel is None:
             return None
         near = self._near(t)
-        p = self.task.prescribed_at(np.array([t]))
-        found = self._kernel(near.state, t - near.t, y[:-1], p)
+        found = self._kernel(near.state, t - near.t, y[:-1], self.task.prescribed_at(np.array([t]))[..., 0])
         if found is not None:
-            self._last = _Known.of(self.task.system, t, found.state)
+            self._last = _Known(t, found.state, *self._sizes)
             self._y, self._shape = y, lambda: (found.steepness, found.condition)
         return found
 
@@ -157,8 +169,7 @@ class ChartStage:
 
     def by_time(self, t: float, y: Array) -> tuple[Callable[[Array], Array], Array] | None:
         """See ``Stage``."""
-        parts = self.task.loads.stored, self.task.loads.rest
-        loads = tuple(load for some in parts for load in some if load.of_time)
+        loads = self._of_time
         if not (loads or len(self.task.columns)) or (loads and not self._evaluated(t, y)):
             return None
         rates = np.concatenate([y[self.n : -1], self.task.prescribed_at(np.array([t]))[1, :, 0]])
@@ -199,7 +210,7 @@ class ChartStage:
         found = moved(closed, y[n:-1], p[1:], self.task.loads, at)
         rates = found.rates
         state = np.concatenate([closed.here.x[:, 0], rates.dq[:, 0], rates.ddq[:, 0]])
-        self._last = _Known.of(self.task.system, t, state)
+        self._last = _Known(t, state, *self._sizes)
         self._shape, self._y, self._moved = partial(self.chart.shape, closed.f), y[:, 0], found
         return found
 

@@ -116,9 +116,12 @@ class Response(Solution):
 
     def _energy_lost(self) -> EnergyLost | None:
         off = np.abs(self.energy.balance)
+        largest = float(np.nan_to_num(off).max(initial=0.0))
+        if largest <= LOST_ENERGY * self.energy.greatest:
+            return None
         # times asked for may be few and of little energy: what is lost counts beside the whole motion too
-        whole, largest = self._course.greatest, float(np.nan_to_num(off).max(initial=0.0))
-        if largest <= LOST_ENERGY * max(self.energy.greatest, whole) or not whole:
+        whole = self._course.greatest
+        if largest <= LOST_ENERGY * whole or not whole:
             return None
         return EnergyLost(largest / whole, float(np.asarray(self.t)[off > 0.5 * largest].min()))
 

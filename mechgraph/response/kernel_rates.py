@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,7 +16,6 @@ from mechgraph.closure.passive_motion import PassiveMotion
 from mechgraph.errors import DeclarationError
 from mechgraph.kernel import build
 from mechgraph.kernel.loads import in_tables
-from mechgraph.kernel.path import pointer
 from mechgraph.kernel.tables import layout, tables, why_not
 from mechgraph.response.chart import Chart
 from mechgraph.response.motion_equations import SPARSE_FROM, Loads
@@ -23,11 +23,9 @@ from mechgraph.response.motion_equations import SPARSE_FROM, Loads
 
 @dataclass(frozen=True)
 class Evaluated:
-    """Of one state: ``u'``, ``v'``, the power, how steep the chart is there and its condition; and the state itself."""
+    """Of one state: the rates of ``u``, ``v`` and the work, how steep the chart is there and its condition; and the state itself."""
 
-    du: Array
-    dv: Array
-    power: float
+    rates: Array
     steepness: float
     condition: float
     state: Array
@@ -88,22 +86,24 @@ class KernelRates:
         assert found is not None
         self.n, self._x0 = len(chart.free), np.ascontiguousarray(chart.x0)
         self._tables = found
-        size = library.mgk_motion_size
-        size.restype = ctypes.c_size_t
-        self._memory = np.empty(size(pointer(found[0])) // 8 + 1)
-        self._out = np.empty(2 * self.n + 3)
-        self._known = [pointer(array) for array in (*found, self._memory)], len(loads.stored)
-        self._call = library.mgk_motion
+        size, of_motion = library.mgk_motion_size, library.mgk_motion
+        size.argtypes, size.restype = [ctypes.c_void_p], ctypes.c_size_t
+        of_motion.argtypes = [*[ctypes.c_void_p] * 3, *[ctypes.c_int] * 2, *[ctypes.c_void_p] * 4, ctypes.c_double, *[ctypes.c_void_p] * 2]
+        self._memory = np.empty(size(found[0].ctypes.data) // 8 + 1)
+        self._y, self._p, self._out = np.empty(2 * self.n), np.empty((3, len(chart.prescribed))), np.empty(2 * self.n + 3)
+        of_tables, own = (
+            [array.ctypes.data for array in some]
+            for some in ((*found, self._memory), (self._x0, self._y, self._p))
+        )
+        self._call, self._result = partial(of_motion, *of_tables, self.n, len(loads.stored), *own), self._out.ctypes.data
 
     def __call__(self, known: Array, h: float, y: Array, p: Array) -> Evaluated | None:
-        """At ``y = (u, v)`` a time ``h`` behind a ``known`` state (x, q', q''), prescribed freedoms ``p (3, p)``; None where it does not
+        """At ``y = (u, v)`` a time ``h`` behind a ``known`` state (x, q', q''), prescribed freedoms at ``p (3, p)``; None where it does not
         serve.
         """
-        (I, P, memory), stored = self._known
-        found, y, p = np.empty(len(known)), np.ascontiguousarray(y), np.ascontiguousarray(p)
-        numbers = [pointer(array) for array in (self._x0, y, p, known)]
-        n, out = self.n, self._out
-        if self._call(I, P, memory, n, stored, *numbers, ctypes.c_double(h), pointer(found), pointer(out)):
+        self._y[:], self._p[:] = y, p
+        found = np.empty(len(known))
+        if self._call(known.ctypes.data, h, found.ctypes.data, self._result):
             return None
-        du, dv, (power, steepness, condition) = out[:n].copy(), out[n : 2 * n].copy(), out[2 * n :].tolist()
-        return Evaluated(du, dv, power, steepness, condition, found)
+        *_, steepness, condition = self._out.tolist()
+        return Evaluated(self._out[:-2].copy(), steepness, condition, found)
