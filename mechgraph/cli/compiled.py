@@ -28,7 +28,8 @@ def compile_(
     inputs: Annotated[
         InputsName,
         typer.Option(
-            "--inputs", help="What is given of the drives: their motion, or their efforts, under which the motion is followed as well."
+            "--inputs",
+            help="What is given of the drives: their motion, or their efforts, under which the motion is followed as well.",
         ),
     ] = "motion",
     json: AsJson = False,

@@ -341,8 +341,8 @@ class Compiled:
         Raises
         ------
         DeclarationError
-            where ``name`` is no identifier of C, ``inputs`` no such word, or the loops cannot be led to the parameters; FileError where it cannot be written,
-            MissingExtraError for a unit where there is no C compiler.
+            where ``name`` is no identifier of C, ``inputs`` no such word, or the loops cannot be led to the parameters; FileError where it
+            cannot be written, MissingExtraError for a unit where there is no C compiler.
         """
         if self._values != self.parameters.wanted and (status := self._led()):
             self._refuse(f"the declared position cannot be led to the parameters: {WORDS[status]}")

@@ -107,6 +107,7 @@ class ChartStage:
         self._path = [self._last]
         self._of_time = tuple(load for some in (task.loads.stored, task.loads.rest) for load in some if load.of_time)
         self._kernel: KernelRates | None = None
+        self._shape: Callable[[], tuple[float, float]]
         found = self._found(t, self._first[:, None])
         if found is None:
             raise Stopped(
@@ -162,7 +163,11 @@ class ChartStage:
         """See ``Stage``: forward differences, all evaluated in one batch."""
         size = NUDGE * np.maximum(1.0, np.abs(y[:-1]))
         places = y[:, None] + np.pad(np.diag(size), ((0, 1), (1, 0)))
-        f = self._rates(t, places) if self._kernel is None else np.stack([self.rates(t, one) for one in places.T], axis=1)
+        f = (
+            self._rates(t, places)
+            if self._kernel is None
+            else np.stack([self.rates(t, one) for one in places.T], axis=1)
+        )
         J = (f[:, 1:] - f[:, :1]) / size
         # where it does not close the rates are NaN as well, and the step is taken back
         return np.nan_to_num(np.pad(J, ((0, 0), (0, 1))), copy=False)

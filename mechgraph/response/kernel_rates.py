@@ -88,14 +88,26 @@ class KernelRates:
         self._tables = found
         size, of_motion = library.mgk_motion_size, library.mgk_motion
         size.argtypes, size.restype = [ctypes.c_void_p], ctypes.c_size_t
-        of_motion.argtypes = [*[ctypes.c_void_p] * 3, *[ctypes.c_int] * 2, *[ctypes.c_void_p] * 4, ctypes.c_double, *[ctypes.c_void_p] * 2]
+        of_motion.argtypes = [
+            *[ctypes.c_void_p] * 3,
+            *[ctypes.c_int] * 2,
+            *[ctypes.c_void_p] * 4,
+            ctypes.c_double,
+            *[ctypes.c_void_p] * 2,
+        ]
         self._memory = np.empty(size(found[0].ctypes.data) // 8 + 1)
-        self._y, self._p, self._out = np.empty(2 * self.n), np.empty((3, len(chart.prescribed))), np.empty(2 * self.n + 3)
-        of_tables, own = (
-            [array.ctypes.data for array in some]
-            for some in ((*found, self._memory), (self._x0, self._y, self._p))
+        self._y, self._p, self._out = (
+            np.empty(2 * self.n),
+            np.empty((3, len(chart.prescribed))),
+            np.empty(2 * self.n + 3),
         )
-        self._call, self._result = partial(of_motion, *of_tables, self.n, len(loads.stored), *own), self._out.ctypes.data
+        of_tables, own = (
+            [array.ctypes.data for array in some] for some in ((*found, self._memory), (self._x0, self._y, self._p))
+        )
+        self._call, self._result = (
+            partial(of_motion, *of_tables, self.n, len(loads.stored), *own),
+            self._out.ctypes.data,
+        )
 
     def __call__(self, known: Array, h: float, y: Array, p: Array) -> Evaluated | None:
         """At ``y = (u, v)`` a time ``h`` behind a ``known`` state (x, q', q''), prescribed freedoms at ``p (3, p)``; None where it does not

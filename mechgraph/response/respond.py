@@ -96,7 +96,9 @@ def respond(
         ``"LSODA"``; ``"auto"`` is DOP853.
     max_step : the longest step. Steps end at the ``breaks`` of loads, and are refused where a look at 2,000 times between begin and end
         sees a load or a prescribed motion do what they missed; a pulse that is shorter needs its ``breaks``, or ``max_step``.
-    engine : as in ``solve``.
+    engine : ``"dense"`` or ``"sparse"`` linear algebra of numpy, ``"compiled"``: accelerations in independent freedoms by the kernel in C,
+        built at first use; or ``"auto"``, the kernel where it is installed and carries the mechanism and its loads. The engine of the
+        response says what ran: the path of a motion of one freedom is tabulated by numpy.
     events : ``Event``s to be watched; a terminal one ends the motion, at its time.
     stops : ``Stop``s, limits of freedoms that they strike, rest on and leave; what a stop exerts is an ``applied_effort``.
     on_stop : where the motion cannot be followed to its end, or is interrupted: ``"raise"``, or ``"return"`` what there is, with
@@ -108,7 +110,9 @@ def respond(
 
     Raises
     ------
-    DeclarationError, AssemblyError
+    DeclarationError
+        which names what ``engine="compiled"`` does not carry; MissingExtraError for it where there is no C compiler.
+    AssemblyError
     ResponseError
         where the motion cannot be followed to its end, or is interrupted; carries the Response so far.
     """
