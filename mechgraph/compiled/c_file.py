@@ -141,7 +141,7 @@ int {name}_begin(void *state, const double *v);
  * gives what is at the last state. Integrated by the method of Dormand and Prince, the error of every step within
  * {RELATIVE:g} of a coordinate or rate plus {ABSOLUTE:g} (radians, or lengths over the unit of the tables, and their rates).
  * position[freedoms], velocity[freedoms] (of a rotation the angular velocity), reaction[pairs][6] as of {name}_solve, with these efforts as
- * loads; any of them may be NULL. Unless {name.upper()}_OK is returned nothing of position and reaction is written, and the state stays. */
+ * loads; any of them may be NULL. Unless {name.upper()}_OK is returned nothing is written and the state stays. */
 int {name}_step(void *state, double time, const double *effort, double *position, double *velocity, double *reaction);
 """
 

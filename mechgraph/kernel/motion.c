@@ -384,7 +384,6 @@ int mgk_advance(const int *I, const double *P, void *state, double time, const d
   if (!status) status = begun_step(&m, &w, &at);
   if (!status) {
     memcpy(w.trial, at.guess, m.states * sizeof(double));
-    FOR(c, m.columns) if (velocity) velocity[c] = w.dq[c] * (m.is_length[c] ? L : 1.0);
     status = rates(&m, &w, at.y + d, at.slope + d);
   }
   if (!status) status = forces(&m, &w, w.trial, w.record, places, largest);
@@ -393,6 +392,7 @@ int mgk_advance(const int *I, const double *P, void *state, double time, const d
     return status;
   }
   if (position) coordinates(&m, &w, w.x, position);
+  if (velocity) FOR(c, m.columns) velocity[c] = w.dq[c] * (m.is_length[c] ? L : 1.0);
   if (reaction) FOR(k, m.pairs) given_out(&m, w.record, places, k, reaction + 6 * k);
   FOR(i, d) w.drive[i] = w.x[m.column_state[declared[i]]];
   return MGK_OK;
