@@ -5,14 +5,13 @@ from __future__ import annotations
 import ctypes
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.by_kernel import COMPILED, at_hand
 from mechgraph.closure.indexing import System
-from mechgraph.closure.passive_motion import PassiveMotion
 from mechgraph.errors import DeclarationError
 from mechgraph.kernel import build
 from mechgraph.kernel.loads import in_tables
@@ -31,26 +30,9 @@ class Evaluated:
     state: Array
 
 
-class Task(Protocol):
-    """What moves, see ``charts.Task``."""
-
-    @property
-    def system(self) -> System:
-        """The scaled system."""
-
-    @property
-    def loads(self) -> Loads:
-        """Its loads."""
-
-    @property
-    def held(self) -> tuple[PassiveMotion, ...]:
-        """Passive motions held at rest."""
-
-
-def cannot(task: Task) -> str | None:
+def cannot(system: System, loads: Loads, held: bool) -> str | None:
     """Why the kernel does not serve a motion; None where it does."""
-    system, loads = task.system, task.loads
-    if task.held:
+    if held:
         return "passive freedoms are held at rest"
     if system.n_freedoms * len(system.m.links) >= SPARSE_FROM:
         return f"it has {system.n_freedoms} freedoms and {len(system.m.links)} links; expected fewer than {SPARSE_FROM} of the product"
@@ -60,8 +42,8 @@ def cannot(task: Task) -> str | None:
     return why_not(system)
 
 
-def library_for(task: Task, engine: str) -> Any:
-    """The library for a task as ``engine`` asks; None where numpy is to serve.
+def library_for(system: System, loads: Loads, held: bool, engine: str) -> Any:
+    """The library as ``engine`` asks, for a motion with passive freedoms held or not; None where numpy is to serve.
 
     Raises
     ------
@@ -69,10 +51,10 @@ def library_for(task: Task, engine: str) -> Any:
         where the kernel was asked for by name and cannot carry it; MissingExtraError without a compiler.
     """
     library = build.built() if engine == COMPILED else at_hand() if engine == "auto" else None
-    why = None if library is None else cannot(task)
+    why = None if library is None else cannot(system, loads, held)
     if why is not None and engine == COMPILED:
         text = f"engine 'compiled' does not serve: {why}. Use engine='auto'"
-        raise DeclarationError(f"respond {task.system.m.name!r}", [text])
+        raise DeclarationError(f"respond {system.m.name!r}", [text])
     return library if why is None else None
 
 

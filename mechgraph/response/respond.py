@@ -155,7 +155,7 @@ def respond(
     task = Task(system, Loads.of(m.loads), prescribed, columns, engine_for(system.n_rows, 1, engine))
     if how.passive == "held":
         task = replace(task, held=free_motion(system, x, columns, task.engine).passive)
-    task = replace(task, library=library_for(task, engine))
+    task = replace(task, library=library_for(system, task.loads, bool(task.held), engine))
     try:
         dq = start_rates(m, task, x, wanted_rates, begin)
     except Stopped as stop:
