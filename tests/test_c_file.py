@@ -3,6 +3,7 @@
 import ctypes
 import os
 import re
+import shutil
 import subprocess
 import zipfile
 from pathlib import Path
@@ -261,3 +262,98 @@ def test_a_unit_of_hostile_names(tmp_path):
     os.remove(tmp_path / "press.fmu")
     write_tables(t, tmp_path / "press.fmu")
     assert (tmp_path / "press.fmu").read_bytes() == again
+
+
+@pytest.mark.usefixtures("compiled")
+def test_a_unit_under_efforts_runs_in_fmpy(tmp_path):
+    """Efforts that change from step to step: the motion that ``respond`` gives with them as loads, its reactions too."""
+    fmpy = pytest.importorskip("fmpy")
+    from fmpy.fmi2 import FMU2Slave
+    from fmpy.validation import validate_fmu
+
+    m, file, h, efforts = mg.load("rcsr"), tmp_path / "press.fmu", 0.05, (0.1, -0.2, 0.3)
+    mg.compile(m).write(file, inputs="efforts")
+    assert validate_fmu(str(file)) == []
+    about = fmpy.read_model_description(str(file))
+    places = {v.name: v.valueReference for v in about.modelVariables}
+    slave = FMU2Slave(
+        guid=about.guid, unzipDirectory=fmpy.extract(str(file), str(tmp_path / "x")), instanceName="press",
+        modelIdentifier=about.coSimulation.modelIdentifier,
+    )  # fmt: skip
+    slave.instantiate()
+    slave.setupExperiment(startTime=0.0)
+    slave.enterInitializationMode()
+    slave.setReal([places["O1.Rz.velocity.start"]], [3.0])
+    slave.exitInitializationMode()
+    start, rates = dict(m.start), {"O1": 3.0}
+    for i, effort in enumerate(efforts):
+        r = mg.respond(
+            m.replace(drives=[], start=start, loads=[*m.loads, mg.Effort("O1", effort)]), [0.0, 0.5 * h, h], rates=rates, rtol=1e-11,
+            atol=1e-12, engine="dense",
+        )  # fmt: skip
+        slave.setReal([places["O1.Rz.effort"]], [effort])
+        slave.doStep(h * i, h)
+        for p in m.pairs:
+            known = {"position": r[p.name].position[-1], "velocity": r[p.name].velocity[-1]}
+            for what, values in known.items():
+                found = slave.getReal([places[f"{name}.{what}"] for name in p.freedom_names])
+                np.testing.assert_allclose(found, np.ravel(values), atol=1e-7, err_msg=f"{p.name} {what}")
+            found = slave.getReal(
+                [places[f"{p.name}.reaction.{part}"] for part in ("Mx", "My", "Mz", "Fx", "Fy", "Fz")]
+            )
+            np.testing.assert_allclose(found, r[p.name].reaction[-1], atol=1e-6 * np.abs(r[p.name].reaction[-1]).max())
+        start = {
+            name: float(value)
+            for p in m.pairs
+            for name, value in zip(p.freedom_names, np.ravel(r[p.name].position[-1]), strict=True)
+        }
+        rates = {"O1": float(r["O1"].velocity[-1, 0])}
+    assert slave.getInteger([0])[0] == 0
+    slave.terminate()
+    slave.freeInstance()
+
+
+@pytest.mark.usefixtures("compiled")
+@pytest.mark.parametrize("command", ["gcc", "clang"])
+def test_steps_of_the_motion_in_c(command, tmp_path):
+    """It compiles without a warning; what is refused leaves the state, and a step may be cut into others."""
+    if shutil.which(command) is None:
+        pytest.skip(f"no {command} here")
+    m, file = mg.load("four-bar"), tmp_path / "press.c"
+    mg.compile(m).write(file, inputs="efforts")
+    line = [command, *STRICT, "-shared", "-fPIC", str(file), "-o", str(tmp_path / "press.so"), "-lm"]
+    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    press = ctypes.CDLL(str(tmp_path / "press.so"))
+    press.press_state_size.restype = ctypes.c_size_t
+    pointer = np.ctypeslib.ndpointer(dtype=float)
+    press.press_begin.argtypes = [pointer, pointer]
+    press.press_step.argtypes = [pointer, ctypes.c_double, *[pointer] * 4]
+    position, velocity, reaction = np.zeros(4), np.zeros(4), np.zeros((4, 6))
+
+    def ends(*times: float, effort: float = 0.5) -> list[int]:
+        return [press.press_step(state, h, np.array([effort]), position, velocity, reaction) for h in times]
+
+    state = np.zeros(press.press_state_size() // 8 + 1)
+    assert press.press_begin(state, np.array([2.0])) == 0
+    assert ends(0.0, 0.1) == [0, 0]
+    whole = position.copy(), velocity.copy()
+    assert press.press_begin(state, np.array([2.0])) == 0
+    assert ends(0.03, 0.04) == [0, 0]
+    assert [status != 0 for status in (*ends(-1.0), *ends(np.nan), *ends(0.1, effort=np.inf))] == [True] * 3
+    assert ends(0.03) == [0]
+    np.testing.assert_allclose(position, whole[0], atol=1e-8)
+    np.testing.assert_allclose(velocity, whole[1], atol=1e-7)
+    loads = [*m.loads, mg.Effort("A", 0.5)]
+    r = mg.respond(
+        m.replace(drives=[], loads=loads), [0.0, 0.05, 0.1], rates={"A": 2.0}, rtol=1e-11, atol=1e-12, engine="dense"
+    )
+    np.testing.assert_allclose(position, np.concatenate([r[p.name].position[-1] for p in m.pairs]), atol=1e-7)
+
+
+def test_inputs_of_what_is_written(tmp_path):
+    with pytest.raises(mg.DeclarationError, match="inputs = 'forces': expected one of 'motion', 'efforts'"):
+        write_tables(tabled(mg.load("four-bar")), tmp_path / "press.c", inputs="forces")
+    done = CliRunner().invoke(app, ["compile", "four-bar", "--out", str(tmp_path / "press.c"), "--inputs", "efforts"])
+    assert done.exit_code == 0, done.output
+    assert "int press_step(void *state, double time" in (tmp_path / "press.h").read_text(encoding="utf-8")

@@ -12,7 +12,7 @@ from mechgraph.cli.output import working, write
 from mechgraph.cli.reading import check_out, loaded
 from mechgraph.cli.records import FileData, write_json
 from mechgraph.compiled.tabled import tabled
-from mechgraph.compiled.write import WRITTEN, write_tables
+from mechgraph.compiled.write import WRITTEN, InputsName, write_tables
 from mechgraph.writing import formats_text
 
 
@@ -25,6 +25,13 @@ def compile_(
         str | None,
         typer.Option("--name", metavar="NAME", help="What symbols begin with; left out, the name of the file."),
     ] = None,
+    inputs: Annotated[
+        InputsName,
+        typer.Option(
+            "--inputs",
+            help="What is given of the drives: their motion, or their efforts, under which the motion is followed as well.",
+        ),
+    ] = "motion",
     json: AsJson = False,
 ) -> None:
     """Write a mechanism as C99 that runs by itself, for a controller, or as a unit for co-simulation (FMI 2.0).
@@ -39,7 +46,7 @@ def compile_(
     check_out(out, mechanism, WRITTEN)
     m = loaded(mechanism)
     with working(f"compiling {m.name}"):
-        write_tables(tabled(m), out, name)
+        write_tables(tabled(m), out, name, inputs)
     if json:
         write_json("compile", FileData(m.name, str(out)))
     else:

@@ -15,7 +15,6 @@ from mechgraph.cli.options import (
     AsJson,
     Compare,
     Drives,
-    Engine,
     Include,
     Method,
     MotionEngine,
@@ -148,7 +147,7 @@ def respond(
     passive: Annotated[
         Literal["free", "held"] | None, typer.Option(help="Whether passive freedoms move freely, or are held at rest.")
     ] = None,
-    engine: Engine = "auto",
+    engine: MotionEngine = "auto",
     over_time: OverTime = False,
     json: AsJson = False,
 ) -> None:

@@ -21,6 +21,8 @@ FILE_NAME = re.compile(r"[\w.+-]+", re.ASCII)
 """Names of files that stand in an #include."""
 COLUMNS = 120
 """Width of the lines of numbers."""
+RELATIVE, ABSOLUTE = 1e-9, 1e-10
+"""Error of a step of a motion, as in ``motion.c``."""
 PATHS = re.compile(r"(?:/\*(?:(?!\*/).)*\*/\n)?^int mgk_path\([^;{]*(?:;\n|\{.*?^\}\n)", re.DOTALL | re.MULTILINE)
 """What only the package calls, with the comment before it."""
 
@@ -114,14 +116,14 @@ enum {{
 /* Bytes of the memory that the other functions ask for. */
 size_t {name}_state_size(void);
 
-/* Begin at the declared position. */
+/* Begin at the declared position{", at rest" * tables.efforts}. */
 void {name}_start(void *state);
 
 /* One position, led on from the last good one along a straight line of the drives q with certified steps, at rates v and a (drives each).
  * effort[drives], reaction[pairs][6] of link a on link b, position[freedoms]; any of them may be NULL. What is not unique is NaN. Unless
  * {NAME}_OK is returned nothing is written and the state stays at the last good position. */
 int {name}_solve(void *state, const double *q, const double *v, const double *a, double *effort, double *reaction, double *position);
-
+{_steps(name) if tables.efforts else ""}
 #ifdef __cplusplus
 }}
 #endif
@@ -129,15 +131,41 @@ int {name}_solve(void *state, const double *q, const double *v, const double *a,
 """
 
 
+def _steps(name: str) -> str:
+    """What the header says of motion under efforts."""
+    return f"""
+/* Begin at the declared position with rates v of the drives. Returns as {name}_solve does. */
+int {name}_begin(void *state, const double *v);
+
+/* The motion that efforts of the drives produce, held for a time from the last state on, beside the loads of the mechanism; a time of 0
+ * gives what is at the last state. Integrated by the method of Dormand and Prince, the error of every step within
+ * {RELATIVE:g} of a coordinate or rate plus {ABSOLUTE:g} (radians, or lengths over the unit of the tables, and their rates).
+ * position[freedoms], velocity[freedoms] (of a rotation the angular velocity), reaction[pairs][6] as of {name}_solve, with these efforts as
+ * loads; any of them may be NULL. Unless {name.upper()}_OK is returned nothing is written and the state stays. */
+int {name}_step(void *state, double time, const double *effort, double *position, double *velocity, double *reaction);
+"""
+
+
 def source_text(tables: Tabled, name: str, header: str) -> str:
     """The source: tables as constants, the kernel with all its functions static, and what the header declares."""
     m = tables.m
-    kernel, declarations = (PATHS.sub("", file.read_text(encoding="utf-8")) for file in INCLUDED)
+    kernel, declarations, motion = (PATHS.sub("", file.read_text(encoding="utf-8")) for file in INCLUDED)
+    kernel = re.sub(r"#endif\n$", "", kernel) + motion * tables.efforts
     declarations = re.sub(r"^#(?:ifndef|endif|include|define MECHGRAPH).*\n", "", declarations, flags=re.MULTILINE)
     kernel = re.sub(r'^#(?:include "kernel.h"|ifndef MGK_COMPLEX|endif)\n', "", kernel, flags=re.MULTILINE)
     both = re.sub(r"^(int|size_t) mgk_", r"static \1 mgk_", f"{declarations}\n{kernel}", flags=re.MULTILINE)
     own = {"mgk": f"{name}_kernel", "MGK": f"{name.upper()}_KERNEL"}
     both = re.sub("mgk(?=_)|MGK(?=_)", lambda found: own[found[0]], both)
+    begin, steps = f"{name}_kernel_start(MECHANISM, NUMBERS, state);", ""
+    if tables.efforts:
+        begin = f"{name}_kernel_motion_start(MECHANISM, NUMBERS, state, NULL);"
+        steps = f"""
+int {name}_begin(void *state, const double *v) {{ return {name}_kernel_motion_start(MECHANISM, NUMBERS, state, v); }}
+
+int {name}_step(void *state, double time, const double *effort, double *position, double *velocity, double *reaction) {{
+  return {name}_kernel_advance(MECHANISM, NUMBERS, state, time, effort, position, velocity, reaction);
+}}
+"""
     home = ", ".join(f"{full} = {value!r}" for full, value in zip(tables.drives, tables.home.tolist(), strict=True))
     return f"""/* Mechanism {in_comment(m.name)}, written by mechgraph {version("mechgraph")}: see {header}.
  *
@@ -155,14 +183,14 @@ static const int MECHANISM[] = {{
 static const double NUMBERS[] = {{
 {"".join(_numbers(tables))}}};
 
-size_t {name}_state_size(void) {{ return {name}_kernel_state_size(MECHANISM); }}
+size_t {name}_state_size(void) {{ return {name}_kernel_{"motion" if tables.efforts else "state"}_size(MECHANISM); }}
 
-void {name}_start(void *state) {{ {name}_kernel_start(MECHANISM, NUMBERS, state); }}
+void {name}_start(void *state) {{ {begin} }}
 
 int {name}_solve(void *state, const double *q, const double *v, const double *a, double *effort, double *reaction, double *position) {{
   return {name}_kernel_solve(MECHANISM, NUMBERS, state, q, v, a, effort, reaction, position);
 }}
-"""
+{steps}"""
 
 
 def _unit(text: str) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array, turn_tangent
 from mechgraph.arguments import door, with_doors
 from mechgraph.compiled.tabled import STATUSES, Tabled, tabled
-from mechgraph.compiled.write import write_tables
+from mechgraph.compiled.write import InputsName, write_tables
 from mechgraph.errors import DeclarationError, listed
 from mechgraph.kernel import build
 from mechgraph.model.mechanism import Mechanism
@@ -345,23 +345,25 @@ class Compiled:
             return True
         return bool(other.status == "ok")
 
-    def write(self, path: str | os.PathLike[str], name: str | None = None) -> None:
+    def write(self, path: str | os.PathLike[str], name: str | None = None, inputs: InputsName = "motion") -> None:
         """Write the mechanism with its parameters as they are: C99 (``press.c``, ``press.h``), or a unit for co-simulation (``.fmu``).
 
         The C has no heap and needs the mathematics of the C library alone; its functions are ``press_start``, ``press_state_size`` and
-        ``press_solve``, as the header says. ``name`` is what symbols begin with: left out, the name of the file.
+        ``press_solve``, as the header says. ``name`` is what symbols begin with: left out, the name of the file. With
+        ``inputs="efforts"`` it also follows the motion that efforts of the drives produce, as ``respond`` does (``press_begin``,
+        ``press_step``: adaptive steps, each within 1e-9 of a coordinate or rate), and a unit has these efforts as its inputs.
 
         Raises
         ------
         DeclarationError
-            where ``name`` is no identifier of C, or the loops cannot be led to the parameters; FileError where it cannot be written,
-            MissingExtraError for a unit where there is no C compiler.
+            where ``name`` is no identifier of C, ``inputs`` no such word, or the loops cannot be led to the parameters; FileError where it
+            cannot be written, MissingExtraError for a unit where there is no C compiler.
         """
         if self._values != self.parameters.wanted and (status := self._led()):
             self._refuse(f"the declared position cannot be led to the parameters: {WORDS[status]}")
         P, x = self.P.copy(), len(self.tables.x)
         P[START : START + x] = self.home[:x]
-        write_tables(replace(self.tables, P=P), path, name)
+        write_tables(replace(self.tables, P=P), path, name, inputs)
 
     # --- parameters --------------------------------------------------------------------------------------------------------
 

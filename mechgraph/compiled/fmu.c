@@ -1,7 +1,9 @@
 /* A mechanism as a co-simulation slave: functions of FMI 2.0 (https://fmi-standard.org), declared here as far as they are used.
  *
- * Real variables by value reference: inputs q, v, a of every drive, then outputs: effort of every drive, position of every freedom,
- * reaction of every pair (six each). Integer variable 0: what model_solve returned. Outputs belong to the inputs that were set last. */
+ * Real variables by value reference: what is set, of every drive, then outputs. Where its motion is given: q, v, a; effort of every drive,
+ * position of every freedom, reaction of every pair (six each). Where efforts are given: effort, and the velocity at the start;
+ * position and velocity of every freedom, reactions. Integer variable 0: what the last function of the model returned. Outputs belong to
+ * the inputs that were set last. */
 #include "model.h"
 
 #include <stdlib.h>
@@ -24,16 +26,22 @@ typedef struct {
   void *environment;
 } Callbacks;
 
-enum { INPUTS = 3 * MODEL_DRIVES, OUTPUTS = MODEL_DRIVES + MODEL_FREEDOMS + 6 * MODEL_PAIRS };
+#define UNDER_EFFORTS @EFFORTS@
+#if UNDER_EFFORTS
+enum { INPUTS = MODEL_DRIVES, SET = 2 * MODEL_DRIVES, OUTPUTS = 2 * MODEL_FREEDOMS + 6 * MODEL_PAIRS };
+#else
+enum { INPUTS = 3 * MODEL_DRIVES, SET = INPUTS, OUTPUTS = MODEL_DRIVES + MODEL_FREEDOMS + 6 * MODEL_PAIRS };
+#endif
 
 typedef struct {
   const Callbacks *callbacks;
   char *name;
-  double value[INPUTS + OUTPUTS];
+  double value[SET + OUTPUTS];
   int result, stale; /* what the last solution returned; inputs were set since */
+  int moved;         /* a step was made: what holds at the start cannot be set any more */
 } Slave;
 
-static const double START[INPUTS] = {@START@};
+static const double START[SET] = {@START@};
 static const char *const MEANING[] = {@MEANING@};
 
 /* The memory of the kernel stands behind the slave, as far aligned as that. */
@@ -46,18 +54,34 @@ static size_t slave_size(void) { return sizeof(Slave) + 16 + model_state_size();
 
 static void begin(Slave *s) {
   memcpy(s->value, START, sizeof START);
-  s->stale = 1;
+  s->stale = 1, s->moved = 0;
   model_start(state_of(s));
 }
 
-static Status solved(Slave *s) {
-  double *q = s->value, *effort = q + INPUTS, *position = effort + MODEL_DRIVES, *reaction = position + MODEL_FREEDOMS;
-  if (s->stale) {
+/* The model asked for its outputs, after a step where there is one. */
+static int asked(Slave *s, double step) {
+#if UNDER_EFFORTS
+  double *effort = s->value, *position = effort + SET, *velocity = position + MODEL_FREEDOMS, *reaction = velocity + MODEL_FREEDOMS;
+  if (!s->moved) {
+    const int status = model_begin(state_of(s), effort + MODEL_DRIVES);
+    if (status) return status;
+  }
+  return model_step(state_of(s), step, effort, position, velocity, reaction);
+#else
+  double *q = s->value, *effort = q + SET, *position = effort + MODEL_DRIVES, *reaction = position + MODEL_FREEDOMS;
+  (void)step;
+  return model_solve(state_of(s), q, q + MODEL_DRIVES, q + 2 * MODEL_DRIVES, effort, reaction, position);
+#endif
+}
+
+static Status solved(Slave *s, double step) {
+  if (s->stale || (UNDER_EFFORTS && step > 0.0)) {
     s->stale = 0;
-    s->result = model_solve(state_of(s), q, q + MODEL_DRIVES, q + 2 * MODEL_DRIVES, effort, reaction, position);
+    s->result = asked(s, step);
+    s->moved |= step > 0.0;
     if (s->result) {
       const double none = strtod("nan", NULL);
-      for (int i = INPUTS; i < INPUTS + OUTPUTS; i++) s->value[i] = none;
+      for (int i = SET; i < SET + OUTPUTS; i++) s->value[i] = none;
       if (s->callbacks && s->callbacks->logger)
         s->callbacks->logger(s->callbacks->environment, s->name, DISCARD, "logStatusDiscard", "%s", MEANING[s->result]);
     }
@@ -111,8 +135,8 @@ EXPORT Status fmi2Reset(Slave *s) {
 
 EXPORT Status fmi2GetReal(Slave *s, const unsigned places[], size_t count, double values[]) {
   for (size_t i = 0; i < count; i++) {
-    if (places[i] >= INPUTS + OUTPUTS) return ERROR_;
-    if (places[i] >= INPUTS) solved(s);
+    if (places[i] >= SET + OUTPUTS) return ERROR_;
+    if (places[i] >= SET) solved(s, 0.0);
     values[i] = s->value[places[i]];
   }
   return OK;
@@ -120,7 +144,7 @@ EXPORT Status fmi2GetReal(Slave *s, const unsigned places[], size_t count, doubl
 
 EXPORT Status fmi2SetReal(Slave *s, const unsigned places[], size_t count, const double values[]) {
   for (size_t i = 0; i < count; i++) {
-    if (places[i] >= INPUTS) return ERROR_;
+    if (places[i] >= (s->moved ? (unsigned)INPUTS : (unsigned)SET)) return ERROR_;
     s->value[places[i]] = values[i];
     s->stale = 1;
   }
@@ -130,7 +154,7 @@ EXPORT Status fmi2SetReal(Slave *s, const unsigned places[], size_t count, const
 EXPORT Status fmi2GetInteger(Slave *s, const unsigned places[], size_t count, int values[]) {
   for (size_t i = 0; i < count; i++) {
     if (places[i]) return ERROR_;
-    solved(s);
+    solved(s, 0.0);
     values[i] = s->result;
   }
   return OK;
@@ -183,8 +207,8 @@ EXPORT Status fmi2FreeFMUstate(Slave *s, void **kept) {
   return OK;
 }
 
-/* The inputs hold at the end of the step. */
+/* The motion of the drives is that at the end of the step; efforts are held over it. */
 EXPORT Status fmi2DoStep(Slave *s, double time, double step, int no_return) {
-  (void)time, (void)step, (void)no_return;
-  return solved(s);
+  (void)time, (void)no_return;
+  return solved(s, step);
 }

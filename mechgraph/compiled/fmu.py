@@ -1,6 +1,7 @@
 """A mechanism as a functional mock-up unit: co-simulation by FMI 2.0, motion of the drives in, efforts, positions and reactions out.
 
-The equations are those of kinetostatics: what is set as ``q``, ``v``, ``a`` of the drives holds when the step ends.
+The equations are those of kinetostatics: what is set as ``q``, ``v``, ``a`` of the drives holds when the step ends. Or efforts of the
+drives go in, held over a step, and the unit integrates the motion that they produce.
 """
 
 from __future__ import annotations
@@ -33,11 +34,12 @@ SYSTEMS = {"win32": "win", "darwin": "darwin"}
 
 
 class Variable(NamedTuple):
-    """A real variable: its name, unit, and the value at which an input starts."""
+    """A real variable: its name, unit, the value at which it starts where it is set, and what it is then."""
 
     name: str
     unit: str
     start: float | None = None
+    causality: str = "input"
 
 
 def write_fmu(tables: Tabled, path: str | os.PathLike[str], name: str | None = None) -> None:
@@ -69,7 +71,7 @@ def write_fmu(tables: Tabled, path: str | os.PathLike[str], name: str | None = N
 
 
 def variables(tables: Tabled) -> tuple[list[Variable], list[Variable]]:
-    """Inputs and outputs, in the order of their value references."""
+    """What is set, inputs before parameters, and outputs, in the order of their value references."""
     m = tables.m
 
     def unit(full: str, order: int = 0) -> str:
@@ -81,10 +83,15 @@ def variables(tables: Tabled) -> tuple[list[Variable], list[Variable]]:
         for i, full in enumerate(tables.drives)
     ]
     efforts = [Variable(f"{f}.effort", unit_of(m.units, (2 if m.turns(f) else 1, 1, -2))) for f in tables.drives]
+    if tables.efforts:
+        rates = [Variable(f"{f}.velocity.start", unit(f, 1), 0.0, "parameter") for f in tables.drives]
+        inputs = [*(effort._replace(start=0.0) for effort in efforts), *rates]
+        efforts = []
     positions = [Variable(f"{full}.position", unit(full)) for full in m.freedom_names()]
     wrench = [(part, unit_of(m.units, (2 if part.startswith("M") else 1, 1, -2))) for part in COMPONENTS]
     reactions = [Variable(f"{p.name}.reaction.{part}", unit) for p in m.pairs for part, unit in wrench]
-    return inputs, [*efforts, *positions, *reactions]
+    velocities = [Variable(f"{full}.velocity", unit(full, 1)) for full in m.freedom_names() if tables.efforts]
+    return inputs, [*efforts, *positions, *velocities, *reactions]
 
 
 def description(tables: Tabled, name: str, guid: str) -> str:
@@ -122,7 +129,8 @@ def description(tables: Tabled, name: str, guid: str) -> str:
 def _scalars(inputs: list[Variable], outputs: list[Variable]) -> Iterator[str]:
     for i, v in enumerate([*inputs, *outputs]):
         known = {"name": visible(v.name), "valueReference": str(i), "variability": "continuous"}
-        known |= {"causality": "output", "initial": "calculated"} if v.start is None else {"causality": "input"}
+        known |= {"causality": "output", "initial": "calculated"} if v.start is None else {"causality": v.causality}
+        known |= {"variability": "fixed", "initial": "exact"} if v.causality == "parameter" else {}
         real = {"unit": v.unit} if v.unit else {}
         real |= {} if v.start is None else {"start": repr(v.start)}
         yield f"<ScalarVariable{_attributes(known)}><Real{_attributes(real)}/></ScalarVariable>"
@@ -146,6 +154,7 @@ def _slave(tables: Tabled, guid: str) -> str:
     starts = ", ".join(repr(v.start) for v in variables(tables)[0])
     meanings = ", ".join(f'"{meaning}"' for _, _, meaning in STATUSES)
     text = SLAVE.read_text(encoding="utf-8")
+    text = text.replace("@EFFORTS@", str(int(tables.efforts)))
     return text.replace("@GUID@", guid).replace("@START@", starts).replace("@MEANING@", meanings)
 
 

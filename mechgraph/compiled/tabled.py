@@ -15,7 +15,8 @@ from mechgraph.closure.assembly import closed_start
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.closure.indexing import System
 from mechgraph.errors import DeclarationError, listed
-from mechgraph.kernel.tables import Integers, Layout, layout, tables
+from mechgraph.kernel.loads import EFFORT
+from mechgraph.kernel.tables import HEAD_LOAD_NUMBERS, HEAD_LOADS, Integers, Layout, layout, tables
 from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import Declared, declared
@@ -57,7 +58,7 @@ FIRST_CHANGE, STEPS_TRIED = 1e-3, 8
 class Tabled:
     """A mechanism in the tables: ``I`` what it is made of, ``P`` its numbers; ``home (d,)`` the declared position of the drives.
 
-    ``fields`` are the declared numbers that were asked for by name.
+    ``fields`` are the declared numbers that were asked for by name; ``efforts``: whether efforts of the drives are what is given.
     """
 
     m: Mechanism
@@ -69,6 +70,17 @@ class Tabled:
     drives: tuple[str, ...]
     home: Array
     fields: dict[str, AnyField] = field(default_factory=dict)
+    efforts: bool = False
+
+    def under_efforts(self) -> Tabled:
+        """The same with a load more in every drive, the last ones of the tables: efforts that are given from outside."""
+        I, d = self.I.copy(), len(self.drives)
+        names, first = self.m.freedom_names(), int(I[HEAD_LOAD_NUMBERS])
+        loads = [(EFFORT, names.index(name), 0, first + i) for i, name in enumerate(self.drives)]
+        I[HEAD_LOADS] += d
+        I[HEAD_LOAD_NUMBERS] += d
+        I = np.concatenate([I, np.array(loads, dtype=np.int32).ravel()])
+        return replace(self, I=I, P=np.append(self.P, np.zeros(d)), efforts=True)
 
     def copy(self) -> Tabled:
         """The same with names of its own."""

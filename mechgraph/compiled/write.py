@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import os
+from typing import Literal, get_args
 
+from mechgraph.arguments import option_faults
 from mechgraph.compiled.c_file import write_c
 from mechgraph.compiled.fmu import write_fmu
 from mechgraph.compiled.tabled import Tabled
+from mechgraph.errors import DeclarationError
 from mechgraph.writing import Format, format_of
 
 WRITTEN = (
@@ -15,12 +18,21 @@ WRITTEN = (
 )
 
 
-def write_tables(tables: Tabled, path: str | os.PathLike[str], name: str | None = None) -> None:
+InputsName = Literal["motion", "efforts"]
+"""What is given of the drives."""
+
+
+def write_tables(
+    tables: Tabled, path: str | os.PathLike[str], name: str | None = None, inputs: InputsName = "motion"
+) -> None:
     """Write the mechanism as the suffix of ``path`` says; symbols begin with ``name``, else with the name of the file.
 
     Raises
     ------
     DeclarationError
-        where ``name`` is no identifier of C; FileError; MissingExtraError for a unit where there is no C compiler.
+        where ``name`` is no identifier of C, ``inputs`` no such word; FileError; MissingExtraError for a unit where there is no C compiler.
     """
-    format_of(path, WRITTEN).write(tables, path, name)
+    faults = option_faults({"inputs": (inputs, get_args(InputsName))})
+    if faults:
+        raise DeclarationError(f"write {tables.m.name!r}", faults)
+    format_of(path, WRITTEN).write(tables.under_efforts() if inputs == "efforts" else tables, path, name)

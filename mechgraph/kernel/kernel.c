@@ -336,14 +336,15 @@ static void difference(const Model *m, const double *x1, const double *x0, doubl
   }
 }
 
-/* Rates of increments dq (below a radian) at the state that they lead to: dexp^-1(v) w for rotations. */
+/* Rates of increments dq (below a turn) at the state that they lead to: dexp^-1(v) w for rotations. */
 static void tangent(const Model *m, const double *dq, const double *rate, double *out) {
   memcpy(out, rate, m->columns * sizeof(double));
   FOR(f, m->factors) {
     if (m->kind[f] != MGK_ROTATION) continue;
     const double *v = dq + m->column[f], square = dot(v, v, 3);
     double *r = out + m->column[f], once[3], twice[3];
-    const double part = 1.0 / 12 + square * (1.0 / 720 + square * (1.0 / 30240 + square / 1209600));
+    const double half = 0.5 * sqrt(square);
+    const double part = half < 0.05 ? 1.0 / 12 + square * (1.0 / 720 + square * (1.0 / 30240 + square / 1209600)) : (1.0 - half / tan(half)) / square;
     cross(v, r, once);
     cross(v, once, twice);
     FOR(i, 3) r[i] += part * twice[i] - 0.5 * once[i];
@@ -1176,10 +1177,26 @@ static void set_drives(const Model *m, double *x, const double *q) {
   FOR(i, m->drives) x[m->column_state[m->drive[i]]] = q[i];
 }
 
+/* Condition number of the independent rows of a closure matrix just factored, whose inverse is made. */
+static double condition_of(const Model *m, Work *w, const double *matrix) {
+  const int n = m->unknowns;
+  double largest = 1.0, inverse = 0.0;
+  FOR(i, n) {
+    memset(w->row_value, 0, m->rows * sizeof(double));
+    w->row_value[w->row[i]] = 1.0;
+    solve(m, w, w->row_value, w->inverse + i * n); /* column i */
+  }
+  FOR(i, n) {
+    double of_matrix = 0.0, of_inverse = 0.0;
+    FOR(j, n) of_matrix += fabs(matrix[w->row[i] * n + j]), of_inverse += fabs(w->inverse[j * n + i]);
+    largest = fmax(largest, of_matrix), inverse = fmax(inverse, of_inverse);
+  }
+  return largest * inverse;
+}
+
 /* What a node is beside its closed state, at which it has just been factored: rates along the path, those of the matrix, the condition. */
 static int made_node(const Model *m, Work *w, Node *node) {
-  const int n = m->unknowns;
-  double largest = 1.0, inverse = 0.0, gap;
+  double gap;
   const int status = velocities(m, w, w->direction, node->rate, &gap);
   if (status) return status;
   if (gap > INDEPENDENT) return MGK_CONTRADICTION;
@@ -1194,17 +1211,7 @@ static int made_node(const Model *m, Work *w, Node *node) {
     memmove(w->chord_V + 3 * l, V, 3 * sizeof(double));
   }
   fill(m, w->G, w->middle, w->S, w->chord_V, node->matrix_rate);
-  FOR(i, n) {
-    memset(w->row_value, 0, m->rows * sizeof(double));
-    w->row_value[w->row[i]] = 1.0;
-    solve(m, w, w->row_value, w->inverse + i * n); /* column i */
-  }
-  FOR(i, n) {
-    double of_matrix = 0.0, of_inverse = 0.0;
-    FOR(j, n) of_matrix += fabs(node->matrix[w->row[i] * n + j]), of_inverse += fabs(w->inverse[j * n + i]);
-    largest = fmax(largest, of_matrix), inverse = fmax(inverse, of_inverse);
-  }
-  node->condition = largest * inverse;
+  node->condition = condition_of(m, w, node->matrix);
   return node->condition <= FAIR ? MGK_OK : MGK_SINGULAR;
 }
 

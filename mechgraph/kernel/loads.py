@@ -74,18 +74,17 @@ def acting(system: System, own: Array, loads: Sequence[Load]) -> Acting | None:
     """
     out, places = Acting([], []), _Places(system, own)
     for load in loads:
-        put = KINDS.get(type(load))
-        if put is None or _varies(load):
+        if not in_tables(load):
             return None
-        put(places, load, out)
+        KINDS[type(load)](places, load, out)
     return out
 
 
-def _varies(load: Load) -> bool:
-    """Whether a field is a function, or an array over positions."""
+def in_tables(load: Load) -> bool:
+    """Whether a load is numbers of the tables: its fields are no functions, and no arrays over positions."""
     values = [getattr(load, name) for name in load.formats]
     given = [name for name in load.over_positions if not isinstance(getattr(load, name), PerCase)]
-    return bool(given) or any(callable(value) for value in values)
+    return type(load) in KINDS and not given and not any(callable(value) for value in values)
 
 
 def rows(value: Any, width: int = 1) -> Array:

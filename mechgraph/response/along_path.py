@@ -153,6 +153,11 @@ class PathStage:
         stored, rest = self._forces(terms, v, np.array([t]))
         self.energy = 0.5 * self._mass * v * v + abs(smooth + float(stored[0] + rest[0])) or 1.0
 
+    @property
+    def engine(self) -> str:
+        """See ``Stage``."""
+        return self.task.engine
+
     def begin(self) -> Array:
         """See ``Stage``."""
         return self._first

@@ -96,20 +96,20 @@ class Chart:
         self.which = self.solver.chosen(here, np.full(1, -1))
         self.start = here
         f = self.solver.factored(here, self.which)
-        self.steepness, self.condition = self._steepness(f), float(f.condition[0])
+        self.steepness, self.condition = self.shape(f)
         self._singles = system.single_rows[self.free]
         self.turns = bool((self._singles < 0).any())
         self._rows = system.single_rows[prescribed]
 
-    def _steepness(self, f: FactoredClosure) -> float:
-        n = len(self.free)
-        return float(np.abs(f.sensitivity()[:, :n]).max(initial=1.0))
+    def shape(self, f: FactoredClosure) -> tuple[float, float]:
+        """The largest rate of a freedom for unit rates of the independent ones, and the condition, at a state."""
+        return float(np.abs(f.sensitivity()[:, : len(self.free)]).max(initial=1.0)), float(f.condition[0])
 
-    def worn(self, f: FactoredClosure, u: Array) -> bool:
-        """Whether another chart should take over at a state with coordinates ``u (n,)``."""
+    def worn(self, steepness: float, condition: float, u: Array) -> bool:
+        """Whether another chart should take over at a state with coordinates ``u (n,)``, so steep and of this condition."""
         far = self.turns and np.abs(u[self._singles < 0]).max(initial=0.0) > MOST_TURNED
-        poor = not f.condition[0] < max(PATH.doubtful, STEEPEST * self.condition)
-        return bool(far or poor or self._steepness(f) > STEEPEST * self.steepness)
+        poor = not condition < max(PATH.doubtful, STEEPEST * self.condition)
+        return bool(far or poor or steepness > STEEPEST * self.steepness)
 
     def coordinates(self, x: Array) -> Array:
         """Independent coordinates ``u (n, T)`` of states: how far they are from where the chart was laid out."""

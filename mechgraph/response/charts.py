@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.by_kernel import COMPILED
 from mechgraph.closure.driver_path import in_blocks
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.passive_motion import PassiveMotion
@@ -17,6 +18,7 @@ from mechgraph.closure.rates import Velocities
 from mechgraph.force.applied_loads import kinetic_energy
 from mechgraph.model.load_base import Load
 from mechgraph.response.chart import Chart, Closed, Stopped
+from mechgraph.response.kernel_rates import Evaluated, KernelRates
 from mechgraph.response.motion_equations import Loads, Moved, accelerations, applied, moved, positions_together
 from mechgraph.response.prescribed import Prescribed
 from mechgraph.structure.mobility import free_motion
@@ -35,6 +37,8 @@ class Task:
     columns: Index
     engine: Literal["dense", "sparse"]
     held: tuple[PassiveMotion, ...] = ()
+    library: Any = None
+    """The compiled kernel, where it serves."""
 
     def chart(self, x: Array) -> Chart:
         """A chart laid out at a closed state ``x (nx,)``."""
@@ -54,18 +58,35 @@ class Task:
 
     def prescribed_at(self, t: Array) -> Array:
         """Prescribed positions, velocities, accelerations ``(3, p, T)``, internal units."""
+        if not len(self.columns):
+            return np.zeros((3, 0, len(t)))
         unit = np.where(self.system.is_length[self.columns], self.system.par.L, 1.0)
         return np.stack([self.prescribed.at(float(one)) / unit for one in t], axis=-1)
 
 
 @dataclass(frozen=True)
 class _Known:
-    """A state that was evaluated, from which others are predicted."""
+    """A state that was evaluated, ``(x, q', q'')`` of so many numbers, from which others are predicted."""
 
     t: float
-    x: Array
-    dq: Array
-    ddq: Array
+    state: Array
+    of_x: int
+    of_dq: int
+
+    @property
+    def x(self) -> Array:
+        """The position."""
+        return self.state[: self.of_x]
+
+    @property
+    def dq(self) -> Array:
+        """Rates."""
+        return self.state[self.of_x : self.of_x + self.of_dq]
+
+    @property
+    def ddq(self) -> Array:
+        """Accelerations."""
+        return self.state[self.of_x + self.of_dq :]
 
     def ahead(self, system: System, t: Array) -> Array:
         """States at other times, to second order, ``(nx, T)``."""
@@ -81,8 +102,12 @@ class ChartStage:
         self.chart = task.chart(x)
         self.n = len(self.chart.free)
         self._first = np.concatenate([np.zeros(self.n), dq[self.chart.moving], [0.0]])
-        self._last = _Known(t, x, dq, np.zeros_like(dq))
+        self._sizes = len(x), len(dq)
+        self._last = _Known(t, np.concatenate([x, dq, np.zeros_like(dq)]), *self._sizes)
         self._path = [self._last]
+        self._of_time = tuple(load for some in (task.loads.stored, task.loads.rest) for load in some if load.of_time)
+        self._kernel: KernelRates | None = None
+        self._shape: Callable[[], tuple[float, float]]
         found = self._found(t, self._first[:, None])
         if found is None:
             raise Stopped(
@@ -92,6 +117,13 @@ class ChartStage:
         # kinetic energy, and the work of the forces over a unit of the coordinates
         kinetic = float(kinetic_energy(found.rates.here, found.rates.V)[0])
         self.energy = kinetic + float(np.abs(found.force).sum()) or 1.0
+        if task.library is not None:
+            self._kernel = KernelRates(task.library, self.chart, task.loads)
+
+    @property
+    def engine(self) -> str:
+        """See ``Stage``."""
+        return self.task.engine if self._kernel is None else COMPILED
 
     def begin(self) -> Array:
         """See ``Stage``."""
@@ -99,7 +131,25 @@ class ChartStage:
 
     def rates(self, t: float, y: Array) -> Array:
         """See ``Stage``."""
-        return self._rates(t, y[:, None])[:, 0]
+        here = self._by_kernel(t, y)
+        if here is None:
+            return self._rates(t, y[:, None])[:, 0]
+        return here.rates
+
+    def _by_kernel(self, t: float, y: Array) -> Evaluated | None:
+        """The same by the kernel; None where there is none, or it does not serve: numpy says what is there."""
+        if self._kernel is None:
+            return None
+        near = self._near(t)
+        found = self._kernel(near.state, t - near.t, y[:-1], self.task.prescribed_at(np.array([t]))[..., 0])
+        if found is not None:
+            self._last = _Known(t, found.state, *self._sizes)
+            self._y, self._shape = y, lambda: (found.steepness, found.condition)
+        return found
+
+    def _near(self, t: float) -> _Known:
+        """The known state next to a time."""
+        return self._last if abs(self._last.t - t) < abs(self._path[-1].t - t) else self._path[-1]
 
     def _rates(self, t: float, y: Array) -> Array:
         """``y' (k, T)`` at one time and several ``y (k, T)``; NaN where no closed states are found near the last ones."""
@@ -112,29 +162,34 @@ class ChartStage:
     def jacobian(self, t: float, y: Array) -> Array:
         """See ``Stage``: forward differences, all evaluated in one batch."""
         size = NUDGE * np.maximum(1.0, np.abs(y[:-1]))
-        f = self._rates(t, y[:, None] + np.pad(np.diag(size), ((0, 1), (1, 0))))
+        places = y[:, None] + np.pad(np.diag(size), ((0, 1), (1, 0)))
+        f = (
+            self._rates(t, places)
+            if self._kernel is None
+            else np.stack([self.rates(t, one) for one in places.T], axis=1)
+        )
         J = (f[:, 1:] - f[:, :1]) / size
         # where it does not close the rates are NaN as well, and the step is taken back
         return np.nan_to_num(np.pad(J, ((0, 0), (0, 1))), copy=False)
 
     def by_time(self, t: float, y: Array) -> tuple[Callable[[Array], Array], Array] | None:
         """See ``Stage``."""
-        parts = self.task.loads.stored, self.task.loads.rest
-        loads = tuple(load for some in parts for load in some if load.of_time)
-        if not (loads or len(self.task.columns)) or not self._evaluated(t, y):
+        loads = self._of_time
+        if not (loads or len(self.task.columns)) or (loads and not self._evaluated(t, y)):
             return None
         rates = np.concatenate([y[self.n : -1], self.task.prescribed_at(np.array([t]))[1, :, 0]])
         return partial(_by_time, self.task, self._moved, loads), rates
 
     def _evaluated(self, t: float, y: Array) -> bool:
         """Evaluate at an accepted place, where that was not the last evaluation; whether the loops close there."""
-        return (self._last.t == t and np.array_equal(self._y, y)) or self._found(t, y[:, None]) is not None
+        known = self._last.t == t and np.array_equal(self._y, y)
+        return known or self._by_kernel(t, y) is not None or self._found(t, y[:, None]) is not None
 
     def accepted(self, t: float, y: Array) -> bool:
         """See ``Stage``."""
         self._evaluated(t, y)
         self._path.append(self._last)
-        return not self.chart.worn(self._f, y[: self.n])
+        return not self.chart.worn(*self._shape(), y[: self.n])
 
     def following(self, t: float, y: Array) -> ChartStage:
         """See ``Stage``."""
@@ -152,15 +207,16 @@ class ChartStage:
     def _found(self, t: float, y: Array) -> Moved | None:
         """Rates and accelerations at a time for ``y (k, T)``; None where no closed states are found near the last ones."""
         at, n = np.full(y.shape[1], t), self.n
-        near = self._last if abs(self._last.t - t) < abs(self._path[-1].t - t) else self._path[-1]
+        near = self._near(t)
         p = self.task.prescribed_at(at[:1]).repeat(len(at), axis=2)
         closed = self.chart.close(near.ahead(self.task.system, at), y[:n], p[0])
         if not closed.done.all():
             return None
         found = moved(closed, y[n:-1], p[1:], self.task.loads, at)
         rates = found.rates
-        self._last = _Known(t, closed.here.x[:, 0], rates.dq[:, 0], rates.ddq[:, 0])
-        self._f, self._y, self._moved = closed.f, y[:, 0], found
+        state = np.concatenate([closed.here.x[:, 0], rates.dq[:, 0], rates.ddq[:, 0]])
+        self._last = _Known(t, state, *self._sizes)
+        self._shape, self._y, self._moved = partial(self.chart.shape, closed.f), y[:, 0], found
         return found
 
 

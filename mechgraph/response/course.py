@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.by_kernel import COMPILED
 from mechgraph.closure.assembly import CLOSED
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_path import in_blocks
@@ -115,9 +116,12 @@ class Response(Solution):
 
     def _energy_lost(self) -> EnergyLost | None:
         off = np.abs(self.energy.balance)
+        largest = float(np.nan_to_num(off).max(initial=0.0))
+        if largest <= LOST_ENERGY * self.energy.greatest:
+            return None
         # times asked for may be few and of little energy: what is lost counts beside the whole motion too
-        whole, largest = self._course.greatest, float(np.nan_to_num(off).max(initial=0.0))
-        if largest <= LOST_ENERGY * max(self.energy.greatest, whole) or not whole:
+        whole = self._course.greatest
+        if largest <= LOST_ENERGY * whole or not whole:
             return None
         return EnergyLost(largest / whole, float(np.asarray(self.t)[off > 0.5 * largest].min()))
 
@@ -221,6 +225,8 @@ class Course:
         m, system = self.mechanism, self.task.system
         trajectory, kinetic, potential = trajectory_of(self.task, m, times, blocks)
         trajectory.work = self.integration.work
+        if COMPILED in {segment.stage.engine for segment in self.integration.segments}:
+            trajectory.engine = COMPILED
         if isinstance(m, SnappedMechanism):
             trajectory.as_declared(partial(declared_closure, system, declared(m.declared)), m.changes.tol)
         return trajectory, kinetic, potential, works * system.par.L**2

@@ -26,9 +26,9 @@ BESIDE_ENDS = 1e-5
 """Part of a step beside its ends at which is looked too, so that a height that turns in the first or last part is seen to."""
 TURN_FOUND = 1e-9
 """Part of a step to which the place of a turn is found; the height there is found to the square of it."""
-LOOKS_IN_STEP = np.unique(
-    np.concatenate([np.linspace(0.0, 1.0, LOOKS + 1), [BESIDE_ENDS, 1.0 - BESIDE_ENDS], 0.5 ** np.arange(4, 20)])
-)
+WATCHED_IN_STEP = np.union1d(np.linspace(0.0, 1.0, LOOKS + 1), [BESIDE_ENDS, 1.0 - BESIDE_ENDS])
+"""Places of looks at events in a step of length 1."""
+LOOKS_IN_STEP = np.union1d(WATCHED_IN_STEP, 0.5 ** np.arange(4, 20))
 """Parts of a step at which stops are looked at: closely behind its beginning, where a freedom may have just left its stop."""
 
 
@@ -65,10 +65,9 @@ class Watch:
     def passed(self, begin: float, end: float) -> Iterator[Occurrence]:
         """What happens in a step, in the order of time."""
         found = []
-        looks = np.union1d(np.linspace(0.0, 1.0, LOOKS + 1), [BESIDE_ENDS, 1.0 - BESIDE_ENDS])
         for which, event in enumerate(self.events):
             height = partial(_heights, event, self.motion)
-            t = begin + (end - begin) * looks
+            t = begin + (end - begin) * WATCHED_IN_STEP
             known = [self._before[which]] if which in self._before else []
             h = np.concatenate([known, height(t[len(known) :])])
             self._before[which] = float(h[-1])

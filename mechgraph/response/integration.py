@@ -41,6 +41,10 @@ class Stage(Protocol):
     energy: float
     """An energy of the size that moves here, against which work is measured."""
 
+    @property
+    def engine(self) -> str:
+        """What evaluates the equations of motion."""
+
     def begin(self) -> Array:
         """The coordinates ``y`` where the stage begins; the work is 0."""
 

@@ -16,7 +16,7 @@ from mechgraph.arguments import Limit, door, items_of, option_faults
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.ranges import BEYOND_END, beyond
 from mechgraph.closure.rank import closure_rank
-from mechgraph.closure.solver import ENGINES, EngineName, engine_for
+from mechgraph.closure.solver import MotionEngineName, engine_for
 from mechgraph.errors import AssemblyError, DeclarationError, MechgraphWarning, ResponseError
 from mechgraph.model.declaration import mapping_faults
 from mechgraph.model.event import Event
@@ -40,6 +40,7 @@ from mechgraph.response.course import Course, Response
 from mechgraph.response.events import LOOKS_IN_STEP, Occurrence, Watch, first_root, read_events, with_turns
 from mechgraph.response.initial import read_rates, read_start, start_rates, started
 from mechgraph.response.integration import Integration, Stage
+from mechgraph.response.kernel_rates import library_for
 from mechgraph.response.looks import OF_ALL
 from mechgraph.response.motion_equations import Loads
 from mechgraph.response.prescribed import OVER_POSITIONS, read_motions
@@ -67,7 +68,7 @@ def respond(
     atol: float | None = None,
     method: MethodName | None = None,
     max_step: Limit | None = None,
-    engine: EngineName = "auto",
+    engine: MotionEngineName = "auto",
     events: Iterable[Event] | Event | None = None,
     stops: Iterable[Stop] | Stop | None = None,
     on_stop: OnStopName = "raise",
@@ -95,7 +96,9 @@ def respond(
         ``"LSODA"``; ``"auto"`` is DOP853.
     max_step : the longest step. Steps end at the ``breaks`` of loads, and are refused where a look at 2,000 times between begin and end
         sees a load or a prescribed motion do what they missed; a pulse that is shorter needs its ``breaks``, or ``max_step``.
-    engine : as in ``solve``.
+    engine : ``"dense"`` or ``"sparse"`` linear algebra of numpy, ``"compiled"``: accelerations in independent freedoms by the kernel in C,
+        built at first use; or ``"auto"``, the kernel where it is installed and carries the mechanism and its loads. The engine of the
+        response says what ran: the path of a motion of one freedom is tabulated by numpy.
     events : ``Event``s to be watched; a terminal one ends the motion, at its time.
     stops : ``Stop``s, limits of freedoms that they strike, rest on and leave; what a stop exerts is an ``applied_effort``.
     on_stop : where the motion cannot be followed to its end, or is interrupted: ``"raise"``, or ``"return"`` what there is, with
@@ -107,7 +110,9 @@ def respond(
 
     Raises
     ------
-    DeclarationError, AssemblyError
+    DeclarationError
+        which names what ``engine="compiled"`` does not carry; MissingExtraError for it where there is no C compiler.
+    AssemblyError
     ResponseError
         where the motion cannot be followed to its end, or is interrupted; carries the Response so far.
     """
@@ -117,7 +122,7 @@ def respond(
         {
             "method": (how.method, METHODS),
             "passive": (how.passive, get_args(PassiveName)),
-            "engine": (engine, ENGINES),
+            "engine": (engine, get_args(MotionEngineName)),
             "on_stop": (on_stop, get_args(OnStopName)),
         }
     )
@@ -150,6 +155,7 @@ def respond(
     task = Task(system, Loads.of(m.loads), prescribed, columns, engine_for(system.n_rows, 1, engine))
     if how.passive == "held":
         task = replace(task, held=free_motion(system, x, columns, task.engine).passive)
+    task = replace(task, library=library_for(system, task.loads, bool(task.held), engine))
     try:
         dq = start_rates(m, task, x, wanted_rates, begin)
     except Stopped as stop:

@@ -1,0 +1,104 @@
+"""Motion in time by the compiled kernel: what the numpy engines give, its own words where it does not serve."""
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import mechgraph as mg
+from mechgraph.cli import app
+
+GOVERNOR = Path(__file__).parent / "reference" / "data" / "flyball-governor.toml"
+
+
+def chain() -> mg.Mechanism:
+    """A crank, a slide along it and a body on a ball at its end, on springs."""
+    links = [
+        mg.Link("frame"),
+        mg.Link("crank", 2.0, (0.2, 0, 0), np.diag([0.01, 0.05, 0.04])),
+        mg.Link("slider", 1.0, (0.5, 0, 0), np.diag([0.01, 0.02, 0.02])),
+        mg.Link("body", 0.7, (0.8, 0.1, 0.05), np.diag([0.01, 0.03, 0.025])),
+    ]
+    pairs = [
+        mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=(0, 1, 0.2)),
+        mg.Pair("B", "P", "crank", "slider", point=(0.5, 0, 0), axis=(1, 0, 0)),
+        mg.Pair("S", "S", "slider", "body", point=(0.7, 0, 0)),
+    ]
+    spring = mg.Spring("crank", "slider", (0, 0, 0), (0.5, 0, 0), 300.0, 0.45, 2.0)
+    return mg.Mechanism(
+        "chain", links, pairs, loads=[mg.Gravity((0, 0, -9.81)), spring, mg.Damper(freedom="A", coefficient=0.3)]
+    )
+
+
+def five_bar() -> mg.Mechanism:
+    """A loop of mobility 2."""
+    at = [(0, 0, 0), (0.3, 0.8, 0), (1.2, 1.3, 0), (2.1, 0.9, 0), (2, 0, 0)]
+    links = [
+        mg.Link("frame"),
+        *(mg.Link(f"r{i}", 1.0, np.add(p, q) / 2, np.eye(3) / 12) for i, (p, q) in enumerate(pairwise(at))),
+    ]
+    names = [link.name for link in links]
+    pairs = [mg.Pair(f"J{i}", "R", names[i], names[(i + 1) % 5], point=p, axis=(0, 0, 1)) for i, p in enumerate(at)]
+    return mg.Mechanism(
+        "five-bar", links, pairs, loads=[mg.Gravity((0, -9.81, 0)), mg.Wrench("r1", force=(1, 2, 0), frame="link")]
+    )
+
+
+def agree(r: mg.Response, s: mg.Response, within: float) -> None:
+    """The same at all output times, all reactions included."""
+    for pair in r.mechanism.pairs:
+        for what in ("position", "velocity", "acceleration", "reaction"):
+            mine, other = (np.nan_to_num(getattr(one[pair.name], what)) for one in (r, s))
+            np.testing.assert_allclose(
+                mine, other, atol=within * max(1.0, np.abs(other).max()), err_msg=f"{pair.name} {what}"
+            )
+    np.testing.assert_allclose(r.energy.work, s.energy.work, atol=within * max(1.0, np.abs(s.energy.kinetic).max()))
+
+
+MOTIONS = {
+    "stiff": (
+        lambda: mg.load(GOVERNOR).replace(drives=[]),
+        {"rates": {"A": 2 * np.pi}, "method": "Radau", "rtol": 1e-6, "atol": 1e-8},
+        0.01,
+    ),
+    "rotations": (chain, {"rates": {"S.Rx": 3.0, "S.Rz": 0.5, "A": 1.0}}, 0.15),
+    "loop": (five_bar, {"rates": {"J0": 1.0, "J4": -0.5}}, 0.2),
+    "prescribed": (five_bar, {"motions": {"J0": lambda t: (np.sin(t), np.cos(t), -np.sin(t))}}, 0.2),
+    "event": (chain, {"events": [mg.Event("B", 0.02)], "rates": {"A": 1.0}}, 0.27),
+    "stop": (chain, {"stops": [mg.Stop("B", upper=0.01, restitution=0.5)]}, 0.3),
+}
+
+
+@pytest.mark.usefixtures("compiled")
+@pytest.mark.parametrize("name", MOTIONS)
+def test_it_is_the_motion_of_the_dense_engine(name):
+    made, how, end = MOTIONS[name]
+    m, t = made(), np.linspace(0.0, end, 7)
+    r, s = (mg.respond(m, t, engine=engine, **{"rtol": 1e-9, "atol": 1e-11, **how}) for engine in ("compiled", "dense"))
+    assert (r.engine, s.engine) == ("compiled", "dense")
+    assert r.work.coordinates == "in independent freedoms"
+    agree(r, s, 1e-6)
+    assert [str(one.event) for one in r.events] == [str(one.event) for one in s.events]
+    np.testing.assert_allclose([one.t for one in r.events], [one.t for one in s.events], atol=1e-7)
+    assert bool(s.events) == (name in ("event", "stop"))
+
+
+@pytest.mark.usefixtures("compiled")
+def test_what_the_kernel_does_not_carry():
+    m = five_bar().replace(loads=[mg.Effort("J0", lambda pose, twist, t: 1.0 + 0.0 * t)])
+    with pytest.raises(
+        mg.DeclarationError, match=r"engine 'compiled' does not serve: load .*J0.* is a function or a table"
+    ):
+        mg.respond(m, (0.0, 0.01), engine="compiled")
+    assert mg.respond(m, (0.0, 0.01)).engine == "dense"
+    with pytest.raises(mg.DeclarationError, match="passive freedoms are held at rest"):
+        mg.respond(mg.load("rssr").replace(drives=[]), (0.0, 0.01), passive="held", engine="compiled")
+
+
+@pytest.mark.usefixtures("compiled")
+def test_the_command_line_takes_the_engine():
+    done = CliRunner().invoke(app, ["respond", str(GOVERNOR), "--for", "1ms", "--engine", "compiled", "--json"])
+    assert done.exit_code == 0, done.output
+    assert '"engine": "compiled"' in done.output
