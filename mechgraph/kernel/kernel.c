@@ -1176,10 +1176,26 @@ static void set_drives(const Model *m, double *x, const double *q) {
   FOR(i, m->drives) x[m->column_state[m->drive[i]]] = q[i];
 }
 
+/* The inverse of the closure matrix that has just been factored, and its condition. */
+static double inverted(const Model *m, Work *w, const double *matrix) {
+  const int n = m->unknowns;
+  double largest = 1.0, inverse = 0.0;
+  FOR(i, n) {
+    memset(w->row_value, 0, m->rows * sizeof(double));
+    w->row_value[w->row[i]] = 1.0;
+    solve(m, w, w->row_value, w->inverse + i * n); /* column i */
+  }
+  FOR(i, n) {
+    double of_matrix = 0.0, of_inverse = 0.0;
+    FOR(j, n) of_matrix += fabs(matrix[w->row[i] * n + j]), of_inverse += fabs(w->inverse[j * n + i]);
+    largest = fmax(largest, of_matrix), inverse = fmax(inverse, of_inverse);
+  }
+  return largest * inverse;
+}
+
 /* What a node is beside its closed state, at which it has just been factored: rates along the path, those of the matrix, the condition. */
 static int made_node(const Model *m, Work *w, Node *node) {
-  const int n = m->unknowns;
-  double largest = 1.0, inverse = 0.0, gap;
+  double gap;
   const int status = velocities(m, w, w->direction, node->rate, &gap);
   if (status) return status;
   if (gap > INDEPENDENT) return MGK_CONTRADICTION;
@@ -1194,17 +1210,7 @@ static int made_node(const Model *m, Work *w, Node *node) {
     memmove(w->chord_V + 3 * l, V, 3 * sizeof(double));
   }
   fill(m, w->G, w->middle, w->S, w->chord_V, node->matrix_rate);
-  FOR(i, n) {
-    memset(w->row_value, 0, m->rows * sizeof(double));
-    w->row_value[w->row[i]] = 1.0;
-    solve(m, w, w->row_value, w->inverse + i * n); /* column i */
-  }
-  FOR(i, n) {
-    double of_matrix = 0.0, of_inverse = 0.0;
-    FOR(j, n) of_matrix += fabs(node->matrix[w->row[i] * n + j]), of_inverse += fabs(w->inverse[j * n + i]);
-    largest = fmax(largest, of_matrix), inverse = fmax(inverse, of_inverse);
-  }
-  node->condition = largest * inverse;
+  node->condition = inverted(m, w, node->matrix);
   return node->condition <= FAIR ? MGK_OK : MGK_SINGULAR;
 }
 
