@@ -57,9 +57,9 @@ static int led(const Model *m, Work *w, double part) {
     FOR(r, n) {
       const int at = w->row[r] * n + j;
       const double A = a->matrix[at], B = b->matrix[at], C = (middle->matrix[at] - rest * rest * A - part * part * B) / (2.0 * part * rest);
-      whole += w->inverse[r * n + i] * (B - A), bend += w->inverse[r * n + i] * (B - C);
+      whole += w->inverse[i * n + r] * (B - A), bend += w->inverse[i * n + r] * (B - C);
     }
-    w->change[i * n + j] = fmax(fabs(whole), fabs(bend));
+    w->change[i * n + j] = raised(fabs(whole), fabs(bend));
   }
   difference(m, b->x, a->x, step);
   FOR(c, columns) step[c] *= part;
