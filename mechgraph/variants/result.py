@@ -61,7 +61,9 @@ class Study(Shown):
         self.outputs: Mapping[str, Array] = {
             name: np.concatenate(
                 [
-                    np.full((len(part.status), *shapes[name]), np.nan) if part.outputs is None else part.outputs.pop(name)
+                    np.full((len(part.status), *shapes[name]), np.nan)
+                    if part.outputs is None
+                    else part.outputs.pop(name)
                     for part in parts
                 ]
             )

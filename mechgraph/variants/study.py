@@ -15,7 +15,7 @@ import numpy as np
 from mechgraph.arguments import Count, Index, door
 from mechgraph.closure.driver_motion import Motions, actuators, driven
 from mechgraph.closure.solver import MotionEngineName
-from mechgraph.errors import DeclarationError, MechgraphWarning, StudyError, counted
+from mechgraph.errors import DeclarationError, MechgraphError, MechgraphWarning, StudyError, counted
 from mechgraph.force.dalembert import MethodName
 from mechgraph.kinetostatics import RedundantName
 from mechgraph.model.mechanism import Mechanism
@@ -95,8 +95,8 @@ def study(
     DeclarationError
         with all faults of parameters and outputs at once. Errors of the mechanism itself as in ``solve``.
     StudyError
-        where processes ended before their variants were solved, again when these were tried alone, or ``progress`` raised; carries the
-        Study of all others.
+        where processes ended before their variants were solved, again when these were tried alone, where an executor gave up, or
+        ``progress`` raised; carries the Study of all others.
     """
     ways = distributions(parameters)
     faults = [] if ways else ["parameters: none are named"]
@@ -193,7 +193,17 @@ def _all_solved(
 ) -> tuple[dict[int, Part], str, Exception | None]:
     """Parts by the numbers of their tasks; why some are missing, and the error that it came from."""
     done: dict[int, Part] = {}
-    for i, part in _streamed(tasks, executor):
+    stream = _streamed(tasks, executor)
+    while True:
+        try:
+            i, part = next(stream)
+        except StopIteration:
+            break
+        except MechgraphError:
+            raise
+        except Exception as error:
+            lost = counted(len(tasks) - len(done), "part")
+            return done, f"{lost} of {len(tasks)} ended with {type(error).__name__}: {error}", error
         done[i] = part
         try:
             if progress is not None:
@@ -252,14 +262,23 @@ def _in_processes(left: dict[int, Task], workers: int) -> Iterator[tuple[int, Pa
 
 
 def _submitted(tasks: Mapping[int, Task], executor: concurrent.futures.Executor) -> Iterator[tuple[int, Part]]:
-    """Parts as they come, as far as the processes of the executor live."""
+    """Parts as they come, as far as the processes of the executor live.
+
+    Where one fails for a reason of the executor's own, as a cluster that gives up a task, the others are waited for.
+    """
     futures: dict[concurrent.futures.Future[Part], int] = {}
+    failed: BaseException | None = None
     try:
         for i, task in tasks.items():
             futures[executor.submit(solved, task)] = i
         for future in concurrent.futures.as_completed(futures):
-            if not isinstance(future.exception(), concurrent.futures.BrokenExecutor):
+            error = future.exception()
+            if error is None or isinstance(error, MechgraphError):
                 yield futures[future], future.result()
+            elif not isinstance(error, concurrent.futures.BrokenExecutor):
+                failed = failed or error
+        if failed is not None:
+            raise failed
     except concurrent.futures.BrokenExecutor:  # in the midst of being given tasks
         return
     finally:
