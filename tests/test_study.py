@@ -334,14 +334,7 @@ def test_every_variant_may_have_its_own_motion() -> None:
 
 def test_variants_solved_alone_keep_the_outcome_of_every_position() -> None:
     """A rocker whose length goes through zero to its negative cannot be followed there: that variant is solved alone, as by ``solve``."""
-    z, ends = (0, 0, 1), [("frame", "crank"), ("crank", "coupler"), ("coupler", "rocker"), ("frame", "rocker")]
-    places = [((0, 0, 0), (0, 0, 0)), ((1, 0, 0), (0, 0, 0)), ((3, 0, 0), (2.5, 0, 0)), ((3.2, 0, 0), (0, 0, 0))]
-    pairs = [
-        mg.Pair(name, "R", *links, on_a=mg.Marker(at[0], z), on_b=mg.Marker(at[1], z))
-        for name, links, at in zip("ABCD", ends, places, strict=True)
-    ]
-    start = {"A": 0.5, "B": 0.24, "C": 0.87, "D": 1.61}
-    m = mg.Mechanism("four-bar", pairs=pairs, drives=["A"], loads=[mg.Effort("D", 1.0)], start=start)
+    m = known.marked_four_bar()
     drive = {"A": np.linspace(0.5, 5.5, 6)}
     study = mg.study(m, {"C.on_b.point.x": [-2.5, -0.9, 2.4]}, ["A.effort"], n=3, motions=drive, sampling="grid")
     for i in range(3):

@@ -6,6 +6,7 @@ import concurrent.futures
 import os
 from typing import Any
 
+import mechanisms as known
 import numpy as np
 import pytest
 import scipy.stats
@@ -49,16 +50,8 @@ def test_a_way_of_turns_leads_over_true_mechanisms() -> None:
 
 def test_a_way_through_a_singular_mechanism_is_not_led() -> None:
     """A rocker whose length goes through zero to its negative has a start on the other side, on a branch that is not its own."""
-    z, ends = (0, 0, 1), [("frame", "crank"), ("crank", "coupler"), ("coupler", "rocker"), ("frame", "rocker")]
-    places = [((0, 0, 0), (0, 0, 0)), ((1, 0, 0), (0, 0, 0)), ((3, 0, 0), (2.5, 0, 0)), ((3.2, 0, 0), (0, 0, 0))]
-    pairs = [
-        mg.Pair(name, "R", *links, on_a=mg.Marker(at[0], z), on_b=mg.Marker(at[1], z))
-        for name, links, at in zip("ABCD", ends, places, strict=True)
-    ]
-    start = {"A": 0.5, "B": 0.24, "C": 0.87, "D": 1.61}
-    m = mg.Mechanism("four-bar", pairs=pairs, drives=["A"], loads=[mg.Effort("D", 1.0)], start=start)
     ways = {"C.on_b.point.x": [-2.5, -0.9, 2.4]}
-    both(m, ways, "A.effort", n=3, sampling="grid", motions={"A": np.linspace(0.5, 5.5, 6)})
+    both(known.marked_four_bar(), ways, "A.effort", n=3, sampling="grid", motions={"A": np.linspace(0.5, 5.5, 6)})
 
 
 def test_threads_give_what_one_gives(monkeypatch: pytest.MonkeyPatch) -> None:

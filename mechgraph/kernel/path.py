@@ -81,7 +81,7 @@ class Kernel:
         return np.empty(ctypes.c_size_t(self.library.mgk_state_size(pointer(self.I))).value // 8 + 1)
 
 
-def pointer(array: Array | Integers) -> ctypes.c_void_p:
+def pointer(array: Any) -> ctypes.c_void_p:
     """Where an array begins, as the library takes it."""
     return ctypes.c_void_p(array.ctypes.data)
 
