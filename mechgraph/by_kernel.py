@@ -6,6 +6,8 @@ numpy, with all that it says of such positions.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import partial
 from operator import is_not
 from typing import Any, Literal, Protocol
@@ -15,15 +17,15 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.call import Call, Starts
 from mechgraph.closure.configuration import ROUNDINGS, Configuration
-from mechgraph.closure.driver_path import Mask, in_blocks
+from mechgraph.closure.driver_path import in_blocks
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.passive_motion import are_alone
 from mechgraph.closure.rates import Rates, Velocities, expected_error
 from mechgraph.closure.solver import ClosureSolver
 from mechgraph.errors import DeclarationError
 from mechgraph.kernel import build
-from mechgraph.kernel.path import Kernel, Records
-from mechgraph.kernel.tables import Layout, layout, tables, why_not
+from mechgraph.kernel.path import MIDDLE, Kernel, Mask, Records
+from mechgraph.kernel.tables import START, Layout, layout, tables, why_not
 from mechgraph.model.contact import Contact
 from mechgraph.model.load_base import Load
 from mechgraph.numerics.newton import Work
@@ -32,6 +34,10 @@ from mechgraph.result.kept import BlockMotion
 
 COMPILED: Literal["compiled"] = "compiled"
 """Name of the engine."""
+SystemAt = Callable[[Array, Index], tuple[System, Mask]]
+"""Gives variants ``(n,)`` each at its part of the way ``(n,)`` from the mechanism itself to its own numbers, and which could be built."""
+SHORTEST_PART = 1 / 64
+"""Shortest step on that way; where it is not certified, the variant is left to numpy."""
 SERVES = 0.8
 """Part of the variants of which the kernel must have solved more; the others are solved one by one."""
 
@@ -95,27 +101,93 @@ def compiled(line: Started, batch: tuple[int, ...], starts: Starts | None = None
     DeclarationError
         where the kernel was asked for by name and cannot carry the mechanism or the call; MissingExtraError without a compiler.
     """
+    if starts is None:
+        library = _library(line)
+        if library is None:
+            return None
+        kernel, forces = _kernel(line, library)
+        starts = Starts(line.x[:, None], line.system.cases, line.m.loads)
+    elif starts.kernel is None:
+        return None
+    else:
+        kernel, forces = starts.kernel.kernel, starts.kernel.forces
+    q, v, a = (np.ascontiguousarray(line.values(kind, batch).T) for kind in ("position", "velocity", "acceleration"))
+    begin = kernel.P[:, START + line.system.single_rows[line.columns]].T
+    records, whole = kernel.follow(begin, q, v, a, batch, forces)
+    return Compiled(line, starts, batch, records, whole, forces) if whole.mean() > SERVES else None
+
+
+def _library(line: Started) -> Any:
+    """The library for a call, None where there is none or it does not serve; raises as ``compiled``."""
     asked = line.options.engine == COMPILED
     if line.options.engine != "auto" and not asked:
         return None
     library = build.built() if asked else at_hand()
     if library is None:
         return None
-    if (why := cannot(line)) is not None:
-        if asked:
-            text = f"engine 'compiled' does not serve: {why}. Use engine='auto'"
-            raise DeclarationError(f"solve {line.m.name!r}", [text])
+    if (why := cannot(line)) is None:
+        return library
+    if asked:
+        text = f"engine 'compiled' does not serve: {why}. Use engine='auto'"
+        raise DeclarationError(f"solve {line.m.name!r}", [text])
+    return None
+
+
+@dataclass(frozen=True)
+class InKernel:
+    """Variants of a mechanism in the tables of the kernel: ``itself`` and its variants ``kernel``; ``forces``: whether it gives theirs."""
+
+    line: Started
+    itself: Kernel
+    kernel: Kernel
+    forces: bool
+
+    def begin(self, x: Array) -> None:
+        """Let the variants begin in closed states ``x (nx, V)``, or all in one ``(nx, 1)``."""
+        self.kernel.P[:, START : START + len(x)] = x.T
+
+    def lead(self, valid: Mask, system_at: SystemAt) -> Array:
+        """Closed states ``(nx, V)`` of the ``valid`` variants, led there from the mechanism itself; NaN where a step is not certified.
+
+        On all of the way there are mechanisms, whose numbers ``system_at`` gives.
+        """
+        V = len(valid)
+        at, step, P = np.zeros(V), np.ones(V), np.repeat(self.itself.P, V, axis=0)
+        x = np.repeat(self.line.x[None], V, axis=0)
+        left = np.flatnonzero(valid)
+        while left.size:
+            ahead = np.minimum(at[left] + step[left], 1.0)
+            middle, built = self._on_the_way(system_at, at[left] + MIDDLE * (ahead - at[left]), left)
+            there, short = self.kernel.P[left], np.flatnonzero(ahead < 1.0)
+            if short.size:
+                there[short], ok = self._on_the_way(system_at, ahead[short], left[short])
+                built[short] &= ok
+            begin, states = replace(self.itself, P=P[left]) if at.any() else self.itself, x[left]
+            went = begin.lead(states, middle, there) & built
+            some = left[went]
+            at[some], x[some], P[some] = ahead[went], states[went], there[went]
+            step[left] *= np.where(went, 2.0, 0.5)
+            left = left[(at[left] < 1.0) & (step[left] >= SHORTEST_PART)]
+        return np.where(at < 1.0, np.nan, x.T)
+
+    def _on_the_way(self, system_at: SystemAt, part: Array, which: Index) -> tuple[Array, Mask]:
+        """Tables of variants on the way, under the loads of the mechanism itself, and which could be built."""
+        system, built = system_at(part, which)
+        x = np.broadcast_to(self.line.x[:, None], (len(self.line.x), len(part)))
+        filled = tables(self.itself.layout, system, x, self.line.m.loads if self.forces else None)
+        assert filled is not None
+        return filled[1], built
+
+
+def in_kernel(line: Started, systems: System, loads: tuple[Load, ...], count: int) -> InKernel | None:
+    """Variants in the tables of the kernel, at the start of the mechanism itself; None where it does not serve, raises as ``compiled``."""
+    library = _library(line)
+    if library is None:
         return None
-    if starts is None:
-        kernel, forces = _kernel(line, library)
-        x, starts = line.x[:, None], Starts(line.x[:, None], line.system.cases, line.m.loads)
-    else:
-        x = np.tile(starts.x, starts.sharing)
-        kernel, forces = _filled(line, library, starts.system_of(np.arange(x.shape[1])), x, starts.loads)
-    q, v, a = (np.ascontiguousarray(line.values(kind, batch).T) for kind in ("position", "velocity", "acceleration"))
-    begin = x[line.system.single_rows[line.columns]]
-    records, whole = kernel.follow(begin, q, v, a, batch, forces)
-    return Compiled(line, starts, batch, records, whole, forces) if whole.mean() > SERVES else None
+    itself, forces = _kernel(line, library)
+    x = np.broadcast_to(line.x[:, None], (len(line.x), count))
+    kernel, known = _filled(line, library, systems, x, loads)
+    return InKernel(line, itself, kernel, known) if known == forces else None
 
 
 def _kernel(line: Started, library: Any) -> tuple[Kernel, bool]:

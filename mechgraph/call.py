@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.arguments import option_faults
@@ -41,13 +41,15 @@ class Starts:
     """Where the paths begin: a closed state ``x (nx, V)`` for every variant, and the systems with the numbers of variants.
 
     ``system_of(variants)`` for variants ``(T,)``; ``loads`` act with the numbers of every variant. ``sharing`` is the number of variants
-    that differ in masses and loads alone and move alike, from the only state: their motion is found once.
+    that differ in masses and loads alone and move alike, from the only state: their motion is found once. ``kernel``: the variants in the
+    tables of the compiled kernel, where it serves.
     """
 
     x: Array
     system_of: Callable[[Index], System]
     loads: tuple[Load, ...]
     sharing: int = 1
+    kernel: Any = None
 
 
 class Call(Protocol):

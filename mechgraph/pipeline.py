@@ -247,7 +247,7 @@ class Pipeline:
     def _with_start(self, key: tuple[object, ...], make: Callable[[], Made]) -> Made:
         """What follows from the start and the drivers alone is kept with the start."""
         kept = self.start.solvers
-        if key not in kept:
-            kept[key] = make()
-        made: Made = kept[key]
+        made: Made = kept.get(key, kept)  # itself stands for nothing; another thread may clear it at any time
+        if made is kept:
+            made = kept[key] = make()
         return made

@@ -370,3 +370,15 @@ def linked_four_bar(crank: float, coupler: float, rocker: float, ground: float, 
     last = pairs[3]
     pairs[3] = mg.Pair("O3", "R", last.a, last.b, on_a=last.on_a, on_b=mg.Marker((ground, 0, 0), Z))
     return mg.Mechanism("four-bar", pairs=pairs, drives=["O0"], frame="ground", start={"O0": angle, "O1": -1.0})
+
+
+def marked_four_bar() -> mg.Mechanism:
+    """A planar four-bar placed by markers; ``C.on_b.point.x`` is the length of its rocker."""
+    z, ends = (0, 0, 1), [("frame", "crank"), ("crank", "coupler"), ("coupler", "rocker"), ("frame", "rocker")]
+    places = [((0, 0, 0), (0, 0, 0)), ((1, 0, 0), (0, 0, 0)), ((3, 0, 0), (2.5, 0, 0)), ((3.2, 0, 0), (0, 0, 0))]
+    pairs = [
+        mg.Pair(name, "R", *links, on_a=mg.Marker(at[0], z), on_b=mg.Marker(at[1], z))
+        for name, links, at in zip("ABCD", ends, places, strict=True)
+    ]
+    start = {"A": 0.5, "B": 0.24, "C": 0.87, "D": 1.61}
+    return mg.Mechanism("four-bar", pairs=pairs, drives=["A"], loads=[mg.Effort("D", 1.0)], start=start)

@@ -334,14 +334,7 @@ def test_every_variant_may_have_its_own_motion() -> None:
 
 def test_variants_solved_alone_keep_the_outcome_of_every_position() -> None:
     """A rocker whose length goes through zero to its negative cannot be followed there: that variant is solved alone, as by ``solve``."""
-    z, ends = (0, 0, 1), [("frame", "crank"), ("crank", "coupler"), ("coupler", "rocker"), ("frame", "rocker")]
-    places = [((0, 0, 0), (0, 0, 0)), ((1, 0, 0), (0, 0, 0)), ((3, 0, 0), (2.5, 0, 0)), ((3.2, 0, 0), (0, 0, 0))]
-    pairs = [
-        mg.Pair(name, "R", *links, on_a=mg.Marker(at[0], z), on_b=mg.Marker(at[1], z))
-        for name, links, at in zip("ABCD", ends, places, strict=True)
-    ]
-    start = {"A": 0.5, "B": 0.24, "C": 0.87, "D": 1.61}
-    m = mg.Mechanism("four-bar", pairs=pairs, drives=["A"], loads=[mg.Effort("D", 1.0)], start=start)
+    m = known.marked_four_bar()
     drive = {"A": np.linspace(0.5, 5.5, 6)}
     study = mg.study(m, {"C.on_b.point.x": [-2.5, -0.9, 2.4]}, ["A.effort"], n=3, motions=drive, sampling="grid")
     for i in range(3):
@@ -477,26 +470,46 @@ def test_same_seed_same_result_whatever_the_executor(monkeypatch: pytest.MonkeyP
     assert not np.array_equal(found[0].outputs["O1.effort"], other.outputs["O1.effort"])
 
 
-def test_dask_cluster() -> None:
-    """A real local cluster through its executor."""
+def test_dask_cluster_of_which_a_worker_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A real local cluster through its executor: what a worker that is killed had is done by the other one."""
     distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(module, "POSITIONS_TOGETHER", 2 * len(ANGLES))
     ways = {"length[2]": scipy.stats.norm(0.4, 0.004)}
-    here = mg.study(mg.load("rcsr"), ways, "O1.effort", n=6, seed=7, motions=RCSR, engine="dense")
+    here = mg.study(mg.load("rcsr"), ways, "O1.effort", n=8, seed=7, motions=RCSR, executor=Here(), engine="dense")
     with (
-        distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as cluster,
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster,
         distributed.Client(cluster) as client,
     ):
+        victim = min(client.run(os.getpid).values())
         there = mg.study(
-            mg.load("rcsr"),
-            ways,
-            "O1.effort",
-            n=6,
-            seed=7,
-            motions=RCSR,
-            engine="dense",
-            executor=client.get_executor(),
-        )
+            mg.load("rcsr"), ways, "O1.effort", n=8, seed=7, motions=RCSR, executor=client.get_executor(),
+            engine="dense", progress=lambda done, of: os.kill(victim, 9) if done == 1 else None,
+        )  # fmt: skip
     assert np.array_equal(here.outputs["O1.effort"], there.outputs["O1.effort"])
+
+
+class Here(concurrent.futures.Executor):
+    """Works in this thread; the task of number ``lost`` is given up for reasons of its own."""
+
+    def __init__(self, lost: int = -1) -> None:
+        self.lost, self.count = lost, 0
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> concurrent.futures.Future[Any]:
+        future: concurrent.futures.Future[Any] = concurrent.futures.Future()
+        if self.count == self.lost:
+            future.set_exception(RuntimeError("worker died four times"))
+        else:
+            future.set_result(fn(*args, **kwargs))
+        self.count += 1
+        return future
+
+
+def test_what_an_executor_gives_up_leaves_the_other_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "POSITIONS_TOGETHER", len(ANGLES))
+    with pytest.raises(mg.StudyError, match="1 part of 4 ended with RuntimeError: worker died four times") as caught:
+        mg.study(mg.load("rcsr"), {"link1.mass": [1, 2, 3]}, "O1.effort", n=3, motions=RCSR, executor=Here(2))
+    assert caught.value.study.failed.tolist() == [False, True, False]
+    assert isinstance(caught.value.__cause__, RuntimeError)
 
 
 # --- variants that fail ------------------------------------------------------------------------------------------------------

@@ -117,12 +117,13 @@ def solver_at_start(
     What was chosen and factored there is kept with the start, for the next call with the same columns.
     """
     key = engine, fixed.tobytes()
-    if key not in start.solvers:
+    found = start.solvers.get(key)
+    if found is None:
         solver = closure_solver(engine, fixed)
         proved = solver.leaves_nothing_free(start)
-        start.solvers.clear()
-        start.solvers[key] = solver.begun(start), proved
-    solver, proved = start.solvers[key]
+        start.solvers.clear()  # other threads may ask for what is kept here
+        found = start.solvers[key] = solver.begun(start), proved
+    solver, proved = found
     return solver.begun(start), proved
 
 

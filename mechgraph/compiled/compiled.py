@@ -17,12 +17,11 @@ from mechgraph.compiled.tabled import STATUSES, Tabled, tabled
 from mechgraph.compiled.write import InputsName, write_tables
 from mechgraph.errors import DeclarationError, listed
 from mechgraph.kernel import build
+from mechgraph.kernel.tables import START
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import has_quantity, is_numeric, real_array, without_units, wrong
 
 WORDS = np.array([word for _, word, _ in STATUSES])
-START = 4
-"""Place of the start in the table of numbers, see ``kernel.h``."""
 OPENING = 1e-6
 """Change of a number, relative, with which redundant loops have to close still; far above their rounding."""
 PARTINGS = 12

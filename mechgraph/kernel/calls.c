@@ -1,5 +1,5 @@
-/* What a compiled mechanism of the package calls beside the functions of kernel.h: many positions at once, poses of links, and derivatives
- * by complex numbers (derivative.c). */
+/* What the package calls beside the functions of kernel.h: many positions or variants at once, poses of links, and derivatives by complex
+ * numbers (derivative.c). */
 #include "kernel.c"
 #include "motion.c"
 
@@ -59,6 +59,82 @@ int mgk_motion(const int *I, const double *P, void *memory, int n, int stored, c
   memcpy(found + m.states, w.dq, c * sizeof(double)), memcpy(found + m.states + c, w.ddq, c * sizeof(double));
   out[2 * n + 1] = fmax(1.0, size_of(at.Z, n * c));
   fill(&m, w.S, w.middle, NULL, NULL, w.a.matrix);
-  out[2 * n + 2] = condition_of(&m, &w, w.a.matrix);
+  out[2 * n + 2] = made_inverse(&m, &w, w.a.matrix);
   return MGK_OK;
+}
+
+/* One step from a mechanism of tables m[0], closed in node a, by m[1] at `part` of it to m[2]: whether node b there is on the same regular
+ * branch.
+ *
+ * The closure matrix on the way is, to third order, the parabola through its three values A, M and B, which lies in the hull of its Bezier
+ * points A, C and B: see `certified`, and there too why another branch is not reached, the curve of the states being the chord. */
+static int led(const Model *m, Work *w, double part) {
+  const int n = m->unknowns, columns = m->columns;
+  const double rest = 1.0 - part;
+  Node *a = &w->a, *b = &w->b, *middle = &w->before;
+  double *step = w->increment;
+  memcpy(middle->x, a->x, m->states * sizeof(double));
+  if (closed(m + 1, w, middle->x, middle->matrix)) return 0;
+  difference(m, middle->x, a->x, step);
+  FOR(c, columns) step[c] *= rest / part;
+  advance(m, middle->x, step, b->x);
+  if (closed(m + 2, w, b->x, b->matrix)) return 0;
+  b->condition = made_inverse(m, w, b->matrix);
+  FOR(i, n) FOR(j, n) {
+    double whole = 0.0, bend = 0.0;
+    FOR(r, n) {
+      const int at = w->row[r] * n + j;
+      const double A = a->matrix[at], B = b->matrix[at], C = (middle->matrix[at] - rest * rest * A - part * part * B) / (2.0 * part * rest);
+      whole += w->inverse[i * n + r] * (B - A), bend += w->inverse[i * n + r] * (B - C);
+    }
+    w->change[i * n + j] = raised(fabs(whole), fabs(bend));
+  }
+  difference(m, b->x, a->x, step);
+  FOR(c, columns) step[c] *= part;
+  advance(m, a->x, step, w->trial);
+  difference(m, middle->x, w->trial, step);
+  const double worst = fmax(a->condition, b->condition);
+  return worst <= FAIR && radius(w->change, n, w->bound) <= DEPARTURE && size_of(step, columns) * fmax(1.0, worst) <= ALONE;
+}
+
+/* Mechanisms whose numbers change, their drives at rest: one step each from numbers `from`, closed in x[count][states], to `end` by
+ * `middle` at `part` of it, each [count][numbers]; all from the first of `from` and x where they are not `apart`. whole[count]: 1 where x is now the certified state at
+ * the end; else it stays. */
+void mgk_lead(const int *I, int count, int numbers, int apart, double part, const double *from, const double *middle, const double *end, void *state,
+              double *x, int *whole) {
+  Model m[3];
+  Work w;
+  opened(I, from, state, m, &w);
+  FOR(i, count) {
+    const size_t at = (size_t)i * numbers;
+    read_tables(I, from + (apart ? at : 0), m), read_tables(I, middle + at, m + 1), read_tables(I, end + at, m + 2);
+    double *own = x + (size_t)i * m->states;
+    if (apart || !i) {
+      memcpy(w.a.x, own, m->states * sizeof(double));
+      w.a.condition = closed(m, &w, w.a.x, w.a.matrix) ? INFINITY : made_inverse(m, &w, w.a.matrix);
+    }
+    whole[i] = led(m, &w, part);
+    if (whole[i]) memcpy(own, w.b.x, m->states * sizeof(double));
+  }
+}
+
+/* Mechanisms of one kind, each with tables P[count][numbers] and positions [count][each][drives], taken in order[each] from the start along
+ * `lines` polygons that end at places ends[count][lines] of the order. out: a record a position; those of a mechanism with a position that is not
+ * given, for which whole[count] is 0, are NaN. largest, work: as of mgk_path. */
+void mgk_variants(const int *I, int count, int numbers, const double *P, void *state, int each, int lines, const int *ends, const int *order,
+                  const double *q, const double *v, const double *a, int forces, double *out, int *whole, double *largest, long *work) {
+  int places[MGK_PARTS + 1], done;
+  mgk_record(I, places);
+  const int length = places[forces ? MGK_PARTS : MGK_POINTS], drives = I[MGK_DRIVES];
+  FOR(i, count) {
+    const size_t at = (size_t)i * each;
+    double *own = out + at * length;
+    whole[i] = 1;
+    for (int l = 0, first = 0, last; l < lines && whole[i]; l++, first = last) {
+      last = ends[i * lines + l];
+      whole[i] = first == last || !mgk_path(I, P + (size_t)i * numbers, state, last - first, order + at + first, q + at * drives, v + at * drives,
+                                            a + at * drives, forces, own, largest, &done, work);
+    }
+    if (!whole[i]) FOR(j, each) FOR(k, length) own[(size_t)j * length + k] = NAN;
+  }
 }

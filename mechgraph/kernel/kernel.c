@@ -158,9 +158,12 @@ size_t mgk_state_size(const int *I) {
 
 /* --- vectors, poses, twists -------------------------------------------------------------------------------------------------------- */
 
+/* As fmax where `most` is a number, without a call of the library. */
+static magnitude raised(magnitude most, magnitude value) { return value > most ? value : most; }
+
 static magnitude size_of(const double *v, int n) {
   magnitude out = 0.0;
-  FOR(i, n) out = fmax(out, fabs(v[i]));
+  FOR(i, n) out = raised(out, fabs(v[i]));
   return out;
 }
 
@@ -375,7 +378,7 @@ static magnitude evaluate(const Model *m, Work *w, const double *x) {
     along_pair(m, w, k, step[1], x, X);
   }
   magnitude worst = w->closure = 0.0, reach = 1.0;
-  FOR(i, m->links) FOR(r, 3) reach = fmax(reach, fabs(w->pose[12 * i + 4 * r + 3]));
+  FOR(i, m->links) FOR(r, 3) reach = raised(reach, fabs(w->pose[12 * i + 4 * r + 3]));
   w->reach = reach;
   FOR(l, m->loops) {
     const int k = m->chord[l];
@@ -1177,19 +1180,25 @@ static void set_drives(const Model *m, double *x, const double *q) {
   FOR(i, m->drives) x[m->column_state[m->drive[i]]] = q[i];
 }
 
-/* Condition number of the independent rows of a closure matrix just factored, whose inverse is made. */
-static double condition_of(const Model *m, Work *w, const double *matrix) {
+/* The inverse of the independent rows of the closure matrix that has just been factored, and its condition. */
+static double made_inverse(const Model *m, Work *w, const double *matrix) {
   const int n = m->unknowns;
-  double largest = 1.0, inverse = 0.0;
+  double largest = 1.0, inverse = 0.0, *X = w->inverse;
+  memset(X, 0, (size_t)n * n * sizeof(double));
   FOR(i, n) {
-    memset(w->row_value, 0, m->rows * sizeof(double));
-    w->row_value[w->row[i]] = 1.0;
-    solve(m, w, w->row_value, w->inverse + i * n); /* column i */
+    const double *A = w->lu + i * n;
+    X[i * n + i] = 1.0;
+    FOR(c, i) FOR(j, c + 1) X[i * n + j] -= A[c] * X[c * n + j];
+  }
+  for (int i = n - 1; i >= 0; i--) {
+    const double *A = w->lu + i * n;
+    for (int c = i + 1; c < n; c++) FOR(j, n) X[i * n + j] -= A[c] * X[c * n + j];
+    FOR(j, n) X[i * n + j] *= A[i];
   }
   FOR(i, n) {
     double of_matrix = 0.0, of_inverse = 0.0;
-    FOR(j, n) of_matrix += fabs(matrix[w->row[i] * n + j]), of_inverse += fabs(w->inverse[j * n + i]);
-    largest = fmax(largest, of_matrix), inverse = fmax(inverse, of_inverse);
+    FOR(j, n) of_matrix += fabs(matrix[w->row[i] * n + j]), of_inverse += fabs(X[i * n + j]);
+    largest = raised(largest, of_matrix), inverse = raised(inverse, of_inverse);
   }
   return largest * inverse;
 }
@@ -1211,7 +1220,7 @@ static int made_node(const Model *m, Work *w, Node *node) {
     memmove(w->chord_V + 3 * l, V, 3 * sizeof(double));
   }
   fill(m, w->G, w->middle, w->S, w->chord_V, node->matrix_rate);
-  node->condition = condition_of(m, w, node->matrix);
+  node->condition = made_inverse(m, w, node->matrix);
   return node->condition <= FAIR ? MGK_OK : MGK_SINGULAR;
 }
 
@@ -1221,9 +1230,9 @@ static double radius(const double *M, int n, double *v) {
   FOR(i, n) v[i] = 1.0;
   FOR(pass, 4) {
     double ratio = 0.0, most = 0.0;
-    FOR(i, n) next[i] = dot(M + i * n, v, n), ratio = fmax(ratio, next[i] / v[i]), most = fmax(most, next[i]);
+    FOR(i, n) next[i] = dot(M + i * n, v, n), ratio = raised(ratio, next[i] / v[i]), most = raised(most, next[i]);
     best = fmin(best, ratio);
-    FOR(i, n) v[i] = fmax(fmax(next[i], 1e-3 * most), 1e-300);
+    FOR(i, n) v[i] = raised(raised(1e-300, 1e-3 * most), next[i]);
   }
   return n ? best : 0.0;
 }
@@ -1242,11 +1251,11 @@ static int certified(const Model *m, Work *w, double *grown) {
   FOR(i, n) {
     memset(whole, 0, 3 * (size_t)n * sizeof(double));
     FOR(r, n) {
-      const double g = w->inverse[r * n + i], *A = a->matrix + w->row[r] * n, *B = b->matrix + w->row[r] * n;
+      const double g = w->inverse[i * n + r], *A = a->matrix + w->row[r] * n, *B = b->matrix + w->row[r] * n;
       const double *from_a = a->matrix_rate + w->row[r] * n, *from_b = b->matrix_rate + w->row[r] * n;
       FOR(j, n) whole[j] += g * (B[j] - A[j]), first[j] += g * from_a[j], last[j] += g * from_b[j];
     }
-    FOR(j, n) w->change[i * n + j] = fmax(fabs(whole[j]), fmax(fabs(whole[j] - third * first[j]), third * fabs(last[j])));
+    FOR(j, n) w->change[i * n + j] = raised(raised(fabs(whole[j]), fabs(whole[j] - third * first[j])), third * fabs(last[j]));
   }
   const double departure = radius(w->change, n, w->bound);
   between(m, w, a, b, 0.5 * (*a->at + *b->at), w->trial);
@@ -1455,7 +1464,7 @@ static int follow(const Model *m, Work *w, Asked *asked, const double *begin, co
     if (!status && m->passives) status = closed_at_rest(m, w, w->b.x, *w->b.at, w->b.matrix);
     if (!status && m->passives) status = made_node(m, w, &w->b);
     if (status) {
-      h = fmin(0.5, grown) * step;
+      h = fmin(0.8, grown) * step;
       if (h < SHORTEST) return status;
       continue;
     }

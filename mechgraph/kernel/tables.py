@@ -33,6 +33,8 @@ PARTS = (
     "hold", "holds", "hold_terms",
 )  # fmt: skip
 """Parts of a record, in order."""
+START = 4
+"""Place of the start in the table of numbers."""
 ROWS_OF_KERNEL = 90
 """Closure rows up to which dense elimination, state by state, serves."""
 

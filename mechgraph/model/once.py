@@ -27,7 +27,8 @@ class Once:
 
     def take_graph_of(self, other: Once) -> None:
         """Take over what was made of the graph of another thing, of which the graph is the same."""
-        self._kept.update({make: made for make, made in other._kept.items() if "of_graph" in vars(make)})
+        known = list(other._kept.items())  # another thread may add to it meanwhile
+        self._kept.update({make: made for make, made in known if "of_graph" in vars(make)})
 
     @cached_property
     def _kept(self) -> dict[Callable[..., Any], Any]:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.by_kernel import InKernel, in_kernel
 from mechgraph.call import Options, Starts
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
@@ -49,14 +50,23 @@ class NumbersPath(DriverPath):
         """The system with the numbers of variants ``(n,)``, each at its part of the way; those of the last calls are kept."""
         key = part.tobytes() + variants.tobytes()
         if key not in self._known:
-            par, m = self.system.par, self._line.m
-            numbers = self._numbers_at(part, variants).numbers
-            made = numbers.with_rest(m).parameters(m, par.offset, par.origin, par.L)
-            # one array with all variants says how many there are
-            mass = np.broadcast_to(made.mass, (len(m.links), len(part)))
             self._known = dict([*self._known.items()][1 - SYSTEMS :])
-            self._known[key] = self.system.with_parameters(dataclasses.replace(made, mass=mass))
+            self._known[key] = self.system_of(self._numbers_at(part, variants))
         return self._known[key]
+
+    def system_of(self, variants: Variants) -> System:
+        """The system with the numbers of variants."""
+        par, m = self.system.par, self._line.m
+        made = variants.numbers.with_rest(m).parameters(m, par.offset, par.origin, par.L)
+        # one array with all variants says how many there are
+        mass = np.broadcast_to(made.mass, (len(m.links), variants.count))
+        return self.system.with_parameters(dataclasses.replace(made, mass=mass))
+
+    def built_at(self, part: Array, variants: Index) -> tuple[System, Mask]:
+        """The system with the numbers of variants at a part of the way, and which could be built."""
+        found, built = self._numbers_at(part, variants), np.ones(len(part), dtype=bool)
+        built[list(found.missing)] = False
+        return self.system_of(found), built
 
     def at(self, x: Array, drive: Array, tracks: Index) -> Configuration:
         """The equations with the numbers at a part of the way."""
@@ -122,15 +132,18 @@ def solve_together(
     good = np.flatnonzero(valid)
     if not good.size:
         return Together(None, np.ones(V, dtype=bool), nothing)
-    itself, systems = (path.system_at(np.full(V, part), every) for part in (0.0, 1.0))
+    systems = path.system_of(variants)
+    kernel = in_kernel(line, systems, variants.loads, V)
     one_motion = int(np.prod(line.drive.batch[:-1])) == 1
-    if V > 1 and one_motion and valid.all() and _move_alike(itself.par, systems.par):
+    if V > 1 and one_motion and valid.all() and _move_alike(line.system.par, systems.par):
         begun, x, sharing = valid, line.x[:, None], V
     else:
-        begun, x, sharing = *_led(line, path, valid), 1
+        begun, x, sharing = *_led(line, path, kernel, valid), 1
     if not begun.any():
         return Together(None, np.ones(V, dtype=bool), nothing)
-    starts = Starts(x, systems.cases, variants.loads, sharing)
+    if kernel is not None:
+        kernel.begin(x)
+    starts = Starts(x, systems.cases, variants.loads, sharing, kernel)
     q = systems.coordinates_of(starts.x[..., None], line.system.start_coordinates(line.m.start))[: len(nothing), :, 0]
     q = np.broadcast_to(q, nothing.shape)
     try:
@@ -153,11 +166,18 @@ def _move_alike(itself: Parameters, varied: Parameters) -> bool:
     return all(bool((getattr(itself, name) == getattr(varied, name)).all()) for name in names)
 
 
-def _led(line: Pipeline, path: NumbersPath, valid: Mask) -> tuple[Mask, Array]:
-    """Which variants could be led from the mechanism itself, and where they begin ``(nx, V)``, NaN for the others."""
+def _led(line: Pipeline, path: NumbersPath, kernel: InKernel | None, valid: Mask) -> tuple[Mask, Array]:
+    """Which variants could be led from the mechanism itself, and where they begin ``(nx, V)``, NaN for the others.
+
+    Those that the kernel does not lead, numpy does, and all that have passive freedoms.
+    """
     V = len(valid)
-    tracks = path.lead(np.repeat(line.x[:, None], V, axis=1), valid)
-    last = np.zeros(V, dtype=np.intp)
-    last[tracks.nodes.track] = np.arange(len(tracks.nodes))
-    begun = valid & np.array([end is End.REACHED for end in tracks.end])
-    return begun, np.where(begun, tracks.nodes.x[:, last], np.nan)
+    x = np.full((len(line.x), V), np.nan) if kernel is None or line.passive else kernel.lead(valid, path.built_at)
+    left = valid & np.isnan(x).any(axis=0)
+    if left.any():
+        tracks = path.lead(np.repeat(line.x[:, None], V, axis=1), left)
+        last = np.zeros(V, dtype=np.intp)
+        last[tracks.nodes.track] = np.arange(len(tracks.nodes))
+        reached = left & np.array([end is End.REACHED for end in tracks.end])
+        x[:, reached] = tracks.nodes.x[:, last[reached]]
+    return valid & ~np.isnan(x).any(axis=0), x

@@ -61,7 +61,9 @@ class Study(Shown):
         self.outputs: Mapping[str, Array] = {
             name: np.concatenate(
                 [
-                    np.full((len(part.status), *shapes[name]), np.nan) if part.outputs is None else part.outputs[name]
+                    np.full((len(part.status), *shapes[name]), np.nan)
+                    if part.outputs is None
+                    else part.outputs.pop(name)
                     for part in parts
                 ]
             )
@@ -171,10 +173,13 @@ class Study(Shown):
         values = self._output(name)
         if not ((np.asarray(q) >= 0) & (np.asarray(q) <= 1)).all():
             raise DeclarationError("study", [f"quantiles q = {q!r}: expected numbers from 0 to 1"])
-        some = np.isfinite(values).any(axis=0)
         at = np.asarray(q, dtype=float)
-        found = np.nanquantile(np.where(some, values, 0.0), at.ravel(), axis=0)
-        return np.where(some, found, np.nan).reshape(at.shape + some.shape)
+        out = np.full((at.size, int(np.prod(values.shape[1:]))), np.nan)
+        for column, own in zip(out.T, values.reshape(len(values), -1).T, strict=True):  # a copy of all might not fit
+            solved = own[~np.isnan(own)]
+            if np.isfinite(solved).any():
+                column[:] = np.quantile(solved, at.ravel())
+        return out.reshape(at.shape + values.shape[1:])
 
     def mean(self, name: str) -> Array:
         """Mean of an output over the variants that were solved."""

@@ -15,7 +15,7 @@ import numpy as np
 from mechgraph.arguments import Count, Index, door
 from mechgraph.closure.driver_motion import Motions, actuators, driven
 from mechgraph.closure.solver import MotionEngineName
-from mechgraph.errors import DeclarationError, MechgraphWarning, StudyError, counted
+from mechgraph.errors import DeclarationError, MechgraphError, MechgraphWarning, StudyError, counted
 from mechgraph.force.dalembert import MethodName
 from mechgraph.kinetostatics import RedundantName
 from mechgraph.model.mechanism import Mechanism
@@ -76,7 +76,8 @@ def study(
     seed : of the sample. The same seed gives the same result, whatever the executor.
     motions : of the drivers as in ``solve``; a leading axis of length ``n`` gives every variant its own.
     sampling : ``"random"``, ``"latin"`` (Latin hypercube) or ``"grid"``.
-    executor : any ``concurrent.futures`` Executor, e.g. that of a cluster; left out, the processors of this machine.
+    executor : any ``concurrent.futures`` Executor, e.g. that of a cluster; left out, the processors of this machine: threads where the
+        compiled kernel serves, else processes.
     actuate, method, redundant, engine, tol : as in ``solve``; every variant is taken as it is meant with the tolerance.
     progress : called with the numbers of parts done and of all parts.
 
@@ -94,8 +95,8 @@ def study(
     DeclarationError
         with all faults of parameters and outputs at once. Errors of the mechanism itself as in ``solve``.
     StudyError
-        where processes ended before their variants were solved, again when these were tried alone, or ``progress`` raised; carries the
-        Study of all others.
+        where processes ended before their variants were solved, again when these were tried alone, where an executor gave up, or
+        ``progress`` raised; carries the Study of all others.
     """
     ways = distributions(parameters)
     faults = [] if ways else ["parameters: none are named"]
@@ -192,7 +193,17 @@ def _all_solved(
 ) -> tuple[dict[int, Part], str, Exception | None]:
     """Parts by the numbers of their tasks; why some are missing, and the error that it came from."""
     done: dict[int, Part] = {}
-    for i, part in _streamed(tasks, executor):
+    stream = _streamed(tasks, executor)
+    while True:
+        try:
+            i, part = next(stream)
+        except StopIteration:
+            break
+        except MechgraphError:
+            raise
+        except Exception as error:
+            lost = counted(len(tasks) - len(done), "part")
+            return done, f"{lost} of {len(tasks)} ended with {type(error).__name__}: {error}", error
         done[i] = part
         try:
             if progress is not None:
@@ -207,39 +218,67 @@ def _all_solved(
 
 
 def _streamed(tasks: Sequence[Task], executor: concurrent.futures.Executor | None) -> Iterator[tuple[int, Part]]:
-    """Parts as they come: from the executor, from processes of this machine where there is much to do, or from here.
+    """Parts as they come: from the executor, from threads or processes of this machine where there is much to do, or from here.
+
+    Threads, where the compiled kernel does nearly all of the work, for which Python's lock is released.
+    """
+    workers, left = os.cpu_count() or 1, dict(enumerate(tasks))
+    if executor is not None:
+        yield from _submitted(left, executor)
+        return
+    if len(tasks) > 2 and workers > 1:
+        threads = False
+        if tasks[0].may_be_compiled:
+            first = solved(left.pop(0))
+            yield 0, first
+            threads = first.compiled
+        if threads:
+            with concurrent.futures.ThreadPoolExecutor(min(workers, len(left))) as pool:
+                yield from _submitted(left, pool)
+            return
+        if _can_be_sent(tasks[0]):
+            yield from _in_processes(left, workers)
+            return
+    for i, task in left.items():
+        yield i, solved(task)
+
+
+def _in_processes(left: dict[int, Task], workers: int) -> Iterator[tuple[int, Part]]:
+    """Parts as they come from processes of this machine.
 
     Those that a process took with it when it ended are tried again, as long as others come, then each in a process of its own; those that
     end this one too are left out.
     """
-    workers = os.cpu_count() or 1
-    if executor is not None:
-        yield from _submitted(dict(enumerate(tasks)), executor)
-    elif len(tasks) > 2 and workers > 1 and _can_be_sent(tasks[0]):
-        left, before = dict(enumerate(tasks)), len(tasks) + 1
-        while 0 < len(left) < before:
-            before = len(left)
-            with concurrent.futures.ProcessPoolExecutor(min(workers, before)) as pool:
-                for i, part in _submitted(left, pool):
-                    del left[i]
-                    yield i, part
-        for i, task in left.items():
-            with concurrent.futures.ProcessPoolExecutor(1) as pool:
-                yield from _submitted({i: task}, pool)
-    else:
-        for i, task in enumerate(tasks):
-            yield i, solved(task)
+    before = len(left) + 1
+    while 0 < len(left) < before:
+        before = len(left)
+        with concurrent.futures.ProcessPoolExecutor(min(workers, before)) as pool:
+            for i, part in _submitted(left, pool):
+                del left[i]
+                yield i, part
+    for i, task in left.items():
+        with concurrent.futures.ProcessPoolExecutor(1) as pool:
+            yield from _submitted({i: task}, pool)
 
 
 def _submitted(tasks: Mapping[int, Task], executor: concurrent.futures.Executor) -> Iterator[tuple[int, Part]]:
-    """Parts as they come, as far as the processes of the executor live."""
+    """Parts as they come, as far as the processes of the executor live.
+
+    Where one fails for a reason of the executor's own, as a cluster that gives up a task, the others are waited for.
+    """
     futures: dict[concurrent.futures.Future[Part], int] = {}
+    failed: BaseException | None = None
     try:
         for i, task in tasks.items():
             futures[executor.submit(solved, task)] = i
         for future in concurrent.futures.as_completed(futures):
-            if not isinstance(future.exception(), concurrent.futures.BrokenExecutor):
+            error = future.exception()
+            if error is None or isinstance(error, MechgraphError):
                 yield futures[future], future.result()
+            elif not isinstance(error, concurrent.futures.BrokenExecutor):
+                failed = failed or error
+        if failed is not None:
+            raise failed
     except concurrent.futures.BrokenExecutor:  # in the midst of being given tasks
         return
     finally:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.by_kernel import COMPILED, at_hand
 from mechgraph.call import Options
 from mechgraph.closure.driver_motion import Motions
 from mechgraph.closure.driver_path import Status
@@ -119,17 +120,25 @@ class Task:
     engine: MotionEngineName
     actuate: tuple[str, ...] | None = None
 
+    @property
+    def may_be_compiled(self) -> bool:
+        """Whether the kernel may serve, and no variant is built by a function."""
+        asked = self.engine == COMPILED or (self.engine == "auto" and at_hand() is not None)
+        return asked and self.source.build is None and self.source.tol is None and not self.source.one_by_one
+
 
 @dataclass(frozen=True)
 class Part:
     """What came of a task: outputs ``(count, ...)`` (None where no variant could be solved), messages, and for every position
-    ``(count, N)`` the number of its outcome in ``STATUSES``; what makes reactions doubtful, of all variants.
+    ``(count, N)`` the number of its outcome in ``STATUSES``; what makes reactions doubtful, of all variants; whether the compiled kernel
+    solved them together.
     """
 
     outputs: dict[str, Array] | None
     status: NDArray[np.int8]
     messages: dict[int, str]
     warnings: tuple[Doubt, ...] = ()
+    compiled: bool = False
 
     def cut(self, count: int) -> tuple[Part, Part]:
         """The first ``count`` variants, and the others; what makes reactions doubtful stays with the first."""
@@ -204,7 +213,8 @@ def solved(task: Task) -> Part:
         elif found is not None:
             for v in found.values():
                 v[i] = np.nan
-    return Part(found, numbered(status), messages, worst(warnings))
+    by_kernel = together.solution is not None and together.solution.engine == COMPILED
+    return Part(found, numbered(status), messages, worst(warnings), by_kernel)
 
 
 def numbered(status: NDArray[np.str_]) -> NDArray[np.int8]:
