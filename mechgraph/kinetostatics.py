@@ -48,7 +48,7 @@ SOLVED = (Status.OK.value, Status.CHANGE_POINT.value, Status.ACTUATORS_REST.valu
 """Outcomes that are no reason to raise."""
 DEAD = "At a dead point the drivers do not determine the motion; drive another freedom, leave the position out, or use on_reach='flag'"
 FLAG = "Use on_reach='flag' for the positions that can be reached"
-WITHOUT_BOUND, SHORTLY = 1e3, 0.01
+WITHOUT_BOUND, BEFORE_END = 1e3, 0.01
 """Slides of so many lengths L that have doubled within so much of the path before its end grow without bound."""
 REFUSED = {
     Status.DEAD_POINT: f"is a dead point{{meet}}. {DEAD}",
@@ -114,7 +114,7 @@ def _without_bound(system: System, way: Nodes) -> str:
         return ""
     slides = np.flatnonzero(system.is_length)
     q = system.coordinates_of(way.x)[slides]
-    before = np.abs(q[:, way.place <= way.place[-1] - SHORTLY]).max(axis=1, initial=0.0)
+    before = np.abs(q[:, way.place <= way.place[-1] - BEFORE_END]).max(axis=1, initial=0.0)
     far = np.abs(q[:, -1]) > np.maximum(WITHOUT_BOUND, 2.0 * before)
     names = system.freedom_names_of(slides[far])
     said = _listed(zip(names, (q[far, -1] * system.par.L).tolist(), strict=True))

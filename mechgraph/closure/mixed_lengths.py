@@ -15,12 +15,12 @@ from mechgraph.errors import DeclarationError, listed
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.tolerances import RANKS
 
-NEAR = 10 * RANKS.loop
+TOO_NEAR = 10 * RANKS.loop
 """Distance of two points over the size of their loop below which it is asked whether it was lost in a rank."""
-LOST = 0.01
+COMES_OF_IT = 0.01
 """Part of that distance above which the largest singular value that counted as zero comes of it: directions make it smaller."""
-ROUNDING = 1e-14
-"""Singular value that is rounding."""
+NO_DISTANCE = 1e-14
+"""Distance over that size, and singular value, that is rounding."""
 
 
 def refuse_mixed_lengths(here: Configuration) -> None:
@@ -46,16 +46,16 @@ def _fault(here: Configuration) -> str:
     after = np.where(np.append(loop[1:], -1) == loop, np.arange(len(loop)) + 1, np.searchsorted(loop, loop))
     apart, size = np.linalg.norm(points[:, pair] - points[:, pair[after]], axis=0), lengths_of(s.graph, points, middles)
     part = apart / size[loop]
-    near = np.flatnonzero((part < NEAR) & (part > ROUNDING))
+    near = np.flatnonzero((part < TOO_NEAR) & (part > NO_DISTANCE))
     if not near.size:
         return ""
-    lost = near[closure_rank(here).dropped > np.maximum(LOST * part[near], ROUNDING)]
+    lost = near[closure_rank(here).dropped > np.maximum(COMES_OF_IT * part[near], NO_DISTANCE)]
     if not lost.size:
         return ""
     i, names = int(lost[np.argmin(part[lost])]), [p.name for p in s.m.pairs]
     return (
         f"lengths are too far apart: {names[pair[i]]} and {names[pair[after[i]]]} are {apart[i] * s.par.L:.3g} apart in the loop "
-        f"{listed(names[k] for k in pair[loop == loop[i]])} of size {size[loop[i]] * s.par.L:.3g}; expected at least {NEAR:g} of "
+        f"{listed(names[k] for k in pair[loop == loop[i]])} of size {size[loop[i]] * s.par.L:.3g}; expected at least {TOO_NEAR:g} of "
         "that, or the same point. Make small lengths larger or zero, or replace long links by slides (the end of a link so long "
         "moves along a line)"
     )

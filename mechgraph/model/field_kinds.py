@@ -72,10 +72,13 @@ def _samples_fault(value: Any, what: str, minimum: float | None) -> str | None:
 
 def _rising_fault(value: Any, what: str, minimum: float | None) -> str | None:
     array = real_array(value)
-    good = array is not None and array.ndim <= 1 and is_numeric(array, array.shape)
-    return (
-        None if good and (np.diff(np.atleast_1d(array)) > 0).all() else wrong(value, what, "finite numbers that rise")
+    rises = (
+        array is not None
+        and array.ndim <= 1
+        and is_numeric(array, array.shape)
+        and (np.diff(np.ravel(array)) > 0).all()
     )
+    return None if rises else wrong(value, what, "finite numbers that rise")
 
 
 def _tensor_fault(value: Any, what: str, minimum: float | None) -> str | None:
