@@ -63,7 +63,7 @@ class KernelRates:
 
     def __init__(self, library: Any, chart: Chart, loads: Loads) -> None:
         s, columns = chart.system, np.concatenate([chart.free, chart.prescribed])
-        places = layout(s, columns, np.zeros(0, dtype=np.intp))
+        places = layout(s, columns, ())
         found = tables(places, s, chart.x0[:, None], (*loads.stored, *loads.rest))
         assert found is not None
         self.n, self._x0 = len(chart.free), np.ascontiguousarray(chart.x0)
