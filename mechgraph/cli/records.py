@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import mechgraph as mg
 from mechgraph.cli.output import write
 from mechgraph.data import VERSION, Json, json_text, object_schema, patch, plain, schema_of
-from mechgraph.equations.symbols import written
+from mechgraph.equations.terms import written
 from mechgraph.model.toml import to_data
 from mechgraph.modes.record import AssembliesData, BranchesData
 from mechgraph.report.data import AdviceData, schemas
