@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from typing import Annotated, Any
 
 import mechgraph as mg
-from mechgraph.cli.output import write
+from mechgraph.cli.options import write
 from mechgraph.data import VERSION, Json, json_text, object_schema, patch, plain, schema_of
 from mechgraph.equations.terms import written
 from mechgraph.model.toml import to_data
