@@ -21,7 +21,7 @@ from mechgraph.equations.build import BOOKKEEPINGS, BookkeepingName, formulate
 from mechgraph.equations.terms import Ledger, LedgerRow
 from mechgraph.errors import DeclarationError
 from mechgraph.force.passive_hold import hold_names
-from mechgraph.graph.linkgraph import LinkGraph, MatchingParts, parts_of
+from mechgraph.graph.linkgraph import LinkGraph, Parts, parts_of
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.linear import independent_rows
 from mechgraph.numerics.tolerances import RANKS
@@ -141,7 +141,7 @@ class GraphFacts:
         return formulate(self.mechanism, bookkeeping).ledger()
 
     @cached_property
-    def parts(self) -> MatchingParts:
+    def parts(self) -> Parts:
         """Dulmage-Mendelsohn parts: which links and pairs are over-, which underdetermined by count."""
         return parts_of(self.mechanism, self.graph)
 
