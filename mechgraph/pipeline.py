@@ -29,15 +29,15 @@ from mechgraph.force.passive_hold import hold_names
 from mechgraph.numerics.linear import independent_rows
 from mechgraph.numerics.tolerances import MOTIONS, PATH
 from mechgraph.outcome import Followed, Outcome
-from mechgraph.report.refused import (
+from mechgraph.report.report import (
     change_point_error,
+    check,
     dead_point_error,
     no_longer_passive_error,
     structure_error,
     undecided_error,
     undriven_error,
 )
-from mechgraph.report.report import check
 from mechgraph.result.solution import Solution
 from mechgraph.structure.actuation import actuation_fault
 from mechgraph.structure.branching import branches

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 import mechgraph as mg
 from mechgraph import writing
-from mechgraph.cli import app, output
+from mechgraph.cli import app, options
 
 ROOT = Path(__file__).resolve().parents[1]
 COMMANDS = [command.name for command in app.registered_commands]
@@ -107,15 +107,15 @@ def test_solve_tells_how_far_it_is() -> None:
 @pytest.mark.parametrize("arguments", [("solve", "7r"), ("respond", "windows-2", "--for", "1s", "--rate", "A0=-1")])
 def test_bars_are_shown_on_a_terminal_alone(arguments: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
     told: list[tuple[float, float | None]] = []
-    real = output.Progress.update
+    real = options.Progress.update
     monkeypatch.setattr(
-        output.Progress,
+        options.Progress,
         "update",
         lambda bar, task, **of: (told.append((of["completed"], of["total"])), real(bar, task, **of)),
     )
     assert CliRunner().invoke(app, [*arguments]).exit_code == 0
     assert not told
-    monkeypatch.setattr(output, "is_terminal", lambda stream: stream is sys.stderr)
+    monkeypatch.setattr(options, "is_terminal", lambda stream: stream is sys.stderr)
     result = CliRunner().invoke(app, [*arguments])
     assert result.exit_code == 0
     assert told

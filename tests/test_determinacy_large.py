@@ -25,8 +25,8 @@ from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
 from mechgraph.closure.rank import ClosureRank, closure_rank, rank_of_rows
 from mechgraph.graph.linkgraph import link_graph
 from mechgraph.numerics.tolerances import RANKS
-from mechgraph.report import rounding
-from mechgraph.report.graph_facts import counted_ledger
+from mechgraph.report import findings
+from mechgraph.report.facts import counted_ledger
 from mechgraph.structure import snapping
 from mechgraph.structure.generic import random_rows
 from mechgraph.structure.kind import kind_of
@@ -338,11 +338,11 @@ def test_near_relations_by_chance_do_not_hold_up_the_report_of_a_long_ring(monke
     """Of 200 axes that stand anyhow hundreds of pairs come near something special; taking them so is minutes of work for no hint."""
     rng, tried = np.random.default_rng(0), []
     ring = known.ring("R" * 200, rng.normal(size=(200, 3)), rng.normal(size=(200, 3)))
-    monkeypatch.setattr(rounding, "snapped", lambda m, tol, *more: tried.append(tol) or snapping.snapped(m, tol, *more))
+    monkeypatch.setattr(findings, "snapped", lambda m, tol, *more: tried.append(tol) or snapping.snapped(m, tol, *more))
     report = mg.check(ring)
     assert report.rounding is None
     assert "mobility 194" in str(report)
-    near = snapping.candidates(ring, rounding.LARGEST_TOL)
+    near = snapping.candidates(ring, findings.LARGEST_TOL)
     assert len(near) > 2 * max(int((near <= tol).sum()) for tol in tried)
 
 

@@ -7,8 +7,7 @@ import pytest
 
 import mechgraph as mg
 from mechgraph.document import Equation, to_html
-from mechgraph.equations.mathml import mathml
-from mechgraph.equations.symbols import Symbol
+from mechgraph.equations.terms import Symbol, mathml
 
 ACCENTS = {"¯": "bar", "˙": "dot", "¨": "ddot", "^": "hat"}
 SIGNS = {

@@ -5,8 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import mechgraph as mg
-from mechgraph.equations.symbols import Symbol, Words, moment_of
-from mechgraph.equations.terms import Term
+from mechgraph.equations.terms import Symbol, Term, Words, moment_of
 
 SECTIONS = {
     "7r": ("3.8", 50),

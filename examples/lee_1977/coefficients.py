@@ -7,7 +7,7 @@ import numpy as np
 import mechgraph as mg
 from lee_1977.chains import rank
 from lee_1977.tables import coefficients
-from mechgraph.equations.state import State
+from mechgraph.equations.terms import State
 
 AXES = "xyz"
 

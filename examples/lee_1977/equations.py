@@ -13,7 +13,7 @@ import numpy as np
 
 import mechgraph as mg
 from lee_1977.tables import DATA
-from mechgraph.equations.symbols import names_of
+from mechgraph.equations.terms import names_of
 
 AGREES, OTHER_SIDE, LETTER, WRENCH, TWICE, LEFT_OUT = (
     "agrees",

@@ -1,29 +1,64 @@
-"""The command line, for a mechanism of the library or a file: one module for each group of commands, here put together."""
+"""The command line, for a mechanism of the library or a file: its name, its help, its version, its commands."""
 
-from mechgraph.cli.compiled import compile_
-from mechgraph.cli.determinacy import check
-from mechgraph.cli.formulation import equations
-from mechgraph.cli.library import list_library, save
-from mechgraph.cli.modes import assemblies, branches
-from mechgraph.cli.motion import respond, solve
-from mechgraph.cli.page import report
-from mechgraph.cli.picture import plot
-from mechgraph.cli.program import app
-from mechgraph.cli.strength import loads
-from mechgraph.cli.structure import structure
+from __future__ import annotations
+
+import importlib.metadata
+import sys
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from mechgraph.cli.commands import check, compile_, equations, list_library, loads, respond, save, solve, structure
+from mechgraph.cli.drawn import assemblies, branches, plot, report
+from mechgraph.cli.options import DONE, EXIT_STATUS, outcome, warned, write
+
+
+class Program(TyperGroup):
+    """The command line, all of which comes to an outcome: options and help as well as commands."""
+
+    def main(self, *arguments: Any, **options: Any) -> Any:
+        """Run it, with streams that show what they cannot encode; a stream may have been closed."""
+        for stream in (sys.stdout, sys.stderr):
+            if stream is not None and hasattr(stream, "reconfigure"):
+                stream.reconfigure(errors="backslashreplace")
+        with outcome():
+            return super().main(*arguments, **options)
+
+    def invoke(self, context: Any) -> Any:
+        """Run a command, before the errors that are left are taken for those of the command line itself."""
+        with outcome(), warned():
+            return super().invoke(context)
+
 
 __all__ = ["app"]
 
+app = typer.Typer(
+    name="mechgraph",
+    cls=Program,
+    help="Spatial mechanisms as graphs of links and pairs: determinacy, equations, motion, driver efforts and reactions.\n\n"
+    + EXIT_STATUS,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+@app.callback(invoke_without_command=True)
+def _main(
+    context: typer.Context, version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False
+) -> None:
+    if version:
+        try:
+            number = importlib.metadata.version("mechgraph")
+        except importlib.metadata.PackageNotFoundError:
+            number = "(not installed)"
+        write(f"mechgraph {number}\n")
+        raise typer.Exit(DONE)
+
+
 app.command("list")(list_library)
-app.command("check")(check)
-app.command("structure")(structure)
-app.command("equations")(equations)
-app.command("solve")(solve)
-app.command("respond")(respond)
-app.command("save")(save)
-app.command("plot")(plot)
-app.command("loads")(loads)
-app.command("report")(report)
-app.command("assemblies")(assemblies)
-app.command("branches")(branches)
+for command in (check, structure, equations, solve, respond, save, plot, loads, report, assemblies, branches):
+    app.command(command.__name__)(command)
 app.command("compile")(compile_)

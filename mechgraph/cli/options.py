@@ -1,17 +1,200 @@
-"""Arguments and options that several commands take."""
+"""What commands take and how they end: arguments and options, what a shell completes, mechanisms by the name or file that was typed.
+
+Texts and documents go to standard output, work in progress to standard error; every error is a message with its exit status.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import errno
+import io
+import os
+import shutil
+import sys
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, NoReturn
 
+import numpy as np
 import typer
+from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.text import Text
 
-from mechgraph.cli.completion import freedom_names, freedoms, library_names
+import mechgraph as mg
+from mechgraph.document import Document, to_text
+from mechgraph.errors import did_you_mean, near_names, visible
+from mechgraph.exchange.comparison import compare
 from mechgraph.exchange.files import READERS
 from mechgraph.result.export import FORMATS
+from mechgraph.result.places import OK, driver_value
 from mechgraph.result.table import MORE
-from mechgraph.writing import formats_text
+from mechgraph.starting import INTERRUPTED
+from mechgraph.typed import refuse
+from mechgraph.writing import Format, format_of, formats_text, writable
+
+
+def is_terminal(stream: Any) -> bool:
+    """Whether a stream, which may have been closed, is shown to somebody."""
+    return stream is not None and stream.isatty()
+
+
+def write(text: str, colour: str = "") -> None:
+    """Write a text; on a terminal its headings in bold and the paragraph after the title in ``colour``."""
+    if sys.stdout is None:
+        raise OSError(errno.EBADF, os.strerror(errno.EBADF))
+    if not sys.stdout.isatty():
+        sys.stdout.write(text)
+        sys.stdout.flush()
+        return
+    console = Console(highlight=False)
+    lines = text.split("\n")
+    first = 3 if colour else len(lines)
+    last = lines.index("", first) if "" in lines[first:] else first
+    for i, (line, following) in enumerate(zip(lines, [*lines[1:], ""], strict=True)):
+        rule = (
+            len(following) > 2
+            and not following.strip(following[0])
+            and following[0] in "=~-"
+            and len(following) >= len(line.strip()) > 0
+        )
+        style = "bold" if rule else f"bold {colour}" if first <= i < last else ""
+        console.print(Text(line, style=style), soft_wrap=True, end="\n" if i < len(lines) - 1 else "")
+
+
+def show(document: Document, colour: str = "") -> None:
+    """Write a document as wide as the terminal; unbroken into a file or another program."""
+    # width in which nothing is wrapped: where the output goes to a file or another program
+    width = max(shutil.get_terminal_size().columns, 40) if is_terminal(sys.stdout) else 10_000
+    write(to_text(document, width), colour)
+
+
+@contextmanager
+def working(what: str) -> Iterator[None]:
+    """A spinner with the time passed on stderr, where that is a terminal."""
+    if not is_terminal(sys.stderr):
+        yield
+        return
+    columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
+    with Progress(*columns, console=Console(stderr=True), transient=True) as spinner:
+        spinner.add_task(what)
+        yield
+
+
+@contextmanager
+def progress(what: str, end: float | None = None) -> Iterator[Callable[..., None] | None]:
+    """A bar on stderr, where that is a terminal; ``moved(reached, of=end)``. Without an end it runs to and fro until there is one."""
+    if not is_terminal(sys.stderr):
+        yield None
+        return
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(what, total=end)
+
+        def moved(reached: float, of: float | None = end) -> None:
+            bar.update(task, completed=reached, total=of)
+
+        yield moved
+
+
+DONE, NO_ANSWER, BAD_INPUT = 0, 1, 2
+"""Exit statuses."""
+
+NO_ANSWERS = (mg.AssemblyError, mg.ReachError, mg.DeadPointError, mg.IndeterminateError, mg.ResponseError)
+"""Errors that say that the mechanism has no answer; every other error is bad input."""
+
+
+EXIT_STATUS = (
+    "Exit status: 0 done; 1 the mechanism has no answer, and the message says why; 2 wrong usage or bad input."
+)
+
+
+def fail(message: str, status: int) -> NoReturn:
+    """End with a message on standard error."""
+    try:
+        if is_terminal(sys.stderr):
+            text = Text.assemble(("mechgraph: ", "bold red"), visible(message))
+            Console(stderr=True, highlight=False).print(text, soft_wrap=True)
+        elif sys.stderr is not None:
+            sys.stderr.write(f"mechgraph: {visible(message)}\n")
+            sys.stderr.flush()
+    except OSError:  # where messages cannot be written either, the status says it
+        forget(sys.stderr)
+    sys.exit(status)
+
+
+@contextmanager
+def warned() -> Iterator[None]:
+    """Every warning of the package as a message."""
+
+    def say(message: Warning | str, *_: Any, **__: Any) -> None:
+        if sys.stderr is not None:
+            sys.stderr.write(f"mechgraph: {visible(str(message))}\n")
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", mg.MechgraphWarning)
+        warnings.showwarning = say
+        yield
+
+
+def _reached(error: mg.MechgraphError) -> str:
+    """The driver values reached, in the words of the command line."""
+    if not isinstance(error, mg.ReachError | mg.DeadPointError) or error.solution is None:
+        return ""
+    if not (np.asarray(error.solution.status) == OK).any():
+        return ""
+    m = error.solution.whole
+    at = ", ".join(driver_value(m, name, value) for name, value in error.value.items())
+    return f"\n  reached {at}; --on-reach flag solves the positions that can be reached"
+
+
+@contextmanager
+def outcome() -> Iterator[None]:
+    """Every error as a message and an exit status."""
+    try:
+        yield
+    except NO_ANSWERS as error:
+        fail(str(error) + _reached(error), NO_ANSWER)
+    except mg.MechgraphError as error:
+        fail(str(error), BAD_INPUT)
+    except MemoryError:
+        fail("not enough memory for so many positions; take fewer", BAD_INPUT)
+    except KeyboardInterrupt:
+        fail("interrupted", INTERRUPTED)
+    except OSError as error:  # of files there is a FileError: this is the output itself
+        forget(sys.stdout)
+        if error.errno == errno.EPIPE:
+            sys.exit(DONE)
+        fail(f"the output cannot be written: {error.strerror or error}", BAD_INPUT)
+
+
+def forget(stream: Any) -> None:
+    """Let nothing of what waits in a stream be written when the program ends: that would fail again."""
+    with suppress(OSError, AttributeError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+def library_names(incomplete: str) -> list[str]:
+    """Mechanisms of the library; where none begins so, the shell completes files."""
+    return [name for name in mg.library() if name.startswith(incomplete)]
+
+
+def freedom_names(ctx: typer.Context, incomplete: str) -> list[str]:
+    """Freedoms of the mechanism that stands before, as far as it can be read."""
+    typed = [ctx.params.get("mechanism"), *ctx.args]  # an option that lacks its value leaves what was typed unread
+    try:
+        with contextlib.redirect_stderr(io.StringIO()):
+            names = mg.load(next(filter(None, typed), "")).freedom_names()
+    except mg.MechgraphError:
+        return []
+    return [name for name in names if name.startswith(incomplete)]
+
+
+def freedoms(ctx: typer.Context, incomplete: str) -> list[str]:
+    """The same, to be followed by a value."""
+    return [f"{name}=" for name in freedom_names(ctx, incomplete)]
+
 
 Named = Annotated[
     str,
@@ -131,3 +314,36 @@ OverTime = Annotated[
         "--over-time", help="Also peak, mean, RMS and work of drivers, and shaking, over time or a whole cycle."
     ),
 ]
+
+
+def loaded(name: str) -> mg.Mechanism:
+    """A mechanism of the library, else of a file; an unknown name is answered with its near matches."""
+    known = mg.library()
+    if name in known:
+        return mg.load(name)
+    path = Path(name)
+    if os.path.lexists(path) or path.suffix.lower() in (".toml", *READERS) or len(path.parts) > 1:
+        return mg.load(path)
+    hint = did_you_mean(near_names(name.lower(), known)) or f"there are: {', '.join(known)}"
+    raise mg.FileError(name, f"no mechanism of that name in the library, and no such file; {hint}")
+
+
+def refuse_own_file(out: Path, mechanism: str) -> None:
+    """Let no output take the place of the file that the mechanism is read from."""
+    if writable(out).exists() and os.path.lexists(mechanism) and out.samefile(mechanism):
+        refuse(f"--out {str(out)!r}", "is the file of the mechanism; name another")
+
+
+def check_out(out: Path | None, mechanism: str, formats: Sequence[Format]) -> None:
+    """Refuse an output that no format takes, or that is the file of the mechanism, before anything is computed."""
+    if out is not None:
+        refuse_own_file(out, mechanism)
+        format_of(out, formats)
+
+
+def show_compared(mechanism: str) -> None:
+    """What FreeCAD stored beside what comes out here, below a report or summary."""
+    if Path(mechanism).suffix.lower() != ".asmt":
+        refuse(f"--compare {mechanism!r}", "is no FreeCAD assembly (.asmt)")
+    write("\n")
+    show(compare(mechanism).document())

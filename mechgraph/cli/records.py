@@ -7,14 +7,13 @@ from dataclasses import dataclass, fields
 from typing import Annotated, Any
 
 import mechgraph as mg
-from mechgraph.cli.output import write
+from mechgraph.cli.options import write
 from mechgraph.data import VERSION, Json, json_text, object_schema, patch, plain, schema_of
-from mechgraph.equations.symbols import written
+from mechgraph.equations.terms import written
 from mechgraph.model.toml import to_data
 from mechgraph.modes.record import AssembliesData, BranchesData
-from mechgraph.report.data import AdviceData, schemas
-from mechgraph.report.rounding import Rounding
-from mechgraph.report.sections import KEYS
+from mechgraph.report.findings import Rounding
+from mechgraph.report.report import KEYS, AdviceData, schemas
 from mechgraph.response.course import ResponseData
 from mechgraph.result.over_time import OverTimeData
 from mechgraph.result.record import SolutionData

@@ -10,11 +10,17 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from mechgraph.arguments import door
-from mechgraph.equations.formulation import Formulation
-from mechgraph.equations.motion import ACCELERATION, MotionWords, has_inertia
-from mechgraph.equations.symbols import (
+from mechgraph.equations.formulation import ACCELERATION, Formulation, MotionWords, has_inertia
+from mechgraph.equations.terms import (
+    AXES,
+    Block,
+    Known,
     LeeNames,
+    ScalarEquation,
+    Screw,
     Symbol,
+    Term,
+    Unknown,
     Words,
     direction,
     dual_unit,
@@ -23,7 +29,6 @@ from mechgraph.equations.symbols import (
     names_of,
     summed,
 )
-from mechgraph.equations.terms import AXES, Block, Known, ScalarEquation, Screw, Term, Unknown
 from mechgraph.model.coupling import BaseCoupling
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
@@ -328,7 +333,6 @@ def _condition(draft: _Draft, k: int, i: int, twist: Freedom, dual: list[int]) -
 
 
 SoughtName = Literal["kinetostatics", "response"]
-SOUGHT: tuple[SoughtName, ...] = ("kinetostatics", "response")
 
 
 @door

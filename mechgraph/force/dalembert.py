@@ -19,7 +19,7 @@ from mechgraph.closure.indexing import Index
 from mechgraph.closure.solver import FactoredClosure
 from mechgraph.equations.build import BookkeepingName, formulate
 from mechgraph.equations.formulation import Formulation
-from mechgraph.equations.state import State
+from mechgraph.equations.terms import State
 from mechgraph.numerics.linear import Choice, ChosenSystem, add_at, choose
 from mechgraph.numerics.sparse import least_solution
 

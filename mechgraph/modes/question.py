@@ -17,7 +17,7 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.family import NO_NUMBERS, SPAN, Array, Family, at_rest
 from mechgraph.modes.form import Form, Rod, Whole, WithoutRods, rods_of
 from mechgraph.numerics.linear import rank_of, singular_values
-from mechgraph.report.refused import dead_point_error, undriven_error
+from mechgraph.report.report import dead_point_error, undriven_error
 from mechgraph.structure.mobility import free_motion
 
 OFF_DEAD_POINT = 0.3

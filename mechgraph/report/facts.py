@@ -1,4 +1,7 @@
-"""The facts of a determinacy report: of the graph alone and of a closed position, each computed when first asked for."""
+"""The facts of a determinacy report: of the graph alone and of a closed position, each computed when first asked for.
+
+Also which drivers move a mechanism, and which freedoms would complete them: pure functions of what can move.
+"""
 
 from __future__ import annotations
 
@@ -8,20 +11,32 @@ from functools import cached_property
 from time import monotonic
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import at_position
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.rank import EngineName
+from mechgraph.equations.build import BOOKKEEPINGS, BookkeepingName, formulate
+from mechgraph.equations.terms import Ledger, LedgerRow
 from mechgraph.errors import DeclarationError
 from mechgraph.force.passive_hold import hold_names
+from mechgraph.graph.linkgraph import LinkGraph, Parts, parts_of
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.numerics.linear import independent_rows
 from mechgraph.numerics.tolerances import RANKS
 from mechgraph.quantities import wrong
-from mechgraph.report import driving, findings
-from mechgraph.report.advice import Advice, driving_advice, variants
-from mechgraph.report.findings import Finding, LoopFact, PassiveFinding
-from mechgraph.report.graph_facts import GraphFacts
-from mechgraph.report.rounding import LIMIT
+from mechgraph.report import findings
+from mechgraph.report.findings import (
+    LIMIT,
+    Advice,
+    Finding,
+    LoopFact,
+    PassiveFinding,
+    completing,
+    driving_advice,
+    variants,
+)
 from mechgraph.structure.advice import advice
 from mechgraph.structure.decomposition import Decomposition, decomposition
 from mechgraph.structure.families import Families, families
@@ -33,8 +48,114 @@ from mechgraph.structure.pair_changes import LARGEST_FOR_SETS, Effect
 from mechgraph.structure.self_stress import SelfStress
 from mechgraph.structure.uniqueness import Uniqueness, uniqueness
 
-MOST_DRIVERS = 60
-"""Freedoms that are tried as driver where the groups of all choices are asked for."""
+
+def weak(freedoms: Freedoms, driven: Index) -> list[int]:
+    """Columns of the drivers that move least when the mechanism does, and as little as the weakest combination of them."""
+    if len(driven) < 2:
+        return [int(c) for c in driven]
+    size = np.sqrt((freedoms.null[driven] ** 2).sum(axis=1))
+    return [int(c) for c in driven[size < 2 * freedoms.drive * size.max()]]
+
+
+def moving(freedoms: Freedoms, driven: Index, near: bool) -> Index:
+    """The drivers without those that depend on the ones before or stand still; ``near`` a dead point without the weak one."""
+    columns = independent_rows(freedoms.null, driven.tolist(), len(driven))
+    left_out = weak(freedoms, driven) if near and len(columns) == len(driven) else []
+    return np.array([c for c in columns if [c] != left_out], dtype=np.intp)
+
+
+def suggested(
+    freedoms: Freedoms, driven: Index, moving: Index, able: NDArray[np.bool_], wanted: int, engine: EngineName
+) -> list[int]:
+    """Columns among those ``able (F,)`` that complete the drivers ``moving`` to at most ``wanted``, independent.
+
+    A driver may stop a motion that was passive, and so leave another one undriven; then more are sought.
+    """
+    columns = moving
+    after = freedoms if len(moving) == len(driven) else freedoms_at(freedoms.position, moving, engine)
+    while after.undriven and len(columns) < wanted:
+        both = [*columns.tolist(), *completing(after, able)]
+        independent = np.array(independent_rows(freedoms.null, both, wanted), dtype=np.intp)
+        if len(independent) == len(columns):
+            break
+        columns = independent
+        after = freedoms_at(freedoms.position, columns, engine)
+    return [int(c) for c in np.sort(columns[len(moving) :])]
+
+
+def ratios(freedoms: Freedoms, driven: Index, of: Index) -> Array:
+    """Rates of freedoms ``of (n,)`` for unit rates of the drivers, ``(n, d)`` in the user's units, passive motions at rest.
+
+    No columns where the drivers do not say all other motions.
+    """
+    null, fixed = freedoms.null, np.concatenate([driven, freedoms.hold])
+    if len(fixed) != null.shape[1] or freedoms.dependent or freedoms.undriven:
+        return np.zeros((len(of), 0))
+    rates = null[of] @ np.linalg.solve(null[fixed], np.eye(len(fixed), len(driven)))
+    units = freedoms.position.declared.system.in_user_units(np.ones(len(null)))
+    return np.asarray(units[of, None] * rates / units[driven])
+
+
+@dataclass(frozen=True, repr=False)
+class GraphFacts:
+    """Names, loops and counts of a mechanism, whatever its geometry."""
+
+    mechanism: Mechanism
+    graph: LinkGraph
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        """Names of the links."""
+        return self.mechanism.link_names()
+
+    @cached_property
+    def pairs(self) -> tuple[str, ...]:
+        """Names of the pairs."""
+        return tuple(p.name for p in self.mechanism.pairs)
+
+    @cached_property
+    def loops(self) -> tuple[tuple[tuple[str, int], ...], ...]:
+        """Independent loops, each a chain of (pair name, sign)."""
+        return tuple(tuple((self.pairs[k], sign) for k, sign in loop) for loop in self.graph.loops)
+
+    @property
+    def freedom_count(self) -> int:
+        """Sum of the freedoms of the pairs."""
+        return sum(p.type.f for p in self.mechanism.pairs)
+
+    @property
+    def equation_count(self) -> int:
+        """Number of closure equations: six a loop, one a coupling."""
+        return 6 * self.graph.n_loops + len(self.mechanism.couplings)
+
+    @property
+    def mobility_by_count(self) -> int:
+        """Kutzbach mobility: sum of freedoms - closure equations."""
+        return self.freedom_count - self.equation_count
+
+    def ledger(self, bookkeeping: BookkeepingName = "lee") -> Ledger:
+        """Unknowns against equations in a bookkeeping, ``"lee"`` or ``"minimal"``."""
+        countable = isinstance(bookkeeping, str) and bookkeeping in BOOKKEEPINGS and not self.mechanism.couplings
+        if countable:
+            return counted_ledger(self.mechanism, bookkeeping)
+        return formulate(self.mechanism, bookkeeping).ledger()
+
+    @cached_property
+    def parts(self) -> Parts:
+        """Dulmage-Mendelsohn parts: which links and pairs are over-, which underdetermined by count."""
+        return parts_of(self.mechanism, self.graph)
+
+
+def counted_ledger(m: Mechanism, bookkeeping: str) -> Ledger:
+    """The ledger counted from the pair table: must agree with that of the formulation."""
+    rows: dict[str, LedgerRow] = {}
+    for pair in m.pairs:
+        unknowns, equations = pair.type.unknowns_and_equations if bookkeeping == "lee" else (6 - pair.type.f, 0)
+        old = rows.get(pair.type.symbol, LedgerRow(0, 0, 0))
+        rows[pair.type.symbol] = LedgerRow(old.count + 1, old.unknowns + unknowns, old.equations + equations)
+    rows["driver"] = LedgerRow(len(m.drives), len(m.drives), 0)
+    rows["link"] = LedgerRow(len(m.links) - 1, 0, 6 * (len(m.links) - 1))
+    return Ledger(bookkeeping, rows)
 
 
 def nearly_singular(loops: int) -> float:
@@ -189,7 +310,8 @@ class Facts(GraphFacts):
             return {}
         others = self.groups.drivers[:-1]
         able = [name for f in self.drivable for name in f.freedoms if name not in others]
-        found = {name: self.groups_with((*others, name)) for name in able[:MOST_DRIVERS]}
+        # freedoms that are tried as driver where the groups of all choices are asked for
+        found = {name: self.groups_with((*others, name)) for name in able[:60]}
         return {name: d.symbol for name, d in found.items() if d and not d.free}
 
     @cached_property
@@ -288,13 +410,13 @@ class Facts(GraphFacts):
     @property
     def weak_drives(self) -> list[int]:
         """Columns of the drivers that move least when the mechanism does, and as little as the weakest combination of them."""
-        return driving.weak(self.geometry.freedoms, self.geometry.driven) if self.geometry else []
+        return weak(self.geometry.freedoms, self.geometry.driven) if self.geometry else []
 
     @cached_property
     def _moving_drives(self) -> Index:
         """Columns of the declared drivers without those that depend on the ones before, stand still, or nearly do (at a dead point)."""
         g = self.geometry
-        return driving.moving(g.freedoms, g.driven, near=self.dead_point) if g else np.zeros(0, dtype=np.intp)
+        return moving(g.freedoms, g.driven, near=self.dead_point) if g else np.zeros(0, dtype=np.intp)
 
     @cached_property
     def replaced_drives(self) -> tuple[str, ...]:
@@ -316,7 +438,7 @@ class Facts(GraphFacts):
         if self.change_point:
             able = findings.moves_nearby(self._null_nearby, self.freedom_count)
             wanted = max((self.finite_mobility or 0) - len(g.freedoms.passive), 0)
-        more = driving.suggested(g.freedoms, g.driven, self._moving_drives, able, wanted, self.asked)
+        more = suggested(g.freedoms, g.driven, self._moving_drives, able, wanted, self.asked)
         return tuple(self.mechanism.freedom_names()[c] for c in more)
 
     @cached_property
@@ -332,7 +454,7 @@ class Facts(GraphFacts):
             return {}
         names = self.mechanism.freedom_names()
         of = np.setdiff1d(g.system.coupled_freedoms, g.driven)
-        found = driving.ratios(g.freedoms, g.driven, of)
+        found = ratios(g.freedoms, g.driven, of)
         drives = [names[c] for c in g.driven]
         return {names[c]: dict(zip(drives, row, strict=True)) for c, row in zip(of, found.tolist(), strict=True) if row}
 

@@ -1,25 +1,21 @@
-"""The determinacy report in sentences: the verdict and the reasons. Pure functions of the facts."""
+"""The determinacy report in sentences: the verdict and the reasons, all of it or for people on one page. Pure functions of the facts."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.closure.indexing import Index
+from mechgraph.document import Block, Bullets, Document, Paragraph, to_text
 from mechgraph.model.pair import second_direction
 from mechgraph.numerics.tolerances import RANKS
 from mechgraph.report.facts import Facts
-from mechgraph.report.findings import vector
-from mechgraph.report.words import KINDS, NAMED, component_words, joined, listed, plural
+from mechgraph.report.findings import KINDS, NAMED, alternatives, component_words, joined, listed, plural, vector
 from mechgraph.structure.kind import Kind
 from mechgraph.structure.uniqueness import Uniqueness
 
-DROPPED = 1e-9
-"""Part of the margin above which a dropped singular value is reported rather than the margin."""
-LINE = 80
-"""Longest list of names in a sentence that is not counted instead."""
 SETS = 3
 """Most sets of components that the verdict names."""
 
@@ -40,7 +36,8 @@ def _near(r: Facts) -> str:
         return ""
     if r.dead_point:
         return f" Near a dead point: {weakest_drive(r)} hardly moves when the mechanism does."
-    if r.dropped > r.margin * DROPPED:
+    # part of the margin above which a dropped singular value is reported rather than the margin
+    if r.dropped > r.margin * 1e-9:
         return f" Near another verdict: a singular value of {r.dropped:.2g} of the largest was taken for zero."
     if not r.near_other_rank and r.reactions:
         return f" Near another verdict: {_doubtful_part(r.reactions)}."
@@ -127,7 +124,8 @@ def here_only(names: Sequence[str]) -> str:
     """What looks passive where the mechanism stands, behind the freedoms that are not; empty where nothing does."""
     if not names:
         return ""
-    shown = joined(names) if len(names) <= SETS and len(joined(names)) <= LINE else f"{len(names)} motions"
+    # longest list of names in a sentence that is not counted instead
+    shown = joined(names) if len(names) <= SETS and len(joined(names)) <= 80 else f"{len(names)} motions"
     return f" ({shown}: passive in this position only)"
 
 
@@ -385,3 +383,73 @@ def count_line(r: Facts) -> str:
     parts = ", ".join(f"{r.excess[key]} {words}" for key, words in why.items() if r.excess.get(key))
     verb = "repeats" if r.redundancy == 1 else "repeat"
     return f"{line}: {r.redundancy} of {r.equation_count} closure equations {verb} others (redundancy; {parts})."
+
+
+LINES = 25
+"""Most lines of text on 80 columns."""
+CHANGES = 4
+"""Most changes of pairs that are advised here."""
+HOW_MUCH = "What is not unique depends on fits, stiffness and temperature; how much force a misfit locks in, a rigid model cannot know."
+MORE = "All the facts: report.text(full=True), mechgraph check --full."
+
+
+def document(r: Facts, first: tuple[Paragraph, ...] = ()) -> Document:
+    """The page, with what stands ``first`` on it; what comes last in a list is left to the whole report where there is no room."""
+    parts = {title: [_sentence(line) for line in told(r)] for title, told in PARTS.items()}
+    while True:
+        items = [item for title, lines in parts.items() if lines for item in (title, lines)]
+        blocks: list[Block] = [*first, Paragraph(verdict(r)), *_note(r), Bullets(items), Paragraph(MORE)]
+        page = Document(f"Determinacy of {r.mechanism.name}", tuple(blocks))
+        longest = max(parts.values(), key=len)
+        if len(to_text(page).splitlines()) <= LINES or len(longest) < 2:
+            return page
+        longest.pop()
+
+
+def _note(r: Facts) -> list[Paragraph]:
+    return [Paragraph(r.note)] if r.note else []
+
+
+def _to_do(r: Facts) -> Iterator[str]:
+    """What to change, the drivers first; for a determinate mechanism nothing."""
+    yield from (a.text for a in r.advice if a.effect is None)
+    if r.contradicting_drives and r.mobility and not r.suggested_drives:
+        yield "the declared drivers depend on each other: take one away"
+    bearing = [p for p in r.passive if p.load_bearing]
+    for p in bearing:
+        what = "couple" if p.turns else "force"
+        yield f"hold {p.name} or balance the load on it: a {what} of {p.size} moves it, and no part takes that"
+    yield from alternatives(r.advice)[:CHANGES]
+    if r.determinate and not r.near and not bearing:
+        yield "nothing: equilibrium alone gives every force"
+
+
+def _trusted(r: Facts) -> Iterator[str]:
+    """What is unique, what is not and why, how sure that is, what was counted."""
+    known = r.reactions
+    if known:
+        efforts = known.is_unique[known.components.efforts]
+        driven = (
+            ["the driver effort" if len(efforts) == 1 else "all driver efforts"]
+            if efforts.any() and efforts.all()
+            else []
+        )
+        # most pairs named for one set of components
+        some = [f"{words} of {listed(pairs, 4)}" for words, pairs, _ in patterns(known, known.is_unique)]
+        some = ["every reaction"] if known.all_unique else some
+        yield f"unique, as equilibrium alone gives it: {'; '.join(some + driven) or 'nothing'}"
+        if not known.all_unique:
+            yield HOW_MUCH
+    yield from doubts(r)
+    yield from filter(None, (kind_line(r), count_line(r)))
+    yield from motion_line(r)
+    if r.passive and not any(p.load_bearing for p in r.passive):
+        yield f"{spins(r)} {'carries' if len(r.passive) == 1 else 'carry'} no load and move{'s' * (len(r.passive) == 1)} no other link"
+
+
+def _sentence(text: str) -> str:
+    return f"{text[0].upper()}{text[1:].removesuffix('.')}."
+
+
+PARTS: dict[str, Callable[[Facts], Iterator[str]]] = {"What to do:": _to_do, "What may be trusted:": _trusted}
+"""The parts of the page."""

@@ -14,7 +14,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.arguments import place_among
 from mechgraph.data import json_text, plain
 from mechgraph.document import Document, Shown, to_text
-from mechgraph.equations.state import State
+from mechgraph.equations.terms import State
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.newton import Work

@@ -11,7 +11,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array, cross
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.rates import Rates
-from mechgraph.equations.state import MovingState
+from mechgraph.equations.terms import MovingState
 from mechgraph.errors import MechgraphError
 from mechgraph.force.applied_loads import inertia_wrenches, user_poses, user_twists
 from mechgraph.force.dalembert import internal_state

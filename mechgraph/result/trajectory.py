@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, cross, rotate
-from mechgraph.equations.state import State
+from mechgraph.equations.terms import State
 from mechgraph.errors import MechgraphError
 from mechgraph.force.applied_loads import Site, inertia_wrenches, kinetic_energy, user_poses, user_twists
 from mechgraph.force.dalembert import given_effort_loads

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.indexing import Index
 from mechgraph.document import Document, Shown, Table
-from mechgraph.equations.state import State
+from mechgraph.equations.terms import State
 from mechgraph.model.load_base import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.newton import Work

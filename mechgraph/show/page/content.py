@@ -9,8 +9,8 @@ import numpy as np
 
 from mechgraph.document.tree import plain
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.report.findings import component_words
 from mechgraph.report.report import DeterminacyReport, check
-from mechgraph.report.words import component_words
 from mechgraph.result.numbers import with_unit
 from mechgraph.result.solution import Solution
 from mechgraph.show.page.changes import compared, stress_arrows

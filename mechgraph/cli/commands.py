@@ -1,0 +1,520 @@
+"""Commands that print and write tables: from ``list`` and ``check`` to ``solve``, ``respond`` and ``loads``."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import typer
+
+import mechgraph as mg
+from mechgraph.cli.options import (
+    NO_ANSWER,
+    Actuate,
+    AsJson,
+    At,
+    Bookkeeping,
+    Compare,
+    Drivers,
+    Drives,
+    Engine,
+    EquationsAt,
+    Include,
+    Method,
+    MotionEngine,
+    Named,
+    OnReach,
+    Out,
+    Outputs,
+    OverTime,
+    Redundant,
+    Tolerance,
+    check_out,
+    fail,
+    loaded,
+    progress,
+    refuse_own_file,
+    show,
+    show_compared,
+    working,
+    write,
+)
+from mechgraph.cli.records import (
+    FileData,
+    LibraryItem,
+    ListData,
+    Written,
+    check_data,
+    equations_data,
+    loads_data,
+    structure_data,
+    write_json,
+)
+from mechgraph.compiled.tabled import tabled
+from mechgraph.compiled.write import WRITTEN, InputsName, write_tables
+from mechgraph.document import Document, Table
+from mechgraph.equations.formulation import FORMATS as WRITINGS
+from mechgraph.exchange.files import WRITERS
+from mechgraph.result.export import FORMATS
+from mechgraph.result.load_files import FORMATS as LOAD_FILES
+from mechgraph.typed import drives_of, duration, longest, motions_of, parse_at, refuse
+from mechgraph.writing import formats_text
+
+
+def list_library(json: AsJson = False) -> None:
+    """Name the mechanisms of the library, with what they are.
+
+    Example: mechgraph list --json
+    """
+    found = {name: mg.load(name) for name in mg.library()}
+    if json:
+        items = [
+            LibraryItem(name, m.description, m.link_names(), {p.name: p.type.symbol for p in m.pairs})
+            for name, m in found.items()
+        ]
+        write_json("list", ListData(tuple(items)))
+        return
+    rows = [(name, " ".join(p.type.symbol for p in m.pairs), m.description) for name, m in found.items()]
+    show(Document("", (Table(("name", "pairs", "description"), tuple(rows)),)))
+
+
+def save(
+    mechanism: Named,
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            help=f"What is written; the suffix says how: .toml, {formats_text(WRITERS)}; others are TOML.",
+        ),
+    ],
+    advice: Annotated[
+        int | None,
+        typer.Option(
+            "--advice", metavar="NUMBER", help="Changed as 'check --json' advises, by the number of the advice from 0."
+        ),
+    ] = None,
+    json: AsJson = False,
+) -> None:
+    """Write a mechanism as another file: TOML, which holds all of it, or what other programs read.
+
+    Example: mechgraph save four-bar --advice 0 --out better.toml
+
+    Exit status: 0 done; 1 it cannot be assembled, where the file holds it at its start; 2 wrong usage or bad input.
+    """
+    refuse_own_file(out, mechanism)
+    m = loaded(mechanism)
+    if advice is not None:
+        known = mg.check(m).advice
+        if not 0 <= advice < len(known):
+            refuse(f"--advice {advice}", f"there are {len(known)}, counted from 0: mechgraph check {mechanism} --json")
+        m = known[advice].apply()
+    mg.save(m, out)
+    if json:
+        write_json("save", FileData(m.name, str(out)))
+    else:
+        write(f"Wrote {out}.\n")
+
+
+def check(
+    mechanism: Named,
+    json: AsJson = False,
+    markdown: Annotated[bool, typer.Option("--markdown", help="The report as Markdown.")] = False,
+    full: Annotated[
+        bool, typer.Option("--full", help="The whole report: every pair, self-stress, loop and count.")
+    ] = False,
+    at: At = None,
+    engine: Engine = "auto",
+    compared: Compare = False,
+    tol: Tolerance = None,
+    limit: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TIME", help="How long each search of the report may take, 20s by itself; it says what was left."
+        ),
+    ] = None,
+) -> None:
+    """Print the determinacy report: the verdict, what to do, and what may be trusted; with --full all of it.
+
+    Example: mechgraph check four-bar --at A=30deg --full
+
+    Exit status: 0 where forces can be solved; 1 where the loops cannot be closed, drivers depend on each other or have nothing
+    to move, or a freedom is neither driven nor passive. Redundancy is information: a mechanism some of whose reactions are not
+    unique has exit status 0, and so has a topology without geometry. 2 wrong usage or bad input.
+    """
+    if json + markdown + compared > 1:
+        refuse("check", "--json, --markdown and --compare exclude each other")
+    m = loaded(mechanism)
+    values = dict(parse_at(m, text) for text in at or ())
+    bounded = {} if limit is None else {"limit": longest(limit, "--limit")}
+    with working(f"checking {m.name}: what can move"):
+        report = mg.check(m, at=values or None, engine=engine, tol=tol, **bounded)
+    with working(f"checking {m.name}: what is unique, what to do"):
+        data = check_data(m, report) if json else {}
+        text = report.to_markdown(full) if markdown else ""
+        document = report.document(full)
+    not_closed = m.has_geometry and report.mobility is None
+    bearing = any(p.load_bearing for p in report.passive)
+    unsolvable = not_closed or report.undriven or report.contradicting_drives
+    doubtful = report.near or bearing or not report.determinate
+    if json:
+        write_json("check", data)
+    elif text:
+        write(text)
+    else:
+        show(document, "red" if unsolvable else "yellow" if doubtful else "green")
+    if compared:
+        show_compared(mechanism)
+    if unsolvable:
+        raise typer.Exit(NO_ANSWER)
+
+
+def structure(
+    mechanism: Named,
+    driver: Drivers = None,
+    at: At = None,
+    engine: Engine = "auto",
+    tol: Tolerance = None,
+    json: AsJson = False,
+) -> None:
+    """Print the structure as the textbooks tell it: kinematic chain, mobility table and families, structural groups.
+
+    Example: mechgraph structure windows-2 --driver A1
+
+    Exit status: 0 done; 1 where the drivers leave links undetermined, or the loops cannot be closed; 2 wrong usage or bad input.
+    """
+    m = loaded(mechanism)
+    values = dict(parse_at(m, text) for text in at or ())
+    with working(f"structure of {m.name}"):
+        found = mg.structure(m, driver or None, at=values or None, engine=engine, tol=tol)
+        data = structure_data(found) if json else None
+        document = found.document()
+    if data:
+        write_json("structure", data)
+    else:
+        show(document)
+    if found.groups.free:
+        raise typer.Exit(NO_ANSWER)
+
+
+def solved_at(m: mg.Mechanism, at: list[str]) -> mg.Solution:
+    """The one position that is named, with its rates."""
+    motions = drives_of(m, at, "--at")
+    if any(np.ndim(motion.position) for motion in motions.values()):
+        refuse("--at", "expected one position, e.g. A=30deg@10")
+    with working("solving"):
+        return mg.solve(m, motions)
+
+
+def equations(
+    mechanism: Named,
+    latex: Annotated[bool, typer.Option("--latex", help="As LaTeX.")] = False,
+    bookkeeping: Bookkeeping = "lee",
+    blocks: Annotated[bool, typer.Option("--blocks", help="Vector equations only, without their components.")] = False,
+    coefficients: Annotated[bool, typer.Option("--coefficients", help="The table of nonzero coefficients.")] = False,
+    csv: Annotated[bool, typer.Option("--csv", help="The table of nonzero coefficients as CSV.")] = False,
+    unknowns: Annotated[
+        Literal["kinetostatics", "response"],
+        typer.Option(help="What is sought: forces for a given motion, or accelerations beside the reactions."),
+    ] = "kinetostatics",
+    at: EquationsAt = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            help=f"Write them; the suffix says how: {formats_text(WRITINGS)}, the first compiles.",
+        ),
+    ] = None,
+    json: AsJson = False,
+) -> None:
+    """Print the closure equations, the d'Alembert equations of every link and the conditions of the pairs; needs no geometry.
+
+    With --at the coefficients {Q}, the right sides {C} and the unknowns {u} with numbers, at one position.
+
+    Example: mechgraph equations rcsr --at O1=160deg@0.1
+
+    Exit status: 0 done; 1 the mechanism has no such position; 2 wrong usage or bad input.
+    """
+    if (latex or blocks) and (coefficients or csv):
+        refuse("equations", "--coefficients and --csv print a table, --latex and --blocks equations; take one of them")
+    if at and (latex or blocks):
+        refuse("equations", "--at prints a table of numbers, --latex and --blocks equations; take one of them")
+    if json and (latex or blocks or coefficients or csv or out):
+        refuse("equations", "--json prints all; leave out --latex, --blocks, --coefficients, --csv and --out")
+    if out and (latex or coefficients or csv or at):
+        refuse("equations", "--out writes what its suffix says; leave out --latex, --coefficients, --csv and --at")
+    check_out(out, mechanism, WRITINGS)
+    m = loaded(mechanism)
+    s = solved_at(m, at) if at else None
+    f = mg.formulate(s.mechanism if s else m, bookkeeping, unknowns=unknowns)
+    if json:
+        write_json("equations", equations_data(f, s))
+    elif out is not None:
+        f.write(out, components=not blocks)
+        write(f"Wrote {out}: {len(f.unknowns)} unknowns, {len(f.equations)} equations.\n")
+    elif csv or coefficients or at:
+        table = f.coefficients(s.state() if s else None)
+        names = "" if csv or not at else "".join(f"u({i}): {u.name}\n" for i, u in enumerate(f.unknowns, 1))
+        write(names + (table.csv() if csv else table.text()))
+    elif latex:
+        write(f.latex(components=not blocks))
+    else:
+        show(f.document(components=not blocks))
+
+
+Told = list[Document] | dict[str, Any]
+"""Documents to be shown, or a record."""
+
+
+def solve(
+    mechanism: Named,
+    drive: Drives = None,
+    actuate: Actuate = None,
+    out: Out = None,
+    include: Include = None,
+    method: Method = "loop_wrench",
+    redundant: Redundant = "nan",
+    on_reach: OnReach = "raise",
+    engine: MotionEngine = "auto",
+    transmission: Outputs = None,
+    compared: Compare = False,
+    tol: Tolerance = None,
+    over_time: OverTime = False,
+    json: AsJson = False,
+) -> None:
+    """Solve positions, efforts of the drivers and all reactions, print a summary and write a table.
+
+    Example: mechgraph solve 7r --drive O1=0:360:5deg@10 --out 7r.csv
+
+    Exit status: 0 done; 1 the loops cannot be closed, a position is out of reach or a dead point (unless flagged and others were
+    solved), a freedom is neither driven nor passive, or drivers contradict each other; 2 wrong usage or bad input. A file is
+    written whole or not at all.
+    """
+    if json and compared:
+        refuse("solve", "--json and --compare exclude each other")
+    check_out(out, mechanism, FORMATS)
+    m = loaded(mechanism)
+    motions = motions_of(m, drive or ())
+    with progress(f"solving {m.name}") as moved, warnings.catch_warnings():
+        warnings.simplefilter("ignore", mg.MechgraphWarning)  # the summary has them
+        how: dict[str, Any] = {"method": method, "redundant": redundant, "on_reach": on_reach, "engine": engine}
+        s = mg.solve(m, motions or None, actuate=actuate, tol=tol, progress=moved, **how)
+    with working(f"summary of {m.name}"):
+        told, written = _told(s, out, tuple(include or ()), json, over_time)
+        angles = [mg.transmission(s, name) for name in transmission or ()]
+        if isinstance(told, dict):
+            told |= {"transmission": [found.to_dict() for found in angles]}
+        else:
+            told += [found.document() for found in angles]
+    _tell("solve", told, written)
+    if compared:
+        show_compared(mechanism)
+    if not (np.asarray(s.status) == "ok").any():
+        raise typer.Exit(NO_ANSWER)
+
+
+def _told(
+    s: mg.Solution, out: Path | None, include: tuple[Any, ...], json: bool, over_time: bool
+) -> tuple[Told, Written | None]:
+    """What is told of a solution, and the file that was written."""
+    figures = mg.over_time(s) if over_time else None
+    told: Told = [s.document(asked=True), *([figures.document()] if figures else [])]
+    if json:
+        told = s.to_dict() | {"over_time": figures and figures.to_dict()}
+    if out is None:
+        return told, None
+    s.write(out, include)
+    return told, Written(str(out), s.status.size, len(s.part(slice(1)).columns(include)))
+
+
+def _tell(command: str, told: Told, written: Written | None) -> None:
+    if isinstance(told, dict):
+        write_json(command, told, written=written)
+        return
+    for place, document in enumerate(told):
+        write("\n" * bool(place))
+        show(document)
+    if written is not None:
+        write(f"\nWrote {written.file}: {written.rows} rows, {written.columns} columns.\n")
+
+
+def respond(
+    mechanism: Named,
+    span: Annotated[
+        str | None,
+        typer.Option("--for", metavar="TIME", help="How long: 10s. Left out, as [response] of the file says."),
+    ] = None,
+    start: Annotated[
+        list[str] | None, typer.Option("--start", metavar="FREEDOM=VALUE", help="Coordinate at the beginning (repeat).")
+    ] = None,
+    rate: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--rate", metavar="FREEDOM=VALUE", help="Rate at the beginning: A=2, A=90deg a unit of time (repeat)."
+        ),
+    ] = None,
+    points: Annotated[
+        int | None,
+        typer.Option("--points", min=2, help="Number of output times, evenly spread; without it the steps taken."),
+    ] = None,
+    out: Out = None,
+    include: Include = None,
+    method: Annotated[
+        Literal["auto", "RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"] | None,
+        typer.Option(help="Stepper of scipy; Radau for stiff loads."),
+    ] = None,
+    rtol: Annotated[float | None, typer.Option(help="Relative tolerance of a step, 1e-8 by itself.")] = None,
+    atol: Annotated[
+        float | None,
+        typer.Option(help="Absolute tolerance (radians, lengths / L, and their rates), 1e-10 by itself."),
+    ] = None,
+    max_step: Annotated[
+        str | None,
+        typer.Option("--max-step", metavar="TIME", help="Longest step: 5ms. By itself as the tolerances allow."),
+    ] = None,
+    passive: Annotated[
+        Literal["free", "held"] | None, typer.Option(help="Whether passive freedoms move freely, or are held at rest.")
+    ] = None,
+    engine: MotionEngine = "auto",
+    over_time: OverTime = False,
+    json: AsJson = False,
+) -> None:
+    """Follow the motion that the loads produce, print a summary with the energy balance and write a table.
+
+    What is left out is that of [response] of the file, where it has one.
+
+    Example: mechgraph respond windows-2 --for 500ms --rate A0=-1
+
+    Exit status: 0 done; 1 the loops cannot be closed, or the motion cannot be followed to its end (what there is is written); 2 wrong
+    usage or bad input. Ctrl-C keeps what was computed. A file is written whole or not at all.
+    """
+    check_out(out, mechanism, FORMATS)
+    m = loaded(mechanism)
+    begin = dict(parse_at(m, text, "--start") for text in start or ())
+    rates = dict(parse_at(m, text, "--rate") for text in rate or ())
+    declared = m.units.get("time", "s")
+    if span is not None:
+        times = np.array([0.0, duration(span, "--for", declared)])
+    elif m.response is not None:
+        times = m.response.times
+    else:
+        refuse("respond", "how long? Give --for TIME; the mechanism has no [response] that says it")
+    given = {m.full_name(d.freedom) for d in (m.response.motions if m.response else ())}
+    still = [d.freedom for d in m.drives if isinstance(d.motion, mg.Motion) and d.motion.t is None]
+    if still := [name for name in still if m.full_name(name) not in given]:
+        refuse(
+            "respond",
+            f"the stored motion of {', '.join(still)} has no times; add t = [...], a time for each position, to its [drive.motion] in "
+            "the file, or leave that out: the freedom then moves as the loads drive it",
+        )
+    longest_step = None if max_step is None else longest(max_step, "--max-step", declared)
+    t = np.linspace(times[0], times[-1], points) if points else times
+    with progress(f"moving {m.name}", float(times[-1])) as moved, warnings.catch_warnings():
+        warnings.simplefilter("ignore", mg.MechgraphWarning)  # the summary has them
+        r = mg.respond(
+            m, t, start=begin or None, rates=rates or None, rtol=rtol, atol=atol, method=method, passive=passive, engine=engine,
+            max_step=longest_step, on_stop="return", progress=moved,
+        )  # fmt: skip
+    with working(f"summary of {m.name}"):
+        told = _told(r, out, tuple(include or ()), json, over_time)
+    _tell("respond", *told)
+    if r.stopped:
+        fail(r.stopped, NO_ANSWER)
+
+
+def loads(
+    mechanism: Named,
+    link: Annotated[str, typer.Argument(metavar="LINK", help="The link.")],
+    drive: Drives = None,
+    actuate: Actuate = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="FILE", help=f"Write the loads; the suffix says how: {formats_text(LOAD_FILES)}."
+        ),
+    ] = None,
+    at: Annotated[
+        str, typer.Option("--at", metavar="POSITIONS", help="'worst', 'all', or the number of a position, from 0.")
+    ] = "worst",
+    model: Annotated[str, typer.Option(help="Deck: file with mesh and couplings, to be included.")] = "",
+    held: Annotated[
+        str, typer.Option(help="Deck: what acts where your model is held, e.g. a pair; a reaction there.")
+    ] = "",
+    couples: Annotated[float | None, typer.Option(help="Deck: moments as two forces at this distance.")] = None,
+    inertia: Annotated[
+        Literal["wrench", "acceleration"] | None,
+        typer.Option(help="Deck: inertia as a force and couple on a node (wrench), or as loads of the elements."),
+    ] = None,
+    redundant: Redundant = "nan",
+    on_reach: OnReach = "raise",
+    engine: Engine = "auto",
+    tol: Tolerance = None,
+    json: AsJson = False,
+) -> None:
+    """Print what acts on a link over the positions, in its own frame and in balance, and write it as a table or a load deck.
+
+    Example: mechgraph loads 7r link3 --drive O1=0:360:5deg@10 --at all
+
+    Exit status: 0 done; 1 as for solve; 2 wrong usage or bad input, or something that is not unique would have to be written as known.
+    """
+    check_out(out, mechanism, LOAD_FILES)
+    m = loaded(mechanism)
+    if at not in ("worst", "all") and not re.fullmatch(r"-?\d+", at):
+        refuse(f"--at {at!r}", "expected worst, all, or the number of a position, from 0")
+    places: Any = at if at in ("worst", "all") else int(at)
+    options = {"model": model, "held": held, "couples": couples, "inertia": inertia}
+    m.place_of_link(link)
+    motions = motions_of(m, drive or ()) or None
+    with working(f"solving {m.name}"):
+        s = mg.solve(m, motions, actuate=actuate, redundant=redundant, on_reach=on_reach, engine=engine, tol=tol)
+        body = mg.free_body(s, link)
+        document = body.document(places)
+        if out is not None:
+            body.write(out, places, **{name: value for name, value in options.items() if value})
+    if json:
+        write_json("loads", loads_data(body, places, None if out is None else str(out)))
+        return
+    show(document)
+    if out is not None:
+        write(f"\nWrote {out}: {len(body.cases(places))} positions.\n")
+
+
+def compile_(
+    mechanism: Named,
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="FILE", help=f"The suffix says how: {formats_text(WRITTEN)}.")
+    ],
+    name: Annotated[
+        str | None,
+        typer.Option("--name", metavar="NAME", help="What symbols begin with; left out, the name of the file."),
+    ] = None,
+    inputs: Annotated[
+        InputsName,
+        typer.Option(
+            "--inputs",
+            help="What is given of the drives: their motion, or their efforts, under which the motion is followed as well.",
+        ),
+    ] = "motion",
+    json: AsJson = False,
+) -> None:
+    """Write a mechanism as C99 that runs by itself, for a controller, or as a unit for co-simulation (FMI 2.0).
+
+    The C needs no compiler here: positions, efforts of the drives and reactions by the equations that 'mechgraph equations' prints.
+
+    Exit status: 0 done; 1 the loops cannot be closed, or a freedom is neither driven nor passive; 2 wrong usage or bad input, or the
+    kernel does not carry the mechanism.
+
+    Example: mechgraph compile four-bar --out press.c
+    """
+    check_out(out, mechanism, WRITTEN)
+    m = loaded(mechanism)
+    with working(f"compiling {m.name}"):
+        write_tables(tabled(m), out, name, inputs)
+    if json:
+        write_json("compile", FileData(m.name, str(out)))
+    else:
+        write(f"Wrote {out}.\n")

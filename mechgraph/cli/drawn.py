@@ -1,0 +1,303 @@
+"""Commands whose answer can be drawn: ``plot`` (pictures and films), ``report``, ``assemblies``, ``branches``."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+import mechgraph as mg
+from mechgraph import show as pictures
+from mechgraph.cli.options import (
+    NO_ANSWER,
+    NO_ANSWERS,
+    Actuate,
+    AsJson,
+    At,
+    Drives,
+    Engine,
+    Method,
+    Named,
+    OnReach,
+    Redundant,
+    Tolerance,
+    freedoms,
+    loaded,
+    progress,
+    refuse_own_file,
+    show,
+    working,
+    write,
+)
+from mechgraph.cli.records import FileData, PlotData, write_json
+from mechgraph.show.animation import FORMATS as FILMS
+from mechgraph.show.animation import PICTURES
+from mechgraph.typed import drives_of, motions_of, parse_at, refuse
+from mechgraph.writing import format_of, formats_text
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What was asked for beside the kind of picture."""
+
+    of: tuple[str, ...]
+    over: str | None
+    position: int
+    forces: bool
+    moment: bool
+
+    def one(self, what: str) -> str:
+        """The one name that a picture needs."""
+        if len(self.of) != 1:
+            refuse(what, "needs the name of one pair: --of A")
+        return self.of[0]
+
+
+@dataclass(frozen=True)
+class _Picture:
+    """A kind of picture: whether it needs a motion, with forces, and how it is drawn."""
+
+    draw: Callable[[Any, _Asked], Any]
+    moves: bool = True
+    forces: bool = False
+
+
+KINDS: dict[str, _Picture] = {
+    "skeleton": _Picture(lambda s, a: pictures.draw_skeleton(s, a.position, forces=a.forces, highlight=a.of)),
+    "graph": _Picture(lambda m, a: pictures.draw_graph(m), moves=False),
+    "structure": _Picture(lambda m, a: pictures.draw_structure(m), moves=False),
+    "groups": _Picture(lambda m, a: pictures.draw_structure(m, groups=mg.groups(m)), moves=False),
+    "equations": _Picture(lambda m, a: pictures.draw_sparsity(mg.formulate(m)), moves=False),
+    "efforts": _Picture(lambda s, a: pictures.effort_curve(s, a.of or None, over=a.over), forces=True),
+    "reaction": _Picture(
+        lambda s, a: pictures.reaction_curve(s, a.one("reaction"), moment=a.moment, over=a.over), forces=True
+    ),
+    "ranges": _Picture(lambda s, a: pictures.reaction_ranges(s, moment=a.moment), forces=True),
+    "polar": _Picture(lambda s, a: pictures.polar_force(s, a.one("polar")), forces=True),
+    "path": _Picture(lambda s, a: pictures.point_path(s, a.of or None)),
+    "hodograph": _Picture(lambda s, a: pictures.hodograph(s, a.of or None)),
+    "margin": _Picture(lambda s, a: pictures.margin_curve(s, over=a.over)),
+}
+
+
+def _kinds(incomplete: str) -> list[str]:
+    return [kind for kind in KINDS if kind.startswith(incomplete)]
+
+
+def plot(
+    mechanism: Named,
+    what: Annotated[
+        str, typer.Argument(metavar="WHAT", autocompletion=_kinds, help=f"What is drawn: {', '.join(KINDS)}.")
+    ] = "skeleton",
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            help=f"The file; the suffix says how: {formats_text(PICTURES)}, of a skeleton also {formats_text(FILMS[:2])}. "
+            "Left out, NAME.png here.",
+        ),
+    ] = None,
+    of: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--of",
+            metavar="NAME",
+            help="The pair, freedom or point that is shown (repeat); of a skeleton pairs to highlight.",
+        ),
+    ] = None,
+    over: Annotated[
+        str | None,
+        typer.Option(
+            "--over",
+            metavar="FREEDOM",
+            help="What curves are drawn over: a freedom, t, or position; the first driver without it.",
+        ),
+    ] = None,
+    position: Annotated[int, typer.Option("--position", help="Number of the position that a skeleton shows.")] = 0,
+    frames: Annotated[
+        int | None, typer.Option("--frames", min=1, help="Frames of a film; without it one a position, at most 72.")
+    ] = None,
+    forces: Annotated[bool, typer.Option("--forces", help="Reaction forces as arrows in a skeleton.")] = False,
+    moment: Annotated[bool, typer.Option("--moment", help="Moments rather than forces of reactions.")] = False,
+    drive: Drives = None,
+    actuate: Actuate = None,
+    on_reach: OnReach = "raise",
+    tol: Tolerance = None,
+    json: AsJson = False,
+) -> None:
+    """Draw a picture, or a film of the skeleton.
+
+    Example: mechgraph plot four-bar reaction --of B --out B.svg
+
+    Exit status: 0 done; 1 the mechanism has no answer (the message says why); 2 wrong usage or bad input. A file is written whole or not
+    at all.
+    """
+    if what not in KINDS:
+        refuse(f"WHAT {what!r}", f"expected one of {', '.join(KINDS)}")
+    kind, m = KINDS[what], loaded(mechanism)
+    target = Path(f"{Path(mechanism).stem}.png") if out is None else out
+    film = what == "skeleton" and (
+        frames is not None or target.suffix.lower() in (s for one in FILMS[:2] for s in one.suffixes)
+    )
+    refuse_own_file(target, mechanism)
+    format_of(target, FILMS if film else PICTURES)
+    asked = _Asked(tuple(of or ()), over, position, forces, moment)
+    still = what == "skeleton" and not (film or drive or any(d.motion is not None for d in m.drives))
+    moves = kind.moves and not still
+    motions = (motions_of if moves else drives_of)(m, drive or ())
+    with working(f"drawing {m.name}"):
+        drawn: Any = m
+        if moves:
+            how: dict[str, Any] = {"on_reach": on_reach, "tol": tol}
+            needs = kind.forces or forces
+            drawn = (
+                mg.solve(m, motions or None, actuate=actuate, **how)
+                if needs
+                else mg.kinematics(m, motions or None, **how)
+            )
+        if not film:
+            pictures.save_picture(kind.draw(drawn, asked), target)
+    if film:
+        count = frames or min(int((np.asarray(drawn.status) == "ok").sum()), 72)
+        with progress(f"drawing {m.name}", count) as reached:
+            each = None if reached is None else lambda done, of_all: reached(done)
+            pictures.animate(drawn, target, frames=frames, forces=forces, progress=each)
+    if json:
+        write_json("plot", PlotData(m.name, what, str(target)))
+    else:
+        write(f"Wrote {target}.\n")
+
+
+def report(
+    mechanism: Named,
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.html", help="The page: one file, without network.")],
+    drive: Drives = None,
+    actuate: Actuate = None,
+    method: Method = "loop_wrench",
+    redundant: Redundant = "nan",
+    on_reach: OnReach = "flag",
+    engine: Engine = "auto",
+    tol: Tolerance = None,
+    json: AsJson = False,
+) -> None:
+    """Write a page to pass on: verdict, determinacy report, the mechanism in space, curves, tables, equations.
+
+    Without --drive the stored motion is solved, where all drivers store one; else the page shows the mechanism as it stands.
+
+    Exit status: 0 done; 1 the loops cannot be closed for a motion, a freedom is neither driven nor passive, drivers contradict each
+    other, or a position cannot be reached (the page says what there is); 2 wrong usage or bad input. The file is written whole or not
+    at all.
+
+    Example: mechgraph report four-bar -o four-bar.html
+    """
+    refuse_own_file(out, mechanism)
+    m = loaded(mechanism)
+    motions = drives_of(m, drive or ())
+    stored = bool(m.drives) and all(d.motion is not None for d in m.drives)
+    s, failure = None, None
+    with working(f"writing the page of {m.name}"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", mg.MechgraphWarning)  # the page has them
+        if motions or actuate or stored:
+            how: dict[str, Any] = {"method": method, "redundant": redundant, "on_reach": on_reach, "engine": engine}
+            try:
+                s = mg.solve(m, motions or None, actuate=actuate, tol=tol, **how)
+            except NO_ANSWERS as error:
+                failure, s = error, getattr(error, "solution", None)
+        mg.write_report(m, s, path=out)
+    if json:
+        write_json("report", FileData(m.name, str(out)))
+    else:
+        write(f"Wrote {out}: {out.stat().st_size / 1e6:.2f} MB.\n")
+    if failure is not None:
+        raise failure
+    if s is not None and not (np.asarray(s.status) == "ok").any():
+        raise typer.Exit(NO_ANSWER)
+
+
+Picture = Annotated[
+    Path | None,
+    typer.Option("--out", metavar="FILE", help=f"Also draw them; the suffix says how: {formats_text(PICTURES)}."),
+]
+
+
+def assemblies(mechanism: Named, at: At = None, out: Picture = None, json: AsJson = False) -> None:
+    """Find all real assemblies with drivers at given values, and say how sure it is that these are all.
+
+    Declared drives stay at their start, those that --at does not name as well.
+
+    Example: mechgraph assemblies four-bar --at A=30deg
+
+    Exit status: 0 done; 1 where there is no real assembly; 2 wrong usage or bad input.
+    """
+    _check_picture(out, mechanism)
+    m = loaded(mechanism)
+    at_start = {m.full_name(d.freedom): m.start.get(m.full_name(d.freedom), 0.0) for d in m.drives}
+    values = {m.full_name(name): value for name, value in (parse_at(m, text) for text in at or ())}
+    if values.keys() <= at_start.keys():
+        values = at_start | values
+    with working(f"assemblies of {m.name}"):
+        found = mg.assemblies(m, values)
+        figure = found.plot() if out is not None and len(found) else None
+    _tell("assemblies", found, figure, out, json)
+    if not len(found):
+        raise typer.Exit(NO_ANSWER)
+
+
+def branches(
+    mechanism: Named,
+    driver: Annotated[
+        str | None,
+        typer.Option(
+            "--driver",
+            metavar="FREEDOM",
+            autocompletion=freedoms,
+            help="The driver; left out, the first declared drive.",
+        ),
+    ] = None,
+    output: Annotated[
+        str | None, typer.Option("--output", metavar="FREEDOM", help="What a picture shows over the driver.")
+    ] = None,
+    out: Picture = None,
+    json: AsJson = False,
+) -> None:
+    """Follow every assembly over the range of a driver: branches, folds, circuits, full turns.
+
+    Example: mechgraph branches rssr --driver A --out rssr.svg
+
+    Exit status: 0 done; 1 where there is no branch; 2 wrong usage or bad input.
+    """
+    _check_picture(out, mechanism)
+    m = loaded(mechanism)
+    name = driver if driver is not None else next((d.freedom for d in m.drives), "")
+    with working(f"branches of {m.name}"):
+        found = mg.branches(m, name)
+        figure = found.plot(output).figure if out is not None and len(found) else None
+    _tell("branches", found, figure, out, json)
+    if not len(found):
+        raise typer.Exit(NO_ANSWER)
+
+
+def _check_picture(out: Path | None, mechanism: str) -> None:
+    """Refuse a picture that could not be written, before anything is computed."""
+    if out is not None:
+        refuse_own_file(out, mechanism)
+        format_of(out, PICTURES)
+
+
+def _tell(command: str, found: Any, figure: Any, out: Path | None, json: bool) -> None:
+    """What was found, as a table or a record, and the picture."""
+    drawn = None if figure is None or out is None else out
+    if drawn is not None:
+        pictures.save_picture(figure, drawn)
+    if json:
+        write_json(command, found.data, file=None if drawn is None else str(drawn))
+        return
+    show(found.document())
+    if drawn is not None:
+        write(f"\nWrote {drawn}.\n")
