@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 import mechgraph as mg
 from mechgraph.model.given_curves import CURVES
 from mechgraph.model.travel import Travel
-from mechgraph.show.symbols import symbol
+from mechgraph.show.shapes import symbol
 
 T = np.linspace(0.0, 1.0, 7)
 ANGLE = np.linspace(0, 2 * np.pi, 37)

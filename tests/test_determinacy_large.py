@@ -305,7 +305,7 @@ def test_all_self_stresses_are_listed(name: str, engine: Any) -> None:
 
 
 def test_an_unknown_engine_is_refused() -> None:
-    with pytest.raises(mg.DeclarationError, match="expected one of 'auto', 'dense', 'sparse'"):
+    with pytest.raises(mg.DeclarationError, match="expected one of 'auto', 'compiled', 'dense', 'sparse'"):
         mg.check(mg.load("four-bar"), engine="fast")  # type: ignore[arg-type]
 
 

@@ -169,10 +169,10 @@ def test_the_check_finds_a_circle(source: str) -> None:
 UPWARD = {
     ("model/mechanism.py", "snapped", "mechgraph.structure.snapping"),
     ("model/mechanism.py", "equivalent", "mechgraph.equivalent"),
-    ("model/mechanism.py", "view", "mechgraph.show.page.widget"),
-    ("result/solution.py", "view", "mechgraph.show.page.widget"),
-    ("modes/result.py", "plot", "mechgraph.show.modes"),
-    ("modes/branches.py", "plot", "mechgraph.show.modes"),
+    ("model/mechanism.py", "view", "mechgraph.show.page.write"),
+    ("result/solution.py", "view", "mechgraph.show.page.write"),
+    ("modes/result.py", "plot", "mechgraph.show.diagrams"),
+    ("modes/branches.py", "plot", "mechgraph.show.diagrams"),
 }
 """Methods that a user looks for on a class of a lower room: all they do is call, when they are called, a function of a room above."""
 

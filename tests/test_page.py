@@ -27,13 +27,13 @@ from test_hostile_names import NAMES, named
 
 import mechgraph as mg
 from mechgraph.show.canvas import PALETTE, REACTION
-from mechgraph.show.page import content, made
-from mechgraph.show.page.packing import json_for_script, packed
+from mechgraph.show.page import content, write
+from mechgraph.show.page.figures import json_for_script, packed
 from mechgraph.show.page.write import report_page
 
 pytestmark = pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
 
-WEB = Path(made.__file__).parent / "web"
+WEB = Path(write.__file__).parent / "web"
 SHOWN = ("four-bar", "rssr", "bricard-cube", "rcsr")
 """Redundant; with a passive freedom; without a stored motion; determinate."""
 SVG = {"svg", "metadata", "RDF", "Work", "type", "format", "title", "creator", "Agent", "defs", "style", "g", "path", "use", "text",

@@ -15,7 +15,7 @@ from test_show import check_texts, four_bar, texts_of
 import mechgraph as mg
 from mechgraph import show
 from mechgraph.errors import visible
-from mechgraph.show.margins import margins
+from mechgraph.show.curves import margins
 
 Z = (0.0, 0.0, 1.0)
 UNITS = {"length": "m", "mass": "kg", "time": "s"}

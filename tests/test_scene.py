@@ -5,8 +5,7 @@ import pytest
 
 import mechgraph as mg
 from mechgraph.show.scene import Part, Scene, scene
-from mechgraph.show.shapes import frame_along
-from mechgraph.show.symbols import symbol
+from mechgraph.show.shapes import frame_along, symbol
 
 Z = (0.0, 0.0, 1.0)
 

@@ -35,8 +35,8 @@ from mechgraph.cli.options import (
     write,
 )
 from mechgraph.cli.records import FileData, PlotData, write_json
-from mechgraph.show.animation import FORMATS as FILMS
-from mechgraph.show.animation import PICTURES
+from mechgraph.show.skeleton import FORMATS as FILMS
+from mechgraph.show.skeleton import PICTURES
 from mechgraph.typed import drives_of, motions_of, parse_at, refuse
 from mechgraph.writing import format_of, formats_text
 

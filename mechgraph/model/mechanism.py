@@ -330,7 +330,7 @@ class Mechanism(Parts, Once, Shown):
         DeclarationError
             where it cannot be drawn; MissingExtraError without anywidget.
         """
-        return importlib.import_module("mechgraph.show.page.widget").view(self)
+        return importlib.import_module("mechgraph.show.page.write").view(self)
 
     @door
     def moved(self, pose: Any) -> Mechanism:

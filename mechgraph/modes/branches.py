@@ -179,7 +179,7 @@ class Branches(Shown):
 
     def plot(self, output: str | None = None, *, ax: Any = None, current: int | None = None) -> Any:
         """A picture: ``output`` (a freedom) over the driver, all branches, folds marked, branch ``current`` highlighted; the axes."""
-        return importlib.import_module("mechgraph.show.modes").draw_branches(self, output, ax=ax, current=current)
+        return importlib.import_module("mechgraph.show.diagrams").draw_branches(self, output, ax=ax, current=current)
 
     def document(self) -> Document:
         """Branches and folds as tables, turns in degrees."""

@@ -131,7 +131,7 @@ class Assemblies(Shown, Sequence[Mechanism]):
 
     def plot(self) -> Any:
         """A picture of all assemblies side by side; the figure."""
-        return importlib.import_module("mechgraph.show.modes").draw_assemblies(self)
+        return importlib.import_module("mechgraph.show.diagrams").draw_assemblies(self)
 
     @property
     def data(self) -> AssembliesData:

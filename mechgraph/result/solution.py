@@ -266,7 +266,7 @@ class Solution(Shown):
             without anywidget.
         """
         # up to a room above: a user looks for it here
-        return importlib.import_module("mechgraph.show.page.widget").view(self)
+        return importlib.import_module("mechgraph.show.page.write").view(self)
 
     def place(self, index: int) -> str:
         """A position of the flat batch in words: the values of the drivers, or its time."""

@@ -1,13 +1,24 @@
-"""Figures and axes of matplotlib, asked for only when something is drawn; colours, and how axes look."""
+"""Where it is drawn: axes, colours, names, painting in depth, and places for texts and graphs."""
 
 from __future__ import annotations
 
 import functools
 import importlib
 import io
-from collections.abc import Sequence
-from typing import Annotated, Any
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import Annotated, Any, Protocol
 
+import matplotlib.patheffects as effects
+import networkx as nx
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.lines import Line2D
+from matplotlib.text import Text
+from matplotlib.transforms import IdentityTransform
+
+from mechgraph.algebra.se3 import Array
 from mechgraph.arguments import Wanted
 from mechgraph.errors import MissingExtraError, visible
 from mechgraph.model.mechanism import Mechanism
@@ -89,7 +100,7 @@ def said(text: str) -> str:
     return f"\u2009{plain_text}" if plain_text.startswith("_") else plain_text
 
 
-def with_unit(text: str, unit: str) -> str:
+def axis_label(text: str, unit: str) -> str:
     """``force [N]``; the text alone where there is no unit."""
     return said(f"{text} [{unit}]" if unit else text)
 
@@ -102,3 +113,493 @@ def colours(m: Mechanism, highlight: Sequence[str] = ()) -> dict[str, str]:
         ends = [link for p in m.pairs if p.name in highlight for link in (p.a, p.b)]
         out |= {k: FAINT for k in moving if ends.count(k) < min(2, len(highlight))}
     return out
+
+
+LIGHT = np.array([-0.45, 0.65, 0.75]) / np.linalg.norm([-0.45, 0.65, 0.75])
+"""Direction to the light: right, up, towards the viewer."""
+MARGIN = np.array([0.07, 0.13, 0.07])
+"""Part of a box that is left free beside, below and above a drawing: for names, and for the directions and the scale."""
+AMBIENT = 0.66
+"""Brightness of what lies in the shade."""
+
+
+class Painter(Protocol):
+    """Draws on axes ``ax``, seen with ``camera (3, 3)``: rows to the right, up, and towards the viewer."""
+
+    ax: Any
+
+    @property
+    def camera(self) -> Array:
+        """Directions to the right, up and towards the viewer."""
+
+    def polygons(self, corners: Sequence[Array], faces: Array, edges: Array, zorder: float) -> Any:
+        """Polygons ``(n, 3)`` with colours ``(count, 4)``, the nearest last."""
+
+    def lines(self, runs: Sequence[Array], **style: Any) -> Any:
+        """Polylines of one style."""
+
+    def marks(self, points: Array, **style: Any) -> Any:
+        """Markers at points."""
+
+    def pixels(self, points: Array) -> Array:
+        """Where points ``(n, 3)`` are on the screen, ``(n, 2)``."""
+
+    def fit(self, points: Array, room: Callable[[], Array]) -> None:
+        """Equal scales, at which points ``(n, 3)`` fill a box on the screen, with margins; ``room()`` gives the box."""
+
+    def fill(self, box: Array) -> None:
+        """Fill a box that may have changed, just before everything is drawn."""
+
+
+class FlatPainter:
+    """On axes of two dimensions."""
+
+    def __init__(self, ax: Any, camera: Array) -> None:
+        self.ax, self.camera = ax, camera
+        self._content = np.zeros((2, 2))
+        self._filled = np.zeros((2, 2))
+
+    def fit(self, points: Array, room: Callable[[], Array]) -> None:
+        """See ``Painter``."""
+        seen = points @ self.camera[:2].T
+        self._content = np.array([seen.min(axis=0), seen.max(axis=0)])
+        self.fill(room())
+
+    def fill(self, box: Array) -> None:
+        """See ``Painter``; the limits are set again where the box has another shape."""
+        if np.allclose(box, self._filled):
+            return
+        self._filled = box
+        whole = self.ax.bbox.get_points()
+        low, high = box[0] + MARGIN[:2] * (box[1] - box[0]), box[1] - MARGIN[[0, 2]] * (box[1] - box[0])
+        span = np.ptp(self._content, axis=0)
+        scale = float(np.max(span / (high - low))) or 1.0
+        begin = self._content.mean(axis=0) - scale * (0.5 * (low + high) - whole[0])
+        end = begin + scale * (whole[1] - whole[0])
+        self.ax.set_xlim(begin[0], end[0])
+        self.ax.set_ylim(begin[1], end[1])
+
+    def polygons(self, corners: Sequence[Array], faces: Array, edges: Array, zorder: float) -> Any:
+        """See ``Painter``."""
+        from matplotlib.collections import PolyCollection
+
+        order = np.argsort([float((p @ self.camera[2]).mean()) for p in corners], kind="stable")
+        flat = [corners[i] @ self.camera[:2].T for i in order]
+        drawn = PolyCollection(flat, facecolors=faces[order], edgecolors=edges[order], linewidths=0.7, zorder=zorder)
+        return self.ax.add_collection(drawn, autolim=False)
+
+    def lines(self, runs: Sequence[Array], **style: Any) -> Any:
+        """See ``Painter``."""
+        from matplotlib.collections import LineCollection
+
+        return self.ax.add_collection(LineCollection([run @ self.camera[:2].T for run in runs], **style), autolim=False)
+
+    def marks(self, points: Array, **style: Any) -> Any:
+        """See ``Painter``."""
+        return self.ax.scatter(*(points @ self.camera[:2].T).T, **style)
+
+    def pixels(self, points: Array) -> Array:
+        """See ``Painter``."""
+        return np.asarray(self.ax.transData.transform(np.asarray(points) @ self.camera[:2].T))
+
+
+class SpacePainter:
+    """On three-dimensional axes, which can be turned afterwards; the drawing fills its place again whenever they are."""
+
+    def __init__(self, ax: Any) -> None:
+        self.ax = ax
+        self._seen: tuple[float, ...] = ()
+
+    def fit(self, points: Array, room: Callable[[], Array]) -> None:
+        """See ``Painter``; matplotlib asks where the axes are just before it draws them, which is when they are fitted."""
+        self._points, self._room = points, room
+        self.ax.set_axes_locator(self._located)
+
+    def _located(self, ax: Any, renderer: Any) -> Any:
+        place = ax.get_position(original=True)
+        ax.apply_aspect(place)
+        box = self._room()
+        seen = (*np.round(box, 3).ravel().tolist(), ax.elev, ax.azim, ax.roll)
+        if seen != self._seen:
+            self._seen = seen
+            self._fill(box)
+        return place
+
+    def _fill(self, box: Array) -> None:
+        """Zoom and shift so that the points fill the box; the axes themselves take but a square of it."""
+        seen = self._points @ self.camera.T
+        middle = self.camera.T @ (0.5 * (seen.min(axis=0) + seen.max(axis=0)))
+        extent = float(np.linalg.norm(np.ptp(seen, axis=0))) or 1.0
+        self._look(middle, extent, 1.0)
+        here, size = self.pixels(middle[None])[0], np.ptp(self.pixels(self._points), axis=0)
+        low, high = box[0] + MARGIN[:2] * (box[1] - box[0]), box[1] - MARGIN[[0, 2]] * (box[1] - box[0])
+        zoom = float(np.min((high - low) / np.maximum(size, 1e-9)))
+        unit = zoom * float(np.linalg.norm(self.pixels((middle + extent * self.camera[0])[None])[0] - here)) / extent
+        right, up = (0.5 * (low + high) - here) / unit
+        self._look(middle - right * self.camera[0] - up * self.camera[1], extent, zoom)
+
+    def _look(self, middle: Array, extent: float, zoom: float) -> None:
+        for setter, c in zip((self.ax.set_xlim, self.ax.set_ylim, self.ax.set_zlim), middle, strict=True):
+            setter(c - extent / 2, c + extent / 2)
+        self.ax.set_box_aspect((1.0, 1.0, 1.0), zoom=zoom)
+
+    def fill(self, box: Array) -> None:
+        """See ``Painter``; it was filled before."""
+
+    @property
+    def camera(self) -> Array:
+        """See ``Painter``."""
+        el, az = np.deg2rad(self.ax.elev), np.deg2rad(self.ax.azim)
+        right = np.array([-np.sin(az), np.cos(az), 0.0])
+        toward = np.array([np.cos(el) * np.cos(az), np.cos(el) * np.sin(az), np.sin(el)])
+        return np.stack([right, np.cross(toward, right), toward])
+
+    def polygons(self, corners: Sequence[Array], faces: Array, edges: Array, zorder: float) -> Any:
+        """See ``Painter``."""
+        # corners are repeated until all have as many: what matplotlib fills up itself holds any numbers
+        most = max(map(len, corners))
+        equal = [np.concatenate([p, np.repeat(p[-1:], most - len(p), axis=0)]) for p in corners]
+        drawn = toolkit("art3d").Poly3DCollection(
+            equal, facecolors=faces, edgecolors=edges, linewidths=0.7, zorder=zorder
+        )
+        return self.ax.add_collection3d(drawn, autolim=False)
+
+    def lines(self, runs: Sequence[Array], **style: Any) -> Any:
+        """See ``Painter``."""
+        return self.ax.add_collection3d(toolkit("art3d").Line3DCollection(list(runs), **style), autolim=False)
+
+    def marks(self, points: Array, **style: Any) -> Any:
+        """See ``Painter``."""
+        return self.ax.scatter(*points.T, depthshade=False, **style)
+
+    def pixels(self, points: Array) -> Array:
+        """See ``Painter``."""
+        x, y, _ = toolkit("proj3d").proj_transform(*np.asarray(points).T, self.ax.get_proj())
+        return np.asarray(self.ax.transData.transform(np.column_stack([x, y])))
+
+
+def shaded(colour: str, corners: Sequence[Array], camera: Array, alpha: float = 1.0) -> Array:
+    """Colours ``(n, 4)`` of polygons in the light: ``c (a + (1 - a) |n . l|)``."""
+    from matplotlib.colors import to_rgba
+
+    light = LIGHT @ camera
+    normals = np.array([np.cross(p[1] - p[0], p[2] - p[0]) for p in corners])
+    sizes = np.linalg.norm(normals, axis=1)
+    bright = AMBIENT + (1 - AMBIENT) * np.abs(normals @ light) / np.where(sizes > 0, sizes, 1.0)
+    out = np.tile(to_rgba(colour, alpha), (len(corners), 1))
+    out[:, :3] *= bright[:, None]
+    return out
+
+
+def edges_of(faces: Array, rims: Sequence[bool], alpha: float = 1.0) -> Array:
+    """Edges of polygons: ink where they are rims, else as the face, so that no seam shows."""
+    from matplotlib.colors import to_rgba
+
+    return np.where(np.asarray(rims, dtype=bool)[:, None], to_rgba(INK, alpha), faces)
+
+
+def inside(ax: Any) -> Array:
+    """The place of axes on the screen as their figure gives it, ``[[left, bottom], [right, top]]`` in pixels."""
+    place = ax.get_position(original=True).transformed(ax.figure.transSubfigure)
+    return np.array(place.get_points())
+
+
+LARGE = 40
+"""Nodes from which on one layout is taken, unseen; from four times as many on that of springs, which is faster."""
+CLEAR = 0.15
+"""Distance of a line from a node that is not its end, over that of neighbours, below which they clash."""
+
+
+def places(names: Iterable[str], edges: Iterable[tuple[str, str]]) -> dict[str, Array]:
+    """Where the nodes of a graph are drawn, neighbours at a distance of about one; the same each time."""
+    number = {name: i for i, name in enumerate(names)}
+    graph: nx.Graph[int] = nx.Graph()  # of numbers: sets of texts have another order each time
+    graph.add_nodes_from(number.values())
+    graph.add_edges_from((number[a], number[b]) for a, b in edges)
+    begin: dict[int, Any]
+    if len(graph) < 3:
+        begin = {name: (float(i), 0.0) for i, name in enumerate(graph)}
+    elif max(degree for _, degree in graph.degree) == 2:
+        turn = 2 * np.pi * np.arange(len(graph)) / len(graph)
+        begin = {name: (np.cos(a), np.sin(a)) for name, a in zip(_cycle_order(graph), turn, strict=True)}
+    else:
+        begin = _clearest(graph)
+    at = _scaled(graph, begin)
+    return {name: at[i] for name, i in number.items()}
+
+
+def _clearest(graph: nx.Graph[int]) -> dict[int, Any]:
+    """Of several layouts that give distances their due, the one in which the fewest lines cross each other or run over nodes."""
+    if len(graph) > LARGE:
+        return nx.kamada_kawai_layout(graph) if len(graph) < 4 * LARGE else nx.spring_layout(graph, seed=0)
+    first = [nx.planar_layout(graph)] if nx.is_planar(graph) else []
+    first += [nx.circular_layout(graph), *(nx.spring_layout(graph, seed=seed) for seed in range(3))]
+    found = [_scaled(graph, nx.kamada_kawai_layout(graph, pos=pos)) for pos in first]
+    return min(found, key=lambda at: _clashes(graph, at))
+
+
+def _clashes(graph: nx.Graph[int], at: dict[int, Array]) -> int:
+    """Pairs of lines that cross, and lines that nearly run over a node that is not their end."""
+    count = 0
+    for (a, b), (c, d) in combinations(graph.edges, 2):
+        if len({a, b, c, d}) == 4:
+            p, q, r, s = at[a], at[b], at[c], at[d]
+            count += _side(p, q, r) != _side(p, q, s) and _side(r, s, p) != _side(r, s, q)
+    for a, b in graph.edges:
+        for name in graph:
+            if name not in (a, b):
+                along = at[b] - at[a]
+                u = np.clip((at[name] - at[a]) @ along / (along @ along), 0.0, 1.0)
+                count += bool(np.linalg.norm(at[a] + u * along - at[name]) < CLEAR)
+    return count
+
+
+def _side(p: Array, q: Array, r: Array) -> bool:
+    return bool((q[0] - p[0]) * (r[1] - p[1]) > (q[1] - p[1]) * (r[0] - p[0]))
+
+
+def _scaled(graph: nx.Graph[int], begin: dict[int, Any]) -> dict[int, Array]:
+    at = {name: np.asarray(begin[name], dtype=float) for name in graph}
+    lengths = [float(np.linalg.norm(at[a] - at[b])) for a, b in graph.edges]
+    unit = float(np.median(lengths)) if lengths else 1.0
+    return {name: p / unit for name, p in at.items()}
+
+
+def _cycle_order(graph: nx.Graph[int]) -> list[int]:
+    """Nodes of a cycle or path, one after the other."""
+    ends = [name for name, degree in graph.degree if degree < 2]
+    return list(nx.dfs_preorder_nodes(graph, source=(ends or list(graph))[0]))
+
+
+RINGS = (1.0, 1.6, 2.4, 3.4, 4.6, 6.0, 8.0)
+"""Distances at which a place for a text is looked for, over the nearest."""
+ANGLES = np.linspace(0.0, 2 * np.pi, 24, endpoint=False) + 0.3
+FORBIDDEN = 1e4
+"""Cost of covering another text, or of reaching beyond the axes, over that of covering one point of the drawing."""
+STEADY = 1.2
+"""Cost of moving a text by its height from where it stood before, over that of covering one point of the drawing."""
+LEGEND_WIDTH = 0.45
+"""Part of the width of the axes that the columns of a legend may take; lines beyond are counted."""
+LOW, BROAD = 8, 0.25
+"""Lines up to which a legend may stand below, and its width over that of the axes from which it does."""
+LEADER = 2.4
+"""Distance over the nearest from which on a fine line leads from the point to its text."""
+
+
+@dataclass
+class Placed:
+    """A text, the point of space that it belongs to, the length in space that it keeps away from it, and its leader line."""
+
+    text: Text
+    at: Array
+    away: float
+    leader: Line2D = field(default_factory=lambda: Line2D([], [], lw=0.6, color=MUTED, zorder=19))
+
+
+class Arrangement(Artist):
+    """Names beside their points, a corner with the directions and a scale; placed when they are drawn.
+
+    ``taken`` gives points ``(n, 2)`` on the screen that texts should not cover, ``pixels`` the screen place of points in space, ``camera``
+    the directions to the right, up and towards the viewer, ``inside`` the box (pixels) in which everything has to stay; ``prepare`` is
+    called first, with the part of that box that the legend leaves. ``places`` holds how texts stood beside their points before
+    (by the text, in points of a 72nd inch): they are kept where that covers little more, and noted anew.
+    """
+
+    def __init__(
+        self,
+        ax: Any,
+        pixels: Callable[[Array], Array],
+        taken: Callable[[], Array],
+        camera: Callable[[], Array],
+        inside: Callable[[], Array],
+        prepare: Callable[[Array], None],
+        places: dict[str, Array] | None = None,
+    ) -> None:
+        super().__init__()
+        self._places = {} if places is None else places
+        self._pixels, self._taken, self._camera, self._inside, self._prepare = pixels, taken, camera, inside, prepare
+        self._ax, self._placed = ax, list[Placed]()
+        self._corner: list[tuple[Line2D, Text, Array]] = []
+        self._bars: list[tuple[Line2D, Text, float]] = []
+        self._legend: list[Text] = []
+        self._lines: list[str] = []
+        self.set_zorder(-50)
+        self.set_in_layout(False)
+        ax.add_artist(self)
+
+    def name(self, text: str, at: Array, colour: str, away: float, **style: Any) -> None:
+        """A text that is put beside a point of space."""
+        placed = Placed(self._text(text, colour, **style), np.asarray(at, dtype=float), away)
+        self._placed.append(placed)
+        self._line(placed.leader)
+
+    def directions(self, arrows: Sequence[tuple[str, Array, str]]) -> None:
+        """Arrows of names and directions in the lower left corner."""
+        for name, direction, colour in arrows:
+            line = self._line(Line2D([], [], lw=1.2, color=colour, zorder=19, marker="o", ms=3, markevery=[1]))
+            self._corner.append((line, self._text(name, colour, fontsize=8.5), direction))
+
+    def scale(self, length: float, text: str, colour: str = MUTED) -> None:
+        """A bar of some length with its text, beside the corner and those before it; a text alone for length 0."""
+        line = self._line(Line2D([], [], lw=1.4, color=colour, zorder=19, marker="|", ms=7))
+        self._bars.append((line, self._text(text, colour, fontsize=8.5), length))
+
+    def legend(self, lines: Sequence[tuple[str, str]]) -> None:
+        """Lines of a text and a colour each, on the right, in as many columns as they need."""
+        self._legend = [self._text(text, colour, fontsize=8.0) for text, colour in lines]
+        self._lines = [text.get_text() for text in self._legend]
+
+    def room(self, renderer: Any = None) -> Array:
+        """The box that the legend leaves: its lines go from the upper right corner down, a few broad ones along the lower edge."""
+        unit, box = self._ax.figure.dpi / 72.0, self._inside().copy()
+        if not self._legend:
+            return box
+        for text, line in zip(self._legend, self._lines, strict=True):
+            text.set_text(line)  # the last one may have counted others
+        sizes = np.array([_size(text, renderer) for text in self._legend])
+        height = float(sizes[:, 1].max()) + 2.0 * unit
+        width, n = float(sizes[:, 0].max()), len(sizes)
+        if n <= LOW and width > BROAD * (box[1, 0] - box[0, 0]):
+            for row, text in enumerate(reversed(self._legend)):
+                text.set_position((box[0, 0], box[0, 1] + row * height))
+            box[0, 1] += (n + 1) * height
+            return box
+        rows = max(int((box[1, 1] - box[0, 1]) / height), 1)
+        left = box[1, 0] - LEGEND_WIDTH * (box[1, 0] - box[0, 0])
+        columns: list[range] = []
+        for i in range(0, n, rows):
+            column = range(i, min(i + rows, n))
+            if columns and box[1, 0] - sizes[: column.stop, 0].max() * (len(columns) + 1) < left:
+                break
+            columns.append(column)
+        shown = columns[-1].stop
+        for i, text in enumerate(self._legend):
+            text.set_visible(i < shown)
+        if shown < n:
+            shown -= 1
+            self._legend[shown].set_text(f"\u2026 and {n - shown} more")
+            sizes[shown] = _size(self._legend[shown], renderer)
+        for column in reversed(columns):
+            box[1, 0] -= sizes[column, 0].max()
+            for row, i in enumerate(column):
+                self._legend[i].set_position((box[1, 0], box[1, 1] - (row + 1) * height))
+            box[1, 0] -= 8.0 * unit
+        return box
+
+    def _text(self, text: str, colour: str, **style: Any) -> Text:
+        where: dict[str, Any] = {"ha": "left", "va": "bottom", "transform": IdentityTransform()}
+        out = Text(0, 0, visible(text), color=colour, zorder=20, parse_math=False, **where, **style)
+        out.set_path_effects([effects.withStroke(linewidth=2.6, foreground="white")])
+        out.set_in_layout(False)
+        self._ax.add_artist(out)
+        out.set_clip_on(False)
+        return out
+
+    def _line(self, line: Line2D) -> Line2D:
+        line.set_transform(IdentityTransform())
+        line.set_in_layout(False)
+        self._ax.add_artist(line)
+        line.set_transform(IdentityTransform())
+        line.set_clip_on(False)
+        return line
+
+    def draw(self, renderer: Any) -> None:
+        """Place everything; the texts and lines are drawn after this, as artists of the axes."""
+        unit = self._ax.figure.dpi / 72.0
+        box = self.room(renderer)
+        self._prepare(box)
+        # points closer than a letter's stroke count once
+        taken = (2 * unit) * np.unique(np.round(self._taken() / (2 * unit)), axis=0)
+        boxes = self._furniture(renderer, unit, box)
+        points = [self._pixels(p.at[None])[0] for p in self._placed]
+        right = self._camera()[0]
+        for placed, point in zip(self._placed, points, strict=True):
+            size = _size(placed.text, renderer) + 2.0 * unit
+            away = float(np.linalg.norm(self._pixels((placed.at + placed.away * right)[None])[0] - point)) + 3.0 * unit
+            before = self._places.get(placed.text.get_text())
+            kept = None if before is None else point + before * unit
+            corner, ring, free = _best(point, size, away, box, boxes, taken, kept)
+            placed.text.set_visible(free)
+            if not free:
+                placed.leader.set_data([], [])
+                continue
+            self._places[placed.text.get_text()] = (corner - point) / unit
+            placed.text.set_position(tuple(corner + unit))
+            boxes.append(np.array([corner, corner + size]))
+            far = ring >= LEADER
+            end = np.clip(point, corner, corner + size)
+            placed.leader.set_data([point[0], end[0]] if far else [], [point[1], end[1]] if far else [])
+
+    def _furniture(self, renderer: Any, unit: float, box: Array) -> list[Array]:
+        """Place the directions and the scale along the lower edge; the boxes that they fill."""
+        length, room = 19.0 * unit, 17.0 * unit
+        origin = box[0] + np.array([1.0, 1.0]) * (length + room)
+        flat = self._camera()[:2]
+        out: list[Array] = []
+        right = float(origin[0])
+        for line, text, direction in self._corner:
+            seen = flat @ direction
+            shown = float(np.linalg.norm(seen)) > 0.15
+            tip, size = origin + length * seen, _size(text, renderer)
+            line.set_data(*(np.array([origin, tip]).T if shown else ([], [])))
+            text.set_visible(shown)
+            if shown:
+                away = seen / float(np.linalg.norm(seen))
+                places = (tip + k * room * away - size / 2 for k in (0.5, 1.0, 1.5, 2.0))
+                corner = next((p for p in places if not any(_meet(p, p + size, other) for other in out)), tip)
+                text.set_position(tuple(corner))
+                out.append(np.array([corner, corner + size]))
+                right = max(right, float(corner[0] + size[0]))
+        for line, text, meant in self._bars:
+            begin, along = np.array([right + room, box[0][1] + 0.6 * room]), self._camera()[0] * meant
+            ends, size = self._pixels(np.stack([np.zeros(3), along])), _size(text, renderer)
+            width = float(np.linalg.norm(ends[1] - ends[0]))
+            line.set_data(*(([begin[0], begin[0] + width], [begin[1]] * 2) if meant else ([], [])))
+            text.set_position((begin[0] + max(0.5 * (width - size[0]), 0.0), begin[1] + 4.0 * unit))
+            right = float(begin[0]) + max(width, size[0])
+            out.append(np.array([begin - 4 * unit, [right, begin[1] + size[1] + 6 * unit]]))
+        return out
+
+
+def _size(text: Text, renderer: Any) -> Array:
+    text.set_visible(True)  # one that is hidden has no size
+    box = text.get_window_extent(renderer)
+    return np.array([box.width, box.height])
+
+
+def _meet(low: Array, high: Array, other: Array) -> bool:
+    return bool((np.minimum(high, other[1]) > np.maximum(low, other[0])).all())
+
+
+def _best(
+    point: Array, size: Array, away: float, box: Array, boxes: Sequence[Array], taken: Array, kept: Array | None = None
+) -> tuple[Array, float, bool]:
+    """Lower left corner of a text near a point, its distance over the nearest one, and whether it is free; it would rather be ``kept``."""
+    directions = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
+    rings = np.repeat(RINGS, len(ANGLES))
+    d = np.tile(directions, (len(RINGS), 1))
+    # the middle of the text is so far away that its nearest edge is at the distance asked for
+    reach = rings[:, None] * away * d + 0.5 * size * np.clip(1.6 * d, -1.0, 1.0)
+    low = point + reach - 0.5 * size
+    high = low + size
+    cost = 0.35 * (rings - 1.0) + 0.02 * (1.0 - d[:, 0]) + 0.02 * (1.0 - d[:, 1])
+    if kept is not None:
+        cost += STEADY * np.minimum(np.linalg.norm(low - kept, axis=1) / float(size[1]), 2.0)
+    beyond = np.maximum(box[0] - low, 0.0).sum(axis=1) + np.maximum(high - box[1], 0.0).sum(axis=1)
+    cost += FORBIDDEN * (beyond > 0) * (1.0 + beyond)
+    if boxes:
+        others = np.array(boxes)[:, :, None]
+        overlap = np.clip(np.minimum(high, others[:, 1]) - np.maximum(low, others[:, 0]), 0.0, None).prod(axis=2)
+        cost += FORBIDDEN * ((overlap > 0) * (1.0 + overlap / size.prod())).sum(axis=0)
+    near = taken[(np.abs(taken - point) < np.abs(reach).max(axis=0) + size).all(axis=1)]
+    if len(near):
+        covered = ((near > low[:, None] - away / 3) & (near < high[:, None] + away / 3)).all(axis=2)
+        cost += covered.sum(axis=1) * 0.6
+    best = int(np.argmin(cost))
+    return low[best], float(rings[best]), bool(cost[best] < FORBIDDEN)
+
+
+def nice_length(extent: float) -> float:
+    """A round length of about a sixth of an extent: 1, 2 or 5 times a power of ten."""
+    power = 10.0 ** np.floor(np.log10(extent / 6))
+    return float(power * max(f for f in (1.0, 2.0, 5.0) if f * power <= extent / 6 * (1 + 1e-9)))

@@ -1,24 +1,28 @@
-"""Curves over the drivers, time or any freedom: efforts, reactions, the margin to a singular position.
-
-Positions that were not solved leave gaps. What is not unique has no curve: a hatched strip says where.
-"""
+"""Curves over a motion: positions, rates, efforts, forces, margins, paths."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.arguments import door
+from mechgraph.closure.assembly import scaled_system
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import indexed
+from mechgraph.closure.rank import closure_rank
 from mechgraph.errors import DeclarationError
+from mechgraph.numerics.tolerances import RANKS
 from mechgraph.quantities import shown
+from mechgraph.report.facts import nearly_singular
 from mechgraph.response.course import Response
 from mechgraph.result.solution import Solution
-from mechgraph.show.canvas import HATCH, INK, MUTED, PALETTE, Axes, new_axes, plain, said, with_unit
-from mechgraph.show.margins import margins
+from mechgraph.result.values import MaterialPoint
+from mechgraph.show.canvas import HATCH, INK, MUTED, PALETTE, REACTION, Axes, axis_label, new_axes, plain, said
+from mechgraph.show.scene import Stage, known_force, place_of
 from mechgraph.units import unit_of
 
 TICKS = (10, 15, 30, 45, 60, 90, 180, 360)
@@ -54,13 +58,13 @@ def abscissa(s: Solution, over: str | None = None) -> Abscissa:
                 f"curve of {m.name!r}", ["over='t': this motion has no times; name a freedom, or 'position'"]
             )
         t = np.broadcast_to(np.asarray(s.t, dtype=float), s.batch).reshape(rows)
-        return Abscissa(t, with_unit("t", unit_of(m.units, (0, 0, 1))))
+        return Abscissa(t, axis_label("t", unit_of(m.units, (0, 0, 1))))
     if over == "position":
         return Abscissa(np.tile(np.arange(rows[1], dtype=float), (status.size // rows[1], 1)), "position")
     values, name = _coordinates(s, over).reshape(rows), m.full_name(over)
     if m.turns(name):
-        return Abscissa(np.rad2deg(values), with_unit(name, "deg"), True)
-    return Abscissa(values, with_unit(name, unit_of(m.units, (1, 0, 0))))
+        return Abscissa(np.rad2deg(values), axis_label(name, "deg"), True)
+    return Abscissa(values, axis_label(name, unit_of(m.units, (1, 0, 0))))
 
 
 def _coordinates(s: Solution, freedom: str) -> Array:
@@ -171,7 +175,7 @@ def effort_curve(
         side.axhline(0.0, color=MUTED, lw=0.8, zorder=0)
         own = [name for name, effort in found.items() if effort.couple == couple]
         who = "of the drivers" if len(own) > 1 else f"{'of the driver' if entries == 1 else 'in'} {own[0]}"
-        lay_out(side, x, with_unit(f"{'torque' if couple else 'force'} {who}", unit_of(m.units, (1 + couple, 1, -2))))
+        lay_out(side, x, axis_label(f"{'torque' if couple else 'force'} {who}", unit_of(m.units, (1 + couple, 1, -2))))
     if len(sides) == 2:
         sides[False].spines["right"].set_visible(True)
         sides[False].grid(False)
@@ -282,7 +286,7 @@ def reaction_curve(
     ax.axhline(0.0, color=MUTED, lw=0.8, zorder=0)
     owner = m.pair(pair)
     what = "moment" if moment else "force"
-    lay_out(ax, x, with_unit(f"{what} of {owner.a} on {owner.b} in {pair}", unit))
+    lay_out(ax, x, axis_label(f"{what} of {owner.a} on {owner.b} in {pair}", unit))
     hatched_strips(ax, x, lost)
     ax.legend(frameon=False)
     return ax
@@ -317,3 +321,305 @@ def known_pair(s: Solution, pair: str) -> str:
             f"picture of {s.mechanism.name!r}", [f"there is no pair {shown(pair)}; pairs: {', '.join(names)}"]
         )
     return pair
+
+
+class Margins(NamedTuple):
+    """Margins ``(...)`` with the drivers free and at rest (None without drivers), NaN where not solved, and what is near."""
+
+    free: Array
+    driven: Array | None
+    near_below: float
+
+
+def margins(s: Solution) -> Margins:
+    """Smallest kept singular value over the largest of the closure equations at every position, scaled about it as ``check`` does.
+
+    With the drivers at rest a position counts as singular with them where a singular value is below what a rank tells apart.
+    """
+    m, status = s.whole, np.asarray(s.status)
+    raw = indexed(m)
+    q = np.concatenate([s[p.name].position.reshape(-1, p.type.f).T for p in m.pairs if p.type.f])
+    names = m.freedom_names()
+    columns = np.array(sorted(names.index(name) for name in s.prescribed if name in names), dtype=np.intp)
+    out = np.full((2, status.size), np.nan)
+    for i in np.flatnonzero(status.reshape(-1) == "ok"):
+        system = scaled_system(m, q[:, i], raw)
+        here = Configuration(system, system.state_of(q[:, i : i + 1]))
+        free = closure_rank(here)
+        out[0, i] = free.margin
+        if len(columns):
+            rest = closure_rank(here, columns)
+            # the drivers at rest take from the mobility; where they do not, they stand at a dead point
+            out[1, i] = rest.margin if rest.rank >= free.rank else max(rest.dropped, RANKS.position)
+    driven = out[1].reshape(status.shape) if len(columns) else None
+    return Margins(out[0].reshape(status.shape), driven, nearly_singular(raw.graph.n_loops))
+
+
+@door
+def reaction_ranges(s: Solution, *, moment: bool = False, ax: Axes = None) -> Any:
+    """Draw from what to what the reactions of all pairs range over the positions. Returns the axes.
+
+    One bar a pair: the size of its force (of its couple about its own point with ``moment``), the dot where the mean is. Where parts are
+    not unique the bar is that of the others, which the name of the pair tells, and is hatched up to the end of the axis: the whole may be
+    of any size.
+
+    Raises
+    ------
+    DeclarationError
+        where the solution has no forces; MissingExtraError without matplotlib.
+    """
+    m = s.mechanism
+    if not s.has_forces:
+        raise DeclarationError(f"reactions of {m.name!r}", ["the solution has no forces: use solve()"])
+    sizes = {p.name: found for p in m.pairs if (found := _sizes(s, p.name, moment)) is not None}
+    ax = new_axes((6.4, 1.3 + 0.34 * len(sizes))) if ax is None else ax
+    largest = max((float(np.nanmax(v, initial=0.0)) for v, _, _ in sizes.values()), default=0.0) or 1.0
+    labels = []
+    for i, (name, (values, parts, lost)) in enumerate(sizes.items()):
+        low, high, mean = (
+            float(f(values)) if np.isfinite(values).any() else 0.0 for f in (np.nanmin, np.nanmax, np.nanmean)
+        )
+        if parts:
+            ax.barh(i, high - low, left=low, height=0.56, color=PALETTE[0], zorder=2)
+            ax.plot(mean, i, "o", ms=6, mfc="white", mec=INK, mew=1.2, zorder=4)
+            ax.plot(
+                [low, low], [i - 0.28, i + 0.28], color=PALETTE[0], lw=1.6, zorder=3
+            )  # a constant force has a bar without length
+        if lost:
+            ax.barh(
+                i, 1.08 * largest - high, left=high, height=0.56, facecolor="white", edgecolor=REACTION, hatch=HATCH, lw=0.8,
+                gid=f"not unique {name}",
+            )  # fmt: skip
+        labels.append(f"{name} ({' '.join(parts) or 'nothing'} unique)" if lost else name)
+    ax.set_yticks(range(len(labels)), map(said, labels))
+    ax.invert_yaxis()
+    ax.set_xlim(0.0, 1.08 * largest)
+    what = "moment" if moment else "force"
+    ax.set_xlabel(axis_label(f"{what} of the reaction", unit_of(m.units, (2 if moment else 1, 1, -2))), color=INK)
+    plain(ax)
+    ax.tick_params(axis="y", length=0)
+    return ax
+
+
+def _sizes(s: Solution, pair: str, moment: bool) -> tuple[Array, list[str], bool] | None:
+    """Sizes at the solved positions of the parts that are unique at all of them, these, and whether there are others; None of no part."""
+    result, row = s[pair], s.mechanism.pair(pair).type
+    good = np.asarray(s.status).reshape(-1) == "ok"
+    unique = {name: bool(np.asarray(flags).reshape(-1)[good].all()) for name, flags in result.unique.items()}
+    if row.reactions is None:
+        whole = (result.moment if moment else result.force).reshape(-1, 3)[good]
+        known = all(unique[name] for name in row.component_names)
+        return (
+            np.linalg.norm(whole, axis=1) if known else np.full(good.sum(), np.nan),
+            ["all"] if known else [],
+            not known,
+        )
+    names = [c.name for c in row.reactions if c.is_couple == moment]
+    if not names:
+        return None
+    parts = [name for name in names if unique[name]]
+    if len(parts) == len(names):
+        whole = (result.moment if moment else result.force).reshape(-1, 3)[good]
+        return np.linalg.norm(whole, axis=1), parts, False
+    values = result.components
+    size = np.sqrt(sum((np.square(values[name].reshape(-1)[good]) for name in parts), np.zeros(int(good.sum()))))
+    return size, parts, True
+
+
+@door
+def polar_force(s: Solution, pair: str, *, on: Literal["a", "b"] = "a", ax: Axes = None) -> Any:
+    """Draw how the force in a bearing turns: its part across the axis in polar coordinates, fixed on a link. Returns the axes.
+
+    The force of link a on link b, the angle counted about the axis from x of the marker on the chosen link: where a housing (``on="a"``) or
+    a pin (``"b"``) is loaded. The circle is the largest force.
+
+    Parameters
+    ----------
+    ax : polar axes of matplotlib (``projection="polar"``); new ones where left out.
+
+    Raises
+    ------
+    DeclarationError
+        where the solution has no forces, no such pair, the axes are not polar, or the force across the axis is not unique.
+    """
+    m = s.mechanism
+    p = m.pair(known_pair(s, pair))
+    if not s.has_forces:
+        raise DeclarationError(f"polar force of {m.name!r}", ["the solution has no forces: use solve()"])
+    if on not in ("a", "b"):
+        raise DeclarationError(f"polar force of {m.name!r}", [f"on = {on!r}: expected 'a' or 'b'"])
+    if ax is not None and ax.name != "polar":
+        raise DeclarationError(
+            f"polar force of {m.name!r}", ["ax: expected polar axes, add_subplot(projection='polar')"]
+        )
+    good, place = place_of(s)
+    stage = Stage(m, place, len(good))
+    frame = stage.frames[f"pair:{pair}@{0 if on == 'a' else p.type.f}"][:, :, :3]
+    force = known_force(stage, s, p, good, frame[:, :, 2])
+    if not np.isfinite(force).all(axis=1).any():
+        raise DeclarationError(
+            f"polar force of {m.name!r}",
+            [f"the force in {pair!r} across its axis is not unique; mg.check(m).unique says why"],
+        )
+    from matplotlib.ticker import MaxNLocator
+
+    inside = np.einsum("tij,ti->tj", frame, force)
+    ax = new_axes((5.6, 5.6), projection="polar") if ax is None else ax
+    full = np.full((np.asarray(s.status).size, 2), np.nan)
+    full[good] = np.column_stack([np.arctan2(inside[:, 1], inside[:, 0]), np.hypot(inside[:, 0], inside[:, 1])])
+    rows = full.reshape(-1, s.batch[-1] if s.batch else 1, 2)
+    for turn in rows:
+        ax.plot(turn[:, 0], turn[:, 1], color=REACTION, lw=1.8, marker="o" if len(turn) == 1 else "")
+    peak = int(np.nanargmax(full[:, 1]))
+    ax.plot(*full[peak], "o", ms=7, mfc="white", mec=REACTION, mew=1.8)
+    unit = unit_of(m.units, (1, 1, -2))
+    link = p.a if on == "a" else p.b
+    what = axis_label(f"force of {p.a} on {p.b} in {pair} across its axis", unit)
+    greatest = f"greatest {full[peak, 1]:.4g} {unit}".rstrip()
+    ax.set_title(f"{what}\nas seen on {said(link)}, {greatest}", color=INK, fontsize=10)
+    ax.tick_params(colors=MUTED)
+    ax.set_rlabel_position(100)
+    ax.yaxis.set_major_locator(MaxNLocator(4))
+    return ax
+
+
+FINE = 400
+"""Points that the path of a response has at least."""
+STILL = 1e-6
+"""Path of a point over the longest below which it stands still."""
+RANK = {"position": 0, "velocity": 1, "acceleration": 2}
+
+
+def motion_of(s: Solution, point: str) -> MaterialPoint:
+    """Motion of a named point ``"bucket.tip"``, of a mass centre by its link ``"bucket"``, or of a pair's point on its link b.
+
+    Raises
+    ------
+    DeclarationError
+        naming what there is.
+    """
+    m = s.mechanism
+    for link in m.links:
+        for name in link.points:
+            if point == f"{link.name}.{name}":
+                return s.link(link.name).at(name)
+    if point in m.link_index and m.link(point).center is not None:
+        return s.link(point).point(m.link(point).center)
+    if point in m.pair_index:
+        pair = m.pair(point)
+        moving = int(pair.b == m.frame)  # a pair to the frame moves on its other link
+        return s.link((pair.b, pair.a)[moving]).point(pair.markers[1 - moving].point)
+    there = [f"{k.name}.{name}" for k in m.links for name in k.points]
+    there += [k.name for k in m.links if k.center is not None] + [p.name for p in m.pairs]
+    raise DeclarationError(f"path in {m.name!r}", [f"there is no point {shown(point)}; points: {', '.join(there)}"])
+
+
+@door
+def point_path(s: Solution, points: str | Iterable[str] | None = None, *, ax: Axes = None) -> Any:
+    """Draw the paths of points: in the plane of a plane mechanism, else in space. Returns the axes.
+
+    Parameters
+    ----------
+    points : names of points (``"bucket.tip"``), of links (their mass centres) or of pairs (on link b); left out, all named points, or where
+        there are none all pairs that move.
+    ax : axes of matplotlib, of two or three dimensions; of a spatial mechanism on two dimensions, x and y are drawn.
+
+    Raises
+    ------
+    DeclarationError
+        where there is no such point; MissingExtraError without matplotlib.
+    """
+    s, names = finely(s), _names(s, points)
+    return _draw(s, {name: motion_of(s, name).position for name in names}, 0, ax)
+
+
+@door
+def hodograph(
+    s: Solution,
+    points: str | Iterable[str] | None = None,
+    *,
+    of: Literal["velocity", "acceleration"] = "velocity",
+    ax: Axes = None,
+) -> Any:
+    """Draw the hodograph of points: the curve of the tips of their velocities (or accelerations), from one origin. Returns the axes.
+
+    Parameters as in ``point_path``.
+    """
+    if of not in ("velocity", "acceleration"):
+        raise DeclarationError(
+            f"hodograph of {s.mechanism.name!r}", [f"of = {of!r}: expected 'velocity' or 'acceleration'"]
+        )
+    s = finely(s)
+    return _draw(s, {name: getattr(motion_of(s, name), of) for name in _names(s, points)}, RANK[of], ax)
+
+
+def finely(s: Solution) -> Solution:
+    """A response at times between its outputs too, so that its paths are curves."""
+    if not isinstance(s, Response) or len(s.t) < 2:
+        return s
+    between = np.linspace(0.0, 1.0, max(2, -(-FINE // (len(s.t) - 1)) + 1))[:-1]
+    return s.at(np.append((s.t[:-1, None] + np.diff(s.t)[:, None] * between).ravel(), s.t[-1]))
+
+
+def _names(s: Solution, points: str | Iterable[str] | None) -> list[str]:
+    if points is not None:
+        return [points] if isinstance(points, str) else list(points)
+    m = s.mechanism
+    named = [f"{k.name}.{name}" for k in m.links for name in k.points if k.name != m.frame]
+    strokes = {p.name: np.ptp(motion_of(s, p.name).position.reshape(-1, 3)[_solved(s)], axis=0).max() for p in m.pairs}
+    moving = [name for name, stroke in strokes.items() if stroke > STILL * max(strokes.values())]
+    return named or moving or [m.pairs[0].name]
+
+
+def _solved(s: Solution) -> Array:
+    return np.asarray(s.status).reshape(-1) == "ok"
+
+
+def _draw(s: Solution, found: dict[str, Array], rank: int, ax: Any) -> Any:
+    m = s.mechanism
+    good, place = place_of(s)
+    stage = Stage(m, place, len(good))
+    flat = stage.normal is not None
+    if ax is None:
+        ax = new_axes() if flat else new_axes((6.4, 5.6), projection="3d")
+    space = ax.name == "3d"
+    axes = np.eye(3) if space or not flat else stage.upright.T[[0, 2]]
+    axes = axes if space else axes[:2]
+    for i, (name, values) in enumerate(found.items()):
+        colour = PALETTE[i % len(PALETTE)]
+        solved = (np.asarray(s.status) == "ok")[..., None]
+        rows = np.where(solved, values, np.nan).reshape(-1, s.batch[-1] if s.batch else 1, 3)
+        for k, row in enumerate(rows):
+            seen = row @ axes.T
+            ax.plot(
+                *seen.T,
+                color=colour,
+                lw=1.9,
+                label="_" * bool(k) + said(name),
+                marker="o" if len(row) == 1 else "",
+                ms=4,
+            )
+            there = seen[np.isfinite(seen).all(axis=1)]
+            if len(there):
+                ax.plot(*there[:1].T, "o", ms=6, mfc="white", mec=colour, mew=1.6, label="_")
+    unit = unit_of(m.units, (1, 0, -rank))
+    letters = [_letter(axis) for axis in axes]
+    words = ("", "velocity ", "acceleration ")[rank]
+    for setter, letter in zip(
+        (ax.set_xlabel, ax.set_ylabel, *([ax.set_zlabel] if space else [])), letters, strict=False
+    ):
+        setter(axis_label(f"{words}{letter}", unit), color=INK)
+    ax.set_aspect("equal", adjustable="datalim") if not space else ax.set_aspect("equal")
+    if not space:
+        plain(ax)
+        if rank:
+            ax.axhline(0.0, color=MUTED, lw=0.8, zorder=0)
+            ax.axvline(0.0, color=MUTED, lw=0.8, zorder=0)
+    ax.legend(frameon=False, **({"loc": "upper left", "bbox_to_anchor": (-0.12, 1.0)} if space else {}))
+    return ax
+
+
+def _letter(axis: Array) -> str:
+    """``x`` for the x axis; the direction for what is none of them."""
+    k = int(np.argmax(np.abs(axis)))
+    return "xyz"[k] if abs(axis[k]) > 1 - 1e-9 else f"along ({', '.join(f'{c:.3g}' for c in axis)})"

@@ -1,27 +1,50 @@
-"""Diagrams of what is connected with what: the link-pair graph, the structural diagram, the pattern of the equations."""
+"""Diagrams: graphs, structures, patterns of equations, chains, studies, branches and assemblies."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain, combinations, pairwise
 from textwrap import wrap
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.arguments import door
+from mechgraph.arguments import Count, door
+from mechgraph.closure.indexing import Index
 from mechgraph.equations.formulation import Formulation
+from mechgraph.errors import DeclarationError
+from mechgraph.graph.chains import Chain
 from mechgraph.graph.linkgraph import link_graph
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.show.canvas import FAINT, HATCH, INK, MUTED, PALETTE, Axes, bare, colours, new_axes, said
-from mechgraph.show.painting import FlatPainter, inside
+from mechgraph.modes.branches import Branch, Branches
+from mechgraph.modes.result import Assemblies
+from mechgraph.quantities import wrong
+from mechgraph.show.canvas import (
+    FAINT,
+    HATCH,
+    INK,
+    MUTED,
+    PALETTE,
+    Axes,
+    FlatPainter,
+    axis_label,
+    bare,
+    colours,
+    inside,
+    new_axes,
+    places,
+    plain,
+    said,
+)
+from mechgraph.show.curves import Abscissa, lay_out
+from mechgraph.show.skeleton import draw_skeleton
 from mechgraph.structure.decomposition import Decomposition
+from mechgraph.units import unit_of
+from mechgraph.variants.result import Study
 
-STRAND = 0.035
-"""Distance of the strands of an edge that lies in several loops, and"""
-BULGE = 0.22
-"""of edges between the same two links, over the distance of neighbours."""
+STRAND, BULGE = 0.035, 0.22
+"""Distance of the strands of an edge in several loops, and of edges between the same two links, over that of neighbours."""
 LETTER, CLEARED = (0.045, 0.11), 1.3
 """Width and height of a letter of the text on a line, over the length of a line; clearance over its size that is enough."""
 LEGEND_LETTERS = 34
@@ -36,8 +59,6 @@ def draw_graph(m: Mechanism, *, ax: Axes = None) -> Any:
 
     A pair in several loops has a strand for each; one in no loop is grey. The frame is a square. Dotted lines are couplings.
     """
-    from mechgraph.show.layout import places
-
     loops = [tuple(m.pairs[k].name for k, _ in loop) for loop in m.once(link_graph).loops]
     at = places(m.link_names(), ((p.a, p.b) for p in m.pairs))
     canvas = _Canvas(ax, np.array(list(at.values())))
@@ -113,8 +134,6 @@ def draw_structure(m: Mechanism, *, groups: Decomposition | None = None, ax: Axe
     Returns the axes. The frame is hatched, a dotted line ties the pairs of a coupling. Nothing is to scale: it is the graph alone. With
     ``groups`` (those of ``mg.groups``) the links are numbered and have a colour for each driver link and group, which the legend names.
     """
-    from mechgraph.show.layout import places
-
     of_link = {name: [p.name for p in m.pairs if name in (p.a, p.b)] for name in m.link_names()}
     at = places((p.name for p in m.pairs), chain.from_iterable(combinations(names, 2) for names in of_link.values()))
     canvas = _Canvas(ax, np.array(list(at.values())))
@@ -215,7 +234,7 @@ class _Canvas:
 
     def finish(self, legend: Sequence[tuple[str, str]]) -> None:
         """Put everything in its place."""
-        from mechgraph.show.arrangement import Arrangement
+        from mechgraph.show.canvas import Arrangement
 
         painter = FlatPainter(self.ax, np.eye(3))
         taken = np.concatenate(self._taken)
@@ -276,3 +295,403 @@ def draw_sparsity(f: Formulation, *, ax: Axes = None) -> Any:
     ax.set_xlabel(f"{k} unknowns", color=INK)
     ax.set_ylabel(f"{n} equations", color=INK)
     return ax
+
+
+MOST_ON_A_PAGE = 240
+"""Chains on one page."""
+CELL = 1.5
+"""Width and height of a chain (inches)."""
+
+
+PLACES_SEED, MOVES_TRIED, REACHES = 3, 6, (2.0, 1.5, 1.01, 0.5, 0.3, 0.2, 0.1)
+"""Tries to move a joint, in rounds of such reach (lengths of links): above one only while links cross, then for even lengths."""
+EVEN = 0.12
+"""Spread of the lengths without a crossing from which on no other start is tried."""
+RUN_OVER = 0.2
+"""Distance of a link from a joint of others below which it runs over it."""
+MARKERS, OTHER = {"R": "o", "P": "s"}, "D"
+"""Shapes of turning and sliding joints; of other types, with their symbol inside."""
+MARKER_SIZE = {"o": 14, "s": 20, "D": 60}
+
+
+@door
+def draw_chains(chains: Iterable[Chain], *, columns: int = 6, titles: Iterable[str] | None = None) -> Any:
+    """Draw chains on one page, numbered in their order; returns the figure.
+
+    Binary links are lines, others polygons, each number of joints in a colour of its own. Turning joints are circles, multiple ones filled,
+    sliding ones squares, others diamonds with the symbol of their type.
+    """
+    some = list(chains)
+    if not 0 < len(some) <= MOST_ON_A_PAGE or columns < 1:
+        expected = f"expected 1 to {MOST_ON_A_PAGE} chains and columns from 1"
+        raise DeclarationError("draw_chains", [f"{len(some)} chains in {columns} columns: {expected}"])
+    names = list(titles) if titles is not None else [str(i) for i in range(1, len(some) + 1)]
+    rows = -(-len(some) // columns)
+    figure = new_axes((CELL * min(columns, len(some)), CELL * rows)).figure
+    figure.clear()
+    for i, shown in enumerate(some):
+        ax = figure.add_subplot(rows, min(columns, len(some)), i + 1)
+        _draw(shown, ax)
+        ax.set_title(names[i] if i < len(names) else "", fontsize=8, color=MUTED, pad=2)
+    return figure
+
+
+def _draw(chain: Chain, ax: Axes) -> None:
+    from matplotlib.patches import Polygon
+
+    joints_of = [[k for k, joint in enumerate(chain.joints) if link in joint] for link in range(chain.links)]
+    at = _joint_places(len(chain.joints), joints_of)
+    for joints in joints_of:
+        corners = at[joints]
+        colour = MUTED if len(joints) < 3 else PALETTE[len(joints) - 3]
+        if len(joints) > 2:
+            middle = corners.mean(axis=0)
+            order = np.argsort(np.arctan2(*(corners - middle).T[::-1]), kind="stable")
+            ax.add_patch(Polygon(corners[order], facecolor=colour, edgecolor=colour, alpha=0.35, lw=1.5, zorder=1))
+        else:
+            ax.plot(*corners.T, color=colour, lw=1.8, zorder=2)
+    many = np.array([len(joint) > 2 for joint in chain.joints])
+    shape = np.array([MARKERS.get(kind, OTHER) for kind in chain.types])
+    for marker in sorted({OTHER, *MARKERS.values()}):
+        mine = shape == marker
+        size, face = np.where(many, 26, MARKER_SIZE[marker])[mine], np.where(many, INK, "white")[mine].tolist()
+        ax.scatter(*at[mine].T, s=size, marker=marker, facecolor=face, edgecolor=INK, lw=0.9, zorder=3)
+    for kind, place in zip(chain.types, at, strict=True):
+        if kind not in MARKERS:
+            ax.annotate(kind, place, ha="center", va="center", fontsize=5, color=INK, zorder=4)
+    bare(ax)
+    ax.set_aspect("equal")
+    ax.margins(0.12)
+
+
+def _joint_places(count: int, joints_of: list[list[int]]) -> Array:
+    """Places ``(joints, 2)``, those of a link near each other; moved one by one as long as links cross each other less."""
+    edges = [(a, b, link) for link, joints in enumerate(joints_of) for a, b in combinations(joints, 2)]
+    found = places(map(str, range(count)), [(str(a), str(b)) for a, b, _ in edges])
+    at = np.array([found[str(k)] for k in range(count)])
+    first = np.array([(a, b) for a, b, _ in edges])
+    apart = [(i, j) for i, j in combinations(range(len(edges)), 2) if not set(edges[i][:2]) & set(edges[j][:2])]
+    other = np.array([(i, j) for i, j in apart if edges[i][2] != edges[j][2]], dtype=np.intp).reshape(-1, 2)
+    beside = np.array([(e, k) for e, (a, b, _) in enumerate(edges) for k in range(count) if k not in (a, b)])
+    starts = [at, *(radius * np.array([np.cos(turns), np.sin(turns)]).T for radius, turns in _rings(joints_of, count))]
+    best = _untangled(starts[0], first, other, beside)
+    for start in starts[1:] if best[1] > EVEN else ():
+        best = min(best, _untangled(start, first, other, beside), key=lambda found: found[1])
+    return best[0]
+
+
+def _rings(joints_of: list[list[int]], count: int) -> Iterator[tuple[float, Array]]:
+    """Radius and angles of the joints one after the other along the links: joints that are neighbours stand side by side."""
+    import networkx as nx
+
+    graph: nx.Graph[int] = nx.Graph((a, b) for joints in joints_of for a, b in combinations(joints, 2))
+    for begin in range(0, count, max(1, count // 2)):
+        turns = np.empty(count)
+        turns[list(nx.dfs_preorder_nodes(graph, begin))] = 2 * np.pi * np.arange(count) / count
+        yield count / (2 * np.pi), turns
+
+
+def _untangled(at: Array, edges: Index, apart: Index, beside: Index) -> tuple[Array, float]:
+    """Places after moves of one joint at a time that cost less, to places nearby and to places between its neighbours; the cost."""
+    rng = np.random.default_rng(PLACES_SEED)
+    near = [np.unique(edges[(edges == k).any(axis=1)]) for k in range(len(at))]
+    cost = _cost(at, edges, apart, beside)
+    for reach in REACHES:
+        for k in range(len(at)):
+            if cost < 1.0 < reach:
+                break  # nothing crosses: only short moves, for even lengths
+            for i, step in enumerate(reach * rng.normal(size=(MOVES_TRIED, 2))):
+                trial = at.copy()
+                trial[k] = (at[k] if i % 2 else at[near[k][near[k] != k]].mean(axis=0)) + step
+                new = _cost(trial, edges, apart, beside)
+                if new < cost:
+                    at, cost = trial, new
+    return at, cost
+
+
+def _cost(at: Array, edges: Index, apart: Index, beside: Index) -> float:
+    """How many links cross each other or run over joints of others, and by part of one how far lengths of links are from one."""
+    p, q = at[edges[:, 0]], at[edges[:, 1]]
+
+    def side(a: Array, b: Array, c: Array) -> Array:
+        return np.sign((b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0]))
+
+    a, b, c, d = p[apart[:, 0]], q[apart[:, 0]], p[apart[:, 1]], q[apart[:, 1]]
+    crossings = int(((side(a, b, c) != side(a, b, d)) & (side(c, d, a) != side(c, d, b))).sum())
+    along, point = (q - p)[beside[:, 0]], at[beside[:, 1]]
+    start = p[beside[:, 0]]
+    u = np.clip(((point - start) * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-9), 0.0, 1.0)
+    over = int((np.linalg.norm(start + u[:, None] * along - point, axis=1) < RUN_OVER).sum())
+    length = np.log(np.maximum(np.linalg.norm(q - p, axis=1), 1e-3))
+    spread = float((length * length).mean())
+    return crossings + over + spread / (1.0 + spread)
+
+
+BANDS = ((0.00135, 0.99865), (0.05, 0.95), (0.25, 0.75))
+"""Quantiles between which bands are drawn: three standard deviations of a normal distribution to each side, nine tenths, half."""
+MOST_BARS = 20
+
+BinsName = Literal["auto", "fd", "doane", "scott", "stone", "rice", "sturges", "sqrt"]
+"""Rules of ``numpy.histogram_bin_edges``."""
+
+
+@door
+def study_histogram(
+    study: Study,
+    output: str,
+    *,
+    position: int | None = None,
+    part: int | None = None,
+    bins: Count | BinsName = "auto",
+    ax: Axes = None,
+) -> Any:
+    """Draw how an output is spread over the variants, with the mechanism itself, the mean and the quantiles. Returns the axes.
+
+    Parameters
+    ----------
+    output : its name.
+    position : of an output over positions the number of one; left out, the value of greatest size of every variant.
+    part : of an output with several entries the number of one.
+    bins : as in ``numpy.histogram_bin_edges``.
+
+    Raises
+    ------
+    DeclarationError
+        where there is no such output, position or part, or no variant was solved.
+    """
+    picked = _Picked(study, output, part)
+    values, itself, label = picked.one(position)
+    values = values[np.isfinite(values)]
+    if not values.size:
+        raise DeclarationError(f"histogram of {output!r}", ["no variant was solved; study.messages says why"])
+    ax = new_axes() if ax is None else ax
+    ax.hist(values, bins=bins, color=PALETTE[0], alpha=0.8, edgecolor="white", lw=0.4)
+    low, high = np.quantile(values, (0.00135, 0.99865))
+    marks: list[tuple[str, float, Any, str]] = [
+        ("mechanism itself", itself, "-", INK),
+        ("mean", float(values.mean()), (0, (5, 2)), PALETTE[1]),
+    ]
+    marks += [("0.135 and 99.865 %", q, (0, (1, 1.5)), PALETTE[2]) for q in (float(low), float(high))]
+    for i, (name, x, style, colour) in enumerate(marks):
+        if np.isfinite(x):
+            text = f"{name}: {x:.4g}" if i < 2 else f"{'_' * (i > 2)}{name}"
+            ax.axvline(x, color=colour, lw=1.8, ls=style, label=text)
+    ax.set_xlabel(label, color=INK)
+    ax.set_ylabel(
+        f"number of variants (of {len(study.failed)}, {len(study.failed) - values.size} not solved)", color=INK
+    )
+    plain(ax)
+    ax.legend(frameon=False)
+    return ax
+
+
+@door
+def study_bands(study: Study, output: str, *, over: str | None = None, part: int | None = None, ax: Axes = None) -> Any:
+    """Draw the quantiles of an output over the positions, as bands about the median, with the mechanism itself. Returns the axes.
+
+    Parameters
+    ----------
+    over : a driver of the study; left out, the first that moves, else the number of the position.
+    part : of an output with several entries the number of one.
+
+    Raises
+    ------
+    DeclarationError
+        where there is no such output, part or driver, or the output has one value a variant.
+    """
+    picked = _Picked(study, output, part)
+    if not picked.placed:
+        raise DeclarationError(f"bands of {output!r}", ["it has one value a variant: use study_histogram"])
+    x = _driver(study, over, picked.values.shape[1])
+    ax = new_axes() if ax is None else ax
+    some = np.isfinite(picked.values).any(axis=0)
+    filled = np.where(some, picked.values, 0.0)
+    for (low, high), alpha in zip(BANDS, (0.16, 0.26, 0.4), strict=True):
+        ends = np.where(some, np.nanquantile(filled, (low, high), axis=0), np.nan)
+        ax.fill_between(
+            x.values[0], *ends, color=PALETTE[0], alpha=alpha, lw=0, label=f"{100 * low:g} to {100 * high:g} %"
+        )
+    ax.plot(x.values[0], np.where(some, np.nanmedian(filled, axis=0), np.nan), color=PALETTE[0], lw=1.8, label="median")
+    ax.plot(x.values[0], picked.itself, color=INK, lw=1.4, ls=(0, (5, 2)), label="mechanism itself")
+    lay_out(ax, x, picked.label)
+    ax.legend(frameon=False)
+    return ax
+
+
+@door
+def study_tornado(
+    study: Study, output: str, *, position: int | None = None, part: int | None = None, ax: Axes = None
+) -> Any:
+    """Draw what every parameter alone changes of an output, to first order, at its ends, the largest on top. Returns the axes.
+
+    A distribution without ends has them at three standard deviations. Parameters as in ``study_histogram``; without ``position`` the place
+    is that of the greatest size of the mechanism itself.
+    """
+    picked = _Picked(study, output, part)
+    itself = np.atleast_1d(picked.itself)
+    if not np.isfinite(itself).any():
+        raise DeclarationError(f"tornado of {output!r}", ["the mechanism itself has no value; study.messages says why"])
+    at = picked.checked(position) if position is not None else int(np.nanargmax(np.abs(itself)))
+    moves = {name: np.atleast_2d(picked.entry(move))[:, at] if picked.placed else picked.entry(move).reshape(2)
+             for name, move in study.moves(output).items()}  # fmt: skip
+    order = sorted(moves, key=lambda name: -float(np.abs(np.nan_to_num(moves[name])).max()))[:MOST_BARS]
+    ax = new_axes((6.4, 1.5 + 0.36 * len(order))) if ax is None else ax
+    for i, name in enumerate(order):
+        for end, colour in zip(moves[name], (PALETTE[0], PALETTE[1]), strict=True):
+            ax.barh(i, end, left=itself[at], height=0.6, color=colour, zorder=2)
+    for colour, word in zip((PALETTE[0], PALETTE[1]), ("lower end", "upper end"), strict=True):
+        ax.barh([0], [0], left=itself[at], color=colour, label=f"parameter at its {word}")
+    ax.axvline(itself[at], color=INK, lw=1.4, zorder=3)
+    ax.set_yticks(range(len(order)), map(said, order))
+    ax.invert_yaxis()
+    ax.set_xlabel(picked.label_at(at if picked.placed else None), color=INK)
+    plain(ax)
+    ax.tick_params(axis="y", length=0)
+    ax.legend(frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
+    return ax
+
+
+class _Picked:
+    """One number of an output for every variant, and for every position where it has them (``placed``)."""
+
+    def __init__(self, study: Study, output: str, part: int | None) -> None:
+        if output not in study.outputs:
+            raise DeclarationError(
+                "picture of a study", [f"{output!r} is no output; outputs: {', '.join(study.outputs)}"]
+            )
+        values, self.output = study.outputs[output], output
+        positions = study.status.shape[1]
+        self.placed = values.ndim > 1 and values.shape[1] == positions
+        rest = values.shape[1 + self.placed :]
+        if len(rest) > 1:
+            raise DeclarationError(
+                "picture of a study", [f"{output!r} has entries of shape {rest}; keep a single row as an output"]
+            )
+        self._entries = rest
+        if rest and not (isinstance(part, int) and 0 <= part < rest[0]):
+            raise DeclarationError(
+                "picture of a study",
+                [wrong(part, "part", f"a number below {rest[0]}: {output!r} has {rest[0]} entries")],
+            )
+        self._part = part if rest else None
+        self.values, self.itself = self.entry(values), self.entry(study.nominal[output])
+        unit = study.units[output]
+        unit = unit[self._part or 0] if isinstance(unit, tuple) else unit
+        self.unit = unit
+        self._name = output if self._part is None else f"{output}[{self._part}]"
+        self.label = self.label_at(None)
+
+    def label_at(self, position: int | None) -> str:
+        """What is drawn, at a position, with its unit."""
+        return axis_label(self._name if position is None else f"{self._name} at position {position}", self.unit)
+
+    def entry(self, values: Array) -> Array:
+        """The chosen entry of the last axis."""
+        return values if self._part is None else values[..., self._part]
+
+    def checked(self, position: int) -> int:
+        """The number of a position."""
+        n = self.values.shape[1] if self.placed else 1
+        if not isinstance(position, int) or not 0 <= position < n:
+            raise DeclarationError(f"picture of {self.output!r}", [wrong(position, "position", f"a number below {n}")])
+        return position
+
+    def one(self, position: int | None) -> tuple[Array, float, str]:
+        """One value a variant, that of the mechanism itself, and what it is."""
+        if not self.placed:
+            return self.values.reshape(-1), float(np.reshape(self.itself, -1)[0]), self.label
+        if position is not None or self.values.shape[1] == 1:
+            at = 0 if position is None else self.checked(position)
+            return self.values[:, at], float(self.itself[at]), self.label_at(position)
+        whole = np.vstack([self.values, self.itself[None]])
+        some = np.asarray(np.isfinite(whole).any(axis=1))
+        peaks = np.where(some, np.nanmax(np.abs(np.where(some[:, None], whole, 0.0)), axis=1), np.nan)
+        return peaks[:-1], float(peaks[-1]), axis_label(f"greatest |{self._name}|", self.unit)
+
+
+def _driver(study: Study, over: str | None, count: int) -> Abscissa:
+    """Positions of a driver of the first variant."""
+    m = study.mechanism
+    rows = {name: np.asarray(motion.position, dtype=float) for name, motion in study.motions.items()}
+    rows = {name: row.reshape(-1, row.shape[-1])[0] if row.ndim else row.reshape(1) for name, row in rows.items()}
+    named = [
+        name for name in rows if over is not None and name == (m.full_name(over) if over in m.pair_index else over)
+    ]
+    if over is not None and not named:
+        raise DeclarationError("bands of a study", [f"{over!r} is no driver of the study; drivers: {', '.join(rows)}"])
+    moving = named or [name for name, row in rows.items() if len(row) == count and np.ptp(row) > 0]
+    if not moving:
+        return Abscissa(np.arange(count, dtype=float)[None], "position")
+    name = moving[0]
+    if m.turns(name):
+        return Abscissa(np.rad2deg(rows[name])[None], axis_label(name, "deg"), True)
+    return Abscissa(rows[name][None], axis_label(name, unit_of(m.units, (1, 0, 0))))
+
+
+MOST_SHOWN = 16
+"""Most assemblies drawn side by side."""
+
+
+def draw_assemblies(modes: Assemblies) -> Any:
+    """The skeletons of all assemblies side by side, numbered, then a point of every continuum; the figure.
+
+    Raises
+    ------
+    DeclarationError
+        where there is none.
+    """
+    drawn = [*zip(modes.modes, modes.kinds, strict=True), *((one.point, "continuum") for one in modes.continua)]
+    if not drawn:
+        raise DeclarationError(f"picture of {modes.mechanism.name!r}", ["there is no real assembly to draw"])
+    shown = drawn[:MOST_SHOWN]
+    columns = int(np.ceil(np.sqrt(len(shown))))
+    rows = -(-len(shown) // columns)
+    probe = draw_skeleton(shown[0][0])
+    projection = getattr(probe, "name", "rectilinear")
+    first = new_axes((3.2 * columns, 3.0 * rows), projection=projection)
+    figure = first.figure
+    figure.clear()
+    for i, (mode, kind) in enumerate(shown):
+        ax = figure.add_subplot(rows, columns, i + 1, projection=projection)
+        draw_skeleton(mode, ax=ax)
+        ax.set_title(f"{i} ({kind})", fontsize=9)
+    return figure
+
+
+def draw_branches(b: Branches, output: str | None = None, *, ax: Any = None, current: int | None = None) -> Any:
+    """A freedom over the driver on all branches, folds marked; branch ``current`` highlighted, the others grey. The axes.
+
+    ``output`` left out is the last freedom that is no rotation of a ball. Angles are shown in degrees.
+    """
+    m, names = b.mechanism, b.mechanism.freedom_names()
+    single = [name for name in names if m.freedom_fault(name, single=True) is None and name != b.driver]
+    name = m.full_name(output) if output is not None else single[-1]
+    if name not in names:
+        raise DeclarationError(f"branches of {m.name!r}", [f"output {output!r}: expected one of {', '.join(single)}"])
+    if current is not None and not 0 <= current < len(b):
+        raise DeclarationError(f"branches of {m.name!r}", [f"current = {current}: expected 0 to {len(b) - 1}"])
+    ax = new_axes((7.0, 4.5)) if ax is None else ax
+    column = names.index(name)
+    for i, branch in enumerate(b.branches):
+        colour = PALETTE[branch.circuit % len(PALETTE)] if current in (None, i) else MUTED
+        x, y = _curve(b, branch, column)
+        ax.plot(
+            x, y, color=colour, lw=2.5 if current == i else 1.5, label=said(f"branch {i}, circuit {branch.circuit}")
+        )
+    for fold in b.folds:
+        for i in fold.branches:
+            x, y = _curve(b, b.branches[i], column)
+            end = -1 if fold.sense > 0 else 0
+            ax.plot(x[end], y[end], "o", color=INK, ms=5)
+    plain(ax)
+    for label, freedom in ((ax.set_xlabel, b.driver), (ax.set_ylabel, name)):
+        label(said(f"{freedom} [deg]" if m.turns(freedom) else freedom))
+    ax.legend(fontsize=8)
+    return ax
+
+
+def _curve(b: Branches, branch: Branch, column: int) -> tuple[Any, Any]:
+    """Driver and output of a branch, angles in degrees."""
+    m = b.mechanism
+    scales = [180.0 / np.pi if m.turns(name) else 1.0 for name in (b.driver, m.freedom_names()[column])]
+    return scales[0] * branch.values, scales[1] * branch.coordinates[:, column]

@@ -1,32 +1,31 @@
-"""What a picture of a mechanism shows, as plain arrays, for any painter: bodies in moving frames, labels, arrows.
-
-``Scene.frames`` holds affine maps ``(T, 3, 4)``, ``x -> A x + p``, one for every drawn position; every ``Part`` is a rigid set of
-vertices in one of them, with polygons and polylines by index (see ``shapes.Shape``). A frame need not be rigid: a spring is a coil of
-length one in a frame whose z is the line between its ends, an arrow of length one stands in a frame whose z is the force. NaN in a frame:
-nothing is to be drawn at that position.
-
-Frames are called ``"link:crank"``, ``"pair:A@0"`` (marker on link a), ``"pair:A@1"`` (after one freedom; the last is the marker on link
-b), ``"load:0"``, ``"load:0:force"``, ``"load:0:moment"``, ``"reaction:A"``, and ``""`` for the global one.
-"""
+"""What is shown of a mechanism: its bodies, paths, stage, and the forces that act, at every position."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
+import scipy
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import assembled
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import System
+from mechgraph.document.tree import plain
 from mechgraph.errors import DeclarationError
 from mechgraph.force.applied_loads import user_poses
+from mechgraph.model import pair_kinematics
+from mechgraph.model.force_law import Law
+from mechgraph.model.load import Effort, Gravity, Wrench
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.pair import Pair
 from mechgraph.result.solution import Solution
-from mechgraph.show import acting, bodies
-from mechgraph.show.stage import Label, Part, Place, Stage
+from mechgraph.show import shapes
+from mechgraph.show.shapes import Line, Shape, frame_along, lines_of, symbol
 
 __all__ = ["Label", "Part", "Place", "Scene", "place_of_states", "scene", "scene_at"]
 
@@ -128,16 +127,477 @@ def scene_at(
 ) -> Scene:
     """The scene of a mechanism that stands somewhere; a ``solution`` gives values to loads that vary, and to reactions."""
     stage = Stage(m, place, len(positions))
-    parts = [*bodies.links(stage), *bodies.pairs(stage), *acting.loads(stage, solution, positions)]
+    parts = [*links(stage), *pairs(stage), *loads(stage, solution, positions)]
     cases = np.asarray(positions) // (
         solution.batch[-1] if solution is not None and solution.batch else 1 + len(positions)
     )
     lost: tuple[str, ...] = ()
     scale = 0.0
     if forces and solution is not None and solution.has_forces:
-        arrows, lost, scale = acting.reactions(stage, solution, positions)
+        arrows, lost, scale = reactions(stage, solution, positions)
         parts += arrows
     return Scene(
-        m, positions, stage.frames, tuple(parts), tuple(bodies.labels(stage)), stage.points, stage.everything, stage.size,
+        m, positions, stage.frames, tuple(parts), tuple(labels(stage)), stage.points, stage.everything, stage.size,
         stage.symbol, stage.normal, stage.upright, stage.gravity, cases, lost, scale,
     )  # fmt: skip
+
+
+FLAT_THICKNESS = 1e-6
+"""Thickness over extent below which a mechanism is drawn as a plane one, and a link as a plate; points closer than that are one."""
+SYMBOL = 0.026
+"""Half width of a symbol over the extent of the mechanism, where pairs leave room for it."""
+
+Role = Literal[
+    "link",
+    "plate",
+    "tie",
+    "guide",
+    "body",
+    "dark",
+    "axis",
+    "foot",
+    "center",
+    "point",
+    "spring",
+    "load",
+    "drive",
+    "reaction",
+]
+
+
+@dataclass(frozen=True)
+class Part:
+    """One body of a drawing.
+
+    ``role`` says how it is painted: ``link`` (rods) and ``plate`` in the colour of ``link``, ``guide`` likewise but translucent, ``body``
+    (white) and ``dark`` of a pair symbol, ``axis`` (a line), ``tie`` (from a link to a point off it), ``foot`` (of the frame), ``center``
+    and ``point`` (one vertex), ``spring``, ``load``, ``drive``, ``reaction``. ``owner`` is the name of the pair, link, point or load.
+    """
+
+    role: Role
+    owner: str
+    link: str
+    frame: str
+    shape: Shape
+    dashed: bool = False
+
+
+@dataclass(frozen=True)
+class Label:
+    """A text that belongs to the point ``at (3,)`` of a frame; ``link`` gives its colour, empty for ink."""
+
+    kind: Literal["pair", "link", "point"]
+    text: str
+    owner: str
+    link: str
+    frame: str
+    at: Array
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a mechanism stands at ``T`` positions: link poses ``(T, 4, 4)`` and coordinates of every pair ``(f, T)``."""
+
+    poses: Mapping[str, Array]
+    coordinates: Mapping[str, Array]
+
+
+class Stage:
+    """A mechanism at ``T`` places: what its parts are made from.
+
+    Attributes
+    ----------
+    frames : name -> affine maps ``(T, 3, 4)``; those of links and pairs, to which parts add their own.
+    points : pair points ``points[pair, link]``, ``(T, 3)``.
+    everything : these, mass centres and points of interest, ``(n, 3)``.
+    normal : of the plane in which all of these lie, else None.
+    size, symbol : extent over all positions, and half width of the largest symbols.
+    gravity : the vector g, None where there is none.
+    """
+
+    def __init__(self, m: Mechanism, place: Place, count: int) -> None:
+        self.m, self.place, self.count = m, place, count
+        self.frames: dict[str, Array] = {"": np.broadcast_to(np.eye(3, 4), (count, 3, 4))}
+        self.frames |= {f"link:{name}": pose[:, :3] for name, pose in place.poses.items()}
+        for pair in m.pairs:
+            for k, frame in enumerate(self._pair_frames(pair)):
+                self.frames[f"pair:{pair.name}@{k}"] = frame
+        ends = ((p, link, k) for p in m.pairs for link, k in ((p.a, 0), (p.b, p.type.f)))
+        self.points = {(p.name, link): self.frames[f"pair:{p.name}@{k}"][:, :, 3] for p, link, k in ends}
+        of_links = [
+            self.on(k.name, c) for k in m.links for c in (*k.points.values(), *([k.center] if k.mass > 0 else []))
+        ]
+        self.everything = np.concatenate([*self.points.values(), *of_links])
+        self.normal = self._plane()
+        self.size = float(np.linalg.norm(np.ptp(self.everything, axis=0))) or 1.0
+        self.symbol = SYMBOL * self.size
+        weights = (np.asarray(load.acceleration, dtype=float) for load in m.loads if isinstance(load, Gravity))
+        self.gravity = next((g for g in weights if g.any()), None)
+
+    def _plane(self) -> Array | None:
+        """The normal of the plane of the mechanism: all points lie in it, and what can only turn does so about the normal."""
+        normal = plane_normal(self.everything)
+        for pair in self.m.pairs:
+            if (
+                normal is not None
+                and pair.type.f == 1
+                and (line := lines_of(pair.type, pair.pitch_per_radian)[0]).turns
+            ):
+                axis = self.frames[f"pair:{pair.name}@0"][0, :, :3] @ line.direction
+                normal = normal if np.linalg.norm(np.cross(axis, normal)) < FLAT_THICKNESS else None
+        return normal
+
+    def _pair_frames(self, pair: Pair) -> list[Array]:
+        """Frames 0, 1, ... of a pair ``(T, 3, 4)``."""
+        base, marker = self.place.poses[pair.a][:, :3], pair.markers[0].pose()
+        origin = base[:, :, :3] @ marker[:, 3] + base[:, :, 3]
+        start = np.concatenate([base[:, :, :3] @ marker[:, :3], origin[:, :, None]], axis=2)
+        x = pair_kinematics.coordinates_to_state(pair.type, self.place.coordinates[pair.name][:, None])
+        pitch = np.array([[pair.pitch_per_radian]])
+        found = pair_kinematics.frames_of(pair.type, pitch, x, np.moveaxis(start, 0, -1)[:, :, None])
+        return [np.moveaxis(frame[:, :, 0], -1, 0) for frame in found]
+
+    def on(self, link: str, point: Any) -> Array:
+        """A point of a link, given in its frame or by its name, in the global frame, ``(T, 3)``."""
+        X = self.place.poses[link][:, :3]
+        return np.asarray(X[:, :, :3] @ self.local(link, point) + X[:, :, 3])
+
+    def local(self, link: str, point: Any) -> Array:
+        """A point of a link, given by its coordinates or its name, in the link's frame."""
+        return np.asarray(self.m.link(link).point(point) if isinstance(point, str) else point, dtype=float)
+
+    def corners(self, link: str) -> list[Array]:
+        """What a link joins, in its own frame: points of the pairs that bear it, and where springs and other laws hold it."""
+        ends = (end for p in self.m.pairs if p.type.bears for end in zip((p.a, p.b), p.markers, strict=True))
+        laws = (load for load in self.m.loads if isinstance(load, Law) and load.between_links)
+        held = ((end, p) for load in laws for end, p in ((load.a, load.p), (load.b, load.q)) if end == link)
+        return [
+            *(np.asarray(marker.point, dtype=float) for name, marker in ends if name == link),
+            *(self.local(link, p) for _, p in held),
+        ]
+
+    def symbol_size(self, pair: Pair) -> float:
+        """Half width of a symbol: less where another pair is near."""
+        here = self.points[pair.name, pair.b][0]
+        gaps = (float(np.linalg.norm(here - self.points[p.name, p.b][0])) for p in self.m.pairs if p is not pair)
+        nearest = min((gap for gap in gaps if gap > FLAT_THICKNESS * self.size), default=self.size)
+        return float(np.clip(0.4 * nearest, 0.45 * self.symbol, self.symbol))
+
+    def freedom(self, name: str) -> tuple[Pair, int, Line, str]:
+        """The pair of a freedom, its number there, its line, and the frame of that."""
+        k, j = self.m.freedom(name)
+        pair = self.m.pairs[k]
+        line = lines_of(pair.type, pair.pitch_per_radian)[j]
+        return pair, j, line, f"pair:{pair.name}@{line.frame}"
+
+    @cached_property
+    def upright(self) -> Array:
+        """Axes of what stands upright, as columns: two level ones, and up: z, or y of a mechanism in a plane that has no z."""
+        if self.normal is None:
+            return np.eye(3)
+        n = self.normal
+        inside = (v - (v @ n) * n for v in (np.eye(3)[2], np.eye(3)[1]))
+        up = next(v / np.linalg.norm(v) for v in inside if np.linalg.norm(v) > 0.1)
+        right = np.cross(up, n)
+        right *= np.sign(right[np.argmax(np.abs(right))])  # seen from where x points to the right
+        return np.column_stack([right, np.cross(up, right), up])
+
+
+def distinct(points: Iterable[Array], tolerance: float) -> Array:
+    """The points, each once, ``(n, 3)``."""
+    out: list[Array] = []
+    for p in points:
+        if all(np.linalg.norm(p - other) > tolerance for other in out):
+            out.append(p)
+    return np.array(out).reshape(-1, 3)
+
+
+def plane_normal(points: Array) -> Array | None:
+    """The normal of the plane in which all points lie, its largest component positive; None where there is no such plane."""
+    _, spread, Vt = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
+    flat = len(spread) > 2 and spread[2] <= FLAT_THICKNESS * spread[0] < spread[1]
+    return np.asarray(Vt[2] * np.sign(Vt[2][np.argmax(np.abs(Vt[2]))])) if flat else None
+
+
+ROD, EDGE = 0.3, 0.2
+"""Radii of rods, and of the edges of plates, over the size of a symbol."""
+
+
+def links(stage: Stage) -> Iterator[Part]:
+    """Links as what they join: a rod between two points, a plate or a body between more; mass centres and points of interest."""
+    for link in stage.m.links:
+        frame, moving = f"link:{link.name}", link.name != stage.m.frame
+        corners = [*stage.corners(link.name), *(np.asarray(p, dtype=float) for p in link.points.values())]
+        if moving:
+            yield from _body(stage, link.name, corners)
+        else:
+            yield from _feet(stage)
+        for name, p in link.points.items():
+            yield Part("point", f"{link.name}.{name}", link.name, frame, Shape(np.array([p], dtype=float)))
+        if link.mass > 0 and moving:
+            center = np.asarray(link.center, dtype=float)
+            middle = np.mean(corners, axis=0) if corners else center
+            yield Part("tie", link.name, link.name, frame, shapes.polyline([middle, center]))
+            yield Part("center", link.name, link.name, frame, Shape(center[None]))
+
+
+def _body(stage: Stage, link: str, corners: list[Array]) -> Iterator[Part]:
+    frame, near = f"link:{link}", FLAT_THICKNESS * stage.size
+    points = distinct(corners, near)
+    if len(points) == 1 and stage.m.link(link).mass > 0:
+        points = distinct([*points, np.asarray(stage.m.link(link).center, dtype=float)], near)
+    if len(points) < 2:
+        return
+    faces, edges = hull(points)
+    if faces:
+        yield Part("plate", link, link, frame, Shape(points, faces))
+    radius = (EDGE if faces else ROD) * stage.symbol
+    yield Part("link", link, link, frame, shapes.together([rod(points[i], points[j], radius) for i, j in edges]))
+
+
+def _feet(stage: Stage) -> Iterator[Part]:
+    """A hatched foot under every pair point of the frame."""
+    name = stage.m.frame
+    X = stage.frames[f"link:{name}"][0]
+    foot = shapes.foot().moved(1.8 * stage.symbol * X[:, :3].T @ stage.upright)
+    for at in distinct(stage.corners(name), FLAT_THICKNESS * stage.size):
+        yield Part("foot", name, "", f"link:{name}", foot.moved(np.eye(3), at))
+
+
+def rod(p: Array, q: Array, radius: float) -> Shape:
+    """A thin round rod between two points, in pieces so that it can be sorted by depth; its one line is its middle line."""
+    length = float(np.linalg.norm(q - p))
+    solid = shapes.prism(6, radius, 0.0, length, int(np.clip(length / (12 * radius), 1, 12))).along(q - p, p)
+    return shapes.together([replace(solid, lines=(), rims=0), shapes.polyline([p, q])])
+
+
+def hull(points: Array) -> tuple[tuple[tuple[int, ...], ...], tuple[tuple[int, int], ...]]:
+    """Faces and edges of the convex hull of points: none and a line, a flat plate, or a body."""
+    middle = points - points.mean(axis=0)
+    _, spread, Vt = np.linalg.svd(middle, full_matrices=False)
+    if len(points) == 2 or spread[1] <= FLAT_THICKNESS * spread[0]:
+        order = np.argsort(middle @ Vt[0]).tolist()
+        return (), tuple(pairwise(order))
+    if len(points) == 3 or spread[2] <= FLAT_THICKNESS * spread[0]:
+        corners = [int(i) for i in scipy.spatial.ConvexHull(middle @ Vt[:2].T).vertices]
+        return (tuple(corners),), tuple(pairwise([*corners, corners[0]]))
+    solid = scipy.spatial.ConvexHull(points)
+    edges: dict[tuple[int, int], list[int]] = {}
+    for k, face in enumerate(solid.simplices.tolist()):
+        for i, j in pairwise([*face, face[0]]):
+            edges.setdefault((min(i, j), max(i, j)), []).append(k)
+    normals = solid.equations[:, :3]
+    sharp = tuple(edge for edge, (k, m) in edges.items() if normals[k] @ normals[m] < 1 - FLAT_THICKNESS)
+    return tuple(tuple(face) for face in solid.simplices.tolist()), sharp
+
+
+def pairs(stage: Stage) -> Iterator[Part]:
+    """Symbols of the pairs with their axes, and arrows at the driven freedoms."""
+    driven = {stage.m.full_name(d.freedom) for d in stage.m.drives}
+    for pair in stage.m.pairs:
+        size, lines = stage.symbol_size(pair), lines_of(pair.type, pair.pitch_per_radian)
+        for e in symbol(pair.type, pair.pitch_per_radian, size, _strokes(stage, pair, lines, size)):
+            link = pair.a if e.role == "guide" else ""
+            yield Part(e.role, pair.name, link, f"pair:{pair.name}@{e.frame}", e.shape, e.dashed)
+        for name, line, single in zip(pair.freedom_names, lines, pair.type.drivable, strict=True):
+            frame = f"pair:{pair.name}@{line.frame}"
+            if line.turns and single:
+                reach = 2.6 * size * line.direction
+                yield Part("axis", pair.name, "", frame, shapes.polyline([line.point - reach, line.point + reach]))
+            if name in driven:
+                yield Part("drive", name, "", frame, freedom_arrow(line, 1.75 * size))
+
+
+def _strokes(stage: Stage, pair: Pair, lines: list[Line], size: float) -> list[tuple[float, float]]:
+    """Least and greatest coordinates, zero among them.
+
+    A guide on the line of which link a is held by another pair reaches to there: the barrel of a cylinder, from its eye to the piston.
+    """
+    q = stage.place.coordinates[pair.name]
+    out = [(float(row.min(initial=0.0)), float(row.max(initial=0.0))) for row in q]
+    slides = [j for j, line in enumerate(lines) if not line.turns]
+    if len(slides) != 1 or pair.a == stage.m.frame:
+        return out
+    X = pair.markers[0].pose()
+    along, (low, high) = X[:, :3] @ lines[slides[0]].direction, out[slides[0]]
+    for d in (p - X[:, 3] for p in stage.corners(pair.a)):
+        if np.linalg.norm(np.cross(d, along)) < FLAT_THICKNESS * stage.size:
+            low, high = min(low, float(d @ along) + 2.6 * size), max(high, float(d @ along) - 2.6 * size)
+    out[slides[0]] = (low, high)
+    return out
+
+
+def freedom_arrow(line: Line, size: float, sign: float = 1.0) -> Shape:
+    """An arrow about the line of a turn, or beside that of a slide."""
+    turn = frame_along(line.direction)
+    if line.turns:
+        return shapes.turn_arrow(sign).moved(size * turn, line.point)
+    lengthwise = turn @ np.diag([0.3 * size, 0.3 * size, sign * 2.2 * size])
+    return shapes.arrow().moved(lengthwise, size * (turn[:, 0] - line.direction))
+
+
+def labels(stage: Stage) -> Iterator[Label]:
+    """Names of pairs with their types, of points, and of moving links."""
+    for pair in stage.m.pairs:
+        text = plain(f"{pair.name} ({pair.type.symbol})")
+        yield Label("pair", text, pair.name, "", f"pair:{pair.name}@{pair.type.f}", np.zeros(3))
+    for link in stage.m.links:
+        frame, corners = f"link:{link.name}", stage.corners(link.name)
+        for name, p in link.points.items():
+            text = f"{link.name}.{name}"
+            yield Label("point", plain(text), text, link.name, frame, np.asarray(p, dtype=float))
+        if link.name != stage.m.frame and corners:
+            yield Label("link", plain(link.name), link.name, link.name, frame, np.mean(corners, axis=0))
+
+
+LONGEST_ARROW = 0.2
+"""Length of the longest force arrow over the extent."""
+SHORTEST_ARROW = 0.25
+"""Length of the shortest arrow of a load over the longest: direction matters more than size there."""
+NOTHING = 1e-9
+"""Force over the largest below which no arrow is drawn."""
+
+LAW_SHAPES: dict[str, tuple[Shape, Shape]] = {
+    "spring": (shapes.coil(), shapes.spiral()),
+    "torsion_spring": (shapes.coil(), shapes.spiral()),
+    "damper": (shapes.dashpot(), shapes.turn_arrow()),
+    "force_law": (shapes.ram(), shapes.spiral()),
+}
+"""Shapes of laws by their kind: between points or along a slide, and about a turn."""
+
+
+class Acting(NamedTuple):
+    """A force at a point or a moment, ``(T, 3)`` each."""
+
+    load: int
+    turns: bool
+    at: Array
+    vector: Array
+
+
+def loads(stage: Stage, solution: Solution | None, positions: Any) -> Iterator[Part]:
+    """Laws between points or in freedoms; given forces, moments and efforts as arrows, the tip of a force where it acts."""
+    acting: list[Acting] = []
+    for i, load in enumerate(stage.m.loads):
+        if isinstance(load, Law):
+            yield _law(stage, i, load)
+        elif isinstance(load, Wrench):
+            acting += _wrench(stage, i, load, solution, positions)
+        elif isinstance(load, Effort):
+            acting.append(_effort(stage, i, load, solution, positions))
+    for one in acting:
+        kind = [np.linalg.norm(other.vector, axis=1) for other in acting if other.turns == one.turns]
+        longest = max(float(np.nanmax(v, initial=0.0)) for v in kind) or 1.0
+        share = np.linalg.norm(one.vector, axis=1) / longest
+        share = np.where(share > NOTHING, np.maximum(share, SHORTEST_ARROW), np.nan)
+        frame = f"load:{one.load}:{'moment' if one.turns else 'force'}"
+        if one.turns:
+            length = width = 2.5 * stage.symbol * share
+            at = one.at
+        else:
+            length, width = LONGEST_ARROW * stage.size * share, np.full(stage.count, 0.42 * stage.symbol)
+            at = one.at - frame_along(one.vector)[..., 2] * length[:, None]
+        stage.frames[frame] = stretched(one.vector, at, length, width)
+        yield Part("load", f"loads[{one.load}]", "", frame, shapes.turn_arrow() if one.turns else shapes.arrow())
+
+
+def stretched(along: Array, at: Array, length: Array, width: Array) -> Array:
+    """Frames ``(T, 3, 4)`` at points, z along a vector and of some length, x and y of some width."""
+    scale = np.stack([width, width, length], axis=1)
+    return np.concatenate([frame_along(along) * scale[:, None], at[:, :, None]], axis=2)
+
+
+def _wrench(stage: Stage, i: int, load: Wrench, solution: Solution | None, positions: Any) -> Iterator[Acting]:
+    center = stage.m.link(load.link).center
+    point = load.point if load.point is not None else center if center is not None else np.zeros(3)
+    at = stage.on(load.link, point)
+    if solution is None:
+        R = stage.place.poses[load.link][:, :3, :3] if load.frame == "link" else np.broadcast_to(np.eye(3), (1, 3, 3))
+        force, moment = (np.zeros((stage.count, 3)) + R @ _constant(v) for v in (load.force, load.moment))
+    else:
+        wrench = solution.load(i).wrenches[load.link].reshape(-1, 6)[positions]
+        force, moment = wrench[:, 3:], wrench[:, :3] - np.cross(at, wrench[:, 3:])
+    if load.force is not None:
+        yield Acting(i, False, at, force)
+    if load.moment is not None:
+        yield Acting(i, True, at, moment)
+
+
+def _effort(stage: Stage, i: int, load: Effort, solution: Solution | None, positions: Any) -> Acting:
+    pair, j, line, frame = stage.freedom(load.freedom)
+    X, couple = stage.frames[frame], pair.type.efforts[j].is_couple
+    if solution is None:
+        value = np.full(stage.count, _constant(load.value, 1)[0])
+    else:
+        value = solution.load(i).force.reshape(-1)[positions]
+    at = X[:, :, :3] @ line.point + X[:, :, 3] if line.turns else stage.points[pair.name, pair.b]
+    return Acting(i, couple, at, (X[:, :, :3] @ line.direction) * value[:, None])
+
+
+def _constant(value: Any, n: int = 3) -> Array:
+    """A constant load; NaN where it varies, which nobody knows without a solution."""
+    try:
+        return np.asarray(value, dtype=float).reshape(n)
+    except (TypeError, ValueError):
+        return np.full(n, np.nan)
+
+
+def _law(stage: Stage, i: int, load: Law) -> Part:
+    """A law between two points, or in a freedom: wound about its axis, or along its slide from the end of the guide."""
+    name, frame = f"loads[{i}]", f"load:{i}"
+    straight, turning = LAW_SHAPES[load.kind]
+    if load.in_freedom is None:
+        begin, end = stage.on(load.a, load.p), stage.on(load.b, load.q)
+    else:
+        pair, j, line, own = stage.freedom(load.in_freedom)
+        size, X = stage.symbol_size(pair), stage.frames[own]
+        if line.turns:
+            return Part("spring", name, "", own, turning.moved(1.7 * size * frame_along(line.direction), line.point))
+        low = float(stage.place.coordinates[pair.name][j].min(initial=0.0)) - 4.5 * size
+        begin, end = X[:, :, :3] @ (low * line.direction) + X[:, :, 3], stage.points[pair.name, pair.b]
+    width = np.full(stage.count, 0.75 * stage.symbol)
+    stage.frames[frame] = stretched(end - begin, begin, np.linalg.norm(end - begin, axis=1), width)
+    return Part("spring", name, "", frame, straight)
+
+
+def reactions(stage: Stage, solution: Solution, positions: Any) -> tuple[list[Part], tuple[str, ...], float]:
+    """Reaction forces on links b as arrows at their markers, pairs whose force is not unique, and the length of a unit of force."""
+    values = {p.name: known_force(stage, solution, p, positions, stage.normal) for p in stage.m.pairs}
+    lost = tuple(name for name, force in values.items() if np.isnan(force).any())
+    longest = max((float(np.nanmax(np.linalg.norm(v, axis=1), initial=0.0)) for v in values.values()), default=0.0)
+    scale = LONGEST_ARROW * stage.size / longest if longest else 0.0
+    out = []
+    for pair in stage.m.pairs:
+        force = values[pair.name]
+        length = np.linalg.norm(force, axis=1) * scale
+        length = np.where(length > FLAT_THICKNESS * stage.size, length, np.nan)
+        at = stage.points[pair.name, pair.b]
+        width = np.minimum(0.36 * stage.symbol, 0.2 * length)
+        stage.frames[f"reaction:{pair.name}"] = stretched(np.nan_to_num(force), at, length, width)
+        out.append(Part("reaction", pair.name, pair.b, f"reaction:{pair.name}", shapes.arrow()))
+    return out, lost, scale
+
+
+def known_force(stage: Stage, solution: Solution, pair: Pair, positions: Any, along: Array | None) -> Array:
+    """Reaction force ``(T, 3)``, NaN where it is not unique (also where values of least norm stand for it).
+
+    With a direction ``along (3,)`` or ``(T, 3)`` the part across it, which may be unique alone: in the plane of a plane mechanism, across
+    the axis of a bearing.
+    """
+    result, row = solution[pair.name], pair.type
+    unique = {name: np.asarray(flags).reshape(-1)[positions] for name, flags in result.unique.items()}
+    force = result.force.reshape(-1, 3)[positions]
+    parts = [part for part in row.reactions or () if not part.is_couple]
+    if along is None or row.reactions is None:
+        names = [part.name for part in parts] if row.reactions is not None else list(row.component_names)
+        known = np.all([unique[name] for name in names], axis=0) if names else np.ones(len(force), dtype=bool)
+        out = np.where(known[:, None], force, np.nan)
+        return out if along is None else out - (out * along).sum(axis=1, keepdims=True) * along
+    out = np.zeros_like(force)
+    for part in parts:
+        direction = stage.frames[f"pair:{pair.name}@{part.frame}"][:, :, :3] @ np.array(part.wrench[3:])
+        across = direction - (direction * along).sum(axis=1, keepdims=True) * along
+        value = np.where(unique[part.name], result.components[part.name].reshape(-1)[positions], np.nan)
+        bears = np.linalg.norm(across, axis=1, keepdims=True) > FLAT_THICKNESS
+        out = out + np.where(bears, across * value[:, None], 0.0)
+    return out

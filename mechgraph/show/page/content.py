@@ -1,27 +1,277 @@
-"""What the view shows: the mechanism, its cycle, every freedom, every self-stress, every advice before and after."""
+"""What a page tells: the cycle, the forces, self-stresses and advice, motions that are free."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from mechgraph.algebra.se3 import Array
+from mechgraph.closure.assembly import CLOSED, close
+from mechgraph.closure.indexing import Index
 from mechgraph.document.tree import plain
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.pair import Pair
+from mechgraph.model.row_parts import Component
+from mechgraph.numerics.tolerances import MOTIONS
+from mechgraph.report.facts import Geometry
 from mechgraph.report.findings import component_words
 from mechgraph.report.report import DeterminacyReport, check
-from mechgraph.result.numbers import with_unit
+from mechgraph.result.numbers import SHOWN_AS_ZERO, with_unit
+from mechgraph.result.places import driver_value
 from mechgraph.result.solution import Solution
-from mechgraph.show.page.changes import compared, stress_arrows
-from mechgraph.show.page.cycle import Cycle
-from mechgraph.show.page.figures import Figure
-from mechgraph.show.page.motions import wiggles
-from mechgraph.show.page.packing import rounded
-from mechgraph.show.scene import place_of_states, scene, scene_at
+from mechgraph.show.canvas import axis_label
+from mechgraph.show.page.figures import Figure, packed, rounded
+from mechgraph.show.scene import Part, Scene, place_of_states, scene, scene_at
 from mechgraph.show.shapes import Shape, frame_along
-from mechgraph.show.stage import Part
 from mechgraph.structure.self_stress import SelfStress
+from mechgraph.units import unit_of
+
+FORCE, MOMENT, LENGTH, TIME = (1, 1, -2), (2, 1, -2), (1, 0, 0), (0, 0, 1)
+
+Data = dict[str, Any]
+
+
+class Cycle:
+    """A solution at the positions of its scene."""
+
+    def __init__(self, s: Solution, scene: Scene) -> None:
+        self.s, self.scene = s, scene
+        self.m = s.mechanism
+        self.drivers = {name: self.of_freedom(name, "position") for name in s.prescribed}
+        forces = [self.at(s[p.name].force) for p in self.m.pairs] if s.has_forces else []
+        moments = [self.at(s[p.name].moment) for p in self.m.pairs] if s.has_forces else []
+        most = [
+            max((float(np.nanmax(np.abs(v), initial=0.0)) for v in rows), default=0.0) for rows in (forces, moments)
+        ]
+        self.noise = SHOWN_AS_ZERO * max(most[0], most[1] / scene.size)
+
+    def at(self, values: Any) -> Array:
+        """Values at the positions of the scene, the batch flat."""
+        array = np.asarray(values, dtype=float)
+        return np.asarray(array.reshape(-1, *array.shape[len(self.s.batch) :])[self.scene.positions])
+
+    def of_freedom(self, name: str, what: str) -> Array:
+        """A quantity of one freedom, ``(T,)``."""
+        k, j = self.s.whole.freedom(name)
+        return self.at(getattr(self.s[self.s.whole.pairs[k].name], what)[..., j])
+
+    def unique(self, pair: Pair) -> dict[str, bool]:
+        """Which components of a reaction are unique at every position, also where those of least norm stand for them; and efforts."""
+        return {name: bool(np.all(self.at(found))) for name, found in self.s[pair.name].unique.items()}
+
+    def unit(self, dimension: tuple[int, int, int]) -> str:
+        """A unit, as declared."""
+        return unit_of(self.m.units, dimension)
+
+    def data(self) -> Data:
+        """All of it for the page."""
+        label, x = self.abscissa()
+        with_forces = self.s.has_forces
+        return {
+            "label": label, "x": packed(x), "places": self.places(),
+            "efforts": list(self.efforts()) if with_forces else [],
+            "forces": [self.arrows(i, p) for i, p in enumerate(self.m.pairs)] if with_forces else [],
+            "pairs": [[*(self.reaction(p) if with_forces else ()), *self.positions(p)] for p in self.m.pairs],
+        }  # fmt: skip
+
+    @property
+    def returns(self) -> bool:
+        """Whether the last position is followed by the first: a driver that turns all the way round."""
+        if len(self.drivers) != 1:
+            return False
+        ((name, values),) = self.drivers.items()
+        steps = np.abs(np.diff(values))
+        return bool(self.s.whole.turns(name) and len(values) > 8 and np.ptp(values) + 2 * steps.max() > 2 * np.pi)
+
+    def abscissa(self) -> tuple[str, Array]:
+        """What the curves are drawn over: the driver, where it is one that goes one way; else time; else numbers of positions."""
+        if len(self.drivers) == 1:
+            ((name, values),) = self.drivers.items()
+            turns = self.s.whole.turns(name)
+            steps = np.sign(values[-1] - values[0]) * np.diff(values)
+            if (steps > 0).all():
+                unit = "deg" if turns else self.unit(LENGTH)
+                return axis_label(plain(name), unit), np.rad2deg(values) if turns else values
+        if self.s.t is not None:
+            return axis_label("time", self.unit(TIME)), self.at(np.broadcast_to(self.s.t, self.s.batch))
+        return "number of the position", self.scene.positions.astype(float)
+
+    def places(self) -> list[str]:
+        """Every position in words."""
+        if self.drivers:
+            rows = zip(*self.drivers.values(), strict=True)
+            return [
+                ", ".join(driver_value(self.s.whole, n, v) for n, v in zip(self.drivers, row, strict=True))
+                for row in rows
+            ]
+        if self.s.t is not None:
+            return [
+                f"t = {value:.5g} {self.unit(TIME)}".rstrip()
+                for value in self.at(np.broadcast_to(self.s.t, self.s.batch))
+            ]
+        return [f"position {i}" for i in self.scene.positions]
+
+    def efforts(self) -> Iterable[Data]:
+        """What drivers supply, couples and forces apart; what springs, dampers and given efforts do in the freedoms."""
+        given = {n: self.of_freedom(n, "applied_effort") for n in self.m.freedom_names()}
+        acting = {n: v for n, v in given.items() if np.abs(np.nan_to_num(v)).max(initial=0.0) > 0}
+        supplied = {n: self.of_freedom(n, "effort") for n in self.s.actuated}
+        for title, rows in (("Effort of the driver" if len(supplied) == 1 else "Efforts of the drivers", supplied),
+                            ("Applied efforts (springs, dampers, given efforts)", acting)):  # fmt: skip
+            for couple, dimension in ((True, MOMENT), (False, FORCE)):
+                mine = {n: v for n, v in rows.items() if self._is_couple(n) is couple}
+                if mine:
+                    yield self.chart(title, dimension, mine, {n: self._effort_is_unique(n) for n in mine})
+
+    def _effort_is_unique(self, freedom: str) -> bool:
+        k, j = self.s.whole.freedom(freedom)
+        pair = self.s.whole.pairs[k]
+        found = self.unique(pair)
+        return found.get(f"effort {pair.type.freedoms[j].name}", found.get("effort", True))
+
+    def _is_couple(self, freedom: str) -> bool:
+        k, j = self.s.whole.freedom(freedom)
+        return self.s.whole.pairs[k].type.efforts[j].is_couple
+
+    def chart(
+        self, title: str, dimension: tuple[int, int, int], rows: Mapping[str, Array], unique: Mapping[str, bool]
+    ) -> Data:
+        """Curves of one unit; what is not known at some position is named, not drawn."""
+        floor = self.noise * (1.0 if dimension == FORCE else self.scene.size)
+        series = [
+            {
+                "name": plain(name),
+                "values": packed(np.where(np.abs(v) <= floor, 0.0, v)),
+                "known": "unique" if unique.get(name, True) else "least norm",
+            }
+            for name, v in rows.items()
+            if not np.isnan(v).any()
+        ]
+        lost = [plain(name) for name, v in rows.items() if np.isnan(v).any()]
+        return {"title": title, "unit": self.unit(dimension), "series": series, "open": lost}
+
+    def reaction(self, pair: Pair) -> Iterable[Data]:
+        """Components of a reaction in the pair's own frames, forces and moments apart, with the size of each where all of it is known."""
+        unique = self.unique(pair)
+        found = {name: self.at(v) for name, v in self.s[pair.name].components.items()}
+        own = components_of(pair)
+        for couple, dimension, size, what in ((False, FORCE, "force", "F"), (True, MOMENT, "moment", "M")):
+            rows = {n: v for n, v in found.items() if (n in own and own[n].is_couple) is couple}
+            whole = np.linalg.norm(self.at(getattr(self.s[pair.name], size)), axis=-1)
+            if not np.isnan(whole).any() and (rows or whole.max(initial=0.0) > self.noise * self.scene.size):
+                rows = {f"|{what}|": whole, **rows}
+            if rows:
+                sure = {**unique, f"|{what}|": all(ok for n, ok in unique.items() if n in rows)}
+                yield self.chart(
+                    f"Reaction {size}{'' if not couple else ' about the point on link b'}", dimension, rows, sure
+                )
+
+    def positions(self, pair: Pair) -> Iterable[Data]:
+        """Coordinates of a pair, turns in degrees."""
+        q = self.at(self.s[pair.name].position)
+        for turning in (True, False):
+            rows = {
+                name: v
+                for name, f, v in zip(pair.freedom_names, pair.type.freedoms, q.T, strict=True)
+                if f.turns is turning
+            }
+            if not rows:
+                continue
+            shown = {n: np.rad2deg(v) if turning else v for n, v in rows.items()}
+            clean = {
+                n: np.where(np.abs(v) < 1e-9 * (180 if turning else self.scene.size), 0.0, v) for n, v in shown.items()
+            }
+            made = self.chart("Coordinates", LENGTH, clean, {})
+            yield {**made, "unit": "deg" if turning else self.unit(LENGTH)}
+
+    def arrows(self, i: int, pair: Pair) -> Data:
+        """Force and moment on link b at its marker: of what has a value; ``open`` names what is not unique."""
+        own, unique, frames = components_of(pair), self.unique(pair), self.scene.frames
+        found = {name: self.at(v) for name, v in self.s[pair.name].components.items()}
+        lost = [plain(n) for n, v in found.items() if np.isnan(v).any() or not unique.get(n, True)]
+        if own:
+            parts = {own[n]: np.where(np.isnan(v), 0.0, v) for n, v in found.items()}
+            force, moment = wrench_of(pair, frames, parts)
+        else:
+            force, moment = (np.nan_to_num(self.at(v)) for v in (self.s[pair.name].force, self.s[pair.name].moment))
+        floor = self.noise * np.array([1.0, self.scene.size])
+        force, moment = (
+            np.where(np.linalg.norm(v, axis=1)[:, None] <= f, 0.0, v)
+            for v, f in zip((force, moment), floor, strict=True)
+        )
+        at = frames[f"pair:{pair.name}@{pair.type.f}"][:, :, 3]
+        return {"pair": i, "at": packed(at), "force": packed(force), "moment": packed(moment), "open": lost}
+
+
+def wrench_of(
+    pair: Pair, frames: Mapping[str, Array], parts: Mapping[Component, Array], length: float = 1.0
+) -> tuple[Array, Array]:
+    """Force and moment about marker B ``(T, 3)``, global, of components with values ``(T,)``; moments counted in forces times ``length``.
+
+    Sum of ``v (R_k w_F)`` and of ``v (R_k w_M + (o_k - o_B) x R_k w_F)``, k the frame of the component.
+    """
+    end = frames[f"pair:{pair.name}@{pair.type.f}"]
+    force, moment = np.zeros((2, len(end), 3))
+    for part, value in parts.items():
+        X = frames[f"pair:{pair.name}@{part.frame}"]
+        w = np.array(part.wrench) + pair.pitch_per_radian * np.array(part.per_pitch)
+        F, M = X[:, :, :3] @ w[3:], X[:, :, :3] @ w[:3]
+        arm = np.zeros(3) if part.at_b else X[:, :, 3] - end[:, :, 3]
+        force = force + value[:, None] * F
+        moment = moment + value[:, None] * ((length if part.is_couple else 1.0) * M + np.cross(arm, F))
+    return force, moment
+
+
+def components_of(pair: Pair) -> dict[str, Component]:
+    """The reaction components of a pair by name; none for a row whose components mix forces and moments."""
+    return {c.name: c for c in pair.type.reactions or ()}
+
+
+def stress_arrows(m: Mechanism, stress: SelfStress, frames: Mapping[str, Array], L: float) -> list[dict[str, Any]]:
+    """What link a exerts on link b in a self-stress, at marker B; moments divided by ``L`` so that they compare."""
+    out = []
+    for i, pair in enumerate(m.pairs):
+        parts = _parts(pair, stress)
+        if not parts:
+            continue
+        at_first = {name: X[:1] for name, X in frames.items() if name.startswith(f"pair:{pair.name}@")}
+        force, moment = wrench_of(pair, at_first, parts, L)
+        at = at_first[f"pair:{pair.name}@{pair.type.f}"][0, :, 3]
+        out.append(
+            {"pair": i, "at": rounded(at), "force": rounded(force[0]), "moment": rounded(moment[0] / L), "open": False}
+        )
+    return out
+
+
+def _parts(pair: Pair, stress: SelfStress) -> dict[Component, Array]:
+    """Components and efforts of a pair in a self-stress."""
+    own = {f"{pair.name}:{name}": c for name, c in components_of(pair).items()}
+    parts = {own[name]: np.array([v]) for name, v in stress.components.items() if name in own}
+    single = [name for name in stress.efforts if name == pair.name]
+    for freedom, effort in zip(pair.type.freedoms, pair.type.efforts, strict=True):
+        for name in (f"{pair.name}.{freedom.name}", *single):
+            if name in stress.efforts:
+                parts[effort] = np.array([stress.efforts[name]])
+    return parts
+
+
+def compared(before: DeterminacyReport, after: DeterminacyReport) -> list[list[str]]:
+    """What an advice changes, as rows: name, before, after."""
+
+    def numbers(r: DeterminacyReport) -> list[tuple[str, str]]:
+        return [
+            ("mobility", "-" if r.mobility is None else str(r.mobility)),
+            ("redundancy", "-" if r.redundancy is None else str(r.redundancy)),
+            ("passive freedoms", str(len(r.passive))),
+            ("self-stresses with the drivers", str(r.reactions.count) if r.reactions else "-"),
+            ("determinate", "yes" if r.determinate else "no"),
+        ]
+
+    return [[name, old, new] for (name, old), (_, new) in zip(numbers(before), numbers(after), strict=True)]
+
 
 MOST_LINKS = 250
 """Links up to which a mechanism is drawn in space."""
@@ -38,8 +288,6 @@ ARROWS = (
     "Arrows: force (one head) and moment (two heads) that the first link of a pair exerts on the second; striped where part of the "
     "reaction is not unique and left out. A hatched name: not all of the reaction of that pair is unique"
 )
-
-Data = dict[str, Any]
 
 
 def view_data(report: DeterminacyReport, s: Solution | None) -> Data | None:
@@ -215,3 +463,103 @@ def _told(m: Mechanism, stress: SelfStress, L: float) -> str:
         f"Reactions that balance each other without any load; assembly can lock in any multiple: {stress.text or 'efforts of couplings'}. "
         f"Arrows: on the second link of each pair, the first takes the opposite; moments (two heads) divided by {length}."
     )
+
+
+REACH = 0.35
+"""How far a freedom is followed to either side (radians, or lengths / L), in so many steps."""
+STEPS_A_MODE = 12
+LEAST = 3
+"""Steps that must be closed for a motion to count as one."""
+KEPT = 0.3
+"""Part of a step that must be left once the loops are closed."""
+SHAKEN = 0.12
+"""How far an infinitesimal motion is drawn."""
+PICTURES_A_TURN = 48
+"""Positions of a full turn."""
+
+
+@dataclass(frozen=True)
+class Wiggle:
+    """One freedom: states ``x (nx, T)`` in the order in which they are passed, a ``title`` and what it is in words.
+
+    Of a passive turn also its ``axis`` and the ``links`` that turn.
+    """
+
+    group: str
+    title: str
+    text: str
+    x: Array
+    kind: str
+    axis: tuple[tuple[float, ...], tuple[float, ...]] | None = None
+    links: tuple[str, ...] = ()
+
+
+def wiggles(report: DeterminacyReport) -> Iterator[Wiggle]:
+    """What every driver does alone, what is neither driven nor passive, and every passive freedom."""
+    g = report.geometry
+    if g is None:
+        return
+    names = report.mechanism.freedom_names()
+    for column in g.driven.tolist():
+        rates = _alone(g, column)
+        if rates is not None:
+            others = ", ".join(names[i] for i in np.flatnonzero(np.abs(rates) > MOTIONS.still) if i != column)
+            text = f"{names[column]} is driven{'; with it move ' + others if others else ', nothing else moves'}"
+            rest = g.driven[g.driven != column]
+            yield _followed(g, "Freedoms", f"{names[column]} driven", text, rates, rest)
+    for motion, finding in zip(g.freedoms.undriven, report.undriven, strict=True):
+        text = f"neither driven nor passive: {finding.text}"
+        yield _followed(g, "Freedoms", f"{', '.join(motion.names[:3])} free", text, motion.rates, g.driven)
+    for passive, found in zip(g.freedoms.passive, report.passive, strict=True):
+        rate = float(np.linalg.norm(passive.twist[:3])) if found.turns else 0.0
+        if rate:
+            along = np.linspace(0, 2 * np.pi / rate, PICTURES_A_TURN + 1)
+        else:
+            along = REACH * np.linspace(-1, 1, 2 * STEPS_A_MODE + 1)
+        x = g.system.advance(g.x[:, None], passive.rates[:, None] * along)
+        yield Wiggle(
+            "Passive freedoms",
+            found.name,
+            found.text,
+            x,
+            "spin" if rate else "swing",
+            found.axis if rate else None,
+            found.links,
+        )
+
+
+def _alone(g: Geometry, column: int) -> Array | None:
+    """Rates with one driver at the rate one and the others at rest, least of the motions that do it; None where there are none."""
+    N = g.freedoms.inputs
+    wanted = (g.driven == column).astype(float)
+    mix, *_ = np.linalg.lstsq(N[g.driven], wanted, rcond=MOTIONS.dependent)
+    if np.abs(N[g.driven] @ mix - wanted).max(initial=0.0) > 1e-6:
+        return None
+    return np.asarray(N @ mix)
+
+
+def _followed(g: Geometry, group: str, title: str, text: str, rates: Array, rest: Index) -> Wiggle:
+    """A motion with the freedoms ``rest`` at rest, to both sides; infinitesimal, without closing, where it cannot be followed."""
+    v = rates / np.abs(rates).max()
+    sides = [_side(g, sign * v, rest) for sign in (-1.0, 1.0)]
+    if max(map(len, sides)) < LEAST:
+        x = g.system.advance(g.x[:, None], v[:, None] * SHAKEN * np.linspace(-1, 1, 2 * STEPS_A_MODE + 1))
+        return Wiggle(
+            group, title, f"{text}. Infinitesimal only: beyond it the loops open, as they are drawn here", x, "swing"
+        )
+    return Wiggle(group, title, text, np.stack([*sides[0][::-1], g.x, *sides[1]], axis=1), "swing")
+
+
+def _side(g: Geometry, v: Array, rest: Index) -> list[Array]:
+    """Closed states to one side: each step goes on in the direction of the one before."""
+    h, x, out = REACH / STEPS_A_MODE, g.x, []
+    for _ in range(STEPS_A_MODE):
+        guess = g.system.advance(x[:, None], h * v[:, None])[:, 0]
+        closed, error = close(g.system, guess, rest)
+        moved = g.system.difference(closed[:, None], x[:, None])[:, 0]
+        size = float(np.abs(moved).max())
+        if error > CLOSED or size < KEPT * h or moved @ v < KEPT * h * (v @ v):
+            break
+        v, x = moved / size, closed
+        out.append(closed)
+    return out

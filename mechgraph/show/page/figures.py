@@ -1,7 +1,9 @@
-"""A scene as the page draws it: pieces in frames, of which those of rigid pair markers are left to their links."""
+"""Shapes and numbers as the scripts of the page read them."""
 
 from __future__ import annotations
 
+import base64
+import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,10 +13,29 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.document.tree import plain
 from mechgraph.model.pair import Pair
 from mechgraph.show.canvas import colours
-from mechgraph.show.page.packing import packed, rounded
-from mechgraph.show.scene import Scene
+from mechgraph.show.scene import Part, Scene
 from mechgraph.show.shapes import Shape
-from mechgraph.show.stage import Part
+
+
+def packed(values: Any) -> dict[str, Any]:
+    """An array as 32-bit numbers, little-endian, in base64; NaN stays NaN."""
+    array = np.ascontiguousarray(values, dtype="<f4")
+    return {"shape": list(array.shape), "f32": base64.b64encode(array.tobytes()).decode()}
+
+
+def rounded(values: Array) -> list[float]:
+    """A few numbers, to seven digits."""
+    return [float(f"{value:.7g}") for value in np.asarray(values, dtype=float).ravel()]
+
+
+def json_for_script(data: Any) -> str:
+    """JSON that ends no script element and no line of one, whatever its texts hold.
+
+    ValueError where a number is not finite: what is not known is packed, or is no number.
+    """
+    text = json.dumps(data, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
 
 OBLIQUE = (0.6, -1.0, 0.55)
 """Direction from which a spatial mechanism is seen, in upright axes."""

@@ -1,32 +1,208 @@
-"""``write_report``: the page of a mechanism, its solution and its study as one file."""
+"""The page as one file, or in a notebook."""
 
 from __future__ import annotations
 
+import base64
+import hashlib
+import importlib
+import importlib.metadata
+import io
+import json
 import os
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import cache, partial
+from importlib.resources import files
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 
 from mechgraph.arguments import door
-from mechgraph.document import Bullets, Document, to_html
+from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Table, to_html
 from mechgraph.equations.build import formulate
-from mechgraph.errors import DeclarationError, MechgraphWarning, MissingExtraError
+from mechgraph.errors import DeclarationError, FileError, MechgraphWarning, MissingExtraError, visible
 from mechgraph.kinetostatics import solve
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.toml import written
 from mechgraph.quantities import wrong
 from mechgraph.report.report import DeterminacyReport, check
 from mechgraph.result.solution import Solution
-from mechgraph.show.page import made
+from mechgraph.show.curves import effort_curve, reaction_ranges
+from mechgraph.show.diagrams import draw_graph, study_histogram, study_tornado
 from mechgraph.show.page.content import view_data
-from mechgraph.show.page.packing import json_for_script
-from mechgraph.show.page.provenance import declaration, provenance, version
-from mechgraph.show.page.stills import Pictures, pictures_of_graph, pictures_of_study, stills
-from mechgraph.show.page.studies import study_document
+from mechgraph.show.page.figures import json_for_script
+from mechgraph.show.skeleton import draw_skeleton
 from mechgraph.variants.result import Study
 from mechgraph.writing import write_whole
+
+WEB = "web"
+"""Folder of the scripts, which build.js of it builds."""
+
+
+@cache
+def text_of(name: str) -> str:
+    """A file of the page."""
+    return files(__package__).joinpath(*name.split("/")).read_text(encoding="utf-8")
+
+
+def scripts() -> tuple[str, str]:
+    """Other people's libraries, and our own modules that stand on them."""
+    return text_of(f"{WEB}/vendor.js"), text_of(f"{WEB}/view.js")
+
+
+def view_style() -> str:
+    """The style sheet of the view."""
+    return text_of(f"{WEB}/vendor.css") + text_of("view.css")
+
+
+def libraries() -> str:
+    """What the scripts stand on, with versions and licences."""
+    packages = json.loads(text_of(f"{WEB}/built.json"))["packages"]
+    return " and ".join(f"{p['name']} {p['version']} ({p['license']})" for p in packages)
+
+
+def content_policy(scripts: list[str], style: str) -> str:
+    """What the page may do: run these scripts, use this style, show pictures that stand in it, and nothing else."""
+    allowed = " ".join(map(_source, scripts))
+    return f"default-src 'none'; script-src {allowed}; style-src {_source(style)}; img-src data:; base-uri 'none'; form-action 'none'"
+
+
+def _source(text: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+
+
+def version() -> str:
+    """The version of this program."""
+    try:
+        return importlib.metadata.version("mechgraph")
+    except importlib.metadata.PackageNotFoundError:
+        return "(not installed)"
+
+
+def declaration(m: Mechanism) -> str:
+    """The declaration as TOML; empty where it holds functions, which no file can hold."""
+    try:
+        return written(m)
+    except FileError:
+        return ""
+
+
+def provenance(m: Mechanism, report: DeterminacyReport, s: Solution | None, study: Study | None) -> Document:
+    """One table: program, mechanism, options."""
+    return Document("", (Table(("what", "value"), tuple(row for row in _rows(m, report, s, study) if row[1])),))
+
+
+def _rows(
+    m: Mechanism, report: DeterminacyReport, s: Solution | None, study: Study | None
+) -> Iterator[tuple[str, str]]:
+    text = declaration(m)
+    yield "program", f"mechgraph {version()}, numpy {np.__version__}"
+    yield "mechanism", m.name
+    yield "source", m.source
+    yield (
+        "SHA-256 of the declaration",
+        hashlib.sha256(text.encode()).hexdigest() if text else "none: it holds functions",
+    )
+    yield "units", ", ".join(f"{base} {unit}" for base, unit in m.units.items()) or "none declared: any consistent set"
+    yield "engine of the report", report.engine or "none: graph alone"
+    if s is not None:
+        yield "prescribed", ", ".join(s.prescribed) or "nothing"
+        yield "unknown efforts", ", ".join(s.actuated) or "none"
+        yield "positions", str(np.asarray(s.status).size)
+        yield "engine and method", f"{s.engine}, {s.method or 'motion alone'}"
+    if study is not None:
+        yield "study", repr(study)
+
+
+OUTPUTS = 4
+"""Outputs of a study of which pictures are made."""
+PAIRS_LABELLED = 40
+"""Pairs up to which names stand in the still picture: finding room for them takes long."""
+RC: dict[Any, Any] = {"svg.hashsalt": "mechgraph", "svg.fonttype": "none", "text.parse_math": False}
+"""The same file at every call; names as text in the reader's fonts, none of them a formula."""
+
+
+Pictures = list[tuple[str, str]]
+"""Titles and pictures: addresses that hold them."""
+
+
+def stills(m: Mechanism, s: Solution | None) -> Pictures:
+    """The mechanism where it begins, what its drivers supply, and from what to what its reactions range."""
+    out = [(m.name, _picture(lambda: draw_skeleton(m if s is None else s, labels=len(m.pairs) <= PAIRS_LABELLED)))]
+    if s is None or not s.has_forces:
+        return out
+    if s.mechanism.drives:
+        out.append(("Efforts of the drivers", _picture(lambda: effort_curve(s))))
+    out.append(("Reaction forces, hatched where not unique", _picture(lambda: reaction_ranges(s))))
+    out.append(("Reaction moments, hatched where not unique", _picture(lambda: reaction_ranges(s, moment=True))))
+    return out
+
+
+def pictures_of_graph(m: Mechanism) -> Pictures:
+    """The link-pair graph."""
+    return [("Links and pairs, coloured by the loops in which they lie", _picture(lambda: draw_graph(m)))]
+
+
+def pictures_of_study(study: Study) -> Pictures:
+    """How the first outputs spread, and what moves them; of those with several entries that of greatest size."""
+    out = []
+    for name in list(study.outputs)[:OUTPUTS]:
+        nominal = np.abs(np.nan_to_num(study.nominal[name]))
+        placed = study.outputs[name].ndim > 1 and study.outputs[name].shape[1] == study.status.shape[1]
+        entries = nominal.ndim - placed
+        if entries > 1 or not nominal.any() or not np.isfinite(study.outputs[name]).any():
+            continue
+        part = int(np.argmax(nominal.reshape(-1, nominal.shape[-1]).max(axis=0))) if entries else None
+        out.append((f"{name} over the variants", _picture(partial(study_histogram, study, name, part=part))))
+        out.append(
+            (f"{name}: what every parameter alone does", _picture(partial(study_tornado, study, name, part=part)))
+        )
+    return out
+
+
+def _picture(draw: Callable[[], Any]) -> str:
+    """A picture as an SVG that stands in its own address."""
+    try:
+        from matplotlib import rc_context
+    except ImportError:
+        raise MissingExtraError("matplotlib", "report") from None
+    buffer = io.BytesIO()
+    with rc_context(RC), warnings.catch_warnings():
+        # the reader's fonts may have the letters of a name; a name as long as the picture leaves the curves no room
+        warnings.filterwarnings("ignore", "Glyph|constrained_layout not applied", UserWarning)
+        draw().figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    return f"data:image/svg+xml,{quote(visible(buffer.getvalue().decode()), safe=' =:/,.;()-')}"
+
+
+Q = (0.00135, 0.5, 0.99865)
+
+
+def study_document(study: Study) -> Document:
+    """What the study tells of itself; and outputs where the mechanism itself has them greatest, with quantiles and sensitivities."""
+    return Document("", (*study.document().blocks, *_blocks(study)))
+
+
+def _blocks(study: Study) -> Iterator[Block]:
+    rows, slopes = [], []
+    for name in study.outputs:
+        nominal = np.asarray(study.nominal[name], dtype=float)
+        if not np.isfinite(nominal).any():
+            continue
+        at = np.unravel_index(int(np.nanargmax(np.abs(nominal))), nominal.shape)
+        values = [nominal, study.mean(name), study.std(name), *study.quantiles(name, Q)]
+        where = ", ".join(map(str, map(int, at))) or "-"
+        rows.append((name, where, *(f"{float(v[at]):.5g}" for v in values)))
+        slopes += [(name, parameter, f"{float(v[at]):.5g}") for parameter, v in study.sensitivities(name).items()]
+    head = ("output", "entry", "nominal", "mean", "deviation", "0.135 %", "median", "99.865 %")
+    if rows:
+        yield Heading("Outputs where they are greatest", 2)
+        yield Paragraph("At the position, and of the component, where the mechanism itself has the greatest value.")
+        yield Table(head, tuple(rows), align="llrrrrrr")
+        yield Heading("Sensitivities there", 2)
+        yield Table(("output", "parameter", "derivative"), tuple(slopes), align="llr")
+
 
 STYLED = re.compile(r' style="text-align: (left|right|center)"| border="1"')
 """What the page's own style sheet does instead: its policy allows no style beside it."""
@@ -120,7 +296,7 @@ def _content(m: Mechanism, report: DeterminacyReport, s: Solution | None, study:
         "results": [(title, _html(document), pictures) for title, document, pictures in _results(s, study)],
         "equations": _html(_equations(report.mechanism)),
         "provenance": _html(provenance(m, report, s, study)), "declaration": declaration(m),
-        "version": version(), "libraries": made.libraries(),
+        "version": version(), "libraries": libraries(),
     }  # fmt: skip
 
 
@@ -177,14 +353,52 @@ def _filled(content: dict[str, Any]) -> str:
         from markupsafe import Markup
     except ImportError:
         raise MissingExtraError("jinja2", "report") from None
-    style = made.view_style() + made.text_of("page.css")
-    scripts = [*made.scripts(), START]
+    style = view_style() + text_of("page.css")
+    run = [*scripts(), START]
     markup = {name: Markup(content[name]) for name in ("brief", "report", "equations", "provenance", "data")}
     results = [(title, Markup(html), pictures) for title, html, pictures in content["results"]]
-    page = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=False).from_string(
-        made.text_of("page.html")
-    )
+    page = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=False).from_string(text_of("page.html"))
     return page.render(
-        {**content, **markup}, results=results, style=Markup(style), scripts=[Markup(script) for script in scripts],
-        policy=made.content_policy(scripts, style),
+        {**content, **markup}, results=results, style=Markup(style), scripts=[Markup(script) for script in run],
+        policy=content_policy(run, style),
     )  # fmt: skip
+
+
+RENDER = "\nexport default { render: ({ model, el }) => mechgraphView.mount(el, model.get('data')) };\n"
+
+
+def view(shown: Mechanism | Solution) -> Any:
+    """The view as a widget: the mechanism in space with every freedom, self-stress and advice, and the curves of a solution.
+
+    A mechanism is shown with the motion that its drivers store, where they all do.
+
+    Raises
+    ------
+    DeclarationError
+        where it has no geometry, or its loops do not close; MissingExtraError without anywidget.
+    """
+    try:
+        anywidget, traitlets = (importlib.import_module(name) for name in ("anywidget", "traitlets"))
+    except ImportError:
+        raise MissingExtraError("anywidget", "notebook") from None
+    m, s = (shown.mechanism, shown) if isinstance(shown, Solution) else (shown, stored_motion(shown))
+    report = check(m)
+    data = view_data(report, s)
+    if data is None:
+        why = report.note or "it has too many links to be drawn"
+        raise DeclarationError(f"view of {report.mechanism.name!r}", [why])
+
+    def with_picture(widget: Any, **asked: Any) -> Any:
+        """What a notebook keeps of it: the widget, and a picture where no widget runs, as in what is exported from it."""
+        bundle = anywidget.AnyWidget._repr_mimebundle_(widget, **asked)
+        kept, about = bundle if isinstance(bundle, tuple) else (bundle or {}, {})
+        drawn = draw_skeleton(shown if s is None else s)._repr_png_()
+        return {**kept, "image/png": base64.b64encode(drawn).decode()}, about
+
+    members = {
+        "_repr_mimebundle_": with_picture,
+        "_esm": "".join(scripts()) + RENDER,
+        "_css": view_style(),
+        "data": traitlets.Dict().tag(sync=True),
+    }
+    return type("View", (anywidget.AnyWidget,), members)(data=data)
