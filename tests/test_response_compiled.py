@@ -1,5 +1,7 @@
 """Motion in time by the compiled kernel: what the numpy engines give, its own words where it does not serve."""
 
+import copy
+import pickle
 from itertools import pairwise
 from pathlib import Path
 
@@ -102,3 +104,10 @@ def test_the_command_line_takes_the_engine():
     done = CliRunner().invoke(app, ["respond", str(GOVERNOR), "--for", "1ms", "--engine", "compiled", "--json"])
     assert done.exit_code == 0, done.output
     assert '"engine": "compiled"' in done.output
+
+
+def test_what_the_kernel_integrated_can_be_copied_and_sent(compiled: None) -> None:
+    r = mg.respond(chain(), (0, 0.5), engine="compiled")
+    for other in (copy.deepcopy(r), pickle.loads(pickle.dumps(r))):
+        assert other.engine == "compiled"
+        agree(other.at([0.1, 0.33]), r.at([0.1, 0.33]), 1e-12)

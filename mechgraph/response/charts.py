@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal
 
@@ -107,6 +107,7 @@ class ChartStage:
         self._path = [self._last]
         self._of_time = tuple(load for some in (task.loads.stored, task.loads.rest) for load in some if load.of_time)
         self._kernel: KernelRates | None = None
+        self.engine = task.engine if task.library is None else COMPILED
         self._shape: Callable[[], tuple[float, float]]
         found = self._found(t, self._first[:, None])
         if found is None:
@@ -120,10 +121,9 @@ class ChartStage:
         if task.library is not None:
             self._kernel = KernelRates(task.library, self.chart, task.loads)
 
-    @property
-    def engine(self) -> str:
-        """See ``Stage``."""
-        return self.task.engine if self._kernel is None else COMPILED
+    def __getstate__(self) -> dict[str, Any]:
+        """What is kept of a motion is asked for its states, which need neither the library, a thing of this process, nor the last shape."""
+        return vars(self) | {"task": replace(self.task, library=None), "_kernel": None, "_shape": None}
 
     def begin(self) -> Array:
         """See ``Stage``."""

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from mechgraph import by_kernel
 from mechgraph.algebra.se3 import Array
-from mechgraph.by_kernel import COMPILED, at_hand
 from mechgraph.closure.indexing import System
 from mechgraph.errors import DeclarationError
 from mechgraph.kernel import build
@@ -50,9 +50,9 @@ def library_for(system: System, loads: Loads, held: bool, engine: str) -> Any:
     DeclarationError
         where the kernel was asked for by name and cannot carry it; MissingExtraError without a compiler.
     """
-    library = build.built() if engine == COMPILED else at_hand() if engine == "auto" else None
+    library = build.built() if engine == by_kernel.COMPILED else by_kernel.at_hand() if engine == "auto" else None
     why = None if library is None else cannot(system, loads, held)
-    if why is not None and engine == COMPILED:
+    if why is not None and engine == by_kernel.COMPILED:
         text = f"engine 'compiled' does not serve: {why}. Use engine='auto'"
         raise DeclarationError(f"respond {system.m.name!r}", [text])
     return library if why is None else None

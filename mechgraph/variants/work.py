@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mechgraph import by_kernel
 from mechgraph.algebra.se3 import Array
-from mechgraph.by_kernel import COMPILED, at_hand
+from mechgraph.by_kernel import COMPILED
 from mechgraph.call import Options
 from mechgraph.closure.driver_motion import Motions
 from mechgraph.closure.driver_path import Status
@@ -123,7 +124,7 @@ class Task:
     @property
     def may_be_compiled(self) -> bool:
         """Whether the kernel may serve, and no variant is built by a function."""
-        asked = self.engine == COMPILED or (self.engine == "auto" and at_hand() is not None)
+        asked = self.engine == COMPILED or (self.engine == "auto" and by_kernel.at_hand() is not None)
         return asked and self.source.build is None and self.source.tol is None and not self.source.one_by_one
 
 
