@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal
 
@@ -39,6 +39,10 @@ class Task:
     held: tuple[PassiveMotion, ...] = ()
     library: Any = None
     """The compiled kernel, where it serves."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the library, a thing of this process."""
+        return vars(self) | {"library": None}
 
     def chart(self, x: Array) -> Chart:
         """A chart laid out at a closed state ``x (nx,)``."""
@@ -122,8 +126,8 @@ class ChartStage:
             self._kernel = KernelRates(task.library, self.chart, task.loads)
 
     def __getstate__(self) -> dict[str, Any]:
-        """What is kept of a motion is asked for its states, which need neither the library, a thing of this process, nor the last shape."""
-        return vars(self) | {"task": replace(self.task, library=None), "_kernel": None, "_shape": None}
+        """What is kept of a motion is asked for its states, which need neither the kernel nor the last shape."""
+        return vars(self) | {"_kernel": None, "_shape": None}
 
     def begin(self) -> Array:
         """See ``Stage``."""
