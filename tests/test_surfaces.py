@@ -309,7 +309,7 @@ def test_a_path_over_a_pole_with_a_tolerance(off):
 
 
 def test_a_pole_that_is_kept_is_named_where_it_ends_the_path():
-    m = over_the_pole(1e-7, loads=[mg.Effort("K.Tu", 1.0)])
+    m = over_the_pole(1e-9, loads=[mg.Effort("K.Tu", 1.0)])
     with pytest.raises(mg.ReachError, match=r"lies behind a pole of the sphere of K .* give the surface another axis"):
         mg.solve(m, {"X": [0.0, -0.3, -0.8]})
     other = m.replace(pairs=[*m.pairs[:2], m.pair("K").replace(surface=mg.Surface.sphere(radius=1.0, axis=(0, 1, 0)))])
