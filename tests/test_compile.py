@@ -60,6 +60,8 @@ def test_passive_freedoms():
     assert beside(c, m, c.tables.home + np.linspace(0.5, 7.0, 4)[:, None]) < 1e-10
     with pytest.raises(mg.DeclarationError, match="hangs on the whole way"):
         c.gradient(f"{c.drives[0]}.effort", ["coupler.mass"])
+    with pytest.raises(mg.DeclarationError, match="passive freedoms, which no motion under efforts holds"):
+        c.write("rssr.c", inputs="efforts")
 
 
 def test_calls_go_on_from_the_last_and_back_to_the_start():

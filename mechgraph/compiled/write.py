@@ -30,9 +30,14 @@ def write_tables(
     Raises
     ------
     DeclarationError
-        where ``name`` is no identifier of C, ``inputs`` no such word; FileError; MissingExtraError for a unit where there is no C compiler.
+        where ``name`` is no identifier of C, ``inputs`` no such word, or efforts are given and there are passive freedoms: nothing would
+        hold these; FileError; MissingExtraError for a unit where there is no C compiler.
     """
     faults = option_faults({"inputs": (inputs, get_args(InputsName))})
+    if inputs == "efforts" and tables.layout.shapes["holds"][0]:
+        faults.append(
+            "inputs = 'efforts': there are passive freedoms, which no motion under efforts holds; use inputs='motion', or mg.respond"
+        )
     if faults:
         raise DeclarationError(f"write {tables.m.name!r}", faults)
     format_of(path, WRITTEN).write(tables.under_efforts() if inputs == "efforts" else tables, path, name)
