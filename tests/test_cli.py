@@ -631,7 +631,7 @@ def shell(command: str, **environment: str) -> "subprocess.CompletedProcess[str]
     )  # fmt: skip
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(1)
 @pytest.mark.skipif(os.name == "nt", reason="a shell of another kind")
 @pytest.mark.parametrize(
     ("command", "status", "message"),

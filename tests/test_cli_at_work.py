@@ -64,7 +64,7 @@ def completed(words: str) -> list[str]:
     return done.stdout.split()
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
@@ -125,6 +125,7 @@ def test_bars_are_shown_on_a_terminal_alone(arguments: tuple[str, ...], monkeypa
 # --- interrupts --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("file", ["x.csv", "x.nc", "x.parquet"])
 def test_an_interrupt_while_a_file_is_written_leaves_the_old_one(
     file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -507,7 +507,7 @@ def test_a_carriage_that_leaves_its_rail_between_positions_is_out_of_reach_from_
         assert (s.status == np.where(np.array(q) > -1.0, "ok", "out of reach")).all()
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize("driver", ["A", "X"])
 def test_two_drivers_come_back_from_beyond_an_end(driver, engine):

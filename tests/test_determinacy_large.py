@@ -189,12 +189,13 @@ def test_library_reports_do_not_depend_on_the_engine(name: str) -> None:
     assert_same_report(mg.load(name))
 
 
+@pytest.mark.daily(5)
 @pytest.mark.parametrize("name", [n for n in KNOWN if hasattr(known, n)])
 def test_known_reports_do_not_depend_on_the_engine(name: str) -> None:
     assert_same_report(getattr(known, name)())
 
 
-@pytest.mark.daily(4)
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("kind", LATTICES)
 @pytest.mark.parametrize("links", [6, 12, 20])
 def test_lattice_reports_do_not_depend_on_the_engine(kind: str, links: int) -> None:

@@ -207,6 +207,7 @@ def nearly_a_parallelogram(off, *loads):
     return mg.Mechanism("nearly a parallelogram", links, pairs, ["A"], [mg.Gravity((0, -9.81, 0)), *loads])
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("off", [1e-5, -1e-9, 1e-10])
 def test_no_energy_is_lost_where_branches_all_but_cross(off):
     """Past the flat position twice, the second time folded over; up to 4 % were lost, or steps collapsed."""

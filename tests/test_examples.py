@@ -34,6 +34,7 @@ def draws(script: Path) -> bool:
     return "sys.argv" in text and "draw" in text and "write_report" not in text
 
 
+@pytest.mark.daily(8)
 @pytest.mark.parametrize("script", EXAMPLES, ids=lambda script: script.stem)
 def test_example(script: Path, tmp_path: Path) -> None:
     text = script.read_text(encoding="utf-8")

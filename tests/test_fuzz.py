@@ -51,6 +51,7 @@ def test_what_is_attacked_takes_its_arguments(folder: Path) -> None:
     assert {name.split()[0] for name, *_ in every_door(folder)} == taken
 
 
+@pytest.mark.daily(1)
 @pytest.mark.seeds(2)
 def test_plausible_mechanisms(seed: int) -> None:
     for i in range(PER_SEED):

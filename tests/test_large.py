@@ -374,7 +374,7 @@ PATHS = {
 }
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("path", PATHS.values(), ids=PATHS)
 @pytest.mark.parametrize("name", ["ladder", "spatial"])
 def test_what_cannot_be_reached_is_told_as_in_a_small_mechanism(name: str, path: object) -> None:

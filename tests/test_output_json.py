@@ -55,7 +55,7 @@ def test_every_command_has_a_schema() -> None:
     assert takes == commands == set(COMMANDS)
 
 
-@pytest.mark.daily(18)
+@pytest.mark.daily(6)
 @pytest.mark.parametrize("call", CALLS, ids=" ".join)
 def test_output_is_valid(call: tuple[str, ...], schema: jsonschema.protocols.Validator) -> None:
     data = run(*call)

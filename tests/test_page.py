@@ -93,7 +93,7 @@ def reader(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Reader]:
 # --- what stands in it -------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.daily(4)
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("name", mg.library())
 def test_a_page_for_every_mechanism(name: str) -> None:
     """One file that asks nothing of the network; what is not data fits into a megabyte."""
@@ -118,7 +118,7 @@ OTHERS = [
 ]  # fmt: skip
 
 
-@pytest.mark.daily(4)
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("build", OTHERS, ids=lambda build: build.__name__)
 def test_a_page_for_other_mechanisms(build: Callable[[], mg.Mechanism]) -> None:
     m = build()
@@ -167,7 +167,7 @@ def tame_shape() -> Shape:
     return Shape(report_page(m, mg.solve(m, {m.drives[0].freedom: np.array([0.1, 0.2])})))
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("name", NAMES)
 def test_no_name_becomes_markup(name: str) -> None:
     m = named(name)
@@ -214,7 +214,7 @@ def items_of(page: str, group: str) -> list[dict[str, Any]]:
     return [item for item in data_of(page)["items"] if item["group"] == group]
 
 
-@pytest.mark.daily(24)
+@pytest.mark.daily(8)
 @pytest.mark.parametrize("name", mg.library())
 def test_everything_there_is_is_shown(name: str) -> None:
     m = mg.load(name)
@@ -229,6 +229,7 @@ def test_everything_there_is_is_shown(name: str) -> None:
         assert ["redundancy", str(report.redundancy), str(after.redundancy)] in item["after"]["rows"]
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize(
     "name", ["four-bar", "bricard-cube", "andrews", "slider-crank", "bennett", "spherical-four-bar", "windows-2"]
 )
@@ -476,7 +477,7 @@ def at_slider(reader: Reader, value: int) -> None:
     reader.settled()
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("name", SHOWN)
 def test_nothing_goes_wrong_and_nothing_leaves(reader: Reader, pages: dict[str, Path], name: str) -> None:
     """Everything that can be chosen is chosen: the console stays silent, and nothing is asked of the network."""
@@ -630,7 +631,7 @@ def test_tables_sort_and_copy(reader: Reader, pages: dict[str, Path]) -> None:
     reader.wait(lambda: reader.js("return arguments[0].textContent", frame) == "Copied")
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("name", SHOWN)
 @pytest.mark.parametrize("width", [320, 390])
 def test_a_phone_shows_it_without_scrolling_sideways(

@@ -116,7 +116,7 @@ def test_every_public_class_is_among_them() -> None:
     assert public - set(here) <= parts | bases
 
 
-@pytest.mark.daily(161)
+@pytest.mark.daily(54)
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("name", things())
 def test_comes_back_equal(name: str, way: str) -> None:
@@ -142,6 +142,7 @@ def test_a_load_without_a_name_is_refused_by_pickle_and_copied_all_the_same() ->
     assert facts(copy.deepcopy(s).columns()) == facts(s.columns())
 
 
+@pytest.mark.daily(1)
 @pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")  # a fork beside threads of other tests
 @pytest.mark.parametrize("start", [way for way in ("spawn", "fork") if way in multiprocessing.get_all_start_methods()])
 def test_to_another_process_and_back(start: str) -> None:

@@ -215,7 +215,7 @@ def test_couplings_tie_pairs() -> None:
         check_texts(ax)
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("name", ["$x$", "_hidden", "$\\frac{", "a\nb", "50 %", "<b>&amp;"])
 def test_names_are_shown_as_they_are(name: str) -> None:
     """No formula is made of them, no legend leaves them out, nothing fails."""

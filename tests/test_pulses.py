@@ -195,6 +195,7 @@ LAWS = {
 }
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("what", LAWS)
 def test_laws_along_the_path_give_the_accelerations_of_the_equations_of_motion(what):
     """Rates integrated with tabulated laws, their differences against the accelerations at closed states with the loads themselves."""

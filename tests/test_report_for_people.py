@@ -205,7 +205,7 @@ def test_the_command_line_prints_the_page_and_the_whole() -> None:
 # --- advice -----------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.daily(16)
+@pytest.mark.daily(6)
 @pytest.mark.parametrize("name", [*BUILDERS])
 def test_every_advice_does_what_it_says(name: str) -> None:
     report = mg.check(BUILDERS[name]())

@@ -468,6 +468,7 @@ def between(r, *names):
     return link[:, :3, :3] @ (q - p)
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
 def test_passive_freedoms_held_as_in_kinetostatics(engine):

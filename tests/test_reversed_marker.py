@@ -30,7 +30,7 @@ def four_bar(turned=None, size=1.0, frames=None):
     return mg.Mechanism("four-bar", None, pairs, ["A"], start={"A": 0.5, "B": 0.3, "D": 2.0})
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("side", ["on_a", "on_b"])
 @pytest.mark.parametrize("pair", "ABCD")
 @pytest.mark.parametrize("size", [1.0, 1e-3, 1e4])

@@ -71,6 +71,7 @@ def test_assemblies_that_are_not_real_close_the_loops_too() -> None:
             assert (np.abs((tube - top) @ at).max(axis=1) < 1e-8 * np.abs(top).max(axis=(1, 2)) ** 2).all()
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize(
     ("feet", "heads"), [((0, 1, 2, 3, 4, 5), (0, 0, 1, 1, 2, 2)), ((0, 1, 1, 2, 2, 0), (0, 0, 1, 1, 2, 2))]
 )
@@ -93,6 +94,7 @@ def test_a_platform_on_three_joints_has_sixteen(feet: tuple[int, ...], heads: tu
     assert gaps.min() < 1e-9
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize(
     ("symbol", "flipped", "rods", "count"),
     [
@@ -176,6 +178,7 @@ HINGED = [
     ],
     ids=["both ends on a link", "both ends on an axis", "a plate held twice"],
 )
+@pytest.mark.daily(1)
 def test_rods_that_hold_nothing_leave_the_class(extra: list[mg.Pair], total: int) -> None:
     """Without them all is known; a plate that one rod would let stand in two ways, another one in one of them, stands in one."""
     pairs = [

@@ -72,6 +72,7 @@ def keys(m: mg.Mechanism, at: Mapping[str, float]) -> list[str]:
     return sorted(Labelling(group.family).key for group in groups_of(Question(m, at).form.family))
 
 
+@pytest.mark.daily(5)
 @pytest.mark.parametrize(("m", "at"), CASES, ids=[m.name for m, _ in CASES])
 def test_a_class_is_the_same_in_whatever_order_it_is_declared(m: mg.Mechanism, at: Mapping[str, float]) -> None:
     own = keys(m, at)

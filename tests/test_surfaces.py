@@ -244,7 +244,7 @@ def agree(a, b):
     assert_allclose(a.contact("K").normal, b.contact("K").normal, atol=1e-10)
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize(
     ("tilt", "engine"),
     [
@@ -263,6 +263,7 @@ def test_a_sphere_goes_on_over_its_poles(tilt, engine):
     agree(mg.solve(swung((0, 1, 0)), turn), mg.solve(swung((0, tilt, 1)), turn, engine=engine))
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("tilt", [0.0, 1e-12, 1e-8, 1e-4])
 def test_positions_on_and_beside_a_pole(tilt):
     """There the rates of longitude and latitude have no value, or one of no accuracy; those about another axis have."""

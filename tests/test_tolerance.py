@@ -270,6 +270,7 @@ def test_a_study_takes_every_variant_as_meant() -> None:
     assert (study.status == "ok").all()
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("started", [False, True])
 def test_a_study_looks_at_the_closure_along_the_path(started: bool) -> None:
     """Every variant has the statuses and closure errors that it has alone; followed together, or from a start of its own.

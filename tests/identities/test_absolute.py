@@ -407,7 +407,7 @@ def forces(found, reference, s, at, i, v, a, condition, report):
             found.say(f"redundancy {report.redundancy}, null space of the constraints {over}")
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(1)
 @pytest.mark.seeds(12, without=(0, 11))
 def test_random_mechanisms_in_absolute_coordinates(seed):
     assert_same(seed)

@@ -68,12 +68,14 @@ def small_blocks(monkeypatch):
     monkeypatch.setattr(driver_path, "BLOCK", 5)
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("seed", range(12))
 def test_blocks_agree_with_newton_euler(small_blocks, seed):
     m, given = solvable(seed)
     assert_same(mg.solve(m, given), mg.solve(m, given, method="newton_euler"), 1e-9)
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("seed", range(20, 32))
 def test_size_of_blocks_changes_nothing(monkeypatch, seed):
     m, given = solvable(seed)

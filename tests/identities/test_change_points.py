@@ -49,7 +49,7 @@ def kite_rates(crank, side, h=1e-4):
 BESIDE = np.array([0.0, 1e-7, 3e-7, 1e-6, 1e-5, 1e-4, 5e-4, 1e-3, 5e-3])
 
 
-@pytest.mark.daily(5)
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize("method", ["loop_wrench", "newton_euler", "printed"])
 @pytest.mark.parametrize("moved", TURNS)

@@ -60,7 +60,7 @@ def drawn(seed):
     return m, motions(m, seed, t, size=float(rng.choice([0.08, 0.5]))), how
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(1)
 @pytest.mark.seeds(24)
 def test_random_mechanisms(seed):
     m, given, how = drawn(seed)
@@ -163,7 +163,7 @@ COUPLED = {
 }
 
 
-@pytest.mark.daily(11)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("name", COUPLED)
 @pytest.mark.parametrize("method", ["loop_wrench", "newton_euler", "printed"])
 def test_couplings(name, method):

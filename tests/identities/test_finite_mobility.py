@@ -88,7 +88,7 @@ def along_the_path(system: System, x: np.ndarray, steps: int = 4) -> tuple[list[
     return out, least
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("kind", KINDS)
 def test_random_mechanisms_against_the_rank_along_the_path(kind: str) -> None:
     for seed in range(MANY // len(KINDS)):

@@ -164,6 +164,7 @@ def test_every_link_is_in_equilibrium(seed):
     assert s.checks.closure.max() < 1e-10
 
 
+@pytest.mark.daily(6)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_undriven_freedoms_transmit_the_efforts_that_are_given_and_reactions_do_no_work(seed):
     """Power of a pair: total . relative twist = effort . rate; reaction . relative twist = 0."""

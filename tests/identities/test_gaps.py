@@ -292,7 +292,7 @@ def five_bar(rng):
     return mg.Mechanism("five-bar", None, pairs, ["A", "E"]), head
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(1)
 @pytest.mark.seeds(6)
 def test_a_polygon_misses_nothing_that_is_reached_alone(seed):
     """Behind gaps of random polygons: on the branch of the closed form, nothing flagged that is reached by itself, the same for any
@@ -319,6 +319,7 @@ def test_a_polygon_misses_nothing_that_is_reached_alone(seed):
     np.testing.assert_allclose(more["C"].position[1::2], s["C"].position, atol=1e-9)
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("seed", [3, 5])
 def test_both_engines_say_the_same_of_positions_out_of_reach(seed):
     """A five-bar with both cranks driven to random angles, most of them out of reach or behind a gap."""

@@ -80,7 +80,7 @@ def test_far_away(name: str) -> None:
     assert far.finite_mobility == here.finite_mobility
 
 
-@pytest.mark.daily(4)
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("name", BUILDERS)
 @settings(max_examples=6)
 @given(seed=st.integers(0, 10**6))

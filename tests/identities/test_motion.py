@@ -84,7 +84,7 @@ def assert_all_rates(m, t, s):
             assert_rate(t, k.center_velocity, k.center_acceleration, f"{name} center acceleration")
 
 
-@pytest.mark.daily(6)
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("seed", range(16))
 def test_rates_are_the_derivatives_of_positions(seed):
     m, t, _, s = moving(seed)

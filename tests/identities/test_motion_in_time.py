@@ -28,7 +28,7 @@ def size_of(r):
     return max(np.ptp(r.energy.kinetic), np.abs(r.energy.kinetic).max(), np.ptp(r.energy.potential), 1e-6)
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(1)
 @pytest.mark.seeds(8)
 def test_energy_is_what_the_loads_bring(seed):
     """Kinetic and potential energy less the work done is constant; loops are closed at every output; both engines move alike."""
@@ -72,6 +72,7 @@ def test_doubling_the_accuracy(seed):
         np.testing.assert_allclose(coarse[p.name].velocity, fine[p.name].velocity, atol=1e-3 * size)
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("seed", [11, 26, 49])
 @pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
 def test_held_passive_freedoms(seed):

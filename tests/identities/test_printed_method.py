@@ -72,7 +72,7 @@ def test_redundant_mechanisms(make, redundant, engine):
     assert_methods_agree(m, given, redundant=redundant, engine=engine)
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(1)
 @pytest.mark.seeds(16)
 def test_random_mechanisms(seed):
     m, given, how = drawn(seed)

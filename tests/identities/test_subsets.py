@@ -65,7 +65,7 @@ def test_library(name):
     assert_subsets_agree(m, freedom, begin + size * np.linspace(0, 2 * np.pi, 19), rng)
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(1)
 @pytest.mark.seeds(14, without=(2, 3, 4, 5, 8, 10, 13, 16, 18, 20, 22))
 def test_random_mechanisms(seed):
     rng = np.random.default_rng((seed, 41))
@@ -213,6 +213,7 @@ def carried_ring(kind):
     return mg.Mechanism("ring", None, pairs, ["A"], couplings=gears)
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize(("kind", "engine"), [("C", "dense"), ("E", "sparse")])
 def test_links_with_several_passive_motions(kind, engine):
     """At rest in all of them, at the same place for any positions, far ones too; no spin, and no slide of the point on the axis."""
@@ -354,6 +355,7 @@ BESIDE = 10.0 ** np.array([-6.5, -5.0, -4.0, -2.5])
 RHOMBUS = [Bars(1.0, 1.0, 1.0, 1.0)]
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize(
     ("bars", "begin", "engine"),
     [
@@ -383,6 +385,7 @@ def test_change_points_near_each_other():
         assert_parallel(solved(m, {"A": [off - begin, 0.9]}), bars, np.array([off - begin, 0.9]), begin)
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize("lean", [1e-4, 3e-3])
 def test_change_points_that_are_passed_together(lean, engine):
@@ -394,6 +397,7 @@ def test_change_points_that_are_passed_together(lean, engine):
         assert_parallel(solved(m, {"A": q}, engine=engine), bars, q, begin)
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("begin", [4.935e-6, 6.329e-6, 2e-5])
 def test_a_start_right_behind_a_change_point_and_before_another(begin):
     """The way back over the first change point, which rounding would lead to its other branch, tells nothing of the second one."""
@@ -434,7 +438,7 @@ def test_several_drivers_beside_a_change_point():
         assert worst < 1e-7, where
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("form", ["full", "reduced"])
 @pytest.mark.parametrize("begin", [-1e-3, 1e-3])
 def test_passive_bodies_beside_a_change_point(begin, form):

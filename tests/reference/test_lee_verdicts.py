@@ -24,6 +24,7 @@ def part_of(document, name):
     return re.search(rf"<!-- {name}: .*? -->\n(.*?)\n<!-- end of {name} -->", document, re.DOTALL)[1].strip()
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("name", PARTS)
 def test_the_document_says_what_the_script_computes(script, name):
     """Words equal; numbers to 2 % or two units of the last place that is shown (rounding differs from machine to machine)."""
