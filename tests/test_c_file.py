@@ -247,6 +247,7 @@ def test_a_unit_runs_in_fmpy(tmp_path):
     slave.freeInstance()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("compiled")
 def test_a_unit_of_hostile_names(tmp_path):
     from xml.etree import ElementTree

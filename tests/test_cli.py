@@ -595,6 +595,7 @@ def test_without_typer(tmp_path: Path) -> None:
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="signals of another kind")
 def test_interrupted(tmp_path: Path) -> None:
     out = tmp_path / "x.csv"

@@ -546,6 +546,7 @@ def test_a_click_on_a_pair_shows_its_numbers(reader: Reader, pages: dict[str, Pa
         assert pair.b in reader.text(".facts")
 
 
+@pytest.mark.slow
 def test_names_of_pairs_with_unknown_reactions_are_hatched(reader: Reader, pages: dict[str, Path]) -> None:
     hatched = "return [...document.querySelectorAll('.label.open')].map((l) => l.textContent)"
     reader.open(pages["four-bar"])
@@ -571,6 +572,7 @@ def test_play_and_pause(reader: Reader, pages: dict[str, Path]) -> None:
     assert reader.text(".play") == "Play"
 
 
+@pytest.mark.slow
 def test_nothing_moves_by_itself_for_those_who_want_that(reader: Reader, pages: dict[str, Path]) -> None:
     reader.open(pages["rssr"], prefers_reduced_motion="reduce")
     for button in reader.all(".choices button"):
@@ -706,6 +708,7 @@ def test_accessibility(reader: Reader, pages: dict[str, Path], name: str, scheme
     assert not [v for v in told if v[1] in ("serious", "critical")]
 
 
+@pytest.mark.slow
 def test_a_notebook_shows_the_same_view(reader: Reader, tmp_path: Path) -> None:
     """The module of the widget in a page that does what a notebook's front end does: it calls ``render`` and takes it away again."""
     pytest.importorskip("anywidget", reason="anywidget is not installed (extra: notebook)")

@@ -274,6 +274,7 @@ def test_names_of_parallel_pairs_lie_on_their_own_lines(count: int, others: bool
     assert not any(a.overlaps(b) for a, b in combinations(boxes.values(), 2))
 
 
+@pytest.mark.slow
 def test_graphs_are_laid_out_the_same_each_time() -> None:
     """Whatever order sets of texts have in a process."""
     code = (

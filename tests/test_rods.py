@@ -136,6 +136,7 @@ NEAR, FAR = np.array((1.0, 0, 0.1)), np.array((1.5, 2, 0.8))
 ALONG, ACROSS = FAR - NEAR, np.cross(FAR - NEAR, Z)
 
 
+@pytest.mark.slow
 def test_two_turns_of_which_one_lies_along_the_leg_are_no_rod() -> None:
     """That turn is a spin of the leg, which rests; it was taken for a rod, and its spin for one that all mechanisms of the class have."""
     two_turns = mg.Pair("U", "U", "leg", "crank", point=NEAR, axis=ALONG, second=ACROSS)

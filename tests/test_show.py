@@ -146,6 +146,7 @@ def test_beyond_a_dozen_pairs_numbers_stand_for_names() -> None:
     check_texts(ax)
 
 
+@pytest.mark.slow
 def test_a_legend_leaves_room_and_counts_what_it_leaves_out() -> None:
     pairs = [
         mg.Pair(f"p{i}", "R", f"k{i}", f"k{i + 1}", point=(float(i), float(i % 2), 0.3 * (i % 3)), axis=(0, 0, 1))

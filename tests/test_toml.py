@@ -221,6 +221,7 @@ def places(data: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     return [q for key, value in items for q in [(*path, key), *places(value, (*path, key))]]
 
 
+@pytest.mark.slow
 @pytest.mark.daily(1)
 @pytest.mark.parametrize("name", ["four-bar", "rchch", "bennett", "own"])
 def test_whatever_stands_in_a_field_the_error_is_ours(name: str) -> None:

@@ -231,6 +231,7 @@ def test_a_long_table_is_the_same_in_pieces(tmp_path: Path, monkeypatch: pytest.
             assert found[name] == values.tolist()
 
 
+@pytest.mark.slow
 def test_a_long_table_needs_little_memory_beside_the_solution(tmp_path: Path) -> None:
     s = mg.solve(mg.load("four-bar"), {"A": np.linspace(0.0, 6.0, 20_000)})
     tracemalloc.start()

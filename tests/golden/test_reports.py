@@ -67,6 +67,7 @@ def test_json(name: str, golden: Golden) -> None:
     golden(f"{name}.json", json.dumps(rounded(facts), indent=2) + "\n")
 
 
+@pytest.mark.slow
 def test_the_same_text_every_time() -> None:
     for build in MECHANISMS.values():
         assert str(mg.check(build())) == str(mg.check(build()))

@@ -192,6 +192,7 @@ def test_a_ring_that_turns_and_slides_has_a_hold_for_each() -> None:
     assert {w.name: (pytest.approx(w.effort), w.unit) for w in s.warnings} == found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("link", ["rod1", pytest.param("rod2", marks=pytest.mark.slow)])
 def test_rods_that_hang_on_balls_end_in_one_pose_however_many_positions_are_asked_for(link: str) -> None:
     """Over a turn of the crank, four numbers of positions: the rest of the passive rods is a matter of the path."""

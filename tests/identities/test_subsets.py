@@ -407,6 +407,7 @@ def test_a_start_right_behind_a_change_point_and_before_another(begin):
     assert_parallel(solved(m, {"A": q}), bars, q, begin)
 
 
+@pytest.mark.slow
 def test_cases_and_periods_beside_a_change_point():
     """Cases of a call, and positions turns later, are solved as those of one path are, and on its branch."""
     m = parallelograms(ONE, -1e-5)
