@@ -203,25 +203,31 @@ def test_the_controller_loop_of_the_readme(tmp_path):
     assert printed == pytest.approx(expected, abs=5e-7)
 
 
-@pytest.mark.usefixtures("compiled")
-def test_a_unit_runs_in_fmpy(tmp_path):
+def entered(file, folder):
+    """A unit that is valid, in its initialization, with the numbers of its variables."""
     fmpy = pytest.importorskip("fmpy")
     from fmpy.fmi2 import FMU2Slave
     from fmpy.validation import validate_fmu
 
-    m = mg.load("rcsr")
-    c, file = mg.compile(m), tmp_path / "press.fmu"
-    c.write(file)
     assert validate_fmu(str(file)) == []
     about = fmpy.read_model_description(str(file))
     places = {v.name: v.valueReference for v in about.modelVariables}
     slave = FMU2Slave(
-        guid=about.guid, unzipDirectory=fmpy.extract(str(file), str(tmp_path / "x")), instanceName="press",
+        guid=about.guid, unzipDirectory=fmpy.extract(str(file), str(folder / "x")), instanceName="press",
         modelIdentifier=about.coSimulation.modelIdentifier,
     )  # fmt: skip
     slave.instantiate()
     slave.setupExperiment(startTime=0.0)
     slave.enterInitializationMode()
+    return slave, places
+
+
+@pytest.mark.usefixtures("compiled")
+def test_a_unit_runs_in_fmpy(tmp_path):
+    m = mg.load("rcsr")
+    c, file = mg.compile(m), tmp_path / "press.fmu"
+    c.write(file)
+    slave, places = entered(file, tmp_path)
     slave.exitInitializationMode()
     q = 2.7 + np.linspace(0.0, 0.6, 7)
     s = mg.solve(m, {"O1": mg.Motion(q, 2.0, 0.5)}, engine="dense")
@@ -268,22 +274,9 @@ def test_a_unit_of_hostile_names(tmp_path):
 @pytest.mark.usefixtures("compiled")
 def test_a_unit_under_efforts_runs_in_fmpy(tmp_path):
     """Efforts that change from step to step: the motion that ``respond`` gives with them as loads, its reactions too."""
-    fmpy = pytest.importorskip("fmpy")
-    from fmpy.fmi2 import FMU2Slave
-    from fmpy.validation import validate_fmu
-
     m, file, h, efforts = mg.load("rcsr"), tmp_path / "press.fmu", 0.05, (0.1, -0.2, 0.3)
     mg.compile(m).write(file, inputs="efforts")
-    assert validate_fmu(str(file)) == []
-    about = fmpy.read_model_description(str(file))
-    places = {v.name: v.valueReference for v in about.modelVariables}
-    slave = FMU2Slave(
-        guid=about.guid, unzipDirectory=fmpy.extract(str(file), str(tmp_path / "x")), instanceName="press",
-        modelIdentifier=about.coSimulation.modelIdentifier,
-    )  # fmt: skip
-    slave.instantiate()
-    slave.setupExperiment(startTime=0.0)
-    slave.enterInitializationMode()
+    slave, places = entered(file, tmp_path)
     slave.setReal([places["O1.Rz.velocity.start"]], [3.0])
     slave.exitInitializationMode()
     start, rates = dict(m.start), {"O1": 3.0}
