@@ -22,7 +22,6 @@ from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.passive_motion import are_alone
 from mechgraph.closure.rates import Rates, Velocities, expected_error
 from mechgraph.closure.solver import ClosureSolver
-from mechgraph.errors import DeclarationError
 from mechgraph.kernel import build
 from mechgraph.kernel.path import MIDDLE, Kernel, Mask, Records
 from mechgraph.kernel.tables import START, Layout, layout, tables, why_not
@@ -128,8 +127,7 @@ def _library(line: Started) -> Any:
     if (why := cannot(line)) is None:
         return library
     if asked:
-        text = f"engine 'compiled' does not serve: {why}. Use engine='auto'"
-        raise DeclarationError(f"solve {line.m.name!r}", [text])
+        raise build.not_served(f"solve {line.m.name!r}", why)
     return None
 
 

@@ -21,8 +21,6 @@ FILE_NAME = re.compile(r"[\w.+-]+", re.ASCII)
 """Names of files that stand in an #include."""
 COLUMNS = 120
 """Width of the lines of numbers."""
-RELATIVE, ABSOLUTE = 1e-9, 1e-10
-"""Error of a step of a motion, as in ``motion.c``."""
 PATHS = re.compile(r"(?:/\*(?:(?!\*/).)*\*/\n)?^int mgk_path\([^;{]*(?:;\n|\{.*?^\}\n)", re.DOTALL | re.MULTILINE)
 """What only the package calls, with the comment before it."""
 
@@ -133,13 +131,14 @@ int {name}_solve(void *state, const double *q, const double *v, const double *a,
 
 def _steps(name: str) -> str:
     """What the header says of motion under efforts."""
+    relative, absolute = re.findall(r"(?:RELATIVE|ABSOLUTE) = ([^,;]+)", INCLUDED[-1].read_text(encoding="utf-8"))
     return f"""
 /* Begin at the declared position with rates v of the drives. Returns as {name}_solve does. */
 int {name}_begin(void *state, const double *v);
 
 /* The motion that efforts of the drives produce, held for a time from the last state on, beside the loads of the mechanism; a time of 0
  * gives what is at the last state. Integrated by the method of Dormand and Prince, the error of every step within
- * {RELATIVE:g} of a coordinate or rate plus {ABSOLUTE:g} (radians, or lengths over the unit of the tables, and their rates).
+ * {relative} of a coordinate or rate plus {absolute} (radians, or lengths over the unit of the tables, and their rates).
  * position[freedoms], velocity[freedoms] (of a rotation the angular velocity), reaction[pairs][6] as of {name}_solve, with these efforts as
  * loads; any of them may be NULL. Unless {name.upper()}_OK is returned nothing is written and the state stays. */
 int {name}_step(void *state, double time, const double *effort, double *position, double *velocity, double *reaction);

@@ -17,7 +17,7 @@ import scipy
 from mechgraph.algebra.se3 import Array
 from mechgraph.exchange.asmt import Connection
 from mechgraph.exchange.asmt_joints import HALF_TURNS
-from mechgraph.exchange.asmt_standing import UNMENTIONED, Standing
+from mechgraph.exchange.asmt_standing import Standing
 from mechgraph.exchange.exact import FITS
 from mechgraph.model.coupling import Coupling
 from mechgraph.model.link import Link
@@ -59,14 +59,7 @@ def bent(builder: Standing, joint: Connection) -> Bend | None:
         float(np.linalg.norm(J[:, 3] - I[:, 3])),
         2 * float(np.arctan2(abs(z), np.hypot(np.hypot(x, y), w))),
     )
-    fits = distance <= FITS * builder.size and angle <= FITS
-    if not fits:
-        builder.notes.append(
-            f"{joint.kind} {joint.name!r} does not fit as the parts stand: its markers are {distance:.3g} and {angle:.3g} rad "
-            "off; the loops are closed by moving the parts"
-        )
-    elif max(distance / builder.size, angle) > UNMENTIONED:
-        builder.moved[joint.j] = (distance, angle)
+    fits = builder.fits(joint, distance, angle)
     between = np.column_stack([I[:, :3] @ turn, I[:, 3]])
     end = np.column_stack([between[:, :3] @ back, I[:, 3]]) if fits else given
     pairs = tuple(

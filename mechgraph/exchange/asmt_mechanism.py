@@ -148,18 +148,11 @@ class Builder(Standing):
         """The pair, marker J moved to its place where it is meant to be there."""
         distance, angle = seat.misfit
         joint, d = seat.joint, seat.directions
-        fits = distance <= FITS * self.size and angle <= FITS
         if d.turned:
             self.notes.append(
                 f"{joint.kind} {joint.name!r}: marker {joint.j} points the opposite way of {joint.i} and was turned half round"
             )
-        if not fits:
-            self.notes.append(
-                f"{joint.kind} {joint.name!r} does not fit as the parts stand: its markers are {distance:.3g} and {angle:.3g} rad "
-                "off; the loops are closed by moving the parts"
-            )
-        elif max(distance / self.size, angle) > UNMENTIONED:
-            self.moved[joint.j] = (distance, angle)
+        fits = self.fits(joint, distance, angle)
         pitch = self.number(joint, seat.row) / (2 * np.pi) if seat.row.number == "pitch" else None
         return self.by_markers(
             joint.name, seat.row.pair_type(), joint, seat.on_a, seat.on_b if fits else seat.given, pitch

@@ -10,6 +10,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array, compose, inverse
 from mechgraph.errors import listed
 from mechgraph.exchange.asmt import Assembly, Connection, Part
+from mechgraph.exchange.exact import FITS
 from mechgraph.quantities import shown
 
 UNMENTIONED = 1e-12
@@ -49,6 +50,18 @@ class Standing:
     def own(self, part: str, X: Array) -> Array:
         """A pose of the assembly in the frame of a part; that of the ground is global."""
         return X if part == self.assembly.name else compose(inverse(self.part(part).pose), X)
+
+    def fits(self, joint: Connection, distance: float, angle: float) -> bool:
+        """Whether the markers of a joint meet; where they do not, or parts have to be moved for it, that is said."""
+        fits = distance <= FITS * self.size and angle <= FITS
+        if not fits:
+            self.notes.append(
+                f"{joint.kind} {joint.name!r} does not fit as the parts stand: its markers are {distance:.3g} and {angle:.3g} rad "
+                "off; the loops are closed by moving the parts"
+            )
+        elif max(distance / self.size, angle) > UNMENTIONED:
+            self.moved[joint.j] = (distance, angle)
+        return fits
 
     @functools.cached_property
     def size(self) -> float:

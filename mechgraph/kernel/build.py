@@ -15,13 +15,18 @@ from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
-from mechgraph.errors import FileError, MissingExtraError
+from mechgraph.errors import DeclarationError, FileError, MissingExtraError
 from mechgraph.kernel import compiler
 from mechgraph.writing import cache_folder
 
 PACKAGED = Path(__file__).parent
 """Where an installation puts its library."""
 NEEDED = "a C compiler"
+
+
+def not_served(call: str, why: str) -> DeclarationError:
+    """What is said where the kernel was asked for by name and does not serve a call."""
+    return DeclarationError(call, [f"engine 'compiled' does not serve: {why}. Use engine='auto'"])
 
 
 @cache

@@ -18,8 +18,9 @@ from mechgraph.closure.solver import MotionEngineName
 from mechgraph.data import Json, json_text, members, plain, schema_of
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Shown, Table, to_markdown, to_text
 from mechgraph.equations.terms import Ledger
-from mechgraph.errors import AssemblyError, DeadPointError, DeclarationError, IndeterminateError, MechgraphError
+from mechgraph.errors import AssemblyError, DeadPointError, IndeterminateError, MechgraphError
 from mechgraph.graph.linkgraph import link_graph
+from mechgraph.kernel import build
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair_table import TABLE
 from mechgraph.numerics.tolerances import RANKS
@@ -542,8 +543,7 @@ def check(
         where the geometry is not made exact to ``tol`` within ``limit``.
     """
     if engine == "compiled":
-        text = "engine 'compiled' does not serve: the kernel follows motions and decides no rank. Use engine='auto'"
-        raise DeclarationError(f"check {m.name!r}", [text])
+        raise build.not_served(f"check {m.name!r}", "the kernel follows motions and decides no rank")
     graph = m.once(link_graph)
     if not m.has_geometry:
         return DeterminacyReport(m, graph, "Topology only: no geometry is declared.", asked=engine, limit=limit)

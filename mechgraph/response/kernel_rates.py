@@ -12,7 +12,6 @@ import numpy as np
 from mechgraph import by_kernel
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.indexing import System
-from mechgraph.errors import DeclarationError
 from mechgraph.kernel import build
 from mechgraph.kernel.loads import in_tables
 from mechgraph.kernel.tables import layout, tables, why_not
@@ -53,8 +52,7 @@ def library_for(system: System, loads: Loads, held: bool, engine: str) -> Any:
     library = build.built() if engine == by_kernel.COMPILED else by_kernel.at_hand() if engine == "auto" else None
     why = None if library is None else cannot(system, loads, held)
     if why is not None and engine == by_kernel.COMPILED:
-        text = f"engine 'compiled' does not serve: {why}. Use engine='auto'"
-        raise DeclarationError(f"respond {system.m.name!r}", [text])
+        raise build.not_served(f"respond {system.m.name!r}", why)
     return library if why is None else None
 
 

@@ -26,6 +26,7 @@ from mechgraph.show.canvas import (
     INK,
     MUTED,
     PALETTE,
+    Arrangement,
     Axes,
     FlatPainter,
     axis_label,
@@ -234,8 +235,6 @@ class _Canvas:
 
     def finish(self, legend: Sequence[tuple[str, str]]) -> None:
         """Put everything in its place."""
-        from mechgraph.show.canvas import Arrangement
-
         painter = FlatPainter(self.ax, np.eye(3))
         taken = np.concatenate(self._taken)
         free = np.column_stack([taken, np.zeros(len(taken))])

@@ -26,6 +26,7 @@ from mechgraph.show.canvas import (
     LOAD,
     MUTED,
     REACTION,
+    Arrangement,
     Axes,
     Dpi,
     FlatPainter,
@@ -37,6 +38,7 @@ from mechgraph.show.canvas import (
     edges_of,
     inside,
     new_axes,
+    nice_length,
     shaded,
 )
 from mechgraph.show.curves import finely
@@ -290,8 +292,6 @@ class Drawing:
         ``extent``: points that fill the axes, those at this position where left out; ``places``: where names stood before, which is
         where they are put again if they can.
         """
-        from mechgraph.show.canvas import Arrangement, nice_length
-
         painter, samples = self.painter, self._samples(t)
         bare(self.ax)
         arranged = Arrangement(

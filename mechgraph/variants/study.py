@@ -193,23 +193,19 @@ def _all_solved(
 ) -> tuple[dict[int, Part], str, Exception | None]:
     """Parts by the numbers of their tasks; why some are missing, and the error that it came from."""
     done: dict[int, Part] = {}
-    stream = _streamed(tasks, executor)
-    while True:
-        try:
-            i, part = next(stream)
-        except StopIteration:
-            break
-        except MechgraphError:
-            raise
-        except Exception as error:
-            lost = counted(len(tasks) - len(done), "part")
-            return done, f"{lost} of {len(tasks)} ended with {type(error).__name__}: {error}", error
-        done[i] = part
-        try:
-            if progress is not None:
-                progress(len(done), len(tasks))
-        except Exception as error:
-            return done, f"progress raised {type(error).__name__}: {error}", error
+    try:
+        for i, part in _streamed(tasks, executor):
+            done[i] = part
+            try:
+                if progress is not None:
+                    progress(len(done), len(tasks))
+            except Exception as error:
+                return done, f"progress raised {type(error).__name__}: {error}", error
+    except MechgraphError:
+        raise
+    except Exception as error:
+        lost = counted(len(tasks) - len(done), "part")
+        return done, f"{lost} of {len(tasks)} ended with {type(error).__name__}: {error}", error
     missing = len(tasks) - len(done)
     why = (
         f"the process of {counted(missing, 'part')} of {len(tasks)} ended before it was done (out of memory, or killed)"

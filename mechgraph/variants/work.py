@@ -214,8 +214,8 @@ def solved(task: Task) -> Part:
         elif found is not None:
             for v in found.values():
                 v[i] = np.nan
-    by_kernel = together.solution is not None and together.solution.engine == COMPILED
-    return Part(found, numbered(status), messages, worst(warnings), by_kernel)
+    compiled = together.solution is not None and together.solution.engine == COMPILED
+    return Part(found, numbered(status), messages, worst(warnings), compiled)
 
 
 def numbered(status: NDArray[np.str_]) -> NDArray[np.int8]:
