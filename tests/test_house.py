@@ -14,8 +14,8 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "mechgraph"
 
 TOP_LEVEL = {
-    ".ci", ".git", ".gitignore", "LICENSE", "README.md",
-    "examples", "library", "mechgraph", "pyproject.toml", "tests",
+    ".ci", ".git", ".gitignore", "ARCHITECTURE.md", "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "README.md",
+    "docs", "examples", "library", "mechgraph", "pyproject.toml", "tests",
 }  # fmt: skip
 MAY_PRINT = {"__main__.py"}
 LONGEST_FILE = 700

@@ -1,0 +1,87 @@
+"""The manual as a static site, without network: ``python -m sphinx -W docs site``."""
+
+import re
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from latex2mathml.converter import convert
+
+DOCS = Path(__file__).resolve().parent
+sys.path[:0] = [str(DOCS.parent), str(DOCS)]
+
+project = "mechgraph"
+author = "the mechgraph authors"
+release = tomllib.loads((DOCS.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+version = release
+project_copyright = author
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc", "sphinx_design"]
+exclude_patterns = ["_built/*.md"]
+nitpicky = True
+
+myst_enable_extensions = ["amsmath", "attrs_inline", "colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 3
+
+autodoc_typehints = "none"
+autosummary_generate = False
+numpydoc_show_class_members = False
+numpydoc_xref_param_type = False
+
+html_theme = "pydata_sphinx_theme"
+html_title = f"mechgraph {release}"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_show_sourcelink = False
+html_copy_source = False
+html_math_renderer = "mathml"
+html_theme_options = {
+    "navigation_with_keys": False,
+    "secondary_sidebar_items": ["page-toc"],
+    "footer_start": ["copyright"],
+    "footer_end": [],
+    "show_nav_level": 1,
+    "header_links_before_dropdown": 8,
+}
+pygments_style = "default"
+
+FOREIGN = re.compile(r"""<(?:script|link|img|iframe)\b[^>]*\b(?:src|href)=["'](?:https?:)?//[^"']*["'][^>]*>""")
+"""What a browser would fetch from the network."""
+
+
+def mathml(latex: str, display: str) -> str:
+    if "\\\\" in latex and "\\begin" not in latex:
+        latex = rf"\begin{{aligned}}{latex}\end{{aligned}}"
+    return convert(latex, display=display)
+
+
+def formula(translator: Any, node: Any) -> None:
+    """A formula as MathML, which browsers draw without a script."""
+    from docutils.nodes import SkipNode
+
+    translator.body.append(mathml(node.astext(), "inline"))
+    raise SkipNode
+
+
+def displayed(translator: Any, node: Any) -> None:
+    from docutils.nodes import SkipNode
+
+    translator.body.append(f'<div class="math">{mathml(node.astext(), "block")}</div>\n')
+    raise SkipNode
+
+
+def stays_here(app: Any, exception: Exception | None) -> None:
+    """No page loads anything from elsewhere."""
+    from sphinx.errors import SphinxError
+
+    if exception is None and app.builder.format == "html":
+        for page in Path(app.outdir).rglob("*.html"):
+            if found := FOREIGN.search(page.read_text(encoding="utf-8")):
+                raise SphinxError(f"{page.relative_to(app.outdir)} loads from the network: {found[0]}")
+
+
+def setup(app: Any) -> dict[str, bool]:
+    app.add_html_math_renderer("mathml", (formula, None), (displayed, None))
+    app.connect("build-finished", stays_here)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
