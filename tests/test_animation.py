@@ -104,6 +104,7 @@ def test_a_picture_has_the_same_bytes_each_time(turn: mg.Solution, tmp_path: Pat
     assert len(one) > 1000
 
 
+@pytest.mark.slow
 def test_the_plot_command_draws_every_kind(tmp_path: Path) -> None:
     of = {"reaction": ["--of", "B"], "polar": ["--of", "A"]}
     kinds = [

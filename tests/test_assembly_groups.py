@@ -119,6 +119,7 @@ def test_a_group_that_leaves_its_class_is_no_group() -> None:
         assert (group.family.rank, group.within) == (3, stays)
 
 
+@pytest.mark.slow
 def test_feet_at_one_place_of_links_that_part_are_two() -> None:
     """A body on a ball and three rods, two of them from one place at the start, which only the rocker of an RSSR leaves."""
     rng, place = np.random.default_rng(3), {}

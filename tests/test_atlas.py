@@ -244,6 +244,7 @@ def test_system_groups_have_mobility_zero() -> None:
         mg.system_groups(0)
 
 
+@pytest.mark.slow
 def test_a_page_of_the_atlas() -> None:
     """Every chain on axes of its own: as many polygons as links with more than two joints, a circle for each joint."""
     chains = list(mg.atlas(8))
@@ -276,6 +277,7 @@ def crossings(ax: Any) -> int:
     return count
 
 
+@pytest.mark.slow
 def test_links_do_not_cross_on_the_page() -> None:
     """Those of up to eight links can all be drawn without crossings; two of the sixteen may keep one."""
     assert [crossings(ax) for ax in draw_chains(mg.atlas(6, multiple=True)).axes] == [0, 0, 0, 0]

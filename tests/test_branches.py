@@ -67,6 +67,7 @@ def test_circuits_are_what_solve_runs_through() -> None:
         assert np.abs(s["D"].position[:, 0] - one.coordinates[:, rocker])[solved].max() < 1e-8
 
 
+@pytest.mark.slow
 def test_a_fold_at_which_no_other_branch_ends_leaves_the_map_open() -> None:
     """The branches that it meets begin between two samples, so that circuits are not told; with samples on them they are one."""
     m = spatial(("RSSR", "frame", "frame"), ("SSP", "03", "frame"), seed=3)
@@ -129,6 +130,7 @@ def test_whether_the_driver_turns_right_round_does_not_depend_on_the_samples(sam
     assert (b.full_turn, b.circuits, b.open_ends) == ((True, True), ((0, 1),), 0)
 
 
+@pytest.mark.slow
 def test_samples_that_lie_on_double_points_are_moved_and_ends_that_are_not_told_are_no_ends(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -164,6 +164,7 @@ def test_certificates_hold_for_every_matrix_within_the_bounds_of_rounding(monkey
     assert found.radius <= 1 / (np.linalg.norm(inverse, 2) * K)
 
 
+@pytest.mark.slow
 def test_a_pair_on_a_curve_has_no_certificate() -> None:
     """Bounds of second derivatives hold for screws and rotations; the word says so."""
     modes = mg.assemblies(mg.load("geneva"), guesses=20)[0]

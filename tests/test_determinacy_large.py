@@ -202,6 +202,7 @@ def test_lattice_reports_do_not_depend_on_the_engine(kind: str, links: int) -> N
     assert_same_report(LATTICES[kind](links))
 
 
+@pytest.mark.slow
 @settings(max_examples=4, deadline=None)
 @given(st.integers(0, 10**6))
 @example(64911)  # near a dead point
@@ -335,6 +336,7 @@ def test_the_kind_of_many_pairs_takes_no_more_memory_than_their_twists(kind: str
         np.testing.assert_allclose(found.place, p[:, 0], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_near_relations_by_chance_do_not_hold_up_the_report_of_a_long_ring(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of 200 axes that stand anyhow hundreds of pairs come near something special; taking them so is minutes of work for no hint."""
     rng, tried = np.random.default_rng(0), []

@@ -177,6 +177,7 @@ def test_a_start_at_a_change_point_is_named(rates):
         mg.respond(m, (0.0, 1.0), rates=rates)
 
 
+@pytest.mark.slow
 def test_with_a_passive_freedom_it_passes_beside_a_change_point():
     """A rod as coupler of a parallelogram whose folded position is missed by 1e-7: it was given up there."""
     inertia = np.diag([0.1, 0.1, 0.1])

@@ -49,6 +49,7 @@ def test_examples_are_numbered_without_gaps() -> None:
     assert [script.stem.partition("_")[0] for script in EXAMPLES] == [f"{i + 1:02d}" for i in range(len(EXAMPLES))]
 
 
+@pytest.mark.slow
 def test_a_worked_example_draws_only_on_request() -> None:
     script = next(script for script in EXAMPLES if script.stem == "03_lee_rcsr")
     assert draws(script)

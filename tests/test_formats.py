@@ -103,6 +103,7 @@ def test_all_formats_hold_the_same_numbers(solution: mg.Solution, tmp_path: Path
                 np.testing.assert_array_equal(np.asarray(found).reshape(values.shape), values, err_msg=label)
 
 
+@pytest.mark.slow
 @pytest.mark.daily(4)
 @pytest.mark.parametrize("name", NAMES)
 def test_names_that_files_cannot_hold(name: str, tmp_path: Path) -> None:

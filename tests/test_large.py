@@ -103,6 +103,7 @@ def test_sparse_and_dense_agree(name: str, seed: int, many: bool, least: bool) -
     assert np.max(np.abs(sparse.checks.power)) < 1e-11
 
 
+@pytest.mark.slow
 @pytest.mark.daily(2)
 @pytest.mark.parametrize("name", LONG)
 def test_three_hundred_links(name: str) -> None:
@@ -170,6 +171,7 @@ def crank_rocker_ladder() -> mg.Mechanism:
     return known.windows(60).replace(drives=["A0"])
 
 
+@pytest.mark.slow
 def test_the_end_of_the_reach_is_found() -> None:
     m = crank_rocker_ladder()
     with pytest.raises((mg.ReachError, mg.DeadPointError)) as caught:

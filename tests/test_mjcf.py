@@ -427,6 +427,7 @@ def test_xml_of_strangers_is_refused_with_its_place(tmp_path, suffix, content, w
     assert words in str(caught.value)
 
 
+@pytest.mark.slow
 def test_a_chain_of_many_bodies_nested_in_each_other_is_written_and_read(tmp_path):
     n = 1500
     pairs = [

@@ -143,6 +143,7 @@ def test_a_search_finds_a_double_point_once() -> None:
     assert [one.x.shape[1] for one in found] == [1, 1]
 
 
+@pytest.mark.slow
 def test_a_parallelogram_folded_flat_is_a_double_point_and_a_kite_that_spins_a_continuum() -> None:
     flat = mg.assemblies(linked_four_bar(1.0, 2.0, 1.0, 2.0, 0.5), {"O0": 0.0})
     assert (flat.kinds, flat.continua) == (("double",), ())
@@ -641,6 +642,7 @@ def test_after_a_stated_effort_what_was_found_is_called_searched(empty: None, mo
     assert not list(cache_folder().glob("*"))
 
 
+@pytest.mark.slow
 def test_an_assembly_that_rounding_had_told_apart_from_itself_is_one() -> None:
     """One of four is known to a few digits the second time: at another member both are one, so that a bound is not met too early."""
     q = Question(general("RCSR"), {"O1": 0.2})

@@ -311,6 +311,7 @@ def test_scalar_time_and_scalar_functions():
     np.testing.assert_allclose(cycle.velocity, np.cos([[0.0, 1.0], [2.0, 3.0]]), rtol=1e-10)
 
 
+@pytest.mark.slow
 def test_one_single_time_finds_a_range_that_serves():
     assert Motion.law(np.sin, t=1e5).acceleration == pytest.approx(-np.sin(1e5), abs=1e-5)
     root = Motion.law(np.sqrt, t=0.01)  # exists to the right of 0 only

@@ -588,6 +588,7 @@ def test_nothing_moves_by_itself_for_those_who_want_that(reader: Reader, pages: 
     reader.wait(lambda: labels(reader) != before)
 
 
+@pytest.mark.slow
 def test_by_keyboard_alone(reader: Reader, pages: dict[str, Path]) -> None:
     keys = pytest.importorskip("selenium.webdriver.common.keys").Keys
     reader.open(pages["rcsr"])
@@ -645,6 +646,7 @@ def test_a_phone_shows_it_without_scrolling_sideways(
     assert reader.js("return document.documentElement.scrollWidth") <= width
 
 
+@pytest.mark.slow
 def test_on_paper_stand_still_pictures(reader: Reader, pages: dict[str, Path]) -> None:
     reader.open(pages["four-bar"])
     shown = "return [...document.querySelectorAll(arguments[0])].map((e) => e.getClientRects().length > 0)"
@@ -658,6 +660,7 @@ def test_on_paper_stand_still_pictures(reader: Reader, pages: dict[str, Path]) -
     assert reader.complaints() == []
 
 
+@pytest.mark.slow
 def test_without_drawing_in_space_all_else_works(tmp_path: Path, pages: dict[str, Path]) -> None:
     with chromium(tmp_path / "profile", *DRAWS_NOT) as reader:
         reader.open(pages["four-bar"])
@@ -732,6 +735,7 @@ def test_a_notebook_shows_the_same_view(reader: Reader, tmp_path: Path) -> None:
     assert reader.requests() == []
 
 
+@pytest.mark.slow
 def test_a_notebook_that_runs_holds_the_view() -> None:
     pytest.importorskip("anywidget", reason="anywidget is not installed (extra: notebook)")
     nbclient, nbformat = pytest.importorskip("nbclient"), pytest.importorskip("nbformat")

@@ -120,6 +120,7 @@ def test_rounding_beside_change_points_of_a_long_row_stays_out_of_the_motion():
     assert np.abs(r.energy.balance).max() < 1.5e-10 * r.energy.kinetic.max()
 
 
+@pytest.mark.slow
 def test_spatial_slider_crank_starts_as_printed_and_moves_alone_and_in_charts():
     """Printed initial velocities (rod centre, rod angular, slider); two choices of coordinates give one motion."""
     m, t = slider_crank(), np.linspace(0, 1, 21)
@@ -155,6 +156,7 @@ def test_bricard_keeps_its_energy():
     assert r.checks.closure.max() < 1e-12
 
 
+@pytest.mark.slow
 def test_double_pendulum():
     """Two rods, against Lagrange's equations written by hand."""
     links = [mg.Link("frame"), rod("upper", (0, 0, 0), (1, 0, 0)), rod("lower", (1, 0, 0), (2, 0, 0))]
@@ -179,6 +181,7 @@ def test_double_pendulum():
     assert np.abs(r.energy.balance).max() < 1e-7
 
 
+@pytest.mark.slow
 def test_tumbling_body_keeps_its_angular_momentum():
     """An asymmetric body free about its mass centre, near its unstable axis: rotations without a singular place."""
     I = np.diag([1.0, 2.0, 3.0])
@@ -196,6 +199,7 @@ def test_tumbling_body_keeps_its_angular_momentum():
     assert own[:, 1].min() < -1.9  # it has turned over
 
 
+@pytest.mark.slow
 def test_pendulum_under_a_driven_slide():
     """The slide follows a law of time: theta'' = -(g cos(theta) - x'' sin(theta)) for a rod bob at 1 from level; driver effort by hand."""
     links = [mg.Link("frame"), mg.Link("cart"), mg.Link("bob", mass=2.0, center=(1, 0, 0))]
@@ -437,6 +441,7 @@ def test_a_chain_of_sixty_pendulums_starts_as_lagrange_says():
     np.testing.assert_allclose(again, found, atol=1e-11 * np.abs(expected).max())
 
 
+@pytest.mark.slow
 def test_the_spin_of_a_rod_between_spheres_is_held_by_a_slotted_one():
     """Free it keeps its spin, a second freedom; slotted it goes along with the crank, on one path. Energy stays in both."""
     free = mg.load("rssr").replace(drives=[])
@@ -501,6 +506,7 @@ def test_a_held_passive_freedom_that_carries_load_is_said():
         mg.respond(m, (0, 0.1), passive="no")
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
 def test_held_passive_freedoms_and_stops():
     """The crank falls on its stop and rests there, the coupler at rest in its spin."""

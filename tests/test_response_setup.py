@@ -121,6 +121,7 @@ def test_it_is_written_and_read_without_loss(file: Path, tmp_path: Path) -> None
     assert not jsonschema.Draft202012Validator(json_schema()).is_valid(data)
 
 
+@pytest.mark.slow
 def test_a_call_takes_what_it_leaves_out(file: Path) -> None:
     m, d = mg.load(file), np.deg2rad
     r = mg.respond(m)
@@ -219,6 +220,7 @@ def test_what_a_file_cannot_hold(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_it_follows_changes_of_the_mechanism(file: Path) -> None:
     pytest.importorskip("pint")
     m = mg.load(file)

@@ -32,6 +32,7 @@ def states(q: Question, modes: mg.Assemblies) -> np.ndarray:
     return np.concatenate([s.state_of(s.start_coordinates(mode.start)[:, None]) for mode in modes], axis=1)
 
 
+@pytest.mark.slow
 def test_a_hexapod_has_forty_assemblies_whatever_carries_its_legs() -> None:
     """Balls at both ends, or universal joints at the feet: eight real postures, the same ones."""
     found = []

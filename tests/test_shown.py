@@ -203,6 +203,7 @@ def test_what_is_shown_needs_a_document() -> None:
         type("Untold", (Shown,), {})()
 
 
+@pytest.mark.slow
 def test_in_a_notebook() -> None:
     nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
     pytest.importorskip("ipykernel")

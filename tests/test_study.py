@@ -599,6 +599,7 @@ def four_bar(ground: float = 2.5, up: float = 1.0, speed: float | None = None) -
                         start={"A": 0.5, "B": (0, 0, 0.9 * up - 0.5), "D": 1.5 * up})  # fmt: skip
 
 
+@pytest.mark.slow
 def test_builders_may_choose_start_and_stored_motion() -> None:
     """Variants on another branch or with another stored motion are as they are by themselves; a bad one stops none."""
     kept, motions = ["D.position", "A.effort"], {"A": [0.5, 0.6]}

@@ -318,6 +318,7 @@ def test_a_pole_that_is_kept_is_named_where_it_ends_the_path():
     assert found == pytest.approx(np.sqrt(0.91) - np.sqrt(0.75), abs=1e-12)
 
 
+@pytest.mark.slow
 def test_variants_beside_a_pole_are_those_by_themselves():
     m, turn = swung((0, 1e-8, 1)), {"A": mg.Motion(TOP * np.linspace(0, 2, 5), 2.0, 1.0)}
     study = mg.study(m, {"slide.mass": [1.0, 2.0]}, "A.effort", n=2, motions=turn, sampling="grid")

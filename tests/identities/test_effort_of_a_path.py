@@ -86,6 +86,7 @@ def test_variants_that_differ_by_little_are_led_in_a_step(monkeypatch):
     assert {careful for problem, careful in led if problem == "NumbersPath"} == {0}
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
 def test_a_study_of_which_no_variant_can_be_led():
     """The first position is out of reach of all: each is assembled and solved alone, and the study goes on."""
