@@ -37,29 +37,22 @@ from mechgraph.graph.atlas import (
 from mechgraph.graph.chains import Chain
 from mechgraph.kinetostatics import assemble, kinematics, solve
 from mechgraph.model.chain import chain
-from mechgraph.model.coupling import Coupling
-from mechgraph.model.curves import Curve
-from mechgraph.model.drive import Drive
-from mechgraph.model.event import Event
-from mechgraph.model.force_law import Damper, ForceLaw, Spring, TorsionSpring
-from mechgraph.model.force_table import ForceTable
+from mechgraph.model.couplings import Coupling
 from mechgraph.model.gears import Belt, BevelGears, Rack, SpurGears, WormGear
-from mechgraph.model.hertz import Hertz
-from mechgraph.model.library import library_names as library
-from mechgraph.model.link import Link
-from mechgraph.model.load import Effort, Gravity, Wrench
+from mechgraph.model.loads import Damper, Effort, ForceLaw, ForceTable, Gravity, Spring, TorsionSpring, Wrench
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.motion import Motion
-from mechgraph.model.pair import Marker, Pair
-from mechgraph.model.pair_table import pair_types
-from mechgraph.model.pair_type import PairType
-from mechgraph.model.response_setup import ResponseSetup
-from mechgraph.model.row_parts import Bookkeeping, Component, Freedom
-from mechgraph.model.stop import Stop
-from mechgraph.model.surfaces import Surface
+from mechgraph.model.motion import Drive, Motion
+from mechgraph.model.pair import Link, Marker, Pair
+from mechgraph.model.response_setup import Event, ResponseSetup, Stop
+from mechgraph.model.toml import library_names as library
 from mechgraph.modes.assemblies import assemblies
 from mechgraph.modes.branches import Branches, branches
 from mechgraph.modes.result import Assemblies, AssembliesOver
+from mechgraph.pairs.contact_types import Hertz
+from mechgraph.pairs.curves import Curve
+from mechgraph.pairs.factors import Bookkeeping, Component, Freedom
+from mechgraph.pairs.pair_type import PairType, pair_types
+from mechgraph.pairs.surfaces import Surface
 from mechgraph.report.report import DeterminacyReport, check
 from mechgraph.report.structure import Structure, groups, structure
 from mechgraph.response.course import Response

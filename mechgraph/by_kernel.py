@@ -25,8 +25,8 @@ from mechgraph.closure.solver import ClosureSolver
 from mechgraph.kernel import build
 from mechgraph.kernel.path import MIDDLE, Kernel, Mask, Records
 from mechgraph.kernel.tables import START, Layout, layout, tables, why_not
-from mechgraph.model.contact import Contact
-from mechgraph.model.load_base import Load
+from mechgraph.model.couplings import Contact
+from mechgraph.model.loads import Load
 from mechgraph.numerics.newton import Work
 from mechgraph.outcome import Outcome, system_at
 from mechgraph.result.kept import BlockMotion

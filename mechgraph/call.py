@@ -13,7 +13,7 @@ from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.passive_motion import PassiveMotion
 from mechgraph.closure.reduction import FORMS
 from mechgraph.errors import DeclarationError
-from mechgraph.model.load_base import Load
+from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 
 

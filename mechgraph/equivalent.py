@@ -28,10 +28,9 @@ from mechgraph.closure.contact_lines import ContactLines
 from mechgraph.errors import DeclarationError
 from mechgraph.force.applied_loads import user_poses
 from mechgraph.graph.atlas import MultipleJoint
-from mechgraph.model.contact import Contact
-from mechgraph.model.link import Link
+from mechgraph.model.couplings import Contact
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair import Marker, Pair
+from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.quantities import wrong
 from mechgraph.structure.kind import kind_of
 from mechgraph.structure.link_rows import LinkRows

@@ -27,7 +27,7 @@ from mechgraph.errors import (
     ReachError,
 )
 from mechgraph.force.dalembert import MethodName
-from mechgraph.model.load_base import Load
+from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import declared
 from mechgraph.numerics.tracks import Nodes

@@ -18,7 +18,7 @@ from mechgraph.closure.rates import Rates, Velocities, accuracy, at_dead_points,
 from mechgraph.closure.solver import ClosureSolver, FactoredClosure, closure_solver
 from mechgraph.errors import DeclarationError
 from mechgraph.force.block import BlockForces, ForceTask, forces_of_block
-from mechgraph.model.load_base import Load
+from mechgraph.model.loads import Load
 from mechgraph.numerics.continuation import Follower
 from mechgraph.numerics.crossings import passed
 from mechgraph.result.kept import BlockMotion

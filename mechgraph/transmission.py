@@ -27,8 +27,8 @@ from mechgraph.data import plain
 from mechgraph.document import Document, Paragraph, Shown
 from mechgraph.errors import DeclarationError, MechgraphWarning
 from mechgraph.kinetostatics import solve
-from mechgraph.model.contact import Contact
-from mechgraph.model.load import Effort
+from mechgraph.model.couplings import Contact
+from mechgraph.model.loads import Effort
 from mechgraph.quantities import wrong
 from mechgraph.result.numbers import ranges
 from mechgraph.result.places import OK, Places

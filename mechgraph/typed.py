@@ -13,7 +13,7 @@ from mechgraph.closure.prescription import coordinate
 from mechgraph.errors import MechgraphError, MechgraphWarning, shortened
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
-from mechgraph.model.sweep import swept
+from mechgraph.model.toml import swept
 from mechgraph.units import KNOWN
 
 

@@ -24,7 +24,7 @@ from public import every_door
 
 import mechgraph as mg
 from mechgraph.model import toml
-from mechgraph.model.library import library_path
+from mechgraph.model.toml import library_path
 
 PATIENCE = 10
 """Seconds of processor time that one input may take."""

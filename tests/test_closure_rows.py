@@ -9,7 +9,7 @@ import mechgraph as mg
 from mechgraph.closure.assembly import scaled_system
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import System
-from mechgraph.model.library import library_path
+from mechgraph.model.toml import library_path
 
 
 def relation(name: str, terms: tuple[tuple[str, float], ...], constant: float | None = None) -> mg.Coupling:

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 import mechgraph as mg
 from mechgraph.cli import app
-from mechgraph.model.hertz import pressed, pressed_along_line
+from mechgraph.pairs.contact_types import pressed, pressed_along_line
 
 ALPHA, WEIGHT, SPEED, G = np.deg2rad(25.0), 12.0, 0.3, 9.81
 STEEL = mg.Hertz(moduli=(210e9, 210e9))

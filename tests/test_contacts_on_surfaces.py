@@ -7,7 +7,7 @@ from test_curves import T, ring
 from test_surfaces import SAMPLE, on
 
 import mechgraph as mg
-from mechgraph.model.hertz import pressed
+from mechgraph.pairs.contact_types import pressed
 
 BALL = 0.05
 STEEL = mg.Hertz((210e9, 210e9), groove_radius=0.052)

@@ -11,7 +11,7 @@ import pytest
 import mechgraph as mg
 from mechgraph.equations.terms import State
 from mechgraph.model import toml
-from mechgraph.model.schema import json_schema
+from mechgraph.model.file_format import json_schema
 from mechgraph.variants.fields import find_field, stacked, varied
 
 Z = (0.0, 0.0, 1.0)

@@ -11,8 +11,8 @@ from identities.test_engines import assert_engines_agree
 from numpy.testing import assert_allclose
 
 import mechgraph as mg
-from mechgraph.model.given_curves import CURVES
-from mechgraph.model.travel import Travel
+from mechgraph.pairs.arc_length import Travel
+from mechgraph.pairs.given import CURVES
 from mechgraph.show.shapes import symbol
 
 T = np.linspace(0.0, 1.0, 7)

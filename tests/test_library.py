@@ -11,12 +11,12 @@ import pytest
 from mechgraph.errors import FileError
 
 ROOT = Path(__file__).resolve().parents[1]
-SOURCE = ROOT / "mechgraph" / "model" / "library.py"
+SOURCE = ROOT / "mechgraph" / "model" / "toml.py"
 
 
 def module_installed_in(folder: Path, *libraries: str) -> ModuleType:
     """The library module as it works when its package lies in `folder`, with `libraries` relative to that."""
-    copy = folder / "mechgraph" / "model" / "library.py"
+    copy = folder / "mechgraph" / "model" / "toml.py"
     copy.parent.mkdir(parents=True)
     shutil.copy(SOURCE, copy)
     for library in libraries:

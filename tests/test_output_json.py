@@ -16,7 +16,7 @@ import mechgraph as mg
 from mechgraph.cli import app
 from mechgraph.cli.records import COMMANDS, output_schema
 from mechgraph.data import json_text, patch, plain, schema_of
-from mechgraph.model.schema import laid_out
+from mechgraph.model.file_format import laid_out
 from mechgraph.model.toml import to_data
 
 CALLS = [

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 import mechgraph as mg
 from mechgraph.cli import app
-from mechgraph.model.schema import json_schema
+from mechgraph.model.file_format import json_schema
 from mechgraph.typed import duration
 
 Z = (0, 0, 1)

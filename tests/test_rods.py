@@ -14,7 +14,6 @@ import mechgraph as mg
 from mechgraph.algebra.se3 import quaternion_matrix, rotation_exp
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import indexed
-from mechgraph.model.factors import ConstantScrew
 from mechgraph.modes.bounds import bound
 from mechgraph.modes.family import Member
 from mechgraph.modes.finding import Finder
@@ -24,6 +23,7 @@ from mechgraph.modes.monodromy import distinct
 from mechgraph.modes.question import Question
 from mechgraph.modes.search import searched
 from mechgraph.modes.targets import Ends, _account, _Run, ends
+from mechgraph.pairs.factors import ConstantScrew
 
 
 def states(q: Question, modes: mg.Assemblies) -> np.ndarray:

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from test_curves import AXIS, CENTER, T, ring
 
 import mechgraph as mg
-from mechgraph.model.on_surface import OnSurface
+from mechgraph.pairs.travelling import OnSurface
 
 GRID = np.array([(i, j, 0.3 * np.sin(0.7 * i) * np.cos(0.5 * j)) for i in range(7) for j in range(8)], dtype=float)
 

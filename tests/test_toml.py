@@ -17,9 +17,8 @@ import pytest
 import mechgraph as mg
 from mechgraph.model import toml
 from mechgraph.model.file_format import SCHEMA as NUMBER
-from mechgraph.model.file_format import TABLES_OF_FILE
-from mechgraph.model.library import library_path
-from mechgraph.model.schema import json_schema, schema_text, with_field_tables
+from mechgraph.model.file_format import TABLES_OF_FILE, json_schema, schema_text, with_field_tables
+from mechgraph.model.toml import library_path
 
 SCHEMA = json_schema()
 VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.tree import Walk
-from mechgraph.model import pair_kinematics as evaluation
-from mechgraph.model.factors import Factor, FixedStack, Stack
-from mechgraph.model.pair_type import PairType
 from mechgraph.numerics.linear import Place, compact
+from mechgraph.pairs import kinematics as evaluation
+from mechgraph.pairs.factors import Factor, FixedStack, Stack
+from mechgraph.pairs.pair_type import PairType
 
 Index = NDArray[np.intp]
 

@@ -17,8 +17,8 @@ from mechgraph.closure.batches import Index, ScrewTable
 from mechgraph.closure.indexing import System
 from mechgraph.closure.one_state import OneState
 from mechgraph.closure.tree import run_sums
-from mechgraph.model import pair_kinematics as evaluation
-from mechgraph.numerics.kept import kept
+from mechgraph.memo import kept
+from mechgraph.pairs import kinematics as evaluation
 
 ROUNDINGS = 20
 """Roundings of a position that add up in a closure residual."""

@@ -19,7 +19,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array, cross
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
-from mechgraph.model.contact import Axes, Contact, Lines
+from mechgraph.model.couplings import Axes, Contact, Lines
 
 
 class ContactLines:

@@ -15,7 +15,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.loop_rows import lengths_of
-from mechgraph.numerics.kept import kept
+from mechgraph.memo import kept
 from mechgraph.numerics.linear import (
     RANK_TOLERANCE,
     Choice,

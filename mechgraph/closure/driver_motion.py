@@ -12,9 +12,8 @@ from mechgraph.arguments import items_of
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.prescription import Prescription, with_free_pairs
 from mechgraph.errors import DeclarationError
-from mechgraph.model.drive import Drive
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.motion import Motion
+from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Pair
 
 

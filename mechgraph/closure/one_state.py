@@ -13,7 +13,7 @@ from mechgraph.algebra.se3 import LEFT_FACTORS, RIGHT_FACTORS, Array, finite_twi
 from mechgraph.closure.batches import FactorBatch, Index
 from mechgraph.closure.coefficients import Numbers
 from mechgraph.closure.places import Places
-from mechgraph.numerics.kept import kept
+from mechgraph.memo import kept
 
 DIFFERENCES = np.concatenate([np.eye(3), -np.eye(3)])
 """From the six products of a vector product to its components."""

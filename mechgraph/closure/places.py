@@ -20,13 +20,13 @@ from mechgraph.closure.batches import FactorBatch, Group, Index, ScrewTable, fac
 from mechgraph.closure.coefficients import MARKER_A, MARKER_B
 from mechgraph.closure.tree import Ranks, Tree, Walk, ranked
 from mechgraph.graph.linkgraph import LinkGraph
+from mechgraph.memo import of_graph
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.once import of_graph
-from mechgraph.model.pair_type import PairType
 from mechgraph.model.parameters import Parameters
-from mechgraph.model.row_parts import Component
-from mechgraph.model.travelling import Travelling
 from mechgraph.numerics.linear import Place, compact
+from mechgraph.pairs.factors import Component
+from mechgraph.pairs.pair_type import PairType
+from mechgraph.pairs.travelling import Travelling
 
 MANY_LOOPS = 16
 """Loops above which the loop matrix is applied as a sparse one (measured: from here on it is the faster one)."""

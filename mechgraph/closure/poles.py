@@ -11,10 +11,10 @@ import numpy as np
 from mechgraph.algebra.se3 import Array, compose, inverse, matrix_quaternion, quaternion_log
 from mechgraph.closure.driver_path import Positions, Status
 from mechgraph.closure.indexing import System
-from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
-from mechgraph.model.surface_rows import placed_surface
+from mechgraph.pairs import kinematics as evaluation
+from mechgraph.pairs.contact_types import placed_surface
 
 AT_POLE = 1e-4
 """Angle from a pole below which a path that ends there ends because of it."""

@@ -20,9 +20,8 @@ from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.model.pair import Marker, Pair
-from mechgraph.model.pair_table import TABLE
-from mechgraph.model.pair_type import PairType
-from mechgraph.model.row_parts import UNIT_TWISTS, Freedom
+from mechgraph.pairs.factors import UNIT_TWISTS, Freedom
+from mechgraph.pairs.pair_type import TABLE, PairType
 from mechgraph.quantities import has_quantity, is_numeric
 
 SLIDES, TURNS = ("Tx", "Ty", "Tz"), ("Rx", "Ry", "Rz")

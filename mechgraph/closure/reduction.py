@@ -29,11 +29,10 @@ from mechgraph.closure.point_rows import PointNumbers, PointRows
 from mechgraph.closure.reduction_plan import ON_LINE, Plan, may_have_rods, plan_of, slides_of_sphere
 from mechgraph.closure.rows import PositionRows
 from mechgraph.closure.solver import engine_for
-from mechgraph.model.link import Link
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair import Pair
-from mechgraph.model.pair_type import PairType
+from mechgraph.model.pair import Link, Pair
 from mechgraph.model.parameters import Parameters
+from mechgraph.pairs.pair_type import PairType
 
 FORMS = ("auto", "full", "reduced")
 """The forms of the equations by which a path may be followed; ``"auto"``: the faster one."""

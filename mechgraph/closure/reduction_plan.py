@@ -11,8 +11,8 @@ from mechgraph.algebra.se3 import Array, cross
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import System
 from mechgraph.graph.linkgraph import components_of_edges
-from mechgraph.model.factors import ConstantScrew
-from mechgraph.model.pair_type import PairType
+from mechgraph.pairs.factors import ConstantScrew
+from mechgraph.pairs.pair_type import PairType
 
 ON_LINE = 1e-12
 """Sine of the angle between a slide and the line of its rod up to which they are one: rounding."""

@@ -9,8 +9,8 @@ import numpy as np
 from mechgraph.algebra.se3 import Array, turn_between, turn_tangent, turned
 from mechgraph.closure.batches import Index
 from mechgraph.closure.places import Places, shared
-from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.numerics.linear import Place, compact
+from mechgraph.pairs import kinematics as evaluation
 
 
 class States(Places):

@@ -17,7 +17,7 @@ from mechgraph.closure.indexing import System
 from mechgraph.errors import DeclarationError, listed
 from mechgraph.kernel.loads import EFFORT
 from mechgraph.kernel.tables import HEAD_LOAD_NUMBERS, HEAD_LOADS, Integers, Layout, layout, tables
-from mechgraph.model.load_base import Load
+from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import Declared, declared
 from mechgraph.pipeline import Pipeline

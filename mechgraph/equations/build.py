@@ -29,10 +29,10 @@ from mechgraph.equations.terms import (
     names_of,
     summed,
 )
-from mechgraph.model.coupling import BaseCoupling
+from mechgraph.model.couplings import BaseCoupling
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
-from mechgraph.model.row_parts import Component, Freedom
+from mechgraph.pairs.factors import Component, Freedom
 
 
 @dataclass

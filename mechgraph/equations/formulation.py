@@ -54,10 +54,9 @@ from mechgraph.equations.terms import (
 )
 from mechgraph.errors import counted
 from mechgraph.graph.linkgraph import LinkGraph, link_graph
-from mechgraph.model.factors import ConstantScrew
-from mechgraph.model.link import Link
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair import Pair
+from mechgraph.model.pair import Link, Pair
+from mechgraph.pairs.factors import ConstantScrew
 from mechgraph.writing import Format, format_of, write_whole
 
 POSITION, RATE, ACCELERATION = range(3)

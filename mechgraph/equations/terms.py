@@ -24,8 +24,8 @@ from mechgraph.document import Document, Equation, Paragraph, Shown, Table, late
 from mechgraph.document.tree import plain
 from mechgraph.errors import DeclarationError, counted
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.row_parts import Component, Freedom
 from mechgraph.numerics.sparse import unique_solution
+from mechgraph.pairs.factors import Component, Freedom
 from mechgraph.quantities import wrong
 from mechgraph.writing import cell, csv_of
 

@@ -22,7 +22,7 @@ from mechgraph.errors import DeclarationError, FileError
 from mechgraph.exchange.asmt_joints import REFUSED
 from mechgraph.exchange.formula import is_name
 from mechgraph.exchange.indented import Node, numbers_of, tree_of
-from mechgraph.model.sweep import LONGEST_SWEEP
+from mechgraph.model.toml import LONGEST_SWEEP
 from mechgraph.quantities import shown
 
 FIRST_LINES = ("OndselSolver", "FreeCADMbD", "freeCAD: 3D CAD with Motion Simulation  by  askoh.com")

@@ -19,9 +19,8 @@ from mechgraph.exchange.asmt import Connection
 from mechgraph.exchange.asmt_joints import HALF_TURNS
 from mechgraph.exchange.asmt_standing import Standing
 from mechgraph.exchange.exact import FITS
-from mechgraph.model.coupling import Coupling
-from mechgraph.model.link import Link
-from mechgraph.model.pair import Marker, Pair
+from mechgraph.model.couplings import Coupling
+from mechgraph.model.pair import Link, Marker, Pair
 
 CONSTANT_VELOCITY = "ConstantVelocityJoint"
 AXES = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])

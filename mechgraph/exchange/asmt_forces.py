@@ -12,7 +12,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.exchange.asmt import Connection
 from mechgraph.exchange.asmt_standing import Standing
 from mechgraph.exchange.formula import FormulaFault, law
-from mechgraph.model.force_law import ForceLaw, Spring
+from mechgraph.model.loads import ForceLaw, Spring
 
 LINEAR = 1e-12
 """Part of the force by which a formula may differ from a line in distance and rate."""

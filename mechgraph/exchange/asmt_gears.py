@@ -22,7 +22,7 @@ from mechgraph.algebra.se3 import Array, compose
 from mechgraph.exchange.asmt import Connection
 from mechgraph.exchange.asmt_standing import Standing
 from mechgraph.exchange.exact import FITS
-from mechgraph.model.coupling import Coupling
+from mechgraph.model.couplings import Coupling
 from mechgraph.model.pair import Pair
 
 GEARED = ("GearJoint", "RackPinionJoint")

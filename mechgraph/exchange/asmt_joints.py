@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, rotation_exp, rotation_log
-from mechgraph.model.pair_type import PairType
-from mechgraph.model.row_parts import Freedom
+from mechgraph.pairs.factors import Freedom
+from mechgraph.pairs.pair_type import PairType
 
 
 class Directions(NamedTuple):

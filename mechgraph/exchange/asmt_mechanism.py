@@ -36,12 +36,10 @@ from mechgraph.exchange.asmt_rods import RODS, rod
 from mechgraph.exchange.asmt_standing import UNMENTIONED, Standing
 from mechgraph.exchange.exact import FITS, Snapping
 from mechgraph.exchange.formula import FormulaFault, evaluated
-from mechgraph.model.drive import Drive
-from mechgraph.model.link import Link
-from mechgraph.model.load import Gravity
+from mechgraph.model.loads import Gravity
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.motion import Motion
-from mechgraph.model.pair import Marker, Pair
+from mechgraph.model.motion import Drive, Motion
+from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.quantities import shown
 
 

@@ -11,9 +11,8 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.exchange.asmt import Connection
 from mechgraph.exchange.asmt_standing import Standing
 from mechgraph.exchange.exact import FITS
-from mechgraph.model.link import Link
-from mechgraph.model.numeric import second_direction
-from mechgraph.model.pair import Marker, Pair
+from mechgraph.fields import second_direction
+from mechgraph.model.pair import Link, Marker, Pair
 
 BALL, HINGE, SLEEVE = ("S", False), ("R", False), ("C", True)
 RODS = {

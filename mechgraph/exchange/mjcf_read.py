@@ -20,12 +20,11 @@ from mechgraph.errors import DeclarationError
 from mechgraph.exchange.mjcf_orientation import Compiler, pose_of
 from mechgraph.exchange.mjcf_write import CUT, WORLD
 from mechgraph.exchange.xml_tree import Element, read_xml
-from mechgraph.model.coupling import Coupling
-from mechgraph.model.drive import Drive
-from mechgraph.model.link import Link
-from mechgraph.model.load import Gravity
+from mechgraph.model.couplings import Coupling
+from mechgraph.model.loads import Gravity
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair import Marker, Pair, second_direction
+from mechgraph.model.motion import Drive
+from mechgraph.model.pair import Link, Marker, Pair, second_direction
 from mechgraph.quantities import shown
 
 JOINTS = {"hinge": ("R", "Rz"), "slide": ("P", "Tz"), "ball": ("S", "")}

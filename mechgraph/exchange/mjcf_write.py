@@ -21,11 +21,11 @@ from mechgraph.algebra.inertia import physical_faults
 from mechgraph.algebra.se3 import Array, compose, inverse, matrix_quaternion, move_twist
 from mechgraph.errors import HIDDEN, FileError
 from mechgraph.kinetostatics import assemble
-from mechgraph.model import pair_kinematics as evaluation
-from mechgraph.model.factors import ConstantScrew
-from mechgraph.model.load import Gravity
+from mechgraph.model.loads import Gravity
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
+from mechgraph.pairs import kinematics as evaluation
+from mechgraph.pairs.factors import ConstantScrew
 from mechgraph.quantities import shown
 from mechgraph.writing import write_whole
 

@@ -17,10 +17,9 @@ from mechgraph.algebra.inertia import physical_faults
 from mechgraph.algebra.se3 import Array, compose
 from mechgraph.errors import DeclarationError, listed
 from mechgraph.exchange.xml_tree import Element, read_xml
-from mechgraph.model.coupling import Coupling
-from mechgraph.model.link import Link
+from mechgraph.model.couplings import Coupling
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair import Marker, Pair, second_direction
+from mechgraph.model.pair import Link, Marker, Pair, second_direction
 from mechgraph.quantities import shown
 
 TYPES = {"revolute": "R", "continuous": "R", "prismatic": "P", "fixed": "W", "planar": "E"}

@@ -12,8 +12,8 @@ from mechgraph.algebra.se3 import Array, cross, rotate, rotate_back, to_matrix
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.rates import Rates, Velocities
 from mechgraph.errors import DeclarationError
-from mechgraph.model.load_base import Load, Value
-from mechgraph.model.numeric import PerCase
+from mechgraph.fields import PerCase
+from mechgraph.model.loads import Load, Value
 from mechgraph.quantities import real_array, wrong
 
 

@@ -19,7 +19,7 @@ from mechgraph.force.dalembert import METHODS, ForceProblem, Wrenches, row_effor
 from mechgraph.force.flanks import STRAIN, least_under_signs
 from mechgraph.force.passive_hold import hold
 from mechgraph.force.reaction_map import effort_map, reaction_map
-from mechgraph.model.load_base import Load
+from mechgraph.model.loads import Load
 from mechgraph.numerics.linear import add_at
 from mechgraph.structure.reaction_split import (
     Stress,

@@ -12,7 +12,7 @@ from mechgraph.closure.passive_motion import PassiveMotion, PassiveMotions
 from mechgraph.closure.rates import Rates, Velocities
 from mechgraph.errors import DeclarationError
 from mechgraph.force.applied_loads import Site
-from mechgraph.model.load_base import Load
+from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.tolerances import MOTIONS
 

@@ -23,7 +23,7 @@ from mechgraph.arguments import Count, Index, at_least, door, items_of
 from mechgraph.errors import DeclarationError, FileError, counted
 from mechgraph.graph.chains import Chain, ChainKind, chains, data_faults, family_faults
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair_table import TABLE
+from mechgraph.pairs.pair_type import TABLE
 from mechgraph.quantities import wrong
 from mechgraph.reading import text_of
 from mechgraph.writing import write_whole

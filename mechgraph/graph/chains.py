@@ -34,11 +34,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.errors import counted
-from mechgraph.model.link import Link
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair import Pair
-from mechgraph.model.pair_table import TABLE
-from mechgraph.model.pair_type import PairType
+from mechgraph.model.pair import Link, Pair
+from mechgraph.pairs.pair_type import TABLE, PairType
 from mechgraph.quantities import wrong
 
 if TYPE_CHECKING:

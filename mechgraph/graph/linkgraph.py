@@ -13,8 +13,8 @@ import scipy
 from numpy.typing import NDArray
 
 from mechgraph.errors import counted
+from mechgraph.memo import of_graph
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.once import of_graph
 
 if TYPE_CHECKING:
     import networkx as nx

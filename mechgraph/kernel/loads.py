@@ -10,10 +10,8 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array, rotate
 from mechgraph.closure.indexing import System
-from mechgraph.model.force_law import Damper, Spring, TorsionSpring
-from mechgraph.model.load import Effort, Gravity, Wrench
-from mechgraph.model.load_base import Load
-from mechgraph.model.numeric import PerCase
+from mechgraph.fields import PerCase
+from mechgraph.model.loads import Damper, Effort, Gravity, Load, Spring, TorsionSpring, Wrench
 
 WEIGHT, WRENCH, EFFORT, LAW, BETWEEN = range(5)
 """Kinds of loads, as in ``kernel.h``."""

@@ -19,10 +19,9 @@ from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.passive_motion import PassiveMotion
 from mechgraph.closure.rows import CouplingRows
 from mechgraph.kernel.loads import Acting, acting
-from mechgraph.model.factors import ConstantScrew, Factor, Rotation
-from mechgraph.model.load_base import Load
-from mechgraph.model.row_parts import Freedom
+from mechgraph.model.loads import Load
 from mechgraph.numerics.linear import complement
+from mechgraph.pairs.factors import ConstantScrew, Factor, Freedom, Rotation
 
 Integers = NDArray[np.int32]
 

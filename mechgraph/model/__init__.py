@@ -1,1 +1,1 @@
-"""What a user declares: frozen data and its checks. A new pair type, load or motion law is a row or a small class here."""
+"""What a user declares: frozen data and its checks. A new load or motion law is a small class here."""

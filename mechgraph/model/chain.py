@@ -12,11 +12,10 @@ from numpy.typing import ArrayLike
 from mechgraph.algebra.se3 import Array, identity, inverse
 from mechgraph.arguments import door, items_of
 from mechgraph.errors import DeclarationError
-from mechgraph.model.link import Link
+from mechgraph.fields import plain
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.numeric import plain
-from mechgraph.model.pair import Marker, Pair
-from mechgraph.model.pair_table import TABLE
+from mechgraph.model.pair import Link, Marker, Pair
+from mechgraph.pairs.pair_type import TABLE
 from mechgraph.quantities import is_numeric, real_array, shown, without_units, wrong
 from mechgraph.units import LENGTH, PURE
 

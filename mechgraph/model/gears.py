@@ -12,9 +12,8 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, cross
-from mechgraph.model.contact import Axes, Contact, Lines, fitting_of, teeth_lines, unit
-from mechgraph.model.coupling import BaseCoupling, Coupling
-from mechgraph.model.field_kinds import FLAG, NUMBER, POSITIVE, TWO_POSITIVE, TWO_WHOLE
+from mechgraph.fields import FLAG, NUMBER, POSITIVE, TWO_POSITIVE, TWO_WHOLE
+from mechgraph.model.couplings import Axes, BaseCoupling, Contact, Coupling, Lines, fitting_of, teeth_lines, unit
 from mechgraph.quantities import wrong
 from mechgraph.units import LENGTH, PURE
 

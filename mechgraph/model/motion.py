@@ -1,25 +1,311 @@
-"""Prescribed motions of a driver.
+"""Drives and their motion.
 
-A `Motion` holds position, velocity and acceleration of a driven freedom (and, where it is known, the time); the laws that generate them
-stand in ``motion_law``.
+A `Motion` holds position, velocity and acceleration of a driven freedom (and, where it is known, the time). A law is a row of `LAWS`:
+an object that says which arguments it takes and evaluates (s, s', s'') at times t. A callable of t is a law too (`Smooth`); where it
+gives the position alone it is differentiated by Chebyshev interpolation, to a stated error.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Protocol
 
 import numpy as np
+import scipy
+from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
-from mechgraph.model.field_format import Described
-from mechgraph.model.field_kinds import SERIES
-from mechgraph.model.motion_law import LAWS, Law, LawFault, Smooth, rates_of_samples, read_series
-from mechgraph.quantities import has_quantity, shown, wrong
+from mechgraph.fields import FREEDOM_NAME, SERIES, TABLE, Described
+from mechgraph.numerics.derivatives import NotSmooth, derivatives
+from mechgraph.quantities import has_quantity, real_array, shown, wrong
 from mechgraph.units import LENGTH, PURE, TIME
+
+Rates = tuple[Array, Array, Array]
+"""Position, velocity, acceleration."""
+
+RANGE_TOLERANCE = 1e-12
+"""Times may leave the range of the samples by this part of its length (rounding) and count as its end."""
+
+SINGLE_TIME_RANGES = 7
+"""How many ranges, each a tenth of the one before, are tried about one single time."""
+
+
+def read_series(value: Any, what: str, faults: list[str]) -> Array:
+    """Return `value` as a new float64 array; what keeps it from being finite goes to `faults`."""
+    array = real_array(value)
+    if array is None:
+        faults.append(wrong(value, what, "a real number, or an array of them with rows of one length"))
+        return np.zeros(())
+    numbers = np.array(array)
+    if not np.isfinite(numbers).all():
+        where = tuple(int(i) for i in np.argwhere(~np.isfinite(numbers))[0])
+        faults.append(f"{what} must be finite, got {numbers[where]}{f' at index {where}' if where else ''}")
+    return numbers
+
+
+class LawFault(Exception):
+    """Why a law cannot be evaluated; `Motion.law` raises it as a DeclarationError that names the law."""
+
+
+class Law(Protocol):
+    """A rule that gives position, velocity and acceleration at times t."""
+
+    @property
+    def choices(self) -> tuple[tuple[str, ...], ...]:
+        """Alternative sets of arguments, of which exactly one is needed."""
+
+    @property
+    def optional(self) -> tuple[str, ...]:
+        """Arguments that may be given besides."""
+
+    def rates(self, t: Array, given: Mapping[str, Any]) -> Rates:
+        """Return position, velocity, acceleration at t (shapes that broadcast with t), or raise LawFault."""
+
+
+@dataclass(frozen=True)
+class DwellRise:
+    """Dwell, rise, dwell.
+
+    s = start + rise y(tau), s' = rise / T y'(tau), s'' = rise / T^2 y''(tau), tau = t / T.
+
+    `value`, `first` and `second` are y, y' and y'' on 0 <= tau <= 1, with y(0) = 0 and y(1) = 1. Outside, the
+    position is held and the rates are 0; at the ends themselves they are those of the rise.
+    """
+
+    value: Callable[[Array], Array]
+    first: Callable[[Array], Array]
+    second: Callable[[Array], Array]
+    choices: tuple[tuple[str, ...], ...] = (("rise", "duration"),)
+    optional: tuple[str, ...] = ("start",)
+
+    def rates(self, t: Array, given: Mapping[str, Any]) -> Rates:
+        """Return position, velocity and acceleration at t."""
+        rise, duration = given["rise"], given["duration"]
+        inside = (t >= 0.0) & (t <= duration)
+        tau = np.clip(t / duration, 0.0, 1.0)
+        return (
+            given.get("start", 0.0) + rise * self.value(tau),
+            np.where(inside, rise / duration * self.first(tau), 0.0),
+            np.where(inside, rise / duration**2 * self.second(tau), 0.0),
+        )
+
+
+def _polynomial(*coefficients: float) -> DwellRise:
+    """Return the rise y = sum_k c_k tau^k, coefficients from the constant term up."""
+    y = Polynomial(coefficients)
+    return DwellRise(y, y.deriv(1), y.deriv(2))
+
+
+@dataclass(frozen=True)
+class ConstantSpeed:
+    """Constant speed for all t: s = start + speed t, with speed = rise / duration where those are given."""
+
+    choices: tuple[tuple[str, ...], ...] = (("rise", "duration"), ("speed",))
+    optional: tuple[str, ...] = ("start",)
+
+    def rates(self, t: Array, given: Mapping[str, Any]) -> Rates:
+        """Return position, velocity and acceleration at t."""
+        start = given.get("start", 0.0)
+        if "speed" in given:
+            speed: Array = given["speed"]
+            return start + speed * t, speed, np.zeros(())
+        rise, duration = given["rise"], given["duration"]
+        return start + rise * (t / duration), rise / duration, np.zeros(())
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """Spline through samples, with "not-a-knot" ends (de Boor, A Practical Guide to Splines, 1978).
+
+    Of degree 5 the error of position, velocity and acceleration falls as h^6, h^5 and h^4 with the spacing h,
+    of degree 3 as h^4, h^3, h^2 (for values that are themselves smooth). There is no smoothing: noise in the
+    values is amplified by 1 / h^2 in the acceleration.
+    """
+
+    choices: tuple[tuple[str, ...], ...] = (("samples",),)
+    optional: tuple[str, ...] = ("degree",)
+
+    def rates(self, t: Array, given: Mapping[str, Any]) -> Rates:
+        """Return position, velocity and acceleration at t; outside the range of the samples is a fault."""
+        times, values = _checked_samples(given["samples"])
+        degree = given.get("degree", 5 if times.size >= 6 else 3)
+        if type(degree) is not int or degree not in (3, 5) or times.size <= degree:
+            raise LawFault(
+                f"degree must be 3 (from 4 samples) or 5 (from 6), got {shown(degree)} with {times.size} samples"
+            )
+        margin = RANGE_TOLERANCE * (times[-1] - times[0])
+        outside = t[(t < times[0] - margin) | (t > times[-1] + margin)]
+        if outside.size:
+            span = f"{times[0]:g} to {times[-1]:g}"
+            raise LawFault(f"t = {outside[0]:g} is outside the samples, which run from {span}")
+        return _splined(times, values, degree, np.clip(t, times[0], times[-1]))
+
+
+def _splined(times: Array, values: Array, degree: int, t: Array) -> Rates:
+    """Value and first two derivatives at t of the spline through samples; times are scaled to -1 ... 1 before."""
+    middle, half = (times[0] + times[-1]) / 2.0, (times[-1] - times[0]) / 2.0
+    spline = scipy.interpolate.make_interp_spline((times - middle) / half, values, k=degree)
+    x = (t - middle) / half
+    first, second = (np.asarray(spline(x, n), dtype=np.float64) / half**n for n in (1, 2))
+    return np.asarray(spline(x), dtype=np.float64), first, second
+
+
+def rates_of_samples(times: Array, values: Array) -> Rates:
+    """Values and rates ``(..., n)`` of the spline of `Sampled` through values at times, row by row; zero where all are the same.
+
+    Raises
+    ------
+    LawFault
+        where times do not increase along the last axis.
+    """
+    n = values.shape[-1] if values.ndim else 1
+    if n == 1 or not np.diff(values, axis=-1).any():
+        return values, np.zeros(values.shape), np.zeros(values.shape)
+    if (np.diff(times, axis=-1) <= 0.0).any():
+        raise LawFault(
+            "t must increase along its last axis, as the rates are those of the spline through the samples; or give velocity"
+        )
+    degree = 5 if n >= 6 else min(3, n - 1)
+    rows = [_splined(t, q, degree, t) for t, q in zip(times.reshape(-1, n), values.reshape(-1, n), strict=True)]
+    position, first, second = (np.stack(part).reshape(values.shape) for part in zip(*rows, strict=True))
+    return position, first, second
+
+
+def _checked_samples(samples: Any) -> tuple[Array, Array]:
+    """Return times and values of samples; LawFault where they are no increasing times with one value each."""
+    try:
+        first, second = samples
+    except (TypeError, ValueError):
+        raise LawFault(wrong(samples, "samples", "a pair (times, values)")) from None
+    faults: list[str] = []
+    times = read_series(first, "times of the samples", faults)
+    values = read_series(second, "values of the samples", faults)
+    if faults:
+        raise LawFault("; ".join(faults))
+    if times.ndim != 1 or values.shape != times.shape or times.size < 4:
+        shapes = f"{times.shape} and {values.shape}"
+        raise LawFault(f"samples must be two lists of the same length, at least 4, got shapes {shapes}")
+    back = np.flatnonzero(np.diff(times) <= 0.0)
+    if back.size:
+        early, late = times[back[0] : back[0] + 2]
+        raise LawFault(f"times of the samples must increase, but {early:g} is followed by {late:g}")
+    return times, values
+
+
+@dataclass(frozen=True)
+class Smooth:
+    """A callable of t: s = f(t), or (s, s', s'') = f(t), taken unchanged.
+
+    It is called with arrays, and if it cannot take them (TypeError, ValueError) with one float at a time.
+    Where it returns the position alone, it is differentiated (`numerics.derivatives`), in practice to below 1e-10 of the largest
+    acceleration for a motion of some cycles; a kink, or an estimated error above 1e-6, is a fault and never a wrong number. A range of
+    times is never left; one single time is taken as the middle of a range of length max(1, |t|), or of the first tenth of it, and so
+    on, in which the callable exists and is smooth.
+    """
+
+    function: Callable[[Any], Any]
+    choices: tuple[tuple[str, ...], ...] = ((),)
+    optional: tuple[str, ...] = ()
+
+    def rates(self, t: Array, given: Mapping[str, Any]) -> Rates:
+        """Return position, velocity and acceleration at t."""
+        result = self._called(t)
+        if isinstance(result, tuple):
+            if len(result) != 3:
+                wanted = "the position or (position, velocity, acceleration)"
+                raise LawFault(f"it must return {wanted}, got a tuple of {len(result)}")
+            position, velocity, acceleration = (self._values(part, t) for part in result)
+            return position, velocity, acceleration
+        position = self._values(result, t)
+        if t.size == 0:
+            return position, position, position
+        low, high = float(t.min()), float(t.max())
+        if low < high:
+            try:
+                return position, *derivatives(self.position, t, position, low, high)
+            except NotSmooth as found:
+                raise _not_smooth(found.t) from None
+        halves = [max(1.0, abs(low)) / 2.0 / 10.0**k for k in range(SINGLE_TIME_RANGES)]
+        for half in halves:
+            try:
+                with np.errstate(all="ignore"):
+                    rates = derivatives(self.position, t, position, low - half, high + half)
+            except (LawFault, NotSmooth):
+                continue
+            return position, *rates
+        raise _not_smooth(low)
+
+    def position(self, t: Array) -> Array:
+        """Return the position alone at t, whatever the function returns."""
+        return self._values(self._called(t), t)
+
+    def _called(self, t: Array) -> Any:
+        """Call the function with the array, or value by value where it takes no arrays."""
+        try:
+            return self.function(t.copy() if t.ndim else float(t))
+        except (TypeError, ValueError):
+            if t.ndim == 0:
+                raise
+        single = [self.function(float(value)) for value in t.ravel()]
+        try:
+            if single and isinstance(single[0], tuple):
+                return tuple(np.reshape(column, t.shape) for column in zip(*single, strict=True))
+            return np.reshape(single, t.shape)
+        except (TypeError, ValueError):
+            raise LawFault(f"it must return one number a time, got {single[0]!r}") from None
+
+    @staticmethod
+    def _values(result: Any, t: Array) -> Array:
+        """Return what the function returned as an array of the shape of t."""
+        faults: list[str] = []
+        values = read_series(result, "what it returns", faults)
+        if faults:
+            raise LawFault("; ".join(faults))
+        if values.shape not in (t.shape, ()):
+            raise LawFault(f"it must return one value a time, shape {t.shape}, got shape {values.shape}")
+        return np.array(np.broadcast_to(values, t.shape))
+
+
+def _not_smooth(t: float) -> LawFault:
+    """Return the fault of a callable whose derivatives cannot be found."""
+    return LawFault(
+        f"it is not smooth enough near t = {t:g} to be differentiated twice; "
+        "let it return (position, velocity, acceleration), or use the law 'sampled'"
+    )
+
+
+TURN = 2.0 * np.pi
+
+LAWS: Mapping[str, Law] = {
+    "cycloidal": DwellRise(
+        lambda tau: tau - np.sin(TURN * tau) / TURN,
+        lambda tau: 1.0 - np.cos(TURN * tau),
+        lambda tau: TURN * np.sin(TURN * tau),
+    ),
+    "harmonic": DwellRise(
+        lambda tau: (1.0 - np.cos(np.pi * tau)) / 2.0,
+        lambda tau: np.pi / 2.0 * np.sin(np.pi * tau),
+        lambda tau: np.pi**2 / 2.0 * np.cos(np.pi * tau),
+    ),
+    "poly345": _polynomial(0, 0, 0, 10, -15, 6),
+    "poly4567": _polynomial(0, 0, 0, 0, 35, -84, 70, -20),
+    "constant_speed": ConstantSpeed(),
+    "sampled": Sampled(),
+}
+r"""The laws by name.
+
+With tau = t / duration and a rise of 1 (Norton, Cam Design and Manufacturing Handbook, 2009, double dwell):
+
+- cycloidal: y = tau - sin(2 pi tau) / (2 pi); acceleration continuous, at most 2 pi;
+- harmonic: y = (1 - cos(pi tau)) / 2; acceleration jumps at both ends, at most pi^2 / 2;
+- poly345: y = 10 tau^3 - 15 tau^4 + 6 tau^5; acceleration continuous, at most 10 / sqrt 3;
+- poly4567: y = 35 tau^4 - 84 tau^5 + 70 tau^6 - 20 tau^7; jerk continuous, acceleration at most
+  84 / (5 sqrt 5).
+"""
+
 
 __all__ = ["LAWS", "Motion"]
 
@@ -276,3 +562,18 @@ def _argument_faults(rule: Law, given: Mapping[str, Any]) -> list[str]:
         return [*faults, f"it needs {needs}"]
     surplus = usable - set(rule.optional) - set(fitting[0])
     return [*faults, f"it needs {needs}, not both"] if surplus & set(given) else faults
+
+
+@dataclass(frozen=True)
+class Drive(Described):
+    """A driven freedom, ``"A"`` or ``"B.Tz"``, with the motion to use where ``solve`` is given none."""
+
+    freedom: Annotated[str, FREEDOM_NAME("the driven freedom; not one of a rotation of S, Sg, Sp")]
+    motion: Annotated[Motion | None, TABLE("used where `solve` is given none", table="motion", default="none")] = None
+
+    def faults(self) -> list[str]:
+        """What is wrong with the motion, one line each."""
+        where = f"drive {self.freedom!r}: motion"
+        if isinstance(self.motion, Motion):
+            return self.motion.faults(f"{where}.")
+        return [] if self.motion is None else [wrong(self.motion, where, "a Motion, mg.Motion(position, ...)")]

@@ -1,31 +1,163 @@
-"""Pairs of a mechanism: the edges of the graph, and where they sit on their links."""
+"""Links and pairs of a mechanism: the nodes and edges of the graph, and where the pairs sit on their links."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from types import MappingProxyType
+from typing import Annotated, Any, ClassVar, Protocol
 
 import numpy as np
 
+from mechgraph.algebra.inertia import physical_faults
 from mechgraph.algebra.se3 import Array
-from mechgraph.errors import ShapeError
-from mechgraph.model.contact_rows import ROWS, curve_faults, in_contact, kept_side
-from mechgraph.model.curves import Curve
-from mechgraph.model.field_format import Described
-from mechgraph.model.field_kinds import DIRECTION, LINK_NAME, NUMBER, POINT, POSITIVE, TEXT
-from mechgraph.model.field_kinds import TABLE as NESTED
-from mechgraph.model.hertz import Hertz
-from mechgraph.model.numeric import PARALLEL_COSINE, cosine, filled_second, parallel_faults, plain
-from mechgraph.model.numeric import second_direction as second_direction
-from mechgraph.model.pair_faults import contact_faults, shape_faults_of
-from mechgraph.model.pair_table import TABLE
-from mechgraph.model.pair_type import PairType
-from mechgraph.model.placed_rows import Contact
-from mechgraph.model.surface_rows import on_surface, row_of, surface_faults
-from mechgraph.model.surfaces import Surface
-from mechgraph.quantities import shown, wrong
-from mechgraph.units import LENGTH
+from mechgraph.errors import DeclarationError, ShapeError
+from mechgraph.fields import (
+    DIRECTION,
+    FLAG,
+    LINK_NAME,
+    NUMBER,
+    PARALLEL_COSINE,
+    POINT,
+    POINTS,
+    POSITIVE,
+    TENSOR,
+    TEXT,
+    Described,
+    cosine,
+    filled_second,
+    parallel_faults,
+    plain,
+)
+from mechgraph.fields import TABLE as NESTED
+from mechgraph.fields import second_direction as second_direction
+from mechgraph.pairs.contact_types import (
+    ROWS,
+    Contact,
+    Hertz,
+    contact_faults,
+    curve_faults,
+    in_contact,
+    kept_side,
+    on_surface,
+    row_of,
+    shape_faults_of,
+    surface_faults,
+)
+from mechgraph.pairs.curves import Curve
+from mechgraph.pairs.pair_type import TABLE, PairType
+from mechgraph.pairs.surfaces import Surface
+from mechgraph.quantities import is_numeric, shown, wrong
+from mechgraph.units import INERTIA, LENGTH, MASS
+
+NO_POINTS: Mapping[str, tuple[float, ...]] = MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class Link(Described):
+    """A link (rigid body).
+
+    Parameters
+    ----------
+    name : its name in the graph.
+    mass : not negative.
+    center : mass centre in the link's frame (global coordinates at the declared configuration for the point/axis form);
+        needed where mass > 0.
+    inertia : 3 x 3 tensor about the mass centre, in the link's frame (off-diagonals are minus the products of inertia).
+    unphysical : accept an inertia that no body can have.
+    points : named points, ``{"tip": (x, y, z)}`` in the coordinates of ``center``, for loads, prescribed motion and results.
+    """
+
+    name: Annotated[str, TEXT("in a chain: `frame`, `link1`, `link2`, ...")]
+    mass: Annotated[float, NUMBER("mass", MASS, minimum=0.0)] = 0.0
+    center: Annotated[
+        Any,
+        POINT(
+            "mass centre in the link's frame (global where pairs are given by point and axis)",
+            LENGTH,
+            default="needed where mass > 0",
+        ),
+    ] = None
+    inertia: Annotated[
+        Any,
+        TENSOR(
+            "tensor about the mass centre, in the link's frame; off-diagonals are minus the products of inertia",
+            INERTIA,
+            default="0",
+        ),
+    ] = None
+    unphysical: Annotated[bool, FLAG("accept an inertia that no body can have")] = False
+    points: Annotated[
+        Any, POINTS("named points, name → 3 numbers, in the coordinates of `center`", LENGTH, default="none")
+    ] = field(default=None, hash=False)
+
+    def __post_init__(self) -> None:
+        self.read_numbers()
+        if self.points is None:
+            object.__setattr__(self, "points", NO_POINTS)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        given = {name: getattr(self, name) for name in self.formats}
+        return partial(type(self), **given | {"points": dict(self.points)}), ()
+
+    def point(self, name: str) -> tuple[float, float, float]:
+        """The point of that name, in the link's frame."""
+        if name not in self.points:
+            raise DeclarationError(f"link {self.name!r}", [self.point_fault(name)])
+        at: tuple[float, float, float] = self.points[name]
+        return at
+
+    def point_fault(self, name: Any) -> str:
+        """What to say of a name that is no point of this link."""
+        known = (
+            f"its points: {', '.join(self.points)}" if self.points else "it has none; declare points={'tip': (x, y, z)}"
+        )
+        return f"link {self.name!r} has no point {shown(name)} ({known})"
+
+    def faults(self) -> list[str]:
+        """What is wrong with this link, one line each."""
+        where = f"link {shown(self.name)}: "
+        if not isinstance(self.name, str) or not self.name:
+            return [f"{where}the name must be a non-empty text"]
+        found = self.value_faults(where)
+        if self.center is None and is_numeric(self.mass, ()) and self.mass > 0:
+            found.append(f"{where}mass = {self.mass:g} without a center; give center=(x, y, z)")
+        if is_numeric(self.inertia, (3, 3)):
+            if self.center is None:
+                found.append(f"{where}inertia without a center; give center=(x, y, z)")
+            if is_numeric(self.mass, ()) and self.mass == 0 and np.any(self.inertia):
+                found.append(f"{where}inertia without mass; give mass=")
+            if isinstance(self.unphysical, bool) and not self.unphysical:
+                impossible = physical_faults(self.inertia)
+                found += [
+                    f"{where}inertia: {fault}; no body has it (unphysical=True accepts it)" for fault in impossible
+                ]
+        return found
+
+
+class Nameable(Protocol):
+    """Links and freedoms of a mechanism, by name."""
+
+    @property
+    def link_index(self) -> Mapping[str, int]:
+        """Place of every link, by name."""
+
+    def freedom_fault(self, name: Any, *, single: bool) -> str | None:
+        """Why ``name`` is no freedom (with ``single``: no single freedom), or None."""
+
+    def massive_links(self) -> tuple[str, ...]:
+        """Links that have mass."""
+
+    def link(self, name: str) -> Link:
+        """The link of that name."""
+
+    def ends_of(self, freedom: str) -> tuple[str, str]:
+        """Links a and b of the pair of a freedom."""
+
+    def full_name(self, name: str) -> str:
+        """The full spelling ``"B.Tz"`` of a freedom."""
+
 
 PERPENDICULAR = 1e-6
 """Largest cosine between axis and second direction that counts as perpendicular where a pair type needs it."""

@@ -1,26 +1,110 @@
-"""What a response starts from and how it is followed, as it is stored with a mechanism: ``[response]`` in a file."""
+"""What a response starts from and how it is followed, with its events and stops: ``[response]`` in a file."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.arguments import items_of, option_faults
-from mechgraph.model.drive import Drive
-from mechgraph.model.event import Event
-from mechgraph.model.field_format import Described
-from mechgraph.model.field_kinds import BY_FREEDOM, NUMBER, OTHER, SERIES, TABLES, TEXT
-from mechgraph.model.motion import Motion
-from mechgraph.model.nameable import Nameable
-from mechgraph.model.numeric import plain, same_fields
-from mechgraph.model.stop import Stop
-from mechgraph.quantities import is_numeric, no_limit, real_array, wrong
+from mechgraph.errors import DeclarationError
+from mechgraph.fields import (
+    BY_FREEDOM,
+    FLAG,
+    FREEDOM_NAME,
+    NUMBER,
+    OTHER,
+    POSITION,
+    SERIES,
+    TABLES,
+    TEXT,
+    Described,
+    plain,
+    same_fields,
+)
+from mechgraph.model.motion import Drive, Motion
+from mechgraph.model.pair import Nameable
+from mechgraph.quantities import is_numeric, no_limit, real_array, shown, wrong
 from mechgraph.units import LENGTH, PURE, TIME, factor_of
+
+What = Literal["position", "velocity", "acceleration"]
+WHATS: tuple[What, ...] = get_args(What)
+
+
+@dataclass(frozen=True)
+class Event(Described):
+    """A quantity that passes a value: ``of`` is the name of a freedom, or a function of the Solution at one time that gives a number.
+
+    ``what``: of a freedom its ``"position"``, ``"velocity"`` or ``"acceleration"``; ``direction``: 1 for rising, -1 for falling, 0 for
+    both; ``terminal``: the motion ends there.
+    """
+
+    of: Annotated[Any, FREEDOM_NAME("the freedom that is watched")]
+    value: Annotated[float, NUMBER("the value that it passes", **POSITION)] = 0.0
+    what: Annotated[What, TEXT("what of it", choices=WHATS)] = "position"
+    direction: Annotated[int, OTHER("1: rising, -1: falling, 0: both", default="0", rules={"enum": [-1, 0, 1]})] = 0
+    terminal: Annotated[bool, FLAG("whether the motion ends there")] = False
+    name: Annotated[str, TEXT("what it is called", default="in words")] = ""
+
+    @property
+    def text(self) -> str:
+        """The event in words."""
+        if self.name:
+            return self.name
+        of = f"{self.what} of {self.of}" if isinstance(self.of, str) else getattr(self.of, "__name__", "function")
+        return f"{of} passes {self.value:g}"
+
+    def faults(self, m: Nameable) -> list[str]:
+        """What is wrong with it."""
+        found = []
+        if isinstance(self.of, str):
+            fault = m.freedom_fault(self.of, single=True)
+            found += [f"event: {fault}"] if fault else []
+        elif not callable(self.of):
+            found.append(f"event of {shown(self.of)}: expected the name of a freedom, or a function of a Solution")
+        if not is_numeric(self.value, ()):
+            return [*found, f"event of {shown(self.of)}: {wrong(self.value, 'value', 'a finite number')}"]
+        if self.what not in WHATS:
+            found.append(f"event {self.text}: {wrong(self.what, 'what', ', '.join(map(repr, WHATS)))}")
+        if self.direction not in (-1, 0, 1):
+            found.append(f"event {self.text}: {wrong(self.direction, 'direction', '-1, 0 or 1')}")
+        return found
+
+    def in_units(self, base: tuple[float, float, float], turns: bool = False) -> Self:
+        """See ``Described``; the dimension of the value is that of ``what``."""
+        if not isinstance(self.of, str):
+            raise DeclarationError("to_units", [f"event {self.text}: watches a function; convert it yourself"])
+        dimension = (0 if turns else 1, 0, -WHATS.index(self.what))
+        return self.replace(value=self.value * factor_of(dimension, base))
+
+
+@dataclass(frozen=True)
+class Stop(Described):
+    """Limits of a freedom, ``lower`` and ``upper`` (None: no limit), which it strikes with a coefficient of ``restitution`` 0 to 1."""
+
+    freedom: Annotated[str, FREEDOM_NAME("the freedom that is limited")]
+    lower: Annotated[float | None, NUMBER("lower limit; at least one of the two", default="none", **POSITION)] = None
+    upper: Annotated[float | None, NUMBER("upper limit", default="none", **POSITION)] = None
+    restitution: Annotated[float, NUMBER("coefficient of restitution, 0 to 1", minimum=0.0)] = 0.0
+
+    def faults(self, m: Nameable) -> list[str]:
+        """What is wrong with it."""
+        fault = m.freedom_fault(self.freedom, single=True)
+        found = [fault] if fault else []
+        limits = {name: value for name in ("lower", "upper") if (value := getattr(self, name)) is not None}
+        found += [wrong(v, name, "a finite number") for name, v in limits.items() if not is_numeric(v, ())]
+        if not limits:
+            found.append("has neither lower nor upper limit")
+        elif len(limits) == 2 and not found and not limits["lower"] < limits["upper"]:
+            found.append(f"lower = {self.lower:g}, upper = {self.upper:g}: expected lower < upper")
+        if not is_numeric(self.restitution, ()) or not 0.0 <= self.restitution <= 1.0:
+            found.append(wrong(self.restitution, "restitution", "a number from 0 to 1"))
+        return [f"stop of {shown(self.freedom)}: {fault}" for fault in found]
+
 
 MOST_POINTS = 10_000_000
 MethodName = Literal["auto", "RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"]

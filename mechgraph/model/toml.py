@@ -1,4 +1,4 @@
-"""Mechanisms in TOML files: read with all faults at once, written whole or not at all.
+"""Mechanisms in TOML files: read with all faults at once, written whole or not at all; and where those of the library are.
 
 What a table may hold stands in ``file_format``; reader and writer go through it. A field that is an angle may be given in degrees under
 its name with ``_deg`` added. ``library/README.md`` describes the format for people.
@@ -16,24 +16,116 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from mechgraph.algebra.se3 import Array
 from mechgraph.errors import ContentError, DeclarationError, FileError
+from mechgraph.fields import (
+    BY_FREEDOM,
+    COEFFICIENTS,
+    SIX,
+    STANDS_AS,
+    TABLE,
+    TABLES,
+    Described,
+    filled_second,
+    is_default,
+    sound_tol,
+)
 from mechgraph.model.chain import chain
-from mechgraph.model.curves import Curve
-from mechgraph.model.field_format import STANDS_AS, Described, is_default
-from mechgraph.model.field_kinds import BY_FREEDOM, COEFFICIENTS, SIX, TABLE, TABLES
 from mechgraph.model.file_format import DEGREES, KINDS, SCHEMA, TABLES_OF_FILE, USUAL
-from mechgraph.model.library import library_names, library_path
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
-from mechgraph.model.numeric import filled_second, sound_tol
-from mechgraph.model.pair_table import TABLE as PAIR_TABLE
-from mechgraph.model.pair_type import PairType
-from mechgraph.model.placed_rows import travels
-from mechgraph.model.surfaces import Surface
-from mechgraph.model.sweep import DIGITS, sweep_of, swept
+from mechgraph.pairs.contact_types import travels
+from mechgraph.pairs.curves import Curve
+from mechgraph.pairs.pair_type import TABLE as PAIR_TABLE
+from mechgraph.pairs.pair_type import PairType
+from mechgraph.pairs.surfaces import Surface
 from mechgraph.quantities import is_numeric, real_array, shown, wrong
 from mechgraph.reading import text_of, toml_of
 from mechgraph.writing import write_whole
+
+__all__ = ["library_names", "library_path"]
+
+_PACKAGE = Path(__file__).resolve().parents[1]
+_PLACES = (_PACKAGE / "library", _PACKAGE.parent / "library")
+
+
+def library_path(name: str | None = None) -> Path:
+    """Path of the library folder, or of the file of the mechanism `name` in it.
+
+    A wheel holds the library as ``mechgraph/library``, an editable install as ``library`` beside
+    ``mechgraph``; the first that exists is taken.
+
+    Parameters
+    ----------
+    name
+        Name as in `library_names`, without ``.toml``.
+
+    Raises
+    ------
+    FileError
+        No library folder in either place, or no mechanism of that name; the message lists those there are.
+    """
+    folder = next((place for place in _PLACES if place.is_dir()), None)
+    if folder is None:
+        raise FileError(_PLACES[0], f"no mechanism library there, nor in {_PLACES[1]}; install mechgraph again")
+    if name is None:
+        return folder
+    names = _stems(folder)
+    if name not in names:
+        raise FileError(folder, f"no mechanism {name!r} in the library; there are: {', '.join(names)}")
+    return folder / f"{name}.toml"
+
+
+def library_names() -> tuple[str, ...]:
+    """Names of the mechanisms in the library, sorted: the stems of its TOML files.
+
+    Raises
+    ------
+    FileError
+        No library folder, see `library_path`.
+    """
+    return _stems(library_path())
+
+
+def _stems(folder: Path) -> tuple[str, ...]:
+    return tuple(sorted(path.stem for path in folder.glob("*.toml")))
+
+
+LONGEST_SWEEP = 1_000_000
+"""Longest sweep that a file or the command line may ask for."""
+LATE_END = 1e-9
+"""Part of a step by which the end may come late through rounding and still be excluded."""
+
+
+DIGITS = 12
+"""Digits in which a sweep is sought first: those that people write."""
+
+
+def sweep_of(positions: Array) -> list[float] | None:
+    """``[first, end, step]`` of which ``swept`` makes exactly these positions ``(n,)``, in the fewest digits; None where none does."""
+    n = len(positions)
+    if n < 4:  # three numbers are as short
+        return None
+    first, step = float(positions[0]), float(positions[-1] - positions[0]) / (n - 1)
+    steps = float(f"{step:.{DIGITS}g}"), step, float(positions[1]) - first
+    for found in ([first, float(f"{first + n * step:.{DIGITS}g}"), step] for step in steps):
+        made = swept(*found)
+        if not isinstance(made, str) and np.array_equal(made, positions):
+            return found
+    return None
+
+
+def swept(first: float, end: float, step: float) -> Array | str:
+    """Positions ``first + k step`` before ``end``, or why there are none."""
+    if step == 0 or first == end:
+        return "no positions: " + ("the step is 0" if step == 0 else "the end, which is excluded, is also the first")
+    count = (end - first) / step
+    if count < 0:
+        return "no positions: the step leads away from the end; change its sign, or exchange first and end"
+    if count > LONGEST_SWEEP:
+        return f"{count:.3g} positions, at most {LONGEST_SWEEP} are taken; take a larger step"
+    return np.asarray(first + step * np.arange(max(int(np.ceil(count - LATE_END)), 1)), dtype=float)
+
 
 LINE_OF_FILE = 120
 """Characters of a line of a written list."""

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from mechgraph.closure.configuration import Configuration
-from mechgraph.model.factors import ConstantScrew, Rotation, screw_terms
 from mechgraph.modes.family import Array
 from mechgraph.modes.rods import RodSystem
+from mechgraph.pairs.factors import ConstantScrew, Rotation, screw_terms
 
 HALF_ULP = 2.0**-53
 """Largest relative rounding of one operation."""

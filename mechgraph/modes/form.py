@@ -33,15 +33,14 @@ from mechgraph.closure.point_rows import PointNumbers
 from mechgraph.closure.reduction import floating_type
 from mechgraph.errors import counted
 from mechgraph.graph.linkgraph import components_of_edges
-from mechgraph.model import pair_kinematics
-from mechgraph.model.link import Link
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair import Pair
-from mechgraph.model.pair_type import PairType
+from mechgraph.model.pair import Link, Pair
 from mechgraph.modes.family import SPAN, Array, Family
 from mechgraph.modes.rods import RodFamily, RodSystem
 from mechgraph.numerics.linear import rank_of, singular_values
 from mechgraph.numerics.tolerances import RANKS
+from mechgraph.pairs import kinematics
+from mechgraph.pairs.pair_type import PairType
 
 WAYS = "A leg that two turns carry can stand in two ways in the same assembly: nearest to the start, the other does not count"
 """What is said of rods with two turns at an end."""
@@ -128,9 +127,7 @@ def behind(system: System, step: Step, x: Array) -> Array:
     """Pose ``(3, 4, T)`` of the link behind a pair, seen from the link before it, at states ``x (nx, T)``."""
     par, pair = system.par, step.pair
     row, states = system.m.pairs[pair].type.scaled(par.L), x[system.first_row[pair] : system.first_row[pair + 1], None]
-    moved = (
-        pair_kinematics.frames_of(row, par.pitch[[pair]], states)[-1][:, :, 0] if row.steps else identity(x.shape[1])
-    )
+    moved = kinematics.frames_of(row, par.pitch[[pair]], states)[-1][:, :, 0] if row.steps else identity(x.shape[1])
     D = compose(compose(par.marker_a[:, :, pair], moved), inverse(par.marker_b[:, :, pair]))
     return D if step.sign > 0 else inverse(D)
 

@@ -20,9 +20,8 @@ from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.point_rows import PointNumbers
 from mechgraph.graph.linkgraph import components_of_edges
-from mechgraph.model.link import Link
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair import Pair
+from mechgraph.model.pair import Link, Pair
 from mechgraph.modes.family import SPAN, Array, Family, Member, generated
 from mechgraph.modes.form import Step, behind
 from mechgraph.modes.rods import RodFamily, RodSystem

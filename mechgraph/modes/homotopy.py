@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from mechgraph.algebra.se3 import finite_twist, homogeneous, move_twist, multiplied, quaternion_product
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
-from mechgraph.model.factors import screw_terms, screw_values
 from mechgraph.modes.family import Array, Family, Member
 from mechgraph.numerics.linear import complement
+from mechgraph.pairs.factors import screw_terms, screw_values
 
 Mask = NDArray[np.bool_]
 

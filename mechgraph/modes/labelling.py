@@ -17,9 +17,9 @@ import numpy as np
 
 from mechgraph.algebra.se3 import compose, cross_twist, inverse
 from mechgraph.graph.chains import least_order, ranked
-from mechgraph.model.pair_type import PairType
 from mechgraph.modes.family import SPAN, Array, Family, Member
 from mechgraph.numerics.linear import Index
+from mechgraph.pairs.pair_type import PairType
 
 GEOMETRY_DIGITS, ALGEBRA_DIGITS = 9, 6
 """Decimals of numbers that a class keeps: of markers, over L, and of the motions by which they may be moved."""

@@ -13,7 +13,7 @@ import scipy
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import SMALL_BATCH
-from mechgraph.numerics.kept import kept
+from mechgraph.memo import kept
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]

@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from mechgraph.numerics.kept import kept
+from mechgraph.memo import kept
 from mechgraph.numerics.tolerances import PATH
 
 Array = NDArray[np.float64]

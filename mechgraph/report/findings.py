@@ -28,12 +28,11 @@ from mechgraph.errors import MechgraphError
 from mechgraph.force.passive_hold import hold_at_rest, hold_names, is_idle
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker, Pair
-from mechgraph.model.pair_table import TABLE
-from mechgraph.model.pair_type import PairType
-from mechgraph.model.row_parts import Component
 from mechgraph.model.toml import to_data
 from mechgraph.numerics.linear import independent_rows, rank_of, singular_values
 from mechgraph.numerics.tolerances import MOTIONS
+from mechgraph.pairs.factors import Component
+from mechgraph.pairs.pair_type import TABLE, PairType
 from mechgraph.structure.kind import kind_of
 from mechgraph.structure.least_change import TOOK_TOO_LONG, SearchEnded
 from mechgraph.structure.mobility import Freedoms, drive_order, single_freedoms

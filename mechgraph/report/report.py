@@ -22,8 +22,8 @@ from mechgraph.errors import AssemblyError, DeadPointError, IndeterminateError, 
 from mechgraph.graph.linkgraph import link_graph
 from mechgraph.kernel import build
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair_table import TABLE
 from mechgraph.numerics.tolerances import RANKS
+from mechgraph.pairs.pair_type import TABLE
 from mechgraph.report import sentences
 from mechgraph.report.facts import Facts, Geometry
 from mechgraph.report.findings import LIMIT, Rounding, component_words, listed, plural, rounding

@@ -18,7 +18,7 @@ from mechgraph.closure.indexing import System
 from mechgraph.closure.solver import FactoredClosure
 from mechgraph.errors import DeclarationError
 from mechgraph.force.applied_loads import NOT_FINITE, Site, user_poses, user_twists
-from mechgraph.model.load_base import Load
+from mechgraph.model.loads import Load
 from mechgraph.response.motion_equations import Loads, along_one
 
 OF_LOADS = 4

@@ -16,7 +16,7 @@ from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.passive_motion import PassiveMotion
 from mechgraph.closure.rates import Velocities
 from mechgraph.force.applied_loads import kinetic_energy
-from mechgraph.model.load_base import Load
+from mechgraph.model.loads import Load
 from mechgraph.response.chart import Chart, Closed, Stopped
 from mechgraph.response.kernel_rates import Evaluated, KernelRates
 from mechgraph.response.motion_equations import Loads, Moved, accelerations, applied, moved, positions_together

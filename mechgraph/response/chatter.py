@@ -8,8 +8,7 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.force.applied_loads import Site
-from mechgraph.model.force_law import Law
-from mechgraph.model.load_base import Load
+from mechgraph.model.loads import Law, Load
 from mechgraph.response.chart import Stopped
 
 TINY_STEP = 1e-5

@@ -27,7 +27,7 @@ from mechgraph.closure.passive_motion import PassiveMotions
 from mechgraph.closure.rates import Rates, Velocities
 from mechgraph.closure.solver import FactoredClosure
 from mechgraph.force.applied_loads import Site, inertia_wrenches
-from mechgraph.model.load_base import Load
+from mechgraph.model.loads import Load
 from mechgraph.response.chart import Closed, Held, Stopped
 from mechgraph.response.saddle import saddle_accelerations
 

@@ -19,18 +19,18 @@ from mechgraph.closure.rank import closure_rank
 from mechgraph.closure.solver import MotionEngineName, engine_for
 from mechgraph.errors import AssemblyError, DeclarationError, MechgraphWarning, ResponseError
 from mechgraph.model.declaration import mapping_faults
-from mechgraph.model.event import Event
-from mechgraph.model.load_base import Load
+from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.response_setup import (
     METHODS,
+    Event,
     MethodName,
     PassiveName,
     ResponseSetup,
+    Stop,
     read_times,
     tolerance_faults,
 )
-from mechgraph.model.stop import Stop
 from mechgraph.report.report import hinted
 from mechgraph.response.along_path import Arc, PathStage
 from mechgraph.response.chart import Stopped, stopping

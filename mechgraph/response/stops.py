@@ -23,9 +23,8 @@ from numpy.typing import NDArray
 from mechgraph.algebra.se3 import Array
 from mechgraph.arguments import items_of
 from mechgraph.force.applied_loads import kinetic_energy
-from mechgraph.model.event import Event
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.stop import Stop
+from mechgraph.model.response_setup import Event, Stop
 from mechgraph.quantities import wrong
 from mechgraph.response.chart import Closed, Stopped
 from mechgraph.response.charts import Task

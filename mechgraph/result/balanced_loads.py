@@ -13,8 +13,8 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.arguments import place_among
 from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError
-from mechgraph.model.link import Link
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.pair import Link
 from mechgraph.quantities import wrong
 from mechgraph.result.numbers import number
 from mechgraph.result.places import OK

@@ -8,10 +8,9 @@ from functools import cached_property
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.model.contact_rows import is_open, pressing, takes_curves
 from mechgraph.model.pair import Pair
-from mechgraph.model.row_parts import Touching
-from mechgraph.model.surface_rows import placed_surface
+from mechgraph.pairs.contact_types import is_open, placed_surface, pressing, takes_curves
+from mechgraph.pairs.factors import Touching
 from mechgraph.result.values import Values
 
 

@@ -19,9 +19,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.document import Block, Document, Paragraph, Shown
 from mechgraph.errors import DeclarationError
-from mechgraph.model.contact_rows import CONFORMAL, is_open
-from mechgraph.model.hertz import Pressed, pressed, pressed_along_line
-from mechgraph.model.surface_rows import placed_surface
+from mechgraph.pairs.contact_types import CONFORMAL, Pressed, is_open, placed_surface, pressed, pressed_along_line
 from mechgraph.quantities import wrong
 from mechgraph.result.contact_geometry import ContactGeometry
 from mechgraph.result.contact_ranges import LiftOff, Overlap, Stretch, stretches

@@ -12,13 +12,11 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.arguments import door
 from mechgraph.document import Bullets, Document, Heading, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError
-from mechgraph.model.coupling import BaseCoupling
-from mechgraph.model.field_kinds import NAMED_POINT
-from mechgraph.model.link import Link
-from mechgraph.model.load import Gravity
-from mechgraph.model.load_base import Load
+from mechgraph.fields import NAMED_POINT
+from mechgraph.model.couplings import BaseCoupling
+from mechgraph.model.loads import Gravity, Load
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair import Marker
+from mechgraph.model.pair import Link, Marker
 from mechgraph.report.report import check
 from mechgraph.result.balanced_loads import SMALL, At, BalancedLoads, PointLoad
 from mechgraph.result.load_files import FORMATS

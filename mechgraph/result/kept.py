@@ -21,7 +21,7 @@ from mechgraph.closure.passive_motion import PassiveMotion
 from mechgraph.closure.rates import Rates, Velocities
 from mechgraph.errors import MechgraphError
 from mechgraph.force.block import BlockForces
-from mechgraph.model.load_base import Load
+from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.newton import Work
 from mechgraph.numerics.tolerances import PATH

@@ -18,7 +18,7 @@ from mechgraph.arguments import door
 from mechgraph.data import plain
 from mechgraph.document import Block, Document, Heading, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError
-from mechgraph.model.numeric import vector_fault
+from mechgraph.fields import vector_fault
 from mechgraph.result.cycle import Cycle, cycles_of
 from mechgraph.result.numbers import bracket, number, with_unit
 from mechgraph.result.solution import Solution

@@ -12,8 +12,8 @@ from mechgraph.closure.contact_lines import ContactLines
 from mechgraph.closure.driver_path import in_blocks
 from mechgraph.closure.indexing import Index
 from mechgraph.errors import DeclarationError
-from mechgraph.model.pair_type import PairType
 from mechgraph.numerics.linear import EVERY, Place
+from mechgraph.pairs.pair_type import PairType
 from mechgraph.result.kept import BlockMotion, Kept
 from mechgraph.result.states import user_wrench
 from mechgraph.result.values import Mask

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.model.coupling import BaseCoupling
+from mechgraph.model.couplings import BaseCoupling
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.result.numbers import number, with_unit
 from mechgraph.result.values import Values

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mechgraph.algebra.se3 import Array
 from mechgraph.arguments import items_of
 from mechgraph.errors import DeclarationError
-from mechgraph.model.force_law import Law
+from mechgraph.model.loads import Law
 from mechgraph.quantities import wrong
 from mechgraph.result.contacts import contact_columns
 from mechgraph.result.values import MaterialPoint, Values

@@ -12,7 +12,7 @@ from mechgraph.errors import MechgraphError
 from mechgraph.force.applied_loads import Site, inertia_wrenches, kinetic_energy, user_poses, user_twists
 from mechgraph.force.dalembert import given_effort_loads
 from mechgraph.force.passive_hold import hold_names, is_idle
-from mechgraph.model.force_law import Law
+from mechgraph.model.loads import Law
 from mechgraph.numerics.tolerances import MOTIONS
 from mechgraph.result.kept import BlockMotion
 from mechgraph.result.pair_forces import PairForces

@@ -13,7 +13,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.indexing import Index
 from mechgraph.document import Document, Shown, Table
 from mechgraph.equations.terms import State
-from mechgraph.model.load_base import Load
+from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.newton import Work
 from mechgraph.numerics.tolerances import CHECKS, PATH

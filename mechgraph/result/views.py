@@ -10,9 +10,9 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.document import Document, Shown
 from mechgraph.errors import DeclarationError
-from mechgraph.model.contact import Contact
-from mechgraph.model.numeric import vector_fault
-from mechgraph.model.pair_type import PairType
+from mechgraph.fields import vector_fault
+from mechgraph.model.couplings import Contact
+from mechgraph.pairs.pair_type import PairType
 from mechgraph.result.describe import coupling_document, link_document, pair_document
 from mechgraph.result.values import MaterialPoint, Values
 from mechgraph.units import unit_of

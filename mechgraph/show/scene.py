@@ -18,11 +18,10 @@ from mechgraph.closure.indexing import System
 from mechgraph.document.tree import plain
 from mechgraph.errors import DeclarationError
 from mechgraph.force.applied_loads import user_poses
-from mechgraph.model import pair_kinematics
-from mechgraph.model.force_law import Law
-from mechgraph.model.load import Effort, Gravity, Wrench
+from mechgraph.model.loads import Effort, Gravity, Law, Wrench
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
+from mechgraph.pairs import kinematics
 from mechgraph.result.solution import Solution
 from mechgraph.show import shapes
 from mechgraph.show.shapes import Line, Shape, frame_along, lines_of, symbol
@@ -252,9 +251,9 @@ class Stage:
         base, marker = self.place.poses[pair.a][:, :3], pair.markers[0].pose()
         origin = base[:, :, :3] @ marker[:, 3] + base[:, :, 3]
         start = np.concatenate([base[:, :, :3] @ marker[:, :3], origin[:, :, None]], axis=2)
-        x = pair_kinematics.coordinates_to_state(pair.type, self.place.coordinates[pair.name][:, None])
+        x = kinematics.coordinates_to_state(pair.type, self.place.coordinates[pair.name][:, None])
         pitch = np.array([[pair.pitch_per_radian]])
-        found = pair_kinematics.frames_of(pair.type, pitch, x, np.moveaxis(start, 0, -1)[:, :, None])
+        found = kinematics.frames_of(pair.type, pitch, x, np.moveaxis(start, 0, -1)[:, :, None])
         return [np.moveaxis(frame[:, :, 0], -1, 0) for frame in found]
 
     def on(self, link: str, point: Any) -> Array:

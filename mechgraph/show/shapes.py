@@ -10,8 +10,8 @@ from typing import Any, Literal
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.model.pair_type import PairType
-from mechgraph.model.row_parts import Freedom
+from mechgraph.pairs.factors import Freedom
+from mechgraph.pairs.pair_type import PairType
 
 GUIDE, BODY, PIN = 0.95, 0.62, 0.24
 """Radii of guides, of what runs in them, and of pins, over the size of a symbol."""

@@ -11,10 +11,10 @@ from mechgraph.algebra.se3 import Array, rotation_exp
 from mechgraph.closure.loop_rows import ClosureRows
 from mechgraph.closure.rank import EngineName, rank_of_rows
 from mechgraph.graph.linkgraph import LinkGraph
-from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair_type import PairType
 from mechgraph.numerics.tolerances import RANKS
+from mechgraph.pairs import kinematics as evaluation
+from mechgraph.pairs.pair_type import PairType
 
 GEOMETRY_SEED = 11
 

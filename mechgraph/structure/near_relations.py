@@ -17,7 +17,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array, rotation_exp
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
-from mechgraph.model.pair_type import PairType
+from mechgraph.pairs.pair_type import PairType
 
 COMPLEX_STEP = 1e-30
 """Step of the complex-step derivatives: exact, as the residuals are analytic."""

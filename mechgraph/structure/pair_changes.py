@@ -17,10 +17,9 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.rank import EngineName
 from mechgraph.closure.sparse_solver import PROBES
-from mechgraph.model import pair_kinematics as evaluation
-from mechgraph.model.pair_table import TABLE
-from mechgraph.model.pair_type import PairType
 from mechgraph.numerics.tolerances import STRESSES
+from mechgraph.pairs import kinematics as evaluation
+from mechgraph.pairs.pair_type import TABLE, PairType
 from mechgraph.structure.mobility import Freedoms, freedoms_at
 from mechgraph.structure.position import PlacedPair
 from mechgraph.structure.uniqueness import pair_states

@@ -31,8 +31,8 @@ from mechgraph.graph.linkgraph import (
     labels_of_bipartite,
     members,
 )
-from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.numerics.tolerances import MOTIONS
+from mechgraph.pairs import kinematics as evaluation
 from mechgraph.structure.position import Position
 
 DIFFERENCE_STEP = 1e-4

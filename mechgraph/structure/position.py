@@ -19,10 +19,10 @@ from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.loop_rows import ClosureRows
 from mechgraph.graph.linkgraph import LinkGraph
-from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair_type import PairType
 from mechgraph.numerics.linear import complement
+from mechgraph.pairs import kinematics as evaluation
+from mechgraph.pairs.pair_type import PairType
 
 
 @dataclass(frozen=True)

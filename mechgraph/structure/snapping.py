@@ -15,8 +15,8 @@ from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index, System
 from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError
+from mechgraph.fields import tolerance_fault
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.numeric import tolerance_fault
 from mechgraph.model.parameters import Declared
 from mechgraph.numerics.linear import singular_values
 from mechgraph.structure.least_change import MOST_ROWS, SearchEnded, least_change, weakness

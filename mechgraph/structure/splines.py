@@ -9,9 +9,8 @@ import numpy as np
 from mechgraph.closure.assembly import assembled, at_position, named_columns
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.rank import EngineName
-from mechgraph.model.link import Link
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair import Marker, Pair
+from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.numerics.tolerances import MOTIONS, STRESSES
 from mechgraph.structure.mobility import Freedoms, free_motion
 from mechgraph.structure.pair_changes import RIGID, SPLINE, Effect, stresses_of

@@ -14,7 +14,7 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array, null_space
 from mechgraph.closure.indexing import Index
-from mechgraph.model.row_parts import Component
+from mechgraph.pairs.factors import Component
 from mechgraph.structure.components import Components
 from mechgraph.structure.reaction_split import UNIQUE
 

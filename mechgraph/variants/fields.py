@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from mechgraph.algebra.inertia import physical
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
+from mechgraph.fields import PerCase
 from mechgraph.model.chain import chain_numbers, markers_of_chain
-from mechgraph.model.load_base import Load
+from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.numeric import PerCase
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.parameters import Declared, coupling_places, declared
 from mechgraph.quantities import is_numeric

@@ -18,13 +18,11 @@ from typing import Any
 import numpy as np
 
 from mechgraph.errors import did_you_mean, near_names
+from mechgraph.fields import POINT, Described, FieldFormat
 from mechgraph.model.chain import NUMBERS_OF_CHAIN, chain_numbers
-from mechgraph.model.coupling import BaseCoupling
-from mechgraph.model.field_format import Described, FieldFormat
-from mechgraph.model.field_kinds import POINT
-from mechgraph.model.link import Link
+from mechgraph.model.couplings import BaseCoupling
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair import Marker, Pair
+from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.model.parameters import Declared, coupling_places
 from mechgraph.quantities import is_numeric
 

@@ -15,7 +15,7 @@ import numpy as np
 
 import mechgraph as mg
 from mechgraph.model.chain import chain_symbols
-from mechgraph.model.library import library_path
+from mechgraph.model.toml import library_path
 from mechgraph.modes import store
 from mechgraph.modes.bounds import bound
 from mechgraph.modes.groups import groups_of

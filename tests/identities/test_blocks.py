@@ -9,8 +9,8 @@ import mechgraph as mg
 from mechgraph.closure import driver_path
 from mechgraph.closure.assembly import assembled
 from mechgraph.closure.configuration import Configuration
-from mechgraph.model import pair_kinematics as evaluation
 from mechgraph.numerics.continuation import Follower
+from mechgraph.pairs import kinematics as evaluation
 
 POSITIONS = 29
 

@@ -19,8 +19,8 @@ from mechgraph.closure.assembly import close, scaled_system
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import System, indexed
 from mechgraph.closure.one_state import FEW_NODES, OneState
-from mechgraph.model.factors import Factor
-from mechgraph.model.library import library_names, library_path
+from mechgraph.model.toml import library_names, library_path
+from mechgraph.pairs.factors import Factor
 
 STEP = 1e-30
 SYMBOLS = [symbol for symbol in mg.pair_types() if symbol != "W"]

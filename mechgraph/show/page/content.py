@@ -14,8 +14,8 @@ from mechgraph.closure.indexing import Index
 from mechgraph.document.tree import plain
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
-from mechgraph.model.row_parts import Component
 from mechgraph.numerics.tolerances import MOTIONS
+from mechgraph.pairs.factors import Component
 from mechgraph.report.facts import Geometry
 from mechgraph.report.findings import component_words
 from mechgraph.report.report import DeterminacyReport, check

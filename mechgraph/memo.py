@@ -1,10 +1,10 @@
-"""What is worked out of a declared thing once and kept with it."""
+"""What is worked out of a thing that does not change once and kept with it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
 Made = TypeVar("Made")
 
@@ -33,3 +33,20 @@ class Once:
     @cached_property
     def _kept(self) -> dict[Callable[..., Any], Any]:
         return {}
+
+
+Value = TypeVar("Value")
+
+
+class kept(Generic[Value]):
+    """A ``cached_property`` without its lock, which takes longer than the arithmetic of one position."""
+
+    def __init__(self, make: Callable[[Any], Value]) -> None:
+        self.make, self.__doc__ = make, make.__doc__
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    def __get__(self, instance: Any, owner: type) -> Value:
+        value = instance.__dict__[self.name] = self.make(instance)
+        return value

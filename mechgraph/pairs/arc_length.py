@@ -19,9 +19,8 @@ import numpy as np
 import scipy
 
 from mechgraph.algebra.se3 import Array, Library, by_components, cross
-from mechgraph.model.curves import CLOSED_GAP, ORDERS, Curve
-from mechgraph.model.numeric import second_direction
-from mechgraph.model.pieces import Pieces, hermite
+from mechgraph.fields import second_direction
+from mechgraph.pairs.curves import CLOSED_GAP, ORDERS, Curve, Pieces, hermite
 from mechgraph.quantities import shown
 
 STRAIGHT, IN_PLANE = 1e-9, 1e-9

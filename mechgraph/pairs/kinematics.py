@@ -26,8 +26,7 @@ from mechgraph.algebra.se3 import (
     turn_tangent,
     turned,
 )
-from mechgraph.model.factors import Factor
-from mechgraph.model.row_parts import Component, Freedom
+from mechgraph.pairs.factors import Component, Factor, Freedom
 
 
 class Row(Protocol):

@@ -1,21 +1,136 @@
-"""The shapes of cams from the laws of their followers, which slide or swing."""
+"""Curves of which a user gives the shape: points to pass, a function, the law of a cam's follower; and the table of all."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
+import scipy
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.errors import DeclarationError
-from mechgraph.model.curves import INTERVALS, ORDERS, WHOLE_TURN, Centred
-from mechgraph.model.field_kinds import FLAG, NUMBER, POSITIVE, SAMPLES, TEXT
-from mechgraph.model.pieces import Pieces, derivatives, parted
+from mechgraph.errors import DeclarationError, ShapeError
+from mechgraph.fields import BREAKS, FLAG, FUNCTION, INTERVAL, NUMBER, POINT_LIST, POSITIVE, SAMPLES, TEXT
+from mechgraph.pairs.curves import (
+    CLOSED_GAP,
+    INTERVALS,
+    ORDERS,
+    WHOLE_TURN,
+    Centred,
+    Circle,
+    Curve,
+    Ellipse,
+    Helix,
+    Involute,
+    Line,
+    Pieces,
+    derivatives,
+    parted,
+)
 from mechgraph.quantities import wrong
 from mechgraph.units import LENGTH
+
+PARAMETERS = "uv"
+"""What the parameters are called in messages."""
+BESIDE = 0.5 * (3.0 - np.sqrt(5.0))
+"""Where in an interval slopes are taken, a part of it that is no ratio of whole numbers, as places where a shape changes are."""
+SLOPE_STEPS, SLOPE_ERROR = (1e-4, 1e-5, 1e-6), 1e-3
+"""Parts of the range over which a slope is taken, and part of the size by which a derivative may differ from it."""
+
+
+def asked(function: Callable[..., Any], at: Sequence[Array], least: int, most: int) -> Array:
+    """Position and derivatives ``(most, 3, n)`` at parameters ``(n,)`` each; zeros for those that may be left out, beyond ``least``.
+
+    Raises
+    ------
+    ShapeError
+        where the function raises (its cause), or returns anything but ``least`` or more finite arrays ``(3, n)``.
+    """
+    if not at[0].size:  # as where all positions are interpolated beside a change point; what reduces nothing raises
+        return np.zeros((most, 3, 0))
+    found = _asked(function, at, least, most)
+    if isinstance(found, np.ndarray):
+        return found
+    first = next((i for i in range(at[0].size) if not _fits(function, [u[i : i + 1] for u in at], least, most)), None)
+    where = "; each of the values alone does" if first is None else f" at {_named([u[first] for u in at])}"
+    text, cause = found
+    raise ShapeError(f"position: {text}{where}") from cause
+
+
+def _asked(
+    function: Callable[..., Any], at: Sequence[Array], least: int, most: int
+) -> Array | tuple[str, Exception | None]:
+    """The arrays, or what is wrong with them and what was raised."""
+    shape = (3, at[0].size)
+    try:
+        given = list(function(*at))[:most]
+        parts = [np.asarray(part, dtype=float) for part in given]
+    except Exception as error:
+        return f"raised {type(error).__name__}: {error}", error
+    wrong = next((part.shape for part in parts if part.shape not in (shape, (3, 1))), None)
+    if wrong is not None or len(parts) < least:
+        got = f"{len(parts)} arrays" if wrong is None else f"an array {wrong}"
+        return f"returned {got}, expected {least} arrays (3, n), here {shape}", None
+    out = np.zeros((most, *shape))
+    for own, part in zip(out, parts, strict=False):
+        own[:] = part
+    return out if np.isfinite(out).all() else ("returned a number that is not finite", None)
+
+
+def _fits(function: Callable[..., Any], at: Sequence[Array], least: int, most: int) -> bool:
+    return isinstance(_asked(function, at, least, most), np.ndarray)
+
+
+def _named(values: Sequence[float]) -> str:
+    return ", ".join(f"{name} = {value:.6g}" for name, value in zip(PARAMETERS, values, strict=False))
+
+
+def inner(ends: tuple[float, float]) -> Array:
+    """A few simple parameters in a range, at which a function is asked first."""
+    return np.linspace(*ends, 7)[1:-1]
+
+
+def between(grid: Array) -> Array:
+    """Parameters ``(n,)`` in the intervals of a grid ``(n + 1,)`` at which slopes are taken."""
+    return np.asarray(grid[:-1] + BESIDE * np.diff(grid))
+
+
+def slope_faults(
+    ask: Callable[..., Array],
+    at: Sequence[Array],
+    steps: Sequence[tuple[int, int, int]],
+    words: Sequence[str],
+    where: str,
+    room: Array | float = np.inf,
+) -> list[str]:
+    """Derivatives that are not the slopes of what they belong to.
+
+    ``at``: parameters ``(n,)`` each, as from ``between``; of ``steps`` each is a derivative, what it is derived from, and the parameter by
+    which: numbers of what ``ask`` returns ``(orders, 3, n)``, called as in ``words``. Slopes are taken over shorter and shorter steps,
+    none longer than the ``room``: that over one of them fits a true derivative, however fast it changes.
+    """
+    found, known = [], ask(*at)
+    for high, low, by in steps:
+        extent = float(np.ptp(at[by]))
+        most = SLOPE_ERROR * np.abs(known[[low, high]]).max() / min(1.0, extent)
+        miss = np.full(at[by].shape, np.inf)
+        for part in SLOPE_STEPS:
+            h = np.minimum(part * extent, room)
+            ahead, back = (ask(*(u + sign * h * (i == by) for i, u in enumerate(at)))[low] for sign in (1.0, -1.0))
+            miss = np.minimum(miss, np.abs((ahead - back) / (2 * h) - known[high]).max(axis=0))
+            if miss.max() <= most:
+                break
+        else:
+            worst = int(np.argmax(miss))
+            at_worst = _named([u[worst] for u in at])
+            found.append(
+                f"{where}position: {words[high]} differs from the slope of {words[low]} by {miss[worst]:.3g} at {at_worst}"
+            )
+    return found
+
 
 FEW_DIGITS = 2e-3
 """Part of its range by which a law may stray from its rates: samples are rounded to few digits."""
@@ -239,3 +354,131 @@ class ArmCam(OfLaw):
                 f"and pivot at {-np.arccos(self._cosine):.6g} or {np.pi - np.arccos(self._cosine):.6g}"
             )
         return found
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Through(Curve):
+    """The curve through points: a spline of degree 5 (3 through fewer than six points) over the lengths of the chords."""
+
+    kind = "points"
+    points: Annotated[Any, POINT_LIST("points passed, in order", LENGTH)]
+    closed: Annotated[
+        bool, FLAG("whether it returns to the first point, with the direction and curvature that it has there")
+    ] = False
+
+    @cached_property
+    def _spline(self) -> Pieces:
+        given = np.array(self.points)
+        if self.closed and np.linalg.norm(given[-1] - given[0]) > CLOSED_GAP * np.ptp(given, axis=0).max():
+            given = np.concatenate([given, given[:1]])
+        elif self.closed:
+            given[-1] = given[0]
+        lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(given, axis=0), axis=1))])
+        degree = 5 if len(given) > 5 else 3
+        ends: Any = "periodic" if self.closed else None
+        made: Any = scipy.interpolate.make_interp_spline(lengths, given, degree, bc_type=ends)
+        breaks = np.unique(np.clip(made.t, lengths[0], lengths[-1]))
+        terms = [made.derivative(k)(breaks[:-1]) / math.factorial(k) for k in range(degree, 0, -1)]
+        return Pieces(breaks, np.stack([*terms, made(breaks[:-1])]), ORDERS)
+
+    def at(self, u: Array) -> Array:
+        """The spline."""
+        return self._spline.at(u)
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Zero, and the length of all chords."""
+        return float(self._spline.breaks[0]), float(self._spline.breaks[-1])
+
+    @property
+    def is_closed(self) -> bool:
+        """As declared."""
+        return self.closed
+
+    @property
+    def nodes(self) -> Array:
+        """Parts of the pieces of the spline."""
+        return parted(self._spline.breaks, max(8, 400 // len(self._spline.breaks)))
+
+    def faults(self, where: str) -> list[str]:
+        """Points that make no curve."""
+        found = super().faults(where)
+        if found:
+            return found
+        gaps = np.linalg.norm(np.diff(np.array(self.points), axis=0), axis=1)
+        if len(self.points) < 4:
+            return [f"{where}points: {len(self.points)} given; a curve with a continuous curvature takes 4 or more"]
+        same = np.flatnonzero(gaps <= 1e-12 * gaps.max())
+        return [f"{where}points: points {i} and {i + 1} are the same; leave one out" for i in same.tolist()]
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Function(Curve):
+    """A curve ``x(u)`` by a function: position and first three derivatives (four, to be exact) at ``u (n,)``, ``(3, n)`` each.
+
+    Where it is in pieces, ``breaks`` names the parameters between them, at which a derivative jumps.
+    """
+
+    kind = "function"
+    position: Annotated[Any, FUNCTION("u -> (x, x', x'', x'''), each (3, n)")]
+    ends_at: Annotated[Any, INTERVAL("least and greatest u")]
+    closed: Annotated[bool, FLAG("whether it returns to where it begins")] = False
+    breaks: Annotated[Any, BREAKS("parameters between its pieces", default="none")] = ()
+
+    @property
+    def nodes(self) -> Array:
+        """Parts of its pieces."""
+        begin, end = self.ends
+        pieces = np.array([begin, *np.atleast_1d(self.breaks), end])
+        parts = np.ceil(INTERVALS * np.diff(pieces) / (end - begin)).astype(int) + 1
+        return np.unique(np.concatenate([*map(np.linspace, pieces[:-1], pieces[1:], parts)]))
+
+    def at(self, u: Array) -> Array:
+        """What the function returns; beyond the ends, and for complex ``u``, by Taylor's series."""
+        inside = np.clip(u.real, *self.ends)
+        known = asked(self.position, [inside.ravel()], ORDERS, ORDERS + 1).reshape(ORDERS + 1, 3, *u.shape)
+        beyond = u - inside
+        if not np.any(beyond):
+            return known[:-1]
+        out = known[:-1] + beyond * known[1:]
+        for order in range(2, ORDERS + 1):
+            out[: ORDERS + 1 - order] += beyond**order / math.factorial(order) * known[order:]
+        return np.asarray(out)
+
+    @cached_property
+    def orders(self) -> int:
+        """As many as it returns."""
+        return len(list(self.position(np.array([self.ends[0]]))))
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """As declared."""
+        begin, end = self.ends_at
+        return begin, end
+
+    @property
+    def is_closed(self) -> bool:
+        """As declared."""
+        return self.closed
+
+    def faults(self, where: str) -> list[str]:
+        """A function that does not do, or whose derivatives are not those of its positions."""
+        found = super().faults(where)
+        if found:
+            return found
+        within = [self.ends[0], *np.atleast_1d(self.breaks), self.ends[1]]
+        if not (np.diff(within) > 0).all():
+            return [wrong(self.breaks, f"{where}breaks", f"rising numbers between {within[0]:g} and {within[-1]:g}")]
+        self.at(inner(self.ends))
+        steps = [(order + 1, order, 0) for order in range(ORDERS - 1)]
+        words = ("position", "derivative 1", "derivative 2", "derivative 3")
+        return slope_faults(self.at, [between(self.grid)], steps, words, where, BESIDE * np.diff(self.grid))
+
+
+CURVES: dict[str, type[Curve]] = {
+    kind.kind: kind for kind in (Line, Circle, Ellipse, Helix, Involute, Through, Function, Cam, ArmCam)
+}
+"""Curves by the names that they have in files."""
+Curve.line, Curve.circle, Curve.ellipse, Curve.helix = Line, Circle, Ellipse, Helix
+Curve.involute, Curve.through, Curve.function = Involute, Through, Function
+Curve.cam, Curve.arm_cam = Cam, ArmCam

@@ -1,0 +1,603 @@
+"""What the fields of a declaration hold, stated once, in the annotations of the dataclasses.
+
+    mass: Annotated[float, NUMBER("mass", MASS, minimum=0.0)] = 0.0
+
+Reading and checking a value, the TOML file, its JSON Schema, the tables of the library's README, the conversion of units, rigid motions
+of the whole mechanism and the names of numbers in studies all follow from it. Numbers are kept as floats and tuples of floats.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from functools import lru_cache, partial
+from types import MappingProxyType
+from typing import Any, ClassVar, Self, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechgraph.algebra.se3 import Array
+from mechgraph.errors import DeclarationError
+from mechgraph.quantities import all_floats, has_quantity, is_numeric, real_array, shown, without_units, wrong
+from mechgraph.units import LENGTH, PURE, Dimension, factor_of, symbol_of
+
+PARALLEL_COSINE = 1 - 1e-12
+"""Cosine above which a second direction is parallel to the axis."""
+MOST_TOL = 0.1
+"""Largest tolerance: beyond, a change is no rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class PerCase:
+    """One number or vector for each of many variants, ``(cases, ...)``: what stands in a load that varies."""
+
+    values: NDArray[np.float64]
+
+
+def plain(value: Any) -> Any:
+    """Numbers, sequences and arrays as floats and nested tuples; what is no number is kept unchanged."""
+    kind = type(value)
+    if value is None or kind is float or kind is str or (kind is tuple and all_floats(value)) or callable(value):
+        return value
+    array = real_array(value)
+    return value if array is None else _as_tuples(array.tolist(), array.ndim)
+
+
+def _as_tuples(value: Any, depth: int) -> Any:
+    if depth < 3:
+        return tuple(map(tuple, value)) if depth == 2 else tuple(value) if depth else value
+    return tuple([_as_tuples(v, depth - 1) for v in value])
+
+
+def filled_second(axis: Any) -> tuple[float, ...] | None:
+    """What fills ``second`` where it is left out, of an axis as ``plain`` gives it; None where that is no direction."""
+    try:
+        return _filled(axis)
+    except TypeError:  # what has no hash is no tuple of numbers
+        return None
+
+
+@lru_cache
+def _filled(axis: Any) -> tuple[float, ...] | None:
+    return second_direction(axis) if is_numeric(axis, (3,)) else None
+
+
+def second_direction(axis: Any) -> tuple[float, ...]:
+    """The global axis least aligned with ``axis``, made perpendicular to it: what fills ``second`` where it is left out."""
+    length = math.hypot(*axis)
+    if not length > 0:
+        return (1.0, 0.0, 0.0)
+    z = [c / length for c in axis]
+    sizes = [abs(c) for c in z]
+    least = sizes.index(min(sizes))
+    along = z[least]
+    x = [0.0 - along * c for c in z]
+    x[least] = 1.0 - along * along
+    size = math.hypot(*x)
+    return x[0] / size, x[1] / size, x[2] / size
+
+
+def vector_fault(value: Any, what: str, *, direction: bool = False) -> str | None:
+    """The fault of a vector of three numbers, or None; a direction must not be zero."""
+    if not is_numeric(value, (3,)):
+        return wrong(value, what, "three finite numbers")
+    if direction and not math.hypot(*value) > 1e-12:
+        return f"{what} = {value!r}: has length 0; give a direction, e.g. (0, 0, 1)"
+    return None
+
+
+def cosine(one: Sequence[float], other: Sequence[float]) -> float:
+    """Of the angle between two directions."""
+    along = sum(a * b for a, b in zip(one, other, strict=True))
+    return along / (math.hypot(*one) * math.hypot(*other))
+
+
+def parallel_faults(axis: Sequence[float], second: Sequence[float], where: str) -> list[str]:
+    """A second direction that has no part at right angles to its axis, one line or none."""
+    if abs(cosine(axis, second)) <= PARALLEL_COSINE:
+        return []
+    return [f"{where}second = {second!r}: parallel to the axis {axis!r}; give another direction"]
+
+
+def number_fault(value: Any, what: str, *, minimum: float | None = None) -> str | None:
+    """The fault of one number, or None."""
+    if not is_numeric(value, ()):
+        return wrong(value, what, "a finite number")
+    if minimum is not None and float(value) < minimum:
+        return f"{what} = {value!r}: expected a number not below {minimum:g}"
+    return None
+
+
+def sound_tol(tol: Any) -> float:
+    """A tolerance of a whole mechanism as far as it is one, else 0."""
+    return float(tol) if tol is not None and tolerance_fault(tol) is None else 0.0
+
+
+def tolerance_fault(tol: Any) -> str | None:
+    """The fault of a tolerance of a whole mechanism, or None."""
+    good = is_numeric(tol, ()) and 0 < tol <= MOST_TOL
+    return None if good else wrong(tol, "tol", f"radians and lengths / L, above 0 and at most {MOST_TOL:g}")
+
+
+def same(a: Any, b: Any) -> bool:
+    """Equality that also holds for arrays."""
+    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
+        return np.shape(a) == np.shape(b) and bool(np.array_equal(np.asarray(a), np.asarray(b)))
+    return bool(a == b)
+
+
+def same_fields(a: Any, b: Any) -> bool:
+    """Field by field equality of two dataclasses of one type, arrays included."""
+    return type(a) is type(b) and all(same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a) if f.compare)
+
+
+XYZ = "xyz"
+Schema = Mapping[str, Any]
+STANDS_AS = {str: "a text", bool: "true or false", dict: "a table"}
+"""How the types of values are called in messages."""
+NEEDED = object()
+"""What stands for the default of a field that must not be left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Kind:
+    """A kind of value.
+
+    ``words`` name it in tables, ``schema`` is its JSON Schema, ``stands_as`` the type of a value in a file where a reader can tell
+    (None: the constructor tells); ``shape`` that of a number, vector or tensor (None for all else); ``fault(value, what, minimum)``
+    says what is wrong with a value; ``moved(value, pose)`` is the value after a rigid motion ``(3, 4)`` of the whole mechanism; ``names``
+    are those of the components where they are not x, y, z; ``entry`` is the kind of one entry of a list.
+    """
+
+    words: str
+    schema: Schema
+    stands_as: type | None = None
+    shape: tuple[int, ...] | None = None
+    numeric: bool = False
+    fault: Callable[[Any, str, float | None], str | None] | None = None
+    moved: Callable[[Any, Array], Any] | None = None
+    names: tuple[str, ...] = ()
+    entry: Kind | None = None
+
+    def __call__(
+        self, meaning: str, dimension: Dimension = PURE, turn: Dimension | None = None, **more: Any
+    ) -> FieldFormat:
+        """A field of this kind; ``dimension`` is that for a slide where ``turn``, that for a turn, is given too."""
+        return FieldFormat(self, meaning, dimension, dimension if turn is None else turn, **more)
+
+    def components(self) -> Mapping[str, tuple[tuple[int, ...], ...]]:
+        """Names of the components as studies spell them, and the places of each in the array; a number has one, named ``""``."""
+        if self.shape == ():
+            return {"": ((),)}
+        if self.shape is not None and len(self.shape) == 1:
+            return {name: ((i,),) for i, name in enumerate(self.names or XYZ)}
+        if self.shape == (3, 3):
+            places = {a + b: [(i, j), (j, i)] for i, a in enumerate(XYZ) for j, b in enumerate(XYZ)}
+            return {name: tuple(dict.fromkeys(both)) for name, both in places.items()}
+        return {}
+
+
+@dataclass(frozen=True)
+class FieldFormat:
+    """One field: its kind, its meaning in a sentence, and its dimension (``slide`` and ``turn`` differ where a freedom decides).
+
+    ``degrees``: may be given in degrees under its name with ``_deg`` added; ``minimum``: smallest number; ``choices``: the texts
+    allowed; ``of``: of the name of a point, the field that names its link; ``key``: its name in files where it is another; ``table``:
+    the table of the file that it holds; ``single``: of the name of a freedom, whether it must not be part of a rotation; ``default``:
+    in words, where the value does not say it; ``held_in``: the array of ``Declared`` that holds the number, and the factor, where the
+    array has another name than the field; ``rules``: more of its schema.
+    """
+
+    kind: Kind
+    meaning: str
+    slide: Dimension = PURE
+    turn: Dimension = PURE
+    degrees: bool = False
+    minimum: float | None = None
+    choices: tuple[str, ...] = ()
+    of: str = ""
+    key: str = ""
+    table: str = ""
+    single: bool = True
+    default: str = ""
+    held_in: tuple[str, float] | None = None
+    rules: Schema = field(default_factory=dict)
+
+    @property
+    def unit(self) -> str:
+        """The unit in letters, ``M L²``, ``rad or L``."""
+        if self.kind.stands_as is not None:
+            return ""
+        both = (symbol_of(self.turn) or "rad", symbol_of(self.slide) or "rad")
+        if self.slide != self.turn:
+            return " or ".join(both).replace("1/", "rad/")
+        return both[0] if self.degrees or self.slide != PURE else ""
+
+    @property
+    def told(self) -> str:
+        """The field in a line of a docstring."""
+        kind = " or ".join(map(repr, self.choices)) or self.kind.words
+        default = f" (left out: {self.default})" if self.default else ""
+        return f"{kind}{self.unit and f' [{self.unit}]'}; {self.meaning}{default}."
+
+    def fault(self, value: Any, what: str) -> str | None:
+        """What is wrong with a value, or None."""
+        if self.choices and not (isinstance(value, str) and value in self.choices):
+            return wrong(value, what, " or ".join(map(repr, self.choices)))
+        stands_as = self.kind.stands_as
+        if stands_as in STANDS_AS and not isinstance(value, stands_as):
+            return wrong(value, what, STANDS_AS[stands_as])
+        return None if self.kind.fault is None else self.kind.fault(value, what, self.minimum)
+
+
+class _Signature:
+    """The signature of a class with fields as ``help`` shows it: what they hold stands in the docstring."""
+
+    def __get__(self, instance: object, cls: type) -> inspect.Signature:
+        every = list(inspect.signature(inspect.getattr_static(cls, "__init__")).parameters.values())[1:]
+        return inspect.Signature([one.replace(annotation=inspect.Parameter.empty) for one in every])
+
+
+class Formatted:
+    """A dataclass whose annotations say what its fields hold (``FieldFormat``)."""
+
+    __signature__ = _Signature()
+    formats: ClassVar[Mapping[str, FieldFormat]] = {}
+    """What the fields hold, by their names."""
+    _numeric: ClassVar[tuple[str, ...]] = ()
+    _defaults: ClassVar[tuple[Any, ...]] = ()
+
+    def __init_subclass__(cls) -> None:
+        if cls.__repr__ is Formatted.__repr__:
+            cls.__repr__ = Formatted.__repr__  # type: ignore[method-assign]  # dataclass leaves alone what stands in the class itself
+        hints = get_type_hints(cls, include_extras=True)
+        found = {name: getattr(hint, "__metadata__", (None,))[0] for name, hint in hints.items()}
+        cls.formats = {name: about for name, about in found.items() if isinstance(about, FieldFormat)}
+        cls._numeric = tuple(name for name, about in cls.formats.items() if about.kind.numeric)
+        cls._defaults = tuple(getattr(cls, name, NEEDED) for name in cls.formats)
+        if cls.__doc__ and cls.formats and "Parameters\n" not in cls.__doc__:
+            told = [f"    {name} : {about.told}" for name, about in cls.formats.items()]
+            cls.__doc__ = "\n".join([cls.__doc__.rstrip(), "", "    Parameters", "    ----------", *told, "    "])
+
+    def __repr__(self) -> str:
+        """The fields that differ from what they are where they are left out."""
+        given = {name: getattr(self, name) for name in self.formats}
+        told = [
+            f"{name}={dict(value) if isinstance(value, Mapping) else repr(value) if isinstance(value, Formatted) else shown(value)}"
+            for name, value in given.items()
+            if not is_default(type(self), name, value)
+        ]
+        return f"{type(self).__name__}({', '.join(told)})"
+
+
+def is_default(cls: type, name: str, value: Any) -> bool:
+    """Whether a value says nothing: that of a field that was left out, or an empty table."""
+    default = getattr(cls, name, NEEDED)
+    return (
+        value is default
+        or (isinstance(value, bool | float | str | tuple) and value == default)
+        or (isinstance(value, Mapping) and not value)
+    )
+
+
+class Described(Formatted):
+    """A declared thing whose numbers are read, checked, moved and converted by what its fields hold."""
+
+    def read_numbers(self) -> None:
+        """Turn what the numeric fields hold into floats and tuples of floats; to be called where the fields are set."""
+        for name in self._numeric:
+            value = getattr(self, name)
+            if value is not None and type(value) is not float:
+                object.__setattr__(self, name, on_each(plain, value))
+
+    def value_faults(self, where: str) -> list[str]:
+        """What is wrong with the values alone; None is no fault where the field may be left out."""
+        faults = []
+        for (name, about), default in zip(self.formats.items(), self._defaults, strict=True):
+            value = getattr(self, name)
+            if value is not None or default is not None:
+                faults.append(about.fault(value, where + name))
+        return [fault for fault in faults if fault]
+
+    def replace(self, **changes: Any) -> Self:
+        """A copy with fields changed."""
+        return type(self)(**{**{name: getattr(self, name) for name in self.formats}, **changes})
+
+    def moved(self, pose: Array) -> Self:
+        """The same after a rigid motion ``(3, 4)`` of the whole mechanism; itself where nothing in it has a place or direction."""
+        changes = {}
+        for name, about in self.formats.items():
+            value = getattr(self, name)
+            if isinstance(value, Described):
+                changes[name] = value.moved(pose)
+            elif value is not None and about.kind.moved is not None:
+                changes[name] = about.kind.moved(value, pose)
+        return self.replace(**changes) if changes else self
+
+    def without_quantities(self, units: Mapping[str, str], turns: bool = False) -> Self:
+        """The same with quantities of pint as plain numbers in these units; those that do not fit stay, and are faults.
+
+        ``turns``: whether the freedom that it names is a turn.
+        """
+        changes = {}
+        for name, about in self.formats.items():
+            value = getattr(self, name)
+            if isinstance(value, Described):
+                changes[name] = value.without_quantities(units, turns)
+            elif about.kind.numeric and has_quantity(value):
+                changes[name] = without_units(value, about.turn if turns else about.slide, units)
+        return self.replace(**changes) if changes else self
+
+    def in_units(self, base: tuple[float, float, float], turns: bool = False) -> Self:
+        """The same with every number times ``prod_i base_i^dimension_i``; ``turns``: whether the freedom that it names is a turn.
+
+        ``base (3,)`` are the factors of lengths, masses and times. A callable is refused (DeclarationError).
+        """
+        changes = {}
+        for name, about in self.formats.items():
+            value = getattr(self, name)
+            if isinstance(value, Described):
+                changes[name] = value.in_units(base, turns)
+            elif callable(value):
+                what = f"{name} of a {type(self).__name__}"
+                raise DeclarationError("to_units", [f"{what} is a callable; convert it yourself, or sample it first"])
+            elif value is not None and about.kind.numeric:
+                factor = factor_of(about.turn if turns else about.slide, base)
+                if factor != 1.0 and not isinstance(value, str):
+                    changes[name] = on_each(partial(_times, factor), value)
+        return self.replace(**changes) if changes else self
+
+
+def on_each(change: Callable[[Any], Any], value: Any) -> Any:
+    """A changed value; of a table of values each, read-only."""
+    if type(value) not in (tuple, np.ndarray) and isinstance(value, Mapping):  # asked last, as it takes long
+        return MappingProxyType({name: change(item) for name, item in value.items()})
+    return change(value)
+
+
+def _times(factor: float, value: Any) -> Any:
+    return plain(np.asarray(value) * factor)
+
+
+@dataclass(frozen=True)
+class MovedFunction:
+    """A callable value of a load, carried along by a rigid motion of the whole mechanism."""
+
+    function: Callable[..., Any]
+    pose: tuple[tuple[float, ...], ...]
+
+    def __call__(self, pose: Array, twist: Array, t: Any) -> Array:
+        """The value, asked for in the coordinates before the motion and turned into those after it."""
+        G = np.asarray(self.pose)
+        R, back = G[:3, :3], np.linalg.inv(G)
+        w, v = twist[..., :3], twist[..., 3:]
+        p = back[:3, 3]
+        local = np.concatenate([w @ R, v @ R + np.cross(p, w @ R)], axis=-1)
+        return np.asarray(self.function(back @ pose @ G, local, t)) @ R.T
+
+
+def _moved_point(value: Any, pose: Array) -> Any:
+    if isinstance(value, str):
+        return value
+    return on_each(lambda p: plain(pose[:, :3] @ np.asarray(p) + pose[:, 3]), value)
+
+
+def _turned(value: Any, pose: Array) -> Any:
+    if callable(value):
+        return MovedFunction(value, plain(np.vstack([pose, (0.0, 0.0, 0.0, 1.0)])))
+    return plain(np.asarray(value) @ pose[:, :3].T)
+
+
+def _turned_tensor(value: Any, pose: Array) -> Any:
+    A = pose[:, :3] @ np.asarray(value) @ pose[:, :3].T
+    return plain((A + A.T) / 2)
+
+
+def _series_fault(width: int) -> Callable[[Any, str, float | None], str | None]:
+    """The check of a number or vector that may be an array over positions or a callable."""
+    wanted = "a finite number" if width == 1 else f"{width} finite numbers"
+
+    def fault(value: Any, what: str, minimum: float | None) -> str | None:
+        if callable(value):
+            return None
+        array = real_array(value)
+        if array is not None and np.isfinite(array).all() and (width == 1 or array.shape[-1:] == (width,)):
+            return None
+        return wrong(value, what, f"{wanted}, an array of them over positions, or a callable (pose, twist, t)")
+
+    return fault
+
+
+def _samples_fault(value: Any, what: str, minimum: float | None) -> str | None:
+    array = real_array(value)
+    good = array is not None and is_numeric(array, array.shape)
+    return None if good else wrong(value, what, "finite numbers")
+
+
+def _rising_fault(value: Any, what: str, minimum: float | None) -> str | None:
+    array = real_array(value)
+    rises = (
+        array is not None
+        and array.ndim <= 1
+        and is_numeric(array, array.shape)
+        and (np.diff(np.ravel(array)) > 0).all()
+    )
+    return None if rises else wrong(value, what, "finite numbers that rise")
+
+
+def _tensor_fault(value: Any, what: str, minimum: float | None) -> str | None:
+    return None if is_numeric(value, (3, 3)) else wrong(value, what, "a 3 x 3 tensor of finite numbers")
+
+
+def _positive_fault(
+    shape: tuple[int, ...], words: str, whole: bool = False
+) -> Callable[[Any, str, float | None], str | None]:
+    def fault(value: Any, what: str, minimum: float | None) -> str | None:
+        good = is_numeric(value, shape) and np.min(value) > 0 and not (whole and np.any(np.mod(value, 1)))
+        return None if good else wrong(value, what, f"{words} above 0")
+
+    return fault
+
+
+def _whole_fault(value: Any, what: str, minimum: float | None) -> str | None:
+    good = isinstance(value, int | np.integer) and not isinstance(value, bool) and value >= 0
+    return None if good else wrong(value, what, "a whole number, 0 or more")
+
+
+def _two_fault(value: Any, what: str, minimum: float | None) -> str | None:
+    return None if is_numeric(value, (2,)) else wrong(value, what, "two finite numbers")
+
+
+def _vector_fault(value: Any, what: str, minimum: float | None) -> str | None:
+    return vector_fault(value, what)
+
+
+def _named_point_fault(value: Any, what: str, minimum: float | None) -> str | None:
+    if isinstance(value, str) or is_numeric(value, (3,)):
+        return None
+    return wrong(value, what, "three finite numbers, or the name of a point of the link")
+
+
+def _points_fault(value: Any, what: str, minimum: float | None) -> str | None:
+    if not isinstance(value, Mapping):
+        return wrong(value, what, "a table name -> (x, y, z)")
+    for name, point in value.items():
+        if not isinstance(name, str) or not name:
+            return wrong(name, f"{what}: name", "a text")
+        fault = vector_fault(point, f"{what}: {name}")
+        if fault:
+            return fault
+    return None
+
+
+def _interval_fault(value: Any, what: str, minimum: float | None) -> str | None:
+    return (
+        None
+        if is_numeric(value, (2,)) and value[0] < value[1]
+        else wrong(value, what, "two finite numbers, the second above the first")
+    )
+
+
+def _point_list_fault(value: Any, what: str, minimum: float | None) -> str | None:
+    array = real_array(value)
+    good = array is not None and array.ndim == 2 and array.shape[1] == 3 and is_numeric(value, array.shape)
+    return None if good else wrong(value, what, "points of three finite numbers each")
+
+
+def _moved_points(value: Any, pose: Array) -> Any:
+    return plain(np.asarray(value) @ pose[:, :3].T + pose[:, 3])
+
+
+def _function_fault(value: Any, what: str, minimum: float | None) -> str | None:
+    return None if callable(value) else wrong(value, what, "a function")
+
+
+@dataclass(frozen=True)
+class MovedShape:
+    """A function that returns a position and its derivatives ``(3, n)``, carried along by a rigid motion of the whole mechanism."""
+
+    function: Callable[..., Any]
+    pose: tuple[tuple[float, ...], ...]
+
+    def __call__(self, *parameters: Array) -> list[Array]:
+        """Position and derivatives after the motion."""
+        G = np.asarray(self.pose)
+        parts = [G[:, :3] @ np.asarray(part) for part in self.function(*parameters)]
+        parts[0] = parts[0] + G[:, 3:]
+        return parts
+
+
+_VECTOR: Schema = {"$ref": "#/$defs/vector"}
+TEXT = Kind("text", {"type": "string"}, str)
+LINK_NAME = Kind("text", {"type": "string"}, str)
+FREEDOM_NAME = Kind("text", {"type": "string"}, str)
+FLAG = Kind("true/false", {"type": "boolean"}, bool)
+INTEGER = Kind("integer", {"type": "integer", "minimum": 0}, fault=_whole_fault)
+NUMBER = Kind(
+    "number", {"type": "number"}, None, (), True, lambda value, what, least: number_fault(value, what, minimum=least)
+)
+POINT = Kind("3 numbers", _VECTOR, None, (3,), True, _vector_fault, _moved_point)
+NAMED_POINT = Kind(
+    "3 numbers or a name",
+    {"anyOf": [_VECTOR, {"type": "string", "minLength": 1}]},
+    None,
+    (3,),
+    True,
+    _named_point_fault,
+    _moved_point,
+)
+POINTS = Kind(
+    "table of 3 numbers",
+    {"type": "object", "additionalProperties": _VECTOR},
+    None,
+    None,
+    True,
+    _points_fault,
+    _moved_point,
+)
+VECTOR = Kind("3 numbers", _VECTOR, None, (3,), True, _vector_fault, _turned)
+DIRECTION = Kind(
+    "3 numbers", _VECTOR, None, (3,), True, lambda value, what, _: vector_fault(value, what, direction=True), _turned
+)
+TENSOR = Kind(
+    "3 × 3",
+    {"type": "array", "items": _VECTOR, "minItems": 3, "maxItems": 3},
+    None,
+    (3, 3),
+    True,
+    _tensor_fault,
+    _turned_tensor,
+)
+SIX = Kind("6 numbers", {"$ref": "#/$defs/six"})
+SERIES = Kind("number(s)", {"$ref": "#/$defs/series"}, None, (), True, _series_fault(1))
+VECTOR_SERIES = Kind(
+    "3 numbers (series)", {"$ref": "#/$defs/vector_series"}, None, (3,), True, _series_fault(3), _turned
+)
+SAMPLES = Kind("n numbers", {"$ref": "#/$defs/series"}, None, None, True, _samples_fault, entry=NUMBER)
+_ABOVE_0: Schema = {"type": "number", "exclusiveMinimum": 0}
+_AB, _ENDS = ("a", "b"), ("begin", "end")
+_TWO: Schema = {"type": "array", "minItems": 2, "maxItems": 2}
+POSITIVE = Kind("number > 0", _ABOVE_0, None, (), True, _positive_fault((), "a finite number"))
+TWO = Kind("2 numbers", {**_TWO, "items": {"type": "number"}}, None, (2,), True, _two_fault, names=_AB)
+TWO_POSITIVE = Kind(
+    "2 numbers > 0",
+    {**_TWO, "items": _ABOVE_0},
+    None,
+    (2,),
+    True,
+    _positive_fault((2,), "two finite numbers"),
+    names=_AB,
+)
+TWO_WHOLE = Kind(
+    "2 integers > 0",
+    {**_TWO, "items": {"type": "integer", "exclusiveMinimum": 0}},
+    None,
+    (2,),
+    True,
+    _positive_fault((2,), "two whole numbers", whole=True),
+    names=_AB,
+)
+INTERVAL = Kind("2 numbers", {**_TWO, "items": {"type": "number"}}, None, (2,), True, _interval_fault, names=_ENDS)
+POINT_LIST = Kind(
+    "n × 3", {"type": "array", "items": _VECTOR}, None, None, True, _point_list_fault, _moved_points, entry=POINT
+)
+FUNCTION = Kind("function", {"not": {}}, None, None, False, _function_fault, lambda f, pose: MovedShape(f, plain(pose)))
+BREAKS = Kind("rising numbers", {"not": {}}, None, None, True, _rising_fault)
+"""Where a function is not smooth; files hold no functions."""
+NUMBERS = Kind("n numbers", {"type": "array", "items": {"type": "number"}})
+FACTS = Kind("table", {"type": "object"}, dict)
+COEFFICIENTS = Kind("table", {"type": "object", "additionalProperties": {"type": "number"}, "minProperties": 1}, dict)
+BY_FREEDOM = Kind("table", {"type": "object", "additionalProperties": {"type": "number"}})
+"""Numbers by freedoms; in a file in degrees under the name of the freedom with ``_deg`` added."""
+TABLE = Kind("table", {})
+TABLES = Kind("tables", {})
+OTHER = Kind("", {})
+"""A kind whose schema the field itself gives, in ``rules``."""
+
+POSITION = {"dimension": LENGTH, "turn": PURE, "degrees": True}
+"""Of a field that holds a coordinate: an angle or a length, as the freedom is."""
+RATE = {"dimension": (1, 0, -1), "turn": (0, 0, -1), "degrees": True}
+"""Of a field that holds its rate."""
