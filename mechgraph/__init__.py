@@ -3,11 +3,15 @@
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from mechgraph import starting  # noqa: F401  # isort: skip  # before all that takes time to load
+from mechgraph import errors  # noqa: F401  # isort: skip  # before all that takes time to load
 from mechgraph.algebra import inertia
+from mechgraph.determinacy.decomposition import Decomposition, Group
+from mechgraph.determinacy.equivalent import multiple_joints, split_joint
+from mechgraph.determinacy.families import Families
+from mechgraph.determinacy.report import DeterminacyReport, check
+from mechgraph.determinacy.structure import Structure, groups, structure
 from mechgraph.equations.build import formulate
 from mechgraph.equations.formulation import Formulation
-from mechgraph.equivalent import multiple_joints, split_joint
 from mechgraph.errors import (
     AssemblyError,
     ContentError,
@@ -53,8 +57,6 @@ from mechgraph.pairs.curves import Curve
 from mechgraph.pairs.factors import Bookkeeping, Component, Freedom
 from mechgraph.pairs.pair_type import PairType, pair_types
 from mechgraph.pairs.surfaces import Surface
-from mechgraph.report.report import DeterminacyReport, check
-from mechgraph.report.structure import Structure, groups, structure
 from mechgraph.response.course import Response
 from mechgraph.response.equilibrium import equilibrium
 from mechgraph.response.respond import respond
@@ -62,8 +64,6 @@ from mechgraph.response.small_motion import linearize
 from mechgraph.result.free_body import FreeBody, free_body
 from mechgraph.result.over_time import OverTime, over_time
 from mechgraph.result.solution import Solution
-from mechgraph.structure.decomposition import Decomposition, Group
-from mechgraph.structure.families import Families
 from mechgraph.transmission import Transmission, transmission
 from mechgraph.variants.result import Study
 from mechgraph.variants.study import study

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from mechgraph.starting import started
+from mechgraph.errors import started
 
 NEEDED = ("typer", "rich")
 """Packages of the ``cli`` extra."""

@@ -15,7 +15,6 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.call import Call, Starts
 from mechgraph.closure.configuration import ROUNDINGS, Configuration
 from mechgraph.closure.driver_path import in_blocks
 from mechgraph.closure.indexing import Index, System
@@ -28,7 +27,7 @@ from mechgraph.kernel.tables import START, Layout, layout, tables, why_not
 from mechgraph.model.couplings import Contact
 from mechgraph.model.loads import Load
 from mechgraph.numerics.newton import Work
-from mechgraph.outcome import Outcome, system_at
+from mechgraph.outcome import Call, Outcome, Starts, system_at
 from mechgraph.result.kept import BlockMotion
 
 COMPILED: Literal["compiled"] = "compiled"

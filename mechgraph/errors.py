@@ -1,15 +1,21 @@
-"""The errors of mechgraph: one family, each carries the data that its message is made of."""
+"""The errors of mechgraph, one family; and Ctrl-C while the command line starts.
+
+Ctrl-C while the command line starts, which is mostly the loading of numpy: a message and a status, no traceback.
+Imported before everything else. An exception would not do: what is being loaded may turn it into another one.
+"""
 
 from __future__ import annotations
 
 import difflib
+import os
 import re
+import signal
+import sys
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from os import PathLike
-
 
 MOST_FAULTS = 30
 """Faults that a message lists."""
@@ -211,3 +217,28 @@ def _restored(kind: type[MechgraphError], message: tuple[Any, ...], data: dict[s
     super(MechgraphError, error).__init__(*message)
     error.__dict__.update(data)
     return error
+
+
+INTERRUPTED = 130
+"""Exit status of a program that was interrupted."""
+
+
+def _stop(*_: Any) -> None:
+    os.write(2, b"mechgraph: interrupted\n")
+    os._exit(INTERRUPTED)
+
+
+def started() -> None:
+    """From here on Ctrl-C raises KeyboardInterrupt again."""
+    if signal.getsignal(signal.SIGINT) is _stop:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def _is_program() -> bool:
+    """Whether Python was started for the command line, not for a program that uses mechgraph."""
+    name = os.path.splitext(os.path.basename(sys.argv[0]))[0] if sys.argv else ""
+    return name == "mechgraph" or (name == "-m" and "mechgraph" in sys.orig_argv)
+
+
+if _is_program() and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+    signal.signal(signal.SIGINT, _stop)

@@ -21,8 +21,20 @@ from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
-from mechgraph.quantities import all_floats, has_quantity, is_numeric, real_array, shown, without_units, wrong
-from mechgraph.units import LENGTH, PURE, Dimension, factor_of, symbol_of
+from mechgraph.quantities import (
+    LENGTH,
+    PURE,
+    Dimension,
+    all_floats,
+    factor_of,
+    has_quantity,
+    is_numeric,
+    real_array,
+    shown,
+    symbol_of,
+    without_units,
+    wrong,
+)
 
 PARALLEL_COSINE = 1 - 1e-12
 """Cosine above which a second direction is parallel to the axis."""

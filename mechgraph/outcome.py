@@ -1,31 +1,95 @@
-"""What becomes of positions that were found: rates, forces, and a trajectory of them, block by block."""
+"""What a call asks for, and what becomes of positions that were found: rates, forces, a trajectory."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from functools import partial
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.call import Call, Starts
 from mechgraph.closure.assembly import CLOSED
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.coordinates import continued
+from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.closure.driver_path import BLOCK, DriverPath, Positions, Status, in_blocks
 from mechgraph.closure.indexing import Index, System
+from mechgraph.closure.passive_motion import PassiveMotion
 from mechgraph.closure.rates import Rates, Velocities, accuracy, at_dead_points, disagreement, rates
+from mechgraph.closure.reduction import FORMS
 from mechgraph.closure.solver import ClosureSolver, FactoredClosure, closure_solver
+from mechgraph.determinacy.finite_motion import branches
+from mechgraph.determinacy.mobility import stand_still
 from mechgraph.errors import DeclarationError
 from mechgraph.force.block import BlockForces, ForceTask, forces_of_block
 from mechgraph.model.loads import Load
+from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.continuation import Follower
 from mechgraph.numerics.crossings import passed
+from mechgraph.quantities import option_faults
 from mechgraph.result.kept import BlockMotion
 from mechgraph.result.trajectory import Trajectory
 from mechgraph.result.values import PassedCrossing
-from mechgraph.structure.actuation import stand_still
-from mechgraph.structure.branching import branches
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to solve: force ``method`` (None: motion alone), what becomes of ``redundant`` reactions, and the ``engine``.
+
+    ``form`` says by which form of the equations paths are followed, ``"full"`` or ``"reduced"``, or ``"auto"``: the faster one.
+    ``progress`` is called with the numbers of positions done and of all that were reached, block by block.
+    """
+
+    method: str | None = "loop_wrench"
+    redundant: str = "nan"
+    engine: str = "auto"
+    progress: Callable[[int, int], None] | None = field(default=None, compare=False)
+    form: str = "auto"
+
+    def __post_init__(self) -> None:
+        if faults := option_faults({"form": (self.form, FORMS)}):
+            raise DeclarationError("options of a solution", faults)
+
+
+@dataclass(frozen=True)
+class Starts:
+    """Where the paths begin: a closed state ``x (nx, V)`` for every variant, and the systems with the numbers of variants.
+
+    ``system_of(variants)`` for variants ``(T,)``; ``loads`` act with the numbers of every variant. ``sharing`` is the number of variants
+    that differ in masses and loads alone and move alike, from the only state: their motion is found once. ``kernel``: the variants in the
+    tables of the compiled kernel, where it serves.
+    """
+
+    x: Array
+    system_of: Callable[[Index], System]
+    loads: tuple[Load, ...]
+    sharing: int = 1
+    kernel: Any = None
+
+
+class Call(Protocol):
+    """A call whose drives, start and unknown efforts are known; ``pipeline.Pipeline`` says what each of these is."""
+
+    m: Mechanism
+    drive: DriverMotion
+    options: Options
+    engine: Literal["dense", "sparse"]
+    system: System
+    columns: Index
+    lead: Index
+    acting: Index
+    hold: Index | None
+    passive: tuple[PassiveMotion, ...]
+
+    @property
+    def leading(self) -> Index:
+        """The freedoms of the leading drivers."""
+
+    def values(self, kind: str, batch: tuple[int, ...]) -> Array:
+        """Driver positions, velocities or accelerations ``(d, T)`` in internal units."""
+
 
 SystemAt = Callable[[Index], System]
 

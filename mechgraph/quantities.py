@@ -1,16 +1,197 @@
-"""The one door for numbers: what counts as a number, how it is shown in a message, and how quantities of pint become plain numbers."""
+"""Units, the one door for numbers, and the one check for arguments.
+
+Dimensions and units: exponents of length, mass and time, their labels, and the factors between two sets of units.
+A number of dimension ``(a, b, c)`` carries the unit ``length^a mass^b time^c``. Angles are radians and have no dimension.
+
+Arguments at the public doors: one check and one sentence for each that is of the wrong kind.
+What a public function or method takes stands once, in its annotations. ``door`` reads them, where it is first called, and refuses all
+that does not fit in one DeclarationError, before anything is done.
+"""
 
 from __future__ import annotations
 
+import collections.abc
+import functools
+import importlib
+import inspect
+import os
 import reprlib
-from collections.abc import Mapping, Sequence
+import sys
+import types
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import chain
-from typing import Any
+from math import isclose, prod
+from typing import Annotated, Any, Literal, NamedTuple, ParamSpec, TypeVar, Union, get_args, get_origin
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from mechgraph.units import BASE_UNITS, Dimension
+from mechgraph.errors import DeclarationError, MissingExtraError
+
+BASE_UNITS = ("length", "mass", "time")
+"""The base units that a mechanism may declare."""
+
+Dimension = tuple[int, int, int]
+PURE: Dimension = (0, 0, 0)
+LENGTH: Dimension = (1, 0, 0)
+MASS: Dimension = (0, 1, 0)
+TIME: Dimension = (0, 0, 1)
+ACCELERATION: Dimension = (1, 0, -2)
+FORCE: Dimension = (1, 1, -2)
+MOMENT: Dimension = (2, 1, -2)
+ENERGY: Dimension = (2, 1, -2)
+POWER: Dimension = (2, 1, -3)
+INERTIA: Dimension = (2, 1, 0)
+PRESSURE: Dimension = (-1, 1, -2)
+FORCE_PER_LENGTH: Dimension = (0, 1, -2)
+FORCE_PER_VELOCITY: Dimension = (0, 1, -1)
+MOMENT_PER_RATE: Dimension = (2, 1, -1)
+
+KNOWN: dict[str, dict[str, float]] = {
+    "length": {
+        "m": 1.0,
+        "dm": 0.1,
+        "cm": 0.01,
+        "mm": 1e-3,
+        "um": 1e-6,
+        "µm": 1e-6,
+        "km": 1e3,
+        "ft": 0.3048,
+        "in": 0.0254,
+    },
+    "mass": {
+        "kg": 1.0,
+        "g": 1e-3,
+        "mg": 1e-6,
+        "t": 1e3,
+        "tonne": 1e3,
+        "Mg": 1e3,
+        "slug": 0.45359237 * 9.80665 / 0.3048,
+    },
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6},
+}
+"""Units of a base in terms of m, kg, s, as far as they make forces that have names."""
+EARTH, EARTHLY = 9.80665, 0.005
+"""Acceleration of gravity on earth in m/s^2, and by what part of it it varies and is rounded."""
+FORCES = {"N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "µN": 1e-6, "nN": 1e-9, "dyn": 1e-5, "lbf": 0.45359237 * 9.80665}
+"""Units of force in N."""
+USUAL = ("N", "kN", "MN", "lbf")
+"""Those in which people think."""
+
+
+def force_unit(units: Mapping[str, str]) -> str:
+    """The name of the force ``mass length / time^2`` of a set of units; empty where it has none."""
+    if not all(units.get(base) in known for base, known in KNOWN.items()):
+        return ""
+    length, mass, time = (KNOWN[base][units[base]] for base in BASE_UNITS)
+    return next((name for name, size in FORCES.items() if isclose(size, mass * length / time**2, rel_tol=1e-9)), "")
+
+
+def force_hint(units: Mapping[str, str]) -> str:
+    """What to say where the unit of force that belongs to a set of units is not a usual one; empty where it is, or is not known."""
+    name = force_unit(units)
+    if not name or name in USUAL:
+        return ""
+    set_, others = ", ".join(units[base] for base in BASE_UNITS), ("t", "kg", "g")
+    better = next((mass for mass in others if force_unit({**units, "mass": mass}) == "N"), "")
+    advice = (
+        f"mass in {better} would make it N, m.to_units(mass={better!r})"
+        if better
+        else "m.to_units(length='m', mass='kg') makes it N"
+    )
+    return f"Units: {set_} belong to the force {name} ({FORCES[name]:g} N), in which loads are read and results given; {advice}."
+
+
+def gravity_hint(units: Mapping[str, str], size: float) -> str:
+    """What to say of an acceleration of gravity that is the earth's in other units than those declared; empty where there is nothing."""
+    length, time = KNOWN["length"].get(units.get("length", "")), KNOWN["time"].get(units.get("time", ""))
+    if length is None or time is None or isclose(size * length / time**2, EARTH, rel_tol=EARTHLY):
+        return ""
+    meant = next((name for name, known in KNOWN["length"].items() if isclose(size * known, EARTH, rel_tol=EARTHLY)), "")
+    unit, right = f"{units['length']}/{units['time']}^2", EARTH * time**2 / length
+    return (
+        f"gravity of {size:.6g} {unit}: on earth it is {size:.6g} {meant}/s^2, which is {right:.6g} {unit}"
+        if meant
+        else ""
+    )
+
+
+def _shortest(dimension: Sequence[float], force: bool = True) -> dict[str, float]:
+    """Powers by the letters L, M, T and F = M L/T^2, whichever way is shorter."""
+    a, b, c = dimension
+    ways = [{"M": b, "L": a, "T": c}, {"F": b, "L": a - b, "T": c + 2 * b}]
+    return min(ways[: 1 + force], key=lambda way: sum(map(abs, way.values())))
+
+
+def unit_of(units: Mapping[str, str], dimension: Sequence[float]) -> str:
+    """The unit of ``length^a mass^b time^c`` in the declared units, ``N mm``, ``m/s^2``; empty where units are not declared or not needed.
+
+    A pure number of three exponents is an angle, in radians, and so is what is left of a rate.
+    """
+    if (
+        not units
+        or len(dimension) != 3
+        or any(p and base not in units for base, p in zip(BASE_UNITS, dimension, strict=True))
+    ):
+        return ""
+    force = force_unit(units)
+    if tuple(dimension) == POWER and (force, units["length"], units["time"]) == ("N", "m", "s"):
+        return "W"
+    names = {"F": force, "L": units.get("length", ""), "M": units.get("mass", ""), "T": units.get("time", "")}
+    powers = {names[letter]: n for letter, n in _shortest(dimension, bool(force)).items() if n}
+    angle = "rad" if not any(dimension[:2]) and dimension[2] <= 0 else ""
+    return _quotient(powers, lambda n: f"^{n:g}", angle)
+
+
+def symbol_of(dimension: Dimension) -> str:
+    """A dimension in letters: ``F L``, ``M L²``, ``L/T²``; empty for a pure number."""
+    return _quotient(_shortest(dimension), lambda n: {2: "²", 3: "³"}.get(int(n), f"^{n:g}"))
+
+
+def _quotient(powers: Mapping[str, float], power: Callable[[float], str], angle: str = "") -> str:
+    """``F L/T²``: what has a positive power over what has a negative one."""
+    above, below = (
+        " ".join(name + (power(abs(n)) if abs(n) != 1 else "") for name, n in powers.items() if n * sign > 0)
+        for sign in (1, -1)
+    )
+    above = above or angle
+    return f"{above or '1'}/{below}" if below else above
+
+
+def base_factors(old: Mapping[str, str], new: Mapping[str, str]) -> tuple[float, float, float]:
+    """Numbers by which lengths, masses and times are multiplied from ``old`` to ``new`` units (``units`` extra: pint).
+
+    Raises
+    ------
+    DeclarationError
+        for a unit that is not declared, unknown or of another dimension; MissingExtraError without pint.
+    """
+    try:
+        registry = importlib.import_module("pint").UnitRegistry()
+    except ImportError:
+        raise MissingExtraError("pint", "units") from None
+    faults, out = [], []
+    for name in BASE_UNITS:
+        if name not in new or new[name] == old.get(name):
+            out.append(1.0)
+        elif name not in old:
+            faults.append(f"{name}: the mechanism declares no unit of {name}; give units={{{name!r}: ...}} first")
+        else:
+            try:
+                out.append(float(registry.Quantity(1.0, old[name]).to(new[name]).magnitude))
+            except Exception as error:
+                faults.append(f"{name}: cannot convert {old[name]!r} to {new[name]!r} ({error})")
+    unknown = [name for name in new if name not in BASE_UNITS]
+    faults += [f"unknown base unit {name!r}; expected {', '.join(BASE_UNITS)}" for name in unknown]
+    if faults:
+        raise DeclarationError("to_units", faults)
+    return out[0], out[1], out[2]
+
+
+def factor_of(dimension: Dimension, base: Sequence[float]) -> float:
+    """The number by which a number of this dimension is multiplied: ``prod_i base_i^dimension_i``."""
+    return float(prod(f**power for f, power in zip(base, dimension, strict=True)))
+
 
 LARGEST = 1e100
 """Numbers from here on are refused: their squares would overflow."""
@@ -159,3 +340,230 @@ def wrong(value: Any, what: str, wanted: str) -> str:
     """The fault of a value that is not what is ``wanted``."""
     hint = "; quantities are converted where the mechanism declares units that they fit, else give plain numbers"
     return f"{what} = {shown(value)}: expected {wanted}{hint if has_quantity(value) else ''}"
+
+
+P = ParamSpec("P")
+R = TypeVar("R")
+FLOATING: dict[str, Any] = {"all": "ignore"}
+"""What numpy says of overflow and of values that are none, in here: nothing, as results say it themselves, whatever a program has set."""
+SPOKEN = {"m": "mechanism", "s": "solution", "f": "formulation"}
+"""Parameters of one letter, in messages."""
+RANGE = sys.maxsize
+"""Whole numbers up to this one count and index something."""
+
+
+class Wanted(NamedTuple):
+    """What an argument must be: a check, and the words for it."""
+
+    fits: Callable[[Any], bool]
+    words: str
+
+
+def door(function: Callable[P, R]) -> Callable[P, R]:
+    """A public function that refuses arguments which its annotations exclude, and calls without or with too many of them.
+
+    Raises
+    ------
+    DeclarationError
+        with all faults.
+    """
+
+    @functools.cache
+    def known() -> tuple[inspect.Signature, dict[str, Wanted | None]]:
+        signature = inspect.signature(function)
+        return signature, wanted_of(function, signature)
+
+    @functools.wraps(function)
+    def entered(*args: P.args, **named: P.kwargs) -> R:
+        signature, wanted = known()
+        try:
+            bound = signature.bind(*args, **named).arguments
+        except TypeError as error:
+            raise DeclarationError(_called(function, args), [f"{error}; it takes {_told(signature)}"]) from None
+        faults = [
+            wrong(value, SPOKEN.get(name, name), one.words)
+            for name, value in bound.items()
+            if (one := wanted[name]) is not None and not one.fits(value)
+        ]
+        if faults:
+            raise DeclarationError(_called(function, args), faults)
+        with np.errstate(**FLOATING):
+            return function(*args, **named)
+
+    return entered
+
+
+def with_doors(cls: type) -> None:
+    """Make doors of the public methods of a class, its own and those of its bases, that take arguments."""
+    ours = [base for base in reversed(cls.__mro__) if base.__module__.startswith("mechgraph")]
+    for name, function in {name: one for base in ours for name, one in vars(base).items()}.items():
+        public = not name.startswith("_") or name == "__getitem__"
+        if public and inspect.isfunction(function) and not hasattr(function, "__wrapped__") and _takes_any(function):
+            setattr(cls, name, door(function))
+
+
+def _takes_any(method: types.FunctionType) -> bool:
+    code = method.__code__
+    return code.co_argcount + code.co_kwonlyargcount > 1 or bool(code.co_flags & inspect.CO_VARKEYWORDS)
+
+
+def _called(function: Callable[..., Any], args: tuple[Any, ...]) -> str:
+    """``solve 'four-bar'``: what was called, of what."""
+    name = getattr(args[0], "name", None) if args else None
+    return f"{function.__qualname__} {name!r}" if isinstance(name, str) else function.__qualname__
+
+
+def _told(signature: inspect.Signature) -> str:
+    return ", ".join(name for name in signature.parameters if name != "self")
+
+
+# --- what annotations say ----------------------------------------------------------------------------------------------------
+
+
+def wanted_of(function: Callable[..., Any], signature: inspect.Signature) -> dict[str, Wanted | None]:
+    """What each argument must be, by its name; None where its annotation leaves it open.
+
+    Annotations are read with the names that the module of the function knows, then with those that a user knows.
+    """
+    names = {**vars(sys.modules["mechgraph"]), **getattr(function, "__globals__", {})}
+    wanted = {}
+    for name, parameter in signature.parameters.items():
+        hint = parameter.annotation
+        single = parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
+        wanted[name] = wanted_by(eval(hint, names)) if single and isinstance(hint, str) else None
+    return wanted
+
+
+def wanted_by(hint: Any) -> Wanted | None:
+    """What an annotation asks of a value; None where it is open."""
+    origin, inner = get_origin(hint), get_args(hint)
+    if hint is Any:
+        return None
+    if origin is Annotated:
+        return next(one for one in inner if isinstance(one, Wanted))
+    if origin in (Union, types.UnionType):
+        numbers = set(ARRAY_LIKE) <= set(inner)
+        each = [wanted_by(one) for one in inner if one is not type(None) and not (numbers and one in ARRAY_LIKE)]
+        each += [REAL] * numbers
+        ways = [one for one in each if one is not None]
+        if len(ways) < len(each):
+            return None
+        optional = type(None) in inner
+        words = dict.fromkeys(one.words.partition(";")[0] if len(ways) > 1 else one.words for one in ways)
+        return Wanted(
+            lambda value: (optional and value is None) or any(one.fits(value) for one in ways),
+            " or ".join(sorted(words, key=lambda text: text.startswith("a list"))),
+        )
+    if origin is Literal:
+        return Wanted(lambda value: isinstance(value, str) and value in inner, f"one of {', '.join(map(repr, inner))}")
+    if hint in PLAIN:
+        return PLAIN[hint]
+    if origin is tuple and Ellipsis not in inner:
+        return _tuple(inner)
+    kind = origin or hint
+    if kind is collections.abc.Mapping:
+        return Wanted(lambda value: isinstance(value, Mapping), "a mapping")
+    if kind in (collections.abc.Iterable, collections.abc.Sequence, tuple, list):
+        return _items(wanted_by(inner[0]), kind is not collections.abc.Iterable)
+    if kind is collections.abc.Callable:
+        return Wanted(callable, "a function")
+    if kind is os.PathLike:
+        return Wanted(lambda value: isinstance(value, os.PathLike), "a path")
+    if kind is np.ndarray:
+        return REAL
+    if isinstance(kind, type):
+        article = "an" if kind.__name__[0] in "AEIOU" else "a"
+        return Wanted(lambda value: isinstance(value, kind), getattr(kind, "_wanted", f"{article} {kind.__name__}"))
+    return None
+
+
+def _whole(value: Any) -> bool:
+    return isinstance(value, int | np.integer) and not isinstance(value, bool) and bool(-RANGE <= value <= RANGE)
+
+
+def at_least(number: int) -> Wanted:
+    """A whole number that is not too small."""
+    return Wanted(lambda value: _whole(value) and value >= number, f"a whole number from {number} on")
+
+
+Count = Annotated[int, at_least(1)]
+Index = Annotated[int, at_least(0)]
+Positive = Annotated[float, Wanted(lambda value: is_numeric(value, ()) and value > 0, "a number above 0")]
+Limit = Annotated[
+    float,
+    Wanted(lambda value: no_limit(value) or (is_numeric(value, ()) and value > 0), "a number above 0, or infinity"),
+]
+
+
+PLAIN: dict[Any, Wanted] = {
+    str: Wanted(lambda value: isinstance(value, str), "a text"),
+    bool: Wanted(lambda value: isinstance(value, bool | np.bool_), "True or False"),
+    int: Wanted(_whole, "a whole number"),
+    float: Wanted(lambda value: is_numeric(value, ()) or is_quantity(value), "a finite number"),
+    slice: Wanted(lambda value: isinstance(value, slice), "a slice"),
+}
+"""What plain types ask for."""
+ARRAY_LIKE = get_args(ArrayLike)
+REAL = Wanted(lambda value: real_array(value) is not None or has_quantity(value), "real numbers")
+
+
+def _tuple(inner: tuple[Any, ...]) -> Wanted:
+    """So many values in a row."""
+    each = [wanted_by(one) for one in inner]
+
+    def fits(value: Any) -> bool:
+        items = items_of(value, "", [])
+        return len(items) == len(each) and all(one is None or one.fits(v) for one, v in zip(each, items, strict=True))
+
+    words = dict.fromkeys(one.words for one in each if one is not None)
+    return Wanted(fits, f"{len(each)} values, each {' or '.join(words)}" if words else f"{len(each)} values")
+
+
+def _items(one: Wanted | None, kept: bool) -> Wanted:
+    """Several values; what is read only once is not looked into."""
+
+    def fits(value: Any) -> bool:
+        faults: list[str] = []
+        if isinstance(value, Iterator):
+            return not kept
+        items = items_of(value, "", faults)
+        return not faults and (one is None or all(one.fits(item) for item in items))
+
+    return Wanted(fits, f"a list, each {one.words}" if one else "a list")
+
+
+# --- arguments whose annotation leaves them open -----------------------------------------------------------------------------
+
+
+def option_faults(allowed: Mapping[str, tuple[Any, Iterable[str]]]) -> list[str]:
+    """Options, name -> (value, allowed texts), whose value is not allowed."""
+    return [
+        wrong(value, name, f"one of {', '.join(map(repr, texts))}")
+        for name, (value, texts) in allowed.items()
+        if not isinstance(value, str) or value not in texts
+    ]
+
+
+def items_of(value: Any, what: str, faults: list[str]) -> tuple[Any, ...]:
+    """The items of a list (or of any other iterable but a text or a mapping); for all else a fault and no items."""
+    if not isinstance(value, str | bytes | Mapping):
+        try:
+            return tuple(value)
+        except TypeError:
+            pass
+    faults.append(wrong(value, what, "a list"))
+    return ()
+
+
+def place_among(place: int, count: int, what: str, of: str) -> int:
+    """A place in a row of ``count``, counted from 0.
+
+    Raises
+    ------
+    DeclarationError
+        where there is none.
+    """
+    if not (_whole(place) and 0 <= place < count):
+        wanted = f"a number below {count}, counted from 0" if count else "none, as there are none"
+        raise DeclarationError(of, [wrong(place, what, wanted)])
+    return int(place)

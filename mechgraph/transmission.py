@@ -22,17 +22,15 @@ from typing import Annotated, Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.arguments import door
-from mechgraph.data import plain
 from mechgraph.document import Document, Paragraph, Shown
 from mechgraph.errors import DeclarationError, MechgraphWarning
+from mechgraph.files import plain
 from mechgraph.kinetostatics import solve
 from mechgraph.model.couplings import Contact
 from mechgraph.model.loads import Effort
-from mechgraph.quantities import wrong
-from mechgraph.result.numbers import ranges
-from mechgraph.result.places import OK, Places
+from mechgraph.quantities import door, wrong
 from mechgraph.result.solution import Solution
+from mechgraph.result.values import OK, Places, ranges
 
 UNMOVED = 1e-12
 """What wrenches on the output could do for a unit effort, below which nothing is transmitted."""

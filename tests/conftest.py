@@ -95,7 +95,7 @@ def start_sets(tmp_path_factory: pytest.TempPathFactory) -> None:
 @pytest.fixture(scope="session", autouse=True)
 def spoken_warnings() -> None:
     """What numpy says of values that are none, users never see; here it is a warning, and so an error."""
-    importlib.import_module("mechgraph.arguments").FLOATING |= {"all": "warn", "under": "ignore"}
+    importlib.import_module("mechgraph.quantities").FLOATING |= {"all": "warn", "under": "ignore"}
 
 
 @pytest.fixture(scope="session")

@@ -17,7 +17,7 @@ from typer.testing import CliRunner, Result
 
 import mechgraph as mg
 from mechgraph.cli import app
-from mechgraph.typed import parse_drive
+from mechgraph.cli.options import parse_drive
 
 ROOT = Path(__file__).resolve().parents[1]
 

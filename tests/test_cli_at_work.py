@@ -14,7 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 import mechgraph as mg
-from mechgraph import writing
+from mechgraph import files
 from mechgraph.cli import app, options
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -135,7 +135,7 @@ def test_an_interrupt_while_a_file_is_written_leaves_the_old_one(
 
     target = tmp_path / file
     target.write_text("old")
-    monkeypatch.setattr(writing.os, "replace", interrupted)
+    monkeypatch.setattr(files.os, "replace", interrupted)
     with pytest.raises(KeyboardInterrupt):
         mg.solve(mg.load("four-bar")).write(target)
     assert [(one.name, one.read_text()) for one in tmp_path.iterdir()] == [(file, "old")]
@@ -147,7 +147,7 @@ def test_an_interrupt_in_the_middle_of_a_text_leaves_nothing(tmp_path: Path) -> 
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        writing.write_whole(tmp_path / "x.txt", pieces())
+        files.write_whole(tmp_path / "x.txt", pieces())
     assert not list(tmp_path.iterdir())
 
 

@@ -8,9 +8,9 @@ import pytest
 
 import mechgraph as mg
 from mechgraph.algebra.se3 import rotation_exp
-from mechgraph.report.report import DeterminacyReport
-from mechgraph.structure import pair_changes
-from mechgraph.structure.pair_changes import Effect, changes_of
+from mechgraph.determinacy import pair_changes
+from mechgraph.determinacy.pair_changes import Effect, changes_of
+from mechgraph.determinacy.report import DeterminacyReport
 
 BUILDERS = {
     "planar": known.planar,

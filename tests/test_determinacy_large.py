@@ -23,15 +23,13 @@ from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.elimination import Elimination
 from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
 from mechgraph.closure.rank import ClosureRank, closure_rank, rank_of_rows
+from mechgraph.determinacy import findings, snapping
+from mechgraph.determinacy.facts import counted_ledger
+from mechgraph.determinacy.families import kind_of
+from mechgraph.determinacy.mobility import free_motion, random_rows
+from mechgraph.determinacy.uniqueness import uniqueness
 from mechgraph.graph.linkgraph import link_graph
 from mechgraph.numerics.tolerances import RANKS
-from mechgraph.report import findings
-from mechgraph.report.facts import counted_ledger
-from mechgraph.structure import snapping
-from mechgraph.structure.generic import random_rows
-from mechgraph.structure.kind import kind_of
-from mechgraph.structure.mobility import free_motion
-from mechgraph.structure.uniqueness import uniqueness
 
 ENGINES = ("dense", "sparse")
 

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mechgraph as mg
+from mechgraph.determinacy.mobility import generic
+from mechgraph.determinacy.uniqueness import canonical
 from mechgraph.graph.linkgraph import link_graph, parts_of
-from mechgraph.structure.generic import generic
-from mechgraph.structure.self_stress import canonical
 
 TYPES = ("R", "P", "C", "S", "E", "U", "W", "Sp", "Sg")
 

@@ -14,7 +14,7 @@ import pytest
 import mechgraph as mg
 from mechgraph import show
 from mechgraph.equations.build import BOOKKEEPINGS, BookkeepingName
-from mechgraph.force.dalembert import METHODS, MethodName
+from mechgraph.force.reactions import METHODS, MethodName
 from mechgraph.show.page.write import report_page
 from mechgraph.variants.sampling import SAMPLINGS, SamplingName
 
@@ -204,7 +204,7 @@ def test_what_is_no_chain_is_refused_with_its_line(line, tmp_path):
 def test_a_program_that_is_ended_leaves_no_temporary_file(tmp_path):
     code = f"""
 import os, signal
-from mechgraph.writing import whole_file
+from mechgraph.files import whole_file
 with whole_file({str(tmp_path / "x.csv")!r}) as temporary:
     temporary.write_text("half")
     os.kill(os.getpid(), signal.SIGTERM)

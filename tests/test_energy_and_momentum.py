@@ -279,7 +279,7 @@ def test_derivatives_for_implicit_steppers_come_in_one_batch(seed):
 
 @pytest.mark.parametrize(
     ("attribute", "check"),
-    [("mechgraph.force.dalembert.tree_wrenches", "equilibrium"), ("mechgraph.force.block.kinetic_power", "power")],
+    [("mechgraph.force.reactions.tree_wrenches", "equilibrium"), ("mechgraph.force.block.kinetic_power", "power")],
 )
 def test_forces_that_fail_a_check_are_warned_of(monkeypatch, attribute, check):
     """A part of the equations that is twice what it should be: a warning says which check fails, where and by how much."""

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
-from mechgraph.units import FORCE, FORCE_PER_LENGTH, MOMENT, force_hint, unit_of
+from mechgraph.quantities import FORCE, FORCE_PER_LENGTH, MOMENT, force_hint, unit_of
 
 
 def crank(shape: tuple[int, ...]) -> mg.Solution:
@@ -144,7 +144,7 @@ def test_tables_in_parts_read_the_loads_of_their_own_positions(tmp_path: Path, m
     """Values over positions, and functions of time, in a table that is written two rows at a time."""
     s = loaded()
     whole = s.columns(["loads"])
-    monkeypatch.setattr("mechgraph.result.export.ROWS_TOGETHER", 2)
+    monkeypatch.setattr("mechgraph.result.solution.ROWS_TOGETHER", 2)
     s.to_csv(tmp_path / "table.csv", include=["loads"])
     rows = list(csv.DictReader((tmp_path / "table.csv").read_text(encoding="utf-8").splitlines()))
     for name in ("loads[3] effort force", "loads[2] force_law force", "loads[1] spring power"):

@@ -5,8 +5,7 @@ import pytest
 from planar import Builder, named, of_chain
 
 import mechgraph as mg
-from mechgraph.structure.groups import _by_pattern, _by_rank
-from mechgraph.structure.link_rows import LinkRows
+from mechgraph.determinacy.decomposition import LinkRows, _by_pattern, _by_rank
 
 VERSIONS = [f"D{kind}{j}" for kind, count in ((1, 1), (2, 4), (3, 2), (4, 4), (5, 8)) for j in range(count)]
 SYMBOLS = [

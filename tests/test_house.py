@@ -111,10 +111,10 @@ def test_nothing_prints_but_the_command_line() -> None:
 
 
 def test_files_are_written_whole() -> None:
-    """What writes a file does so through ``mechgraph.writing``: whole or not at all."""
+    """What writes a file does so through ``mechgraph.files``: whole or not at all."""
     writes = re.compile(r"\.write_(?:text|bytes)\(|\bopen\([^)]*[\"'][wa]b?[\"']")
     found = [name_of(file) for file in package_files() if writes.search(file.read_text(encoding="utf-8"))]
-    assert set(found) <= {"mechgraph/writing.py"}
+    assert set(found) <= {"mechgraph/files.py"}
 
 
 def test_nothing_branches_on_a_pair_symbol() -> None:

@@ -22,11 +22,11 @@ from strategies import closed_mechanism, motions, with_drives, with_loads, with_
 
 import mechgraph as mg
 from mechgraph import by_kernel
-from mechgraph.call import Options
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.kernel import build, tables
 from mechgraph.kernel.path import pointer
-from mechgraph.pipeline import Pipeline
+from mechgraph.kinetostatics import Pipeline
+from mechgraph.outcome import Options
 
 pytestmark = [pytest.mark.usefixtures("compiled"), pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")]
 

@@ -89,7 +89,7 @@ def test_imports_go_down_only(file: Path) -> None:
     [
         "from mechgraph.force import dalembert",
         "from mechgraph import force",
-        "import mechgraph.force.dalembert",
+        "import mechgraph.force.reactions",
         "import mechgraph",
         "from mechgraph import Mechanism",
         "from ..force import dalembert",
@@ -167,8 +167,8 @@ def test_the_check_finds_a_circle(source: str) -> None:
 
 
 UPWARD = {
-    ("model/mechanism.py", "snapped", "mechgraph.structure.snapping"),
-    ("model/mechanism.py", "equivalent", "mechgraph.equivalent"),
+    ("model/mechanism.py", "snapped", "mechgraph.determinacy.snapping"),
+    ("model/mechanism.py", "equivalent", "mechgraph.determinacy.equivalent"),
     ("model/mechanism.py", "view", "mechgraph.show.page.write"),
     ("result/solution.py", "view", "mechgraph.show.page.write"),
     ("modes/result.py", "plot", "mechgraph.show.diagrams"),

@@ -13,7 +13,8 @@ from mechanisms import Z, bennett, linked_four_bar, ring
 import mechgraph as mg
 from mechgraph.closure.assembly import close_all, closed_start
 from mechgraph.closure.configuration import Configuration
-from mechgraph.force.applied_loads import user_poses
+from mechgraph.files import cache_folder
+from mechgraph.force.loads import user_poses
 from mechgraph.model.chain import chain_symbols
 from mechgraph.modes import store
 from mechgraph.modes.bounds import bound
@@ -24,7 +25,6 @@ from mechgraph.modes.monodromy import _tame, start_set
 from mechgraph.modes.question import Question
 from mechgraph.modes.targets import Ends, _account, _Run
 from mechgraph.modes.trace import _beside, _poles, rational, trace_test
-from mechgraph.writing import cache_folder
 
 
 @pytest.fixture

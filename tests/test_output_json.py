@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 import mechgraph as mg
 from mechgraph.cli import app
 from mechgraph.cli.records import COMMANDS, output_schema
-from mechgraph.data import json_text, patch, plain, schema_of
+from mechgraph.files import json_text, patch, plain, schema_of
 from mechgraph.model.file_format import laid_out
 from mechgraph.model.toml import to_data
 

@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 
 import mechgraph as mg
 from mechgraph.cli import app
+from mechgraph.cli.options import duration
 from mechgraph.model.file_format import json_schema
-from mechgraph.typed import duration
 
 Z = (0, 0, 1)
 FILE = """

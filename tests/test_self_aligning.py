@@ -7,8 +7,7 @@ import pytest
 from lattices import ladder
 
 import mechgraph as mg
-from mechgraph.structure.pair_changes import changes_of, wider_types
-from mechgraph.structure.self_aligning import rank_key, self_aligning_sets
+from mechgraph.determinacy.pair_changes import changes_of, rank_key, self_aligning_sets, wider_types
 
 OVERCONSTRAINED = ["four-bar", "slider-crank", "bennett", "spherical-four-bar", "windows-2"]
 

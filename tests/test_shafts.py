@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
-from mechgraph.structure.pair_changes import wider_types
+from mechgraph.determinacy.pair_changes import wider_types
 
 Z = np.array([0.0, 0.0, 1.0])
 I_AXIAL = 0.02

@@ -9,9 +9,8 @@ from typer.testing import CliRunner
 
 import mechgraph as mg
 from mechgraph.cli import app
-from mechgraph.result import pair_forces
 from mechgraph.result import summary as summaries
-from mechgraph.result.extremes import Greatest, efforts, reactions
+from mechgraph.result.summary import Greatest, efforts, reactions
 
 Z = (0.0, 0.0, 1.0)
 TURN = {"A": mg.Motion(np.deg2rad(np.arange(0, 360, 5.0)), 10.0, 0.0)}
@@ -53,7 +52,7 @@ def test_extremes_are_those_of_the_arrays() -> None:
 
 def test_extremes_do_not_depend_on_the_blocks(four_bar: mg.Mechanism, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = mg.solve(four_bar, TURN).summary()
-    monkeypatch.setattr(pair_forces, "TOGETHER", 1)
+    monkeypatch.setattr("mechgraph.result.kept.TOGETHER", 1)
     assert mg.solve(four_bar, TURN).summary() == whole
 
 

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 import mechgraph as mg
 from mechgraph.cli import app
-from mechgraph.report.findings import plausible
+from mechgraph.determinacy.findings import plausible
 
 SPECIAL = {
     **{name: getattr(mechanisms, name) for name in (

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
-from mechgraph.writing import cell, whole_file, write_whole
+from mechgraph.files import cell, whole_file, write_whole
 
 posix = pytest.mark.skipif(os.name == "nt", reason="links, pipes and rights of another kind")
 
@@ -221,7 +221,7 @@ def test_a_table_holds_all_digits(tmp_path: Path) -> None:
 
 def test_a_long_table_is_the_same_in_pieces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     s = mg.solve(mg.load("rssr").replace(drives=["D"]), {"D": np.linspace(-0.1, 0.1, 101)}, on_reach="flag")
-    monkeypatch.setattr("mechgraph.result.export.ROWS_TOGETHER", 7)
+    monkeypatch.setattr("mechgraph.result.solution.ROWS_TOGETHER", 7)
     s.to_csv(tmp_path / "x.csv")
     found = read(tmp_path / "x.csv")
     for name, values in s.columns().items():

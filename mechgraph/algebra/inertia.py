@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mechgraph.arguments import door
 from mechgraph.errors import DeclarationError
-from mechgraph.quantities import LARGEST, is_numeric, real_array, shown, wrong
+from mechgraph.quantities import LARGEST, door, is_numeric, real_array, shown, wrong
 
 __all__ = ["box", "cylinder", "from_components", "physical_faults", "rod", "shifted", "sphere"]
 

@@ -33,9 +33,15 @@ from mechgraph.cli.options import (
     Redundant,
     Tolerance,
     check_out,
+    drives_of,
+    duration,
     fail,
     loaded,
+    longest,
+    motions_of,
+    parse_at,
     progress,
+    refuse,
     refuse_own_file,
     show,
     show_compared,
@@ -58,10 +64,9 @@ from mechgraph.compiled.write import WRITTEN, InputsName, write_tables
 from mechgraph.document import Document, Table
 from mechgraph.equations.formulation import FORMATS as WRITINGS
 from mechgraph.exchange.files import WRITERS
-from mechgraph.result.export import FORMATS
-from mechgraph.result.load_files import FORMATS as LOAD_FILES
-from mechgraph.typed import drives_of, duration, longest, motions_of, parse_at, refuse
-from mechgraph.writing import formats_text
+from mechgraph.files import formats_text
+from mechgraph.result.free_body import FORMATS as LOAD_FILES
+from mechgraph.result.solution import FORMATS
 
 
 def list_library(json: AsJson = False) -> None:

@@ -26,19 +26,22 @@ from mechgraph.cli.options import (
     OnReach,
     Redundant,
     Tolerance,
+    drives_of,
     freedoms,
     loaded,
+    motions_of,
+    parse_at,
     progress,
+    refuse,
     refuse_own_file,
     show,
     working,
     write,
 )
 from mechgraph.cli.records import FileData, PlotData, write_json
+from mechgraph.files import format_of, formats_text
 from mechgraph.show.skeleton import FORMATS as FILMS
 from mechgraph.show.skeleton import PICTURES
-from mechgraph.typed import drives_of, motions_of, parse_at, refuse
-from mechgraph.writing import format_of, formats_text
 
 
 @dataclass(frozen=True)

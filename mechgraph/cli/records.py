@@ -8,17 +8,17 @@ from typing import Annotated, Any
 
 import mechgraph as mg
 from mechgraph.cli.options import write
-from mechgraph.data import VERSION, Json, json_text, object_schema, patch, plain, schema_of
+from mechgraph.determinacy.decomposition import Group
+from mechgraph.determinacy.families import Families
+from mechgraph.determinacy.findings import Rounding
+from mechgraph.determinacy.report import KEYS, AdviceData, schemas
 from mechgraph.equations.terms import written
+from mechgraph.files import VERSION, Json, json_text, object_schema, patch, plain, schema_of
 from mechgraph.model.toml import to_data
 from mechgraph.modes.record import AssembliesData, BranchesData
-from mechgraph.report.findings import Rounding
-from mechgraph.report.report import KEYS, AdviceData, schemas
 from mechgraph.response.course import ResponseData
 from mechgraph.result.over_time import OverTimeData
-from mechgraph.result.record import SolutionData
-from mechgraph.structure.decomposition import Group
-from mechgraph.structure.families import Families
+from mechgraph.result.summary import SolutionData
 from mechgraph.transmission import TransmissionData
 
 

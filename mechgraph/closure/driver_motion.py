@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.arguments import items_of
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.prescription import Prescription, with_free_pairs
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Pair
+from mechgraph.quantities import items_of
 
 
 def _as_motion(m: Mechanism, value: Any, name: str, faults: list[str]) -> Motion | None:

@@ -10,10 +10,9 @@ from pathlib import Path
 
 from mechgraph.compiled.tabled import STATUSES, Tabled
 from mechgraph.errors import DeclarationError, FileError, visible
+from mechgraph.files import writable, write_whole
 from mechgraph.kernel.compiler import INCLUDED
-from mechgraph.quantities import wrong
-from mechgraph.units import unit_of
-from mechgraph.writing import writable, write_whole
+from mechgraph.quantities import unit_of, wrong
 
 IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
 """Names that symbols of C begin with; none of them is reserved, as something follows."""

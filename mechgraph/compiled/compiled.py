@@ -12,14 +12,13 @@ from typing import Any, NoReturn
 import numpy as np
 
 from mechgraph.algebra.se3 import Array, turn_tangent
-from mechgraph.arguments import door, with_doors
 from mechgraph.compiled.tabled import STATUSES, Tabled, tabled
 from mechgraph.compiled.write import InputsName, write_tables
 from mechgraph.errors import DeclarationError, listed
 from mechgraph.kernel import build
 from mechgraph.kernel.tables import START
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.quantities import has_quantity, is_numeric, real_array, without_units, wrong
+from mechgraph.quantities import door, has_quantity, is_numeric, real_array, with_doors, without_units, wrong
 
 WORDS = np.array([word for _, word, _ in STATUSES])
 OPENING = 1e-6

@@ -22,9 +22,9 @@ from xml.sax.saxutils import quoteattr
 from mechgraph.compiled.c_file import header_text, identifier, source_text
 from mechgraph.compiled.tabled import STATUSES, Tabled
 from mechgraph.errors import visible
+from mechgraph.files import whole_file, write_whole
 from mechgraph.kernel import build, compiler
-from mechgraph.units import unit_of
-from mechgraph.writing import whole_file, write_whole
+from mechgraph.quantities import unit_of
 
 SLAVE = Path(__file__).with_name("fmu.c")
 COMPONENTS = ("Mx", "My", "Mz", "Fx", "Fy", "Fz")

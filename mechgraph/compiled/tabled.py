@@ -10,19 +10,19 @@ import numpy as np
 
 from mechgraph.algebra.se3 import Array, homogeneous
 from mechgraph.by_kernel import cannot, gives_forces
-from mechgraph.call import Options
 from mechgraph.closure.assembly import closed_start
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.closure.indexing import System
+from mechgraph.determinacy.snapping import meant
 from mechgraph.errors import DeclarationError, listed
 from mechgraph.kernel.loads import EFFORT
 from mechgraph.kernel.tables import HEAD_LOAD_NUMBERS, HEAD_LOADS, Integers, Layout, layout, tables
+from mechgraph.kinetostatics import Pipeline
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import Declared, declared
-from mechgraph.pipeline import Pipeline
+from mechgraph.outcome import Options
 from mechgraph.quantities import shown
-from mechgraph.structure.snapping import meant
 from mechgraph.variants.fields import AnyField, Variants, clashes, field_values, find_field, varied
 
 STATUSES = (

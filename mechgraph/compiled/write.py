@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 from typing import Literal, get_args
 
-from mechgraph.arguments import option_faults
 from mechgraph.compiled.c_file import write_c
 from mechgraph.compiled.fmu import write_fmu
 from mechgraph.compiled.tabled import Tabled
 from mechgraph.errors import DeclarationError
-from mechgraph.writing import Format, format_of
+from mechgraph.files import Format, format_of
+from mechgraph.quantities import option_faults
 
 WRITTEN = (
     Format("C99, with a header beside it", (".c",), write_c),

@@ -16,7 +16,6 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import ClassVar, assert_never
 
-from mechgraph.arguments import with_doors
 from mechgraph.document.tree import (
     ALIGNMENTS,
     Block,
@@ -32,6 +31,7 @@ from mechgraph.document.tree import (
     kept_lines,
     plain,
 )
+from mechgraph.quantities import with_doors
 
 WIDTH = 80
 """Default width of a text rendering, in columns."""

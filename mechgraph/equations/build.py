@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from mechgraph.arguments import door
 from mechgraph.equations.formulation import ACCELERATION, Formulation, MotionWords, has_inertia
 from mechgraph.equations.terms import (
     AXES,
@@ -33,6 +32,7 @@ from mechgraph.model.couplings import BaseCoupling
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.pairs.factors import Component, Freedom
+from mechgraph.quantities import door
 
 
 @dataclass

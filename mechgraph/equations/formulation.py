@@ -53,11 +53,11 @@ from mechgraph.equations.terms import (
     written,
 )
 from mechgraph.errors import counted
+from mechgraph.files import Format, format_of, write_whole
 from mechgraph.graph.linkgraph import LinkGraph, link_graph
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Pair
 from mechgraph.pairs.factors import ConstantScrew
-from mechgraph.writing import Format, format_of, write_whole
 
 POSITION, RATE, ACCELERATION = range(3)
 LETTERS = {True: ("theta", "omega", "alpha"), False: ("S", "dS", "ddS")}

@@ -19,15 +19,14 @@ import scipy
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.arguments import place_among
 from mechgraph.document import Document, Equation, Paragraph, Shown, Table, latex_words
 from mechgraph.document.tree import plain
 from mechgraph.errors import DeclarationError, counted
+from mechgraph.files import cell, csv_of
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.sparse import unique_solution
 from mechgraph.pairs.factors import Component, Freedom
-from mechgraph.quantities import wrong
-from mechgraph.writing import cell, csv_of
+from mechgraph.quantities import place_among, wrong
 
 LETTERS = {"x": "X", "y": "Y", "z": "A"}
 """Letter of a marker direction: A is the pair axis, as in Lee."""

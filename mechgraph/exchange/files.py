@@ -7,7 +7,6 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 
-from mechgraph.arguments import door
 from mechgraph.errors import ContentError, DeclarationError, FileError, MechgraphWarning
 from mechgraph.exchange.asmt import Assembly, Reader
 from mechgraph.exchange.asmt_mechanism import mechanism_of
@@ -15,10 +14,10 @@ from mechgraph.exchange.graph import save_graphml, save_node_link
 from mechgraph.exchange.mjcf_read import read_mjcf
 from mechgraph.exchange.mjcf_write import save_mjcf
 from mechgraph.exchange.urdf import read_urdf
+from mechgraph.files import Format, text_of
 from mechgraph.model import toml
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.reading import text_of
-from mechgraph.writing import Format
+from mechgraph.quantities import door
 
 Notes = tuple[str, ...]
 

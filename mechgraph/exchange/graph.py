@@ -11,10 +11,10 @@ import os
 from typing import TYPE_CHECKING, Any
 
 from mechgraph.errors import visible
+from mechgraph.files import write_whole
 from mechgraph.graph.linkgraph import link_graph
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
-from mechgraph.writing import write_whole
 
 if TYPE_CHECKING:
     import networkx as nx

@@ -20,6 +20,7 @@ import numpy as np
 from mechgraph.algebra.inertia import physical_faults
 from mechgraph.algebra.se3 import Array, compose, inverse, matrix_quaternion, move_twist
 from mechgraph.errors import HIDDEN, FileError
+from mechgraph.files import write_whole
 from mechgraph.kinetostatics import assemble
 from mechgraph.model.loads import Gravity
 from mechgraph.model.mechanism import Mechanism
@@ -27,7 +28,6 @@ from mechgraph.model.pair import Pair
 from mechgraph.pairs import kinematics as evaluation
 from mechgraph.pairs.factors import ConstantScrew
 from mechgraph.quantities import shown
-from mechgraph.writing import write_whole
 
 WORLD = "world"
 """Name of the frame in MJCF."""

@@ -15,8 +15,8 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.errors import FileError
 from mechgraph.exchange.indented import numbers_of
+from mechgraph.files import text_of
 from mechgraph.quantities import shown
-from mechgraph.reading import text_of
 
 
 @dataclass

@@ -19,14 +19,12 @@ from os import PathLike
 from pathlib import Path
 from typing import Annotated
 
-from mechgraph.arguments import Count, Index, at_least, door, items_of
 from mechgraph.errors import DeclarationError, FileError, counted
+from mechgraph.files import text_of, write_whole
 from mechgraph.graph.chains import Chain, ChainKind, chains, data_faults, family_faults
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.pairs.pair_type import TABLE
-from mechgraph.quantities import wrong
-from mechgraph.reading import text_of
-from mechgraph.writing import write_whole
+from mechgraph.quantities import Count, Index, at_least, door, items_of, wrong
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from functools import cache
 from pathlib import Path
 
 from mechgraph.errors import DeclarationError, FileError, MissingExtraError
+from mechgraph.files import cache_folder
 from mechgraph.kernel import compiler
-from mechgraph.writing import cache_folder
 
 PACKAGED = Path(__file__).parent
 """Where an installation puts its library."""

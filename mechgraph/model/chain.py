@@ -10,14 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mechgraph.algebra.se3 import Array, identity, inverse
-from mechgraph.arguments import door, items_of
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import plain
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.pairs.pair_type import TABLE
-from mechgraph.quantities import is_numeric, real_array, shown, without_units, wrong
-from mechgraph.units import LENGTH, PURE
+from mechgraph.quantities import LENGTH, PURE, door, is_numeric, items_of, real_array, shown, without_units, wrong
 
 NUMBERS_OF_CHAIN = ("twist", "length", "offset")
 """What places the link after every pair of a chain, in the order of the rows of its numbers."""

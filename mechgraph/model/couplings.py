@@ -23,8 +23,7 @@ from mechgraph.algebra.se3 import Array, cross
 from mechgraph.fields import COEFFICIENTS, FREEDOM_NAME, NUMBER, TEXT, Described, number_fault, plain, sound_tol
 from mechgraph.model.pair import Marker, Nameable, Pair
 from mechgraph.pairs.pair_type import PairType
-from mechgraph.quantities import is_numeric, shown, without_units, wrong
-from mechgraph.units import LENGTH, PURE
+from mechgraph.quantities import LENGTH, PURE, is_numeric, shown, without_units, wrong
 
 Terms = tuple[tuple[str, float], ...]
 

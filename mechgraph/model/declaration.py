@@ -42,8 +42,7 @@ from mechgraph.model.pair import NO_POINTS, Link, Marker, Pair, largest_cosine
 from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.pairs.contact_types import travels
 from mechgraph.pairs.pair_type import PairType
-from mechgraph.quantities import column, is_numeric, shown, without_units, wrong
-from mechgraph.units import BASE_UNITS, LENGTH, PURE
+from mechgraph.quantities import BASE_UNITS, LENGTH, PURE, column, is_numeric, shown, without_units, wrong
 
 START = {
     "type": "object",

@@ -25,7 +25,7 @@ from mechgraph.pairs.factors import Bookkeeping, Component, Freedom
 from mechgraph.pairs.given import CURVES, Function
 from mechgraph.pairs.pair_type import PairType
 from mechgraph.pairs.surfaces import SURFACES, ByFunction
-from mechgraph.units import BASE_UNITS, LENGTH
+from mechgraph.quantities import BASE_UNITS, LENGTH
 
 WRITABLE = {kind: curve for kind, curve in CURVES.items() if curve is not Function}
 """Curves that a file can hold."""

@@ -14,8 +14,7 @@ import numpy as np
 from mechgraph.algebra.se3 import Array, cross
 from mechgraph.fields import FLAG, NUMBER, POSITIVE, TWO_POSITIVE, TWO_WHOLE
 from mechgraph.model.couplings import Axes, BaseCoupling, Contact, Coupling, Lines, fitting_of, teeth_lines, unit
-from mechgraph.quantities import wrong
-from mechgraph.units import LENGTH, PURE
+from mechgraph.quantities import LENGTH, PURE, wrong
 
 _TEETH = TWO_WHOLE("numbers of teeth of both gears")
 _PRESSURE = NUMBER("of the flanks, in the normal section", PURE, degrees=True, minimum=0.0)

@@ -36,8 +36,7 @@ from mechgraph.fields import (
     same_fields,
 )
 from mechgraph.model.pair import Nameable
-from mechgraph.quantities import is_numeric, real_array, shown, wrong
-from mechgraph.units import (
+from mechgraph.quantities import (
     ACCELERATION,
     FORCE,
     FORCE_PER_LENGTH,
@@ -46,6 +45,10 @@ from mechgraph.units import (
     MOMENT,
     MOMENT_PER_RATE,
     TIME,
+    is_numeric,
+    real_array,
+    shown,
+    wrong,
 )
 
 Value = Any

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from mechgraph.arguments import door, items_of
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, MechgraphWarning, counted
 from mechgraph.fields import plain, same_fields
@@ -28,8 +27,18 @@ from mechgraph.model.pair import Link, Pair
 from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.pairs.contact_types import row_of, travels
 from mechgraph.pairs.pair_type import PairType
-from mechgraph.quantities import is_numeric, shown, wrong
-from mechgraph.units import LENGTH, MASS, base_factors, gravity_hint, unit_of
+from mechgraph.quantities import (
+    LENGTH,
+    MASS,
+    base_factors,
+    door,
+    gravity_hint,
+    is_numeric,
+    items_of,
+    shown,
+    unit_of,
+    wrong,
+)
 
 LISTED = 20
 """Most rows of one table."""
@@ -414,14 +423,14 @@ class Mechanism(Parts, Once, Shown):
             where the mechanism has no geometry, or its loops do not close to ``tol``.
         """
         # this, equivalent() and view() call up to a room above: a user looks for them here
-        made: Mechanism = importlib.import_module("mechgraph.structure.snapping").snapped(self, tol)
+        made: Mechanism = importlib.import_module("mechgraph.determinacy.snapping").snapped(self, tol)
         return made
 
     @door
     def equivalent(self, at: Mapping[str, float] | None = None, *, rollers: str = "removed") -> Mechanism:
         """The planar mechanism with links and lower pairs in place of higher pairs, gears and belts, with freedoms at values ``at``.
 
-        It has the same velocities and accelerations there (see ``mechgraph.equivalent``). ``rollers="kept"`` keeps a roller on a pin as a
+        It has the same velocities and accelerations there. ``rollers="kept"`` keeps a roller on a pin as a
         link that spins passively; it is otherwise itself the link that takes the place of its contact.
 
         Raises
@@ -429,7 +438,9 @@ class Mechanism(Parts, Once, Shown):
         DeclarationError
             where it is not planar, or has couplings without a line of contact.
         """
-        made: Mechanism = importlib.import_module("mechgraph.equivalent").equivalent(self, at, rollers=rollers)
+        made: Mechanism = importlib.import_module("mechgraph.determinacy.equivalent").equivalent(
+            self, at, rollers=rollers
+        )
         return made
 
     def view(self) -> Any:

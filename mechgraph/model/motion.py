@@ -20,8 +20,7 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import FREEDOM_NAME, SERIES, TABLE, Described
 from mechgraph.numerics.derivatives import NotSmooth, derivatives
-from mechgraph.quantities import has_quantity, real_array, shown, wrong
-from mechgraph.units import LENGTH, PURE, TIME
+from mechgraph.quantities import LENGTH, PURE, TIME, has_quantity, real_array, shown, wrong
 
 Rates = tuple[Array, Array, Array]
 """Position, velocity, acceleration."""

@@ -48,8 +48,7 @@ from mechgraph.pairs.contact_types import (
 from mechgraph.pairs.curves import Curve
 from mechgraph.pairs.pair_type import TABLE, PairType
 from mechgraph.pairs.surfaces import Surface
-from mechgraph.quantities import is_numeric, shown, wrong
-from mechgraph.units import INERTIA, LENGTH, MASS
+from mechgraph.quantities import INERTIA, LENGTH, MASS, is_numeric, shown, wrong
 
 NO_POINTS: Mapping[str, tuple[float, ...]] = MappingProxyType({})
 

@@ -10,7 +10,6 @@ from typing import Annotated, Any, Literal, Self, get_args
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.arguments import items_of, option_faults
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import (
     BY_FREEDOM,
@@ -28,8 +27,19 @@ from mechgraph.fields import (
 )
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Nameable
-from mechgraph.quantities import is_numeric, no_limit, real_array, shown, wrong
-from mechgraph.units import LENGTH, PURE, TIME, factor_of
+from mechgraph.quantities import (
+    LENGTH,
+    PURE,
+    TIME,
+    factor_of,
+    is_numeric,
+    items_of,
+    no_limit,
+    option_faults,
+    real_array,
+    shown,
+    wrong,
+)
 
 What = Literal["position", "velocity", "acceleration"]
 WHATS: tuple[What, ...] = get_args(What)

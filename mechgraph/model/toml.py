@@ -30,6 +30,7 @@ from mechgraph.fields import (
     is_default,
     sound_tol,
 )
+from mechgraph.files import text_of, toml_of, write_whole
 from mechgraph.model.chain import chain
 from mechgraph.model.file_format import DEGREES, KINDS, SCHEMA, TABLES_OF_FILE, USUAL
 from mechgraph.model.mechanism import Mechanism
@@ -40,8 +41,6 @@ from mechgraph.pairs.pair_type import TABLE as PAIR_TABLE
 from mechgraph.pairs.pair_type import PairType
 from mechgraph.pairs.surfaces import Surface
 from mechgraph.quantities import is_numeric, real_array, shown, wrong
-from mechgraph.reading import text_of, toml_of
-from mechgraph.writing import write_whole
 
 __all__ = ["library_names", "library_path"]
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from mechgraph.arguments import Count, Index, Positive, door
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.finding import GUESSED_TURNS, GUESSES, Finder, Progress
 from mechgraph.modes.question import Question
 from mechgraph.modes.result import AssembliesOver
+from mechgraph.quantities import Count, Index, Positive, door
 
 
 @door

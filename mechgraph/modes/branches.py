@@ -9,12 +9,11 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from mechgraph.arguments import Index, at_least, door
 from mechgraph.closure.assembly import CLOSED, close, led
 from mechgraph.closure.configuration import Configuration
-from mechgraph.data import plain
 from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, counted
+from mechgraph.files import plain
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.family import Array
 from mechgraph.modes.finding import Finder
@@ -22,7 +21,7 @@ from mechgraph.modes.question import Question
 from mechgraph.modes.record import Bifurcation, BranchData, BranchesData, Fold
 from mechgraph.modes.result import in_degrees, unit_of, values_text, weakest
 from mechgraph.modes.tracing import ARRIVES, TOUCHES, Map, Tracer
-from mechgraph.quantities import is_numeric, wrong
+from mechgraph.quantities import Index, at_least, door, is_numeric, wrong
 
 SAMPLES_A_TURN = 24
 """Positions of the driver at which all assemblies are found."""

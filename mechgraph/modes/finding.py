@@ -13,7 +13,7 @@ from mechgraph.closure.assembly import close_all
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import System
 from mechgraph.errors import counted
-from mechgraph.force.applied_loads import user_poses
+from mechgraph.force.loads import user_poses
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.balls import TINY
 from mechgraph.modes.bounds import bound

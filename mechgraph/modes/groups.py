@@ -19,6 +19,7 @@ from mechgraph.algebra.se3 import compose, identity
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.point_rows import PointNumbers
+from mechgraph.determinacy.decomposition import MOST_SPLIT, Constraint, Constraints, rows_of_pair, smallest
 from mechgraph.graph.linkgraph import components_of_edges
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Pair
@@ -27,8 +28,6 @@ from mechgraph.modes.form import Step, behind
 from mechgraph.modes.rods import RodFamily, RodSystem
 from mechgraph.numerics.linear import complement
 from mechgraph.numerics.tolerances import RANKS
-from mechgraph.structure.groups import MOST_SPLIT, smallest
-from mechgraph.structure.link_rows import Constraint, Constraints, rows_of_pair
 
 KNOWN_MOVED = 0.3
 """Change of what is known (radians, lengths over L) at which a group must still be a member of its class."""

@@ -12,13 +12,13 @@ from mechgraph.closure.assembly import CLOSED, close_all, closed_start, named_co
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.closure.indexing import Index, System
+from mechgraph.determinacy.mobility import free_motion
+from mechgraph.determinacy.report import dead_point_error, undriven_error
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.family import NO_NUMBERS, SPAN, Array, Family, at_rest
 from mechgraph.modes.form import Form, Rod, Whole, WithoutRods, rods_of
 from mechgraph.numerics.linear import rank_of, singular_values
-from mechgraph.report.report import dead_point_error, undriven_error
-from mechgraph.structure.mobility import free_motion
 
 OFF_DEAD_POINT = 0.3
 """Motion (radians, or lengths over L) of what moves most from a singular start to where the class is read."""

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from mechgraph.data import plain
 from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import counted
+from mechgraph.files import plain
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.certificate import Certificate
 from mechgraph.modes.family import Array

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from mechgraph.errors import MechgraphError
+from mechgraph.files import cache_folder, whole_file
 from mechgraph.modes.family import Family
 from mechgraph.modes.labelling import Labelling
 from mechgraph.modes.monodromy import StartSet
 from mechgraph.modes.trace import Trace
-from mechgraph.writing import cache_folder, whole_file
 
 PACKED = Path(__file__).with_name("start-sets.npz")
 """Start sets that come with the package, one after the other: names are ``key/array``."""

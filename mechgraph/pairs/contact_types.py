@@ -28,8 +28,7 @@ from mechgraph.pairs.factors import Touching
 from mechgraph.pairs.pair_type import TABLE, PairType, fill_row
 from mechgraph.pairs.surfaces import Surface
 from mechgraph.pairs.travelling import AlongCurve, Beside, OnSurface, X, Z
-from mechgraph.quantities import is_numeric, wrong
-from mechgraph.units import LENGTH, PRESSURE, PURE
+from mechgraph.quantities import LENGTH, PRESSURE, PURE, is_numeric, wrong
 
 OFF_CURVE = 1e-6
 """Part of the extent of a curve, or angle, by which the contact may miss it."""

@@ -30,7 +30,7 @@ from mechgraph.fields import (
     parallel_faults,
 )
 from mechgraph.memo import Once
-from mechgraph.units import LENGTH
+from mechgraph.quantities import LENGTH
 
 DERIVATIVES = 4
 """The highest derivative that is asked for."""

@@ -20,8 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array, homogeneous, inverse, quaternion_matrix, skew
-from mechgraph.arguments import items_of
-from mechgraph.quantities import is_numeric, shown, wrong
+from mechgraph.quantities import is_numeric, items_of, shown, wrong
 
 Six = tuple[float, float, float, float, float, float]
 

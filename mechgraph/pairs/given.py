@@ -30,8 +30,7 @@ from mechgraph.pairs.curves import (
     derivatives,
     parted,
 )
-from mechgraph.quantities import wrong
-from mechgraph.units import LENGTH
+from mechgraph.quantities import LENGTH, wrong
 
 PARAMETERS = "uv"
 """What the parameters are called in messages."""

@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from mechgraph.arguments import items_of
 from mechgraph.document import Document, Shown, Table
 from mechgraph.errors import DeclarationError
 from mechgraph.pairs import kinematics as evaluation
@@ -36,7 +35,7 @@ from mechgraph.pairs.factors import (
     read_component,
     read_freedom,
 )
-from mechgraph.quantities import shown, wrong
+from mechgraph.quantities import items_of, shown, wrong
 
 ROTATION = ("Rx", "Ry", "Rz")
 

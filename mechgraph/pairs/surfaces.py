@@ -33,8 +33,7 @@ from mechgraph.fields import TABLE as NESTED
 from mechgraph.pairs.arc_length import far_from
 from mechgraph.pairs.curves import WHOLE_TURN, Circle, Curve, Line, remade_from
 from mechgraph.pairs.given import asked, between, slope_faults
-from mechgraph.quantities import wrong
-from mechgraph.units import LENGTH, PURE
+from mechgraph.quantities import LENGTH, PURE, wrong
 
 NEAREST_GRID = 33
 """Values of each parameter from which the nearest point of a surface is sought."""

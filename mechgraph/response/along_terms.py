@@ -17,7 +17,7 @@ from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import System
 from mechgraph.closure.solver import FactoredClosure
 from mechgraph.errors import DeclarationError
-from mechgraph.force.applied_loads import NOT_FINITE, Site, user_poses, user_twists
+from mechgraph.force.loads import NOT_FINITE, Site, user_poses, user_twists
 from mechgraph.model.loads import Load
 from mechgraph.response.motion_equations import Loads, along_one
 

@@ -15,13 +15,13 @@ from mechgraph.closure.driver_path import in_blocks
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.passive_motion import PassiveMotion
 from mechgraph.closure.rates import Velocities
-from mechgraph.force.applied_loads import kinetic_energy
+from mechgraph.determinacy.mobility import free_motion
+from mechgraph.force.loads import kinetic_energy
 from mechgraph.model.loads import Load
 from mechgraph.response.chart import Chart, Closed, Stopped
 from mechgraph.response.kernel_rates import Evaluated, KernelRates
 from mechgraph.response.motion_equations import Loads, Moved, accelerations, applied, moved, positions_together
 from mechgraph.response.prescribed import Prescribed
-from mechgraph.structure.mobility import free_motion
 
 NUDGE = 1e-7
 """Part of a coordinate (or of one) by which it is changed for a derivative."""

@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.force.applied_loads import Site
+from mechgraph.force.loads import Site
 from mechgraph.model.loads import Law, Load
 from mechgraph.response.chart import Stopped
 

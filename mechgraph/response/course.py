@@ -17,10 +17,11 @@ from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_path import in_blocks
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.rates import Velocities
-from mechgraph.data import plain
+from mechgraph.determinacy.snapping import SnappedMechanism, declared_closure
 from mechgraph.document import Bullets, Document, Heading, Paragraph, Shown
 from mechgraph.errors import DeclarationError, ResponseError
-from mechgraph.force.applied_loads import Site
+from mechgraph.files import plain
+from mechgraph.force.loads import Site
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import declared
 from mechgraph.quantities import real_array, wrong
@@ -30,12 +31,10 @@ from mechgraph.response.events import Occurrence
 from mechgraph.response.integration import Integration
 from mechgraph.response.motion_equations import moved, positions_together
 from mechgraph.response.reading import trajectory_of
-from mechgraph.result.numbers import ranges
-from mechgraph.result.record import SolutionData, solution_data
 from mechgraph.result.solution import Solution
-from mechgraph.result.summary import summary
+from mechgraph.result.summary import SolutionData, solution_data, summary
 from mechgraph.result.trajectory import Trajectory
-from mechgraph.structure.snapping import SnappedMechanism, declared_closure
+from mechgraph.result.values import ranges
 
 LOST_ENERGY = 1e-3
 """Error of the balance of energies, of the greatest one, from which on a motion in time is doubtful."""

@@ -9,14 +9,14 @@ import numpy as np
 import scipy
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.arguments import door
 from mechgraph.closure.solver import EngineName
+from mechgraph.determinacy.mobility import free_motion
 from mechgraph.document import Document, Paragraph
 from mechgraph.errors import ResponseError, listed
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.quantities import door
 from mechgraph.response.place import STEP, Derivatives, Place
 from mechgraph.result.solution import Solution
-from mechgraph.structure.mobility import free_motion
 
 EQUILIBRIUM_STEPS = 60
 """Most steps to an equilibrium."""

@@ -11,10 +11,9 @@ import numpy as np
 import scipy
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.arguments import items_of
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.response_setup import WHATS, Event
-from mechgraph.quantities import real_array, shown, wrong
+from mechgraph.quantities import items_of, real_array, shown, wrong
 from mechgraph.response.chart import Stopped, stopping
 from mechgraph.result.solution import Solution
 

@@ -13,6 +13,7 @@ from mechgraph.closure.assembly import assembled_at, named_columns
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.rank import closure_rank
+from mechgraph.determinacy.finite_motion import branches, branches_text, finite_motion
 from mechgraph.errors import DeclarationError
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.linear import rank_of, singular_values
@@ -22,8 +23,6 @@ from mechgraph.response.chart import Stopped
 from mechgraph.response.charts import Task
 from mechgraph.response.motion_equations import Columns
 from mechgraph.response.prescribed import Prescribed
-from mechgraph.structure.branching import branches, branches_text
-from mechgraph.structure.finite_motion import finite_motion
 
 AGREEING = 1e-9
 """Part of the given rates by which they may miss the closure before they contradict it."""

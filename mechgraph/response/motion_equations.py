@@ -26,7 +26,7 @@ from mechgraph.closure.indexing import System
 from mechgraph.closure.passive_motion import PassiveMotions
 from mechgraph.closure.rates import Rates, Velocities
 from mechgraph.closure.solver import FactoredClosure
-from mechgraph.force.applied_loads import Site, inertia_wrenches
+from mechgraph.force.loads import Site, inertia_wrenches
 from mechgraph.model.loads import Load
 from mechgraph.response.chart import Closed, Held, Stopped
 from mechgraph.response.saddle import saddle_accelerations

@@ -13,8 +13,8 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.rates import Rates, Velocities
-from mechgraph.force.applied_loads import Site, kinetic_energy
 from mechgraph.force.block import ForceTask, forces_of_block
+from mechgraph.force.loads import Site, kinetic_energy
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.response.chart import Closed
 from mechgraph.response.charts import Task

@@ -12,11 +12,13 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.arguments import Limit, door, items_of, option_faults
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.ranges import BEYOND_END, beyond
 from mechgraph.closure.rank import closure_rank
 from mechgraph.closure.solver import MotionEngineName, engine_for
+from mechgraph.determinacy.mobility import free_motion
+from mechgraph.determinacy.report import hinted
+from mechgraph.determinacy.snapping import meant
 from mechgraph.errors import AssemblyError, DeclarationError, MechgraphWarning, ResponseError
 from mechgraph.model.declaration import mapping_faults
 from mechgraph.model.loads import Load
@@ -31,7 +33,7 @@ from mechgraph.model.response_setup import (
     read_times,
     tolerance_faults,
 )
-from mechgraph.report.report import hinted
+from mechgraph.quantities import Limit, door, items_of, option_faults
 from mechgraph.response.along_path import Arc, PathStage
 from mechgraph.response.chart import Stopped, stopping
 from mechgraph.response.charts import ChartStage, Task
@@ -45,8 +47,6 @@ from mechgraph.response.looks import OF_ALL
 from mechgraph.response.motion_equations import Loads
 from mechgraph.response.prescribed import OVER_POSITIONS, read_motions
 from mechgraph.response.stops import Stops, read_stops
-from mechgraph.structure.mobility import free_motion
-from mechgraph.structure.snapping import meant
 
 OnStopName = Literal["raise", "return"]
 CROWDED = 1000

@@ -12,16 +12,15 @@ import numpy as np
 import scipy
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.arguments import door
 from mechgraph.closure.solver import EngineName
 from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, MechgraphWarning, counted, listed
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.quantities import door, unit_of
 from mechgraph.response.motion_equations import MASSLESS, in_unit_inertias
 from mechgraph.response.place import STEP, Place
-from mechgraph.result.numbers import bracket, number
 from mechgraph.result.solution import Solution
-from mechgraph.units import unit_of
+from mechgraph.result.values import bracket, number
 
 UNBALANCED = 1e-6
 """Generalized force, against the largest that a load exerts, above which a position is said to be none of equilibrium."""

@@ -21,11 +21,10 @@ import scipy
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.arguments import items_of
-from mechgraph.force.applied_loads import kinetic_energy
+from mechgraph.force.loads import kinetic_energy
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.response_setup import Event, Stop
-from mechgraph.quantities import wrong
+from mechgraph.quantities import items_of, wrong
 from mechgraph.response.chart import Closed, Stopped
 from mechgraph.response.charts import Task
 from mechgraph.response.events import LOOKS_IN_STEP, Occurrence, first_root, with_turns

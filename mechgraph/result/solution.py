@@ -1,39 +1,48 @@
-"""The Solution: values by the names of pairs, freedoms and links, batch axes first, in the declared units."""
+"""The Solution: values by the names of pairs, freedoms and links, batch axes first, in the declared units; its table and its exports."""
 
 from __future__ import annotations
 
 import importlib
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from urllib.parse import quote
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.arguments import place_among
-from mechgraph.data import json_text, plain
 from mechgraph.document import Document, Shown, to_text
 from mechgraph.equations.terms import State
-from mechgraph.errors import DeclarationError
+from mechgraph.errors import DeclarationError, visible
+from mechgraph.files import Format, csv_of, format_of, json_text, optional, plain, whole_file, write_whole
+from mechgraph.model.loads import Law
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.newton import Work
 from mechgraph.numerics.tolerances import CHECKS, PATH
-from mechgraph.quantities import wrong
-from mechgraph.result import export
-from mechgraph.result.contact_ranges import LiftOff, Overlap
-from mechgraph.result.contacts import ContactResult, contacts_of, lift_offs, overlaps, place_of_contact
-from mechgraph.result.places import OK, Places
-from mechgraph.result.record import solution_data
-from mechgraph.result.summary import summary
-from mechgraph.result.table import Include, table_of
+from mechgraph.quantities import BASE_UNITS, items_of, place_among, unit_of, wrong
+from mechgraph.result.contacts import (
+    ContactResult,
+    LiftOff,
+    Overlap,
+    contact_columns,
+    contacts_of,
+    lift_offs,
+    overlaps,
+    place_of_contact,
+)
+from mechgraph.result.summary import solution_data, summary
 from mechgraph.result.values import (
+    OK,
     Checks,
     Inaccurate,
     LoadBearing,
     LoadResult,
     Mask,
+    MaterialPoint,
     PassedCrossing,
+    Places,
     Unbalanced,
     Values,
 )
@@ -42,6 +51,227 @@ from mechgraph.result.views import CouplingResult, LinkResult, PairResult
 if TYPE_CHECKING:
     import pandas
     import xarray
+
+
+class Column(NamedTuple):
+    """Name, values ``(...)`` and unit of a column; no unit where the mechanism declares none, and for what has none."""
+
+    name: str
+    values: Array
+    unit: str = ""
+
+    @property
+    def label(self) -> str:
+        """``A.Rz effort [N m]``."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+
+def table_of(s: Values, include: Sequence[Include] = ()) -> list[Column]:
+    """All columns: coordinates, rates, efforts, reaction components, status and checks.
+
+    Names are ``B.Tz``, ``B.Tz velocity``, ``B.Tz effort`` (of the drive), ``B.Tz applied effort`` (of springs, dampers, given efforts),
+    ``B:Fx`` (component of the reaction). ``include`` adds what ``MORE`` has under these names.
+    """
+    m = s.mechanism
+    faults: list[str] = []
+    asked = items_of(include, "include", faults)
+    faults += [wrong(name, "include", " or ".join(map(repr, MORE))) for name in asked if name not in tuple(MORE)]
+    if faults:
+        raise DeclarationError("table of a solution", faults)
+    out: list[Column] = []
+
+    def put(name: str, values: Array | NDArray[np.str_], *dimension: float, unit: str = "") -> None:
+        out.append(Column(name, np.asarray(values), unit or unit_of(m.units, dimension)))
+
+    if s.t is not None:
+        put("t", np.broadcast_to(s.t, s.batch), 0, 0, 1)
+    shown = {*m.freedom_names(), *s.prescribed}
+    for k, pair in enumerate(s.whole.pairs):
+        r = PairResult(s, k)
+        values = (r.position, r.velocity, r.acceleration)
+        for j, (name, freedom) in enumerate(zip(pair.freedom_names, pair.type.freedoms, strict=True)):
+            if name not in shown:
+                continue
+            for order, (label, value) in enumerate(zip(("", " velocity", " acceleration"), values, strict=True)):
+                put(name + label, value[..., j], 0 if freedom.turns else 1, 0, -order)
+    if s.has_forces:
+        for k, pair in enumerate(s.whole.pairs):
+            r = PairResult(s, k)
+            efforts = {"effort": r.effort, "applied effort": r.applied_effort}
+            for j, (name, part) in enumerate(zip(pair.freedom_names, pair.type.efforts, strict=True)):
+                for label, effort in efforts.items() if name in shown else ():
+                    put(f"{name} {label}", effort[..., j], 2 if part.is_couple else 1, 1, -2)
+            for name, value in r.components.items():
+                put(f"{pair.name}:{name}", value, unit=r.units["components"][name])
+    for name in asked:
+        for column, more, dimension in MORE[name](s):
+            put(column, more, *dimension)
+    for name in ("closure", "equilibrium", "power", "accuracy"):
+        put(name, getattr(s.checks(), name))
+    put("status", s.status())
+    return out
+
+
+Extra = tuple[str, Array, tuple[int, ...]]
+"""Name, values and dimension of a column; no exponents for a number without a unit."""
+XYZ = "xyz"
+
+
+def _vector(name: str, values: Array, dimension: tuple[int, ...], letters: Sequence[str] = XYZ) -> Iterator[Extra]:
+    for i, letter in enumerate(letters):
+        yield f"{name}:{letter}", values[..., i], dimension
+
+
+def _point(name: str, p: MaterialPoint) -> Iterator[Extra]:
+    for order, (label, values) in enumerate(zip(("", " velocity", " acceleration"), p, strict=True)):
+        yield from _vector(name + label, values, (1, 0, -order))
+
+
+def _points(s: Values) -> Iterator[Extra]:
+    """Motion of the named points of links: ``bucket.tip:x``, ``bucket.tip velocity:x``, ..."""
+    for i, link in enumerate(s.mechanism.links):
+        for name, p in link.points.items():
+            yield from _point(f"{link.name}.{name}", s.link_point(i, p))
+
+
+def _links(s: Values) -> Iterator[Extra]:
+    """Poses of the links: origin of the frame ``crank:x``, rotation matrix ``crank:Rxx``, and angular rates."""
+    for i, link in enumerate(s.mechanism.links):
+        pose, twist, acceleration = s.link(i)
+        yield from _vector(link.name, pose[..., :3, 3], (1, 0, 0))
+        for j, row in enumerate(XYZ):
+            for k, column in enumerate(XYZ):
+                yield f"{link.name}:R{row}{column}", pose[..., j, k], ()
+        yield from _vector(f"{link.name} angular velocity", twist[..., :3], (0, 0, -1))
+        yield from _vector(f"{link.name} angular acceleration", acceleration[..., :3], (0, 0, -2))
+
+
+def _centers(s: Values) -> Iterator[Extra]:
+    """Motion of the mass centres: ``crank center:x``, ``crank center velocity:x``, ..."""
+    for i, link in enumerate(s.mechanism.links):
+        if link.center is not None:
+            yield from _point(f"{link.name} center", s.link_point(i, None))
+
+
+def _loads(s: Values) -> Iterator[Extra]:
+    """What loads do: coordinate, rate and force of laws, efforts, else wrenches on links about the global origin; and their power."""
+    m = s.mechanism
+    for i, load in enumerate(m.loads):
+        found, name = s.load(i), f"loads[{i}] {load.kind}"
+        turns = m.turns(load.in_freedom)
+        if isinstance(load, Law):
+            yield f"{name} x", found.coordinate, (0 if turns else 1, 0, 0)
+            yield f"{name} v", found.rate, (0 if turns else 1, 0, -1)
+        if isinstance(load, Law) or load.in_freedom is not None:
+            yield f"{name} force", found.force, (2 if turns else 1, 1, -2)
+        else:
+            for link, wrench in found.wrenches.items():
+                yield from _vector(f"{name} on {link}", wrench[..., :3], (2, 1, -2), ("Mx", "My", "Mz"))
+                yield from _vector(f"{name} on {link}", wrench[..., 3:], (1, 1, -2), ("Fx", "Fy", "Fz"))
+        yield f"{name} power", found.power, (2, 1, -3)
+
+
+Include = Literal["points", "links", "centers", "loads", "contacts"]
+MORE: dict[str, Callable[[Values], Iterator[Extra]]] = {
+    "points": _points,
+    "links": _links,
+    "centers": _centers,
+    "loads": _loads,
+    "contacts": contact_columns,
+}
+"""What a table may have beside the pairs, on request."""
+
+
+ROWS_TOGETHER = 1024
+"""Rows of a CSV table that are made together: bounds the memory that a long table takes."""
+Path = str | os.PathLike[str]
+
+
+def to_csv(s: Values, path: Path, include: Sequence[Include] = ()) -> None:
+    """Write one row a position; numbers with all digits. The rows are made as they are written, some at a time."""
+    write_whole(path, _csv_pieces(s, include))
+
+
+def _csv_pieces(s: Values, include: Sequence[Include]) -> Iterator[str]:
+    count = s.status().size
+    for first in range(0, max(count, 1), ROWS_TOGETHER):
+        table = table_of(s.part(slice(first, first + ROWS_TOGETHER)), include)
+        rows = zip(*(column.values.tolist() for column in table), strict=True)
+        yield csv_of([column.label for column in table] if not first else (), rows)
+
+
+def to_pandas(s: Values, include: Sequence[Include] = ()) -> pandas.DataFrame:
+    """The table as a DataFrame; several batch axes become index levels, units by column stand in ``attrs`` too."""
+    pd = optional("pandas", "pandas")
+    table = table_of(s, include)
+    frame = pd.DataFrame({column.label: column.values.reshape(-1) for column in table})
+    if len(s.batch) > 1:
+        frame.index = pd.MultiIndex.from_product([range(n) for n in s.batch], names=axis_names(s.batch))
+    frame.attrs = {**_facts(s), "units": {column.label: column.unit for column in table if column.unit}}
+    return frame
+
+
+def to_parquet(s: Values, path: Path, include: Sequence[Include] = ()) -> None:
+    """Write the DataFrame as Parquet; ``pandas.read_parquet`` gives back an equal one, ``attrs`` included."""
+    frame = to_pandas(s, include).rename(columns=visible)
+    frame.attrs["units"] = {visible(name): unit for name, unit in frame.attrs["units"].items()}
+    with whole_file(path) as temporary:
+        frame.to_parquet(temporary, engine="pyarrow")
+
+
+def to_xarray(s: Values, include: Sequence[Include] = ()) -> xarray.Dataset:
+    """The table as a Dataset over the batch axes: units as attributes, times and what is prescribed as coordinates.
+
+    One row of rising times is the dimension ``t``, every other last axis is ``position``.
+    """
+    xr = optional("xarray", "xarray")
+    axes = axis_names(s.batch)
+    if s.t is not None and np.shape(s.t) == s.batch and len(axes) == 1 and bool((np.diff(s.t) > 0).all()):
+        axes = ["t"]
+    data: dict[str, Any] = {}
+    for name, values, unit in table_of(s, include):
+        data[name] = (axes, values, {"units": unit} if unit else {})
+    coordinates = [name for name in ("t", *s.prescribed) if name in data]
+    return xr.Dataset(data, attrs=_facts(s)).set_coords(coordinates)
+
+
+def to_netcdf(s: Values, path: Path, include: Sequence[Include] = ()) -> None:
+    """Write the Dataset as NetCDF 4; ``xarray.open_dataset`` gives it back.
+
+    A slash separates groups there and a space coordinates: they are quoted as in an address (``urllib.parse.unquote`` undoes it).
+    """
+    data = to_xarray(s, include)
+    signs = {name: r"[%/\s]" if name in data.coords else "[%/]" for name in data.variables}
+    names = {name: re.sub(sign, lambda found: quote(found[0], safe=""), str(name)) for name, sign in signs.items()}
+    data = data.rename({name: visible(quoted) for name, quoted in names.items()})
+    with whole_file(path) as temporary:
+        data.to_netcdf(temporary, engine="h5netcdf")
+
+
+FORMATS = (
+    Format("CSV", (".csv",), to_csv),
+    Format("NetCDF", (".nc",), to_netcdf, ("xarray", "h5netcdf", "h5py"), "netcdf"),
+    Format("Parquet", (".parquet",), to_parquet, ("pandas", "pyarrow"), "parquet"),
+)
+"""What a solution can be written as."""
+
+
+def write(s: Values, path: Path, include: Sequence[Include] = ()) -> None:
+    """Write the table in the format that the suffix says."""
+    format_of(path, FORMATS).write(s, path, include)
+
+
+def _facts(s: Values) -> dict[str, str]:
+    """What the solution is of, and how it was made; texts alone."""
+    m = s.mechanism
+    texts = {"mechanism": m.name, "description": m.description, "source": m.source, "engine": s.engine}
+    texts |= {"method": s.method or "", **{f"unit of {name}": m.units.get(name, "") for name in BASE_UNITS}}
+    return {name: visible(text) for name, text in texts.items() if text}
+
+
+def axis_names(batch: tuple[int, ...]) -> list[str]:
+    """Names of the batch axes: the last is the position, those before it are cases."""
+    return [f"case{i}" if len(batch) > 2 else "case" for i in range(len(batch) - 1)] + ["position"] * (len(batch) > 0)
 
 
 class Solution(Shown):
@@ -292,7 +522,7 @@ class Solution(Shown):
 
     def to_pandas(self, include: Sequence[Include] = ()) -> pandas.DataFrame:
         """A DataFrame, one row a position (``pandas`` extra); ``include`` as in ``columns``."""
-        return export.to_pandas(self._values, include)
+        return to_pandas(self._values, include)
 
     def to_xarray(self, include: Sequence[Include] = ()) -> xarray.Dataset:
         """A Dataset over the batch axes (``xarray`` extra); ``include`` as in ``columns``.
@@ -300,7 +530,7 @@ class Solution(Shown):
         Names are those of ``columns`` without units, which stand in ``attrs["units"]``. Coordinates are the times and what was
         prescribed; one row of rising times is the dimension ``t``, every other last axis is ``position``.
         """
-        return export.to_xarray(self._values, include)
+        return to_xarray(self._values, include)
 
     def write(self, path: str | os.PathLike[str], include: Sequence[Include] = ()) -> None:
         """Write the table, whole or not at all, as the suffix says; ``include`` as in ``columns``.
@@ -313,11 +543,11 @@ class Solution(Shown):
         FileError
             for another suffix, or where the file cannot be written; MissingExtraError.
         """
-        export.write(self._values, path, include)
+        write(self._values, path, include)
 
     def to_csv(self, path: str | os.PathLike[str], include: Sequence[Include] = ()) -> None:
         """Write the table as CSV, whole or not at all; ``include`` as in ``columns``."""
-        export.to_csv(self._values, path, include)
+        to_csv(self._values, path, include)
 
     def __repr__(self) -> str:
         status = self.status

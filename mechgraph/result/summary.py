@@ -1,23 +1,359 @@
-"""The summary of a solution for people: what was solved, ranges of efforts, greatest reactions, checks, engine and work."""
+"""The summary of a solution: extremes over the positions, the record of plain data, its words for people."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+from mechgraph.algebra.se3 import Array
+from mechgraph.closure.indexing import Index
+from mechgraph.determinacy.snapping import SnappedMechanism
+from mechgraph.determinacy.uniqueness import labels_of
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Table
 from mechgraph.errors import counted
-from mechgraph.result.contacts import contacts_of, lift_offs, overlaps
-from mechgraph.result.extremes import Greatest, Range, Reactions, efforts, multipliers, reactions
-from mechgraph.result.numbers import SHOWN_AS_ZERO, bracket, number, with_unit
-from mechgraph.result.places import OK, Places, coupling_unit
-from mechgraph.result.values import Mask, Values
-from mechgraph.structure.components import labels_of
-from mechgraph.structure.snapping import SnappedMechanism
-from mechgraph.units import FORCE, PRESSURE, force_hint, unit_of
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.quantities import FORCE, PRESSURE, force_hint, unit_of
+from mechgraph.result.contacts import LiftOff, Overlap, contacts_of, lift_offs, overlaps
+from mechgraph.result.values import (
+    OK,
+    SHOWN_AS_ZERO,
+    LoadBearing,
+    Mask,
+    PassedCrossing,
+    Places,
+    Values,
+    bracket,
+    coupling_unit,
+    number,
+    with_unit,
+)
+
+TIE = 1e-9
+"""Relative difference below which two values share the extreme; the first position is named."""
+
+
+class Greatest:
+    """The greatest values ``best (n,)`` of some rows, and the flat places ``at (n,)`` at which they are reached first."""
+
+    def __init__(self, count: int) -> None:
+        self.best, self.at = np.full(count, -np.inf), np.zeros(count, dtype=np.intp)
+
+    def look(self, values: Array, places: Index) -> None:
+        """Take note of values ``(n, T)`` at places that follow those seen so far; NaN counts for nothing."""
+        values = np.where(np.isnan(values), -np.inf, values)
+        high = values.max(axis=1)
+        room = TIE * np.abs(values).max(axis=1, where=np.isfinite(values), initial=0.0)
+        first = np.argmax(values >= (high - room)[:, None], axis=1)
+        better = high > self.best + room
+        self.best = np.where(better, high, self.best)
+        self.at = np.where(better, places[first], self.at)
+
+
+class Range:
+    """Least (as greatest of what is turned round) and greatest values of some rows, and which rows are not unique somewhere."""
+
+    def __init__(self, count: int) -> None:
+        self.low, self.high, self.loose = Greatest(count), Greatest(count), np.zeros(count, dtype=bool)
+
+    def look(self, values: Array, places: Index, loose: Mask | None = None) -> None:
+        """Take note of values ``(n, T)``."""
+        self.high.look(values, places)
+        self.low.look(-values, places)
+        if loose is not None:
+            self.loose |= loose.any(axis=1)
+
+    @property
+    def size(self) -> Array:
+        """Greatest size of every row."""
+        return np.asarray(np.maximum(self.high.best, self.low.best))
+
+
+@dataclass(frozen=True)
+class Reactions:
+    """Greatest ``force`` and ``moment`` of the reaction of every pair, and where they are ``loose``, not unique.
+
+    There they are those of the components alone that are ``kept`` as unique ``(2, 6, P)``, unless values of least norm stand for all.
+    ``touched (6, P)`` are the components, in the order of the pair table, that are not unique somewhere.
+    """
+
+    force: Greatest
+    moment: Greatest
+    loose: Mask
+    kept: Mask
+    touched: Mask
+
+
+def multipliers(values: Values) -> Range:
+    """Ranges of the multipliers of all couplings."""
+    found, loose = values.multipliers()
+    out = Range(len(found))
+    if len(found):
+        out.look(found, np.arange(found.shape[1]), loose)
+    return out
+
+
+def efforts(values: Values) -> tuple[Range, Range]:
+    """Ranges of own and of applied efforts of all freedoms."""
+    own, applied = (Range(len(values.whole.freedom_names())) for _ in range(2))
+    for places in values.blocks():
+        mine, given, loose = values.efforts_at(places)
+        own.look(mine, places, loose)
+        applied.look(given, places)
+    return own, applied
+
+
+def reactions(values: Values) -> Reactions:
+    """The greatest reactions of all pairs."""
+    P = len(values.whole.pairs)
+    force, moment, loose = Greatest(P), Greatest(P), np.zeros((2, P), dtype=bool)
+    for places in values.blocks():
+        wrenches, open_ = values.reactions_at(places)
+        moment.look(np.linalg.norm(wrenches[:3], axis=0), places)
+        force.look(np.linalg.norm(wrenches[3:], axis=0), places)
+        loose |= np.stack([open_[3:].any(axis=(0, 2)), open_[:3].any(axis=(0, 2))])
+    kept, touched = np.zeros((2, 6, P), dtype=bool), np.zeros((6, P), dtype=bool)
+    if loose.any():
+        found, touched = _of_what_is_unique(values)
+        if not values.least_norm:
+            kept = _kept(values.whole, touched)
+            for one, whole, open_ in zip(found, (force, moment), loose, strict=True):
+                whole.best, whole.at = np.where(open_, one.best, whole.best), np.where(open_, one.at, whole.at)
+    return Reactions(force, moment, loose, kept, touched)
+
+
+def _of_what_is_unique(values: Values) -> tuple[tuple[Greatest, Greatest], Mask]:
+    """The greatest forces and moments of the components that are unique everywhere, and which are not.
+
+    Where a block shows another one that is not, all is begun again without it; nearly always the first one shows them all.
+    """
+    P = len(values.whole.pairs)
+    touched = np.zeros((6, P), dtype=bool)
+    while True:
+        found, kept = (Greatest(P), Greatest(P)), _kept(values.whole, touched)
+        for places in values.blocks():
+            components, loose = values.components_at(places)
+            here = loose.any(axis=2)
+            if (here & ~touched).any():
+                touched |= here
+                break
+            for one, mine in zip(found, kept, strict=True):
+                one.look(np.sqrt((np.where(mine[:, :, None], components, 0.0) ** 2).sum(axis=0)), places)
+        else:
+            return found, touched
+
+
+def _kept(m: Mechanism, touched: Mask) -> Mask:
+    """Which components are forces and which are moments, those that are ``touched`` left out."""
+    kinds = _kinds(m)
+    return np.stack([(kinds == kind) & ~touched for kind in (0, 1)])
+
+
+def _kinds(m: Mechanism) -> Array:
+    """``(6, P)``: 0 for a component that is a force, 1 for a couple, -1 where a pair has none or they mix both."""
+    columns = {id(p.type): [int(c.is_couple) for c in p.type.reactions or ()] for p in m.pairs}
+    out = np.full((6, len(m.pairs)), -1)
+    for k, pair in enumerate(m.pairs):
+        mine = columns[id(pair.type)]
+        out[: len(mine), k] = mine
+    return out
+
+
+PositionNumber = Annotated[int, "number of the position, counted from 0 over all of them in order"]
+
+
+@dataclass(frozen=True)
+class At:
+    """A value, and the first position at which it is reached: radians and the declared units."""
+
+    value: float
+    position: PositionNumber
+    drivers: Annotated[Mapping[str, float | None], "the values of the drivers there, in radians or the unit of length"]
+
+
+@dataclass(frozen=True)
+class EffortRange:
+    """The range of an effort over the positions; without values where it is not unique and nothing of least norm stands for it."""
+
+    freedom: str
+    unit: str
+    unique: bool
+    least: At | None
+    greatest: At | None
+
+
+@dataclass(frozen=True)
+class MultiplierRange:
+    """The range of the multiplier of a coupling over the positions, as that of an effort."""
+
+    coupling: str
+    unit: str
+    unique: bool
+    least: At | None
+    greatest: At | None
+
+
+@dataclass(frozen=True)
+class ReactionSize:
+    """The greatest force or moment of a reaction; where it is not unique as a whole that of ``parts``, or that of least norm."""
+
+    unit: str
+    unique: bool
+    parts: Annotated[tuple[str, ...], "the components that the value contains, where these are not all"]
+    greatest: At | None
+
+
+@dataclass(frozen=True)
+class ReactionData:
+    """The reaction of a pair, of link ``of`` on link ``on``; the moment about the pair's own point on link ``on``."""
+
+    pair: str
+    type: str
+    on: str
+    of: Annotated[str, "the link that exerts it"]
+    force: ReactionSize
+    moment: ReactionSize
+    not_unique: Annotated[tuple[str, ...], "components and efforts of the pair that are not unique somewhere"]
+
+
+@dataclass(frozen=True)
+class Unsolved:
+    """A range of positions that were not solved, first to last, and why."""
+
+    first: PositionNumber
+    last: PositionNumber
+    status: str
+
+
+@dataclass(frozen=True)
+class ChecksData:
+    """The worst of every check over the positions; None where it was not made."""
+
+    closure: float | None
+    equilibrium: float | None
+    power: float | None
+    accuracy: Annotated[float | None, "estimated relative error of rates and forces"]
+
+
+@dataclass(frozen=True)
+class SolutionData:
+    """What the summary of a solution tells, of all pairs."""
+
+    mechanism: str
+    units: Annotated[Mapping[str, str], "names of the units of length, mass and time, where they are declared"]
+    positions: int
+    solved: int
+    not_solved: tuple[Unsolved, ...]
+    drivers: Annotated[Mapping[str, tuple[float, float]], "least and greatest value, in radians or the unit of length"]
+    least_norm: Annotated[bool, "values of least norm stand for what is not unique, an assumption"]
+    efforts: Annotated[tuple[EffortRange, ...], "what the drives supply"]
+    applied_efforts: Annotated[tuple[EffortRange, ...], "what springs, dampers and given efforts do"]
+    multipliers: Annotated[
+        tuple[MultiplierRange, ...], "what the couplings exert, a moment or force for a coefficient of 1"
+    ]
+    reactions: tuple[ReactionData, ...]
+    warnings: Annotated[tuple[LoadBearing, ...], "passive freedoms that carry load"]
+    lift_off: Annotated[tuple[LiftOff, ...], "positions at which contacts that are only pushed would have to pull"]
+    overlap: Annotated[tuple[Overlap, ...], "positions at which the elements of contacts cut into each other"]
+    crossings: Annotated[tuple[PassedCrossing, ...], "crossings of branches that the path was led over"]
+    passive: Annotated[tuple[str, ...], "names of all passive freedoms"]
+    checks: ChecksData
+    engine: str
+    method: Annotated[str | None, "how the forces were solved; none for a motion alone"]
+    work: Annotated[Mapping[str, int], "how much was computed"]
+
+
+def solution_data(values: Values) -> SolutionData:
+    """All that a summary tells."""
+    places, checks = Places(values), values.checks()
+    forces = values.has_forces and bool(places.solved.any())
+    own, applied = efforts(values) if forces else (None, None)
+    worst = [
+        float(np.nanmax(np.abs(of))) if np.isfinite(of).any() else None
+        for of in (checks.closure, checks.equilibrium, checks.power, checks.accuracy)
+    ]
+    names = values.whole.freedom_names()
+    driven = [names.index(name) for name in values.actuated]
+    loaded = [] if applied is None else np.flatnonzero(applied.size[: len(places.m.freedom_names())] > 0).tolist()
+    return SolutionData(
+        values.mechanism.name,
+        dict(values.mechanism.units),
+        places.status.size,
+        int(places.solved.sum()),
+        tuple(Unsolved(a, b, str(places.status[a])) for a, b in places.runs() if places.status[a] != OK),
+        {
+            name: (float(np.nanmin(of)), float(np.nanmax(of)))
+            for name, of in zip(places.drivers, places.driver_values, strict=True)
+            if np.isfinite(of).any()
+        },
+        values.least_norm,
+        () if own is None else tuple(_effort(places, own, k, names[k]) for k in driven),
+        () if applied is None else tuple(_effort(places, applied, k, names[k]) for k in loaded),
+        _multipliers(places) if forces else (),
+        _reactions(places) if forces else (),
+        values.load_bearing(),
+        lift_offs(values),
+        overlaps(values),
+        values.crossings(),
+        tuple(values.passive_efforts()) if forces else (),
+        ChecksData(*worst),
+        values.engine,
+        values.method,
+        {name: number for number, name in values.work.counts},
+    )  # fmt: skip
+
+
+def _at(places: Places, found: Greatest, k: int, sign: float = 1.0) -> At | None:
+    """An extreme with its place; none where there is no number."""
+    if not np.isfinite(found.best[k]):
+        return None
+    at = int(found.at[k])
+    there = {name: float(of[at]) for name, of in zip(places.drivers, places.driver_values, strict=True)}
+    return At(sign * float(found.best[k]), at, there)
+
+
+def _effort(places: Places, found: Range, k: int, name: str) -> EffortRange:
+    m = places.values.whole
+    pair, j = m.freedom(name)
+    unit = unit_of(m.units, (2 if m.pairs[pair].type.efforts[j].is_couple else 1, 1, -2))
+    return EffortRange(name, unit, *_ends(places, found, k))
+
+
+def _multipliers(places: Places) -> tuple[MultiplierRange, ...]:
+    found, m = multipliers(places.values), places.m
+    return tuple(
+        MultiplierRange(c.name, coupling_unit(m, c), *_ends(places, found, k)) for k, c in enumerate(m.couplings)
+    )
+
+
+def _ends(places: Places, found: Range, k: int) -> tuple[bool, At | None, At | None]:
+    """Whether a quantity is unique, and its extremes where it has a value."""
+    loose = bool(found.loose[k])
+    known = not loose or places.values.least_norm
+    return not loose, *((_at(places, found.low, k, -1.0), _at(places, found.high, k)) if known else (None, None))
+
+
+def _reactions(places: Places) -> tuple[ReactionData, ...]:
+    values, m = places.values, places.m
+    found = reactions(values)
+    units = [unit_of(m.units, (power, 1, -2)) for power in (1, 2)]
+    out = []
+    for k, pair in enumerate(m.pairs):
+        sizes = []
+        for i, one in enumerate((found.force, found.moment)):
+            loose, names = bool(found.loose[i, k]), pair.type.component_names
+            parts = tuple(names[c] for c in np.flatnonzero(found.kept[i, :, k])) if loose else ()
+            known = not loose or values.least_norm or bool(parts)
+            sizes.append(ReactionSize(units[i], not loose, parts, _at(places, one, k) if known else None))
+        some = found.loose[:, k].any() or any(values.whole.freedom(name)[0] == k for name in values.actuated)
+        unique = values.unique(k) if some else {}
+        not_unique = tuple(name for name, ok in unique.items() if not places.flat(ok)[places.solved].all())
+        out.append(ReactionData(pair.name, pair.type.symbol, pair.b, pair.a, sizes[0], sizes[1], not_unique))
+    return tuple(out)
+
 
 LISTED = 20
 """Most rows of one table."""

@@ -9,16 +9,14 @@ import numpy as np
 from mechgraph.algebra.se3 import Array, cross, rotate
 from mechgraph.equations.terms import State
 from mechgraph.errors import MechgraphError
-from mechgraph.force.applied_loads import Site, inertia_wrenches, kinetic_energy, user_poses, user_twists
-from mechgraph.force.dalembert import given_effort_loads
-from mechgraph.force.passive_hold import hold_names, is_idle
+from mechgraph.force.block import hold_names, is_idle
+from mechgraph.force.loads import Site, inertia_wrenches, kinetic_energy, user_poses, user_twists
+from mechgraph.force.reactions import given_effort_loads
 from mechgraph.model.loads import Law
 from mechgraph.numerics.tolerances import MOTIONS
-from mechgraph.result.kept import BlockMotion
-from mechgraph.result.pair_forces import PairForces
-from mechgraph.result.states import flat_place, user_state, user_wrench
+from mechgraph.quantities import unit_of
+from mechgraph.result.kept import BlockMotion, PairForces, flat_place, user_state, user_wrench
 from mechgraph.result.values import Checks, LoadBearing, LoadResult, MaterialPoint, PassedCrossing
-from mechgraph.units import unit_of
 
 
 class Trajectory(PairForces):

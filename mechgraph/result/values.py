@@ -1,9 +1,10 @@
-"""Where a solution takes its values from (``Values``), and the records among them: checks, points, loads, warnings."""
+"""Where a solution takes its values from (``Values``), the records among them, positions as people call them, numbers for people."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
@@ -13,11 +14,53 @@ from mechgraph.algebra.se3 import Array
 from mechgraph.closure.indexing import Index
 from mechgraph.document import Document, Shown, Table
 from mechgraph.equations.terms import State
+from mechgraph.model.couplings import BaseCoupling
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.numerics.newton import Work
 from mechgraph.numerics.tolerances import CHECKS, PATH
-from mechgraph.result.numbers import ranges
+from mechgraph.quantities import unit_of
+
+SHOWN_AS_ZERO = 1e-11
+"""Part of the largest value of its kind below which a value is rounding noise and shown as 0."""
+
+
+def number(value: float, scale: float = 0.0) -> str:
+    """Five digits; 0 for what is noise beside ``scale``."""
+    if abs(value) <= SHOWN_AS_ZERO * scale or abs(value) < 1e-300:
+        return "0"
+    return f"{value:.5g}"
+
+
+def with_unit(text: str, unit: str) -> str:
+    """A number or name and the unit behind it, where there is one."""
+    return f"{text} {unit}" if unit else text
+
+
+def bracket(unit: str) -> str:
+    """The unit in the head of a column."""
+    return f" [{unit}]" if unit else ""
+
+
+def ranges(rows: Iterable[tuple[str, Any]], name: Callable[[int], str] = "position {}".format) -> Table:
+    """The range of every quantity over the positions, and at which it is reached; of one position the values."""
+    found = [(label, np.asarray(values, dtype=float).reshape(-1)) for label, values in rows]
+    if all(values.size == 1 for _, values in found):
+        return Table(("quantity", "value"), [(label, _value(values[0], 0.0)) for label, values in found], "lr")
+    cells: list[tuple[str, ...]] = []
+    for label, values in found:
+        if not np.isfinite(values).any():
+            cells.append((label, "no value", "", "", ""))
+            continue
+        least, greatest = int(np.nanargmin(values)), int(np.nanargmax(values))
+        size = max(abs(values[least]), abs(values[greatest]))
+        cells.append((label, _value(values[least], size), name(least), _value(values[greatest], size), name(greatest)))
+    return Table(("quantity", "least", "at", "greatest", "at"), cells, "lrrrr")
+
+
+def _value(value: float, scale: float) -> str:
+    return "no value" if np.isnan(value) else number(float(value), scale)
+
 
 Mask = NDArray[np.bool_]
 RATES_APART = 1e-6
@@ -341,3 +384,80 @@ class Values(Protocol):
 
     def part(self, places: slice) -> Values:
         """The values at a range of flat positions."""
+
+
+OK = "ok"
+"""Status of a solved position."""
+
+
+def coordinate(m: Mechanism, name: str, value: float) -> str:
+    """The value of a freedom with its unit: degrees for a turn."""
+    if m.turns(name):
+        return f"{number(float(np.rad2deg(value)))} deg"
+    return with_unit(number(value), unit_of(m.units, (1, 0, 0)))
+
+
+def driver_value(m: Mechanism, name: str, value: float) -> str:
+    """``A.Rz = 30 deg``: a driver's value with its unit."""
+    return f"{name} = {coordinate(m, name, value)}"
+
+
+def coupling_unit(m: Mechanism, coupling: BaseCoupling) -> str:
+    """The unit of the multiplier: a force where all freedoms are slides, else a moment."""
+    slides = not any(m.turns(name) for name in coupling.freedoms)
+    return unit_of(m.units, (1 if slides else 2, 1, -2))
+
+
+class Places:
+    """The positions of a solution laid out flat."""
+
+    def __init__(self, values: Values) -> None:
+        self.values = values
+        self.m: Mechanism = values.mechanism
+        self.status = np.asarray(values.status()).reshape(-1)
+        self.solved = self.status == OK
+        self.drivers = values.prescribed
+
+    @cached_property
+    def driver_values(self) -> list[Array]:
+        """Coordinates of the drivers."""
+        return [self.coordinates(name)[0] for name in self.drivers]
+
+    def coordinates(self, name: str) -> tuple[Array, Array]:
+        """Coordinate and rate of a freedom, one value a position."""
+        k, j = self.values.whole.freedom(name)
+        position, velocity, _ = self.values.coordinates(k)
+        return self.flat(position[..., j]), self.flat(velocity[..., j])
+
+    def flat(self, values: Any) -> Array:
+        """One value a position."""
+        return np.asarray(values, dtype=float).reshape(self.status.size)
+
+    def runs(self) -> list[tuple[int, int]]:
+        """First and last index of every run of equal statuses."""
+        cuts = np.flatnonzero(self.status[1:] != self.status[:-1])
+        starts = [0, *(int(c) + 1 for c in cuts)]
+        ends = [*(int(c) for c in cuts), self.status.size - 1]
+        return list(zip(starts, ends, strict=True)) if self.status.size else []
+
+    def coordinate(self, name: str, value: float) -> str:
+        """A driver's value with its unit."""
+        return coordinate(self.values.whole, name, value)
+
+    def name(self, index: int) -> str:
+        """The driver values of a position; where these are not known its time, or its number."""
+        found = [
+            self.coordinate(n, v[index])
+            for n, v in zip(self.drivers, self.driver_values, strict=True)
+            if np.isfinite(v[index])
+        ]
+        if not found and self.values.t is not None:
+            t = np.broadcast_to(np.asarray(self.values.t, dtype=float), self.values.batch).reshape(-1)[index]
+            return f"t = {with_unit(number(t), unit_of(self.m.units, (0, 0, 1)))}"
+        return ", ".join(found) or f"position {index}"
+
+    def full_name(self, index: int) -> str:
+        """The same with the names of the drivers, ``A.Rz = 30 deg``."""
+        values = zip(self.drivers, self.driver_values, strict=True)
+        found = [driver_value(self.values.whole, n, v[index]) for n, v in values if np.isfinite(v[index])]
+        return ", ".join(found) or self.name(index)

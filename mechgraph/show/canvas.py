@@ -19,10 +19,9 @@ from matplotlib.text import Text
 from matplotlib.transforms import IdentityTransform
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.arguments import Wanted
 from mechgraph.errors import MissingExtraError, visible
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.quantities import is_numeric
+from mechgraph.quantities import Wanted, is_numeric
 
 MOST_DPI, MOST_INCHES, PNG_DPI = 10_000, 400, 110
 

@@ -9,21 +9,19 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.arguments import door
 from mechgraph.closure.assembly import scaled_system
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import indexed
 from mechgraph.closure.rank import closure_rank
+from mechgraph.determinacy.facts import nearly_singular
 from mechgraph.errors import DeclarationError
 from mechgraph.numerics.tolerances import RANKS
-from mechgraph.quantities import shown
-from mechgraph.report.facts import nearly_singular
+from mechgraph.quantities import door, shown, unit_of
 from mechgraph.response.course import Response
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import MaterialPoint
 from mechgraph.show.canvas import HATCH, INK, MUTED, PALETTE, REACTION, Axes, axis_label, new_axes, plain, said
 from mechgraph.show.scene import Stage, known_force, place_of
-from mechgraph.units import unit_of
 
 TICKS = (10, 15, 30, 45, 60, 90, 180, 360)
 """Distances of ticks of angles, degrees."""

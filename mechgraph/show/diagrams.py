@@ -10,8 +10,8 @@ from typing import Any, Literal
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.arguments import Count, door
 from mechgraph.closure.indexing import Index
+from mechgraph.determinacy.decomposition import Decomposition
 from mechgraph.equations.formulation import Formulation
 from mechgraph.errors import DeclarationError
 from mechgraph.graph.chains import Chain
@@ -19,7 +19,7 @@ from mechgraph.graph.linkgraph import link_graph
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.branches import Branch, Branches
 from mechgraph.modes.result import Assemblies
-from mechgraph.quantities import wrong
+from mechgraph.quantities import Count, door, unit_of, wrong
 from mechgraph.show.canvas import (
     FAINT,
     HATCH,
@@ -40,8 +40,6 @@ from mechgraph.show.canvas import (
 )
 from mechgraph.show.curves import Abscissa, lay_out
 from mechgraph.show.skeleton import draw_skeleton
-from mechgraph.structure.decomposition import Decomposition
-from mechgraph.units import unit_of
 from mechgraph.variants.result import Study
 
 STRAND, BULGE = 0.035, 0.22

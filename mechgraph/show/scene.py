@@ -17,7 +17,7 @@ from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import System
 from mechgraph.document.tree import plain
 from mechgraph.errors import DeclarationError
-from mechgraph.force.applied_loads import user_poses
+from mechgraph.force.loads import user_poses
 from mechgraph.model.loads import Effort, Gravity, Law, Wrench
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair

@@ -13,10 +13,10 @@ from typing import Annotated, Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.arguments import Positive, door
 from mechgraph.errors import DeclarationError
+from mechgraph.files import Format, format_of, optional, whole_file, writable
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.quantities import shown, wrong
+from mechgraph.quantities import Positive, door, shown, unit_of, wrong
 from mechgraph.response.course import Response
 from mechgraph.result.solution import Solution
 from mechgraph.show.canvas import (
@@ -43,8 +43,6 @@ from mechgraph.show.canvas import (
 )
 from mechgraph.show.curves import finely
 from mechgraph.show.scene import Part, Scene, scene
-from mechgraph.units import unit_of
-from mechgraph.writing import Format, format_of, optional, whole_file, writable
 
 NAMES_IN_DRAWING = 12
 """Pairs up to which all names stand in the drawing; beyond, numbers stand there and a legend beside it says what they are."""

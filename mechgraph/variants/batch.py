@@ -14,21 +14,21 @@ from numpy.typing import NDArray
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.by_kernel import InKernel, in_kernel
-from mechgraph.call import Options, Starts
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.closure.driver_path import DriverPath
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.poles import away_from_poles
 from mechgraph.closure.solver import FactoredClosure, closure_solver
+from mechgraph.determinacy.snapping import declared_closure
 from mechgraph.errors import DeclarationError
+from mechgraph.kinetostatics import Pipeline
 from mechgraph.model.motion import Motion
 from mechgraph.model.parameters import Parameters
 from mechgraph.numerics.continuation import End, Follower, Tracks
 from mechgraph.numerics.tracks import Paths
-from mechgraph.pipeline import Pipeline
+from mechgraph.outcome import Options, Starts
 from mechgraph.result.solution import Solution
-from mechgraph.structure.snapping import declared_closure
 from mechgraph.variants.fields import Variants
 
 Mask = NDArray[np.bool_]

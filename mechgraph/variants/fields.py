@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mechgraph.algebra.inertia import physical
 from mechgraph.algebra.se3 import Array
+from mechgraph.determinacy.snapping import SnappedMechanism
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import PerCase
 from mechgraph.model.chain import chain_numbers, markers_of_chain
@@ -20,7 +21,6 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.parameters import Declared, coupling_places, declared
 from mechgraph.quantities import is_numeric
-from mechgraph.structure.snapping import SnappedMechanism
 from mechgraph.variants.number_names import MARKER, AnyField, ChainField, Field, ItemField, LoadField, find_field
 
 __all__ = ["AnyField", "Variants", "clashes", "field_values", "find_field", "stacked", "topology_of", "varied"]

@@ -8,13 +8,11 @@ from typing import Any
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.arguments import items_of
 from mechgraph.errors import DeclarationError, did_you_mean, listed, near_names
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.quantities import shown, wrong
+from mechgraph.quantities import items_of, shown, unit_of, wrong
 from mechgraph.result.solution import Solution
 from mechgraph.result.views import LinkResult, PairResult, link_units, pair_units
-from mechgraph.units import unit_of
 from mechgraph.variants.number_names import ALIKE
 
 Output = str | Callable[[Solution], Any]

@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from mechgraph.algebra.se3 import Array
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, counted
+from mechgraph.files import optional
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
-from mechgraph.result.numbers import number
+from mechgraph.result.values import number
 from mechgraph.variants.outputs import Output, unit_of_output
 from mechgraph.variants.sampling import deviation, reach
 from mechgraph.variants.work import STATUSES, Part, Source, worst
-from mechgraph.writing import optional
 
 if TYPE_CHECKING:
     import pandas

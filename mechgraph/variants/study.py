@@ -12,16 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from mechgraph.arguments import Count, Index, door
 from mechgraph.closure.driver_motion import Motions, actuators, driven
 from mechgraph.closure.solver import MotionEngineName
+from mechgraph.determinacy.snapping import meant
 from mechgraph.errors import DeclarationError, MechgraphError, MechgraphWarning, StudyError, counted
-from mechgraph.force.dalembert import MethodName
+from mechgraph.force.reactions import MethodName
 from mechgraph.kinetostatics import RedundantName
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
-from mechgraph.quantities import wrong
-from mechgraph.structure.snapping import meant
+from mechgraph.quantities import Count, Index, door, wrong
 from mechgraph.variants.fields import AnyField, clashes, field_values, find_field
 from mechgraph.variants.outputs import named_outputs
 from mechgraph.variants.result import Study

@@ -12,20 +12,20 @@ from numpy.typing import NDArray
 from mechgraph import by_kernel
 from mechgraph.algebra.se3 import Array
 from mechgraph.by_kernel import COMPILED
-from mechgraph.call import Options
 from mechgraph.closure.driver_motion import Motions
 from mechgraph.closure.driver_path import Status
 from mechgraph.closure.indexing import Index
 from mechgraph.closure.solver import MotionEngineName
+from mechgraph.determinacy.snapping import SnappedMechanism, meant, started
 from mechgraph.errors import DeclarationError, MechgraphError
-from mechgraph.force.dalembert import MethodName
+from mechgraph.force.reactions import MethodName
 from mechgraph.kinetostatics import RedundantName, solve_quietly
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
-from mechgraph.result.contact_ranges import LiftOff, Overlap
+from mechgraph.outcome import Options
+from mechgraph.result.contacts import LiftOff, Overlap
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import LoadBearing, Unbalanced
-from mechgraph.structure.snapping import SnappedMechanism, meant, started
 from mechgraph.variants.batch import solve_together
 from mechgraph.variants.fields import AnyField, Variants, stacked, topology_of, varied
 from mechgraph.variants.number_names import ItemField

@@ -22,7 +22,7 @@ import mechgraph as mg
 from mechgraph import kinetostatics, outcome
 from mechgraph.closure import legs
 from mechgraph.force import block
-from mechgraph.force.dalembert import METHODS
+from mechgraph.force.reactions import METHODS
 from mechgraph.numerics.continuation import Follower
 from mechgraph.result.trajectory import Trajectory
 

@@ -17,9 +17,9 @@ import mechanisms as known
 import numpy as np
 
 import mechgraph as mg
-from mechgraph.call import Options
 from mechgraph.closure.driver_motion import DriverMotion
-from mechgraph.pipeline import Pipeline
+from mechgraph.kinetostatics import Pipeline
+from mechgraph.outcome import Options
 
 ROUNDS = 5
 FORMS = ("full", "reduced")

@@ -7,9 +7,9 @@ import pytest
 
 import mechgraph as mg
 from mechgraph.closure import assembly
+from mechgraph.kinetostatics import Pipeline
 from mechgraph.numerics import continuation
 from mechgraph.numerics.tolerances import PATH
-from mechgraph.pipeline import Pipeline
 
 Z = (0, 0, 1)
 

@@ -16,7 +16,7 @@ import mechgraph as mg
 from mechgraph.closure.assembly import close
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import System
-from mechgraph.structure.finite_motion import finite_motion
+from mechgraph.determinacy.finite_motion import finite_motion
 
 MANY = int(os.environ.get("MECHGRAPH_MANY", "240"))
 STEP = 0.02

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import mechgraph as mg
 from mechgraph.algebra.se3 import rotation_exp
-from mechgraph.report.report import DeterminacyReport
+from mechgraph.determinacy.report import DeterminacyReport
 
 pytestmark = pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
 """Random loads move passive freedoms; ``test_passive_loads`` looks at what is said of it."""

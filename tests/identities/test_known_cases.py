@@ -11,7 +11,7 @@ import pytest
 from mechanisms import X, Y, Z
 
 import mechgraph as mg
-from mechgraph.report.report import DeterminacyReport
+from mechgraph.determinacy.report import DeterminacyReport
 
 
 @dataclass(frozen=True)

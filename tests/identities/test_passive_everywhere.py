@@ -6,7 +6,7 @@ import pytest
 from mechanisms import X, Y, Z
 
 import mechgraph as mg
-from mechgraph.structure import mobility
+from mechgraph.determinacy import mobility
 
 ENGINES = ("dense", "sparse")
 

@@ -8,7 +8,7 @@ import pytest
 import mechgraph as mg
 from mechgraph.closure.assembly import closed_start
 from mechgraph.closure.passive_motion import PassiveMotions, are_alone
-from mechgraph.structure.mobility import free_motion
+from mechgraph.determinacy.mobility import free_motion
 from tests import machines
 from tests import mechanisms as known
 

@@ -9,10 +9,10 @@ import pytest
 from attack import differences
 
 import mechgraph as mg
-import mechgraph.pipeline as pipeline
-from mechgraph.call import Options
+import mechgraph.kinetostatics as pipeline
 from mechgraph.closure.driver_motion import DriverMotion
-from mechgraph.pipeline import Pipeline
+from mechgraph.kinetostatics import Pipeline
+from mechgraph.outcome import Options
 from mechgraph.result.solution import Solution
 
 SAME = 1e-11

@@ -9,9 +9,9 @@ from mechanisms import Z
 from strategies import chebyshev_rate, chebyshev_times, closed_mechanism, with_drives, with_loads, with_loads_on_links
 
 import mechgraph as mg
-from mechgraph.call import Options
 from mechgraph.closure.driver_motion import DriverMotion
-from mechgraph.pipeline import Pipeline
+from mechgraph.kinetostatics import Pipeline
+from mechgraph.outcome import Options
 from mechgraph.result.solution import Solution
 
 pytestmark = pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")

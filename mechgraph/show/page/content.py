@@ -11,23 +11,22 @@ import numpy as np
 from mechgraph.algebra.se3 import Array
 from mechgraph.closure.assembly import CLOSED, close
 from mechgraph.closure.indexing import Index
+from mechgraph.determinacy.facts import Geometry
+from mechgraph.determinacy.findings import component_words
+from mechgraph.determinacy.report import DeterminacyReport, check
+from mechgraph.determinacy.uniqueness import SelfStress
 from mechgraph.document.tree import plain
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.numerics.tolerances import MOTIONS
 from mechgraph.pairs.factors import Component
-from mechgraph.report.facts import Geometry
-from mechgraph.report.findings import component_words
-from mechgraph.report.report import DeterminacyReport, check
-from mechgraph.result.numbers import SHOWN_AS_ZERO, with_unit
-from mechgraph.result.places import driver_value
+from mechgraph.quantities import unit_of
 from mechgraph.result.solution import Solution
+from mechgraph.result.values import SHOWN_AS_ZERO, driver_value, with_unit
 from mechgraph.show.canvas import axis_label
 from mechgraph.show.page.figures import Figure, packed, rounded
 from mechgraph.show.scene import Part, Scene, place_of_states, scene, scene_at
 from mechgraph.show.shapes import Shape, frame_along
-from mechgraph.structure.self_stress import SelfStress
-from mechgraph.units import unit_of
 
 FORCE, MOMENT, LENGTH, TIME = (1, 1, -2), (2, 1, -2), (1, 0, 0), (0, 0, 1)
 

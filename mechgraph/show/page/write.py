@@ -19,15 +19,15 @@ from urllib.parse import quote
 
 import numpy as np
 
-from mechgraph.arguments import door
+from mechgraph.determinacy.report import DeterminacyReport, check
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Table, to_html
 from mechgraph.equations.build import formulate
 from mechgraph.errors import DeclarationError, FileError, MechgraphWarning, MissingExtraError, visible
+from mechgraph.files import write_whole
 from mechgraph.kinetostatics import solve
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.toml import written
-from mechgraph.quantities import wrong
-from mechgraph.report.report import DeterminacyReport, check
+from mechgraph.quantities import door, wrong
 from mechgraph.result.solution import Solution
 from mechgraph.show.curves import effort_curve, reaction_ranges
 from mechgraph.show.diagrams import draw_graph, study_histogram, study_tornado
@@ -35,7 +35,6 @@ from mechgraph.show.page.content import view_data
 from mechgraph.show.page.figures import json_for_script
 from mechgraph.show.skeleton import draw_skeleton
 from mechgraph.variants.result import Study
-from mechgraph.writing import write_whole
 
 WEB = "web"
 """Folder of the scripts, which build.js of it builds."""

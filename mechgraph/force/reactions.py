@@ -1,0 +1,509 @@
+"""Reactions: d'Alembert's equations, what they tell of every pair, flanks of gears.
+
+Ways to the wrenches of all pairs: one unknown wrench a loop, or all reaction components and efforts at once.
+All return total pair wrenches and independent self-stress states; they must agree to rounding.
+
+Multipliers of least norm where gears touch each other on flanks that hang on the signs of these very multipliers.
+On given flanks reactions are linear in the multipliers, and the least ones solve a least-squares problem under the condition that every
+multiplier keeps the sign of its flank. Where the least ones touch each other no more (a multiplier is zero there) the other flank may make
+the reactions less: flanks are changed one after the other while it does, so that the norm only falls.
+Source: Lawson and Hanson, Solving Least Squares Problems, 1974, chapter 23 (LSI, least distance programming by NNLS).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+import scipy
+
+from mechgraph.algebra.se3 import Array, batch_last, cross, shift_wrench
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.contact_lines import ContactLines
+from mechgraph.closure.indexing import Index
+from mechgraph.closure.solver import FactoredClosure
+from mechgraph.equations.build import BookkeepingName, formulate
+from mechgraph.equations.formulation import Formulation
+from mechgraph.equations.terms import State
+from mechgraph.numerics.linear import Choice, ChosenSystem, add_at, choose
+from mechgraph.numerics.sparse import least_solution
+from mechgraph.numerics.tolerances import STRESSES
+
+UNIQUE = STRESSES.unique
+"""Part of a unit self-stress in a component above which the component is not unique (forces and moments / L compared)."""
+
+
+@dataclass(frozen=True)
+class Stress:
+    """Self-stresses: reaction states without load, orthonormal in the measure ``sum |F|^2 + |M / L|^2`` at the pair points.
+
+    ``wrenches (6, P, s, T)`` are the reaction parts about the internal origin, ``efforts (F, s, T)`` what they bring to driven and
+    coupled freedoms, ``multipliers (n, s, T)`` those of the closure rows behind those of the loops.
+    """
+
+    wrenches: Array
+    efforts: Array
+    multipliers: Array
+
+
+def at_pair_points(here: Configuration, wrenches: Array) -> Array:
+    """Wrenches ``(6, P, ..., T)`` about the internal origin, taken about the origin of marker B of their pair."""
+    points = here.pair_points
+    extra = wrenches.ndim - 3
+    return shift_wrench(wrenches, points.reshape(3, points.shape[1], *(1,) * extra, points.shape[2]))
+
+
+def reaction_part(here: Configuration, totals: Array, efforts: Array) -> Array:
+    """Reaction wrenches ``w - E tau``; totals ``(6, P, T)``, efforts ``(F, T)``."""
+    return totals - here.pair_sums(here.E * efforts)
+
+
+def pair_power(here: Configuration, totals: Array) -> Array:
+    """``S^T w`` of every freedom, ``(F, T)``: the efforts that the total wrenches ``(6, P, T)`` stand for."""
+    return np.asarray((here.S * totals[:, here.system.owners]).sum(axis=0))
+
+
+def split_stress(here: Configuration, states: Array, multipliers: Array, acting: Index) -> Stress:
+    """Reaction parts and efforts of pair wrench states ``(6, P, s, T)``; only the freedoms ``acting`` (driven, coupled) have efforts.
+
+    The reaction parts take the place of ``states``, as these are large.
+    """
+    s = states.shape[2]
+    efforts = np.zeros((here.system.n_freedoms, s, here.T))
+    for i in range(s):
+        tau = pair_power(here, states[:, :, i])
+        efforts[acting, i] = tau[acting]
+        states[:, :, i] = reaction_part(here, states[:, :, i], efforts[:, i])
+    return Stress(states, efforts, multipliers)
+
+
+def orthonormal_stress(here: Configuration, states: Array, multipliers: Array, acting: Index) -> Stress:
+    """Self-stresses from independent total wrench states ``(6, P, s, T)``, orthonormal at every position."""
+    stress, s = split_stress(here, states, multipliers, acting), states.shape[2]
+    if not s:
+        return stress
+    reactions, efforts = stress.wrenches, stress.efforts
+    flat = at_pair_points(here, reactions).transpose(3, 0, 1, 2).reshape(here.T, 6 * states.shape[1], s)
+    mix = batch_last(_orthonormal(flat, np.concatenate([efforts, multipliers]).transpose(2, 0, 1)))
+    mixed = (np.einsum("fit,ijt->fjt", values, mix) for values in (efforts, multipliers))
+    return Stress(np.einsum("cpit,ijt->cpjt", reactions, mix), *mixed)
+
+
+def _orthonormal(reactions: Array, efforts: Array) -> Array:
+    """Mixes ``(T, s, s)`` that make states orthonormal in their reactions ``(T, n, s)``; in their efforts where those are all zero."""
+    R = np.linalg.qr(reactions, mode="r")
+    size = np.abs(np.einsum("tii->ti", R))
+    if (size.min(axis=1) > STRESSES.drivers_alone * size.max(axis=1)).all():
+        return np.asarray(np.linalg.inv(R))
+    _, sigma, Vt = np.linalg.svd(reactions, full_matrices=False)
+    out = np.swapaxes(Vt, 1, 2).copy()
+    for t, (mix, values) in enumerate(zip(out, sigma, strict=True)):
+        alone = values <= STRESSES.drivers_alone * max(values[0], float(np.abs(efforts[t]).max()))
+        mix[:, ~alone] /= values[~alone]
+        mix[:, alone] = mix[:, alone] @ np.linalg.inv(np.linalg.qr(efforts[t] @ mix[:, alone], mode="r"))
+    return out
+
+
+def least_multiples(here: Configuration, reactions: Array, efforts: Array, multipliers: Array, stress: Stress) -> Array:
+    """Multiples ``(s, T)`` of the self-stresses with which reactions ``(6, P, T)`` have minimum norm: no part along any of them."""
+    states = at_pair_points(here, stress.wrenches)
+    y = -np.einsum("cpit,cpt->it", states, at_pair_points(here, reactions))
+    alone = (states**2).sum(axis=(0, 1)) < 0.5  # drivers or couplings that strain each other without any reaction
+    acting = np.einsum("fit,ft->it", stress.efforts, efforts) + np.einsum("nit,nt->it", stress.multipliers, multipliers)
+    y -= np.where(alone, acting, 0.0)
+    return np.asarray(y)
+
+
+class PairFrames:
+    """Components of reaction wrenches in the frames of the pair table, by the dual basis of ``[W, E]``."""
+
+    def __init__(self, here: Configuration) -> None:
+        self.here = here
+
+    @cached_property
+    def dual(self) -> list[Array]:
+        """For every group the inverse of ``[W, E]`` at the pair points, ``(n, T, 6, 6)``."""
+        here = self.here
+        out = []
+        for g, W in zip(here.system.groups, here.W, strict=True):
+            E = here.E[:, g.columns]
+            basis = np.concatenate([W, E], axis=1)
+            points = here.pair_points[:, None, g.pairs]
+            local = np.concatenate([basis[:3] - cross(points, basis[3:]), basis[3:]])
+            out.append(np.linalg.inv(local.transpose(2, 3, 0, 1)))
+        return out
+
+    def components(self, wrenches: Array) -> list[Array]:
+        """For every group the components ``(6 - f, n, ..., T)`` of reaction wrenches ``(6, P, ..., T)``."""
+        local = at_pair_points(self.here, wrenches)
+        out = []
+        for g, inverse in zip(self.here.system.groups, self.dual, strict=True):
+            values = np.einsum("ijnt,jn...t->in...t", batch_last(inverse), local[:, g.pairs])
+            out.append(values[: 6 - g.row.f])
+        return out
+
+    def components_of(self, number: int, i: int, wrenches: Array) -> Array:
+        """Components ``(6 - f, ..., T)`` of the ``i``-th pair of a group from its reaction wrenches ``(6, ..., T)``."""
+        here = self.here
+        g = here.system.groups[number]
+        basis = np.concatenate([here.W[number][:, :, i], here.E[:, g.columns[:, i]]], axis=1)
+        point = here.pair_points[:, int(g.pairs[i])]
+        local = np.concatenate([basis[:3] - cross(point[:, None], basis[3:]), basis[3:]])
+        inverse = np.linalg.inv(np.moveaxis(local, 2, 0))
+        shifted = shift_wrench(wrenches, point.reshape(3, *(1,) * (wrenches.ndim - 2), here.T))
+        return np.asarray(np.einsum("ijt,j...t->i...t", batch_last(inverse), shifted)[: 6 - g.row.f])
+
+
+ENTRIES_TOGETHER = 4_000_000
+"""Largest number of matrix entries solved in one batch."""
+BAD_CONDITION = 1e8
+"""Condition number above which other independent rows and columns are chosen."""
+
+
+@dataclass(frozen=True)
+class ForceProblem:
+    """What a method solves: closed positions with loads (internal units).
+
+    ``loads (6, N, T)`` inertia and applied wrenches, ``efforts (F, T)`` given efforts, ``driven`` the freedoms with a driver,
+    ``solver`` the closure equations, which hold what the drivers leave free.
+    """
+
+    here: Configuration
+    loads: Array
+    efforts: Array
+    driven: Index
+    solver: FactoredClosure
+
+
+@dataclass(frozen=True)
+class Wrenches:
+    """Total pair wrenches ``(6, P, T)`` and self-stress states ``(6, P, s, T)``; ``multipliers (n, T)`` of the closure rows behind those
+    of the loops, with ``multiplier_stress (n, s, T)``: row ``r`` brings the effort ``J_ri m`` into freedom ``i``.
+    """
+
+    totals: Array
+    stress: Array
+    multipliers: Array
+    multiplier_stress: Array
+
+
+def loop_wrench(problem: ForceProblem) -> Wrenches:
+    """``w = w_tree + C^T x`` with one wrench ``x`` a loop: ``J^T x = tau - S^T w_tree`` in the undriven freedoms.
+
+    The transpose of the closure Jacobian, so the factors of the velocity serve again.
+    """
+    here = problem.here
+    tree = tree_wrenches(here, problem.loads)
+    rhs = problem.efforts - (here.S * tree[:, here.system.owners]).sum(axis=0)
+    x = problem.solver.solve_transposed(rhs[:, None])
+    tree += here.pair_wrenches(x)[:, :, 0]
+    null = problem.solver.self_stresses()
+    loops = 6 * here.system.graph.n_loops
+    # J^T x is minus the effort that a row exerts in a freedom
+    return Wrenches(tree, here.pair_wrenches(null), -x[loops:, 0], -null[loops:])
+
+
+def row_efforts(here: Configuration, multipliers: Array) -> Array:
+    """Efforts ``(F, k, T)`` that multipliers ``(n, k, T)`` of the rows behind those of the loops exert in the freedoms."""
+    if not len(multipliers):
+        return np.zeros((here.system.n_freedoms, *multipliers.shape[1:]))
+    loops = np.zeros((6 * here.system.graph.n_loops, *multipliers.shape[1:]))
+    return here.row_efforts(np.concatenate([loops, multipliers]))
+
+
+def tree_wrenches(here: Configuration, loads: Array) -> Array:
+    """Pair wrenches that carry the loads along the spanning tree, chords free, ``(6, P, T)``."""
+    return here.system.tree.wrenches(loads, len(here.system.m.pairs))
+
+
+def newton_euler(problem: ForceProblem) -> Wrenches:
+    """All reaction components and driver efforts: six equations for every moving link, in the minimal bookkeeping.
+
+    Redundant systems through independent rows and columns.
+    """
+    return _by_equations(problem, "minimal", _by_choice if problem.solver.complete else _by_sparse)
+
+
+def printed(problem: ForceProblem) -> Wrenches:
+    """Exactly the system that ``formulate(m)`` prints, in Lee's bookkeeping (3.53), by sparse LU position by position.
+
+    Redundant systems have more unknowns than equations: their solution of least norm.
+    """
+    return _by_equations(problem, "lee", _by_sparse)
+
+
+Solve = Callable[[Formulation, State, int], tuple[Array, Array | None]]
+
+
+def _by_equations(problem: ForceProblem, bookkeeping: BookkeepingName, solve: Solve) -> Wrenches:
+    """The wrenches from the equations of a formulation; positions at which different freedoms are held are solved separately."""
+    here = problem.here
+    n = here.system.n_rows - 6 * here.system.graph.n_loops
+    parts = []
+    for held, at in problem.solver.by_held():
+        mine = here if at.size == here.T else here.part(at)
+        f = problem.solver if at.size == here.T else problem.solver.part(at, mine)
+        mine_alone = ForceProblem(mine, problem.loads[:, :, at], problem.efforts[:, at], problem.driven, f)
+        parts.append((at, _components_and_efforts(mine_alone, held, bookkeeping, solve)))
+    s = max((part.stress.shape[2] for _, part in parts), default=0)
+    P = len(here.system.m.pairs)
+    shapes = {"totals": (6, P), "stress": (6, P, s), "multipliers": (n,), "multiplier_stress": (n, s)}
+    out = {name: np.zeros((*shape, here.T)) for name, shape in shapes.items()}
+    for at, part in parts:
+        k = part.stress.shape[2]
+        out["totals"][..., at], out["multipliers"][..., at] = part.totals, part.multipliers
+        out["stress"][:, :, :k, at], out["multiplier_stress"][:, :k, at] = part.stress, part.multiplier_stress
+    return Wrenches(**out)
+
+
+def _components_and_efforts(problem: ForceProblem, held: Index, bookkeeping: BookkeepingName, solve: Solve) -> Wrenches:
+    here, m = problem.here, problem.here.system.m
+    names = m.freedom_names()
+    f = formulate(m, bookkeeping, efforts=[names[c] for c in sorted({*problem.driven.tolist(), *held.tolist()})])
+    state = internal_state(here, problem.loads + given_effort_loads(here, problem.efforts))
+    u, null = solve(f, state, here.T)
+    totals, multipliers = (part[..., 0, :] for part in _pair_totals(f, state, u[:, None]))
+    totals = totals + here.pair_sums(here.E * problem.efforts)
+    lines, flank = ContactLines(here), np.ones(multipliers.shape)
+    if lines:
+        totals = totals + lines.through(multipliers, flank)
+    if null is None:
+        loops = problem.solver.self_stresses()
+        stress, multiplier_stress = here.pair_wrenches(loops), -loops[6 * here.system.graph.n_loops :]
+    else:
+        stress, multiplier_stress = _pair_totals(f, state, null)
+        stress = stress + lines.through(multiplier_stress, flank) if lines else stress
+    return Wrenches(totals, stress, multipliers, multiplier_stress)
+
+
+def _by_choice(f: Formulation, state: State, T: int) -> tuple[Array, Array]:
+    """Unknowns ``(unknowns, T)`` by independent equations and unknowns, and all solutions ``(unknowns, s, T)`` without load."""
+    rows, cols, _, _ = f.pattern
+    entries, right = f.entries(state), f.right_side(state)
+    shape = (len(f.equations), len(f.unknowns))
+    size = max(1, ENTRIES_TOGETHER // max(1, shape[0] * shape[1]))
+    known: list[Choice] = []
+    parts = []
+    for begin in range(0, T, size):
+        span = slice(begin, min(begin + size, T))
+        A = np.zeros((*shape, span.stop - span.start))
+        np.add.at(A, (rows, cols), entries[:, span])
+        solver = chosen_for_all(A, known)
+        parts.append((solver.solve(right[:, None, span])[:, 0], _null(A, solver)))
+    return np.concatenate([p[0] for p in parts], axis=1), np.concatenate([p[1] for p in parts], axis=2)
+
+
+def _by_sparse(f: Formulation, state: State, T: int) -> tuple[Array, None]:
+    """Unknowns ``(unknowns, T)`` by sparse LU, of least norm where there are more than equations; the equations are independent."""
+    rows, cols, _, _ = f.pattern
+    entries, right = f.entries(state), f.right_side(state)
+    shape = (len(f.equations), len(f.unknowns))
+    out = np.empty((shape[1], T))
+    for t in range(T):
+        out[:, t] = least_solution(scipy.sparse.csc_array((entries[:, t], (rows, cols)), shape=shape), right[:, t])
+    return out, None
+
+
+def chosen_for_all(A: Array, known: list[Choice], fixed: Index | None = None) -> ChosenSystem:
+    """Independent rows and columns for every position of a batch: one choice, and new ones where it fails.
+
+    Columns in ``fixed`` are left out.
+    """
+    T = A.shape[2]
+    nothing = np.zeros(0, dtype=np.intp) if fixed is None else fixed
+    if not T:
+        return ChosenSystem(A, known, np.zeros(0, dtype=np.intp))
+    if not known:
+        known.append(choose(A[:, :, 0], nothing))
+    which = np.zeros(T, dtype=np.intp)
+    best = np.full(T, np.inf)
+    for i in range(len(known) + 6):
+        if i == len(known):
+            known.append(choose(A[:, :, int(np.argmax(best))], nothing))
+        open_ = np.flatnonzero(best > BAD_CONDITION)
+        condition = ChosenSystem(A[:, :, open_], [known[i]], np.zeros(open_.size, dtype=np.intp)).condition
+        better = condition < best[open_]
+        which[open_[better]] = i
+        best[open_[better]] = condition[better]
+        if (best <= BAD_CONDITION).all() or (i >= len(known) - 1 and i > 0 and not better.any()):
+            break
+    return ChosenSystem(A, known, which)
+
+
+def _null(A: Array, solver: ChosenSystem) -> Array:
+    """Basis ``(n, n - r, T)`` of the null space of A: one vector a column that was not chosen."""
+    flipped = ChosenSystem(
+        np.swapaxes(A, 0, 1), [Choice(c.cols, c.rows, c.held, c.fixed) for c in solver.choices], solver.which
+    )
+    return flipped.null_of_transpose()
+
+
+def _pair_totals(f: Formulation, state: State, u: Array) -> tuple[Array, Array]:
+    """Total pair wrenches ``(6, P, k, T)`` and multipliers of couplings ``(n, k, T)`` from unknowns ``(unknowns, k, T)``."""
+    rows, cols, _, _ = f.transmitted.pattern
+    out = np.zeros((len(f.transmitted.equations), *u.shape[1:]))
+    np.add.at(out, rows, f.transmitted.entries(state)[:, None] * u[cols])
+    multipliers = [i for i, unknown in enumerate(f.unknowns) if unknown.group == "coupling"]
+    return out.reshape(len(f.mechanism.pairs), 6, *u.shape[1:]).swapaxes(0, 1), u[multipliers]
+
+
+def given_effort_loads(here: Configuration, efforts: Array) -> Array:
+    """What given efforts do to the links: ``+E tau`` on b, ``-E tau`` on a, ``(6, N, T)``."""
+    s = here.system
+    out = np.zeros((6, len(s.m.links), here.T))
+    if efforts.any():
+        pair = here.pair_sums(here.E * efforts)
+        add_at(out, s.b, pair)
+        add_at(out, s.a, -pair)
+    return out
+
+
+def internal_state(here: Configuration, loads: Array, flank: Array | None = None) -> State:
+    """The State of a batch in internal units; ``flank (n, T)``: signs of the multipliers of couplings, all positive where left out."""
+    s = here.system
+    reactions: list[Array] = [np.zeros(0)] * len(s.m.pairs)
+    efforts = list(reactions)
+    for g, W in zip(s.groups, here.W, strict=True):
+        for i, k in enumerate(g.pairs):
+            reactions[k] = W[:, :, i]
+            efforts[k] = here.E[:, g.columns[:, i]]
+    coefficients = []
+    for row, coupling in zip(s.coupling_matrix, s.m.couplings, strict=True):
+        places = [s.m.freedom(freedom) for freedom in coupling.freedoms]
+        coefficients.append(np.array([row[s.first_column[k] + j] for k, j in places]))
+    along, conditions = here.lee_screws
+    nothing = np.zeros((s.n_freedoms, here.T))
+    return State(
+        nothing,
+        nothing,
+        here.poses,
+        np.zeros((6, len(s.m.links), here.T)),
+        tuple(reactions),
+        tuple(efforts),
+        along,
+        conditions,
+        loads,
+        tuple(coefficients),
+        tuple(ContactLines(here).unit(np.ones((len(s.m.couplings), here.T)) if flank is None else flank)),
+    )
+
+
+MethodName = Literal["loop_wrench", "newton_euler", "printed"]
+METHODS: dict[str, Callable[[ForceProblem], Wrenches]] = {
+    "loop_wrench": loop_wrench,
+    "newton_euler": newton_euler,
+    "printed": printed,
+}
+"""Force methods by name."""
+
+
+def reaction_map(here: Configuration, t: int) -> scipy.sparse.csr_array:
+    """``R (6 P, rows)`` at position ``t``: reaction parts at the pair points for unit wrenches of every loop; other rows bring none."""
+    s = here.system
+    loop, pair, sign = s.graph.loop_steps
+    points = here.pair_points[:, :, t]
+    about = (points[:, pair] - here.middles[:, loop, t])[:, None]
+    w = shift_wrench(np.einsum("ij,n->ijn", np.eye(6), sign), about)
+    owner = np.repeat(np.arange(len(s.m.pairs)), np.diff(s.first_column))
+    E = shift_wrench(here.E[:, :, t], points[:, owner])
+    S = here.S[:, :, t]
+    S = np.concatenate([S[:3], S[3:] + cross(S[:3], points[:, owner])])
+    for g in s.groups:
+        place = np.full(len(s.m.pairs), -1)
+        place[g.pairs] = np.arange(len(g.pairs))
+        mine = np.flatnonzero(place[pair] >= 0)
+        columns = g.columns[:, place[pair[mine]]]
+        effort = np.einsum("ifn,ijn->fjn", S[:, columns], w[:, :, mine])
+        w[:, :, mine] -= np.einsum("ifn,fjn->ijn", E[:, columns], effort)
+    rows = np.broadcast_to(6 * pair + np.arange(6)[:, None, None], w.shape)
+    cols = np.broadcast_to(6 * loop + np.arange(6)[None, :, None], w.shape)
+    return scipy.sparse.csr_array((w.ravel(), (rows.ravel(), cols.ravel())), shape=(6 * len(s.m.pairs), s.n_rows))
+
+
+def effort_map(here: Configuration, t: int, acting: Index) -> scipy.sparse.csr_array:
+    """``M (n, rows)`` at position ``t``: efforts in the freedoms ``acting`` for unit multipliers of all rows, then minus the multipliers
+    of the rows behind those of the loops.
+    """
+    s = here.system
+    loop, pair, sign = s.graph.loop_steps
+    step, place = np.nonzero(pair[:, None] == np.arange(len(s.m.pairs))[s.owners][acting])
+    values = here.S[:, acting[place], t]
+    values[3:] += cross(values[:3], here.middles[:, loop[step], t])
+    values *= sign[step]
+    shape = (6, len(step))
+    rows, cols = np.broadcast_to(place, shape), 6 * loop[step] + np.arange(6)[:, None]
+    efforts = scipy.sparse.csr_array((values.ravel(), (rows.ravel(), cols.ravel())), shape=(len(acting), s.n_rows))
+    others = s.n_rows - 6 * len(s.graph.loops)
+    return scipy.sparse.csr_array(
+        scipy.sparse.vstack([efforts, -scipy.sparse.eye_array(others, s.n_rows, k=s.n_rows - others)])
+    )
+
+
+STRAIN = 1e-4
+"""Weight of efforts beside reactions: where drivers or couplings strain each other without any reaction, their efforts decide alone."""
+
+
+def least_under_signs(
+    here: Configuration, wrenches: Wrenches, lines: ContactLines, acting: Index
+) -> tuple[Array, Array]:
+    """Multiples ``(s,)`` of all self-stresses that make the reactions of one position least, and the signs ``(n,)`` of the flanks.
+
+    ``wrenches`` are total ones of which contacts take nothing off yet, with a basis of all self-stresses.
+    """
+    own, change = wrenches.multipliers[:, 0], wrenches.multiplier_stress[:, :, 0]
+    size = max(float(np.abs(own).max()), np.finfo(float).tiny)
+    free = [g for g, _ in lines.contacts if np.abs(change[g]).max() > STRESSES.unique * np.abs(change).max()]
+
+    def tried(flank: Array) -> tuple[Array, float] | None:
+        A, b = _norm(here, wrenches, lines, acting, flank)
+        y = _least_above(A, b, flank[free, None] * change[free], -flank[free] * own[free] - STRESSES.rounding * size)
+        return None if y is None else (y, float(np.linalg.norm(A @ y + b)))
+
+    flank = np.where(own < 0.0, -1.0, 1.0)
+    best = tried(flank) or (np.zeros(change.shape[1]), np.inf)
+    going = True
+    while going:
+        going = False
+        now = own + change @ best[0]
+        for g in free:
+            if abs(now[g]) <= STRESSES.unique * np.abs(now).max():
+                other = flank.copy()
+                other[g] = -flank[g]
+                found = tried(other)
+                if found is not None and found[1] < (1.0 - STRESSES.unique) * best[1]:
+                    flank, best, going = other, found, True
+                    break
+    return best[0], flank
+
+
+def _norm(
+    here: Configuration, wrenches: Wrenches, lines: ContactLines, acting: Index, flank: Array
+) -> tuple[Array, Array]:
+    """``A`` and ``b`` of the norm ``|A y + b|`` of reactions, and of efforts with their weight, on flanks ``(n,)``."""
+    states = np.concatenate([wrenches.stress, wrenches.totals[:, :, None]], axis=2)
+    multipliers = np.concatenate([wrenches.multiplier_stress, wrenches.multipliers[:, None]], axis=1)
+    every = np.arange(here.system.n_freedoms)
+    split = split_stress(here, states - lines.relief(multipliers, flank[:, None]), multipliers, every)
+    points = at_pair_points(here, split.wrenches).reshape(-1, states.shape[2])
+    whole = np.concatenate([points, STRAIN * split.efforts[acting, :, 0], STRAIN * multipliers[:, :, 0]])
+    return whole[:, :-1], whole[:, -1]
+
+
+def _least_above(A: Array, b: Array, G: Array, h: Array) -> Array | None:
+    """``y`` with ``G y >= h`` that makes ``|A y + b|`` least; None where there is none. A has full column rank."""
+    Q, R = np.linalg.qr(A)
+    shift = Q.T @ b
+    # z = R y + Q^T b is to be the shortest one
+    G = scipy.linalg.solve_triangular(R, G.T, trans="T").T
+    h = h + G @ shift
+    size = max(float(np.abs(h).max(initial=0.0)), np.finfo(float).tiny)
+    E = np.vstack([G.T, h / size])
+    unit = np.zeros(len(E))
+    unit[-1] = 1.0
+    left = E @ scipy.optimize.nnls(E, unit)[0] - unit
+    if -left[-1] <= STRESSES.rounding:
+        return None
+    return np.asarray(scipy.linalg.solve_triangular(R, -size * left[:-1] / left[-1] - shift))

@@ -1,1 +1,0 @@
-"""The determinacy report: facts, findings, sentences, sections."""

@@ -1,1 +1,0 @@
-"""Graph and geometry together: mobility, finite motion, passive freedoms, self-stress and uniqueness, pair changes."""
